@@ -264,6 +264,14 @@ def test_after_an_edit_of_the_page_the_page_alone_is_made_again(folder: Path, tm
     assert steps_with_report == {"page", "overview"}
 
 
+def test_of_a_stage_that_stage_alone_is_explained(folder: Path, capsys: pytest.CaptureFixture) -> None:
+    for stage, names in (("measure", {"measure toss/5"}), ("read", {"nothing to do"})):
+        assert run("toss.csv", "--output", "out", "--explain", "--radius", "0.2", "--only", stage) == 0
+        assert {line.partition(":")[0] for line in capsys.readouterr().out.splitlines()} == names
+    assert run("hand.csv", "--output", "new", "--explain", "--only", "read") == 0
+    assert capsys.readouterr().out == "read hand.csv: never done\n"
+
+
 def test_of_recordings_that_were_never_read_it_is_explained_that_they_will_be(
     folder: Path, capsys: pytest.CaptureFixture
 ) -> None:

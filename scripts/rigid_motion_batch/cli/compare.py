@@ -87,7 +87,7 @@ def main(arguments: list[str]) -> int:
         with Store(output, alone=not options.only, overwrite=options.overwrite) as store:
             plan = ComparisonPlan(comparison, store)
             if options.explain:
-                return _explain(plan, store)
+                return _explain(plan, store, _share(options))
             with Progress(quiet=options.quiet) as progress, _executor(options, store, progress) as executor:
                 return _Run(options, plan, executor, progress).run()
     except (SubjectError, FolderInUse, ExecutorError, OutputError, Refused) as error:
@@ -289,7 +289,7 @@ class _Run:
     ) -> None:
         self.options, self.plan, self.store, self.executor = options, plan, plan.store, executor
         self.progress = progress
-        self.share = Share(frozenset({options.only}), *options.part) if options.only else Share()
+        self.share = _share(options)
         self.on_farm = os.environ.get(PROGRESS) == "openjd"
         self.notes: list[str] = []
         self.outcome = Outcome()
@@ -465,15 +465,19 @@ class _Run:
         }
 
 
-def _explain(plan: ComparisonPlan, store: Store) -> int:
+def _share(options: argparse.Namespace) -> Share:
+    """What is to be done here."""
+    return Share(frozenset({options.only}), *options.part) if options.only else Share()
+
+
+def _explain(plan: ComparisonPlan, store: Store, share: Share) -> int:
     """Print what a run would do, and why."""
-    reading = [(task, why) for task, why in explain(plan.reading, store)]
-    for task, why in reading:
-        print(f"{task.name}: {why}")
-    if reading:
-        print("What follows from these recordings is known when they have been read.")
-        return 0
-    plan.look_into()
-    lines = [f"{task.name}: {why}" for task, why in explain(plan.tasks, store)]
+    lines = [f"{task.name}: {why}" for task, why in explain(plan.reading, store, share)]
+    if any(not store.result(task.key) for task in plan.reading()):
+        if share.stages != {"read"}:
+            lines.append("What follows from these recordings is known when they have been read.")
+    elif share.stages != {"read"}:
+        plan.look_into()
+        lines += [f"{task.name}: {why}" for task, why in explain(plan.tasks, store, share)]
     print(*(lines or ["nothing to do"]), sep="\n")
     return 0

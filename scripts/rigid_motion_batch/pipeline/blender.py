@@ -1,26 +1,26 @@
-"""Steps in a Blender of the user's: one program for each task, `BLENDER --background --python worker.py -- REQUEST`.
+"""Orders in a Blender of the user's: one program for each, `BLENDER --background --python worker.py -- ORDER PATH...`.
 
-The request is JSON, and so are the lines that come back: how far it is, and what came of it. The step's modules are
-found by path; they may use the standard library, NumPy and bpy, which is what a Blender has.
+Order and answer are pickled into files beside the order's folder. The step's modules are found by path; they may use
+the standard library, NumPy and bpy, which is what a Blender has.
 """
 
 from __future__ import annotations
 
-import json
 import os
+import pickle
 import re
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from rigid_motion_batch.places import EXTENSION, PACKAGE
 from rigid_motion_batch.supervising import end_with_parent
 
-from .performing import ExecutorError
-from .steps import Job, Step, TaskError
-from .values import to_plain
+from .performing import INTERVAL, ExecutorError, Failed, Lost, Made, Order, progress_of
+from .steps import Step
 
 WORKER = Path(__file__).with_name("worker.py")
 
@@ -43,70 +43,41 @@ def version_of(blender: str) -> str:
     return found[1]
 
 
-def in_blender(blender: str, step: Step, job: Job, parameters: Any) -> Mapping[str, Any]:
-    """Do a step in a Blender of its own.
-
-    Returns
-    -------
-    mapping
-        What the step returned.
-
-    Raises
-    ------
-    TaskError, OSError, RuntimeError
-        As the step did; the last for what nobody foresaw, with the traceback as a note.
-    ChildProcessError
-        Where that Blender died.
-    """
-    request = {
-        "path": [os.fspath(place) for place in (PACKAGE.parent, EXTENSION.parent, *_of_module(step))],
-        "step": step.name,
-        "parameters": to_plain(parameters),
-        "before": [None if before is None else os.path.abspath(before) for before in job.before],
-        "inputs": [os.path.abspath(path) for path in job.inputs],
-        "folder": os.path.abspath(job.folder),
-    }
-    stem = job.folder.with_name(f"{job.folder.name}.request")
-    stem.write_text(json.dumps(request), encoding="utf-8")
-    log = stem.with_suffix(".log")
-    command = [blender, "--background", "--factory-startup", "--python", os.fspath(WORKER), "--", os.path.abspath(stem)]
-    answer: dict[str, Any] = {}
+def perform_in_blender(order: Order, tell: Callable[[float, str], object] | None) -> Made | Failed | Lost:
+    """Do an order in a Blender of its own, as `perform` does it here."""
+    file, answer, log = (Path(f"{order.folder}.{name}") for name in ("order", "order.answer", "log"))
+    file.write_bytes(pickle.dumps(replace(order, blender="", here=order.here or os.getcwd())))
+    path = [os.fspath(place) for place in (PACKAGE.parent, EXTENSION.parent, *_of_module(order.step))]
+    command = [order.blender, "--background", "--factory-startup", "--python", os.fspath(WORKER), "--", file, *path]
     try:
         with (
             log.open("wb") as errors,
             subprocess.Popen(
                 command,
                 stdin=subprocess.PIPE,  # Whose end tells it that nobody waits any more.
-                stdout=subprocess.PIPE,
+                stdout=subprocess.DEVNULL,
                 stderr=errors,
-                text=True,
-                encoding="utf-8",
-                errors="replace",
                 preexec_fn=end_with_parent if sys.platform == "linux" else None,
             ) as process,
         ):
-            for line in process.stdout:
-                if line.startswith("rigid-motion: "):
-                    answer = json.loads(line.removeprefix("rigid-motion: "))
-                    if "share" in answer:
-                        job.progress(answer["share"], 1.0, answer["doing"])
-            process.stdin.close()
+            while _is_at_work(process):
+                if tell and (progress := progress_of(order)):
+                    tell(*progress)
+        if answer.exists():
+            return pickle.loads(answer.read_bytes())
         said = next((line for line in reversed(log.read_text(errors="replace").splitlines()) if line.strip()), "")
+        return Lost(f"Blender died (exit code {process.returncode}){f': {said[:200]}' if said else ''}")
+    except OSError as error:
+        return Failed(f"{order.blender}: {error.strerror}")
     finally:
-        stem.unlink(missing_ok=True)
-        log.unlink(missing_ok=True)
-    if "share" in answer or not answer:
-        raise ChildProcessError(f"Blender died (exit code {process.returncode}){f': {said[:200]}' if said else ''}")
-    job.notes += answer["notes"]
-    if "facts" in answer:
-        return answer["facts"]
-    if answer["kind"] == "TaskError":
-        raise TaskError(answer["error"])
-    if answer["kind"] == "OSError":
-        raise OSError(*answer["error"])
-    error = RuntimeError(answer["error"])
-    error.add_note(answer["details"])
-    raise error
+        for one in (file, answer, log):
+            one.unlink(missing_ok=True)
+
+
+def _is_at_work(process: subprocess.Popen) -> bool:
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(INTERVAL)
+    return process.returncode is None
 
 
 def _of_module(step: Step) -> list[Path]:

@@ -98,9 +98,16 @@ def write_bundle(
     return values
 
 
-def below_inputs(arguments: Iterable[str]) -> tuple[list[str], Path]:
-    """Arguments with the files that they name, FILE, FILE:BODY or --option=FILE, as the job finds them, and where."""
-    found = [(one, *_file_in(one)) for one in arguments]
+def below_inputs(arguments: Sequence[str]) -> tuple[list[str], Path]:
+    """Arguments with the files that they name, FILE, FILE:BODY or --option=FILE, as the job finds them, and where.
+
+    The program of `--blender` is none of the inputs.
+    """
+    programs = {place + 1 for place, one in enumerate(arguments) if one == "--blender"}
+    is_input = [place not in programs and not one.startswith("--blender=") for place, one in enumerate(arguments)]
+    found = [
+        (one, *(_file_in(one) if wanted else ("", "", one))) for one, wanted in zip(arguments, is_input, strict=True)
+    ]
     files = [os.path.abspath(file) for _, _, file, _ in found if file]
     inputs = Path(os.path.commonpath([os.path.dirname(file) for file in files])) if files else Path.cwd()
 

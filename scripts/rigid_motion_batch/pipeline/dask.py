@@ -11,9 +11,9 @@ import asyncio
 import logging
 import os
 import queue
-import threading
 import time
 import uuid
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import CancelledError
 from contextlib import suppress
@@ -30,9 +30,6 @@ from .steps import version_here
 
 CONNECTING = 5.0
 """Seconds that a scheduler has to answer."""
-
-FIRST_WORKER = 60.0
-"""Seconds that the first worker has to say who it is."""
 
 LOOK = 1.0
 """Seconds between two looks at which workers there are, and at whether a task is still wanted."""
@@ -53,8 +50,8 @@ LOADED = version_here()
 
 # -- what a worker does -----------------------------------------------------------------------------------------------
 
-_idle: dict[str, list[ProcessExecutor]] = {}
-_lock = threading.Lock()
+_idle: dict[str, deque[ProcessExecutor]] = {}
+"""Session to the processes that wait for its next task."""
 
 
 def identify(folder: str) -> str:
@@ -64,9 +61,7 @@ def identify(folder: str) -> str:
 
 def retire(session: str) -> None:
     """End the processes of a run that is over."""
-    with _lock:
-        executors = _idle.pop(session, [])
-    for executor in executors:
+    for executor in _idle.pop(session, ()):
         executor.__exit__()
 
 
@@ -86,9 +81,11 @@ def do(order: Order, session: str) -> Made | Failed | Lost:
         else:
             ended.append(message)
 
-    with _lock:
-        idle = _idle.get(session)
-        executor = idle.pop() if idle else ProcessExecutor(1)
+    idle = _idle.setdefault(session, deque())
+    try:
+        executor = idle.pop()
+    except IndexError:
+        executor = ProcessExecutor(1)
     try:
         executor.submit(replace(order, folder=f"{order.folder}-{uuid.uuid4().hex[:8]}"))
         while not ended:
@@ -98,8 +95,7 @@ def do(order: Order, session: str) -> Made | Failed | Lost:
                 return Lost("it was stopped")
     finally:
         if ended:
-            with _lock:
-                _idle.setdefault(session, []).append(executor)
+            idle.append(executor)
         else:
             executor.__exit__()
     return ended[0]
@@ -134,7 +130,6 @@ class DaskExecutor:
         self._unfit: set[str] = set()
         self._at_work: dict[Future, tuple[Order, frozenset[str]]] = {}
         """With the workers that may do it."""
-        self._waiting: list[Order] = []
         self._ended: queue.SimpleQueue[Future] = queue.SimpleQueue()
         self._looked_at = 0.0
         self._alone = False
@@ -144,7 +139,7 @@ class DaskExecutor:
     @property
     def capacity(self) -> int:
         # A worker goes on with the next task while what it has just made is put in place.
-        return 2 * sum(self._workers.values()) or 1
+        return 2 * sum(self._workers.values())
 
     @property
     def workers(self) -> list[str]:
@@ -152,11 +147,14 @@ class DaskExecutor:
         return [*self._workers]
 
     def submit(self, order: Order) -> None:
-        self._waiting.append(order)
-        self._distribute()
+        key = f"{order.step.function.__name__}-{uuid.uuid4().hex[:8]}"
+        asked = replace(order, here=os.getcwd())
+        future = self._client.submit(do, asked, self._session, key=key, workers=self.workers, pure=False)
+        self._at_work[future] = order, frozenset(self._workers)
+        future.add_done_callback(self._ended.put)
 
     def wait(self, tell: Tell, seconds: float) -> None:
-        self._look(tell)
+        self._look()
         try:
             future = self._ended.get(timeout=min(seconds, PROGRESS))
         except queue.Empty:
@@ -170,7 +168,6 @@ class DaskExecutor:
 
     def stop(self) -> None:
         futures = [*self._at_work]
-        self._waiting.clear()
         self._at_work.clear()
         with suppress(*UNREACHABLE):
             self._client.cancel(futures, force=True)
@@ -198,11 +195,9 @@ class DaskExecutor:
         try:
             if (said := self._client.run_on_scheduler(_asker(), "")).startswith("No module"):
                 raise ExecutorError(f"{self._address}: the scheduler: {said}")
-            ends = time.monotonic() + FIRST_WORKER
-            while not (self._workers or self._alone) and time.monotonic() < ends:
-                self._look(lambda *_: None)
-                if self._unfit and not self._workers:
-                    raise ExecutorError(f"{self._address}: none of its workers is fit")
+            self._look()
+            if self._unfit and not self._workers:
+                raise ExecutorError(f"{self._address}: none of its workers is fit")
         except BaseException:
             self.__exit__()
             raise
@@ -214,43 +209,41 @@ class DaskExecutor:
             self._client.run(retire, self._session, workers=self.workers, on_error="ignore")
             self._client.close(timeout=2.0)
 
-    def _look(self, tell: Tell) -> None:
-        """See which workers have come and gone."""
+    def _look(self) -> None:
+        """See which workers have come and gone. Raises ExecutorError where the scheduler has."""
         if time.monotonic() - self._looked_at < LOOK:
             return
         self._looked_at = time.monotonic()
-        try:
-            if self._client.status != "running":
-                raise OSError
-            found = self._client.sync(self._client.scheduler.identity, n_workers=-1, callback_timeout=ANSWER)
-        except UNREACHABLE:
-            for order in [*self._waiting, *(order for order, _ in self._at_work.values())][:1]:
-                tell(order, self._gone())
-            return
-        threads = {address: worker["nthreads"] for address, worker in found["workers"].items()}
-        for address in [address for address in self._workers if address not in threads]:
+        threads = self._threads()
+        for address in self._workers.keys() - threads.keys():
             del self._workers[address]
             self._note(f"worker {address} is gone; others go on with its tasks")
         self._unfit &= threads.keys()
-        self._welcome({address: threads[address] for address in threads.keys() - self._workers.keys() - self._unfit})
+        if strangers := threads.keys() - self._workers.keys() - self._unfit:
+            self._welcome({address: threads[address] for address in strangers})
         for future, (order, workers) in [*self._at_work.items()]:
-            # Of those that could have done it none is left.
+            # Of those that could have done it none is left: that is no fault of the task.
             if self._workers and not workers.intersection(self._workers):
                 del self._at_work[future]
                 self._client.cancel([future], force=True)
-                self._waiting.append(order)
-        self._distribute()
+                self.submit(order)
         if not self._alone and not threads:
             self._note(f"{self._address} has no worker; waiting for one: `dask worker {self._address}`")
         self._alone = not threads
 
+    def _threads(self) -> dict[str, int]:
+        """The workers that the scheduler knows, and how many threads each has."""
+        with suppress(*UNREACHABLE):
+            if self._client.status == "running":
+                found = self._client.sync(self._client.scheduler.identity, n_workers=-1, callback_timeout=ANSWER)
+                return {address: worker["nthreads"] for address, worker in found["workers"].items()}
+        raise ExecutorError(f"{self._address}: the Dask scheduler is gone")
+
     def _welcome(self, threads: dict[str, int]) -> None:
         """Ask workers who have come who they are, and take those that fit."""
-        try:
-            asked = {"workers": [*threads], "on_error": "return"}
-            answers = self._client.run(_asker(), str(self._folder), **asked) if threads else {}
-        except UNREACHABLE:
-            return  # They are seen again at the next look, or gone.
+        answers: dict[str, str | BaseException] = {}
+        with suppress(*UNREACHABLE):  # They are seen again at the next look, or gone.
+            answers = self._client.run(_asker(), str(self._folder), workers=[*threads], on_error="return")
         for address, answer in answers.items():
             if answer == LOADED:
                 self._workers[address] = threads[address]
@@ -260,29 +253,15 @@ class DaskExecutor:
                 said = f"it has {said}, and this is {LOADED}" if said.startswith("program") else said
                 self._note(f"worker {address}: {said}; it is left out")
 
-    def _distribute(self) -> None:
-        """Give Dask the orders that are waiting, if there is anybody to do them."""
-        while self._workers and self._waiting:
-            order = self._waiting.pop(0)
-            key = f"{order.step.function.__name__}-{uuid.uuid4().hex[:8]}"
-            asked = replace(order, here=os.getcwd())
-            future = self._client.submit(do, asked, self._session, key=key, workers=self.workers, pure=False)
-            self._at_work[future] = order, frozenset(self._workers)
-            future.add_done_callback(self._ended.put)
-
     def _message(self, future: Future) -> Made | Failed | Lost:
         """What became of an order that Dask has done with."""
         try:
             return future.result(timeout=ANSWER)
         except KilledWorker as error:
             return Lost(f"{error.allowed_failures + 1} workers died of it, {error.last_worker.address} last")
-        except CancelledError:
-            return Lost("it was cancelled") if self._client.status == "running" else self._gone()
-        except Exception as error:  # Of Dask's, or of a worker's machine; not of the task's.
+        except (CancelledError, Exception) as error:  # Of Dask's, or of a worker's machine; not of the task's.
+            self._threads()  # Where the scheduler is gone, that is what there is to say.
             return Lost(f"its worker failed: {_first_sentence(error)}")
-
-    def _gone(self) -> Failed:
-        return Failed(f"{self._address}: the Dask scheduler is gone", hopeless=True)
 
 
 async def _knock(address: str) -> None:

@@ -68,12 +68,10 @@ class ProcessExecutor:
     ----------
     jobs : int
         How many there are at most.
-    max_tasks : int
-        After so many tasks a process makes room for a fresh one; 0 for never.
     """
 
-    def __init__(self, jobs: int, *, max_tasks: int = 0) -> None:
-        self.capacity, self._max_tasks = max(1, jobs), max_tasks
+    def __init__(self, jobs: int) -> None:
+        self.capacity = max(1, jobs)
         self._idle: list[ProcessPool] = []
         self._at_work: dict[ProcessFuture, tuple[Order, ProcessPool]] = {}
         self._ended: queue.SimpleQueue[ProcessFuture] = queue.SimpleQueue()
@@ -132,7 +130,7 @@ class ProcessExecutor:
         if self._logs is None:
             self._logs = tempfile.TemporaryDirectory(prefix="rigid-motion-", ignore_cleanup_errors=True)
         spawn = multiprocessing.get_context("spawn")
-        return ProcessPool(1, self._max_tasks, initializer=_begin, initargs=(self._logs.name,), context=spawn)
+        return ProcessPool(1, initializer=_begin, initargs=(self._logs.name,), context=spawn)
 
     def _message(self, future: ProcessFuture) -> Made | Failed | Lost:
         try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from .running import Plan, look_through
+from .running import EVERYTHING, Plan, Share, look_through
 from .steps import Task
 from .store import OutputError, Store
 from .values import to_plain
@@ -14,17 +14,18 @@ MOST = 3
 """Of several changes, how many are named."""
 
 
-def explain(plan: Plan, store: Store) -> Iterator[tuple[Task, str]]:
-    """The tasks of a plan that a run would do, and why. Nothing is written."""
+def explain(plan: Plan, store: Store, share: Share = EVERYTHING) -> Iterator[tuple[Task, str]]:
+    """The tasks of a share of a plan that a run would do, and why. Nothing is written."""
     latest = store.latest()
     changed: dict[str, str] = {}
     """Key to name, of tasks that would be done."""
-    for found in look_through(plan, store):
+    for found in look_through(plan, store, share):
         task = found.task
         if found.result and not found.done:
             yield task, _unpublished(task, store)
         for one in () if found.result else (*found.missing, task):
-            yield one, _reason(one, store, latest.get(one.name), changed)
+            if found.chosen or one is not task:
+                yield one, _reason(one, store, latest.get(one.name), changed)
             changed[one.key] = one.shown
 
 

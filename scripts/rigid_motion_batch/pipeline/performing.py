@@ -99,12 +99,12 @@ class Executor(Protocol):
     """Who does orders. A context; may be used again after `stop`."""
 
     capacity: int
-    """How many orders it takes at a time."""
+    """How many orders it takes at a time; 0 where there is nobody to do one yet."""
 
     def submit(self, order: Order) -> None: ...
 
     def wait(self, tell: Callable[[Order, Told | Made | Failed | Lost], object], seconds: float) -> None:
-        """Pass on what has happened, or wait for it for so long."""
+        """Pass on what has happened, or wait for it for so long. Raises ExecutorError where nothing can any more."""
 
     def stop(self) -> None:
         """End what is at work, and forget what is waiting, within a second."""
@@ -127,6 +127,12 @@ def perform(order: Order, tell: Callable[[float, str], object] | None = None) ->
     tell : callable, optional
         Takes the share that is done and what is being done; written into a file for `progress_of` unless given.
     """
+    if order.here and os.path.isdir(order.here):
+        os.chdir(order.here)
+    if order.step.blender and order.blender:
+        from .blender import perform_in_blender
+
+        return perform_in_blender(order, tell)
     job = Job(
         Path(order.folder),
         [None if before is None else Path(before) for before in order.before],
@@ -134,15 +140,13 @@ def perform(order: Order, tell: Callable[[float, str], object] | None = None) ->
         tell or _writing(order),
     )
     started = time.perf_counter()
-    done: Made | Failed | Lost | None = None
+    done: Made | Failed | None = None
     try:
-        if order.here and os.path.isdir(order.here):
-            os.chdir(order.here)
         for one in order.inputs:
             if os.path.exists(one.path) and not os.path.isfile(one.path):
                 raise TaskError(f"{one.path}: this is no file, but a folder, pipe or device; give a file")
         job.folder.mkdir(parents=True)
-        facts = _function(order)(job, order.parameters)
+        facts = order.step.function(job, order.parameters)
         for one in order.inputs:
             if _changed(one):
                 raise TaskError(f"{one.path}: this file changed while it was read; run the same command again")
@@ -155,8 +159,6 @@ def perform(order: Order, tell: Callable[[float, str], object] | None = None) ->
         done = Made(order.folder, index, job.notes)
     except TaskError as error:
         done = Failed(str(error), notes=job.notes)
-    except ChildProcessError as error:
-        done = Lost(str(error))
     except OSError as error:
         where = f"{_shown(error.filename, order)}: " if error.filename else ""
         own = str(error.filename or "").startswith(order.output)
@@ -187,14 +189,6 @@ def progress_of(order: Order) -> tuple[float, str] | None:
         return float(share), str(doing)
     except (OSError, ValueError, TypeError):
         return None
-
-
-def _function(order: Order) -> Callable[[Job, Any], Any]:
-    if not (order.step.blender and order.blender):
-        return order.step.function
-    from .blender import in_blender
-
-    return lambda job, parameters: in_blender(order.blender, order.step, job, parameters)
 
 
 def _writing(order: Order) -> Callable[[float, str], None]:

@@ -18,7 +18,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from .performing import FULL_OR_FORBIDDEN, Executor, Failed, Lost, Made, Order, Told, perform
+from .performing import FULL_OR_FORBIDDEN, Executor, ExecutorError, Failed, Lost, Made, Order, Told, perform
 from .steps import Task
 from .store import OutputError, Result, Store, not_written
 
@@ -73,12 +73,6 @@ class Outcome:
     details: dict[str, str] = field(default_factory=dict)
     """And to what Python said of it; empty where that is known."""
 
-    seconds: float = 0.0
-    """Of work, by all workers together."""
-
-    facts: Counter[str] = field(default_factory=Counter)
-    """Sums of the numbers among the facts of what was done."""
-
     interrupted: bool = False
     """By Ctrl-C."""
 
@@ -89,8 +83,6 @@ class Outcome:
         """What became of both of two runs of one plan."""
         done = self.counts[State.DONE]
         later.counts.update({State.DONE: done, State.UP_TO_DATE: -done})
-        later.seconds += self.seconds
-        later.facts.update(self.facts)
         return later
 
     def note_failures(self, store: Store) -> None:
@@ -207,7 +199,6 @@ def run(
     *,
     progress: Progress | None = None,
     share: Share = EVERYTHING,
-    retries: int = RETRIES,
     blender: str = "",
 ) -> Outcome:
     """Do what is missing of a plan.
@@ -221,8 +212,6 @@ def run(
     progress : Progress, optional
     share : Share
         What is to be done here; of the rest, what is there is used.
-    retries : int
-        How often a task is begun anew whose process died.
     blender : str
         The program for steps that need Blender, if it is not to be this one.
 
@@ -240,7 +229,7 @@ def run(
     survey = Survey.of(plan, store, share)
     if not survey.tasks:
         return Outcome(Counter({State.UP_TO_DATE: survey.up_to_date}))
-    attempt = _Run(plan, store, executor, progress or Progress(), share, retries, blender, survey)
+    attempt = _Run(plan, store, executor, progress or Progress(), share, blender, survey)
     outcome = attempt.run()
     if not attempt.damaged or outcome.interrupted or outcome.problem:
         return outcome
@@ -281,7 +270,6 @@ class _Run:
     executor: Executor
     progress: Progress
     share: Share
-    retries: int
     blender: str
     survey: Survey
     mends: bool = True
@@ -311,7 +299,7 @@ class _Run:
             self._work()
             if self.share == EVERYTHING and not outcome.failures:
                 self.store.sweep(key for key in self.settled.values() if key)
-        except _Hopeless as error:
+        except (_Hopeless, ExecutorError) as error:
             outcome.problem = str(error)
             self._stop()
         except KeyboardInterrupt:
@@ -332,7 +320,7 @@ class _Run:
                     self._meet(found)
             while self.ready and len(self.at_work) < self.executor.capacity:
                 self._begin(heapq.heappop(self.ready)[1])
-            if self.at_work:
+            if self.at_work or not self.executor.capacity:
                 self.executor.wait(self._hear, PATIENCE)
 
     def _meet(self, found: Found) -> None:
@@ -374,20 +362,15 @@ class _Run:
         before = self._before(task)
         opened.key = task.key_after(before)
         if result := self.store.result(opened.key):
-            is_new = not self.store.is_published(task, result)
-            if self._publish(opened, result):
-                self._close(opened, State.DONE if is_new else State.UP_TO_DATE)
+            self._settle(opened, result)
         elif self.settled.get(task.key, "") is None or (None in before and not (task.step.partial and any(before))):
             self.store.withdraw(task.publish.values())
             self._close(opened, State.SKIPPED)
         else:
-            self._submit(opened)
-
-    def _submit(self, opened: _Open) -> None:
-        order = self._order(opened.task)
-        self.at_work[order.folder], opened.share = opened, 0.0
-        self._show(opened.task.shown)
-        self.executor.submit(order)
+            order = self._order(task)
+            self.at_work[order.folder], opened.share = opened, 0.0
+            self._show(task.shown)
+            self.executor.submit(order)
 
     def _order(self, task: Task) -> Order:
         return Order(
@@ -414,41 +397,35 @@ class _Run:
         for note in message.notes:
             self.progress.note(note)
         if isinstance(message, Made):
-            if self._kept(opened, message):
-                self._close(opened, State.DONE)
+            self._settle(opened, message)
         elif isinstance(message, Failed):
             self._failed(opened, message)
         else:
             shutil.rmtree(order.folder, ignore_errors=True)
             opened.losses += 1
-            if opened.losses <= self.retries:
+            if opened.losses <= RETRIES:
                 self.progress.note(f"{shown}: {message.message}; trying again")
-                self._submit(opened)
+                heapq.heappush(self.ready, (opened.number, opened))
             else:
                 self._failed(opened, Failed(f"{shown}: {message.message}; given up after {opened.losses} attempts"))
 
-    def _kept(self, opened: _Open, made: Made) -> bool:
-        """Keep and publish what was made, and return whether that could be."""
+    def _settle(self, opened: _Open, made: Made | Result) -> None:
+        """Keep what was made, and put its files in place."""
+        task, is_new = opened.task, True
         try:
-            result = self.store.keep(opened.task, opened.key, Path(made.folder), made.index)
-        except OSError as error:
-            shutil.rmtree(made.folder, ignore_errors=True)
-            return self._failed(opened, _of_system(error))
-        self.outcome.seconds += made.index["seconds"]
-        facts = made.index["facts"].items()
-        self.outcome.facts.update({name: fact for name, fact in facts if isinstance(fact, (int, float))})
-        return self._publish(opened, result)
-
-    def _publish(self, opened: _Open, result: Result) -> bool:
-        try:
-            self.store.publish(opened.task, result)
-            return True
+            if isinstance(made, Made):
+                made = self.store.keep(task, opened.key, Path(made.folder), made.index)
+            else:
+                is_new = not self.store.is_published(task, made)
+            self.store.publish(task, made)
         except OutputError as error:
-            return self._failed(opened, Failed(str(error)))
+            self._failed(opened, Failed(str(error)))
         except OSError as error:
-            return self._failed(opened, _of_system(error))
+            self._failed(opened, _of_system(error))
+        else:
+            self._close(opened, State.DONE if is_new else State.UP_TO_DATE)
 
-    def _failed(self, opened: _Open, failed: Failed) -> bool:
+    def _failed(self, opened: _Open, failed: Failed) -> None:
         # An error that nobody foresaw does not say by itself what it is about.
         task = opened.task
         said = f"{task.shown}: {failed.message}" if failed.details else failed.message
@@ -464,7 +441,6 @@ class _Run:
         # What is there under its name was made of something else.
         self.store.withdraw(task.publish.values())
         self._close(opened, State.FAILED, said)
-        return False
 
     def _close(self, opened: _Open, state: State, problem: str = "") -> None:
         """An open task has come to its end: those after it may begin."""
@@ -526,13 +502,9 @@ class _Run:
                 raise _OutOfTime
 
         tell(0.0, "")
-        if result := self.store.result(opened.key):
-            made = self._publish(opened, result)
-        else:
-            message = perform(self._order(opened.task), tell)
-            made = isinstance(message, Made) and self._kept(opened, message)
-        if made:
-            self._close(opened, State.DONE)
+        made = self.store.result(opened.key) or perform(self._order(opened.task), tell)
+        if isinstance(made, (Made, Result)):
+            self._settle(opened, made)
 
 
 def _of_system(error: OSError) -> Failed:

@@ -16,7 +16,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any
 
 from rigid_motion_batch import places
 
@@ -92,12 +92,6 @@ class Step:
     def name(self) -> str:
         """Package.module:function, which finds it again."""
         return f"{self.function.__module__}:{self.function.__name__}"
-
-    @cached_property
-    def parameters(self) -> Any:
-        """The type of its parameters."""
-        hints = get_type_hints(self.function)
-        return next(kind for name, kind in [*hints.items()][1:] if name != "return")
 
     @cached_property
     def versions(self) -> Mapping[str, str]:

@@ -19,7 +19,6 @@ import errno
 import json
 import os
 import shutil
-import socket
 import stat
 import time
 import uuid
@@ -51,7 +50,7 @@ Files = Mapping[str, tuple[int, int, str]]
 
 
 class FolderInUse(Exception):
-    """Another run works in the folder. The message says which, in one line."""
+    """Another run works in the folder, in one line."""
 
 
 class OutputError(Exception):
@@ -102,19 +101,14 @@ class Store:
 
     def __enter__(self) -> Self:
         for folder in (self.own, self._results, self._scratch, self.own / "published"):
-            if os.path.lexists(folder) and not folder.is_dir():
-                folder.unlink()
             folder.mkdir(parents=True, exist_ok=True)
         if self._lock:
             try:
                 self._lock.acquire()
             except Timeout:
                 raise FolderInUse(
-                    f"{self.output}: another run is at work in this folder{self._holder()}; wait for it, or choose "
-                    "another"
+                    f"{self.output}: another run is at work in this folder; wait for it, or choose another"
                 ) from None
-            holder = {"process": os.getpid(), "host": socket.gethostname(), "since": time.strftime("%Y-%m-%d %H:%M")}
-            self.note("holder.json", holder)
         self._clear_dead_sessions()
         while self._session is None:
             session = FileLock(self._scratch / f"{uuid.uuid4().hex[:8]}.lock")
@@ -135,7 +129,6 @@ class Store:
         for name in ("results", "scratch", "published"):
             _remove_if_empty(self.own / name)
         if self._lock:
-            (self.own / "holder.json").unlink(missing_ok=True)
             if not self._results.exists():
                 for name in ("inputs.json", "latest.jsonl", "failures.json", "lock"):
                     (self.own / name).unlink(missing_ok=True)
@@ -156,7 +149,8 @@ class Store:
 
     def note(self, name: str, content: Any) -> None:
         """Write a file of the store's own, of JSON; of nothing there is none."""
-        _clear(self.own / name)
+        if (self.own / name).is_dir():
+            shutil.rmtree(self.own / name)
         if content:
             write_text(self.own / name, json.dumps(content, indent=1))
         else:
@@ -168,13 +162,6 @@ class Store:
             with suppress(Timeout, OSError), lock:
                 shutil.rmtree(path.with_suffix(""), ignore_errors=True)
                 path.unlink(missing_ok=True)
-
-    def _holder(self) -> str:
-        try:
-            holder = json.loads(_read(self.own / "holder.json"))
-            return f" (process {holder['process']} on {holder['host']}, since {holder['since']})"
-        except (OSError, ValueError, KeyError, TypeError, RecursionError):
-            return ""
 
     # -- inputs -------------------------------------------------------------------------------------------------------
 
@@ -229,7 +216,7 @@ class Store:
         """
         folder = f"{self._results}/{key}"
         try:
-            index = json.loads(_read(f"{folder}/{INDEX}"))
+            index = json.loads(Path(folder, INDEX).read_bytes())
             for name, (size, mtime, digest) in index["files"].items():
                 found = os.lstat(f"{folder}/{name}")
                 if not stat.S_ISREG(found.st_mode) or found.st_size != size:
@@ -406,7 +393,6 @@ class Store:
         """Add lines to a file at once: of two who do so at the same time each line stays whole."""
         text = "".join(f"{json.dumps(line)}\n" for line in lines)
         path.parent.mkdir(exist_ok=True)
-        _clear(path)
         opened = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
         try:
             os.write(opened, f"\n{text}".encode())  # A line that was cut off ends here.
@@ -426,7 +412,7 @@ def not_written(paths: list[str]) -> str:
 
 def _inputs_known(output: Path) -> dict[str, list[Any]]:
     try:
-        content = json.loads(_read(output / OWN / "inputs.json"))
+        content = json.loads((output / OWN / "inputs.json").read_bytes())
         return {path: seen for path, seen in content.items() if len(seen) == 5 and isinstance(seen[-1], str)}
     except (OSError, ValueError, TypeError, AttributeError, RecursionError):
         return {}
@@ -435,29 +421,13 @@ def _inputs_known(output: Path) -> dict[str, list[Any]]:
 def _lines(path: Path) -> Iterator[dict[str, Any]]:
     """The objects of a file with a line of JSON for each; lines that are damaged are left out."""
     try:
-        text = _read(path)
+        text = path.read_bytes()
     except OSError:
         return
     for line in text.splitlines():
         with suppress(ValueError, RecursionError):
             if isinstance(content := json.loads(line), dict):
                 yield content
-
-
-def _read(path: Path | str) -> bytes:
-    """The content of a file; OSError for pipes and devices, which may never end."""
-    if not stat.S_ISREG(os.lstat(path).st_mode):
-        raise OSError(errno.EINVAL, "no file", os.fspath(path))
-    with open(path, "rb") as stream:
-        return stream.read()
-
-
-def _clear(path: Path) -> None:
-    """Take away what is no file, or leads elsewhere, where the store keeps a file of its own."""
-    if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path)
-    elif os.path.lexists(path) and not stat.S_ISREG(path.lstat().st_mode):
-        path.unlink()
 
 
 def _remove_if_empty(folder: Path) -> bool:

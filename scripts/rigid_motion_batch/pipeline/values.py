@@ -1,21 +1,21 @@
-"""Values as JSON and arrays, and back: dataclasses of numbers, text, arrays and one another, by their types.
+"""Values as JSON and arrays, and back: dataclasses of numbers, text, tuples, mappings, arrays and one another.
 
-A dataclass becomes an object with its class's name under "$", so that a field which may have one of several classes
-gets the right one. Arrays go into an .npz beside the JSON.
+A dataclass becomes an object with its module and name under "$". Arrays go into an .npz beside the JSON.
 """
 
 from __future__ import annotations
 
 import json
-import types
-from collections.abc import Iterator, Mapping, MutableMapping
+import sys
+from collections.abc import Mapping, MutableMapping
 from dataclasses import fields, is_dataclass
-from enum import Enum
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar, get_origin
 
 T = TypeVar("T")
+
+CLASS, ARRAY = "$", "array"
 
 
 def to_plain(value: Any, arrays: MutableMapping[str, Any] | None = None) -> Any:
@@ -23,57 +23,40 @@ def to_plain(value: Any, arrays: MutableMapping[str, Any] | None = None) -> Any:
 
     Parameters
     ----------
-    value : dataclass, list, tuple, mapping with text for keys, enum, path, number, text or None
+    value : dataclass, list, tuple, mapping with text for keys, number, text or None
     arrays : mapping, optional
         Takes the NumPy arrays, each under a number; without it there may be none.
     """
-    if value is None or isinstance(value, (bool, str)):
+    if value is None or isinstance(value, (bool, int, float, str)):
         return value
-    if isinstance(value, Enum):
-        return value.value
-    if isinstance(value, (int, float)):
-        return int(value) if isinstance(value, int) else float(value)
     if is_dataclass(value):
-        content = {name: to_plain(getattr(value, name), arrays) for name in _names(type(value))}
-        return {"$": type(value).__name__, **content}
+        kind = type(value)
+        content = {name: to_plain(getattr(value, name), arrays) for name in _names(kind)}
+        return {CLASS: f"{kind.__module__}:{kind.__qualname__}", **content}
     if isinstance(value, Mapping):
-        return {str(name): to_plain(inner, arrays) for name, inner in value.items()}
-    if isinstance(value, (list, tuple, frozenset)):
-        return [to_plain(inner, arrays) for inner in (sorted(value) if isinstance(value, frozenset) else value)]
-    if isinstance(value, Path):
-        return str(value)
+        return {name: to_plain(inner, arrays) for name, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [to_plain(inner, arrays) for inner in value]
     if hasattr(value, "dtype"):
         if value.ndim == 0:
             return value.item()
         if arrays is not None:
             name = str(len(arrays))
             arrays[name] = value
-            return {"array": name}
+            return {ARRAY: name}
     raise TypeError(f"{type(value).__name__} is no value for JSON")
 
 
-def from_plain(kind: Any, plain: Any, arrays: Mapping[str, Any] | None = None) -> Any:
-    """The value of `to_plain`, whose type is `kind`: a class, or what an annotation of a field says."""
-    origin, inner = get_origin(kind), get_args(kind)
-    if kind is Any or plain is None:
-        return plain
-    if origin in (Union, types.UnionType):
-        return from_plain(_member(inner, plain), plain, arrays)
-    if isinstance(plain, dict) and plain.keys() == {"array"}:
-        return arrays[plain["array"]]
-    if isinstance(plain, dict) and "$" in plain:
-        found = _class_named(plain["$"], kind)
-        hints = _hints(found)
-        return found(**{name: from_plain(hints[name], inner, arrays) for name, inner in plain.items() if name != "$"})
-    if isinstance(plain, dict):
-        of_values = inner[1] if len(inner) == 2 else Any
-        return {name: from_plain(of_values, value, arrays) for name, value in plain.items()}
+def from_plain(plain: Any, arrays: Mapping[str, Any] | None = None) -> Any:
+    """The value of `to_plain`; lists are tuples now. ValueError for a class that is not loaded, or no dataclass."""
     if isinstance(plain, list):
-        if origin is tuple and inner and inner[-1] is not Ellipsis:
-            return tuple(from_plain(one, value, arrays) for one, value in zip(inner, plain, strict=True))
-        of_values, into = (inner[0] if inner else Any), (kind if origin is None else origin)
-        return (into if into in (list, frozenset) else tuple)(from_plain(of_values, value, arrays) for value in plain)
-    return kind(plain) if isinstance(kind, type) and issubclass(kind, (Enum, Path, float)) else plain
+        return tuple(from_plain(inner, arrays) for inner in plain)
+    if not isinstance(plain, dict):
+        return plain
+    if plain.keys() == {ARRAY}:
+        return arrays[plain[ARRAY]]
+    content = {name: from_plain(inner, arrays) for name, inner in plain.items() if name != CLASS}
+    return _class_named(plain[CLASS])(**content) if CLASS in plain else content
 
 
 def write(stem: Path, value: Any) -> None:
@@ -90,12 +73,16 @@ def write(stem: Path, value: Any) -> None:
 def read(kind: type[T], stem: Path) -> T:
     """Read a value of this type that was written. Raises OSError, ValueError or KeyError where it is damaged."""
     plain = json.loads(stem.with_suffix(".json").read_text(encoding="utf-8"))
-    if not stem.with_suffix(".npz").exists():
-        return from_plain(kind, plain)
-    import numpy as np
+    if stem.with_suffix(".npz").exists():
+        import numpy as np
 
-    with np.load(stem.with_suffix(".npz"), allow_pickle=False) as arrays:
-        return from_plain(kind, plain, arrays)
+        with np.load(stem.with_suffix(".npz"), allow_pickle=False) as arrays:
+            value = from_plain(plain, arrays)
+    else:
+        value = from_plain(plain)
+    if not isinstance(value, get_origin(kind) or kind):
+        raise ValueError(f"{stem}: a {type(value).__name__} is no {kind.__name__}")
+    return value
 
 
 @cache
@@ -103,28 +90,10 @@ def _names(kind: type) -> tuple[str, ...]:
     return tuple(field.name for field in fields(kind) if field.init)
 
 
-_hints = cache(get_type_hints)
-
-
-def _member(members: tuple[Any, ...], plain: Any) -> Any:
-    """Which of the types of a union a value has."""
-    some = [one for one in members if one is not type(None)]
-    if isinstance(plain, dict) and "$" in plain:
-        return next(one for one in some if any(found.__name__ == plain["$"] for found in _classes(one)))
-    kinds = {list: (list, tuple, frozenset), dict: (dict, Mapping)}.get(type(plain), (type(plain),))
-    return next((one for one in some if (get_origin(one) or one) in kinds), some[0])
-
-
-def _class_named(name: str, kind: Any) -> type:
-    found = next((one for one in _classes(kind) if one.__name__ == name), None)
-    if found is None:
-        raise ValueError(f"{name} is no {getattr(kind, '__name__', kind)}")
+def _class_named(name: str) -> type:
+    """A class by its module and name. What asks for a value has loaded its class, so a file makes nothing load."""
+    module, _, kind = name.partition(":")
+    found = getattr(sys.modules.get(module), kind, None)
+    if not is_dataclass(found):
+        raise ValueError(f"{name} is no class of values")
     return found
-
-
-def _classes(kind: Any) -> Iterator[type]:
-    """A class and those derived from it."""
-    if isinstance(kind, type):
-        yield kind
-        for derived in kind.__subclasses__():
-            yield from _classes(derived)

@@ -221,14 +221,20 @@ def nonsense(path: Path) -> None:
     path.write_text('{"files": {"a\\u0000": [1, 2, 3]}, "name": 7, "path": [], "key": {}}\n"x"\n{"name": "a"}\n')
 
 
-DAMAGES = (removed, emptied, cut, brackets, nonsense, replaced_by_folder, replaced_by_pipe, replaced_by_device)
+DAMAGES = (removed, emptied, cut, brackets, nonsense)
+OTHERS = (replaced_by_folder, replaced_by_pipe, replaced_by_device)
 
 needs_pipes = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has no pipes and devices among its files")
 
 
 @needs_pipes
-@pytest.mark.parametrize("damage", DAMAGES)
-@pytest.mark.parametrize("part", ["results/*/out.txt", "results/*/.index.json"])
+@pytest.mark.parametrize(
+    ("part", "damage"),
+    [
+        *(("results/*/out.txt", damage) for damage in (*DAMAGES, *OTHERS)),
+        *(("results/*/.index.json", damage) for damage in DAMAGES),
+    ],
+)
 def test_a_damaged_result_is_made_again(output: Path, damage: Callable[[Path], None], part: str) -> None:
     hidden = task("hidden", steps.write, Write("1"), publish={})
     run_in(output, hidden)
@@ -239,7 +245,6 @@ def test_a_damaged_result_is_made_again(output: Path, damage: Callable[[Path], N
     assert states(run_in(output, hidden, joining("c", hidden))) == {"up to date": 2}
 
 
-@needs_pipes
 @pytest.mark.parametrize("damage", DAMAGES)
 @pytest.mark.parametrize("part", ["latest.jsonl", "inputs.json", "published/*.jsonl"])
 def test_whatever_becomes_of_its_records_the_work_goes_on(
@@ -251,13 +256,6 @@ def test_whatever_becomes_of_its_records_the_work_goes_on(
     (path,) = (output / OWN).glob(part)
     damage(path)
     assert copying(output, source) == {"up to date": 1}
-
-
-@pytest.mark.parametrize("place", ["", "results", "scratch", "published"])
-def test_a_file_where_the_program_keeps_a_folder_is_cleared_away(output: Path, place: str) -> None:
-    (output / OWN / place).parent.mkdir(parents=True, exist_ok=True)
-    (output / OWN / place).write_text("no folder")
-    assert states(run_in(output, *whole())) == {"done": 3}
 
 
 def rewritten(path: Path, content: str) -> None:
@@ -304,8 +302,8 @@ def test_old_results_that_nobody_asks_for_go(output: Path, monkeypatch: pytest.M
 # -- runs at the same time --------------------------------------------------------------------------------------------
 
 
-def test_two_runs_in_one_folder_are_refused_and_told_who_is_there(output: Path) -> None:
-    with Store(output), pytest.raises(FolderInUse, match=f"another run is at work .*process {os.getpid()} on"):
+def test_two_runs_in_one_folder_are_refused(output: Path) -> None:
+    with Store(output), pytest.raises(FolderInUse, match="another run is at work in this folder"):
         run_in(output, writing("a"))
     assert states(run_in(output, writing("a"))) == {"done": 1}
 
@@ -443,6 +441,12 @@ def test_what_is_kept_of_a_result_says_what_it_was_made_of(output: Path) -> None
     run_in(output, writing("a", "1"))
     (index,) = (output / OWN).glob("results/*/.index.json")
     made_of = json.loads(index.read_text())["made_of"]
-    assert made_of["parameters"] == {"$": "Write", "text": "1", "log": "", "seconds": 0.0, "files": []}
+    assert made_of["parameters"] == {
+        "$": "tests.scripts.pipeline.steps:Write",
+        "text": "1",
+        "log": "",
+        "seconds": 0.0,
+        "files": [],
+    }
     assert made_of["step"] == "tests.scripts.pipeline.steps:write"
     assert states(run_in(output, task("a", steps.write, Nothing()), executor=SerialExecutor())) == {"failed": 1}
