@@ -1,7 +1,7 @@
 """Orders in a Blender of the user's: one program for each, `BLENDER --background --python worker.py -- ORDER PATH...`.
 
-Order and answer are pickled into files beside the order's folder. The step's modules are found by path; they may use
-the standard library, NumPy and bpy, which is what a Blender has.
+Order and answer are pickled into a temporary folder that nobody else may enter. The step's modules are found by path;
+they may use the standard library, NumPy and bpy, which is what a Blender has.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import pickle
 import re
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
@@ -45,33 +46,31 @@ def version_of(blender: str) -> str:
 
 def perform_in_blender(order: Order, tell: Callable[[float, str], object] | None) -> Made | Failed | Lost:
     """Do an order in a Blender of its own, as `perform` does it here."""
-    file, answer, log = (Path(f"{order.folder}.{name}") for name in ("order", "order.answer", "log"))
-    file.write_bytes(pickle.dumps(replace(order, blender="", here=order.here or os.getcwd())))
     path = [os.fspath(place) for place in (PACKAGE.parent, EXTENSION.parent, *_of_module(order.step))]
-    command = [order.blender, "--background", "--factory-startup", "--python", os.fspath(WORKER), "--", file, *path]
     try:
-        with (
-            log.open("wb") as errors,
-            subprocess.Popen(
-                command,
-                stdin=subprocess.PIPE,  # Whose end tells it that nobody waits any more.
-                stdout=subprocess.DEVNULL,
-                stderr=errors,
-                preexec_fn=end_with_parent if sys.platform == "linux" else None,
-            ) as process,
-        ):
-            while _is_at_work(process):
-                if tell and (progress := progress_of(order)):
-                    tell(*progress)
-        if answer.exists():
-            return pickle.loads(answer.read_bytes())
-        said = next((line for line in reversed(log.read_text(errors="replace").splitlines()) if line.strip()), "")
-        return Lost(f"Blender died (exit code {process.returncode}){f': {said[:200]}' if said else ''}")
+        with tempfile.TemporaryDirectory() as folder:
+            file, answer, log = (Path(folder, name) for name in ("order", "order.answer", "log"))
+            file.write_bytes(pickle.dumps(replace(order, blender="", here=order.here or os.getcwd())))
+            command = [order.blender, "--background", "--factory-startup", "--python", WORKER, "--", file, *path]
+            with (
+                log.open("wb") as errors,
+                subprocess.Popen(
+                    command,
+                    stdin=subprocess.PIPE,  # Whose end tells it that nobody waits any more.
+                    stdout=subprocess.DEVNULL,
+                    stderr=errors,
+                    preexec_fn=end_with_parent if sys.platform == "linux" else None,
+                ) as process,
+            ):
+                while _is_at_work(process):
+                    if tell and (progress := progress_of(order)):
+                        tell(*progress)
+            if answer.exists():
+                return pickle.loads(answer.read_bytes())
+            said = next((line for line in reversed(log.read_text(errors="replace").splitlines()) if line.strip()), "")
+            return Lost(f"Blender died (exit code {process.returncode}){f': {said[:200]}' if said else ''}")
     except OSError as error:
         return Failed(f"{order.blender}: {error.strerror}")
-    finally:
-        for one in (file, answer, log):
-            one.unlink(missing_ok=True)
 
 
 def _is_at_work(process: subprocess.Popen) -> bool:
