@@ -12,6 +12,7 @@ from .modes import KEYFRAME_MODES, MODES, Mode, in_betweens, interpolate, prepar
 from .poses import Poses
 from .reduction import reduce_keys
 from .repair import Repair, repair
+from .skeleton_channels import SeparateKeys
 from .skeleton_reduction import reduce_skeleton_keys
 from .skeletons import Skeleton
 
@@ -22,6 +23,7 @@ __all__ = [
     "Mode",
     "Poses",
     "Repair",
+    "SeparateKeys",
     "Skeleton",
     "best_modes",
     "decimate",

@@ -27,14 +27,18 @@ class Level(Recording):
         How all joints of the body are shown by now, in their parents' space.
     tolerance : float
         Of the shell error.
+    off_at_keys : bool
+        As `Recording` has it.
     """
 
-    def __init__(self, body: Body, joints: np.ndarray, shown: Poses, tolerance: float) -> None:
+    def __init__(
+        self, body: Body, joints: np.ndarray, shown: Poses, tolerance: float, off_at_keys: bool = False
+    ) -> None:
         self.body, self.joints = body, joints
         count = len(body.times)
         starts = count * np.arange(len(joints))
         poses = reshaped(body.poses[joints], -1)
-        super().__init__(np.tile(body.times, len(joints)), poses, body.mode, 0.0, tolerance, starts)
+        super().__init__(np.tile(body.times, len(joints)), poses, body.mode, 0.0, tolerance, starts, off_at_keys)
         weighs = body.weights.any(axis=1)
         below = map(body.skeleton.below, joints.tolist())
         weighty = [hanging[weighs[hanging]] for hanging in below]

@@ -10,7 +10,9 @@ share are those of Roberts, Lewis and Anjyo, "Optimal and interactive keyframe s
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,6 +25,7 @@ from .key_search import Keys, Search
 from .modes import mode_named
 from .poses import LIMIT, PackedPoses, Poses, numbers, reshaped
 from .quaternions import align_signs
+from .skeleton_channels import Channels, SeparateKeys, changes
 from .skeleton_levels import Level
 from .skeletons import Skeleton
 
@@ -54,11 +57,12 @@ def reduce_skeleton_keys(
     tolerance: float | None = None,
     radius: float | ArrayLike = 0.03,
     shared: bool = False,
+    separate: bool = False,
     budget: int | None = None,
     weights: ArrayLike | None = None,
     fixed: ArrayLike | None = None,
     tries: int = 2,
-) -> tuple[np.ndarray, ...]:
+) -> tuple[np.ndarray, ...] | tuple[SeparateKeys, ...]:
     """The fewest keys of a body's joints that keep every joint within a tolerance, or the best ones within a budget.
 
     Parameters
@@ -77,10 +81,15 @@ def reduce_skeleton_keys(
         Of the ball at each joint that the shell error is of, in the unit of the positions.
     shared : bool
         Key poses: all joints have keys at the same samples. Otherwise each has its own, the fewest in all.
+    separate : bool
+        Each joint's rotation and its location have keys of their own, for modes where neither depends on the other, as
+        in `lerp_slerp`, and for joints whose scale does not change. There are never more numbers in them, at 4 to a
+        rotation and 3 to a location, than in the keys of joints, mostly a fifth to two fifths fewer.
     budget : int, optional
         The most keys, instead of a tolerance: key poses, at least 2, or keys of all joints together, at least 2 for
-        each. The error is then as small as can be found: for key poses as `reduce_keys` does, for keys of their own by
-        bisecting the tolerance, which takes the time of ten searches or so.
+        each. With `separate` keys of rotations and of locations count, at least 2 for each, and 1 where it never
+        changes. The error is then as small as can be found: for key poses as `reduce_keys` does, for keys of their own
+        by bisecting the tolerance, which takes the time of ten searches or so.
     weights : array-like, shape (joints,) or (joints, n), optional
         How many times the error of each joint counts, at each sample: more for feet that stand (see `standing`) and
         hands that hold, 0 for joints that do not matter. With a tolerance, a joint of weight 2 keeps to half of it.
@@ -92,8 +101,9 @@ def reduce_skeleton_keys(
     Returns
     -------
     tuple of array of int, one for each joint
-        Rising samples. A joint that need not move has a single one; the others have the first and the last among them,
-        and all samples where they are fixed.
+        Rising samples. A joint that need not move has a single one, whose pose it holds; the others have the first and
+        the last among them, and all samples where they are fixed. With `separate`, a tuple of `SeparateKeys`, and the
+        same holds for rotations and locations; what never changes in the recording has the first sample alone.
 
     Raises
     ------
@@ -106,6 +116,7 @@ def reduce_skeleton_keys(
     See Also
     --------
     reduce_keys : The same for one object.
+    SeparateKeys : What there is of each joint with `separate`.
     standing : Which joints stand on the ground, for weights.
 
     Notes
@@ -130,6 +141,9 @@ def reduce_skeleton_keys(
     mode_named(mode)
     check_wishes(tolerance, budget, tries)
     check_flag(shared, "shared")
+    check_flag(separate, "separate")
+    if shared and separate:
+        raise ValueError("key poses are whole poses: give one of shared=True and separate=True, not both")
     check_poses(poses, "poses")
     skeleton, times = Skeleton(parents), numbers(times, "times")
     if poses.shape != (len(skeleton), *times.shape):
@@ -141,23 +155,29 @@ def reduce_skeleton_keys(
         raise ValueError("every joint has a weight of 0: nothing would matter")
     weights = np.broadcast_to(weights if weights.ndim == 2 else weights[:, None], poses.shape)
     free = ~_mask(fixed, len(skeleton))
-    if budget is not None and not shared and budget < 2 * np.count_nonzero(free):
+    poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
+    body = Body(times, poses, skeleton, mode, radii, weights, free)
+    channels = Channels(body) if separate else None
+    if budget is not None and channels:
+        budget = channels.budget(budget)
+    elif budget is not None and not shared and budget < 2 * np.count_nonzero(free):
         raise ValueError(f"a budget of {budget} keys is too small for {np.count_nonzero(free)} joints: each may need 2")
     if len(times) <= 1:
-        return (np.arange(len(times)),) * len(skeleton)
+        keys = (np.arange(len(times)),) * len(skeleton)
+        return tuple(SeparateKeys(own, own) for own in keys) if separate else keys
     if not shared and skeleton.depths.max() > DEEPEST:
         joint = int(skeleton.depths.argmax())
         raise ValueError(
             f"joint {joint} hangs on {skeleton.depths[joint]} others, and keys of their own are searched for where it "
             f"is {DEEPEST} at most: shared=True finds key poses for longer chains"
         )
-    poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
-    body = Body(times, poses, skeleton, mode, radii, weights, free)
     if shared:
         keys = _key_poses(body, tolerance, budget, tries)
         every = np.arange(len(times))
         return tuple(keys if moves else every for moves in free.tolist())
-    return _OwnKeys(body, tolerance).found() if tolerance is not None else _own_keys_within(body, budget)
+    search = functools.partial(_OwnKeys, body) if channels is None else functools.partial(_ChannelKeys, channels)
+    keys = search(tolerance).found() if tolerance is not None else _own_keys_within(search, budget)
+    return keys if channels is None else channels.of_joints(keys)
 
 
 def _key_poses(body: Body, tolerance: float | None, budget: int | None, tries: int) -> np.ndarray:
@@ -167,10 +187,11 @@ def _key_poses(body: Body, tolerance: float | None, budget: int | None, tries: i
     return Search(recording).within(tries) if tolerance is not None else BudgetSearch(recording, budget).least(tries)
 
 
-def _own_keys_within(body: Body, budget: int) -> tuple[np.ndarray, ...]:
+def _own_keys_within(search_for: Callable[[float], _OwnKeys], budget: int) -> tuple[np.ndarray, ...]:
     """The keys with the smallest error among those of several tolerances that so many can keep to, and what is left."""
+    best = search_for(math.inf)
+    body = best.body
     free = np.flatnonzero(body.free).tolist()
-    best = _OwnKeys(body, math.inf)
     least = float(body.errors(body.at_rest()).max())
     # The logarithms of tolerances that need more and that need no more keys, and how many by their logarithm.
     low, high = None, (math.log(max(least, TINY)), math.log(len(free) or 1))
@@ -179,7 +200,7 @@ def _own_keys_within(body: Body, budget: int) -> tuple[np.ndarray, ...]:
         logarithm = _between(low, high, math.log(budget))
         if logarithm < lowest or (low and high[0] - low[0] < NARROW):
             break
-        search = _OwnKeys(body, math.exp(logarithm))
+        search = search_for(math.exp(logarithm))
         count = sum(len(keys) for joint, keys in enumerate(search.found()) if body.free[joint])
         if count > budget:
             low = logarithm, math.log(count)
@@ -227,6 +248,8 @@ class _OwnKeys:
     then keys are taken out for as long as the error in the root's space allows it: of all joints of a depth at once,
     since these do not move one another, with what hangs on them and what they hang on as it is shown by then.
     """
+
+    off_at_keys = False
 
     def __init__(self, body: Body, tolerance: float) -> None:
         self.body, self.tolerance, self.shown = body, tolerance, body.poses.copy()
@@ -308,16 +331,19 @@ class _OwnKeys:
         joints = np.array(movable, dtype=np.int64)
         if not len(joints):
             return
-        level = Level(self.body, joints, self.shown, self.tolerance)
+        level = self._level(joints)
         rests = level.may_rest()
         for joint in joints[rests].tolist():
             self._show(joint, self.body.middles[[joint]])
         joints = joints[~rests]
         if len(joints):
             count = len(self.body.times)
-            search = Search(Level(self.body, joints, self.shown, self.tolerance) if rests.any() else level)
+            search = Search(self._level(joints) if rests.any() else level)
             tracks = [count * place + self.keys[joint] for place, joint in enumerate(joints.tolist())]
             self._take(joints, search.refined(search.thinned(search.measured(np.concatenate(tracks)), 1.0)))
+
+    def _level(self, joints: np.ndarray) -> Level:
+        return Level(self.body, joints, self.shown, self.tolerance, self.off_at_keys)
 
     def _prove(self) -> None:
         """Put keys back where errors are over the tolerance after all, which takes more than rounding to happen."""
@@ -354,10 +380,29 @@ class _OwnKeys:
             self._show(joint, np.union1d(self.keys[joint], (*ends, *np.flatnonzero(wanted[joint]))))
 
 
+class _ChannelKeys(_OwnKeys):
+    """The same for rotations and locations: from the keys of joints, which both begin with, more are taken out.
+
+    So there are never more of them. As one channel's keys go the other's stay, and what is off at them by the other
+    counts: without that, the proof would put many back.
+    """
+
+    off_at_keys = True
+
+    def __init__(self, channels: Channels, tolerance: float) -> None:
+        super().__init__(channels.body, tolerance)
+        self.channels = channels
+
+    def _share_out(self) -> None:
+        whole = _OwnKeys(self.channels.whole, self.tolerance).found()
+        for node, keys in enumerate(self.channels.of_nodes(whole)):
+            self._show(node, keys)
+
+
 def _moves(poses: Poses) -> np.ndarray:
     """Which joints (joints, n) ever change in their parents' space, shape (joints,)."""
     numbers = [poses.positions, poses.quaternions] + ([] if poses.scales is None else [poses.scales])
-    return np.any([(rows != rows[:, :1]).reshape(len(rows), -1).any(axis=1) for rows in numbers], axis=0)
+    return np.any([changes(rows) for rows in numbers], axis=0)
 
 
 def _mask(fixed: ArrayLike | None, joints: int) -> np.ndarray:
