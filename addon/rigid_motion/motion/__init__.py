@@ -12,6 +12,8 @@ from .modes import KEYFRAME_MODES, MODES, Mode, in_betweens, interpolate, prepar
 from .poses import Poses
 from .reduction import reduce_keys
 from .repair import Repair, repair
+from .skeleton_channels import SeparateKeys
+from .skeleton_measures import skeleton_errors
 from .skeleton_reduction import reduce_skeleton_keys
 from .skeletons import Skeleton
 
@@ -22,6 +24,7 @@ __all__ = [
     "Mode",
     "Poses",
     "Repair",
+    "SeparateKeys",
     "Skeleton",
     "best_modes",
     "decimate",
@@ -36,5 +39,6 @@ __all__ = [
     "repair",
     "rms",
     "shell_error",
+    "skeleton_errors",
     "standing",
 ]

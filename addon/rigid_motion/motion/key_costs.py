@@ -57,6 +57,8 @@ class Recording:
         Of the shell error. Errors are counted in tolerances.
     starts : array of int, optional
         The first sample of each track; one track, otherwise.
+    off_at_keys : bool
+        Whether errors at keys count as well, but for the last of a track: what else moves may be off there.
     """
 
     def __init__(
@@ -67,9 +69,10 @@ class Recording:
         radius: float | np.ndarray,
         tolerance: float | np.ndarray = 1.0,
         starts: np.ndarray | None = None,
+        off_at_keys: bool = False,
     ) -> None:
         self.times, self.poses, self.mode = times, poses, mode
-        self.radius, self.tolerance = np.asarray(radius), np.asarray(tolerance)
+        self.radius, self.tolerance, self.off_at_keys = np.asarray(radius), np.asarray(tolerance), off_at_keys
         self.starts = np.zeros(1, dtype=np.int64) if starts is None else starts
         self.ends = np.append(self.starts[1:], len(times)) - 1
         self.truth = PackedPoses(poses)
@@ -105,12 +108,13 @@ class Costs:
         """How many keys have a say in a segment. A segment is a row of them: samples, -1 where there is none."""
         self.looked = 0.0
         """How many poses have been looked at so far."""
+        self._first = 0 if recording.off_at_keys else 1
         self._memory = _Memory(self.keys, min(REMEMBERED, REMEMBERED_EACH * len(recording.times)))
 
     def of(self, segments: np.ndarray) -> Found:
-        """Costs and peaks (...) of segments (..., keys), zero where there is no sample between their keys."""
+        """Costs and peaks (...) of segments (..., keys), zero where no sample counts."""
         rows = segments.reshape(-1, self.keys)
-        filled = np.flatnonzero(_counts(rows, self.reach) > 0)
+        filled = np.flatnonzero(self._counts(rows) > 0)
         found = np.zeros((len(rows), 2))
         for first in range(0, len(filled), LOOKED_UP):
             some = filled[first : first + LOOKED_UP]
@@ -132,12 +136,12 @@ class Costs:
 
     def effort(self, segments: np.ndarray) -> float:
         """How many poses are to be looked at, at most, for segments (..., keys)."""
-        return self.recording.poses_each * _counts(segments.reshape(-1, self.keys), self.reach).sum()
+        return self.recording.poses_each * self._counts(segments.reshape(-1, self.keys)).sum()
 
     def errors(self, segments: np.ndarray) -> np.ndarray:
         """The error at every sample between the keys of segments (s, keys), in tolerances, zero elsewhere, (n,)."""
         errors = np.zeros(len(self.recording.times))
-        for batch, counts in self._batches(segments[_counts(segments, self.reach) > 0]):
+        for batch, counts in self._batches(segments[self._counts(segments) > 0]):
             samples, errors_there = self._errors(batch, counts)
             errors[samples] = errors_there
         return errors
@@ -162,15 +166,21 @@ class Costs:
 
     def _batches(self, rows: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Segments (s, keys), a batch at a time, and how many samples there are in each, (s,)."""
-        counts = _counts(rows, self.reach)
+        counts = self._counts(rows)
         bounds = math.prod(self.recording.poses.shape[:-1]) * np.append(0, np.cumsum(counts))
         for some, _ in blocks(bounds, BATCH):
             yield rows[some], counts[some]
 
+    def _counts(self, rows: np.ndarray) -> np.ndarray:
+        """How many samples count in each of some segments (s, keys), none where there are no keys, (s,)."""
+        first, second = rows[:, self.reach], rows[:, self.reach + 1]
+        return np.where((first >= 0) & (second >= 0), second - first - self._first, 0)
+
     def _errors(self, rows: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Samples (n,) and their errors (n,) in segments (s, keys) with so many of them in each, (s,)."""
         recording, before = self.recording, self.reach
-        samples = np.repeat(rows[:, before] + 1 - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
+        begins = rows[:, before] + self._first - np.cumsum(counts) + counts
+        samples = np.repeat(begins, counts) + np.arange(counts.sum())
         key_times, keys = _with_ends(recording, rows, self.reach)
         starts, rates = key_times[:, before], 1.0 / (key_times[:, before + 1] - key_times[:, before])
         progress = (recording.times[samples] - np.repeat(starts, counts)) * np.repeat(rates, counts)
@@ -221,12 +231,6 @@ class _Memory:
 def _at(numbers: np.ndarray, samples: np.ndarray) -> np.ndarray:
     """The number of each of some samples (m,), or the one that all have."""
     return numbers[samples] if numbers.ndim else numbers
-
-
-def _counts(rows: np.ndarray, reach: int) -> np.ndarray:
-    """How many samples there are between the two keys of segments (s, keys), none where there are no keys, (s,)."""
-    first, second = rows[:, reach], rows[:, reach + 1]
-    return np.where((first >= 0) & (second >= 0), second - first - 1, 0)
 
 
 def _with_ends(recording: Recording, rows: np.ndarray, reach: int) -> tuple[np.ndarray, Poses]:

@@ -60,6 +60,9 @@ class Mode:
     for_streams: bool = False
     """Whether it uses no key after the segment's own. It is for streams alone: keyframes have better modes."""
 
+    is_separable: bool = False
+    """Whether neither rotation nor location depends on the other, so that each can have keys of its own."""
+
     short: str = ""
     """As a pie menu shows it, where that is not the label without the algebra."""
 
@@ -89,6 +92,7 @@ MODES: dict[str, Mode] = {
         "The origin runs along a straight line while the object turns at an even speed",
         curves.lerp_slerp,
         vector_quaternion.lerp_slerp,
+        is_separable=True,
     ),
     "dq_sclerp": Mode(
         2,
