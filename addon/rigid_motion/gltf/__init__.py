@@ -1,0 +1,5 @@
+"""glTF files with fewer keys: what they show stays within a tolerance, in the world, of what they showed.
+
+`documents` are files, `accessors` their numbers, `tracks` and `nodes` what moves; `rewriting` puts other tracks into a
+document. NumPy and the standard library alone.
+"""
