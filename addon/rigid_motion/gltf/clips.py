@@ -16,9 +16,9 @@ from .documents import Document
 from .errors import World
 from .nodes import Nodes, by_target
 from .rewriting import StoredTrack
-from .search import Search, fixed_nodes, reaches
+from .search import Search, reaches
 from .thinning import on_lines, shared_times, without_repeats
-from .tracks import CUBICSPLINE, LINEAR, ROTATION, SCALE, STEP, TO_XYZW, WEIGHTS, Clip, Track
+from .tracks import CUBICSPLINE, LINEAR, ROTATION, SCALE, STEP, TO_XYZW, TRANSLATION, WEIGHTS, Clip, Track
 
 NOISE = 0.01
 """A channel that changes by less than this share of the tolerance is constant."""
@@ -234,7 +234,9 @@ class ClipReduction:
         taken = self._error_of_storing(smooth, dense, integers)
         if taken > OF_INTEGERS * self.tolerance:
             integers, taken = False, self._error_of_storing(smooth, dense, False)
-        search = Search(world, smooth | dense, fixed_nodes(world, open_tracks))
+        moved = [target for target, track in smooth.items() if len(track.times) > 1]
+        steps = [node for node, path in moved if path in (TRANSLATION, ROTATION)]
+        search = Search(world, smooth | dense, np.isin(world.moving, steps))
         places = world.places(world.truth, times)[self.joints]
         stands = (
             standing(times, _upright(places))
@@ -286,14 +288,14 @@ class ClipReduction:
         ):
             own[number] = samples
         found = []
-        for (target, track), samples in zip(dense.items(), own, strict=True):
+        for track, samples in zip(dense.values(), own, strict=True):
             key_times = times[samples] if len(samples) > 1 else self.span[:1]
             found.append(stored(replace(track, times=key_times, values=track.values[samples]), integers))
         found += [stored(track, integers) for track in smooth.values()]
         return self._spanning(sorted(found, key=lambda track: track.channel))
 
     def _spanning(self, tracks: list[StoredTrack]) -> list[StoredTrack]:
-        """The same with a key at the begin and the end of the clip in one of them at least: it lasts as long as before."""
+        """The same with keys at both ends of the clip in one of them at least: it lasts as long as before."""
         span = self.span.astype(np.float32)
         seen = {time for track in tracks for time in track.times[[0, -1]].tolist()}
         if set(span.tolist()) <= seen:

@@ -91,6 +91,13 @@ class Document:
             raise GltfError(f"{length} bytes are more than a GLB can hold", "export it as .gltf, with files beside it")
         return beside | {name: b"".join((struct.pack("<4sII", MAGIC, 2, length), *parts))}
 
+    def companions(self, folder: Path) -> dict[str, bytes]:
+        """Files that the document names and that have not changed, from its folder: names, and what is in them."""
+        buffers = [buffer for number, buffer in enumerate(objects(self.json, "buffers")) if number not in self.changed]
+        uris = [part.get("uri") for part in (*buffers, *objects(self.json, "images"))]
+        names = {unquote(uri) for uri in uris if isinstance(uri, str) and not is_data(uri) and is_inside(unquote(uri))}
+        return {name: (folder / name).read_bytes() for name in names if (folder / name).is_file()}
+
     @property
     def _binary(self) -> bytes | None:
         """What the first buffer holds, where it is the one inside of the GLB."""

@@ -12,11 +12,8 @@ from .clips import ClipReduction, ReducedClip
 from .documents import Document, GltfError, read_document
 from .nodes import Nodes
 from .rewriting import rewritten
-from .sizes import joints_of, radii_of, size_of
+from .sizes import OF_A_BODY, joints_of, radii_of, size_of
 from .tracks import WEIGHTS, read_clips
-
-OF_SIZE = 0.003
-"""The tolerance where none is given, of the size: 5 mm of a grown-up."""
 
 MOST = 0.1
 """A tolerance above this share of the size is a mistake, mostly of the unit."""
@@ -83,7 +80,7 @@ def _moved(nodes: Nodes, clips: tuple) -> np.ndarray:
 
 def _checked(tolerance: float | None, size: float) -> float:
     if tolerance is None:
-        return OF_SIZE * size or 0.001
+        return OF_A_BODY * size or 0.001
     if tolerance > MOST * size > 0.0:
         raise GltfError(
             f"a tolerance of {tolerance:.3g} m is more than a tenth of the size, which is {size:.3g} m in this file",

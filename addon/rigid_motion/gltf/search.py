@@ -67,7 +67,7 @@ class Search:
 
 
 def reaches(world: World) -> np.ndarray:
-    """How far what hangs on each node is from it at most, with the balls around it, shape (n,). It is an upper bound."""
+    """How far what hangs on each node is from it at most, with the balls around it, shape (n,); an upper bound."""
     nodes, moving = world.nodes, world.moving
     places = world.places(world.truth, world.times)
     numbers = {node: place for place, node in enumerate(moving.tolist())}
@@ -92,9 +92,3 @@ def _pose(world: World, tracks: Tracks, node: int) -> tuple[np.ndarray, np.ndarr
         for path in (TRANSLATION, ROTATION)
     )
     return translation, rotation
-
-
-def fixed_nodes(world: World, reducible: Tracks) -> np.ndarray:
-    """Nodes with tracks of which some are not to be reduced with the others, shape (n,)."""
-    kept = {node for node, path in world.truth if (node, path) not in reducible and path in (TRANSLATION, ROTATION)}
-    return np.isin(world.moving, list(kept))

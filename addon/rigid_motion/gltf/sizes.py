@@ -13,6 +13,12 @@ from .accessors import numbers
 from .documents import Document, Json, entry, objects
 from .nodes import Nodes
 
+OF_A_BODY = 0.003
+"""The tolerance that the keys of a body are reduced to where none is given, of its size: 5 mm for a grown-up."""
+
+OF_KEY_POSES = 0.02
+"""The same for key poses, which are to be few: 35 mm."""
+
 SHELL = 0.03 / 1.7
 """The radius of a joint's ball, of the size of its body: three centimetres of a grown-up."""
 
