@@ -5,72 +5,62 @@ A clip that would not become smaller stays as it was.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..motion import SeparateKeys
 from ..motion.contacts import slide, standing
-from .accessors import denormalised, stored_size
-from .documents import Document
-from .errors import World
-from .nodes import Nodes, by_target
+from .errors import PARTS, World
+from .nodes import Nodes, Tracks, by_target
 from .rewriting import StoredTrack
-from .search import Search, reaches
-from .thinning import on_lines, shared_times, without_repeats
-from .tracks import CUBICSPLINE, LINEAR, ROTATION, SCALE, STEP, TO_XYZW, TRANSLATION, WEIGHTS, Clip, Track
-
-NOISE = 0.01
-"""A channel that changes by less than this share of the tolerance is constant."""
-
-WITHIN_WEIGHTS = 0.005
-"""How far off weights of morph targets may be: of 1."""
-
-OF_SCALES = 0.1
-"""The share of the tolerance that a channel of scales may take."""
+from .search import Search
+from .settling import moments, settled
+from .storing import Amount, amount, amount_before, key_size, shown, stored
+from .thinning import shared_times
+from .tracks import LINEAR, ROTATION, TRANSLATION, Clip, Track
 
 OF_INTEGERS = 0.25
 """The share of the tolerance that rotations may take that are stored as 16-bit integers."""
 
-STANDING = 4.0
-"""How many times errors of joints count that stand on the ground."""
-
 MORE_SLIDE = 0.001 / 1.7
 """How much farther feet may slide than before, of the size of the body: a millimetre of a grown-up."""
 
+MORE_WEIGHT = 2.0
+"""How many times more errors of standing joints count, where they slide too far."""
+
 TRIES = 6
-"""Searches, each with a smaller tolerance or a larger weight of standing feet than the one before."""
+"""Searches, each with a smaller tolerance or a larger weight of standing joints than the one before."""
+
+ROUNDS = 8
+"""How often keys are put back where the proof fails."""
 
 LEAST = 0.1
 """The share of the tolerance that is worth a search."""
 
-WIDE = np.radians(15.0)
-"""A gap between samples in which a node turns farther is halved: what hangs on it runs in a bow."""
-
-BOW = 0.02
-"""The share of the tolerance by which a spline may leave the line between two samples."""
-
-HALVINGS = 8
-
-INTEGER = 32767
-"""What stands for 1 where 16-bit integers are normalised."""
+NEEDED, LARGER = "all of its keys are needed", "fewer keys would take more bytes"
 
 
 @dataclass(frozen=True)
-class Before:
-    """What a clip was, or is."""
+class Wishes:
+    """How few keys are wanted. Lengths are in the unit of the document."""
 
-    keys: int
-    """Of all channels together."""
+    tolerance: float
+    """Of the displacement of any point of the balls around nodes, in the world."""
 
-    size: int
-    """Bytes of key times and values."""
+    shared: bool = False
+    """Whether all nodes get their keys at the same times."""
+
+    count: int | None = None
+    """So many key poses of all nodes, whatever they are off by."""
 
 
 @dataclass(frozen=True, eq=False)
 class ReducedClip:
     """What became of a clip; lengths are in the unit of the document."""
 
+    number: int
     name: str
     tracks: tuple[StoredTrack, ...] | None
     """None where the clip stays as it was."""
@@ -78,13 +68,13 @@ class ReducedClip:
     reason: str
     """Why it does; otherwise empty."""
 
-    before: Before
-    after: Before
+    before: Amount
+    after: Amount
     error: float = 0.0
-    """The largest displacement of any point that is promised."""
+    """The largest displacement of any point that is promised, in the world."""
 
     slides: tuple[float, float] = (0.0, 0.0)
-    """How far feet slide that stand, before and after."""
+    """How far joints slide that stand on the ground, before and after."""
 
 
 class ClipReduction:
@@ -98,9 +88,11 @@ class ClipReduction:
         The nodes that may move, parents before their children.
     radii : array, shape (n,)
         Of the balls around them.
-    joints : list of int
+    joints : iterable of int
         Nodes that are joints, some of which may be feet.
-    tolerance, size : float
+    size : float
+        Of the body.
+    wishes : Wishes
     """
 
     def __init__(
@@ -110,260 +102,175 @@ class ClipReduction:
         moving: np.ndarray,
         radii: np.ndarray,
         joints: Iterable[int],
-        tolerance: float,
         size: float,
+        wishes: Wishes,
     ) -> None:
-        self.nodes, self.clip, self.tolerance, self.size = nodes, clip, tolerance, size
-        self.document = nodes.document
-        truth = by_target(clip.tracks)
-        self.span = np.unique(np.concatenate([track.times[[0, -1]] for track in clip.tracks]))[[0, -1]]
-        self.world = World(nodes, moving, radii, truth, np.unique(self.span))
-        self.world = replace(self.world, times=self._samples())
-        self.joints = np.flatnonzero(np.isin(moving, list(joints)))
-        self.reach = dict(zip(moving.tolist(), reaches(self.world).tolist(), strict=True))
+        self.clip, self.wishes, self.size = clip, wishes, size
+        self.before = amount_before(nodes.document, clip)
+        span = np.unique([track.times[end] for track in clip.tracks for end in (0, -1)])[[0, -1]]
+        world = World(nodes, moving, radii, by_target(clip.tracks), np.unique(span))
+        self.world = replace(world, times=moments(world, clip, wishes.tolerance))
+        found = settled(self.world, clip, wishes.tolerance)
+        self.settled = {target: track for target, track in found.items() if track is not None}
+        times = self.world.times
+        self.dense = {
+            (track.node, track.path): replace(track, interpolation=LINEAR, times=times, values=track.at(times))
+            for track in clip.tracks
+            if (track.node, track.path) not in found
+        }
+        """The tracks that are to have fewer keys, with a key at every moment."""
+        feet = np.flatnonzero(np.isin(moving, list(joints)))
+        self.feet = feet if len(times) > 1 else feet[:0]
+        self.stands = standing(times, _upright(self.world.positions[self.feet])) if len(self.feet) else None
 
     def reduced(self) -> ReducedClip:
-        before = measured_before(self.document, self.clip)
-        settled = self._settled()
-        found = self._searched(settled)
+        """The clip with fewer keys, or as it was."""
+        found = self._key_poses() if self.wishes.shared or self.wishes.count else self._own_keys()
         if found is None:
-            return ReducedClip(self.clip.name, None, "its keys are needed", before, before)
-        tracks, error, slides = found
-        after = measured(tracks)
-        if after.size >= before.size:
-            return ReducedClip(self.clip.name, None, "it is smaller as it was", before, before)
-        return ReducedClip(self.clip.name, tuple(tracks), "", before, after, error, slides)
+            return self._kept(NEEDED)
+        tracks, error = found
+        after = amount(tracks)
+        if after.size >= self.before.size:
+            return self._kept(LARGER)
+        slides = self._slides(self._shown(tracks))
+        return ReducedClip(self.clip.number, self.clip.name, tuple(tracks), "", self.before, after, error, slides)
 
-    def _samples(self) -> np.ndarray:
-        """The moments between which everything runs evenly, as close as its turns and splines need it."""
-        moved = [track for track in self.clip.tracks if track.path != WEIGHTS and not track.is_constant]
-        times = np.unique(np.concatenate([self.span, *(track.times for track in moved)]))
-        curved = [track for track in moved if track.interpolation == CUBICSPLINE]
-        turning = [track for track in moved if track.path == ROTATION and track.interpolation != STEP]
-        reach = dict(zip(self.world.moving.tolist(), reaches(replace(self.world, times=times)).tolist(), strict=True))
-        for _ in range(HALVINGS):
-            halved = np.zeros(len(times) - 1, dtype=bool)
-            for track in turning:
-                turns = track.at(times)
-                halved |= np.abs(np.einsum("ij,ij->i", turns[1:], turns[:-1])) < np.cos(WIDE / 2)
-            for track in curved:
-                halved |= _bows(track, times) * reach[track.node] > BOW * self.tolerance
-            middles = ((times[:-1] + times[1:]) / 2)[halved].astype(np.float32).astype(np.float64)
-            more = np.union1d(times, middles)
-            if len(more) == len(times):
-                break
-            times = more
-        return times
+    def _kept(self, reason: str) -> ReducedClip:
+        return ReducedClip(self.clip.number, self.clip.name, None, reason, self.before, self.before)
 
-    def _settled(self) -> dict[tuple[int, str], Track | None]:
-        """The tracks that need no search: constant ones, steps, scales and weights. None for what rests."""
-        found: dict[tuple[int, str], Track | None] = {}
-        for track in self.clip.tracks:
-            target = track.node, track.path
-            if (constant := self._constant(track)) is not None:
-                found[target] = constant if len(constant.times) else None
-            elif track.interpolation == STEP:
-                keys = without_repeats(track.values)
-                found[target] = replace(track, times=track.times[keys], values=track.values[keys])
-            elif track.path in (SCALE, WEIGHTS):
-                found[target] = self._on_lines(track)
-        return found
+    def _key_poses(self) -> tuple[list[StoredTrack], float] | None:
+        wishes = self.wishes
+        search, integers, taken = self._search(), *self._storing()
+        tolerance = None if wishes.count else wishes.tolerance - taken
+        keys = search.key_poses(tolerance=tolerance, count=wishes.count)
+        tracks = self._stored([keys] * len(self.dense), integers=integers)
+        error = self.world.largest_error(self._shown(tracks), self.world.eighths)
+        return (tracks, error) if wishes.count or error <= wishes.tolerance else self._own_keys()
 
-    def _constant(self, track: Track) -> Track | None:
-        """A track of one key where nothing changes that would be seen, of none where it rests as the node does."""
-        if track.path == WEIGHTS:
-            within, values = (0.0 if track.interpolation == STEP else WITHIN_WEIGHTS), track.at(self._moments(track))
-            rest = self.nodes.rest_of(track.node, WEIGHTS)
-            rest = rest if len(rest) == values.shape[1] else np.zeros(values.shape[1])
-            off = [float(np.abs(values - value).max()) for value in (rest, values[0])]
-        else:
-            within, values = NOISE * self.tolerance, track.at(self._moments(track))
-            rest = self.nodes.rest_of(track.node, track.path)
-            off = [float(self._displacements(track, values, value).max()) for value in (rest, values[0])]
-        if off[0] <= within:
-            return replace(track, interpolation=LINEAR, times=track.times[:0], values=values[:0])
-        if off[1] <= within:
-            return replace(track, interpolation=LINEAR, times=self.span[:1], values=values[:1])
-        return None
-
-    def _moments(self, track: Track) -> np.ndarray:
-        """The moments at which a track is looked at."""
-        return track.times if track.interpolation != CUBICSPLINE else np.union1d(self.world.times, track.times)
-
-    def _displacements(self, track: Track, values: np.ndarray, others: np.ndarray) -> np.ndarray:
-        """How far what hangs on the node is moved at most between values (m, width) and others, shape (m,)."""
-        reach = self.reach[track.node]
-        if track.path == ROTATION:
-            return 2.0 * reach * np.sqrt(np.maximum(1.0 - np.einsum("...i,...i->...", values, others) ** 2, 0.0))
-        if track.path == SCALE:
-            return reach * np.abs(values / np.where(others == 0.0, 1.0, others) - 1.0).max(axis=-1)
-        return np.linalg.norm(values - others, axis=-1) * self._length_above(track.node)
-
-    def _length_above(self, node: int) -> float:
-        """How long the axes of a node's parent ever are in the world."""
-        parent = int(self.nodes.parents[node])
-        if parent < 0:
-            return 1.0
-        axes = self.nodes.resting.axes[parent]
-        if (places := np.flatnonzero(self.world.moving == parent)).size:
-            axes = self.nodes.worlds(self.world.moving, self.world.truth, self.world.times).axes[places[0]]
-        return float(np.linalg.norm(axes, axis=-2).max())
-
-    def _on_lines(self, track: Track) -> Track:
-        """Fewer keys of scales or weights, which depend on nothing else."""
-        times = self.world.times if track.path == SCALE else np.union1d(track.times, self._moments(track))
-        values = track.at(times)
-        within = WITHIN_WEIGHTS
-        if track.path == SCALE:
-            within = OF_SCALES * self.tolerance / self.reach[track.node] * float(np.abs(values).max())
-        keys = on_lines(times, values, within)
-        return replace(track, interpolation=LINEAR, times=times[keys], values=values[keys])
-
-    def _searched(
-        self, settled: dict[tuple[int, str], Track | None]
-    ) -> tuple[list[StoredTrack], float, tuple[float, float]] | None:
-        """Stored tracks that keep to the tolerance, the error and how feet slide; None where none are found."""
-        world, times = self.world, self.world.times
-        smooth = {track: value for track, value in settled.items() if value is not None}
-        open_tracks = {target: track for target, track in world.truth.items() if target not in settled}
-        dense = {
-            target: replace(track, interpolation=LINEAR, times=times, values=track.at(times))
-            for target, track in open_tracks.items()
-        }
-        integers = True
-        taken = self._error_of_storing(smooth, dense, integers)
-        if taken > OF_INTEGERS * self.tolerance:
-            integers, taken = False, self._error_of_storing(smooth, dense, False)
-        moved = [target for target, track in smooth.items() if len(track.times) > 1]
-        steps = [node for node, path in moved if path in (TRANSLATION, ROTATION)]
-        search = Search(world, smooth | dense, np.isin(world.moving, steps))
-        places = world.places(world.truth, times)[self.joints]
-        stands = (
-            standing(times, _upright(places))
-            if len(self.joints) and len(times) > 1
-            else np.zeros(places.shape[:2], bool)
-        )
-        slides_before = slide(places, stands)
-        allowed, standing_weight = self.tolerance - taken, STANDING
+    def _own_keys(self) -> tuple[list[StoredTrack], float] | None:
+        """Tracks with keys of their own that keep to the tolerance, and the largest error; None where none do."""
+        tolerance, shape = self.wishes.tolerance, (len(self.world.moving), len(self.world.times))
+        search, integers, taken = self._search(), *self._storing()
+        allowed, weight = tolerance - taken, 1.0
         for _ in range(TRIES):
-            if allowed < LEAST * self.tolerance:
-                return None
-            weights = np.ones((len(world.moving), len(times)))
-            weights[self.joints] += (standing_weight - 1.0) * stands
-            keys = search.keys(allowed, weights)
-            stored = self._stored(smooth, dense, keys, integers)
-            shown = by_target(tuple(shown_by(self.clip, track) for track in stored))
-            error = world.largest_error(shown, world.eighths)
-            slides = slides_before, slide(world.places(shown, times)[self.joints], stands)
-            if error > self.tolerance:
-                allowed -= 1.2 * (error - self.tolerance)
-            elif slides[1] > slides[0] + MORE_SLIDE * self.size:
-                standing_weight *= 2.0
+            if allowed < LEAST * tolerance:
+                break
+            weights = np.ones(shape)
+            if self.stands is not None:
+                weights[self.feet] += (weight - 1.0) * self.stands
+            tracks, error = self._proven(self._samples(search.keys(allowed, weights)), integers=integers)
+            before, after = self._slides(self._shown(tracks))
+            if error > tolerance:
+                allowed -= error - tolerance
+            elif after > before + MORE_SLIDE * self.size:
+                weight *= MORE_WEIGHT
             else:
-                return stored, error, slides
+                return tracks, error
         return None
 
-    def _error_of_storing(self, smooth: dict, dense: dict, integers: bool) -> float:
-        """How far off everything is with all keys, by how it is stored and by what is settled."""
-        tracks = [*smooth.values(), *dense.values()]
-        shown = by_target(tuple(shown_by(self.clip, stored(track, integers)) for track in tracks))
-        return self.world.largest_error(shown, self.world.times)
+    def _search(self) -> Search:
+        """A search for the keys of nodes, but for those whose steps are kept."""
+        moved = [target for target, track in self.settled.items() if len(track.times) > 1]
+        steps = [node for node, path in moved if path in (TRANSLATION, ROTATION)]
+        return Search(self.world, self.settled | self.dense, np.isin(self.world.moving, steps))
 
-    def _stored(self, smooth: dict, dense: dict, keys: tuple, integers: bool) -> list[StoredTrack]:
-        """All tracks as they are to be stored, those that are searched for with these keys."""
-        times = self.world.times
-        places = {node: place for place, node in enumerate(self.world.moving.tolist())}
-        own = []
-        for node, path in dense:
-            of_node = keys[places[node]]
-            own.append(of_node.rotation if path == ROTATION else of_node.location)
-        moving = [number for number, samples in enumerate(own) if len(samples) > 1]
-        targets = list(dense)
-        widths = [
-            8 if integers and targets[number][1] == ROTATION else 4 * dense[targets[number]].values.shape[1]
-            for number in moving
+    def _storing(self) -> tuple[bool, float]:
+        """Whether rotations may be integers, and how far off all is with all keys, by storing and what is settled."""
+        for integers in (True, False):
+            tracks = self._with_settled([stored(track, integers=integers) for track in self.dense.values()], integers)
+            taken = self.world.largest_error(self._shown(tracks), self.world.times)
+            if taken <= OF_INTEGERS * self.wishes.tolerance:
+                break
+        return integers, taken
+
+    def _samples(self, keys: Sequence[SeparateKeys]) -> list[np.ndarray]:
+        """Those that are keys of each dense track."""
+        of_nodes = [(path, keys[self.world.places[node]]) for node, path in self.dense]
+        return [own.rotation if path == ROTATION else own.location for path, own in of_nodes]
+
+    def _proven(self, samples: list[np.ndarray], *, integers: bool) -> tuple[list[StoredTrack], float]:
+        """Stored tracks with keys at these samples, and at more of them where the proof fails, and the error then."""
+        world, tolerance = self.world, self.wishes.tolerance
+        for _ in range(ROUNDS):
+            tracks = self._stored(samples, integers=integers)
+            shown_tracks = self._shown(tracks)
+            error = world.largest_error(shown_tracks, world.eighths)
+            if error <= tolerance:
+                break
+            samples = self._with_more(samples, *world.worst(shown_tracks, world.eighths, tolerance))
+        return tracks, error
+
+    def _with_more(self, samples: list[np.ndarray], places: np.ndarray, eighths: np.ndarray) -> list[np.ndarray]:
+        """Samples with those around some of the eighths, for the nodes at these places and all that they hang on."""
+        wanted = np.zeros((len(self.world.moving), len(self.world.times)), dtype=bool)
+        wanted[places, eighths // PARTS] = wanted[places, -(-eighths // PARTS)] = True
+        for place in range(len(wanted) - 1, -1, -1):
+            if (parent := self.world.parents[place]) >= 0:
+                wanted[parent] |= wanted[place]
+        ends = (0, len(self.world.times) - 1)
+        more = [np.flatnonzero(wanted[self.world.places[node]]) for node, _ in self.dense]
+        return [
+            np.union1d(own, (*ends, *new)).astype(np.int64) if len(new) else own
+            for own, new in zip(samples, more, strict=True)
         ]
-        for number, samples in zip(
-            moving, shared_times([own[number] for number in moving], widths, len(times)), strict=True
-        ):
-            own[number] = samples
-        found = []
-        for track, samples in zip(dense.values(), own, strict=True):
-            key_times = times[samples] if len(samples) > 1 else self.span[:1]
-            found.append(stored(replace(track, times=key_times, values=track.values[samples]), integers))
-        found += [stored(track, integers) for track in smooth.values()]
-        return self._spanning(sorted(found, key=lambda track: track.channel))
+
+    def _stored(self, samples: Sequence[np.ndarray], *, integers: bool) -> list[StoredTrack]:
+        """All tracks as they are to be stored, the dense ones with keys at these samples."""
+        times, tracks = self.world.times, []
+        moving = [number for number, own in enumerate(samples) if len(own) > 1]
+        dense = list(self.dense.values())
+        widths = [key_size(dense[number], integers=integers) for number in moving]
+        shared = shared_times([samples[number] for number in moving], widths, len(times))
+        together = dict(zip(moving, shared, strict=True))
+        for number, (track, own) in enumerate(zip(dense, samples, strict=True)):
+            if number not in together:
+                thinned = replace(track, times=times[:1], values=track.values[own])
+            else:
+                thinned = replace(track, times=times[own], values=track.values[own])
+                # Keys for the sake of others change nothing of what is shown.
+                key_times = times[together[number]]
+                thinned = replace(track, times=key_times, values=thinned.at(key_times))
+            tracks.append(stored(thinned, integers=integers))
+        return self._spanning(self._with_settled(tracks, integers))
+
+    def _with_settled(self, tracks: list[StoredTrack], integers: bool) -> list[StoredTrack]:
+        return tracks + [stored(track, integers=integers) for track in self.settled.values()]
 
     def _spanning(self, tracks: list[StoredTrack]) -> list[StoredTrack]:
         """The same with keys at both ends of the clip in one of them at least: it lasts as long as before."""
-        span = self.span.astype(np.float32)
-        seen = {time for track in tracks for time in track.times[[0, -1]].tolist()}
-        if set(span.tolist()) <= seen:
+        ends = self.world.times[[0, -1]]
+        seen = [time for track in tracks for time in track.times[[0, -1]].tolist()]
+        if np.isin(ends.astype(np.float32), seen).all():
             return tracks
         if not tracks:
             first = self.clip.tracks[0]
             tracks = [
-                stored(replace(first, interpolation=LINEAR, times=self.span[:1], values=first.at(self.span[:1])), False)
+                stored(replace(first, interpolation=LINEAR, times=ends[:1], values=first.at(ends[:1])), integers=False)
             ]
-        place = next((number for number, track in enumerate(tracks) if len(track.times) == 1), 0)
-        track = shown_by(self.clip, tracks[place])
-        times = np.union1d(track.times, np.unique(span))
-        tracks[place] = stored(
-            replace(track, times=times, values=track.at(times)), tracks[place].values.dtype.kind == "i"
-        )
+        number = min(range(len(tracks)), key=lambda number: len(tracks[number].times))
+        integers = tracks[number].values.dtype.kind == "i"
+        track = shown(self._of_channel[tracks[number].channel], tracks[number])
+        times = np.union1d(track.times, ends)
+        tracks[number] = stored(replace(track, times=times, values=track.at(times)), integers=integers)
         return tracks
 
+    @property
+    def _of_channel(self) -> dict[int, Track]:
+        return {track.channel: track for track in self.clip.tracks}
 
-def stored(track: Track, integers: bool) -> StoredTrack:
-    """A track as it is stored; rotations as normalised 16-bit integers where these are asked for."""
-    values = track.values[..., TO_XYZW] if track.path == ROTATION else track.values
-    values = values.reshape(-1, 1 if track.path == WEIGHTS else values.shape[-1])
-    if integers and track.path == ROTATION and track.interpolation != CUBICSPLINE:
-        values = np.rint(values * INTEGER).astype(np.int16)
-    else:
-        values = values.astype(np.float32)
-    return StoredTrack(track.channel, track.interpolation, track.times.astype(np.float32), values)
+    def _shown(self, tracks: Iterable[StoredTrack]) -> Tracks:
+        of_channel = self._of_channel
+        return by_target(tuple(shown(of_channel[track.channel], track) for track in tracks))
 
-
-def shown_by(clip: Clip, stored: StoredTrack) -> Track:
-    """What a stored track shows, of a clip that has its channel."""
-    track = next(track for track in clip.tracks if track.channel == stored.channel)
-    values = denormalised(stored.values) if stored.values.dtype.kind == "i" else stored.values.astype(np.float64)
-    values = values.reshape(len(stored.times), -1)
-    if track.path == ROTATION:
-        values = values[:, [3, 0, 1, 2]]
-    return replace(track, interpolation=stored.interpolation, times=stored.times.astype(np.float64), values=values)
+    def _slides(self, tracks: Tracks) -> tuple[float, float]:
+        """How far joints slide that stand, before and after."""
+        if self.stands is None:
+            return 0.0, 0.0
+        positions = self.world.positions[self.feet], self.world.positions_of(tracks, self.feet)
+        return slide(positions[0], self.stands), slide(positions[1], self.stands)
 
 
-def measured(tracks: Iterable[StoredTrack]) -> Before:
-    """Keys and bytes of tracks that are to be stored; what is the same is stored once."""
-    parts = {(part.dtype.str, part.tobytes()) for track in tracks for part in track.accessors}
-    return Before(sum(len(track.times) for track in tracks), sum(len(content) for _, content in parts))
-
-
-def measured_before(document: Document, clip: Clip) -> Before:
-    """Keys and bytes of the tracks of a clip as it is in the file."""
-    animation = document.json["animations"][clip.number]
-    samplers = [animation["samplers"][animation["channels"][track.channel]["sampler"]] for track in clip.tracks]
-    accessors = {sampler[key] for sampler in samplers for key in ("input", "output")}
-    size = sum(stored_size(document, number) for number in accessors)
-    return Before(sum(len(track.times) for track in clip.tracks), size)
-
-
-def _bows(track: Track, times: np.ndarray) -> np.ndarray:
-    """How far a spline leaves the straight way between moments (m,), in each gap, as a share of what hangs on it."""
-    found = np.zeros(len(times) - 1)
-    values = track.at(times)
-    for share in (0.25, 0.5, 0.75):
-        there = track.at((1 - share) * times[:-1] + share * times[1:])
-        line = (1 - share) * values[:-1] + share * values[1:]
-        if track.path == ROTATION:
-            line = line / np.linalg.norm(line, axis=1, keepdims=True)
-        found = np.maximum(found, np.linalg.norm(there - line, axis=1))
-    return found
-
-
-def _upright(places: np.ndarray) -> np.ndarray:
+def _upright(positions: np.ndarray) -> np.ndarray:
     """Places (..., 3) with the third axis upwards, where glTF has the second."""
-    x, y, z = np.moveaxis(places, -1, 0)
+    x, y, z = np.moveaxis(positions, -1, 0)
     return np.stack((x, -z, y), axis=-1)

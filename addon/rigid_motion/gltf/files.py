@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import itertools
+import os
+import secrets
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from .clips import ClipReduction, ReducedClip
+from .clips import ClipReduction, ReducedClip, Wishes
 from .documents import Document, GltfError, read_document
 from .nodes import Nodes
 from .rewriting import rewritten
-from .sizes import OF_A_BODY, joints_of, radii_of, size_of
-from .tracks import WEIGHTS, read_clips
+from .sizes import OF_A_BODY, OF_KEY_POSES, joints_of, radii_of, size_of
+from .tracks import WEIGHTS, Clip, read_clips
 
 MOST = 0.1
 """A tolerance above this share of the size is a mistake, mostly of the unit."""
+
+SOME = 1e-3
+"""The tolerance where nothing has a size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +38,14 @@ class Report:
     """With fewer keys; the same where no clip needs fewer."""
 
 
-def reduced(document: Document, *, tolerance: float | None = None, radius: float | None = None) -> Report:
+def reduced(
+    document: Document,
+    *,
+    tolerance: float | None = None,
+    radius: float | None = None,
+    shared: bool = False,
+    count: int | None = None,
+) -> Report:
     """A document with fewer keys in all of its clips.
 
     Parameters
@@ -42,6 +55,10 @@ def reduced(document: Document, *, tolerance: float | None = None, radius: float
         How far off any point within the radius of any node may be in the world; a share of the size where None.
     radius : float, optional
         The same for all nodes; otherwise that of meshes is theirs, and that of joints a share of the size.
+    shared : bool
+        Whether all nodes of a clip get their keys at the same times.
+    count : int, optional
+        So many key poses of each clip instead of a tolerance.
 
     Raises
     ------
@@ -54,36 +71,50 @@ def reduced(document: Document, *, tolerance: float | None = None, radius: float
     nodes = Nodes(document)
     moved = _moved(nodes, clips)
     size = size_of(nodes, moved)
-    tolerance = _checked(tolerance, size)
-    radii = np.full(len(moved), radius) if radius is not None else radii_of(nodes, moved, size)
-    joints = list(itertools.chain.from_iterable(joints_of(document)))
-    done = []
-    for clip in clips:
-        own = np.isin(moved, _moved(nodes, (clip,)))
-        done.append(ClipReduction(nodes, clip, moved[own], radii[own], joints, tolerance, size).reduced())
-    tracks = {clip.number: found.tracks for clip, found in zip(clips, done, strict=True) if found.tracks is not None}
-    return Report(size, tolerance, tuple(done), rewritten(document, tracks) if tracks else document)
-
-
-def reduce_file(path: Path, output: Path, *, tolerance: float | None = None, radius: float | None = None) -> Report:
-    """Write a file with fewer keys, with those beside it that a .gltf needs."""
-    report = reduced(read_document(path), tolerance=tolerance, radius=radius)
-    for name, content in report.document.files(output.name).items():
-        (output.parent / name).write_bytes(content)
-    return report
-
-
-def _moved(nodes: Nodes, clips: tuple) -> np.ndarray:
-    targets = {track.node for clip in clips for track in clip.tracks if track.path != WEIGHTS}
-    return nodes.below(np.array(sorted(targets), dtype=np.int64))
-
-
-def _checked(tolerance: float | None, size: float) -> float:
     if tolerance is None:
-        return OF_A_BODY * size or 0.001
-    if tolerance > MOST * size > 0.0:
+        tolerance = (OF_KEY_POSES if shared else OF_A_BODY) * size or SOME
+    elif tolerance > MOST * size > 0.0:
         raise GltfError(
             f"a tolerance of {tolerance:.3g} m is more than a tenth of the size, which is {size:.3g} m in this file",
             f"give one below {MOST * size:.2g} m",
         )
-    return tolerance
+    radii = np.full(len(moved), radius) if radius is not None else radii_of(nodes, moved, size)
+    joints = set(itertools.chain.from_iterable(joints_of(document)))
+    wishes = Wishes(tolerance, shared, count)
+    found = []
+    for clip in clips:
+        if clip.tracks:
+            own = np.isin(moved, _moved(nodes, (clip,)))
+            found.append(ClipReduction(nodes, clip, moved[own], radii[own], joints, size, wishes).reduced())
+    tracks = {clip.number: clip.tracks for clip in found if clip.tracks is not None}
+    return Report(size, tolerance, tuple(found), rewritten(document, tracks) if tracks else document)
+
+
+def reduce_file(
+    path: Path,
+    output: Path,
+    *,
+    tolerance: float | None = None,
+    radius: float | None = None,
+    shared: bool = False,
+    count: int | None = None,
+) -> Report:
+    """Write a .glb or .gltf file with fewer keys, and the file of its buffer beside a .gltf: see `reduced`.
+
+    What is at the place of the output is replaced once all is written. Files that a .gltf names are not copied.
+    """
+    report = reduced(read_document(path), tolerance=tolerance, radius=radius, shared=shared, count=count)
+    for name, content in report.document.files(output.name).items():
+        beside = output.with_name(f".{secrets.token_hex(4)}{output.suffix}")
+        try:
+            beside.write_bytes(content)
+            os.replace(beside, output.with_name(name))
+        finally:
+            beside.unlink(missing_ok=True)
+    return report
+
+
+def _moved(nodes: Nodes, clips: Iterable[Clip]) -> np.ndarray:
+    """The nodes that tracks move, and all that hang on them, parents before their children."""
+    targets = {track.node for clip in clips for track in clip.tracks if track.path != WEIGHTS}
+    return nodes.below(np.array(sorted(targets), dtype=np.int64))

@@ -33,30 +33,18 @@ class Search:
 
     def __init__(self, world: World, tracks: Tracks, fixed: np.ndarray) -> None:
         self.world, self.fixed = world, fixed
-        nodes, moving, times = world.nodes, world.moving, world.times
-        places = {node: place for place, node in enumerate(moving.tolist())}
-        self.parents = np.array([places.get(parent, -1) for parent in nodes.parents[moving].tolist()])
-        self.above = np.empty((len(moving), len(times), 3))
-        """How long the axes of each node's parent are in the world."""
-        lengths = np.linalg.norm(nodes.worlds(moving, world.truth, times).axes, axis=-2)
-        for place, (node, parent) in enumerate(zip(moving.tolist(), self.parents.tolist(), strict=True)):
-            if parent >= 0:
-                self.above[place] = lengths[parent]
-            elif nodes.parents[node] >= 0:
-                self.above[place] = np.linalg.norm(nodes.resting.axes[nodes.parents[node]], axis=-2)
-            else:
-                self.above[place] = 1.0
-        positions, quaternions = np.empty((*self.above.shape[:2], 3)), np.empty((*self.above.shape[:2], 4))
-        for place, node in enumerate(moving.tolist()):
+        shape = (len(world.moving), len(world.times))
+        positions, quaternions = np.empty((*shape, 3)), np.empty((*shape, 4))
+        for place, node in enumerate(world.moving.tolist()):
             positions[place], quaternions[place] = _pose(world, tracks, node)
-        self.poses = Poses(positions * self.above, align_signs(quaternions))
+        self.poses = Poses(positions * world.lengths_above, align_signs(quaternions))
 
     def keys(self, tolerance: float, weights: np.ndarray) -> tuple[SeparateKeys, ...]:
         """The samples that are keys of each node, with errors that count so many times, weights (n, m)."""
         return reduce_skeleton_keys(
             self.world.times,
             self.poses,
-            self.parents,
+            self.world.parents,
             MODE,
             tolerance=tolerance,
             radius=self.world.radii,
@@ -65,19 +53,19 @@ class Search:
             fixed=self.fixed,
         )
 
-
-def reaches(world: World) -> np.ndarray:
-    """How far what hangs on each node is from it at most, with the balls around it, shape (n,); an upper bound."""
-    nodes, moving = world.nodes, world.moving
-    places = world.places(world.truth, world.times)
-    numbers = {node: place for place, node in enumerate(moving.tolist())}
-    found = world.radii.copy()
-    for place, node in reversed(list(enumerate(moving.tolist()))):
-        parent = numbers.get(int(nodes.parents[node]))
-        if parent is not None:
-            away = float(np.linalg.norm(places[place] - places[parent], axis=-1).max())
-            found[parent] = max(found[parent], away + found[place])
-    return found
+    def key_poses(self, *, tolerance: float | None, count: int | None) -> np.ndarray:
+        """The samples that are keys of all nodes."""
+        keys = reduce_skeleton_keys(
+            self.world.times,
+            self.poses,
+            self.world.parents,
+            MODE,
+            tolerance=tolerance,
+            budget=None if count is None else min(count, len(self.world.times)),
+            radius=self.world.radii,
+            shared=True,
+        )
+        return keys[0]
 
 
 def _pose(world: World, tracks: Tracks, node: int) -> tuple[np.ndarray, np.ndarray]:

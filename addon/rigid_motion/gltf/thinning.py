@@ -50,56 +50,37 @@ def shared_times(keys: Sequence[np.ndarray], widths: Sequence[int], samples: int
     Returns
     -------
     list of array of int
-        Rising; those of channels that share are the same array.
+        Rising.
     """
-    if not keys:
-        return []
     marked = np.zeros((len(keys), samples), dtype=np.float32)
     for row, own in zip(marked, keys, strict=True):
         row[own] = 1.0
     groups = [[channel] for channel in range(len(keys))]
-    counts, bytes_each = marked.sum(axis=1), np.array(widths, dtype=np.float64)
+    counts, sizes = marked.sum(axis=1), np.array(widths, dtype=np.float64)
     both = marked @ marked.T
-    saved = _saved(both, counts, bytes_each)
-    while True:
-        first, second = np.unravel_index(int(np.argmax(saved)), saved.shape)
-        if not saved[first, second] > 0.0:
-            break
+
+    def saved(first: int) -> np.ndarray:
+        """The bytes that each other group needs less together with this one."""
+        needed_by_first, needed_by_others = counts - both[first], counts[first] - both[first]
+        found = TIME * both[first] - sizes[first] * needed_by_first - sizes * needed_by_others
+        found[[number == first or not group for number, group in enumerate(groups)]] = -np.inf
+        return found
+
+    savings = np.array([saved(first) for first in range(len(groups))])
+    while savings.size and savings.max() > 0.0:
+        first, second = divmod(int(np.argmax(savings)), len(groups))
         groups[first] += groups[second]
         groups[second] = []
         marked[first] = np.maximum(marked[first], marked[second])
-        marked[second] = 0.0
-        counts[first], counts[second] = marked[first].sum(), 0.0
-        bytes_each[first] += bytes_each[second]
+        counts[first], sizes[first] = marked[first].sum(), sizes[first] + sizes[second]
         both[first] = both[:, first] = marked @ marked[first]
-        both[second] = both[:, second] = 0.0
-        saved[second] = saved[:, second] = -1.0
-        row = _saved(both[first][None], counts[first : first + 1], bytes_each[first : first + 1], counts, bytes_each)[0]
-        row[[not group for group in groups]] = -1.0
-        row[first] = -1.0
-        saved[first] = saved[:, first] = row
-    found: list[np.ndarray] = [np.empty(0)] * len(keys)
+        savings[second] = savings[:, second] = -np.inf
+        savings[first] = savings[:, first] = saved(first)
+    found = list(keys)
     for row, group in zip(marked, groups, strict=True):
-        own = np.flatnonzero(row)
         for channel in group:
-            found[channel] = own
+            found[channel] = np.flatnonzero(row)
     return found
-
-
-def _saved(
-    both: np.ndarray,
-    counts: np.ndarray,
-    widths: np.ndarray,
-    others: np.ndarray | None = None,
-    other_widths: np.ndarray | None = None,
-) -> np.ndarray:
-    """The bytes that each pair of channels needs less with all keys of both, given how many keys are in both."""
-    square = others is None
-    others, other_widths = (counts, widths) if others is None else (others, other_widths)
-    saved = TIME * both - widths[:, None] * (others[None] - both) - other_widths[None] * (counts[:, None] - both)
-    if square:
-        np.fill_diagonal(saved, -1.0)
-    return saved
 
 
 def _is_line(times: np.ndarray, values: np.ndarray, first: int, last: int, within: float) -> bool:
