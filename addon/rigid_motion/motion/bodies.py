@@ -18,7 +18,10 @@ SOME_TURN = 1e-12
 
 
 class Body:
-    """The recording of a body, and what it is measured by. Errors are weighted."""
+    """The recording of a body, and what it is measured by. Errors are weighted.
+
+    `truth` is where joints should be in the root's space, unless that is where their poses put them.
+    """
 
     def __init__(
         self,
@@ -29,12 +32,20 @@ class Body:
         radii: np.ndarray,
         weights: np.ndarray,
         free: np.ndarray,
+        truth: Poses | None = None,
     ) -> None:
         self.times, self.poses, self.skeleton, self.mode = times, poses, skeleton, mode
         self.radii, self.weights, self.free = radii, weights, free
-        with np.errstate(over="ignore", invalid="ignore"):
-            self.truth = skeleton.in_root_space(poses)
-        check_body(times, self.truth, ", in the root's space")
+        if truth is None:
+            with np.errstate(over="ignore", invalid="ignore"):
+                truth = skeleton.in_root_space(poses)
+            check_body(times, truth, ", in the root's space")
+        self.truth = truth
+
+    def with_poses(self, poses: Poses) -> Body:
+        """The same with others in the place of its poses, that are to be where those put it."""
+        skeleton, radii, weights, free = self.skeleton, self.radii, self.weights, self.free
+        return Body(self.times, poses, skeleton, self.mode, radii, weights, free, self.truth)
 
     def errors(self, shown: Poses, samples: np.ndarray | None = None) -> np.ndarray:
         """Of all joints (joints, m), where these poses (joints, m) in their parents' space are shown, at samples."""
@@ -56,6 +67,11 @@ class Body:
         """Samples that are looked at in one go."""
         step = max(1, AT_ONCE // len(self.skeleton))
         return [slice(first, first + step) for first in range(0, len(self.times), step)]
+
+    @cached_property
+    def off(self) -> np.ndarray:
+        """The errors of its own poses, shape (joints, n): zero, but for a truth of its own."""
+        return self.errors(self.poses)
 
     @cached_property
     def packed_truth(self) -> PackedPoses:

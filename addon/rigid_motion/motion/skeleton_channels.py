@@ -51,27 +51,18 @@ class SeparateKeys(NamedTuple):
 class Channels:
     """A body whose joints are taken apart where both channels of one change.
 
-    Raises
-    ------
-    ValueError
-        Where the mode does not allow it, or a joint's scale changes, which would be a third channel.
+    Parameters
+    ----------
+    whole : Body
+    turns, moves : array of bool, shape (joints,), optional
+        Which rotations and which locations change, where that is known of more than what is here.
     """
 
-    def __init__(self, whole: Body) -> None:
-        if not MODES[whole.mode].is_separable:
-            names = ", ".join(name for name, mode in MODES.items() if mode.is_separable)
-            raise ValueError(
-                f"separate=True needs a mode whose rotation and location do not depend on one another, {names}, and "
-                f"{whole.mode} is none"
-            )
+    def __init__(self, whole: Body, turns: np.ndarray | None = None, moves: np.ndarray | None = None) -> None:
         poses = whole.poses
-        if poses.scales is not None and (grows := changes(poses.scales)).any():
-            raise ValueError(
-                f"the scale of joint {int(np.argmax(grows))} changes, and separate=True has keys of rotation and "
-                "location alone: leave it out, for keys of whole poses"
-            )
         self.whole = whole
-        self.turns, self.moves = changes(poses.quaternions), changes(poses.positions)
+        self.turns = changes(poses.quaternions) if turns is None else turns
+        self.moves = changes(poses.positions) if moves is None else moves
         self.apart = np.flatnonzero(self.turns & self.moves & whole.free)
         """The joints that two nodes stand for: a joint's own number turns, and the others come behind all joints."""
 
@@ -101,8 +92,20 @@ class Channels:
         parents[apart] = len(poses) + np.arange(len(apart))
         radii, free = np.append(whole.radii, np.zeros(len(apart))), np.append(whole.free, np.ones(len(apart), bool))
         weights = np.concatenate((whole.weights, np.zeros(more)))
-        return Body(
-            whole.times, Poses(positions, quaternions, scales), Skeleton(parents), whole.mode, radii, weights, free
+        nodes = Poses(positions, quaternions, scales)
+        return Body(whole.times, nodes, Skeleton(parents), whole.mode, radii, weights, free, self._truth())
+
+    def _truth(self) -> Poses:
+        """Where nodes should be in the root's space: those that only translate are where their joints are."""
+        truth, above = self.whole.truth, self.whole.skeleton.parents[self.apart]
+        more = truth[self.apart]
+        scales = None
+        if truth.scales is not None:
+            scales = np.concatenate((truth.scales, np.where((above >= 0)[:, None], truth.scales[above], 1.0)))
+        return Poses(
+            np.concatenate((truth.positions, more.positions)),
+            np.concatenate((truth.quaternions, more.quaternions)),
+            scales,
         )
 
     def of_nodes(self, keys: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
@@ -125,3 +128,18 @@ class Channels:
 def changes(rows: np.ndarray) -> np.ndarray:
     """Which joints have anything but the same numbers at all samples, from (joints, n, ...), shape (joints,)."""
     return (rows != rows[:, :1]).reshape(len(rows), -1).any(axis=1)
+
+
+def check_separable(mode: str, poses: Poses) -> None:
+    """A ValueError where channels of joints (joints, n) cannot have keys of their own, or there are more than two."""
+    if not MODES[mode].is_separable:
+        names = ", ".join(name for name, row in MODES.items() if row.is_separable)
+        raise ValueError(
+            f"separate=True needs a mode whose rotation and location do not depend on one another, {names}, and {mode} "
+            "is none"
+        )
+    if poses.scales is not None and (grows := changes(poses.scales)).any():
+        raise ValueError(
+            f"the scale of joint {int(np.argmax(grows))} changes, and separate=True has keys of rotation and location "
+            "alone: leave it out, for keys of whole poses"
+        )

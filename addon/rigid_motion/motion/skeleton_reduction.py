@@ -18,19 +18,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .bodies import Body
-from .checks import check_body, check_flag, check_poses, check_wishes
+from .checks import check_body, check_flag, check_poses, check_wishes, whole_number
 from .key_budget import BudgetSearch
 from .key_costs import Recording
-from .key_search import Keys, Search
-from .modes import mode_named
-from .poses import LIMIT, PackedPoses, Poses, numbers, reshaped
+from .key_search import Search
+from .modes import MODES, mode_named
+from .poses import LIMIT, PackedPoses, Poses, numbers
 from .quaternions import align_signs
-from .skeleton_channels import Channels, SeparateKeys, changes
-from .skeleton_levels import Level
+from .skeleton_channels import Channels, SeparateKeys, check_separable
+from .skeleton_search import TINY, ChannelKeys, OwnKeys, that_move
+from .skeleton_stretches import LongRecording, Run, keys_in_stretches
 from .skeletons import Skeleton
-
-TINY = 1e-30
-"""Stands for a weight of zero."""
 
 BUDGET_STEPS = 9
 """Of a search for the tolerance that a budget of keys of their own can keep to."""
@@ -43,6 +41,9 @@ NARROW = 0.01
 
 DEEPEST = 1000
 """How many joints a joint with keys of its own may hang on: the work grows with the square of it."""
+
+SHORTEST_STRETCH = 2
+"""Samples from one shared key to the next."""
 
 LEAST = 12.0
 """How much smaller than that of a body at rest the tolerance may be, by its logarithm."""
@@ -62,6 +63,8 @@ def reduce_skeleton_keys(
     weights: ArrayLike | None = None,
     fixed: ArrayLike | None = None,
     tries: int = 2,
+    stretch: int | None = None,
+    run: Run = map,
 ) -> tuple[np.ndarray, ...] | tuple[SeparateKeys, ...]:
     """The fewest keys of a body's joints that keep every joint within a tolerance, or the best ones within a budget.
 
@@ -97,6 +100,12 @@ def reduce_skeleton_keys(
         Joints that stay as they are recorded: they are carried along, and what hangs on them is measured.
     tries : int
         With `shared`, as in `reduce_keys`.
+    stretch : int, optional
+        For long recordings, with a tolerance and in modes that are not smooth: all that moves has keys after so many
+        samples, or fewer, and what is between them is searched for itself. It takes the memory of one stretch, half the
+        time for ten minutes of mocap, and by 0.1 to 0.4 % more keys with 1000 to 2000 samples.
+    run : callable
+        What has stretches searched, called as `map` is: `ProcessPoolExecutor().map` has it done side by side.
 
     Returns
     -------
@@ -155,6 +164,19 @@ def reduce_skeleton_keys(
         raise ValueError("every joint has a weight of 0: nothing would matter")
     weights = np.broadcast_to(weights if weights.ndim == 2 else weights[:, None], poses.shape)
     free = ~_mask(fixed, len(skeleton))
+    if separate:
+        check_separable(mode, poses)
+    if stretch is not None:
+        _check_stretch(stretch, mode, shared, tolerance)
+    if not shared and len(times) > 1 and skeleton.depths.max() > DEEPEST:
+        joint = int(skeleton.depths.argmax())
+        raise ValueError(
+            f"joint {joint} hangs on {skeleton.depths[joint]} others, and keys of their own are searched for where it "
+            f"is {DEEPEST} at most: shared=True finds key poses for longer chains"
+        )
+    if stretch is not None and len(times) > stretch + 1:
+        recording = LongRecording(times, poses, skeleton, mode, radii, weights, free)
+        return keys_in_stretches(recording, tolerance, separate, stretch, run)
     poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
     body = Body(times, poses, skeleton, mode, radii, weights, free)
     channels = Channels(body) if separate else None
@@ -165,19 +187,26 @@ def reduce_skeleton_keys(
     if len(times) <= 1:
         keys = (np.arange(len(times)),) * len(skeleton)
         return tuple(SeparateKeys(own, own) for own in keys) if separate else keys
-    if not shared and skeleton.depths.max() > DEEPEST:
-        joint = int(skeleton.depths.argmax())
-        raise ValueError(
-            f"joint {joint} hangs on {skeleton.depths[joint]} others, and keys of their own are searched for where it "
-            f"is {DEEPEST} at most: shared=True finds key poses for longer chains"
-        )
     if shared:
         keys = _key_poses(body, tolerance, budget, tries)
         every = np.arange(len(times))
         return tuple(keys if moves else every for moves in free.tolist())
-    search = functools.partial(_OwnKeys, body) if channels is None else functools.partial(_ChannelKeys, channels)
+    search = functools.partial(OwnKeys, body) if channels is None else functools.partial(ChannelKeys, channels)
     keys = search(tolerance).found() if tolerance is not None else _own_keys_within(search, budget)
     return keys if channels is None else channels.of_joints(keys)
+
+
+def _check_stretch(stretch: int, mode: str, shared: bool, tolerance: float | None) -> None:
+    """A TypeError where a stretch is no number of samples, a ValueError where there can be none."""
+    if whole_number(stretch, "stretch") < SHORTEST_STRETCH:
+        raise ValueError(f"a stretch of {stretch} samples is too short: give {SHORTEST_STRETCH} or more")
+    if shared or tolerance is None:
+        raise ValueError("stretches are for keys of each joint's own within a tolerance: leave out shared and budget")
+    if MODES[mode].is_smooth:
+        raise ValueError(
+            f"{mode} is smooth, so that keys count beyond the segments next to them: leave out stretch, or take one of "
+            + ", ".join(name for name, row in MODES.items() if not row.is_smooth)
+        )
 
 
 def _key_poses(body: Body, tolerance: float | None, budget: int | None, tries: int) -> np.ndarray:
@@ -187,7 +216,7 @@ def _key_poses(body: Body, tolerance: float | None, budget: int | None, tries: i
     return Search(recording).within(tries) if tolerance is not None else BudgetSearch(recording, budget).least(tries)
 
 
-def _own_keys_within(search_for: Callable[[float], _OwnKeys], budget: int) -> tuple[np.ndarray, ...]:
+def _own_keys_within(search_for: Callable[[float], OwnKeys], budget: int) -> tuple[np.ndarray, ...]:
     """The keys with the smallest error among those of several tolerances that so many can keep to, and what is left."""
     best = search_for(math.inf)
     body = best.body
@@ -229,7 +258,7 @@ class _WholeBody(Recording):
 
     def __init__(self, body: Body, tolerance: float) -> None:
         # What stands still in its parent's space is the same between any keys.
-        moves = _moves(body.poses) & body.free
+        moves = that_move(body.poses) & body.free
         moves[0] |= not moves.any()
         super().__init__(body.times, body.poses[moves], body.mode, 0.0, tolerance)
         self.body, self.moving, self.everything = body, np.flatnonzero(moves), PackedPoses(body.poses)
@@ -238,171 +267,6 @@ class _WholeBody(Recording):
         everything = self.everything[samples]
         everything[self.moving] = shown
         return self.in_tolerances(self.body.errors(everything, samples).max(axis=0), samples)
-
-
-class _OwnKeys:
-    """The search for keys that each joint has of its own.
-
-    First every joint on a chain gets its share of the tolerance, for the largest displacement that its own error gives
-    to anything that hangs on it: by the triangle inequality that is enough. Errors of joints seldom add up, though, so
-    then keys are taken out for as long as the error in the root's space allows it: of all joints of a depth at once,
-    since these do not move one another, with what hangs on them and what they hang on as it is shown by then.
-    """
-
-    off_at_keys = False
-
-    def __init__(self, body: Body, tolerance: float) -> None:
-        self.body, self.tolerance, self.shown = body, tolerance, body.poses.copy()
-        every = np.arange(len(body.times))
-        self.keys = [body.middles[[joint]] if free else every for joint, free in enumerate(body.free.tolist())]
-
-    def found(self) -> tuple[np.ndarray, ...]:
-        self._share_out()
-        for joints in self.body.skeleton.levels:
-            self._take_out(joints)
-        self._prove()
-        return tuple(self.keys)
-
-    def spend(self, budget: int) -> None:
-        """Put keys in where errors are largest, one place after the other, as long as that makes them smaller."""
-        least = self.body.errors(self.shown).max()
-        while True:
-            errors = self.body.errors(self.shown)
-            keys, shown = list(self.keys), self.shown.copy()
-            self._put_back(np.argmax(errors, keepdims=False)[None])
-            count = sum(len(keys) for joint, keys in enumerate(self.keys) if self.body.free[joint])
-            error = self.body.errors(self.shown).max()
-            if count > budget or not error < least:
-                self.keys, self.shown = keys, shown
-                return
-            least = error
-
-    def _share_out(self) -> None:
-        """Keys of all joints, each within its share of the tolerance."""
-        body, count = self.body, len(self.body.times)
-        sizes, shares = self._sizes_and_shares()
-        rests = np.all(body.shell_errors(body.at_rest(), body.poses, sizes) <= shares, axis=1)
-        self.shown[rests & body.free] = body.at_rest()[rests & body.free]
-        moving = np.flatnonzero(~rests & body.free)
-        if len(moving):
-            times, starts = np.tile(body.times, len(moving)), count * np.arange(len(moving))
-            size, share = sizes[moving].ravel(), shares[moving].ravel()
-            search = Search(Recording(times, reshaped(body.poses[moving], -1), body.mode, size, share, starts))
-            self._take(moving, search.thinned(search.measured(np.arange(len(times))), 1.0))
-
-    def _sizes_and_shares(self) -> tuple[np.ndarray, np.ndarray]:
-        """How large what hangs on each joint is and how far it may be off by that joint, both (joints, n).
-
-        Both in the unit of the joint's parent. Joints that never move need no share.
-        """
-        body, skeleton = self.body, self.body.skeleton
-        moves = (_moves(body.poses) & body.free).astype(np.int64)
-        above, beneath = moves.copy(), moves.copy()
-        for joints in skeleton.levels[1:]:
-            above[joints] += above[skeleton.parents[joints]]
-        for joints in skeleton.levels[:0:-1]:
-            parents = skeleton.parents[joints]
-            np.maximum.at(beneath, parents, moves[parents] + beneath[joints])
-        weights = body.weights.copy()
-        for joints in skeleton.levels[:0:-1]:
-            np.maximum.at(weights, skeleton.parents[joints], weights[joints])
-        longest_chain = np.maximum(above + beneath - moves, 1)
-        shares = np.full(body.poses.shape, self.tolerance) / longest_chain[:, None]
-        shares /= np.maximum(weights, TINY)
-        if body.truth.scales is None:
-            return body.sizes, shares
-        on_joints = (skeleton.parents >= 0)[:, None]
-        return body.sizes / body.truth.scales, shares / np.where(on_joints, body.truth.scales[skeleton.parents], 1.0)
-
-    def _take(self, joints: np.ndarray, keys: Keys) -> None:
-        """Note and show the keys of joints that were tracks."""
-        count = len(self.body.times)
-        bounds = np.searchsorted(keys.indices, count * np.arange(len(joints) + 1))
-        for place, joint in enumerate(joints.tolist()):
-            self._show(joint, keys.indices[bounds[place] : bounds[place + 1]] - count * place)
-
-    def _show(self, joint: int, keys: np.ndarray) -> None:
-        self.keys[joint] = keys
-        self.shown[joint] = self.body.shown(joint, keys)
-
-    def _take_out(self, joints: np.ndarray) -> None:
-        """Take keys out of joints that do not hang on one another, as far as the error in the root's space allows."""
-        movable = [joint for joint in joints.tolist() if len(self.keys[joint]) > 1 and self.body.free[joint]]
-        joints = np.array(movable, dtype=np.int64)
-        if not len(joints):
-            return
-        level = self._level(joints)
-        rests = level.may_rest()
-        for joint in joints[rests].tolist():
-            self._show(joint, self.body.middles[[joint]])
-        joints = joints[~rests]
-        if len(joints):
-            count = len(self.body.times)
-            search = Search(self._level(joints) if rests.any() else level)
-            tracks = [count * place + self.keys[joint] for place, joint in enumerate(joints.tolist())]
-            self._take(joints, search.refined(search.thinned(search.measured(np.concatenate(tracks)), 1.0)))
-
-    def _level(self, joints: np.ndarray) -> Level:
-        return Level(self.body, joints, self.shown, self.tolerance, self.off_at_keys)
-
-    def _prove(self) -> None:
-        """Put keys back where errors are over the tolerance after all, which takes more than rounding to happen."""
-        allowed, many = self.tolerance * (1.0 + 1e-9), 1
-        while True:
-            # What rests all over is in one place.
-            rests = all(len(keys) == 1 for keys in self.keys)
-            errors = self.body.errors(self.body.at_rest() if rests else self.shown)
-            errors[self._keyed()] = 0.0  # Whatever is left there is rounding, and may be more than a tiny tolerance.
-            over = np.flatnonzero(errors > allowed)
-            if not len(over):
-                return
-            worst = over[np.argsort(-errors.flat[over], kind="stable")[:many]]
-            self._put_back(worst)
-            many *= 2
-
-    def _keyed(self) -> np.ndarray:
-        """Where joints and all that they hang on have keys, shape (joints, n)."""
-        keyed = np.zeros(self.body.poses.shape, dtype=bool)
-        for joint, keys in enumerate(self.keys):
-            keyed[joint, keys] = True
-        for joints in self.body.skeleton.levels[1:]:
-            keyed[joints] &= keyed[self.body.skeleton.parents[joints]]
-        return keyed
-
-    def _put_back(self, numbers: np.ndarray) -> None:
-        """Keys at these of all joints' samples (joints * n,), also for what the joints hang on."""
-        wanted = np.zeros(self.body.poses.shape, dtype=bool)
-        wanted.flat[numbers] = True
-        for joints in self.body.skeleton.levels[:0:-1]:
-            np.logical_or.at(wanted, self.body.skeleton.parents[joints], wanted[joints])
-        for joint in np.flatnonzero(wanted.any(axis=1) & self.body.free).tolist():
-            ends = (0, len(self.body.times) - 1)
-            self._show(joint, np.union1d(self.keys[joint], (*ends, *np.flatnonzero(wanted[joint]))))
-
-
-class _ChannelKeys(_OwnKeys):
-    """The same for rotations and locations: from the keys of joints, which both begin with, more are taken out.
-
-    So there are never more of them. As one channel's keys go the other's stay, and what is off at them by the other
-    counts: without that, the proof would put many back.
-    """
-
-    off_at_keys = True
-
-    def __init__(self, channels: Channels, tolerance: float) -> None:
-        super().__init__(channels.body, tolerance)
-        self.channels = channels
-
-    def _share_out(self) -> None:
-        whole = _OwnKeys(self.channels.whole, self.tolerance).found()
-        for node, keys in enumerate(self.channels.of_nodes(whole)):
-            self._show(node, keys)
-
-
-def _moves(poses: Poses) -> np.ndarray:
-    """Which joints (joints, n) ever change in their parents' space, shape (joints,)."""
-    numbers = [poses.positions, poses.quaternions] + ([] if poses.scales is None else [poses.scales])
-    return np.any([changes(rows) for rows in numbers], axis=0)
 
 
 def _mask(fixed: ArrayLike | None, joints: int) -> np.ndarray:

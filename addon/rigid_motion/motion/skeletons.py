@@ -112,6 +112,23 @@ class Skeleton:
         first, order = self._places
         return np.sort(order[first[joint] : first[joint] + self.sizes[joint]])
 
+    def longest_chains(self, counts: np.ndarray) -> np.ndarray:
+        """Return the largest sum of counts (joints,) on any chain from a root to an end through each joint."""
+        above, beneath = counts.copy(), counts.copy()
+        for joints in self.levels[1:]:
+            above[joints] += above[self.parents[joints]]
+        for joints in self.levels[:0:-1]:
+            parents = self.parents[joints]
+            np.maximum.at(beneath, parents, counts[parents] + beneath[joints])
+        return above + beneath - counts
+
+    def most_below(self, numbers: np.ndarray) -> np.ndarray:
+        """Return the largest of the numbers (joints, ...) of each joint and all that hang on it."""
+        most = numbers.copy()
+        for joints in self.levels[:0:-1]:
+            np.maximum.at(most, self.parents[joints], most[joints])
+        return most
+
     def in_root_space(self, poses: Poses) -> Poses:
         """Where joints are that have these poses in their parents' space.
 

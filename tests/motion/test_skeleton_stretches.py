@@ -1,0 +1,152 @@
+"""Long recordings of bodies in stretches: what they promise, recomputed apart from the program."""
+
+from __future__ import annotations
+
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rigid_motion.motion import MODES, Poses, reduce_skeleton_keys
+from rigid_motion_batch.recordings import read_trajectories
+from tests.motion.bodies import body_errors, in_root_space, wandering_body
+from tests.motion.test_skeleton_channels import channel_errors, numbers_in
+from tests.motion.test_skeleton_reduction import BODIES
+from tests.thoroughness import tried
+
+
+def as_lists(keys: tuple) -> list:
+    """Keys of joints or of their channels, for comparing."""
+    return [own.tolist() if isinstance(own, np.ndarray) else [some.tolist() for some in own] for own in keys]
+
+
+STRAIGHT = tuple(name for name, mode in MODES.items() if not mode.is_smooth)
+TWO_WAYS = pytest.mark.parametrize("separate", [False, True])
+
+
+@settings(max_examples=tried(60))
+@given(
+    st.integers(3, 150),
+    st.integers(1, 10),
+    st.integers(0, 2**16),
+    st.booleans(),
+    st.sampled_from((1e-5, 1e-3, 0.02, 0.3)),
+    st.integers(2, 60),
+    st.sampled_from((None, *STRAIGHT)),
+)
+def test_every_joint_stays_within_the_tolerance_everywhere(count, joints, seed, scaled, tolerance, stretch, mode):
+    """Without a mode, rotations and locations are apart."""
+    random = np.random.default_rng(seed)
+    times, poses, parents = wandering_body(count, joints, seed, scaled=scaled, noise=(0.0, 1e-3)[seed % 2])
+    if mode is None and scaled:
+        poses = Poses(poses.positions, poses.quaternions, poses.scales[:, :1].repeat(count, axis=1))
+    radii, weights = random.choice((0.0, 0.03, 0.5), joints), random.choice((0.0, 0.5, 1.0, 2.0), (joints, count))
+    weights[:, : count // 2] = weights[:, :1]
+    weights[random.integers(joints), random.integers(count)] = 1.0
+    fixed = random.random(joints) < 0.2
+    options = {"tolerance": tolerance, "radius": radii, "weights": weights, "stretch": stretch, "fixed": fixed}
+    if mode is None:
+        found = reduce_skeleton_keys(times, poses, parents, "lerp_slerp", separate=True, **options)
+        errors = channel_errors(times, poses, parents, found, radii)
+        keys = [own for channels in found for own in channels]
+    else:
+        keys = reduce_skeleton_keys(times, poses, parents, mode, **options)
+        errors = body_errors(times, poses, parents, keys, mode, radii)
+        assert [len(own) == count for own, stays in zip(keys, fixed, strict=True) if stays] == [True] * sum(fixed)
+    rounding = 1e-13 * max(1.0, float(np.abs(in_root_space(poses, parents)).max()))
+    assert (weights * errors).max() <= tolerance * (1.0 + 1e-9) + 2.0 * rounding
+    for own in keys:
+        assert len(own) == 1 or (own[0], own[-1]) == (0, count - 1)
+        assert len(own) == 1 or (np.diff(own).min() > 0 and np.diff(own).max() <= stretch)
+
+
+@TWO_WAYS
+def test_stretches_cost_few_keys(separate):
+    """0.6 and, of channels, 0.9 % more, with five stretches, in the mean of six bodies."""
+    more = []
+    for seed in range(3):
+        times, poses, parents = wandering_body(600, 6, seed)
+        options = {"mode": "lerp_slerp", "tolerance": 0.005, "separate": separate}
+        whole, parts = (
+            reduce_skeleton_keys(times, poses, parents, stretch=stretch, **options) for stretch in (None, 120)
+        )
+        counted = numbers_in if separate else lambda keys: sum(map(len, keys))
+        more.append(counted(parts) / counted(whole))
+    assert np.mean(more) < 1.03
+
+
+@pytest.mark.recordings
+@TWO_WAYS
+def test_a_real_body_in_stretches_has_few_more_keys(separate):
+    (body,) = read_trajectories(str(BODIES["cmu_01_01"])).trajectories
+    options = {"mode": "lerp_slerp", "tolerance": 0.1, "radius": 0.5, "separate": separate}
+    whole, parts = (
+        reduce_skeleton_keys(body.times, body.poses, body.figure.parents, stretch=stretch, **options)
+        for stretch in (None, 1000)
+    )
+    counted = numbers_in if separate else lambda keys: sum(map(len, keys))
+    assert counted(parts) < 1.03 * counted(whole)
+
+
+@TWO_WAYS
+def test_what_trembles_below_the_tolerance_rests_from_beginning_to_end(separate):
+    times, poses, parents = wandering_body(200, 5, 3, resting=0.0)
+    trembling = poses.positions[:, :1] + np.random.default_rng(5).uniform(-1e-5, 1e-5, poses.positions.shape)
+    poses.quaternions[:2] = poses.quaternions[:2, :1]
+    poses = Poses(trembling, poses.quaternions)
+    keys = reduce_skeleton_keys(times, poses, parents, "lerp_slerp", tolerance=0.002, separate=separate, stretch=50)
+    if separate:
+        assert [len(own.location) for own in keys] == [1] * 5
+        keys = [own.rotation for own in keys]
+    assert [len(own) == 1 for own in keys] == [True, True, False, False, False]
+
+
+@TWO_WAYS
+def test_what_does_not_move_in_one_stretch_has_keys_at_its_ends(separate):
+    times, poses, parents = wandering_body(121, 3, 1, resting=0.0)
+    poses.positions[:, 40:81], poses.quaternions[:, 40:81] = poses.positions[:, 40:41], poses.quaternions[:, 40:41]
+    keys = reduce_skeleton_keys(times, poses, parents, "lerp_slerp", tolerance=0.002, separate=separate, stretch=40)
+    for own in [own for channels in keys for own in channels] if separate else keys:
+        assert own[(own >= 40) & (own <= 80)].tolist() == [40, 80]
+
+
+@TWO_WAYS
+def test_stretches_side_by_side_are_those_one_by_one(separate):
+    body = wandering_body(200, 5, 4)
+    options = {"mode": "lerp_slerp", "tolerance": 0.002, "separate": separate, "stretch": 60}
+    here = as_lists(reduce_skeleton_keys(*body, **options))
+    with ThreadPoolExecutor(2) as pool:
+        assert as_lists(reduce_skeleton_keys(*body, **options, run=pool.map)) == here
+
+    def elsewhere(function, arguments):
+        return map(*(pickle.loads(pickle.dumps(one)) for one in (function, list(arguments))))
+
+    assert as_lists(reduce_skeleton_keys(*body, **options, run=elsewhere)) == here
+
+
+@TWO_WAYS
+def test_what_is_not_longer_than_a_stretch_is_searched_as_without(separate):
+    body = wandering_body(60, 4, 6)
+    options = {"mode": "lerp_slerp", "tolerance": 0.002, "separate": separate}
+    here, there = (reduce_skeleton_keys(*body, **options, stretch=stretch) for stretch in (None, 59))
+    assert as_lists(here) == as_lists(there)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({"mode": "motor_spline"}, ValueError, "motor_spline is smooth, .* take one of lerp_slerp, dq_sclerp"),
+        ({"shared": True}, ValueError, "leave out shared and budget"),
+        ({"tolerance": None, "budget": 50}, ValueError, "leave out shared and budget"),
+        ({"stretch": 1}, ValueError, "a stretch of 1 samples is too short: give 2 or more"),
+        ({"stretch": 2.5}, TypeError, "stretch is 2.5: give a whole number"),
+    ],
+)
+def test_what_stretches_cannot_do_is_refused(options, error, message):
+    times, poses, parents = wandering_body(20, 3, 1)
+    given = {"times": times, "poses": poses, "parents": parents, "mode": "lerp_slerp", "tolerance": 0.1, "stretch": 5}
+    with pytest.raises(error, match=message):
+        reduce_skeleton_keys(**{**given, **options})
