@@ -244,9 +244,8 @@ class ClipReduction:
             return tracks
         if not tracks:
             first = self.clip.tracks[0]
-            tracks = [
-                stored(replace(first, interpolation=LINEAR, times=ends[:1], values=first.at(ends[:1])), integers=False)
-            ]
+            still = replace(first, interpolation=LINEAR, times=ends[:1], values=first.at(ends[:1]))
+            tracks = [stored(still, integers=False)]
         number = min(range(len(tracks)), key=lambda number: len(tracks[number].times))
         integers = tracks[number].values.dtype.kind == "i"
         track = shown(self._of_channel[tracks[number].channel], tracks[number])

@@ -101,7 +101,7 @@ class _Settling:
         return OF_SCALES * self.tolerance / self.world.reaches[self.place] * float(np.abs(self.values).max())
 
     def _is_at(self, value: np.ndarray) -> bool:
-        if self.track.path == WEIGHTS or self.track.interpolation == STEP:
+        if self.track.path == WEIGHTS:
             return bool(np.all(self.values == value))
         return float(self._displacements(value).max()) <= NOISE * self.tolerance
 

@@ -10,7 +10,7 @@ import numpy as np
 from .accessors import denormalised, stored_size
 from .documents import Document
 from .rewriting import StoredTrack
-from .tracks import CUBICSPLINE, ROTATION, TO_WXYZ, TO_XYZW, WEIGHTS, Clip, Track
+from .tracks import LINEAR, ROTATION, TO_WXYZ, TO_XYZW, WEIGHTS, Clip, Track
 
 INTEGER = np.iinfo(np.int16).max
 """What stands for 1 where 16-bit integers are normalised."""
@@ -31,7 +31,7 @@ class Amount:
 
 
 def stored(track: Track, *, integers: bool) -> StoredTrack:
-    """A track as it is stored; rotations as normalised 16-bit integers where these are asked for."""
+    """A track without tangents as it is stored; rotations as normalised 16-bit integers where these are asked for."""
     values = track.values[..., TO_XYZW] if track.path == ROTATION else track.values
     values = values.reshape(-1, 1 if track.path == WEIGHTS else values.shape[-1])
     if integers and is_integral(track):
@@ -43,13 +43,13 @@ def stored(track: Track, *, integers: bool) -> StoredTrack:
 
 def is_integral(track: Track) -> bool:
     """Whether a track may be stored as integers."""
-    return track.path == ROTATION and track.interpolation != CUBICSPLINE
+    return track.path == ROTATION and track.interpolation == LINEAR
 
 
 def shown(track: Track, stored: StoredTrack) -> Track:
     """What is shown by a track as it is stored."""
     values = denormalised(stored.values) if stored.values.dtype.kind == "i" else stored.values.astype(np.float64)
-    values = values.reshape(len(stored.times), *track.values.shape[1:])
+    values = values.reshape(len(stored.times), -1)
     if track.path == ROTATION:
         values = values[..., TO_WXYZ]
     return replace(track, interpolation=stored.interpolation, times=stored.times.astype(np.float64), values=values)
