@@ -104,7 +104,7 @@ def turns(times: np.ndarray, seed: int, wide: float = 0.6) -> np.ndarray:
 
 
 def walk(joints: int = 6, seconds: float = 2.0, rate: float = 30.0, unit: float = 1.0) -> Making:
-    """A chain of joints that swing, the first of which goes along, with a skin and constant channels as exporters have."""
+    """A chain of joints that swing, the first of which goes along, with a skin, and with constant channels too."""
     made, times = Making(), np.arange(round(seconds * rate) + 1) / rate
     made.json["nodes"] = [
         {"name": f"Joint{joint}", "translation": [0.0, 0.3 * unit, 0.0], "children": [joint + 1]}

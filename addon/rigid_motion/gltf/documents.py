@@ -13,6 +13,8 @@ import math
 import re
 import struct
 from binascii import Error as NotBase64
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
@@ -39,6 +41,15 @@ class GltfError(ValueError):
     def __init__(self, problem: str, way_out: str = AGAIN) -> None:
         super().__init__(f"{problem}; {way_out}")
         self.problem, self.way_out = problem, way_out
+
+
+@contextmanager
+def damage_refused() -> Iterator[None]:
+    """What is read of a document in the block may have any type: where that leads to, a `GltfError` says so."""
+    try:
+        yield
+    except (AttributeError, IndexError, KeyError, OverflowError, TypeError) as error:
+        raise GltfError(f"this glTF is damaged ({' '.join(str(error).split())[:80]})") from error
 
 
 @dataclass(frozen=True, eq=False)

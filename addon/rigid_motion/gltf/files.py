@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from .clips import ClipReduction, ReducedClip, Wishes
-from .documents import Document, GltfError, read_document
+from .documents import Document, GltfError, damage_refused, read_document
 from .nodes import Nodes
 from .rewriting import rewritten
 from .sizes import OF_A_BODY, OF_KEY_POSES, joints_of, radii_of, size_of
@@ -65,12 +65,14 @@ def reduced(
     GltfError
         For what is damaged, and where the tolerance makes no sense.
     """
-    clips = read_clips(document)
+    with damage_refused():
+        clips, nodes = read_clips(document), Nodes(document)
+        joints = set(itertools.chain.from_iterable(joints_of(document)))
+        moved = _moved(nodes, clips)
+        size = size_of(nodes, moved)
+        radii = np.full(len(moved), radius) if radius is not None else radii_of(nodes, moved, size)
     if not any(clip.tracks for clip in clips):
         raise GltfError("no animation moves a node", "export it with its animations")
-    nodes = Nodes(document)
-    moved = _moved(nodes, clips)
-    size = size_of(nodes, moved)
     if tolerance is None:
         tolerance = (OF_KEY_POSES if shared else OF_A_BODY) * size or SOME
     elif tolerance > MOST * size > 0.0:
@@ -78,8 +80,6 @@ def reduced(
             f"a tolerance of {tolerance:.3g} m is more than a tenth of the size, which is {size:.3g} m in this file",
             f"give one below {MOST * size:.2g} m",
         )
-    radii = np.full(len(moved), radius) if radius is not None else radii_of(nodes, moved, size)
-    joints = set(itertools.chain.from_iterable(joints_of(document)))
     wishes = Wishes(tolerance, shared, count)
     found = []
     for clip in clips:
@@ -87,7 +87,8 @@ def reduced(
             own = np.isin(moved, _moved(nodes, (clip,)))
             found.append(ClipReduction(nodes, clip, moved[own], radii[own], joints, size, wishes).reduced())
     tracks = {clip.number: clip.tracks for clip in found if clip.tracks is not None}
-    return Report(size, tolerance, tuple(found), rewritten(document, tracks) if tracks else document)
+    with damage_refused():
+        return Report(size, tolerance, tuple(found), rewritten(document, tracks) if tracks else document)
 
 
 def reduce_file(

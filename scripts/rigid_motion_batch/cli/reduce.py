@@ -106,6 +106,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     )
     keys.add_argument(
         "--keys",
+        "--key-poses",
         type=_count,
         metavar="N",
         help="instead of a tolerance: N keys of each object, or N key poses of each rig, where the error is smallest",

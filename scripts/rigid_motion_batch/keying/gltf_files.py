@@ -17,6 +17,7 @@ from .wishes import Wishes, doubt, fewer, off
 ENDINGS = (".glb", ".gltf")
 
 MILLIMETRES = 1e3
+"""In a metre."""
 
 
 class GltfRun:
@@ -49,13 +50,17 @@ class GltfRun:
         try:
             document = _read(job.source)
             tolerance = None if wishes.tolerance is None else wishes.tolerance.metres(1.0)
-            report = reduced(document, tolerance=tolerance, radius=wishes.radius)
+            report = reduced(
+                document, tolerance=tolerance, radius=wishes.radius, shared=wishes.shared, count=wishes.count
+            )
         except GltfError as error:
             raise Unreadable(str(error)) from None
         self._stop_if_asked()
         length = wishes.tolerance or Tolerance(f"{MILLIMETRES * report.tolerance:.6f}mm")
         for clip in report.clips:
-            self._note(f"{job.source}: {clip.name}: {_told(clip, length, self._would)}")
+            self._note(
+                f"{job.source}: {clip.name}: {_told(clip, length, self._would, by_number=wishes.count is not None)}"
+            )
         size = f"{report.size:.3g} m large"
         self._note(f"{job.source}: {size}{doubt(report.size, wishes.tolerance, 1.0)}")
         outcome.clips += sum(clip.tracks is not None for clip in report.clips)
@@ -94,12 +99,12 @@ def _read(path: Path) -> Document:
         raise Unreadable(f"this cannot be read ({error.strerror}): see to its path, and who may read it") from None
 
 
-def _told(clip: ReducedClip, tolerance: Tolerance, would: str) -> str:
+def _told(clip: ReducedClip, tolerance: Tolerance, would: str, *, by_number: bool) -> str:
     """What became of a clip."""
     if clip.tracks is None:
         return f"stays as it was, {clip.before.keys} keys in {clip.before.size} bytes: {clip.reason}"
     told = f"{would}reduced{fewer(clip.before.keys, clip.after.keys)}, {clip.before.size} -> {clip.after.size} bytes"
-    told += off(tolerance, clip.error, 1.0, by_number=False)
+    told += off(tolerance, clip.error, 1.0, by_number=by_number)
     if clip.slides[0] > 0.0:
         before, after = (tolerance.alike(slide, 1.0) for slide in clip.slides)
         told += f"; feet slide {after}, and {before} before"
