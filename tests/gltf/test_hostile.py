@@ -109,8 +109,8 @@ def test_json_that_is_none_or_too_much_is_refused(tmp_path, capsys, monkeypatch)
         ('{"nodes": NaN}', "this is no glTF (its JSON cannot be read: NaN is no number)"),
     ):
         assert line in refusal(changed(path, lambda _: None, text), capsys)
-    monkeypatch.setattr(documents, "MOST_JSON", 1000)
-    assert "MB of JSON are more than the" in refusal(changed(path, lambda _: None), capsys)
+    monkeypatch.setattr(documents, "MOST_VALUES", 100)
+    assert "values of JSON are more than the 100 that are read" in refusal(changed(path, lambda _: None), capsys)
 
 
 def test_chunks_that_lie_are_refused(tmp_path, capsys):

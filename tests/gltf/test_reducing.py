@@ -147,6 +147,22 @@ def test_weights_of_morph_targets_keep_to_half_a_percent(tmp_path):
     assert np.abs(np.transpose(found) - weights).max() <= 0.005 + ROUNDING
 
 
+def test_vertices_of_skins_are_measured(tmp_path):
+    made, random = walk(), np.random.default_rng(2)
+    places = random.normal(size=(50, 3)).astype("<f4")
+    joints, shares = random.integers(0, 6, size=(50, 4)).astype("u1"), random.uniform(size=(50, 4)).astype("<f4")
+    shares /= shares.sum(axis=1, keepdims=True)
+    attributes = {"POSITION": places, "JOINTS_0": joints, "WEIGHTS_0": shares}
+    numbers = {name: made.accessor(values) for name, values in attributes.items()}
+    made.json["meshes"] = [{"primitives": [{"attributes": numbers}]}]
+    made.json["nodes"].append({"mesh": 0, "skin": 0})
+    before, after, report = both(made, tmp_path, 5e-3, vertices=True)
+    times = np.union1d(before.moments(0), after.moments(0))
+    moved = after.worlds(0, times)[:6] - before.worlds(0, times)[:6]
+    moved = np.einsum("vk,vkmab,vb->mva", shares, moved[joints], np.column_stack((places, np.ones(50))))
+    assert report.clips[0].vertices == pytest.approx(np.linalg.norm(moved[..., :3], axis=-1).max(), rel=1e-4)
+
+
 def test_sparse_strided_normalised_and_scattered_accessors_are_read(tmp_path):
     made = walk()
     made.buffers += [bytearray(), bytearray()]

@@ -20,6 +20,7 @@ from .settling import moments, settled
 from .storing import Amount, amount, amount_before, key_size, shown, stored
 from .thinning import shared_times
 from .tracks import LINEAR, ROTATION, TRANSLATION, Clip, Track
+from .vertices import largest_displacement
 
 OF_INTEGERS = 0.25
 """The share of the tolerance that rotations may take that are stored as 16-bit integers."""
@@ -55,6 +56,9 @@ class Wishes:
     count: int | None = None
     """So many key poses of all nodes, whatever they are off by."""
 
+    vertices: bool = False
+    """Whether vertices of skins are measured."""
+
 
 @dataclass(frozen=True, eq=False)
 class ReducedClip:
@@ -75,6 +79,9 @@ class ReducedClip:
 
     slides: tuple[float, float] = (0.0, 0.0)
     """How far joints slide that stand on the ground, before and after."""
+
+    vertices: float | None = None
+    """The largest displacement of any vertex of a skin, where that was asked for and there is one."""
 
 
 class ClipReduction:
@@ -132,8 +139,10 @@ class ClipReduction:
         after = amount(tracks)
         if after.size >= self.before.size:
             return self._kept(LARGER)
-        slides = self._slides(self._shown(tracks))
-        return ReducedClip(self.clip.number, self.clip.name, tuple(tracks), "", self.before, after, error, slides)
+        shown_tracks = self._shown(tracks)
+        off = largest_displacement(self.world, shown_tracks) if self.wishes.vertices else None
+        slides, name = self._slides(shown_tracks), self.clip.name
+        return ReducedClip(self.clip.number, name, tuple(tracks), "", self.before, after, error, slides, off)
 
     def _kept(self, reason: str) -> ReducedClip:
         return ReducedClip(self.clip.number, self.clip.name, None, reason, self.before, self.before)

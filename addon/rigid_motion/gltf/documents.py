@@ -22,8 +22,8 @@ from urllib.parse import quote, unquote
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = b"glTF", b"JSON", b"BIN\0"
 
-MOST_JSON = 2**26
-"""Bytes of JSON that are read: a hundred times as many as a body of thousands of joints has."""
+MOST_VALUES = 2**22
+"""In the JSON that is read: a hundred times as many as a body of thousands of joints has."""
 
 MOST_BYTES = 2**32 - 1
 """Of a GLB, which counts them in 32 bits."""
@@ -162,9 +162,10 @@ def chunks_of(content: bytes) -> tuple[tuple[bytes, bytes], ...]:
 
 def parsed(text: bytes) -> Json:
     """The JSON of a document, which is an object."""
-    if len(text) > MOST_JSON:
+    values = sum(map(text.count, (b",", b"[", b"{")))
+    if values > MOST_VALUES:
         raise GltfError(
-            f"{len(text) >> 20} MB of JSON are more than the {MOST_JSON >> 20} that are read",
+            f"{values} values of JSON are more than the {MOST_VALUES} that are read",
             "export the body without the rest of its scene",
         )
     try:

@@ -45,6 +45,7 @@ def reduced(
     radius: float | None = None,
     shared: bool = False,
     count: int | None = None,
+    vertices: bool = False,
 ) -> Report:
     """A document with fewer keys in all of its clips.
 
@@ -59,6 +60,8 @@ def reduced(
         Whether all nodes of a clip get their keys at the same times.
     count : int, optional
         So many key poses of each clip instead of a tolerance.
+    vertices : bool
+        Whether the largest displacement of any vertex of a skin is measured.
 
     Raises
     ------
@@ -80,7 +83,7 @@ def reduced(
             f"a tolerance of {tolerance:.3g} m is more than a tenth of the size, which is {size:.3g} m in this file",
             f"give one below {MOST * size:.2g} m",
         )
-    wishes = Wishes(tolerance, shared, count)
+    wishes = Wishes(tolerance, shared, count, vertices)
     found = []
     for clip in clips:
         if clip.tracks:
@@ -99,12 +102,15 @@ def reduce_file(
     radius: float | None = None,
     shared: bool = False,
     count: int | None = None,
+    vertices: bool = False,
 ) -> Report:
     """Write a .glb or .gltf file with fewer keys, and the file of its buffer beside a .gltf: see `reduced`.
 
     What is at the place of the output is replaced once all is written. Files that a .gltf names are not copied.
     """
-    report = reduced(read_document(path), tolerance=tolerance, radius=radius, shared=shared, count=count)
+    report = reduced(
+        read_document(path), tolerance=tolerance, radius=radius, shared=shared, count=count, vertices=vertices
+    )
     for name, content in report.document.files(output.name).items():
         beside = output.with_name(f".{secrets.token_hex(4)}{output.suffix}")
         try:

@@ -136,12 +136,22 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         "--axes", type=str.lower, choices=AXES, help="axes of the recordings (opengl for BVH, blender for others)"
     )
     add_reading_options(parser)
+    gltf = parser.add_argument_group("glTF files")
+    gltf.add_argument(
+        "--vertices", action="store_true", help="also measure how far any vertex of a skin is off, which takes a while"
+    )
     add_file_options(parser)
     options = parser.parse_args(arguments)
     files, recorded = _sorted(options.inputs, blend=options.blend)
     gltf = [file for file in files if _is_gltf(file)]
     options.wishes = Wishes(
-        options.mode or MODE, options.tolerance, options.radius, options.shared, options.discard, options.keys
+        options.mode or MODE,
+        options.tolerance,
+        options.radius,
+        options.shared,
+        options.discard,
+        options.keys,
+        options.vertices,
     )
     try:
         refuse_odd_places(options)

@@ -51,7 +51,12 @@ class GltfRun:
             document = _read(job.source)
             tolerance = None if wishes.tolerance is None else wishes.tolerance.metres(1.0)
             report = reduced(
-                document, tolerance=tolerance, radius=wishes.radius, shared=wishes.shared, count=wishes.count
+                document,
+                tolerance=tolerance,
+                radius=wishes.radius,
+                shared=wishes.shared,
+                count=wishes.count,
+                vertices=wishes.vertices,
             )
         except GltfError as error:
             raise Unreadable(str(error)) from None
@@ -105,6 +110,8 @@ def _told(clip: ReducedClip, tolerance: Tolerance, would: str, *, by_number: boo
         return f"stays as it was, {clip.before.keys} keys in {clip.before.size} bytes: {clip.reason}"
     told = f"{would}reduced{fewer(clip.before.keys, clip.after.keys)}, {clip.before.size} -> {clip.after.size} bytes"
     told += off(tolerance, clip.error, 1.0, by_number=by_number)
+    if clip.vertices is not None:
+        told += f"; vertices {tolerance.alike(clip.vertices, 1.0)} at most"
     if clip.slides[0] > 0.0:
         before, after = (tolerance.alike(slide, 1.0) for slide in clip.slides)
         told += f"; feet slide {after}, and {before} before"

@@ -28,6 +28,9 @@ class Wishes:
     count: int | None = None
     """So many keys of each object, or key poses of each rig, instead of a tolerance."""
 
+    vertices: bool = False
+    """Whether the vertices of skins are measured, in glTF files."""
+
 
 def doubt(size: float, tolerance: Tolerance | None, per_unit: float) -> str:
     """What to think of where a tolerance is in metres, and a body of this size in metres hardly is; mostly nothing."""
