@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..motion import SeparateKeys
-from ..motion.contacts import slide, standing
 from .errors import PARTS, World
+from .feet import Feet
 from .nodes import Nodes, Tracks, by_target
 from .rewriting import StoredTrack
 from .search import Search
@@ -28,13 +28,10 @@ OF_INTEGERS = 0.25
 MORE_SLIDE = 0.001 / 1.7
 """How much farther feet may slide than before, of the size of the body: a millimetre of a grown-up."""
 
-MORE_WEIGHT = 2.0
-"""How many times more errors of standing joints count, where they slide too far."""
+TIGHTER = 0.7
+"""How much smaller the tolerance of the next search is, where no keys that are put back help."""
 
-TRIES = 6
-"""Searches, each with a smaller tolerance or a larger weight of standing joints than the one before."""
-
-ROUNDS = 8
+ROUNDS = 12
 """How often keys are put back where the proof fails."""
 
 LEAST = 0.1
@@ -126,9 +123,7 @@ class ClipReduction:
             if (track.node, track.path) not in found
         }
         """The tracks that are to have fewer keys, with a key at every moment."""
-        feet = np.flatnonzero(np.isin(moving, list(joints)))
-        self.feet = feet if len(times) > 1 else feet[:0]
-        self.stands = standing(times, _upright(self.world.positions[self.feet])) if len(self.feet) else None
+        self.feet = Feet(self.world, joints)
 
     def reduced(self) -> ReducedClip:
         """The clip with fewer keys, or as it was."""
@@ -141,7 +136,7 @@ class ClipReduction:
             return self._kept(LARGER)
         shown_tracks = self._shown(tracks)
         off = largest_displacement(self.world, shown_tracks) if self.wishes.vertices else None
-        slides, name = self._slides(shown_tracks), self.clip.name
+        slides, name = self.feet.slides(shown_tracks), self.clip.name
         return ReducedClip(self.clip.number, name, tuple(tracks), "", self.before, after, error, slides, off)
 
     def _kept(self, reason: str) -> ReducedClip:
@@ -158,23 +153,13 @@ class ClipReduction:
 
     def _own_keys(self) -> tuple[list[StoredTrack], float] | None:
         """Tracks with keys of their own that keep to the tolerance, and the largest error; None where none do."""
-        tolerance, shape = self.wishes.tolerance, (len(self.world.moving), len(self.world.times))
         search, integers, taken = self._search(), *self._storing()
-        allowed, weight = tolerance - taken, 1.0
-        for _ in range(TRIES):
-            if allowed < LEAST * tolerance:
-                break
-            weights = np.ones(shape)
-            if self.stands is not None:
-                weights[self.feet] += (weight - 1.0) * self.stands
-            tracks, error = self._proven(self._samples(search.keys(allowed, weights)), integers=integers)
-            before, after = self._slides(self._shown(tracks))
-            if error > tolerance:
-                allowed -= error - tolerance
-            elif after > before + MORE_SLIDE * self.size:
-                weight *= MORE_WEIGHT
-            else:
-                return tracks, error
+        allowed = self.wishes.tolerance - taken
+        while allowed > LEAST * self.wishes.tolerance:
+            found = self._proven(self._samples(search.keys(allowed)), integers=integers)
+            if found is not None:
+                return found
+            allowed *= TIGHTER
         return None
 
     def _search(self) -> Search:
@@ -197,17 +182,24 @@ class ClipReduction:
         of_nodes = [(path, keys[self.world.places[node]]) for node, path in self.dense]
         return [own.rotation if path == ROTATION else own.location for path, own in of_nodes]
 
-    def _proven(self, samples: list[np.ndarray], *, integers: bool) -> tuple[list[StoredTrack], float]:
-        """Stored tracks with keys at these samples, and at more of them where the proof fails, and the error then."""
+    def _proven(self, samples: list[np.ndarray], *, integers: bool) -> tuple[list[StoredTrack], float] | None:
+        """Stored tracks with keys at these samples, and at more of them where the proof fails, and their largest error.
+
+        None where the proof fails with more and more of them.
+        """
         world, tolerance = self.world, self.wishes.tolerance
         for _ in range(ROUNDS):
             tracks = self._stored(samples, integers=integers)
             shown_tracks = self._shown(tracks)
-            error = world.largest_error(shown_tracks, world.eighths)
-            if error <= tolerance:
-                break
-            samples = self._with_more(samples, *world.worst(shown_tracks, world.eighths, tolerance))
-        return tracks, error
+            places, eighths = self.feet.slips(shown_tracks, MORE_SLIDE * self.size)
+            eighths *= PARTS
+            if not len(places):
+                error = world.largest_error(shown_tracks, world.eighths)
+                if error <= tolerance:
+                    return tracks, error
+                places, eighths = world.worst(shown_tracks, world.eighths, tolerance)
+            samples = self._with_more(samples, places, eighths)
+        return None
 
     def _with_more(self, samples: list[np.ndarray], places: np.ndarray, eighths: np.ndarray) -> list[np.ndarray]:
         """Samples with those around some of the eighths, for the nodes at these places and all that they hang on."""
@@ -269,16 +261,3 @@ class ClipReduction:
     def _shown(self, tracks: Iterable[StoredTrack]) -> Tracks:
         of_channel = self._of_channel
         return by_target(tuple(shown(of_channel[track.channel], track) for track in tracks))
-
-    def _slides(self, tracks: Tracks) -> tuple[float, float]:
-        """How far joints slide that stand, before and after."""
-        if self.stands is None:
-            return 0.0, 0.0
-        positions = self.world.positions[self.feet], self.world.positions_of(tracks, self.feet)
-        return slide(positions[0], self.stands), slide(positions[1], self.stands)
-
-
-def _upright(positions: np.ndarray) -> np.ndarray:
-    """Places (..., 3) with the third axis upwards, where glTF has the second."""
-    x, y, z = np.moveaxis(positions, -1, 0)
-    return np.stack((x, -z, y), axis=-1)

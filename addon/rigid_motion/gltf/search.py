@@ -18,6 +18,9 @@ from .tracks import ROTATION, TRANSLATION
 MODE = "lerp_slerp"
 """What glTF calls LINEAR."""
 
+STRETCH, LONG = 1500, 2
+"""Samples of a recording that are searched at once, where there are more than so many times as many."""
+
 
 class Search:
     """The nodes of a world as a body.
@@ -39,8 +42,8 @@ class Search:
             positions[place], quaternions[place] = _pose(world, tracks, node)
         self.poses = Poses(positions * world.lengths_above, align_signs(quaternions))
 
-    def keys(self, tolerance: float, weights: np.ndarray) -> tuple[SeparateKeys, ...]:
-        """The samples that are keys of each node, with errors that count so many times, weights (n, m)."""
+    def keys(self, tolerance: float) -> tuple[SeparateKeys, ...]:
+        """The samples that are keys of each node."""
         return reduce_skeleton_keys(
             self.world.times,
             self.poses,
@@ -49,8 +52,8 @@ class Search:
             tolerance=tolerance,
             radius=self.world.radii,
             separate=True,
-            weights=weights,
             fixed=self.fixed,
+            stretch=STRETCH if len(self.world.times) > LONG * STRETCH else None,
         )
 
     def key_poses(self, *, tolerance: float | None, count: int | None) -> np.ndarray:
