@@ -16,7 +16,7 @@ import pytest
 from rigid_motion import animation
 from rigid_motion.animation import is_baked, set_mode
 from rigid_motion_batch.keying import jobs
-from rigid_motion_batch.keying.jobs import jobs_of
+from rigid_motion_batch.keying.options import jobs_of
 from tests.animation.farm import played_on_a_farm
 from tests.animation.oracle import curves_of, expected_worlds, shown_worlds, snapshot
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own_deltas

@@ -130,7 +130,7 @@ def test_a_whole_body_becomes_a_rig_that_plays_like_it_in_any_blender(tmp_path, 
 def test_the_tolerance_holds_at_every_key_of_every_curve_and_between_them(tmp_path, capsys, body):
     body = body()
     source = body.write(tmp_path / "walk.glb")
-    assert run(source) == 0
+    assert run(source, "--blend") == 0
     told = re.search(r"(\S+) mm off at most \(5 mm allowed\)", capsys.readouterr().err)
     assert told is not None
     assert float(told[1]) <= 5.0

@@ -67,7 +67,7 @@ def standing(times: ArrayLike, positions: ArrayLike) -> np.ndarray:
     slow = ways <= SLOW * height * np.diff(times)
     at_rest = np.concatenate((slow[:, :1], slow), axis=1) & np.concatenate((slow, slow[:, -1:]), axis=1)
     stands = at_rest & (heights - heights.min() <= LOW * height)
-    for joint, first, last in _spans(stands):
+    for joint, first, last in spans(stands):
         if times[last] - times[first] < SHORTEST:
             stands[joint, first : last + 1] = False
     return stands
@@ -76,13 +76,13 @@ def standing(times: ArrayLike, positions: ArrayLike) -> np.ndarray:
 def slide(positions: np.ndarray, stands: np.ndarray) -> float:
     """The farthest that anything (joints, n, 3) gets, while it stands (joints, n), from where it stood at first."""
     farthest = 0.0
-    for joint, first, last in _spans(stands):
+    for joint, first, last in spans(stands):
         away = positions[joint, first : last + 1] - positions[joint, first]
         farthest = max(farthest, float(np.linalg.norm(away, axis=-1).max()))
     return farthest
 
 
-def _spans(stands: np.ndarray) -> list[tuple[int, int, int]]:
+def spans(stands: np.ndarray) -> list[tuple[int, int, int]]:
     """Joint, first and last sample of every stretch of time (joints, n) that is marked."""
     edges = np.diff(stands.astype(np.int8), axis=1, prepend=0, append=0)
     joints, firsts = np.nonzero(edges == 1)

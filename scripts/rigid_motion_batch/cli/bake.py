@@ -19,7 +19,8 @@ PROGRAM = program_of(SCRIPT)
 require_blender(SCRIPT)
 
 from rigid_motion_batch.keying.baking import baking, unbaking
-from rigid_motion_batch.keying.jobs import BlendRun, add_file_options, add_target_options, jobs_of, refuse_odd_places
+from rigid_motion_batch.keying.jobs import BlendRun
+from rigid_motion_batch.keying.options import add_file_options, add_target_options, jobs_of, refuse_odd_places
 from rigid_motion_batch.keying.sessions import Work, do_all
 
 SMALLEST_STEP = 0.01

@@ -18,28 +18,22 @@ from rigid_motion_batch.system_libraries import require_blender
 SCRIPT = "reduce.py"
 PROGRAM = program_of(SCRIPT)
 
-require_blender(SCRIPT)
-
-from rigid_motion.animation.baking.sizes import OF_A_RIG, OF_KEY_POSES
+from rigid_motion.gltf.sizes import OF_A_BODY, OF_KEY_POSES
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.radii import RIGID
 from rigid_motion_batch.axes import AXES
-from rigid_motion_batch.keying.jobs import (
-    BlendRun,
-    Job,
-    add_file_options,
-    add_target_options,
-    jobs_of,
-    refuse_odd_places,
-)
-from rigid_motion_batch.keying.keyed_files import RATES
-from rigid_motion_batch.keying.recordings import TOLERANCE, Reading, Recorded, RecordingRun, Writing, place_and_body
-from rigid_motion_batch.keying.reducing import Wishes, reducing
+from rigid_motion_batch.keying.gltf_files import ENDINGS, GltfRun
+from rigid_motion_batch.keying.options import Job, add_file_options, add_target_options, jobs_of, refuse_odd_places
+from rigid_motion_batch.keying.recorded import RATES, TOLERANCE, Reading, Recorded, Writing, place_and_body
 from rigid_motion_batch.keying.sessions import Note, Outcome, StopIfAsked, Work, do_all
+from rigid_motion_batch.keying.wishes import Wishes
 from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
 
 MODE = "motor_spline"
+
+SUFFIX = "-reduced"
+"""Of the names of files that are written of .blend and glTF files."""
 
 MOST = 1000000
 """Keys that can be asked for: Blender's last frame."""
@@ -97,7 +91,9 @@ exit code:
 def parse(arguments: list[str]) -> argparse.Namespace:
     """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
     parser = parser_of(SCRIPT, __doc__, EPILOG)
-    parser.add_argument("inputs", nargs="+", type=not_empty, metavar="INPUT", help=".blend files and recordings")
+    parser.add_argument(
+        "inputs", nargs="+", type=not_empty, metavar="INPUT", help=".blend files, glTF files and recordings"
+    )
     add_target_options(parser, "keys")
     keys = parser.add_argument_group("keys")
     keys.add_argument(
@@ -105,16 +101,17 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         type=_tolerance,
         metavar="LENGTH",
         help="largest error on any frame: 5mm, 0.5cm, 0.005m; a plain number is in the unit of the file (in .blend "
-        f"files 1mm for objects and {OF_A_RIG:.1%}% of the size of a rig; for recordings {TOLERANCE.written}; with "
+        f"files 1mm for objects and {OF_A_BODY:.1%}% of the size of a rig; for recordings {TOLERANCE.written}; with "
         f"--shared {OF_KEY_POSES:.0%}% of the size of a rig or body)",
     )
     keys.add_argument(
         "--keys",
+        "--key-poses",
         type=_count,
         metavar="N",
         help="instead of a tolerance: N keys of each object, or N key poses of each rig, where the error is smallest",
     )
-    keys.add_argument("--mode", choices=KEYFRAME_MODES, default=MODE, help="mode between the keys (%(default)s)")
+    keys.add_argument("--mode", choices=KEYFRAME_MODES, help=f"mode between the keys ({MODE}; glTF knows one)")
     keys.add_argument(
         "--radius",
         type=_radius,
@@ -139,24 +136,41 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         "--axes", type=str.lower, choices=AXES, help="axes of the recordings (opengl for BVH, blender for others)"
     )
     add_reading_options(parser)
+    gltf = parser.add_argument_group("glTF files")
+    gltf.add_argument(
+        "--vertices", action="store_true", help="also measure how far any vertex of a skin is off, which takes a while"
+    )
     add_file_options(parser)
     options = parser.parse_args(arguments)
-    files, recorded = _sorted(options.inputs)
+    files, recorded = _sorted(options.inputs, blend=options.blend)
+    gltf = [file for file in files if _is_gltf(file)]
     options.wishes = Wishes(
-        options.mode, options.tolerance, options.radius, options.shared, options.discard, options.keys
+        options.mode or MODE,
+        options.tolerance,
+        options.radius,
+        options.shared,
+        options.discard,
+        options.keys,
+        options.vertices,
     )
-    options.action = reducing(options.wishes, options.objects)
     try:
         refuse_odd_places(options)
         if options.keys is not None and options.tolerance is not None:
             raise ValueError("--keys and --tolerance exclude one another: each decides how many keys there are")
         if recorded and options.in_place:
             raise ValueError(f"--in-place is for .blend files, and {recorded[0].source} is a recording: leave one out")
-        if options.objects and not files:
+        if gltf and options.in_place:
+            raise ValueError(f"--in-place is for .blend files, and {gltf[0]} is none: leave one out")
+        if gltf and options.mode:
+            raise ValueError(
+                f"--mode is for .blend files and tables, and {gltf[0]} knows lines and even turns alone: leave it out, "
+                "or add --blend, for a .blend file with that mode"
+            )
+        if options.objects and len(files) == len(gltf):
             raise ValueError("--objects is for .blend files: of a recording name one body with FILE:BODY")
         options.reading = Reading(options.axes, reading_options(options))
         options.jobs = [
-            *jobs_of(files, options.action.suffix, options.output, in_place=options.in_place),
+            *jobs_of(files, SUFFIX, options.output, in_place=options.in_place),
             *recorded,
         ]
     except ValueError as error:
@@ -167,25 +181,51 @@ def parse(arguments: list[str]) -> argparse.Namespace:
 def main(arguments: list[str]) -> int:
     """Do all inputs, and return the exit code."""
     options = parse(arguments)
-    action = options.action
-    work = Work(PROGRAM, action.doing, action.done, options.objects, options.dry_run)
-    return do_all(options.jobs, work, lambda *session: _doing(options, *session))
+    in_blender = not all(isinstance(job, Job) and _is_gltf(job.source) for job in options.jobs)
+    if in_blender:
+        require_blender(SCRIPT)
+    work = Work(PROGRAM, "Reducing", "reduced", options.objects, options.dry_run, in_blender)
+    return do_all(options.jobs, work, lambda *session: _doing(options, in_blender, *session))
 
 
-def _doing(options: argparse.Namespace, note: Note, stop_if_asked: StopIfAsked) -> Callable[[Job | Recorded], Outcome]:
-    """What does one input, be it a .blend file or a recording."""
+def _doing(
+    options: argparse.Namespace, in_blender: bool, note: Note, stop_if_asked: StopIfAsked
+) -> Callable[[Job | Recorded], Outcome]:
+    """What does one input, be it a .blend file, a glTF file or a recording."""
+    wishes, written = options.wishes, {"overwrite": options.overwrite, "dry_run": options.dry_run}
+    gltf = GltfRun(wishes, **written, note=note, stop_if_asked=stop_if_asked)
+    if not in_blender:
+        return gltf.do
+    from rigid_motion_batch.keying.jobs import BlendRun
+    from rigid_motion_batch.keying.recordings import RecordingRun
+    from rigid_motion_batch.keying.reducing import reducing
+
     writing = Writing(options.output, options.overwrite, options.dry_run, options.blend, options.fps)
-    files = BlendRun(options, options.action, note, stop_if_asked)
-    recordings = RecordingRun(options.wishes, options.reading, writing, options.inputs, note, stop_if_asked)
-    return lambda job: recordings.do(job) if isinstance(job, Recorded) else files.do(job)
+    files = BlendRun(options, reducing(wishes, SUFFIX, options.objects), note, stop_if_asked)
+    recordings = RecordingRun(wishes, options.reading, writing, options.inputs, note, stop_if_asked)
+
+    def do(job: Job | Recorded) -> Outcome:
+        if isinstance(job, Recorded):
+            return recordings.do(job)
+        return gltf.do(job) if _is_gltf(job.source) else files.do(job)
+
+    return do
 
 
-def _sorted(inputs: list[str]) -> tuple[list[Path], list[Recorded]]:
-    """The .blend files and the recordings, each of these once. A body of a .blend file is a recording."""
-    files = [Path(source) for source in inputs if source.lower().endswith(".blend")]
+def _is_gltf(path: Path) -> bool:
+    return path.suffix.lower() in ENDINGS
+
+
+def _sorted(inputs: list[str], *, blend: bool) -> tuple[list[Path], list[Recorded]]:
+    """The .blend and glTF files, and the recordings, each of these once.
+
+    A body of a file is a recording, and so is a glTF file of which a .blend file is to be made.
+    """
+    endings = (".blend",) if blend else (".blend", *ENDINGS)
+    files = [Path(source) for source in inputs if source.lower().endswith(endings)]
     recorded: dict[tuple[str, str | None], str] = {}
     for source in inputs:
-        if not source.lower().endswith(".blend"):
+        if not source.lower().endswith(endings):
             recorded.setdefault(place_and_body(source), source)
     return files, list(map(Recorded, recorded.values()))
 

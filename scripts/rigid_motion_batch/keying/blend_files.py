@@ -13,14 +13,13 @@ import bpy
 from rigid_motion_batch.files import written_beside
 from rigid_motion_batch.hushing import hushed
 
+from .output_files import FileProblem, Unreadable, changed_at, refuse_came_meanwhile
+
 HERE = bpy.app.version[:2]
 """The Blender that this runs in."""
 
 MAGIC = (b"BLENDER", b"\x28\xb5\x2f\xfd", b"\x1f\x8b")
 """What .blend files begin with: as they are, compressed, and compressed by a Blender before 3.0."""
-
-LONGEST_NAME = 255
-"""Bytes of the name of a file."""
 
 CUT_OFF = "it broke off half-way, the disk may be full"
 
@@ -28,14 +27,6 @@ NAMED = 5
 """As many of the data that are missing from a library are named."""
 
 MAY_HOLD_OBJECTS = (bpy.types.Collection, bpy.types.Scene)
-
-
-class FileProblem(Exception):
-    """Why a file cannot be done, and the way out."""
-
-
-class Unreadable(FileProblem):
-    """Why a file cannot be opened, and the way out."""
 
 
 @dataclass
@@ -80,14 +71,6 @@ def open_file(path: Path) -> None:
         raise Unreadable(
             f"this was saved by Blender {named(newer)}, and this is {named(HERE)}: take that one or a later one"
         )
-
-
-def changed_at(path: Path) -> int | None:
-    """When a file was changed last, in nanoseconds; None where there is none."""
-    try:
-        return os.stat(path).st_mtime_ns
-    except OSError:
-        return None
 
 
 def missing_data() -> Missing:
@@ -137,40 +120,6 @@ def only_overridden() -> set[bpy.types.Object]:
     return linked
 
 
-def refuse_to_replace(path: Path, *, overwrite: bool) -> None:
-    """Raise `FileProblem` where there is something already that is not to be replaced, or the name is too long."""
-    refuse_long_name(path)
-    if os.path.isdir(path):
-        raise FileProblem(f"{path} is a folder: rename it, or give another --output")
-    if os.path.lexists(path) and not overwrite:
-        raise FileProblem(f"{path} is there already: add --overwrite, or another --output")
-
-
-def refuse_long_name(path: Path) -> None:
-    """Raise `FileProblem` where a file system allows no name that is as long as this one."""
-    length = len(os.fsencode(path.name))
-    if length > LONGEST_NAME:
-        raise FileProblem(
-            f"the name {path.name} has {length} bytes, of which file systems allow {LONGEST_NAME}: "
-            "give the input a shorter name"
-        )
-
-
-def refuse_read_only(path: Path) -> None:
-    """Raise `FileProblem` where a file or its folder cannot be written: better said before hours go into it."""
-    place = Path(os.path.realpath(path))
-    if not os.path.exists(place):
-        place = next(one for one in place.parents if os.path.exists(one))
-        if not os.path.isdir(place):
-            raise FileProblem(f"{place} is a file, and {path} cannot be written in it: give another --output")
-    elif os.access(place, os.W_OK):
-        place = place.parent
-    if not os.access(place, os.W_OK):
-        raise FileProblem(
-            f"{path} cannot be written, for {place} is read-only: allow it, or write elsewhere with --output"
-        )
-
-
 def write_file(
     source: Path, output: Path, stop_if_asked: Callable[[], None], *, overwrite: bool, opened: int | None = None
 ) -> None:
@@ -213,14 +162,6 @@ def write_file(
         refuse_came_meanwhile(output, error)
         place, reason = error.filename or output, error.strerror or error
         raise FileProblem(f"{place} could not be written ({reason}): write elsewhere with --output") from None
-
-
-def refuse_came_meanwhile(path: Path, error: OSError) -> None:
-    """Raise `FileProblem` where an error of writing a file is that there is one by now."""
-    if isinstance(error, FileExistsError) and error.filename == str(path):
-        raise FileProblem(
-            f"{path} has come there meanwhile, from another run perhaps: add --overwrite, or another --output"
-        ) from None
 
 
 def refuse_cut_off(path: Path) -> None:

@@ -14,15 +14,14 @@ from rigid_motion import animation
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.hushing import hushed
-from rigid_motion_batch.keying.blend_files import FileProblem
-from rigid_motion_batch.keying.reducing import Wishes, reduced
+from rigid_motion_batch.keying.output_files import FileProblem
+from rigid_motion_batch.keying.recorded import RATES
+from rigid_motion_batch.keying.reducing import reduced
 from rigid_motion_batch.keying.targets import Result
+from rigid_motion_batch.keying.wishes import Wishes
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.rigs import LAST_FRAME
 from rigid_motion_batch.scenes.armature import Rest, Rig
-
-RATES = 1, 240
-"""Frames a second that a file may be given for the rate of its recording."""
 
 CLOSEST = 0.01
 """Frames between keys that Blender takes for two."""

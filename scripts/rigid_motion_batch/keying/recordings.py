@@ -8,74 +8,33 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from rigid_motion.motion import reduce_keys
-from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.metrics import write_poses
 from rigid_motion_batch.analysis.radii import RIGID
 from rigid_motion_batch.analysis.reconstructions import fill_in
-from rigid_motion_batch.keying.blend_files import (
+from rigid_motion_batch.keying.blend_files import write_file
+from rigid_motion_batch.keying.keyed_files import key_body, key_object, new_file
+from rigid_motion_batch.keying.options import place_of
+from rigid_motion_batch.keying.output_files import (
     FileProblem,
     Unreadable,
     refuse_came_meanwhile,
     refuse_read_only,
     refuse_to_replace,
-    write_file,
 )
-from rigid_motion_batch.keying.jobs import place_of
-from rigid_motion_batch.keying.keyed_files import key_body, key_object, new_file
-from rigid_motion_batch.keying.reducing import Wishes, fewer, off
+from rigid_motion_batch.keying.recorded import TOLERANCE, Reading, Recorded, Writing
 from rigid_motion_batch.keying.sessions import Note, Outcome, StopIfAsked, Stopped, counted, tell_failure
-from rigid_motion_batch.recordings import ReadingOptions, TrajectoryError
+from rigid_motion_batch.keying.wishes import Wishes, fewer, off
+from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import folder_names, read_source
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.reading import split_source
 
-TOLERANCE = Tolerance("5mm")
-"""Where none is given."""
-
 SUFFIX = "-keys"
 """Of the names of files that are written."""
-
-
-@dataclass(frozen=True)
-class Recorded:
-    """A recording to be done."""
-
-    source: str
-    """The file, and the body where one was named."""
-
-    @property
-    def title(self) -> str:
-        return os.path.basename(self.source)
-
-
-@dataclass(frozen=True)
-class Reading:
-    """How recordings are to be read."""
-
-    axes: str | None
-    """None for those of each format."""
-
-    options: ReadingOptions
-
-
-@dataclass(frozen=True)
-class Writing:
-    """What is to be written of recordings, and where."""
-
-    folder: Path | None
-    """None for beside each recording."""
-
-    overwrite: bool
-    dry_run: bool
-    blend: bool
-    """Whether rigid motions become .blend files too."""
-
-    fps: int | None
-    """None for the rate of each recording."""
 
 
 class RecordingRun:
@@ -230,15 +189,6 @@ class RecordingRun:
     def _tell_written(self, title: str, path: Path, outcome: Outcome) -> None:
         self._note(f"{title}: {self._would}written to {path}")
         outcome.add_written(path)
-
-
-def place_and_body(source: str) -> tuple[str, str | None]:
-    """Where the file of a recording is, the same however it is written, and which body of it is meant."""
-    try:
-        file, body = split_source(source)
-    except TrajectoryError:
-        file, body = Path(source), None
-    return place_of(file), body
 
 
 def _file_of(source: str) -> Path:

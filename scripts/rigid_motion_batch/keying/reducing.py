@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import bpy
 
@@ -15,7 +14,7 @@ from rigid_motion.animation.transforms import Transform
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.keying.sessions import counted
 from rigid_motion_batch.keying.targets import Action, Result
-from rigid_motion_batch.recordings.figures import unit_of
+from rigid_motion_batch.keying.wishes import Wishes, doubt, fewer, off
 
 FEWEST = 2
 """So many keys are as few as a motion has."""
@@ -24,28 +23,7 @@ LEAST = 1e-6
 """Millimetres: no tolerance is smaller."""
 
 
-@dataclass(frozen=True)
-class Wishes:
-    """How few keys are wanted, of what."""
-
-    mode: str
-    tolerance: Tolerance | None
-    """What each thing begins with in Blender's window, or `reduce.py` with recordings, where None."""
-
-    radius: float | None
-    """Of the shell in metres; what each object and bone measures, or what `compare` takes of recordings, where None."""
-
-    shared: bool
-    """Whether all bones of a rig get keys on the same frames."""
-
-    discard: bool = False
-    """Whether the dense keys go out of the file, so that Restore Keys cannot give them back."""
-
-    count: int | None = None
-    """So many keys of each object, or key poses of each rig, instead of a tolerance."""
-
-
-def reducing(wishes: Wishes, asked: Sequence[str] | None = None) -> Action:
+def reducing(wishes: Wishes, suffix: str, asked: Sequence[str] | None = None) -> Action:
     """Fewer keys for what has more than two; and for what was asked for by its very name, if only to say why not."""
 
     def concerned(targets: Sequence[Transform]) -> list[Transform]:
@@ -56,7 +34,7 @@ def reducing(wishes: Wishes, asked: Sequence[str] | None = None) -> Action:
     def reduce(targets: Sequence[Transform]) -> Result:
         return reduced(targets, wishes)
 
-    return Action("Reducing", "reduced", "-reduced", concerned, reduce, whole_rigs=True)
+    return Action("Reducing", "reduced", suffix, concerned, reduce, whole_rigs=True)
 
 
 def reduced(targets: Sequence[Transform], wishes: Wishes) -> Result:
@@ -120,25 +98,7 @@ def not_promised(rig: WholeRig) -> str:
 
 def _doubt(targets: Sequence[Transform], tolerance: Tolerance | None, unit: float) -> str:
     """What to think of where a tolerance is in metres, and a rig hardly is: importers leave it in units of its own."""
-    size = rig_size(targets[0].animated) * unit if targets[0].is_part else 0.0
-    name, length = unit_of(size)
-    if tolerance is None or not tolerance.is_length or length == 1.0:
-        return ""
-    meant = tolerance.metres(unit) / (unit * length)
-    return f"; it is {size:.3g} m large in this file: if these are {name}, give --tolerance {meant:.6g}"
-
-
-def fewer(before: int, after: int) -> str:
-    """How many keys became how many."""
-    return f", {before} -> {after} keys"
-
-
-def off(tolerance: Tolerance, metres: float, per_unit: float, *, by_number: bool) -> str:
-    """How far off that is, in the unit of the tolerance, which is of so many metres where it says none."""
-    if by_number:
-        return f", {tolerance.alike(metres, per_unit)} off at most"
-    allowed = tolerance.alike(tolerance.metres(per_unit), per_unit)
-    return f", {tolerance.alike(metres, per_unit)} off at most ({allowed} allowed)"
+    return doubt(rig_size(targets[0].animated) * unit if targets[0].is_part else 0.0, tolerance, unit)
 
 
 def _written(metres: float) -> Tolerance:

@@ -1,4 +1,4 @@
-"""A session in Blender: inputs done one after another, each wholly or not at all, and summed up in a line.
+"""A session, mostly in Blender: inputs done one after another, each wholly or not at all, and summed up in a line.
 
 Ctrl-C ends it between two steps: what was written by then is whole, and nothing else was touched. `supervising` has
 what is between them ended, from outside.
@@ -11,15 +11,11 @@ import signal
 import sys
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, TypeVar
 
-import addon_utils
-import bpy
-
-from rigid_motion import animation
 from rigid_motion_batch.command_line import path_line
 from rigid_motion_batch.progress import Progress
 from rigid_motion_batch.supervising import report, stop_signals
@@ -64,6 +60,7 @@ class Work:
     """The names and patterns of the objects that are meant; None for all."""
 
     dry_run: bool = False
+    in_blender: bool = True
 
 
 @dataclass
@@ -72,6 +69,7 @@ class Outcome:
 
     objects: int = 0
     bones: int = 0
+    clips: int = 0
     """How many of them were done."""
 
     refused: int = 0
@@ -95,7 +93,7 @@ class Outcome:
 
     @property
     def done(self) -> int:
-        return self.objects + self.bones
+        return self.objects + self.bones + self.clips
 
 
 def do_all(
@@ -112,7 +110,8 @@ def do_all(
     """
     outcomes: list[Outcome] = []
     stopped, unmatched = None, set()
-    with Progress() as progress, _extension(), _stopped_between_steps() as stop_if_asked:
+    extension = _extension() if work.in_blender else nullcontext()
+    with Progress() as progress, extension, _stopped_between_steps() as stop_if_asked:
         do = begin(progress.note, stop_if_asked)
         try:
             with progress.stage(work.doing, len(inputs)) as stage:
@@ -147,7 +146,7 @@ def do_all(
 def _summary(outcomes: Sequence[Outcome], count: int, work: Work, *, interrupted: bool) -> str:
     """What came of it all, in a line."""
     would = "to be " if work.dry_run else ""
-    objects, bones = sum(one.objects for one in outcomes), sum(one.bones for one in outcomes)
+    objects, bones, clips = (sum(getattr(one, what) for one in outcomes) for what in ("objects", "bones", "clips"))
     refused = sum(one.refused for one in outcomes)
     written, failed = sum(bool(one.written) for one in outcomes), sum(one.failed for one in outcomes)
     idle = sum(not (one.written or one.failed) for one in outcomes)
@@ -156,8 +155,9 @@ def _summary(outcomes: Sequence[Outcome], count: int, work: Work, *, interrupted
     parts += [f"{failed} failed"] if failed else []
     parts += [f"{incomplete} incomplete"] if (incomplete := sum(one.incomplete for one in outcomes)) else []
     parts += [f"{count - len(outcomes)} not reached"] if interrupted else []
-    done = [counted(objects, "object")] if objects or not bones else []
+    done = [counted(objects, "object")] if objects or not (bones or clips) else []
     done += [counted(bones, "bone")] if bones else []
+    done += [counted(clips, "clip")] if clips else []
     told = f"{' and '.join(done)} {would}{work.done}" + (f", {refused} not" if refused else "")
     return f"{'Stopped. ' if interrupted else ''}{told}; {counted(count, 'file')}: {', '.join(parts)}."
 
@@ -176,6 +176,11 @@ def tell_failure(note: Note, title: object, error: Exception) -> None:
 @contextmanager
 def _extension() -> Iterator[None]:
     """What the extension keeps in files and follows, from this checkout, in place of one that is installed."""
+    import addon_utils
+    import bpy
+
+    from rigid_motion import animation
+
     enabled = [addon.module for addon in bpy.context.preferences.addons]
     installed = [name for name in enabled if name.rpartition(".")[2] == EXTENSION]
     for name in installed:

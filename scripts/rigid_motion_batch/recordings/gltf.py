@@ -9,21 +9,30 @@ Source: the glTF 2.0 specification, Khronos 2021.
 from __future__ import annotations
 
 import json
-import re
 import shutil
-import struct
-from pathlib import Path, PurePosixPath, PureWindowsPath
+from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
-from urllib.parse import unquote
 
 import numpy as np
 
+from rigid_motion.gltf.documents import (
+    BINARY_CHUNK,
+    JSON_CHUNK,
+    MAGIC,
+    GltfError,
+    bytes_of_uri,
+    chunks_of,
+    file_of,
+    is_data,
+    parsed,
+)
+
 from .bvh import DEEPEST, MOST_JOINTS, MOST_POSES
-from .gltf_tracks import bytes_of_uri, straightened
+from .gltf_tracks import straightened
 from .importing import read_imported, refuse_too_large
 from .options import AS_THE_FILE_SAYS, ReadingOptions
-from .recordings import Selection, Trajectory, TrajectoryError, shown
+from .recordings import Selection, Trajectory, TrajectoryError
 
 ADDON = "io_scene_gltf2"
 
@@ -48,24 +57,18 @@ MOST_NODES = 10_000
 MOST_CHANNELS = 100_000
 """Of all takes together: each becomes up to four F-curves."""
 
-MAGIC = b"glTF"
-
-SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
-
 
 def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE_SAYS) -> list[Trajectory]:
     """The whole skeleton; or bones that are named, or all."""
     refuse_too_large(path)
     content = path.read_bytes()
-    text, binary = _chunks(path, content) if content.startswith(MAGIC) else (content, None)
     try:
-        document = json.loads(text.decode("utf-8-sig"))
-    except (RecursionError, ValueError) as error:
-        problem = f"this is no glTF (its JSON cannot be read: {' '.join(str(error).split())[:80]})"
-        raise TrajectoryError(path, problem, "export it again") from None
-    if not isinstance(document, dict):
-        raise TrajectoryError(path, "this is no glTF (its JSON is no object)", "export it again")
-    others = _buffers(path, document)
+        chunks = dict(reversed(chunks_of(content))) if content.startswith(MAGIC) else {JSON_CHUNK: content}
+        document = parsed(chunks[JSON_CHUNK])
+        others = _buffers(path, document)
+    except GltfError as error:
+        raise TrajectoryError(path, error.problem, error.way_out) from None
+    binary = chunks.get(BINARY_CHUNK)
     refuse_too_large(path, *others.values())
     _refuse_made_up(path, document)
     _refuse_too_many(path, document)
@@ -78,55 +81,18 @@ def _rate(_: float, keys: float | None) -> float:
     return keys or WITHOUT_A_RATE
 
 
-def _chunks(path: Path, content: bytes) -> tuple[bytes, bytes | None]:
-    """The JSON of a GLB file, and the bytes that come with it, if any."""
-    found: dict[bytes, bytes] = {}
-    place, whole = 12, len(content)
-    if whole >= place:
-        version, length = struct.unpack_from("<II", content, 4)
-        if version != 2:
-            raise TrajectoryError(path, f"this is GLB {version}, and 2 is known", "export it as glTF 2.0")
-        if length > whole:
-            raise TrajectoryError(path, f"{whole} of {length} bytes are here", "copy the file again, or export it anew")
-        whole = length
-    while place + 8 <= whole:
-        length, kind = struct.unpack_from("<I4s", content, place)
-        place += 8
-        if place + length > whole:
-            raise TrajectoryError(path, "a part of this file is longer than the whole", "export it again")
-        found.setdefault(kind, content[place : place + length])
-        place += length
-    if b"JSON" not in found:
-        raise TrajectoryError(path, "this GLB holds no JSON", "export it again")
-    return found[b"JSON"], found.get(b"BIN\0")
-
-
 def _buffers(path: Path, document: dict[str, Any]) -> dict[int, Path]:
-    """The files that buffers are in, by their numbers.
-
-    Raises
-    ------
-    TrajectoryError
-        Where one is not in the folder of the file or below, or is no file.
-    """
-    found = {}
+    """The files that buffers are in, by their numbers, all of them in the folder of the file or below."""
     buffers = document.get("buffers")
-    for number, buffer in enumerate(buffers if isinstance(buffers, list) else ()):
-        uri = buffer.get("uri") if isinstance(buffer, dict) else None
-        if uri is None or (isinstance(uri, str) and uri[:5].lower() == "data:"):
-            continue
-        if not isinstance(uri, str) or not _inside(uri) or not _inside(unquote(uri)):
-            problem = f"buffer {number} is outside of its folder ({shown(str(uri))})"
-            raise TrajectoryError(path, problem, "export it as .glb, which is one file")
-        found[number] = path.parent / unquote(uri)
-        try:
-            there = found[number].is_file()
-        except ValueError:
-            there = False
-        if not there:
-            problem = f"buffer {number}, {shown(unquote(uri))}, is not there"
-            raise TrajectoryError(path, problem, "bring that file along, or export it as .glb, which is one file")
-    return found
+    uris = [
+        buffer.get("uri") if isinstance(buffer, dict) else None
+        for buffer in (buffers if isinstance(buffers, list) else ())
+    ]
+    return {
+        number: file_of(path.parent, number, uri)
+        for number, uri in enumerate(uris)
+        if uri is not None and not is_data(uri)
+    }
 
 
 def _refuse_made_up(path: Path, document: dict[str, Any]) -> None:
@@ -176,18 +142,6 @@ def _depth(nodes: list[dict[str, Any]]) -> int:
     return depth
 
 
-def _inside(uri: str) -> bool:
-    """Whether a path stays in its folder, on whatever system."""
-    if SCHEME.match(uri) or PurePosixPath(uri).is_absolute() or PureWindowsPath(uri).anchor:
-        return False
-    depth = 0
-    for part in PureWindowsPath(uri).parts:
-        depth += -1 if part == ".." else 1
-        if depth < 0:
-            return False
-    return True
-
-
 def _copy(
     folder: Path, document: dict[str, Any], binary: bytes | None, others: dict[int, Path]
 ) -> tuple[Path, np.ndarray]:
@@ -212,7 +166,7 @@ def _copy(
 
 def _bytes_of(folder: Path, buffer: dict[str, Any]) -> bytes:
     uri = buffer["uri"]
-    return bytes_of_uri(uri) if uri[:5].lower() == "data:" else (folder / uri).read_bytes()
+    return bytes_of_uri(uri) if is_data(uri) else (folder / uri).read_bytes()
 
 
 def _plain(part: Any) -> Any:

@@ -7,7 +7,6 @@ C).
 
 from __future__ import annotations
 
-import base64
 import math
 from collections.abc import Callable
 from functools import cache
@@ -15,11 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from rigid_motion.gltf.accessors import COMPONENTS, KINDS, denormalised
 from rigid_motion.motion.repair import LARGEST
-
-NUMBERS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-
-COMPONENTS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 
 WIDEST = np.radians(25.0)
 """A turn that is wider from key to key gets keys between: a line of quaternions is then off by 0.3 milliradians."""
@@ -130,15 +126,15 @@ class _Made:
         view = self._document["bufferViews"][accessor["bufferView"]]
         if "sparse" in accessor or view.get("extensions"):
             raise ValueError("sparse or compressed")
-        kind = np.dtype(NUMBERS[accessor["componentType"]])
+        kind = np.dtype(KINDS[accessor["componentType"]])
         count, width = accessor["count"], COMPONENTS[accessor["type"]]
         stride = view.get("byteStride") or kind.itemsize * width
         first = view.get("byteOffset", 0)
         data = self._bytes_of(view["buffer"])[first : first + view["byteLength"]][accessor.get("byteOffset", 0) :]
         if not 0 < count * stride <= len(data) + stride - kind.itemsize * width:
             raise ValueError("not as many as it says")
-        found = np.ndarray((count, width), kind, data, strides=(stride, kind.itemsize)).astype(np.float64)
-        return found if kind.kind == "f" else np.maximum(found / np.iinfo(kind).max, -1.0)
+        found = np.ndarray((count, width), kind, data, strides=(stride, kind.itemsize))
+        return found.astype(np.float64) if kind.kind == "f" else denormalised(found)
 
     def _add(self, numbers: np.ndarray, kind: str) -> int:
         numbers = numbers.astype("<f4")
@@ -203,11 +199,3 @@ def _split(parts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Of segments in so many parts: the segment in which each part begins, and how far along it."""
     segment = np.repeat(np.arange(len(parts)), parts)
     return segment, (np.arange(len(segment)) - (np.cumsum(parts) - parts)[segment]) / parts[segment]
-
-
-def bytes_of_uri(uri: str) -> bytes:
-    """What a data URI holds."""
-    head, _, data = uri.partition(",")
-    if not head.endswith(";base64"):
-        raise ValueError("not in base64")
-    return base64.b64decode(data)

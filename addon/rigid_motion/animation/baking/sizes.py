@@ -7,17 +7,12 @@ from collections.abc import Iterable
 import bpy
 import numpy as np
 
+from ...gltf.sizes import OF_A_BODY, OF_KEY_POSES
 from ..transforms import Transform
 from ..transforms.reaches import SOME_SIZE, metres_per_unit, reach_of, size_of
 
 SAME_PLACE = 0.1
 """Heads of bones that are closer than this, of a bone's length, make no size."""
-
-OF_A_RIG = 0.003
-"""The tolerance that the keys of a rig are reduced to at first, of its size: 5 mm for a grown-up."""
-
-OF_KEY_POSES = 0.02
-"""The same for key poses, which are to be few: 35 mm."""
 
 
 def radius_of(obj: bpy.types.Object | bpy.types.PoseBone) -> float:
@@ -67,7 +62,7 @@ def first_tolerance(scene: bpy.types.Scene, targets: Iterable[Transform], *, sha
     sizes = [rig_size(rig) for rig in {target.animated for target in targets if target.is_part}]
     if not sizes or max(sizes) <= 0.0:
         return 0.001 / metres_per_unit(scene)
-    return float(f"{(OF_KEY_POSES if shared else OF_A_RIG) * max(sizes):.2g}")
+    return float(f"{(OF_KEY_POSES if shared else OF_A_BODY) * max(sizes):.2g}")
 
 
 def _evaluated(obj: bpy.types.Object) -> bpy.types.Object:

@@ -1,0 +1,122 @@
+"""Accessors: the numbers of a glTF document, decoded from views of its buffers.
+
+Rows are elements, columns components: shape (count, components). Whole numbers that are normalised become floats as
+the specification has it (glTF 2.0, sections 3.6 and 3.11): -1 to 1, or 0 to 1.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .documents import Document, GltfError, Json, entry, shown, whole
+
+KINDS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+"""Types of components, as NumPy names them."""
+
+COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+
+MOST_NUMBERS = 2**27
+"""Of an accessor: one without a view is made of zeros, and may name any count."""
+
+COMPRESSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression")
+"""What bytes of a view are not what its accessors say."""
+
+
+def raw_numbers(document: Document, number: object) -> np.ndarray:
+    """The numbers of an accessor as they are kept, shape (count, components).
+
+    Raises
+    ------
+    GltfError
+        Where it does not fit its buffer, or is compressed.
+    """
+    accessor = entry(document.json, "accessors", number)
+    kind, columns, count = _kind(accessor), _columns(accessor), whole(accessor, "count", least=1)
+    if count * columns > MOST_NUMBERS:
+        raise GltfError(f"accessor {number} has {count} elements, more than are read")
+    if "bufferView" in accessor:
+        found = _in_view(document, accessor, kind, columns, count, f"accessor {number}")
+    else:
+        found = np.zeros((count, columns), kind)
+    return _with_sparse(document, accessor, found, f"accessor {number}") if "sparse" in accessor else found
+
+
+def numbers(document: Document, number: object) -> np.ndarray:
+    """The numbers of an accessor, shape (count, components), float64.
+
+    Raises
+    ------
+    GltfError
+        As `raw_numbers`, and for what is not finite.
+    """
+    raw = raw_numbers(document, number)
+    if not np.isfinite(raw).all():
+        raise GltfError(f"accessor {number} has numbers that are not finite")
+    normalised = entry(document.json, "accessors", number).get("normalized") is True
+    return denormalised(raw) if normalised and raw.dtype.kind != "f" else raw.astype(np.float64)
+
+
+def denormalised(raw: np.ndarray) -> np.ndarray:
+    """What normalised whole numbers stand for."""
+    return np.maximum(raw / np.iinfo(raw.dtype).max, -1.0)
+
+
+def stored_size(document: Document, number: int) -> int:
+    """How many bytes the numbers of an accessor take, without what lies between them."""
+    accessor = entry(document.json, "accessors", number)
+    size = whole(accessor, "count") * _columns(accessor) * _kind(accessor).itemsize
+    if "sparse" not in accessor:
+        return size
+    sparse = accessor["sparse"]
+    index = np.dtype(KINDS[sparse["indices"]["componentType"]]).itemsize
+    size = size if "bufferView" in accessor else 0
+    return size + whole(sparse, "count") * (index + _columns(accessor) * _kind(accessor).itemsize)
+
+
+def _kind(accessor: Json) -> np.dtype:
+    kind = accessor.get("componentType")
+    if not isinstance(kind, int) or kind not in KINDS:
+        raise GltfError(f"an accessor has components of the type {shown(kind)}, which glTF does not know")
+    return np.dtype(KINDS[kind])
+
+
+def _columns(accessor: Json) -> int:
+    kind = accessor.get("type")
+    if not isinstance(kind, str) or kind not in COMPONENTS:
+        raise GltfError(f"an accessor is of the type {shown(kind)}, which glTF does not know")
+    return COMPONENTS[kind]
+
+
+def _in_view(document: Document, part: Json, kind: np.dtype, columns: int, count: int, what: str) -> np.ndarray:
+    """The elements that a part of the document names by its view and an offset in it."""
+    view = entry(document.json, "bufferViews", part.get("bufferView"))
+    extensions = view.get("extensions")
+    if isinstance(extensions, dict) and any(name in extensions for name in COMPRESSIONS):
+        raise GltfError(
+            f"{what} is compressed by meshopt, which is not read", "export the file without it (gltfpack: without -c)"
+        )
+    entry(document.json, "buffers", view.get("buffer"))
+    data = document.buffers[view["buffer"]]
+    if data is None:
+        raise GltfError(f"{what} is in a buffer that has no bytes")
+    first, length = whole(view, "byteOffset", 0), whole(view, "byteLength", least=1)
+    width = kind.itemsize * columns
+    stride, offset = whole(view, "byteStride", width, least=1), whole(part, "byteOffset", 0)
+    if first + length > len(data) or offset + (count - 1) * stride + width > length or stride < width:
+        raise GltfError(f"{what} reaches beyond the bytes that it names")
+    return np.ndarray((count, columns), kind, data, first + offset, (stride, kind.itemsize))
+
+
+def _with_sparse(document: Document, accessor: Json, found: np.ndarray, what: str) -> np.ndarray:
+    """The elements with those put in that a sparse accessor keeps apart."""
+    sparse = accessor["sparse"]
+    if not all(isinstance(part, dict) for part in (sparse, sparse.get("indices"), sparse.get("values"))):
+        raise GltfError(f"{what} is sparse, and does not say what is where")
+    count, kind = whole(sparse, "count", least=1), _kind(sparse["indices"])
+    indices = _in_view(document, sparse["indices"], kind, 1, count, what)[:, 0].astype(np.int64)
+    values = _in_view(document, sparse["values"], found.dtype, found.shape[1], count, what)
+    if kind.kind != "u" or indices.max() >= len(found) or np.any(np.diff(indices) <= 0):
+        raise GltfError(f"{what} is sparse, and its indices do not rise to its last element")
+    found = found.copy()
+    found[indices] = values
+    return found

@@ -1,0 +1,263 @@
+"""The reduction of one clip: keys that are needed, stored as small as they may be, and the proof of what they show.
+
+A clip that would not become smaller stays as it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..motion import SeparateKeys
+from .errors import PARTS, World
+from .feet import Feet
+from .nodes import Nodes, Tracks, by_target
+from .rewriting import StoredTrack
+from .search import Search
+from .settling import moments, settled
+from .storing import Amount, amount, amount_before, key_size, shown, stored
+from .thinning import shared_times
+from .tracks import LINEAR, ROTATION, TRANSLATION, Clip, Track
+from .vertices import largest_displacement
+
+OF_INTEGERS = 0.25
+"""The share of the tolerance that rotations may take that are stored as 16-bit integers."""
+
+MORE_SLIDE = 0.001 / 1.7
+"""How much farther feet may slide than before, of the size of the body: a millimetre of a grown-up."""
+
+TIGHTER = 0.7
+"""How much smaller the tolerance of the next search is, where no keys that are put back help."""
+
+ROUNDS = 12
+"""How often keys are put back where the proof fails."""
+
+LEAST = 0.1
+"""The share of the tolerance that is worth a search."""
+
+NEEDED, LARGER = "all of its keys are needed", "fewer keys would take more bytes"
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """How few keys are wanted. Lengths are in the unit of the document."""
+
+    tolerance: float
+    """Of the displacement of any point of the balls around nodes, in the world."""
+
+    shared: bool = False
+    """Whether all nodes get their keys at the same times."""
+
+    count: int | None = None
+    """So many key poses of all nodes, whatever they are off by."""
+
+    vertices: bool = False
+    """Whether vertices of skins are measured."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedClip:
+    """What became of a clip; lengths are in the unit of the document."""
+
+    number: int
+    name: str
+    tracks: tuple[StoredTrack, ...] | None
+    """None where the clip stays as it was."""
+
+    reason: str
+    """Why it does; otherwise empty."""
+
+    before: Amount
+    after: Amount
+    error: float = 0.0
+    """The largest displacement of any point that is promised, in the world."""
+
+    slides: tuple[float, float] = (0.0, 0.0)
+    """How far joints slide that stand on the ground, before and after."""
+
+    vertices: float | None = None
+    """The largest displacement of any vertex of a skin, where that was asked for and there is one."""
+
+
+class ClipReduction:
+    """The search for the keys of one clip.
+
+    Parameters
+    ----------
+    nodes : Nodes
+    clip : Clip
+    moving : array of int, shape (n,)
+        The nodes that may move, parents before their children.
+    radii : array, shape (n,)
+        Of the balls around them.
+    joints : iterable of int
+        Nodes that are joints, some of which may be feet.
+    size : float
+        Of the body.
+    wishes : Wishes
+    """
+
+    def __init__(
+        self,
+        nodes: Nodes,
+        clip: Clip,
+        moving: np.ndarray,
+        radii: np.ndarray,
+        joints: Iterable[int],
+        size: float,
+        wishes: Wishes,
+    ) -> None:
+        self.clip, self.wishes, self.size = clip, wishes, size
+        self.before = amount_before(nodes.document, clip)
+        span = np.unique([track.times[end] for track in clip.tracks for end in (0, -1)])[[0, -1]]
+        world = World(nodes, moving, radii, by_target(clip.tracks), np.unique(span))
+        self.world = replace(world, times=moments(world, clip, wishes.tolerance))
+        found = settled(self.world, clip, wishes.tolerance)
+        self.settled = {target: track for target, track in found.items() if track is not None}
+        times = self.world.times
+        self.dense = {
+            (track.node, track.path): replace(track, interpolation=LINEAR, times=times, values=track.at(times))
+            for track in clip.tracks
+            if (track.node, track.path) not in found
+        }
+        """The tracks that are to have fewer keys, with a key at every moment."""
+        self.feet = Feet(self.world, joints)
+
+    def reduced(self) -> ReducedClip:
+        """The clip with fewer keys, or as it was."""
+        found = self._key_poses() if self.wishes.shared or self.wishes.count else self._own_keys()
+        if found is None:
+            return self._kept(NEEDED)
+        tracks, error = found
+        after = amount(tracks)
+        if after.size >= self.before.size:
+            return self._kept(LARGER)
+        shown_tracks = self._shown(tracks)
+        off = largest_displacement(self.world, shown_tracks) if self.wishes.vertices else None
+        slides, name = self.feet.slides(shown_tracks), self.clip.name
+        return ReducedClip(self.clip.number, name, tuple(tracks), "", self.before, after, error, slides, off)
+
+    def _kept(self, reason: str) -> ReducedClip:
+        return ReducedClip(self.clip.number, self.clip.name, None, reason, self.before, self.before)
+
+    def _key_poses(self) -> tuple[list[StoredTrack], float] | None:
+        wishes = self.wishes
+        search, integers, taken = self._search(), *self._storing()
+        tolerance = None if wishes.count else wishes.tolerance - taken
+        keys = search.key_poses(tolerance=tolerance, count=wishes.count)
+        tracks = self._stored([keys] * len(self.dense), integers=integers)
+        error = self.world.largest_error(self._shown(tracks), self.world.eighths)
+        return (tracks, error) if wishes.count or error <= wishes.tolerance else self._own_keys()
+
+    def _own_keys(self) -> tuple[list[StoredTrack], float] | None:
+        """Tracks with keys of their own that keep to the tolerance, and the largest error; None where none do."""
+        search, integers, taken = self._search(), *self._storing()
+        allowed = self.wishes.tolerance - taken
+        while allowed > LEAST * self.wishes.tolerance:
+            found = self._proven(self._samples(search.keys(allowed)), integers=integers)
+            if found is not None:
+                return found
+            allowed *= TIGHTER
+        return None
+
+    def _search(self) -> Search:
+        """A search for the keys of nodes, but for those whose steps are kept."""
+        moved = [target for target, track in self.settled.items() if len(track.times) > 1]
+        steps = [node for node, path in moved if path in (TRANSLATION, ROTATION)]
+        return Search(self.world, self.settled | self.dense, np.isin(self.world.moving, steps))
+
+    def _storing(self) -> tuple[bool, float]:
+        """Whether rotations may be integers, and how far off all is with all keys, by storing and what is settled."""
+        for integers in (True, False):
+            tracks = self._with_settled([stored(track, integers=integers) for track in self.dense.values()], integers)
+            taken = self.world.largest_error(self._shown(tracks), self.world.times)
+            if taken <= OF_INTEGERS * self.wishes.tolerance:
+                break
+        return integers, taken
+
+    def _samples(self, keys: Sequence[SeparateKeys]) -> list[np.ndarray]:
+        """Those that are keys of each dense track."""
+        of_nodes = [(path, keys[self.world.places[node]]) for node, path in self.dense]
+        return [own.rotation if path == ROTATION else own.location for path, own in of_nodes]
+
+    def _proven(self, samples: list[np.ndarray], *, integers: bool) -> tuple[list[StoredTrack], float] | None:
+        """Stored tracks with keys at these samples, and at more of them where the proof fails, and their largest error.
+
+        None where the proof fails with more and more of them.
+        """
+        world, tolerance = self.world, self.wishes.tolerance
+        for _ in range(ROUNDS):
+            tracks = self._stored(samples, integers=integers)
+            shown_tracks = self._shown(tracks)
+            places, eighths = self.feet.slips(shown_tracks, MORE_SLIDE * self.size)
+            eighths *= PARTS
+            if not len(places):
+                error = world.largest_error(shown_tracks, world.eighths)
+                if error <= tolerance:
+                    return tracks, error
+                places, eighths = world.worst(shown_tracks, world.eighths, tolerance)
+            samples = self._with_more(samples, places, eighths)
+        return None
+
+    def _with_more(self, samples: list[np.ndarray], places: np.ndarray, eighths: np.ndarray) -> list[np.ndarray]:
+        """Samples with those around some of the eighths, for the nodes at these places and all that they hang on."""
+        wanted = np.zeros((len(self.world.moving), len(self.world.times)), dtype=bool)
+        wanted[places, eighths // PARTS] = wanted[places, -(-eighths // PARTS)] = True
+        for place in range(len(wanted) - 1, -1, -1):
+            if (parent := self.world.parents[place]) >= 0:
+                wanted[parent] |= wanted[place]
+        ends = (0, len(self.world.times) - 1)
+        more = [np.flatnonzero(wanted[self.world.places[node]]) for node, _ in self.dense]
+        return [
+            np.union1d(own, (*ends, *new)).astype(np.int64) if len(new) else own
+            for own, new in zip(samples, more, strict=True)
+        ]
+
+    def _stored(self, samples: Sequence[np.ndarray], *, integers: bool) -> list[StoredTrack]:
+        """All tracks as they are to be stored, the dense ones with keys at these samples."""
+        times, tracks = self.world.times, []
+        moving = [number for number, own in enumerate(samples) if len(own) > 1]
+        dense = list(self.dense.values())
+        widths = [key_size(dense[number], integers=integers) for number in moving]
+        shared = shared_times([samples[number] for number in moving], widths, len(times))
+        together = dict(zip(moving, shared, strict=True))
+        for number, (track, own) in enumerate(zip(dense, samples, strict=True)):
+            if number not in together:
+                thinned = replace(track, times=times[:1], values=track.values[own])
+            else:
+                thinned = replace(track, times=times[own], values=track.values[own])
+                # Keys for the sake of others change nothing of what is shown.
+                key_times = times[together[number]]
+                thinned = replace(track, times=key_times, values=thinned.at(key_times))
+            tracks.append(stored(thinned, integers=integers))
+        return self._spanning(self._with_settled(tracks, integers))
+
+    def _with_settled(self, tracks: list[StoredTrack], integers: bool) -> list[StoredTrack]:
+        return tracks + [stored(track, integers=integers) for track in self.settled.values()]
+
+    def _spanning(self, tracks: list[StoredTrack]) -> list[StoredTrack]:
+        """The same with keys at both ends of the clip in one of them at least: it lasts as long as before."""
+        ends = self.world.times[[0, -1]]
+        seen = [time for track in tracks for time in track.times[[0, -1]].tolist()]
+        if np.isin(ends.astype(np.float32), seen).all():
+            return tracks
+        if not tracks:
+            first = self.clip.tracks[0]
+            still = replace(first, interpolation=LINEAR, times=ends[:1], values=first.at(ends[:1]))
+            tracks = [stored(still, integers=False)]
+        number = min(range(len(tracks)), key=lambda number: len(tracks[number].times))
+        integers = tracks[number].values.dtype.kind == "i"
+        track = shown(self._of_channel[tracks[number].channel], tracks[number])
+        times = np.union1d(track.times, ends)
+        tracks[number] = stored(replace(track, times=times, values=track.at(times)), integers=integers)
+        return tracks
+
+    @property
+    def _of_channel(self) -> dict[int, Track]:
+        return {track.channel: track for track in self.clip.tracks}
+
+    def _shown(self, tracks: Iterable[StoredTrack]) -> Tracks:
+        of_channel = self._of_channel
+        return by_target(tuple(shown(of_channel[track.channel], track) for track in tracks))

@@ -1,0 +1,293 @@
+"""glTF files, read and written whole: the JSON as it is, the bytes of buffers, and what else a GLB holds.
+
+Nothing is interpreted here but where bytes are. Unknown chunks, members and nulls stay. Files beside a document are
+read from its folder and below alone.
+Source: the glTF 2.0 specification, Khronos 2021, sections 3.6 and 4.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+import re
+import struct
+from binascii import Error as NotBase64
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Any
+from urllib.parse import quote, unquote
+
+MAGIC, JSON_CHUNK, BINARY_CHUNK = b"glTF", b"JSON", b"BIN\0"
+
+MOST_VALUES = 2**22
+"""In the JSON that is read: a hundred times as many as a body of thousands of joints has."""
+
+MOST_BYTES = 2**32 - 1
+"""Of a GLB, which counts them in 32 bits."""
+
+SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
+
+AGAIN = "export it again"
+
+Json = dict[str, Any]
+
+
+class GltfError(ValueError):
+    """What is wrong with a file or with what is asked of it, in one line, and what to do about it."""
+
+    def __init__(self, problem: str, way_out: str = AGAIN) -> None:
+        super().__init__(f"{problem}; {way_out}")
+        self.problem, self.way_out = problem, way_out
+
+
+@contextmanager
+def damage_refused() -> Iterator[None]:
+    """What is read of a document in the block may have any type: where that leads to, a `GltfError` says so."""
+    try:
+        yield
+    except (AttributeError, IndexError, KeyError, OverflowError, TypeError) as error:
+        raise GltfError(f"this glTF is damaged ({' '.join(str(error).split())[:80]})") from error
+
+
+@dataclass(frozen=True, eq=False)
+class Document:
+    """A glTF document and the bytes that belong to it.
+
+    Parameters
+    ----------
+    json : dict
+        As it is in the file.
+    buffers : tuple of bytes or None
+        What each buffer holds; None for one that stands for compressed data alone.
+    chunks : tuple of (bytes, bytes), optional
+        Kinds and contents of all chunks of a GLB, in their order. None for a .gltf file.
+    changed : frozenset of int
+        The buffers that are not what their files hold.
+    """
+
+    json: Json
+    buffers: tuple[bytes | None, ...]
+    chunks: tuple[tuple[bytes, bytes], ...] | None = None
+    changed: frozenset[int] = frozenset()
+
+    def files(self, name: str) -> dict[str, bytes]:
+        """What is to be written where the document is written as `name`: names of files, and what is in them.
+
+        Buffers that have changed get a file of their own, beside it and called as it is.
+        """
+        beside, buffers = {}, []
+        for number, (buffer, data) in enumerate(zip(objects(self.json, "buffers"), self.buffers, strict=True)):
+            if number in self.changed and data is not None and "uri" in buffer and not is_data(buffer["uri"]):
+                file = f"{Path(name).stem}{number or ''}.bin"
+                beside[file], buffer = data, {**buffer, "uri": quote(file)}
+            buffers.append(buffer)
+        document = {**self.json, "buffers": buffers} if beside else self.json
+        text = json.dumps(document, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode()
+        if self.chunks is None:
+            return beside | {name: text}
+        binary = self._binary
+        parts = [_chunk(JSON_CHUNK, text, b" ")]
+        for kind, content in self.chunks:
+            if kind == BINARY_CHUNK and binary is not None:
+                parts, binary = [*parts, _chunk(kind, binary, b"\0")], None
+            elif kind != JSON_CHUNK:
+                parts.append(_chunk(kind, content, b"\0"))
+        if binary is not None:
+            parts.insert(1, _chunk(BINARY_CHUNK, binary, b"\0"))
+        length = 12 + sum(map(len, parts))
+        if length > MOST_BYTES:
+            raise GltfError(f"{length} bytes are more than a GLB can hold", "export it as .gltf, with files beside it")
+        return beside | {name: b"".join((struct.pack("<4sII", MAGIC, 2, length), *parts))}
+
+    def companions(self, folder: Path) -> dict[str, bytes]:
+        """Files that the document names and that have not changed, from its folder: names, and what is in them."""
+        buffers = [buffer for number, buffer in enumerate(objects(self.json, "buffers")) if number not in self.changed]
+        uris = [part.get("uri") for part in (*buffers, *objects(self.json, "images"))]
+        names = {unquote(uri) for uri in uris if isinstance(uri, str) and not is_data(uri) and is_inside(unquote(uri))}
+        return {name: (folder / name).read_bytes() for name in names if (folder / name).is_file()}
+
+    @property
+    def _binary(self) -> bytes | None:
+        """What the first buffer holds, where it is the one inside of the GLB."""
+        first = objects(self.json, "buffers")[:1]
+        return self.buffers[0] if self.chunks is not None and first and "uri" not in first[0] else None
+
+
+def read_document(path: Path) -> Document:
+    """Read a .glb or .gltf file, and the files that its buffers are in.
+
+    Raises
+    ------
+    GltfError
+        For what is damaged, too large, missing or outside of the folder.
+    OSError
+        Where the file cannot be read.
+    """
+    content = path.read_bytes()
+    chunks = chunks_of(content) if content.startswith(MAGIC) else None
+    document = parsed(content if chunks is None else next(data for kind, data in chunks if kind == JSON_CHUNK))
+    binary = next((data for kind, data in chunks or () if kind == BINARY_CHUNK), None)
+    buffers = [
+        _buffer(path.parent, number, buffer, binary if number == 0 else None)
+        for number, buffer in enumerate(objects(document, "buffers"))
+    ]
+    return Document(document, tuple(buffers), chunks)
+
+
+def chunks_of(content: bytes) -> tuple[tuple[bytes, bytes], ...]:
+    """The kinds and contents of all chunks of a GLB file, the JSON among them."""
+    found: list[tuple[bytes, bytes]] = []
+    place, whole = 12, len(content)
+    if whole >= place:
+        version, length = struct.unpack_from("<II", content, 4)
+        if version != 2:
+            raise GltfError(f"this is GLB {version}, and 2 is known", "export it as glTF 2.0")
+        if length > whole:
+            raise GltfError(f"{whole} of {length} bytes are here", "copy the file again, or export it anew")
+        whole = length
+    while place + 8 <= whole:
+        length, kind = struct.unpack_from("<I4s", content, place)
+        place += 8
+        if place + length > whole:
+            raise GltfError("a part of this file is longer than the whole")
+        found.append((kind, content[place : place + length]))
+        place += length
+    if JSON_CHUNK not in [kind for kind, _ in found]:
+        raise GltfError("this GLB holds no JSON")
+    return tuple(found)
+
+
+def parsed(text: bytes) -> Json:
+    """The JSON of a document, which is an object."""
+    values = sum(map(text.count, (b",", b"[", b"{")))
+    if values > MOST_VALUES:
+        raise GltfError(
+            f"{values} values of JSON are more than the {MOST_VALUES} that are read",
+            "export the body without the rest of its scene",
+        )
+    try:
+        document = json.loads(text.decode("utf-8-sig"), parse_float=_finite, parse_constant=_finite)
+    except (RecursionError, ValueError) as error:
+        raise GltfError(f"this is no glTF (its JSON cannot be read: {' '.join(str(error).split())[:80]})") from None
+    if not isinstance(document, dict):
+        raise GltfError("this is no glTF (its JSON is no object)")
+    return document
+
+
+def objects(parent: Json, name: str) -> list[Json]:
+    """The objects in a list of the document; empty where there is none."""
+    found = parent.get(name)
+    if found is None:
+        return []
+    if not isinstance(found, list) or not all(isinstance(entry, dict) for entry in found):
+        raise GltfError(f"{name} is no list of objects")
+    return found
+
+
+def entry(parent: Json, name: str, number: object) -> Json:
+    """The object of a number in a list of the document."""
+    found = objects(parent, name)
+    if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < len(found):
+        raise GltfError(f"{name} has no entry {shown(number)}, which something in the file names")
+    return found[number]
+
+
+def whole(parent: Json, name: str, default: int | None = None, least: int = 0) -> int:
+    """A member that is a whole number, and not below the least."""
+    number = parent.get(name, default)
+    if isinstance(number, float) and number.is_integer():
+        number = int(number)
+    if not isinstance(number, int) or isinstance(number, bool) or number < least:
+        raise GltfError(f"{name} is {shown(number)}, and has to be a whole number from {least} on")
+    return number
+
+
+def shown(value: object) -> str:
+    """A value of a file as a message has it: short, on one line."""
+    return repr(value)[:60]
+
+
+def is_data(uri: object) -> bool:
+    return isinstance(uri, str) and uri[:5].lower() == "data:"
+
+
+def bytes_of_uri(uri: str) -> bytes:
+    """What a data URI holds. Raises ValueError where it is not in base64."""
+    head, _, data = uri.partition(",")
+    if not head.endswith(";base64"):
+        raise ValueError("not in base64")
+    return base64.b64decode(data)
+
+
+def is_inside(uri: str) -> bool:
+    """Whether a path stays in its folder, on whatever system."""
+    if SCHEME.match(uri) or PurePosixPath(uri).is_absolute() or PureWindowsPath(uri).anchor:
+        return False
+    depth = 0
+    for part in PureWindowsPath(uri).parts:
+        depth += -1 if part == ".." else 1
+        if depth < 0:
+            return False
+    return True
+
+
+def file_of(folder: Path, number: int, uri: object) -> Path:
+    """The file that a buffer is in.
+
+    Raises
+    ------
+    GltfError
+        Where it is not in the folder or below, or is no file.
+    """
+    if not isinstance(uri, str) or not is_inside(uri) or not is_inside(unquote(uri)):
+        raise GltfError(
+            f"buffer {number} is outside of its folder ({shown(uri)})", "export it as .glb, which is one file"
+        )
+    path = folder / unquote(uri)
+    try:
+        is_there = path.is_file()
+    except ValueError:
+        is_there = False
+    if not is_there:
+        raise GltfError(
+            f"buffer {number}, {shown(unquote(uri))}, is not there",
+            "bring that file along, or export it as .glb, which is one file",
+        )
+    return path
+
+
+def data_uri(data: bytes) -> str:
+    return f"data:application/octet-stream;base64,{base64.b64encode(data).decode()}"
+
+
+def _buffer(folder: Path, number: int, buffer: Json, binary: bytes | None) -> bytes | None:
+    uri, length = buffer.get("uri"), whole(buffer, "byteLength", least=1)
+    if uri is None:
+        data = binary
+    elif is_data(uri):
+        try:
+            data = bytes_of_uri(uri)
+        except (NotBase64, ValueError):
+            raise GltfError(f"buffer {number} is text that is not in base64") from None
+    else:
+        data = file_of(folder, number, uri).read_bytes()
+    if data is None:
+        return None
+    if len(data) < length:
+        raise GltfError(f"buffer {number} has {len(data)} of {length} bytes", "copy the file again, or export it anew")
+    return data[:length]
+
+
+def _chunk(kind: bytes, content: bytes, padding: bytes) -> bytes:
+    content += padding * (-len(content) % 4)
+    return struct.pack("<I4s", len(content), kind) + content
+
+
+def _finite(text: str) -> float:
+    number = float(text) if text[-1:].isdigit() else math.nan
+    if not math.isfinite(number):
+        raise ValueError(f"{text[:20]} is no number")
+    return number

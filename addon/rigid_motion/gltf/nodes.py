@@ -1,0 +1,152 @@
+"""The node tree of a glTF document: how nodes hang on one another, how they rest, and where tracks put them.
+
+Arrays have the nodes first. Quaternions are w, x, y, z.
+Source: the glTF 2.0 specification, Khronos 2021, section 3.5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+
+import numpy as np
+
+from ..motion import Skeleton
+from ..motion.affine import AffineMaps
+from ..motion.quaternions import matrices, normalise
+from .documents import Document, GltfError, Json, entry, objects, shown
+from .tracks import FARTHEST, ROTATION, SCALE, TO_WXYZ, TRANSLATION, WIDTHS, Track
+
+REST = {TRANSLATION: (0.0, 0.0, 0.0), ROTATION: (0.0, 0.0, 0.0, 1.0), SCALE: (1.0, 1.0, 1.0)}
+"""Of a node that says nothing."""
+
+Tracks = Mapping[tuple[int, str], Track]
+"""By node and path."""
+
+
+class Nodes:
+    """The nodes of a document.
+
+    Raises
+    ------
+    GltfError
+        For nodes that hang on themselves or on two others, and transforms that are none.
+    """
+
+    def __init__(self, document: Document) -> None:
+        self.document = document
+        nodes = objects(document.json, "nodes")
+        self.parents = _parents(nodes)
+        self.rest = {path: _rest(nodes, path) for path in WIDTHS}
+        """Translation (nodes, 3), rotation (nodes, 4) and scale (nodes, 3)."""
+        self.matrices = {
+            number: _matrix(node["matrix"], number) for number, node in enumerate(nodes) if "matrix" in node
+        }
+        """Of nodes that have one instead, (4, 4)."""
+
+    def __len__(self) -> int:
+        return len(self.parents)
+
+    @cached_property
+    def skeleton(self) -> Skeleton:
+        return Skeleton(self.parents)
+
+    def rest_of(self, node: int, path: str) -> np.ndarray:
+        """What a track of the node's takes the place of, shape (width,)."""
+        if path in self.rest:
+            return self.rest[path][node]
+        own = self.document.json["nodes"][node]
+        mesh = entry(self.document.json, "meshes", own["mesh"]) if "mesh" in own else {}
+        return np.array(own.get("weights", mesh.get("weights", ())), dtype=np.float64)
+
+    def below(self, moved: np.ndarray) -> np.ndarray:
+        """The nodes that move where these (m,) do, parents before their children, shape (n,)."""
+        moves = np.zeros(len(self), dtype=bool)
+        moves[moved] = True
+        for nodes in self.skeleton.levels[1:]:
+            moves[nodes] |= moves[self.parents[nodes]]
+        return np.concatenate([nodes[moves[nodes]] for nodes in self.skeleton.levels])
+
+    @cached_property
+    def resting(self) -> AffineMaps:
+        """Where all nodes are without tracks, shape (nodes,)."""
+        found = self.worlds(np.concatenate(self.skeleton.levels), {}, np.zeros(1))
+        order = np.argsort(np.concatenate(self.skeleton.levels))
+        return found[order, 0]
+
+    def worlds(self, nodes: np.ndarray, tracks: Tracks, times: np.ndarray) -> AffineMaps:
+        """Where nodes are at times (m,) as tracks move them, shape (nodes, m).
+
+        `nodes` (n,) has parents before their children; a parent that is not among them rests.
+        """
+        found: dict[int, AffineMaps] = {}
+        for node in nodes.tolist():
+            parent, local = int(self.parents[node]), self._local(node, tracks, times)
+            above = found.get(parent)
+            if above is None and parent >= 0:
+                above = self.resting[parent]
+            found[node] = local if above is None else above @ local
+        shape = (len(nodes), len(times))
+        axes, origins = np.empty((*shape, 3, 3)), np.empty((*shape, 3))
+        for place, node in enumerate(nodes.tolist()):
+            axes[place], origins[place] = found[node].axes, found[node].origins
+        return AffineMaps(axes, origins)
+
+    def _local(self, node: int, tracks: Tracks, times: np.ndarray) -> AffineMaps:
+        """In its parent's space, shape (m,), or (1,) where it rests."""
+        if node in self.matrices:
+            matrix = self.matrices[node][None]
+            return AffineMaps(matrix[:, :3, :3], matrix[:, :3, 3])
+        translation, rotation, scale = (
+            tracks[node, path].at(times) if (node, path) in tracks else self.rest[path][None, node] for path in WIDTHS
+        )
+        axes = np.moveaxis(matrices(rotation), -1, 0) * scale[:, None, :]
+        return AffineMaps(axes, translation)
+
+
+def by_target(tracks: tuple[Track, ...]) -> Tracks:
+    return {(track.node, track.path): track for track in tracks}
+
+
+def _parents(nodes: list[Json]) -> np.ndarray:
+    parents = np.full(len(nodes), -1, dtype=np.int64)
+    for number, node in enumerate(nodes):
+        children = node.get("children", [])
+        if not isinstance(children, list):
+            raise GltfError(f"the children of node {number} are no list")
+        for child in children:
+            entry({"nodes": nodes}, "nodes", child)
+            if parents[child] >= 0:
+                raise GltfError(f"node {child} hangs on nodes {parents[child]} and {number}")
+            parents[child] = number
+    try:
+        if len(nodes):
+            Skeleton(parents)
+    except ValueError as error:
+        raise GltfError(str(error).replace("joint", "node")) from None
+    return parents
+
+
+def _rest(nodes: list[Json], path: str) -> np.ndarray:
+    found = np.array([_vector(node.get(path, REST[path]), number, path) for number, node in enumerate(nodes)])
+    found = found.reshape(len(nodes), WIDTHS[path])
+    if path != ROTATION:
+        return found
+    lengths = np.linalg.norm(found, axis=1)
+    if not lengths.all():
+        raise GltfError(f"the rotation of node {int(np.argmin(lengths))} is of length zero")
+    return normalise(found[:, TO_WXYZ])
+
+
+def _vector(given: object, node: int, name: str, width: int | None = None) -> list[float]:
+    width = width or WIDTHS[name]
+    numbers = given if isinstance(given, (list, tuple)) else ()
+    if len(numbers) != width or not all(
+        isinstance(number, (int, float)) and abs(number) < FARTHEST for number in numbers
+    ):
+        raise GltfError(f"the {name} of node {node} is {shown(given)}, and not {width} numbers")
+    return list(numbers)
+
+
+def _matrix(given: object, node: int) -> np.ndarray:
+    return np.array(_vector(given, node, "matrix", 16), dtype=np.float64).reshape(4, 4).T

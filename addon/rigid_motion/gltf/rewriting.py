@@ -1,0 +1,309 @@
+"""Documents with other animations: nothing else changes but the numbers of accessors, views and where bytes are.
+
+What animations alone used goes out of the buffers, what they use now comes in behind the rest, in one view. Views and
+images that stay have the same bytes. In files with extensions that are not known here, which may name accessors and
+views in ways of their own, all that stays keeps its number.
+"""
+
+from __future__ import annotations
+
+import copy
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from .accessors import KINDS, raw_numbers
+from .documents import Document, Json, data_uri, objects
+from .tracks import LINEAR
+
+KNOWN = re.compile(
+    "(?:KHR|EXT)_(?:materials|texture|lights|mesh|animation|node|xmp)_.*|.*_meshopt_compression"
+    "|KHR_draco_mesh_compression|KHR_xmp|KHR_techniques_webgl|MSFT_(?:lod|texture_dds|packing_.*)|VRM.*"
+)
+"""Extensions whose numbers of accessors and views are found below, or that have none."""
+
+INSTANCES = "EXT_mesh_gpu_instancing"
+
+TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
+
+COMPONENT_TYPES = {kind.lstrip("<"): number for number, kind in KINDS.items()}
+
+ALIGNED = 8
+"""Bytes go out of buffers in multiples of it, so that what stays is aligned as it was."""
+
+Range = tuple[int, int]
+"""The first byte, and that behind the last."""
+
+
+@dataclass(frozen=True, eq=False)
+class StoredTrack:
+    """A track as it is to be stored, for a channel of an animation."""
+
+    channel: int
+    interpolation: str
+    times: np.ndarray
+    """Shape (n,), float32."""
+
+    values: np.ndarray
+    """Shape (rows, columns), float32 or int16, which is normalised; quaternions are x, y, z, w."""
+
+    @property
+    def accessors(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of keys and of values, each (count, columns)."""
+        return self.times[:, None], self.values
+
+
+def rewritten(document: Document, tracks: Mapping[int, Sequence[StoredTrack]]) -> Document:
+    """The document with other tracks in animations, by their numbers.
+
+    Their channels that are not among the tracks go, but for those that move no node or that extensions define.
+    """
+    return _Rewriting(document, tracks).done()
+
+
+class _Rewriting:
+    def __init__(self, document: Document, tracks: Mapping[int, Sequence[StoredTrack]]) -> None:
+        self.before, self.tracks = document, tracks
+        self.json: Json = copy.deepcopy(document.json)
+        self.accessors, self.views = (self.json.setdefault(name, []) for name in ("accessors", "bufferViews"))
+        self.data = bytearray()
+        self.known: dict[tuple[str, int, bytes], int] = {}
+        self.first_new = len(self.accessors)
+        self.keeps_numbers = not all(
+            isinstance(name, str) and KNOWN.fullmatch(name) for name in self.json.get("extensionsUsed", ())
+        )
+
+    def done(self) -> Document:
+        before = {container[key] for container, key in _sampler_slots(self.json)}
+        others = {container[key] for container, key in _other_slots(self.json)}
+        view = len(self.views)
+        for number, tracks in self.tracks.items():
+            self._put(objects(self.json, "animations")[number], tracks, view)
+        after = {container[key] for container, key in _sampler_slots(self.json)}
+        unused = before - after - others
+        removed = self._views_without(unused, before - others)
+        for number in after - others:
+            if number < self.first_new and removed & set(_views_of(self.accessors[number])):
+                self._move(number, view)
+        self.views.append({"buffer": 0, "byteLength": max(len(self.data), 1)})
+        self._renumber(
+            "accessors", unused, list(_accessor_slots(self.json)), {"componentType": 5126, "count": 1, "type": "SCALAR"}
+        )
+        buffers = self._buffers(removed)
+        self._renumber("bufferViews", removed, list(_view_slots(self.json)), {**self.views[view], "byteLength": 1})
+        return buffers
+
+    def _put(self, animation: Json, tracks: Sequence[StoredTrack], view: int) -> None:
+        """Give an animation these tracks and no others."""
+        new = {track.channel: track for track in tracks}
+        channels, samplers = [], []
+        for number, channel in enumerate(animation["channels"]):
+            sampler = dict(animation["samplers"][channel["sampler"]])
+            if number in new:
+                times, values = (self._add(numbers, view) for numbers in new[number].accessors)
+                sampler |= {"input": times, "output": values}
+                if sampler.get("interpolation", LINEAR) != new[number].interpolation:
+                    sampler["interpolation"] = new[number].interpolation
+            elif is_track(channel):
+                continue
+            samplers.append(sampler)
+            channels.append({**channel, "sampler": len(samplers) - 1})
+        animation["channels"], animation["samplers"] = channels, samplers
+
+    def _add(self, numbers: np.ndarray, view: int) -> int:
+        """The number of an accessor of these (count, columns), the same where there is one already."""
+        kind = numbers.dtype.str.lstrip("<|")
+        content = numbers.tobytes()
+        known = (kind, numbers.shape[1], content)
+        if known not in self.known:
+            accessor: Json = self._placed(content, view) | {"componentType": COMPONENT_TYPES[kind]}
+            accessor |= {"normalized": True} if kind != "f4" else {}
+            accessor |= {"count": len(numbers), "type": TYPES[numbers.shape[1]]}
+            if numbers.shape[1] == 1:
+                accessor |= {"min": [float(numbers.min())], "max": [float(numbers.max())]}
+            self.known[known] = len(self.accessors)
+            self.accessors.append(accessor)
+        return self.known[known]
+
+    def _placed(self, content: bytes, view: int) -> Json:
+        self.data += bytes(-len(self.data) % 4)
+        offset = len(self.data)
+        self.data += content
+        return {"bufferView": view} | ({"byteOffset": offset} if offset else {})
+
+    def _move(self, number: int, view: int) -> None:
+        """Bring what an accessor has into the new view: that which it is in goes."""
+        accessor, content = self.accessors[number], raw_numbers(self.before, number)
+        accessor.pop("byteOffset", None)
+        accessor.pop("sparse", None)
+        accessor |= self._placed(content.tobytes(), view)
+
+    def _views_without(self, unused: set[int], of_animations: set[int]) -> set[int]:
+        """The views that animations alone use, and some of which they use no more."""
+        places = [(container, container[key]) for container, key in _view_slots(self.json)]
+        owned = {view for number in of_animations for view in _views_of(self.accessors[number])}
+        counted = dict.fromkeys(owned, 0)
+        for _, view in places:
+            if view in counted:
+                counted[view] += 1
+        for number in of_animations:
+            for view in _views_of(self.accessors[number]):
+                counted[view] -= 1
+        free = {view for view, count in counted.items() if count == 0}
+        return free & {view for number in unused for view in _views_of(self.accessors[number])}
+
+    def _renumber(self, name: str, unused: set[int], slots: list[tuple[Any, Any]], nothing: Json) -> None:
+        """Take entries out of a list, the last ones into their places, and say so wherever they are named."""
+        listed = self.json[name]
+        numbers = {number: number for number in range(len(listed))}
+        if self.keeps_numbers:
+            for number in unused:
+                listed[number] = dict(nothing)
+            return
+        kept = [number for number in numbers if number not in unused]
+        numbers = {before: after for after, before in enumerate(kept)}
+        listed[:] = [listed[number] for number in kept]
+        for container, key in slots:
+            if container[key] in numbers:
+                container[key] = numbers[container[key]]
+
+    def _buffers(self, removed: set[int]) -> Document:
+        """The document with its bytes: without those of views that were removed, and with the new ones."""
+        json, contents = self.json, list(self.before.buffers)
+        ranges: dict[int, list[Range]] = {}
+        for number in sorted(removed):
+            view = self.views[number]
+            ranges.setdefault(view["buffer"], []).append(_range(view))
+        target = max(ranges, key=lambda buffer: sum(end - first for first, end in ranges[buffer]), default=-1)
+        if target < 0:
+            target = len(contents)
+            json.setdefault("buffers", []).append(
+                {"byteLength": 0} | ({} if self._has_room else {"uri": data_uri(b"")})
+            )
+            contents.append(b"")
+        users = [user for number, view in enumerate(self.views[:-1]) if number not in removed for user in _spans(view)]
+        for buffer in {*ranges, target}:
+            own = [user for user in users if user.get("buffer") == buffer]
+            cuts = _cuts(ranges.get(buffer, []), [_range(user) for user in own])
+            for user in own:
+                offset = user.get("byteOffset", 0)
+                if (moved := offset - sum(end - first for first, end in cuts if end <= offset)) != offset:
+                    user["byteOffset"] = moved
+            contents[buffer] = _without(contents[buffer], cuts)
+        view = self.views[-1]
+        view["buffer"] = target
+        padded = contents[target] + bytes(-len(contents[target]) % ALIGNED)
+        if padded:
+            view |= {"byteOffset": len(padded)}
+        contents[target] = padded + bytes(self.data or b"\0")
+        for buffer in {*ranges, target}:
+            described = json["buffers"][buffer]
+            described["byteLength"] = len(contents[buffer])
+            if isinstance(described.get("uri"), str) and described["uri"][:5].lower() == "data:":
+                described["uri"] = data_uri(contents[buffer])
+        return replace(self.before, json=json, buffers=tuple(contents), changed=self.before.changed | {*ranges, target})
+
+    @property
+    def _has_room(self) -> bool:
+        """Whether a first buffer may be that inside of a GLB."""
+        return self.before.chunks is not None and not self.before.buffers
+
+
+def is_track(channel: Json) -> bool:
+    """Whether a channel moves a node in a way that glTF itself knows."""
+    return "node" in channel["target"] and channel["target"].get("path") in (
+        "translation",
+        "rotation",
+        "scale",
+        "weights",
+    )
+
+
+def _accessor_slots(json: Json) -> Iterator[tuple[Any, Any]]:
+    """Every place that names an accessor: what it is in, and by which key."""
+    yield from _sampler_slots(json)
+    yield from _other_slots(json)
+
+
+def _sampler_slots(json: Json) -> Iterator[tuple[Json, str]]:
+    for animation in objects(json, "animations"):
+        for sampler in objects(animation, "samplers"):
+            yield from ((sampler, key) for key in ("input", "output"))
+
+
+def _other_slots(json: Json) -> Iterator[tuple[Json, str]]:
+    for mesh in objects(json, "meshes"):
+        for primitive in objects(mesh, "primitives"):
+            if "indices" in primitive:
+                yield primitive, "indices"
+            for attributes in (primitive.get("attributes"), *objects(primitive, "targets")):
+                yield from ((attributes, name) for name in attributes or {})
+    for skin in objects(json, "skins"):
+        if "inverseBindMatrices" in skin:
+            yield skin, "inverseBindMatrices"
+    for node in objects(json, "nodes"):
+        attributes = node.get("extensions", {}).get(INSTANCES, {}).get("attributes", {})
+        yield from ((attributes, name) for name in attributes)
+
+
+def _view_slots(json: Json) -> Iterator[tuple[Json, str]]:
+    """Every place that names a view, in extensions as well: all name it alike."""
+    waiting: list[Any] = [part for name, part in json.items() if name != "extras"]
+    while waiting:
+        part = waiting.pop()
+        if isinstance(part, dict):
+            if isinstance(part.get("bufferView"), int):
+                yield part, "bufferView"
+            waiting += [below for name, below in part.items() if name != "extras"]
+        elif isinstance(part, list):
+            waiting += part
+
+
+def _views_of(accessor: Json) -> list[int]:
+    """The views that an accessor is in: its own, and those of what is sparse."""
+    return [container["bufferView"] for container, _ in _view_slots({"accessor": accessor})]
+
+
+def _spans(view: Json) -> Iterator[Json]:
+    """What names bytes of a buffer: a view, and the compressed form of it."""
+    yield view
+    for extension in view.get("extensions", {}).values():
+        if isinstance(extension, dict) and {"buffer", "byteLength"} <= extension.keys():
+            yield extension
+
+
+def _range(view: Json) -> Range:
+    first = view.get("byteOffset", 0)
+    return first, first + view["byteLength"]
+
+
+def _cuts(removed: list[Range], kept: list[Range]) -> list[Range]:
+    """What can go out of a buffer: ranges without those that stay, aligned, rising."""
+    edges = sorted({place for some in (removed, kept) for one in some for place in one})
+    if not edges:
+        return []
+    places = np.array(edges)
+    counts = np.zeros((2, len(edges)), dtype=np.int64)
+    for row, some in enumerate((removed, kept)):
+        for first, end in some:
+            counts[row, np.searchsorted(places, first)] += 1
+            counts[row, np.searchsorted(places, end)] -= 1
+    goes, stays = np.cumsum(counts, axis=1) > 0
+    free = goes & ~stays
+    # Padding between two ranges that go, which nothing names, goes with them.
+    free[1:-1] |= ~stays[1:-1] & free[:-2] & free[2:] & (np.diff(places)[1:] < ALIGNED)
+    found: list[Range] = []
+    for first, end in zip(places[:-1][free[:-1]].tolist(), places[1:][free[:-1]].tolist(), strict=True):
+        if found and found[-1][1] == first:
+            first = found.pop()[0]
+        found.append((first, end))
+    aligned = [(-(-first // ALIGNED) * ALIGNED, end // ALIGNED * ALIGNED) for first, end in found]
+    return [(first, end) for first, end in aligned if first < end]
+
+
+def _without(data: bytes, cuts: list[Range]) -> bytes:
+    begins, ends = [0, *(end for _, end in cuts)], [*(first for first, _ in cuts), len(data)]
+    return b"".join(data[first:end] for first, end in zip(begins, ends, strict=True))

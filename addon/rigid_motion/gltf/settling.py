@@ -1,0 +1,128 @@
+"""What of a clip needs no search for keys: channels that are constant, stepped, or depend on nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .errors import World
+from .thinning import on_lines, without_repeats
+from .tracks import CUBICSPLINE, LINEAR, ROTATION, SCALE, STEP, WEIGHTS, Clip, Track
+
+NOISE = 0.01
+"""A channel that changes by less than this share of the tolerance is constant."""
+
+OF_SCALES = 0.1
+"""The share of the tolerance that a channel of scales may take."""
+
+WITHIN_WEIGHTS = 0.005
+"""How far off weights of morph targets may be: half a percent of the whole target."""
+
+WIDE = np.radians(15.0)
+"""A gap between samples in which a node turns farther is halved: what hangs on it runs in a bow."""
+
+BOW = 0.02
+"""The share of the tolerance by which a spline may leave the line between two samples."""
+
+HALVINGS = 8
+
+
+def moments(world: World, clip: Clip, tolerance: float) -> np.ndarray:
+    """The moments between which everything runs evenly, as close as turns and splines need it, shape (m,), rising."""
+    moved = [track for track in clip.tracks if track.path != WEIGHTS and not track.is_constant]
+    times = np.unique(np.concatenate([world.times, *(track.times for track in moved)]))
+    smooth = [track for track in moved if track.interpolation != STEP]
+    reaches = replace(world, times=times).reaches
+    for _ in range(HALVINGS):
+        halved = np.zeros(len(times) - 1, dtype=bool)
+        for track in smooth:
+            values = track.at(times)
+            if track.path == ROTATION:
+                halved |= np.abs(np.einsum("ij,ij->i", values[1:], values[:-1])) < np.cos(WIDE / 2)
+            if track.interpolation == CUBICSPLINE:
+                reach = 1.0 if track.path not in (ROTATION, SCALE) else 2.0 * reaches[world.places[track.node]]
+                halved |= _bows(track, times, values) * reach > BOW * tolerance
+        middles = ((times[:-1] + times[1:]) / 2)[halved].astype(np.float32).astype(np.float64)
+        more = np.union1d(times, middles)
+        if len(more) == len(times):
+            break
+        times = more
+    return times
+
+
+def settled(world: World, clip: Clip, tolerance: float) -> dict[tuple[int, str], Track | None]:
+    """The tracks that need no search, and what takes their places: None where the node rests."""
+    found: dict[tuple[int, str], Track | None] = {}
+    for track in clip.tracks:
+        target = track.node, track.path
+        settling = _Settling(world, track, tolerance)
+        if settling.rests:
+            found[target] = None
+        elif settling.is_constant:
+            found[target] = replace(track, interpolation=LINEAR, times=world.times[:1], values=settling.values[:1])
+        elif track.interpolation == STEP:
+            keys = without_repeats(track.values)
+            found[target] = replace(track, times=track.times[keys], values=track.values[keys])
+        elif track.path in (SCALE, WEIGHTS):
+            keys = on_lines(settling.times, settling.values, settling.within)
+            times, values = settling.times[keys], settling.values[keys]
+            found[target] = replace(track, interpolation=LINEAR, times=times, values=values)
+    return found
+
+
+class _Settling:
+    """A track, and how far it moves what hangs on its node, at the moments between which it runs evenly."""
+
+    def __init__(self, world: World, track: Track, tolerance: float) -> None:
+        self.world, self.track, self.tolerance = world, track, tolerance
+        curved = track.interpolation == CUBICSPLINE
+        self.times = np.union1d(world.times, track.times) if curved else track.times
+        self.values = track.at(self.times)
+        self.place = world.places.get(track.node, -1)
+
+    @property
+    def rests(self) -> bool:
+        """Whether the node is all the time as it would be without the track."""
+        rest = self.world.nodes.rest_of(self.track.node, self.track.path)
+        if self.track.path == WEIGHTS and not len(rest):
+            rest = np.zeros(self.values.shape[1])
+        return len(rest) == self.values.shape[1] and self._is_at(rest)
+
+    @property
+    def is_constant(self) -> bool:
+        return self._is_at(self.values[0])
+
+    @property
+    def within(self) -> float:
+        """How far off the numbers of scales or weights may be."""
+        if self.track.path == WEIGHTS:
+            return WITHIN_WEIGHTS
+        return OF_SCALES * self.tolerance / self.world.reaches[self.place] * float(np.abs(self.values).max())
+
+    def _is_at(self, value: np.ndarray) -> bool:
+        if self.track.path == WEIGHTS:
+            return bool(np.all(self.values == value))
+        return float(self._displacements(value).max()) <= NOISE * self.tolerance
+
+    def _displacements(self, value: np.ndarray) -> np.ndarray:
+        """How far what hangs on the node is moved at most from where one value has it, shape (m,)."""
+        values, reach = self.values, self.world.reaches[self.place]
+        if self.track.path == ROTATION:
+            # Of both signs, for noise is smaller than what is left of 1 less a cosine.
+            return 2.0 * reach * np.minimum(*(np.linalg.norm(values + sign * value, axis=1) for sign in (1.0, -1.0)))
+        if self.track.path == SCALE:
+            return reach * np.abs(values / np.where(value == 0.0, 1.0, value) - 1.0).max(axis=1)
+        return np.linalg.norm(values - value, axis=1) * float(self.world.lengths_above[self.place].max())
+
+
+def _bows(track: Track, times: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """How far a spline leaves the straight way between its values at moments (m,), in each gap, shape (m - 1,)."""
+    found = np.zeros(len(times) - 1)
+    for share in (0.25, 0.5, 0.75):
+        line = (1.0 - share) * values[:-1] + share * values[1:]
+        if track.path == ROTATION:
+            line /= np.linalg.norm(line, axis=1, keepdims=True)
+        there = track.at((1.0 - share) * times[:-1] + share * times[1:])
+        found = np.maximum(found, np.linalg.norm(there - line, axis=1))
+    return found

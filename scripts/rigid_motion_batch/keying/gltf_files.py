@@ -1,0 +1,118 @@
+"""What `reduce.py` does to glTF files: the same file with fewer keys in all of its clips. No Blender is needed here."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from rigid_motion.gltf import Document, GltfError, ReducedClip, Report, read_document, reduced
+from rigid_motion_batch.analysis.choices import Tolerance
+from rigid_motion_batch.files import written_beside
+
+from .options import Job
+from .output_files import FileProblem, Unreadable, refuse_came_meanwhile, refuse_read_only, refuse_to_replace
+from .sessions import Note, Outcome, StopIfAsked, tell_failure
+from .wishes import Wishes, doubt, fewer, off
+
+ENDINGS = (".glb", ".gltf")
+
+MILLIMETRES = 1e3
+"""In a metre."""
+
+
+class GltfRun:
+    """Doing glTF files, one after the other."""
+
+    def __init__(
+        self, wishes: Wishes, *, overwrite: bool, dry_run: bool, note: Note, stop_if_asked: StopIfAsked
+    ) -> None:
+        self.wishes, self.overwrite, self.dry_run = wishes, overwrite, dry_run
+        self._note, self._stop_if_asked = note, stop_if_asked
+        self._would = "would be " if dry_run else ""
+
+    def do(self, job: Job) -> Outcome:
+        """Read a file, reduce its clips, and write it."""
+        outcome = Outcome()
+        try:
+            refuse_to_replace(job.output, overwrite=self.overwrite)
+            refuse_read_only(job.output)
+            self._do(job, outcome)
+        except FileProblem as problem:
+            outcome.failed, outcome.unreadable = True, isinstance(problem, Unreadable)
+            self._note(f"{job.source}: {problem}")
+        except Exception as error:
+            outcome.failed = True
+            tell_failure(self._note, job.source, error)
+        return outcome
+
+    def _do(self, job: Job, outcome: Outcome) -> None:
+        wishes = self.wishes
+        try:
+            document = _read(job.source)
+            tolerance = None if wishes.tolerance is None else wishes.tolerance.metres(1.0)
+            report = reduced(
+                document,
+                tolerance=tolerance,
+                radius=wishes.radius,
+                shared=wishes.shared,
+                count=wishes.count,
+                vertices=wishes.vertices,
+            )
+        except GltfError as error:
+            raise Unreadable(str(error)) from None
+        self._stop_if_asked()
+        length = wishes.tolerance or Tolerance(f"{MILLIMETRES * report.tolerance:.6f}mm")
+        for clip in report.clips:
+            self._note(
+                f"{job.source}: {clip.name}: {_told(clip, length, self._would, by_number=wishes.count is not None)}"
+            )
+        size = f"{report.size:.3g} m large"
+        self._note(f"{job.source}: {size}{doubt(report.size, wishes.tolerance, 1.0)}")
+        outcome.clips += sum(clip.tracks is not None for clip in report.clips)
+        if not outcome.clips:
+            self._note(f"{job.source}: nothing could be reduced; left alone")
+            return
+        self._write(job, document, report)
+        self._note(f"{job.source}: {self._would}written to {job.output}")
+        outcome.add_written(job.output)
+
+    def _write(self, job: Job, document: Document, report: Report) -> None:
+        if self.dry_run:
+            return
+        folder, files = job.output.parent, report.document.files(job.output.name)
+        if os.path.realpath(folder) != os.path.realpath(job.source.parent):
+            files = report.document.companions(job.source.parent) | files
+        for name, content in files.items():
+            place = folder / name
+            try:
+                if place != job.output:
+                    refuse_to_replace(place, overwrite=self.overwrite)
+                with written_beside(place, overwrite=self.overwrite) as beside:
+                    beside.write_bytes(content)
+            except OSError as error:
+                refuse_came_meanwhile(place, error)
+                reason = error.strerror or error
+                raise FileProblem(f"{place} could not be written ({reason}): write elsewhere with --output") from None
+
+
+def _read(path: Path) -> Document:
+    if path.is_dir():
+        raise Unreadable(f"this is a folder: name the files in it, as in {path / '*.glb'}")
+    try:
+        return read_document(path)
+    except OSError as error:
+        raise Unreadable(f"this cannot be read ({error.strerror}): see to its path, and who may read it") from None
+
+
+def _told(clip: ReducedClip, tolerance: Tolerance, would: str, *, by_number: bool) -> str:
+    """What became of a clip."""
+    if clip.tracks is None:
+        return f"stays as it was, {clip.before.keys} keys in {clip.before.size} bytes: {clip.reason}"
+    told = f"{would}reduced{fewer(clip.before.keys, clip.after.keys)}, {clip.before.size} -> {clip.after.size} bytes"
+    told += off(tolerance, clip.error, 1.0, by_number=by_number)
+    if clip.vertices is not None:
+        told += f"; vertices {tolerance.alike(clip.vertices, 1.0)} at most"
+    if clip.slides[0] > 0.0:
+        before, after = (tolerance.alike(slide, 1.0) for slide in clip.slides)
+        told += f"; feet slide {after}, and {before} before"
+    return told

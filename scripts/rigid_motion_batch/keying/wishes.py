@@ -1,0 +1,54 @@
+"""How few keys are wanted, and how they are spoken of. No Blender is needed here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rigid_motion_batch.analysis.choices import Tolerance
+from rigid_motion_batch.recordings.figures import unit_of
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """How few keys are wanted, of what."""
+
+    mode: str
+    tolerance: Tolerance | None
+    """What each thing begins with in Blender's window, or `reduce.py` with recordings, where None."""
+
+    radius: float | None
+    """Of the shell in metres; what each object and bone measures, or what `compare` takes of recordings, where None."""
+
+    shared: bool
+    """Whether all bones of a rig get keys on the same frames."""
+
+    discard: bool = False
+    """Whether the dense keys go out of the file, so that Restore Keys cannot give them back."""
+
+    count: int | None = None
+    """So many keys of each object, or key poses of each rig, instead of a tolerance."""
+
+    vertices: bool = False
+    """Whether the vertices of skins are measured, in glTF files."""
+
+
+def doubt(size: float, tolerance: Tolerance | None, per_unit: float) -> str:
+    """What to think of where a tolerance is in metres, and a body of this size in metres hardly is; mostly nothing."""
+    name, length = unit_of(size)
+    if tolerance is None or not tolerance.is_length or length == 1.0:
+        return ""
+    meant = tolerance.metres(per_unit) / (per_unit * length)
+    return f"; it is {size:.3g} m large in this file: if these are {name}, give --tolerance {meant:.6g}"
+
+
+def fewer(before: int, after: int) -> str:
+    """How many keys became how many."""
+    return f", {before} -> {after} keys"
+
+
+def off(tolerance: Tolerance, metres: float, per_unit: float, *, by_number: bool) -> str:
+    """How far off that is, in the unit of the tolerance, which is of so many metres where it says none."""
+    if by_number:
+        return f", {tolerance.alike(metres, per_unit)} off at most"
+    allowed = tolerance.alike(tolerance.metres(per_unit), per_unit)
+    return f", {tolerance.alike(metres, per_unit)} off at most ({allowed} allowed)"

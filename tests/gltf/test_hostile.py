@@ -1,0 +1,154 @@
+"""Damaged and hostile glTF files: one line each that says what is wrong and what to do, and nothing is written."""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rigid_motion.gltf import GltfError, documents, read_document, reduce_file, reduced
+from rigid_motion_batch.cli import reduce
+from tests.gltf.making import glb, walk
+from tests.gltf.oracle import File
+
+RESULT = "walk-reduced"
+
+
+def refusal(path: Path, capsys: pytest.CaptureFixture[str]) -> str:
+    """The line that refuses a file, without its path; nothing is written."""
+    before = sorted(os.listdir(path.parent))
+    assert reduce.main([str(path)]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    line, *_ = said.err.splitlines()
+    assert sorted(os.listdir(path.parent)) == before
+    assert "Traceback" not in said.err
+    assert line.startswith(f"{path}: ")
+    return line.removeprefix(f"{path}: ")
+
+
+def changed(path: Path, change: Callable[[dict[str, Any]], None], text: str = "") -> Path:
+    """The file with other JSON."""
+    file = File(walk().write(path))
+    change(file.json)
+    path.write_bytes(glb((text or json.dumps(file.json)).encode(), file.buffers[0]))
+    return path
+
+
+def put(*keys: str | int, to: object) -> Callable[[dict[str, Any]], None]:
+    def change(document: Any) -> None:
+        for key in keys[:-1]:
+            document = document[key]
+        document[keys[-1]] = to
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "line"),
+    [
+        (put("accessors", 1, "count", to=2**40), "accessor 1 has 1099511627776 elements, more than are read"),
+        (put("accessors", 1, "count", to=-1), "count is -1, and has to be a whole number from 1 on"),
+        (put("accessors", 1, "count", to=99), "accessor 1 reaches beyond the bytes that it names"),
+        (put("accessors", 1, "bufferView", to=-1), "bufferViews has no entry -1, which something in the file names"),
+        (put("accessors", 1, "byteOffset", to=2**50), "accessor 1 reaches beyond the bytes that it names"),
+        (put("accessors", 1, "componentType", to=[]), "components of the type [], which glTF does not know"),
+        (put("bufferViews", 1, "byteLength", to=2**31), "accessor 1 reaches beyond the bytes that it names"),
+        (put("bufferViews", 1, "buffer", to=7), "buffers has no entry 7, which something in the file names"),
+        (put("bufferViews", 1, "byteStride", to=1), "accessor 1 reaches beyond the bytes that it names"),
+        (put("buffers", 0, "byteLength", to=2**30), f"of {2**30} bytes; copy the file again, or export it anew"),
+        (put("nodes", 5, "children", to=[0]), "hangs on itself, through its parents; export it again"),
+        (put("nodes", 5, "children", to=[5]), "node 5 hangs on nodes 4 and 5; export it again"),
+        (put("nodes", 5, "children", to=[2]), "node 2 hangs on nodes 1 and 5; export it again"),
+        (put("nodes", 5, "children", to=[99]), "nodes has no entry 99, which something in the file names"),
+        (put("nodes", 5, "rotation", to=[0, 0, 0, 0]), "the rotation of node 5 is of length zero; export it again"),
+        (put("nodes", 5, "translation", to=[1e300] * 3), "and not 3 numbers; export it again"),
+        (put("nodes", 5, to=None), "nodes is no list of objects; export it again"),
+        (put("animations", 0, "channels", 1, "sampler", to=True), "samplers has no entry True"),
+        (
+            put("animations", 0, "samplers", 0, "interpolation", to="CUBIC"),
+            "the interpolation 'CUBIC' is none of LINEAR",
+        ),
+        (put("animations", 0, "samplers", 0, "input", to=2), "its times do not rise; export it again"),
+        (put("animations", 0, "samplers", 0, "output", to=1), "61 values do not fit 61 keys of translation"),
+        (put("animations", 0, "channels", 0, "target", to="all"), "channel 0 has no target; export it again"),
+        (put("animations", to=[]), "no animation moves a node; export it with its animations"),
+        (put("skins", 0, "joints", to=["a"]), "nodes has no entry 'a', which something in the file names"),
+        (put("skins", 0, "inverseBindMatrices", to={}), "this glTF is damaged"),
+        (put("buffers", 0, "uri", to="data:,%00"), "buffer 0 is text that is not in base64; export it again"),
+        (put("buffers", 0, "uri", to="../../etc/passwd"), "buffer 0 is outside of its folder ('../../etc/passwd')"),
+        (put("buffers", 0, "uri", to="%2e%2e/secret"), "buffer 0 is outside of its folder ('%2e%2e/secret')"),
+        (put("buffers", 0, "uri", to="file:///etc/passwd"), "buffer 0 is outside of its folder ('file:///etc/passwd')"),
+        (put("buffers", 0, "uri", to="C:\\secret"), "buffer 0 is outside of its folder"),
+        (
+            put("buffers", 0, "uri", to="not there.bin"),
+            "buffer 0, 'not there.bin', is not there; bring that file along",
+        ),
+        (
+            put("bufferViews", 1, "extensions", to={"EXT_meshopt_compression": {}}),
+            "is compressed by meshopt, which is not read; export the file without it (gltfpack: without -c)",
+        ),
+    ],
+)
+def test_each_is_refused_in_one_line(tmp_path, capsys, change, line):
+    assert line in refusal(changed(tmp_path / "walk.glb", change), capsys)
+
+
+def test_json_that_is_none_or_too_much_is_refused(tmp_path, capsys, monkeypatch):
+    path = tmp_path / "walk.glb"
+    for text, line in (
+        ("[" * 200_000, "this is no glTF (its JSON cannot be read"),
+        ("[]", "this is no glTF (its JSON is no object); export it again"),
+        ('{"nodes": [{"scale": [1e999, 1, 1]}]}', "this is no glTF (its JSON cannot be read: 1e999 is no number)"),
+        ('{"nodes": NaN}', "this is no glTF (its JSON cannot be read: NaN is no number)"),
+    ):
+        assert line in refusal(changed(path, lambda _: None, text), capsys)
+    monkeypatch.setattr(documents, "MOST_VALUES", 100)
+    assert "values of JSON are more than the 100 that are read" in refusal(changed(path, lambda _: None), capsys)
+
+
+def test_chunks_that_lie_are_refused(tmp_path, capsys):
+    path = walk().write(tmp_path / "walk.glb")
+    content = path.read_bytes()
+    for begin, value, line in (
+        (4, 1, "this is GLB 1, and 2 is known; export it as glTF 2.0"),
+        (8, len(content) + 1, f"{len(content)} of {len(content) + 1} bytes are here; copy the file again"),
+        (12, 2**32 - 1, "a part of this file is longer than the whole; export it again"),
+        (16, 0, "this GLB holds no JSON; export it again"),
+    ):
+        path.write_bytes(content[:begin] + struct.pack("<I", value) + content[begin + 4 :])
+        assert line in refusal(path, capsys)
+    path.write_bytes(content[: len(content) // 2])
+    assert "bytes are here" in refusal(path, capsys)
+
+
+def test_whatever_is_damaged_is_refused_or_does_no_harm(tmp_path):
+    file = File(walk(joints=2, seconds=0.3).write(tmp_path / "walk.glb"))
+    random, path = np.random.default_rng(3), tmp_path / "damaged.glb"
+    values = [None, -1, 0, 1, 3, 2**40, 1.5, "x", "../x", [], {}, True, [[]], {"uri": 3}]
+    refused = 0
+    for _ in range(300):
+        document = json.loads(json.dumps(file.json))
+        for _ in range(int(random.integers(1, 4))):
+            part: Any = document
+            while True:
+                keys = list(part) if isinstance(part, dict) else list(range(len(part)))
+                key = keys[int(random.integers(len(keys)))]
+                if not isinstance(part[key], (dict, list)) or not part[key] or random.random() < 0.15:
+                    break
+                part = part[key]
+            part[key] = values[int(random.integers(len(values)))]
+        path.write_bytes(glb(json.dumps(document).encode(), file.buffers[0]))
+        try:
+            reduce_file(path, tmp_path / "made.glb", tolerance=1e-3)
+            reduced(read_document(tmp_path / "made.glb"))
+        except GltfError as error:
+            lines = str(error).splitlines()
+            refused += len(lines)
+    assert 100 < refused < 300, "one line each, and not all of them are refused"

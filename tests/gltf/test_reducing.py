@@ -1,0 +1,294 @@
+"""glTF files with fewer keys: what they promise holds, and nothing else changes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rigid_motion.gltf import GltfError, Report, read_document, reduce_file, reduced
+from tests.gltf.making import Making, turns, walk
+from tests.gltf.oracle import File, off
+
+RADIUS = 0.03
+
+ROUNDING = 1e-6
+"""Of the size: single precision."""
+
+
+def both(
+    made: Making, folder: Path, tolerance: float, name: str = "walk.glb", **more: float
+) -> tuple[File, File, Report]:
+    path = made.write(folder / name)
+    output = path.with_stem(f"{path.stem}-reduced")
+    report = reduce_file(path, output, tolerance=tolerance, radius=RADIUS, **more)
+    return File(path), File(output), report
+
+
+def holds(before: File, after: File, report: Report, clip: int = 0) -> float:
+    """The largest error of a clip, which is no larger than promised and as large as is said."""
+    error = off(before, after, clip, RADIUS)
+    assert error <= report.tolerance + ROUNDING * report.size
+    assert error <= report.clips[clip].error + ROUNDING * report.size
+    return error
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 5e-3, 2e-2])
+def test_no_point_around_any_joint_is_off_by_more_than_the_tolerance(tmp_path, tolerance):
+    before, after, report = both(walk(), tmp_path, tolerance)
+    assert holds(before, after, report) > 0.1 * tolerance
+    assert report.clips[0].after.size < 0.7 * report.clips[0].before.size
+    assert after.moments(0)[[0, -1]].tolist() == before.moments(0)[[0, -1]].tolist()
+
+
+def test_everything_else_of_the_file_stays(tmp_path):
+    made = walk()
+    image = made.view(bytes(range(256)))
+    made.json |= {"images": [{"bufferView": image, "mimeType": "image/png"}], "odd": [None, {"a": None}], "extras": 1.5}
+    positions = made.accessor(np.eye(3, dtype="<f4"))
+    made.json["meshes"] = [{"primitives": [{"attributes": {"POSITION": positions}}]}]
+    path = made.write(tmp_path / "walk.glb", [(b"ODD\0", b"some")])
+    reduce_file(path, tmp_path / "made.glb", tolerance=1e-3)
+    before, after = File(path), File(tmp_path / "made.glb")
+    assert [kind for kind, _ in after.chunks] == [b"JSON", b"BIN\0", b"ODD\0"]
+    assert after.chunks[2] == before.chunks[2]
+    changing = {"animations", "accessors", "bufferViews", "buffers", "meshes", "skins", "images"}
+    assert {name: part for name, part in before.json.items() if name not in changing} == {
+        name: part for name, part in after.json.items() if name not in changing
+    }
+    for file in (before, after):
+        file.image = file.bytes_of(file.json["images"][0].pop("bufferView"))
+        file.places = file.numbers(file.json["meshes"][0]["primitives"][0]["attributes"].pop("POSITION"))
+        file.inverse = file.numbers(file.json["skins"][0].pop("inverseBindMatrices"))
+    assert after.image == before.image
+    assert np.array_equal(after.places, before.places)
+    assert np.array_equal(after.inverse, before.inverse)
+    assert all(before.json[name] == after.json[name] for name in ("images", "meshes", "skins"))
+
+
+def test_constant_channels_have_one_key_and_those_at_rest_none(tmp_path):
+    made = walk()
+    times = made.times([0.0, 1.0])
+    made.json["nodes"].append({"name": "Hat", "translation": [0.0, 0.2, 0.0]})
+    made.json["nodes"][5]["children"] = [6]
+    made.channel(6, "translation", times, np.array([[0.0, 0.2, 0.0]] * 2))
+    made.channel(6, "rotation", times, turns(np.zeros(2), 3), "STEP")
+    _, after, _ = both(made, tmp_path, 1e-3)
+    tracks = after.tracks(0)
+    assert (6, "translation") not in tracks
+    assert all((joint, "scale") not in tracks for joint in range(6))
+    assert len(tracks[6, "rotation"][1]) == 1
+
+
+@pytest.mark.parametrize("unit", [1.0, 0.01, 100.0])
+def test_units_of_all_sizes_are_the_same_motion(tmp_path, unit):
+    path = walk(unit=unit).write(tmp_path / "walk.glb")
+    report = reduced(read_document(path), tolerance=2e-3 * unit, radius=RADIUS * unit)
+    (clip,) = report.clips
+    assert 0.0 < clip.error <= 2e-3 * unit
+    assert clip.after.size < 0.6 * clip.before.size
+
+
+def test_steps_stay_as_they_are(tmp_path):
+    made = walk()
+    steps = np.repeat(np.array([[0.0, 0.3, 0.0], [0.1, 0.3, 0.0], [0.2, 0.5, 0.0]]), 4, axis=0)
+    made.channel(3, "translation", made.times(np.arange(12) / 6), steps, "STEP")
+    before, after, report = both(made, tmp_path, 2e-3)
+    kind, times, values = after.tracks(0)[3, "translation"]
+    assert (kind, len(times)) == ("STEP", 3)
+    assert np.array_equal(values, steps[::4].astype("<f4"))
+    holds(before, after, report)
+
+
+def test_splines_become_lines_where_these_are_smaller(tmp_path):
+    made, random = walk(), np.random.default_rng(7)
+    times = np.arange(61) / 30
+    rows = np.zeros((61, 3, 4))
+    rows[:, 1] = turns(times, 9)
+    rows[:, [0, 2]] = random.normal(0.0, 0.3, (61, 2, 4))
+    made.json["nodes"][5] |= {"children": [6]}
+    made.json["nodes"].append({"translation": [0.0, 0.3, 0.0]})
+    made.channel(6, "rotation", made.times(times), rows.reshape(-1, 4), "CUBICSPLINE")
+    before, after, report = both(made, tmp_path, 5e-3)
+    holds(before, after, report)
+
+
+def test_scales_that_change_and_uneven_ones_keep_to_the_tolerance(tmp_path):
+    made = walk()
+    times = np.arange(61) / 30
+    made.json["animations"][0]["channels"] = [
+        channel
+        for channel in made.json["animations"][0]["channels"]
+        if channel["target"] not in ({"node": 2, "path": "scale"}, {"node": 4, "path": "scale"})
+    ]
+    own = made.times(times)
+    made.channel(2, "scale", own, np.column_stack((1.0 + 0.3 * np.sin(3 * times),) * 3))
+    made.channel(4, "scale", own, np.column_stack((1.0 + 0.2 * np.sin(times), np.full(61, 0.7), np.cos(times))))
+    before, after, report = both(made, tmp_path, 5e-3)
+    assert report.clips[0].tracks is not None
+    holds(before, after, report)
+
+
+def test_weights_of_morph_targets_keep_to_half_a_percent(tmp_path):
+    made = walk()
+    times = np.arange(61) / 30
+    made.json["nodes"][0]["mesh"] = 0
+    made.json["meshes"] = [{"primitives": [{"attributes": {}, "targets": [{}, {}]}], "weights": [0.0, 0.0]}]
+    weights = np.column_stack((0.5 + 0.5 * np.sin(3 * times), np.abs(np.cos(times))))
+    made.channel(0, "weights", made.times(times), weights.reshape(-1, 1))
+    _, after, _ = both(made, tmp_path, 5e-3)
+    kind, key_times, values = after.tracks(0)[0, "weights"]
+    assert (kind, len(key_times) < 40) == ("LINEAR", True)
+    found = [np.interp(times, key_times, column) for column in values.reshape(-1, 2).T]
+    assert np.abs(np.transpose(found) - weights).max() <= 0.005 + ROUNDING
+
+
+def test_vertices_of_skins_are_measured(tmp_path):
+    made, random = walk(), np.random.default_rng(2)
+    places = random.normal(size=(50, 3)).astype("<f4")
+    joints, shares = random.integers(0, 6, size=(50, 4)).astype("u1"), random.uniform(size=(50, 4)).astype("<f4")
+    shares /= shares.sum(axis=1, keepdims=True)
+    attributes = {"POSITION": places, "JOINTS_0": joints, "WEIGHTS_0": shares}
+    numbers = {name: made.accessor(values) for name, values in attributes.items()}
+    made.json["meshes"] = [{"primitives": [{"attributes": numbers}]}]
+    made.json["nodes"].append({"mesh": 0, "skin": 0})
+    before, after, report = both(made, tmp_path, 5e-3, vertices=True)
+    times = np.union1d(before.moments(0), after.moments(0))
+    moved = after.worlds(0, times)[:6] - before.worlds(0, times)[:6]
+    moved = np.einsum("vk,vkmab,vb->mva", shares, moved[joints], np.column_stack((places, np.ones(50))))
+    assert report.clips[0].vertices == pytest.approx(np.linalg.norm(moved[..., :3], axis=-1).max(), rel=1e-4)
+
+
+def test_sparse_strided_normalised_and_scattered_accessors_are_read(tmp_path):
+    made = walk()
+    made.buffers += [bytearray(), bytearray()]
+    times = np.arange(61) / 30
+    made.json["nodes"] += [{"translation": [0.1, 0.0, 0.0]} for _ in range(3)]
+    made.json["nodes"][5]["children"] = [6, 7, 8]
+    own = made.times(times, buffer=1)
+    whole = np.rint(turns(times, 11).astype(np.float64) * 32767).astype("<i2")
+    made.channel(6, "rotation", own, made.accessor(whole, buffer=2, normalized=True))
+    spread = np.zeros((61, 5), dtype="<f4")
+    spread[:, :3] = 0.05 * np.column_stack((np.sin(times), np.cos(times), times))
+    view = made.view(spread.tobytes(), buffer=2, byteStride=20)
+    made.json["accessors"].append({"bufferView": view} | made.described(spread[:, :3]))
+    made.channel(7, "translation", own, len(made.json["accessors"]) - 1)
+    places, values = np.array([20, 40], dtype="<u2"), np.array([[0.1, 0.2, 0.0], [0.0, 0.1, 0.3]], dtype="<f4")
+    sparse = {
+        "count": 2,
+        "indices": {"bufferView": made.view(places.tobytes()), "componentType": 5123},
+        "values": {"bufferView": made.view(values.tobytes())},
+    }
+    made.json["accessors"].append({"componentType": 5126, "count": 61, "type": "VEC3", "sparse": sparse})
+    made.channel(8, "translation", own, len(made.json["accessors"]) - 1)
+    before, after, report = both(made, tmp_path, 2e-3)
+    holds(before, after, report)
+    assert (tmp_path / "walk-reduced2.bin").stat().st_size < (tmp_path / "walk 2.bin").stat().st_size
+
+
+def test_a_gltf_has_its_buffer_beside_it(tmp_path):
+    before, after, report = both(walk(), tmp_path, 2e-3, "a walk.gltf")
+    holds(before, after, report)
+    assert after.json["buffers"][0]["uri"] == "a%20walk-reduced.bin"
+    assert (tmp_path / "a walk-reduced.bin").stat().st_size == after.json["buffers"][0]["byteLength"]
+
+
+def test_clips_that_share_numbers_are_reduced_each_for_itself(tmp_path):
+    made = walk()
+    first = made.json["animations"][0]
+    made.json["animations"].append(json.loads(json.dumps(first)) | {"name": "Again"})
+    few = made.times([0.0, 1.0])
+    made.channel(2, "translation", few, np.eye(3)[:2], clip=2)
+    before, after, report = both(made, tmp_path, 2e-3)
+    for clip in range(3):
+        holds(before, after, report, clip)
+    assert report.clips[2].tracks is None
+    assert report.clips[0].after.size <= report.clips[0].before.size
+    assert report.clips[0].after == report.clips[1].after
+
+
+def test_a_file_with_an_extension_that_nobody_knows_keeps_its_numbers(tmp_path):
+    made = walk()
+    positions = made.accessor(np.eye(3, dtype="<f4"))
+    made.json |= {"extensionsUsed": ["ACME_hair"], "extensions": {"ACME_hair": {"strands": positions}}}
+    before, after, report = both(made, tmp_path, 2e-3)
+    holds(before, after, report)
+    assert np.array_equal(after.numbers(positions), before.numbers(positions))
+    assert after.json["extensions"] == before.json["extensions"]
+
+
+def test_channels_of_extensions_stay(tmp_path):
+    made = walk()
+    made.json["extensionsUsed"] = ["KHR_animation_pointer"]
+    times = made.times([0.0, 1.0])
+    made.channel(0, "pointer", times, np.array([[0.0], [0.7]]))
+    channel = made.json["animations"][0]["channels"][-1]
+    channel["target"] = {"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": "/materials/0"}}}
+    path = made.write(tmp_path / "walk.glb")
+    reduce_file(path, tmp_path / "made.glb", tolerance=2e-3)
+    after = File(tmp_path / "made.glb")
+    animation = after.json["animations"][0]
+    (found,) = [some for some in animation["channels"] if some["target"] == channel["target"]]
+    assert after.numbers(animation["samplers"][found["sampler"]]["output"]).ravel().tolist() == [0.0, np.float32(0.7)]
+
+
+def test_key_poses_are_so_many_times_of_all_nodes(tmp_path):
+    path = walk().write(tmp_path / "walk.glb")
+    report = reduce_file(path, tmp_path / "made.glb", count=7)
+    after = File(tmp_path / "made.glb")
+    assert len(after.moments(0)) == 7
+    assert {len(times) for _, times, _ in after.tracks(0).values()} == {7}
+    assert report.clips[0].error > 0.0
+
+
+def test_a_tolerance_above_a_tenth_of_the_size_is_refused_with_the_way_out(tmp_path):
+    document = read_document(walk(unit=0.01).write(tmp_path / "walk.glb"))
+    with pytest.raises(
+        GltfError, match=r"a tolerance of 0\.01 m is more than a tenth .* 0\.015 m .*; give one below 0\.0015 m"
+    ):
+        reduced(document, tolerance=0.01)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 10**9))
+def test_whatever_hangs_on_whatever_keeps_to_the_tolerance(tmp_path_factory, seed):
+    random, folder = np.random.default_rng(seed), tmp_path_factory.mktemp("random")
+    made, count = Making(), int(random.integers(1, 8))
+    unit = 10.0 ** random.uniform(-2.0, 2.0)
+    nodes = made.json["nodes"] = [{"translation": (0.4 * unit * random.normal(size=3)).tolist()} for _ in range(count)]
+    for node in range(1, count):
+        nodes[random.integers(0, node)].setdefault("children", []).append(node)
+    made.json["skins"] = [{"joints": list(range(count))}]
+    for node in random.permutation(count)[: random.integers(1, count + 1)].tolist():
+        keys = int(random.integers(2, 30))
+        times = np.cumsum(random.uniform(0.02, 0.2, keys)).astype("<f4")
+        own = made.times(times)
+        for path in ("rotation", "translation", "scale"):
+            if random.random() < 0.3:
+                continue
+            kind = str(random.choice(["LINEAR", "STEP", "CUBICSPLINE"], p=[0.7, 0.15, 0.15]))
+            if path == "rotation":
+                values = turns(times, int(random.integers(0, 99)), random.uniform(0.1, 3.0))
+            elif path == "translation":
+                values = 0.3 * unit * np.cumsum(random.normal(size=(keys, 3)), axis=0) / np.sqrt(keys)
+            else:
+                values = random.uniform(0.5, 1.5, size=(1, 3)) * np.ones((keys, 1))
+            if kind == "CUBICSPLINE":
+                rows = np.zeros((keys, 3, values.shape[1]))
+                rows[:, 1] = values
+                rows[:, [0, 2]] = 0.3 * np.abs(values).max() * random.normal(size=(keys, 2, values.shape[1]))
+                values = rows.reshape(3 * keys, -1)
+            made.channel(node, path, own, np.asarray(values, dtype="<f4"), kind)
+    if not made.json["animations"]:
+        return
+    path = made.write(folder / "made.glb")
+    document = read_document(path)
+    size = reduced(document, radius=RADIUS * unit, tolerance=None).size
+    report = reduce_file(path, folder / "out.glb", tolerance=0.01 * size or unit, radius=RADIUS * unit)
+    error = off(File(path), File(folder / "out.glb"), 0, RADIUS * unit)
+    assert error <= report.tolerance * (1.0 + 1e-4) + ROUNDING * unit * 10.0
+    assert report.clips[0].after.size <= report.clips[0].before.size

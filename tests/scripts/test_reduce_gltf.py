@@ -1,0 +1,116 @@
+"""`reduce.py` gives glTF files back as they are, with fewer keys, and needs no Blender for that."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+
+from rigid_motion_batch.cli import reduce
+from tests.gltf.making import walk
+from tests.gltf.oracle import File, off
+
+WITHOUT_BLENDER = """
+import sys
+sys.modules["bpy"] = None
+from rigid_motion_batch.cli import reduce
+sys.exit(reduce.main(sys.argv[1:]))
+"""
+
+
+def run(*arguments: object) -> int:
+    return reduce.main([str(argument) for argument in arguments])
+
+
+def test_no_blender_is_needed(tmp_path):
+    source = walk().write(tmp_path / "walk.glb")
+    command = [sys.executable, "-c", WITHOUT_BLENDER, str(source), "--tolerance", "2mm", "--radius", "0.03"]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, env=environment)
+    made = tmp_path / "walk-reduced.glb"
+    assert (done.returncode, done.stdout) == (0, f"{made}\n")
+    told = re.search(
+        r"Take0: reduced, (\d+) -> (\d+) keys, (\d+) -> (\d+) bytes, (\S+) mm off at most \(2 mm allowed\)", done.stderr
+    )
+    assert told is not None
+    before, after, size_before, size_after = map(int, told.groups()[:4])
+    assert after < before
+    assert size_after < size_before
+    assert off(File(source), File(made), 0, 0.03) <= 1e-3 * float(told[5]) + 1e-5
+    assert float(told[5]) <= 2.0
+    assert re.search(r"walk\.glb: 1\.5 m large", done.stderr)
+    assert "1 clip reduced; 1 file: 1 written." in done.stderr
+
+
+def test_a_file_in_another_unit_is_told_from_its_size(tmp_path, capsys):
+    source = walk(unit=100.0).write(tmp_path / "walk.glb")
+    assert run(source, "--tolerance", "2mm") == 0
+    assert "150 m large in this file: if these are centimetres, give --tolerance 0.2" in capsys.readouterr().err
+
+
+def test_a_tolerance_that_is_too_large_is_refused_and_nothing_is_written(tmp_path, capsys):
+    source = walk(unit=0.01).write(tmp_path / "walk.glb")
+    assert run(source, "--tolerance", "2mm") == 2
+    assert "a tolerance of 0.002 m is more than a tenth of the size, which is 0.015 m" in capsys.readouterr().err
+    assert os.listdir(tmp_path) == ["walk.glb"]
+
+
+def test_a_gltf_finds_its_files_from_another_folder(tmp_path):
+    made = walk()
+    made.json["images"] = [{"uri": "skin%20a.png"}]
+    (tmp_path / "skin a.png").write_bytes(b"some")
+    source = made.write(tmp_path / "walk.gltf")
+    assert run(source, "--output", tmp_path / "out", "--tolerance", "2mm") == 0
+    assert sorted(os.listdir(tmp_path / "out")) == ["skin a.png", "walk-reduced.bin", "walk-reduced.gltf"]
+    assert off(File(source), File(tmp_path / "out" / "walk-reduced.gltf"), 0, 0.0) <= 2e-3
+
+
+def test_a_clip_that_needs_its_keys_stays_and_the_file_is_left_alone(tmp_path, capsys):
+    source = walk(joints=1, seconds=0.1).write(tmp_path / "walk.glb")
+    assert run(source, "--tolerance", "0.001mm") == 0
+    said = capsys.readouterr()
+    assert said.out == str(tmp_path / "walk-reduced.glb") + "\n" or "stays as it was" in said.err
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        (["--mode", "dq_sclerp"], "knows lines and even turns alone: leave it out, or add --blend, for a .blend file"),
+        (["--in-place"], "--in-place is for .blend files, and"),
+        (["--objects", "A"], "--objects is for .blend files"),
+    ],
+)
+def test_options_of_blend_files_are_refused(tmp_path, capsys, options, line):
+    source = walk().write(tmp_path / "walk.glb")
+    with pytest.raises(SystemExit) as ended:
+        run(source, *options)
+    assert ended.value.code == 2
+    assert line in capsys.readouterr().err
+
+
+def test_what_is_there_stays_without_overwrite_and_a_dry_run_writes_nothing(tmp_path, capsys):
+    source = walk().write(tmp_path / "walk.glb")
+    assert run(source, "--dry-run") == 0
+    assert os.listdir(tmp_path) == ["walk.glb"]
+    made = tmp_path / "walk-reduced.glb"
+    made.write_bytes(b"mine")
+    assert run(source) == 1
+    assert f"{made} is there already: add --overwrite, or another --output" in capsys.readouterr().err
+    assert made.read_bytes() == b"mine"
+    assert run(source, "--overwrite") == 0
+    assert made.read_bytes()[:4] == b"glTF"
+
+
+def test_key_poses_are_so_many_frames_of_all_joints(tmp_path):
+    source = walk().write(tmp_path / "walk.glb")
+    assert run(source, "--key-poses", "9") == 0
+    assert len(File(tmp_path / "walk-reduced.glb").moments(0)) == 9
+
+
+def test_a_rig_with_its_mode_comes_with_blend(tmp_path):
+    source = walk().write(tmp_path / "walk.glb")
+    assert run(source, "--blend", "--mode", "dq_sclerp") == 0
+    assert sorted(os.listdir(tmp_path)) == ["walk-keys.blend", "walk.glb"]
