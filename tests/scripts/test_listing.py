@@ -47,8 +47,6 @@ BROKEN = [
     ("no_other_way_to_load_code", "import sys\ndel sys.modules['other']"),
     ("no_other_way_to_load_code", "import importlib"),
     ("no_other_way_to_load_code", "exec('1')"),
-    ("permissions_are_those_that_are_used", "open('settings.json', 'w')"),
-    ("permissions_are_those_that_are_used", "from pathlib import Path"),
     ("permissions_are_those_that_are_used", "bpy.context.window_manager.clipboard = ''"),
     ("its_own_folder_is_left_alone", "HERE = __file__"),
     ("named_by_its_package", "class Preferences(bpy.types.AddonPreferences):\n    bl_idname = 'rigid_motion'"),
@@ -91,8 +89,16 @@ def test_a_zip_without_manifest_or_licence_is_found():
     assert len(list(listing_rules.nothing_is_left_over({"__init__.py": b""}))) == 2
 
 
+@pytest.mark.parametrize("code", ["open('settings.json', 'w')", "from pathlib import Path"])
+def test_files_without_their_permission_are_found(code):
+    manifest = MANIFEST.read_text(encoding="utf-8").partition("[permissions]")[0]
+    files = {MANIFEST.name: manifest.encode(), "ui/added.py": code.encode()}
+    (complaint,) = listing_rules.permissions_are_those_that_are_used(files)
+    assert complaint.startswith("ui/added.py")
+
+
 def test_a_permission_that_is_not_used_is_found(files):
-    asking = files[MANIFEST.name] + b'\n[permissions]\nnetwork = "To look for news"\n'
+    asking = files[MANIFEST.name] + b'network = "To look for news"\n'
     found = list(listing_rules.permissions_are_those_that_are_used({**files, MANIFEST.name: asking}))
     assert found == ["the permission for network is asked for, and not used"]
 
@@ -111,7 +117,7 @@ def test_a_permission_that_is_not_used_is_found(files):
 )
 def test_a_manifest_that_the_site_does_not_want_is_found(entry, value, files):
     manifest = tomllib.loads(files[MANIFEST.name].decode()) | {entry: value}
-    text = "\n".join(f"{name} = {value!r}" for name, value in manifest.items()).encode()
+    text = "\n".join(f"{name} = {value!r}" for name, value in manifest.items() if name != "permissions").encode()
     assert len(list(listing_rules.the_manifest_is_as_the_site_wants_it({MANIFEST.name: text}))) == 1
 
 

@@ -13,6 +13,7 @@ breakdown    those that key poses by a slider
 exactness    exact between frames, or not
 preferences  of the extension                           manual       where the documentation is
 turn_operator  whole turns between keys
+gltf_export  glTF files with few keys
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ import bpy
 from . import (
     breakdown,
     exactness,
+    gltf_export,
     keymap,
     manual,
     menus,
@@ -43,6 +45,7 @@ CLASSES = (
     *exactness.CLASSES,
     *pose_operators.CLASSES,
     *reducing.CLASSES,
+    *gltf_export.CLASSES,
     *menus.CLASSES,
     *panels.CLASSES,
 )

@@ -12,6 +12,7 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from ..animation.transforms import OWN_WORDS
+from .gltf_export import RIGID_MOTION_OT_export_gltf
 from .pose_operators import RIGID_MOTION_OT_copy_pose, RIGID_MOTION_OT_create_pose_asset
 from .targets import CURRENT, SELECTED, WHOLE, active_target, is_posing, modes_meant
 from .wording import LABELS, SHORT_LABELS
@@ -196,6 +197,10 @@ def _draw_copy_and_view(self: bpy.types.Menu, context: bpy.types.Context) -> Non
     _draw_in_view(self, context)
 
 
+def _draw_export(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    self.layout.operator(RIGID_MOTION_OT_export_gltf.bl_idname, text="glTF, Reduced (.glb)")
+
+
 ENTRIES = {
     "DOPESHEET_MT_key": _draw_keys,
     "DOPESHEET_MT_context_menu": _draw_keys,
@@ -206,6 +211,7 @@ ENTRIES = {
     "VIEW3D_MT_pose": _draw_copy,
     "VIEW3D_MT_pose_context_menu": _draw_copy_and_view,
     "VIEW3D_MT_pose_slide": _draw_in_betweens,
+    "TOPBAR_MT_file_export": _draw_export,
 }
 """Blender's menus, and what is appended to each. That of Object > Animation is the one of Pose > Animation too."""
 

@@ -37,5 +37,9 @@ REPORTS = {
     "; not promised for what follows constraints or drivers, and hangs on it: {bones}": (
         "; nicht zugesagt für das, was Beschränkungen oder Treibern folgt, und was daran hängt: {bones}"
     ),
+    "{name}: {keys} of {all_keys} keys, {size:.0f} of {full:.0f} kB of animation, {error:.2f} mm off at most": (
+        "{name}: {keys} von {all_keys} Schlüsselbildern, {size:.0f} von {full:.0f} kB Animation, "
+        "höchstens {error:.2f} mm daneben"
+    ),
     "; segments: {modes}": "; Segmente: {modes}",
 }

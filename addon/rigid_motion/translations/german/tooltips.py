@@ -404,4 +404,23 @@ TOOLTIPS = {
     "These keys were reduced since: Restore Keys first": (
         "Diese Schlüsselbilder wurden seitdem reduziert: zuerst „Schlüsselbilder wiederherstellen“"
     ),
+    # glTF
+    (
+        "Write a GLB file with only the keys that its animations need: no joint, nor any point within the radius of "
+        "it, is off by more than the tolerance in any viewer. All other options are those that glTF 2.0 was exported "
+        "with last"
+    ): (
+        "Eine GLB-Datei mit nur den Schlüsselbildern schreiben, die ihre Animationen brauchen: kein Gelenk und kein "
+        "Punkt innerhalb des Radius ist in irgendeinem Betrachter um mehr als die Toleranz daneben. Alle anderen "
+        "Einstellungen sind die, mit denen glTF 2.0 zuletzt exportiert wurde"
+    ),
+    "How far off any point within the radius of any joint or object may be in the world, at any time": (
+        "Wie weit ein Punkt innerhalb des Radius eines Gelenks oder Objekts zu irgendeiner Zeit in der Welt daneben "
+        "sein darf"
+    ),
+    "How far from its joint a point may be for which the tolerance holds": (
+        "Wie weit ein Punkt, für den die Toleranz gilt, von seinem Gelenk entfernt sein darf"
+    ),
+    "Export selected objects only": "Nur ausgewählte Objekte exportieren",
+    "Enable the add-on glTF 2.0 format first": "Zuerst das Add-on glTF 2.0 format aktivieren",
 }

@@ -1,0 +1,126 @@
+"""*File > Export > glTF, Reduced*: Blender's own glTF exporter, and then only the keys that the motion needs."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.app.translations import pgettext_tip as tip_
+from bpy.props import BoolProperty, FloatProperty, StringProperty
+from bpy_extras.io_utils import ExportHelper
+
+from ..gltf import GltfError, Report, reduce_file
+
+EXPORTER = "export_scene.gltf"
+
+NOT_PASSED_ON = {
+    "filepath",
+    "check_existing",
+    "filter_glob",
+    "export_format",
+    "export_use_gltfpack",
+    "use_selection",
+    "will_save_settings",
+}
+"""Options of the exporter that this operator sets itself, or that are for its dialog alone; gltfpack would resample."""
+
+
+class RIGID_MOTION_OT_export_gltf(bpy.types.Operator, ExportHelper):
+    bl_idname = "rigid_motion.export_gltf"
+    bl_label = "Export glTF, Reduced"
+    bl_description = (
+        "Write a GLB file with only the keys that its animations need: no joint, nor any point within the radius of "
+        "it, is off by more than the tolerance in any viewer. All other options are those that glTF 2.0 was exported "
+        "with last"
+    )
+
+    filename_ext = ".glb"
+    filter_glob: StringProperty(default="*.glb", options={"HIDDEN"})
+
+    tolerance: FloatProperty(
+        name="Tolerance",
+        description="How far off any point within the radius of any joint or object may be in the world, at any time",
+        default=0.001,
+        min=1e-6,
+        soft_max=0.1,
+        step=0.1,
+        precision=4,
+        subtype="DISTANCE",
+        unit="LENGTH",
+    )
+    radius: FloatProperty(
+        name="Radius",
+        description="How far from its joint a point may be for which the tolerance holds",
+        default=0.03,
+        min=0.0,
+        soft_max=1.0,
+        step=1.0,
+        precision=3,
+        subtype="DISTANCE",
+        unit="LENGTH",
+    )
+    use_selection: BoolProperty(name="Selected Objects", description="Export selected objects only", default=False)
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        if not _has_exporter():
+            cls.poll_message_set(tip_("Enable the add-on glTF 2.0 format first"))
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        output = Path(self.filepath)
+        try:
+            with tempfile.TemporaryDirectory() as folder:
+                exported = Path(folder) / output.name
+                bpy.ops.export_scene.gltf(
+                    filepath=str(exported),
+                    export_format="GLB",
+                    use_selection=self.use_selection,
+                    **_last_options(context),
+                )
+                report = reduce_file(exported, output, tolerance=self.tolerance, radius=self.radius)
+        except (GltfError, OSError, RuntimeError) as error:
+            self.report({"ERROR"}, str(error).strip())
+            return {"CANCELLED"}
+        self.report({"INFO"}, _summary(report, output))
+        return {"FINISHED"}
+
+
+def _has_exporter() -> bool:
+    return "gltf" in dir(bpy.ops.export_scene)
+
+
+def _last_options(context: bpy.types.Context) -> dict[str, Any]:
+    """Return what Blender's exporter was told last in its dialog, but for what is set here."""
+    last = context.window_manager.operator_properties_last(EXPORTER)
+    if last is None:
+        return {}
+    return {
+        name: getattr(last, name)
+        for name, found in last.bl_rna.properties.items()
+        if found.type in {"BOOLEAN", "INT", "FLOAT", "STRING", "ENUM"}
+        and name not in NOT_PASSED_ON
+        and last.is_property_set(name)
+    }
+
+
+def _summary(report: Report, output: Path) -> str:
+    """Return one line for the status bar: bytes and keys before and after, and the largest error."""
+    before, after = ([getattr(clip, when) for clip in report.clips] for when in ("before", "after"))
+    return rpt_(
+        "{name}: {keys} of {all_keys} keys, {size:.0f} of {full:.0f} kB of animation, {error:.2f} mm off at most"
+    ).format(
+        name=output.name,
+        keys=sum(one.keys for one in after),
+        all_keys=sum(one.keys for one in before),
+        size=sum(one.size for one in after) / 1000.0,
+        full=sum(one.size for one in before) / 1000.0,
+        error=1000.0 * max(clip.error for clip in report.clips),
+    )
+
+
+CLASSES = (RIGID_MOTION_OT_export_gltf,)
