@@ -18,7 +18,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
-from urllib.parse import quote, unquote
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = b"glTF", b"JSON", b"BIN\0"
 
@@ -82,7 +81,7 @@ class Document:
         for number, (buffer, data) in enumerate(zip(objects(self.json, "buffers"), self.buffers, strict=True)):
             if number in self.changed and data is not None and "uri" in buffer and not is_data(buffer["uri"]):
                 file = f"{Path(name).stem}{number or ''}.bin"
-                beside[file], buffer = data, {**buffer, "uri": quote(file)}
+                beside[file], buffer = data, {**buffer, "uri": _quoted(file)}
             buffers.append(buffer)
         document = {**self.json, "buffers": buffers} if beside else self.json
         text = json.dumps(document, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode()
@@ -106,7 +105,8 @@ class Document:
         """Files that the document names and that have not changed, from its folder: names, and what is in them."""
         buffers = [buffer for number, buffer in enumerate(objects(self.json, "buffers")) if number not in self.changed]
         uris = [part.get("uri") for part in (*buffers, *objects(self.json, "images"))]
-        names = {unquote(uri) for uri in uris if isinstance(uri, str) and not is_data(uri) and is_inside(unquote(uri))}
+        outside = [uri for uri in uris if isinstance(uri, str) and not is_data(uri)]
+        names = {name for name in map(_unquoted, outside) if is_inside(name)}
         return {name: (folder / name).read_bytes() for name in names if (folder / name).is_file()}
 
     @property
@@ -242,18 +242,18 @@ def file_of(folder: Path, number: int, uri: object) -> Path:
     GltfError
         Where it is not in the folder or below, or is no file.
     """
-    if not isinstance(uri, str) or not is_inside(uri) or not is_inside(unquote(uri)):
+    if not isinstance(uri, str) or not is_inside(uri) or not is_inside(_unquoted(uri)):
         raise GltfError(
             f"buffer {number} is outside of its folder ({shown(uri)})", "export it as .glb, which is one file"
         )
-    path = folder / unquote(uri)
+    path = folder / _unquoted(uri)
     try:
         is_there = path.is_file()
     except ValueError:
         is_there = False
     if not is_there:
         raise GltfError(
-            f"buffer {number}, {shown(unquote(uri))}, is not there",
+            f"buffer {number}, {shown(_unquoted(uri))}, is not there",
             "bring that file along, or export it as .glb, which is one file",
         )
     return path
@@ -291,3 +291,15 @@ def _finite(text: str) -> float:
     if not math.isfinite(number):
         raise ValueError(f"{text[:20]} is no number")
     return number
+
+
+def _quoted(name: str) -> str:
+    """A file's name as a URI, RFC 3986, section 2.1. The extension imports nothing that has a way to the network."""
+    plain = b"abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-._~"
+    return "".join(chr(byte) if byte in plain else f"%{byte:02X}" for byte in name.encode())
+
+
+def _unquoted(uri: str) -> str:
+    """The name that a URI stands for."""
+    found = re.sub(rb"%([0-9A-Fa-f]{2})", lambda match: bytes((int(match[1], 16),)), uri.encode())
+    return found.decode(errors="replace")
