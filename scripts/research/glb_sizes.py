@@ -1,0 +1,293 @@
+"""Animations of GLB files made smaller: reduce, gltf-transform and gltfpack side by side.
+
+    python scripts/research glb_sizes walk.fbx run.bvh --tools FOLDER
+    python scripts/research glb_sizes walk.fbx --tools FOLDER --output docs/benchmark_glb.md
+
+`--tools` is the folder with the programs `gltfpack` and `gltf-transform`, as `npm install gltfpack
+@gltf-transform/cli` puts them into `node_modules/.bin`; each that is missing is left out.
+
+Each body is scaled to 1.7 m and exported by Blender's own exporter, a key on every frame. All files
+are read by this page's own few lines, which share nothing with the program, and played by 4 x 4 matrices at eighths of
+the gaps between the keys of both files. The error is the largest displacement of any joint's head, or of a point 3 cm
+from it along its axes, in the world. *Animation* counts the bytes of all keys: times and values.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from research.publishing import opening
+from rigid_motion.gltf import reduce_file
+from rigid_motion_batch.command_line import parser_of
+from rigid_motion_batch.files import write_text
+
+HEIGHT = 1.7
+RADIUS = 0.03
+"""Metres."""
+
+TOLERANCES = (1e-4, 1e-3, 5e-3)
+"""Metres."""
+
+NUMBERS = {5120: "i1", 5121: "u1", 5122: "i2", 5123: "u2", 5125: "u4", 5126: "f4"}
+SIZES = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """One channel: times of shape (k,), values of shape (k, 3 or 4), linear between them, or held."""
+
+    node: int
+    path: str
+    times: np.ndarray
+    values: np.ndarray
+    steps: bool
+
+
+@dataclass(frozen=True, eq=False)
+class File:
+    """What is played of a file: nodes by name, and the tracks of its longest clip."""
+
+    names: list[str]
+    parents: list[int]
+    rest: list[dict[str, np.ndarray]]
+    tracks: list[Track]
+    animation_bytes: int
+    """Of the accessors of all clips."""
+
+    file_bytes: int
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a tool made of a clip."""
+
+    tool: str
+    animation_bytes: int
+    file_bytes: int
+    error: float
+    """Largest, in metres."""
+
+    within: tuple[float, float]
+    """Share of all joints and times that are within 0.1 and 1 mm."""
+
+
+def read(path: Path) -> File:
+    """Read a GLB with one buffer, no sparse accessor and no other interpolation than LINEAR and STEP."""
+    data = path.read_bytes()
+    length = struct.unpack_from("<I", data, 12)[0]
+    document, binary = json.loads(data[20 : 20 + length]), data[20 + length + 8 :]
+
+    def values(number: int) -> np.ndarray:
+        accessor = document["accessors"][number]
+        view = document["bufferViews"][accessor["bufferView"]]
+        kind, width = np.dtype(NUMBERS[accessor["componentType"]]), SIZES[accessor["type"]]
+        start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+        step = view.get("byteStride", kind.itemsize * width)
+        found = np.ndarray((accessor["count"], width), kind, binary, start, (step, kind.itemsize))
+        if not accessor.get("normalized"):
+            return found.astype(float)
+        return np.maximum(found / float(np.iinfo(kind).max), -1.0)
+
+    nodes = document["nodes"]
+    parents = [-1] * len(nodes)
+    for number, node in enumerate(nodes):
+        for child in node.get("children", ()):
+            parents[child] = number
+    clips = []
+    accessors = set()
+    for animation in document.get("animations", ()):
+        tracks = []
+        for channel in animation["channels"]:
+            sampler = animation["samplers"][channel["sampler"]]
+            accessors |= {sampler["input"], sampler["output"]}
+            times, keys = values(sampler["input"])[:, 0], values(sampler["output"])
+            steps = sampler.get("interpolation", "LINEAR") == "STEP"
+            tracks.append(Track(channel["target"]["node"], channel["target"]["path"], times, keys, steps))
+        clips.append(tracks)
+
+    def size(number: int) -> int:
+        accessor = document["accessors"][number]
+        return accessor["count"] * SIZES[accessor["type"]] * np.dtype(NUMBERS[accessor["componentType"]]).itemsize
+
+    rest = [
+        {
+            "translation": np.array(node.get("translation", (0.0, 0.0, 0.0))),
+            "rotation": np.array(node.get("rotation", (0.0, 0.0, 0.0, 1.0))),
+            "scale": np.array(node.get("scale", (1.0, 1.0, 1.0))),
+        }
+        for node in nodes
+    ]
+    longest = max(clips, key=len)
+    names = [node.get("name", f"node {number}") for number, node in enumerate(nodes)]
+    return File(names, parents, rest, longest, sum(map(size, accessors)), len(data))
+
+
+def slerp(times: np.ndarray, keys: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Return unit quaternions (x, y, z, w) at moments, by the shorter way between keys."""
+    after = np.clip(np.searchsorted(times, at, side="right"), 1, max(len(times) - 1, 1))
+    if len(times) == 1:
+        return np.repeat(keys, len(at), axis=0)
+    one, other = keys[after - 1], keys[after]
+    share = np.clip((at - times[after - 1]) / (times[after] - times[after - 1]), 0.0, 1.0)[:, None]
+    cosine = (one * other).sum(axis=1, keepdims=True)
+    other, cosine = np.where(cosine < 0.0, -other, other), np.minimum(np.abs(cosine), 1.0)
+    angle = np.arccos(cosine)
+    sine = np.where(angle > 1e-6, np.sin(angle), 1.0)
+    near = angle <= 1e-6
+    found = np.where(near, 1.0 - share, np.sin((1.0 - share) * angle) / sine) * one
+    found += np.where(near, share, np.sin(share * angle) / sine) * other
+    return found / np.linalg.norm(found, axis=1, keepdims=True)
+
+
+def matrices(location: np.ndarray, rotation: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Return matrices of shape (n, 4, 4)."""
+    x, y, z, w = rotation.T
+    found = np.zeros((len(x), 4, 4))
+    found[:, :3, 0] = np.stack((1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)), axis=1)
+    found[:, :3, 1] = np.stack((2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)), axis=1)
+    found[:, :3, 2] = np.stack((2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)), axis=1)
+    found[:, :3, :3] *= scale[:, None, :]
+    found[:, :3, 3], found[:, 3, 3] = location, 1.0
+    return found
+
+
+def points(file: File, at: np.ndarray) -> dict[str, np.ndarray]:
+    """Return where each node's head and points beside it are in the world: name to shape (moments, 7, 3)."""
+    channels = {(track.node, track.path): track for track in file.tracks}
+    worlds: dict[int, np.ndarray] = {}
+
+    def values(node: int, path: str) -> np.ndarray:
+        track = channels.get((node, path))
+        if track is None:
+            return np.repeat(file.rest[node][path][None], len(at), axis=0)
+        if track.steps:
+            return track.values[np.clip(np.searchsorted(track.times, at, side="right") - 1, 0, None)]
+        if path == "rotation":
+            return slerp(track.times, track.values, at)
+        return np.stack([np.interp(at, track.times, column) for column in track.values.T], axis=1)
+
+    def world(node: int) -> np.ndarray:
+        if node not in worlds:
+            own = matrices(*(values(node, path) for path in ("translation", "rotation", "scale")))
+            worlds[node] = own if file.parents[node] < 0 else world(file.parents[node]) @ own
+        return worlds[node]
+
+    found = {}
+    for node, name in enumerate(file.names):
+        matrix = world(node)
+        axes = np.swapaxes(matrix[:, :3, :3], 1, 2)
+        axes = RADIUS * axes / np.linalg.norm(axes, axis=2, keepdims=True)
+        head = matrix[:, None, :3, 3]
+        found[name] = np.concatenate((head, head + axes, head - axes), axis=1)
+    return found
+
+
+def beside(original: File, smaller: File, tool: str) -> Outcome:
+    """Return what a tool made of a clip, with its errors."""
+    times = np.unique(np.concatenate([track.times for file in (original, smaller) for track in file.tracks]))
+    eighths = np.unique((times[:-1, None] + np.diff(times)[:, None] * np.arange(8) / 8.0).ravel())
+    one, other = points(original, eighths), points(smaller, eighths)
+    errors = np.array([np.linalg.norm(one[name] - other[name], axis=2).max(axis=1) for name in one if name in other])
+    shares = tuple(float((errors <= limit).mean()) for limit in (1e-4, 1e-3))
+    return Outcome(tool, smaller.animation_bytes, smaller.file_bytes, float(errors.max()), shares)
+
+
+def export(path: Path, output: Path) -> None:
+    """Import a body with Blender, scale it to `HEIGHT`, and export it with a key on every frame."""
+
+    def load(scale: float) -> None:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        if path.suffix.lower() == ".fbx":
+            bpy.ops.import_scene.fbx(filepath=str(path), global_scale=scale)
+        else:
+            options = {"use_fps_scale": False, "update_scene_fps": True, "update_scene_duration": True}
+            bpy.ops.import_anim.bvh(filepath=str(path), global_scale=scale, **options)
+
+    load(1.0)
+    rig = next(obj for obj in bpy.data.objects if obj.type == "ARMATURE")
+    heads = np.array([rig.matrix_world @ bone.head_local for bone in rig.data.bones])
+    load(HEIGHT / float(np.ptp(heads, axis=0).max()))
+    ends = [frame for action in bpy.data.actions for frame in action.frame_range]
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = int(min(ends)), int(max(ends))
+    bpy.ops.export_scene.gltf(filepath=str(output), export_format="GLB")
+
+
+def tools_in(folder: Path | None) -> dict[str, Callable[[Path, Path], None]]:
+    """Return what makes a file smaller, by its name."""
+
+    def reduced(tolerance: float) -> Callable[[Path, Path], None]:
+        return lambda path, output: reduce_file(path, output, tolerance=tolerance, radius=RADIUS) and None
+
+    def program(name: str, arguments: Callable[[Path, Path], Sequence[object]]) -> Callable[[Path, Path], None] | None:
+        found = shutil.which(name, path=str(folder)) if folder else None
+        if found is None:
+            return None
+        return lambda path, output: (
+            subprocess.run([found, *map(str, arguments(path, output))], check=True, capture_output=True) and None
+        )
+
+    others = {
+        "gltf-transform `resample`": program("gltf-transform", lambda one, other: ("resample", one, other)),
+        "gltfpack `-noq`": program("gltfpack", lambda one, other: ("-i", one, "-o", other, "-kn", "-noq")),
+        "gltfpack, its defaults": program("gltfpack", lambda one, other: ("-i", one, "-o", other, "-kn")),
+    }
+    ours = {f"`reduce --tolerance {1e3 * tolerance:g}mm`": reduced(tolerance) for tolerance in TOLERANCES}
+    return ours | {name: run for name, run in others.items() if run}
+
+
+def measure(path: Path, tools: dict[str, Callable[[Path, Path], None]], folder: Path) -> Iterator[Outcome]:
+    """Yield what the exporter and each tool make of a body."""
+    exported = folder / f"{path.stem}.glb"
+    export(path, exported)
+    original = read(exported)
+    yield beside(original, original, "exported by Blender")
+    for number, (name, run) in enumerate(tools.items()):
+        output = folder / f"{path.stem}-{number}.glb"
+        run(exported, output)
+        yield beside(original, read(output), name)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure, print, and write where asked."""
+    parser = parser_of("glb_sizes.py", __doc__)
+    parser.add_argument("bodies", type=Path, nargs="+", metavar="PATH", help="FBX and BVH files")
+    parser.add_argument("--tools", type=Path, metavar="FOLDER", help="where gltfpack and gltf-transform are")
+    parser.add_argument("--output", type=Path, help="a Markdown file to write the tables to")
+    options = parser.parse_args(arguments)
+    tools = tools_in(options.tools)
+    command = f"python scripts/research glb_sizes ...{' --tools ...' if options.tools else ''}"
+    lines = opening("Animations of GLB files, made smaller", command, __doc__, Blender=bpy.app.version_string)
+    shares: dict[str, list[float]] = {}
+    titles = ("clip", "tool", "animation, bytes", "of the export", "file, bytes", "largest error, mm")
+    lines += [f"| {' | '.join((*titles, 'under 0.1 mm', 'under 1 mm'))} |"]
+    lines += ["|---|---|---:|---:|---:|---:|---:|---:|"]
+    with tempfile.TemporaryDirectory() as folder:
+        for path in options.bodies:
+            print(f"{path.name} ...", file=sys.stderr, flush=True)
+            outcomes = list(measure(path, tools, Path(folder)))
+            for number, one in enumerate(outcomes):
+                share = one.animation_bytes / outcomes[0].animation_bytes
+                shares.setdefault(one.tool, []).append(share)
+                lines.append(
+                    f"| {'' if number else path.stem} | {one.tool} | {one.animation_bytes} | {share:.3f} "
+                    f"| {one.file_bytes} | {1e3 * one.error:.2f} | {one.within[0]:.2%} | {one.within[1]:.2%} |"
+                )
+    lines += ["", "| tool | animation of the export, geometric mean |", "|---|---:|"]
+    lines += [f"| {tool} | {np.exp(np.log(found).mean()):.3f} |" for tool, found in shares.items()]
+    page = "\n".join(lines) + "\n"
+    print(page)
+    if options.output:
+        write_text(options.output, page)
+    return 0
