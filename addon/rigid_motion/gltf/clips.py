@@ -127,7 +127,10 @@ class ClipReduction:
 
     def reduced(self) -> ReducedClip:
         """The clip with fewer keys, or as it was."""
-        found = self._key_poses() if self.wishes.shared or self.wishes.count else self._own_keys()
+        if not self.dense:
+            found = self._proven([], integers=False)
+        else:
+            found = self._key_poses() if self.wishes.shared or self.wishes.count else self._own_keys()
         if found is None:
             return self._kept(NEEDED)
         tracks, error = found
