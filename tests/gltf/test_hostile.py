@@ -128,6 +128,12 @@ def test_chunks_that_lie_are_refused(tmp_path, capsys):
     assert "bytes are here" in refusal(path, capsys)
 
 
+def test_a_chain_without_end_is_refused(tmp_path, capsys):
+    line = "more than 1000 nodes hang on one another; export a shorter chain"
+    nodes = [{"children": [number + 1]} for number in range(2000)]
+    assert line in refusal(changed(tmp_path / "walk.glb", put("nodes", to=[*nodes, {}])), capsys)
+
+
 def test_whatever_is_damaged_is_refused_or_does_no_harm(tmp_path):
     file = File(walk(joints=2, seconds=0.3).write(tmp_path / "walk.glb"))
     random, path = np.random.default_rng(3), tmp_path / "damaged.glb"

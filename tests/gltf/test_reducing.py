@@ -147,6 +147,29 @@ def test_weights_of_morph_targets_keep_to_half_a_percent(tmp_path):
     assert np.abs(np.transpose(found) - weights).max() <= 0.005 + ROUNDING
 
 
+def test_a_clip_of_weights_alone_is_reduced(tmp_path):
+    made, times = Making(), np.arange(61) / 30
+    made.json["nodes"] = [{"mesh": 0}]
+    positions = made.accessor(np.eye(3, dtype="<f4"), min=[0.0] * 3, max=[1.0] * 3)
+    made.json["meshes"] = [
+        {"primitives": [{"attributes": {"POSITION": positions}, "targets": [{"POSITION": positions}]}]}
+    ]
+    made.channel(0, "weights", made.times(times), np.abs(np.sin(times))[:, None])
+    _, after, report = both(made, tmp_path, 1e-3)
+    assert report.clips[0].after.keys < 30
+    assert len(after.tracks(0)[0, "weights"][1]) == report.clips[0].after.keys
+
+
+def test_a_clip_that_stands_still_lasts_as_long_as_before(tmp_path):
+    made = Making()
+    made.json["nodes"] = [{"translation": [1.0, 2.0, 3.0]}, {"translation": [2.0, 2.0, 3.0]}]
+    for node in (0, 1):
+        made.channel(node, "translation", made.times([0.5, 1.0, 2.5]), np.tile([1.0 + node, 2.0, 3.0], (3, 1)))
+    _, after, report = both(made, tmp_path, 1e-3)
+    assert report.clips[0].after.size < report.clips[0].before.size
+    assert after.moments(0).tolist() == [0.5, 2.5]
+
+
 def test_vertices_of_skins_are_measured(tmp_path):
     made, random = walk(), np.random.default_rng(2)
     places = random.normal(size=(50, 3)).astype("<f4")

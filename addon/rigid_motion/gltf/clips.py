@@ -31,7 +31,7 @@ MORE_SLIDE = 0.001 / 1.7
 TIGHTER = 0.7
 """How much smaller the tolerance of the next search is, where no keys that are put back help."""
 
-ROUNDS = 12
+ROUNDS = 24
 """How often keys are put back where the proof fails."""
 
 LEAST = 0.1
@@ -127,7 +127,10 @@ class ClipReduction:
 
     def reduced(self) -> ReducedClip:
         """The clip with fewer keys, or as it was."""
-        found = self._key_poses() if self.wishes.shared or self.wishes.count else self._own_keys()
+        if not self.dense:
+            found = self._proven([], integers=False)
+        else:
+            found = self._key_poses() if self.wishes.shared or self.wishes.count else self._own_keys()
         if found is None:
             return self._kept(NEEDED)
         tracks, error = found
@@ -187,19 +190,29 @@ class ClipReduction:
 
         None where the proof fails with more and more of them.
         """
-        world, tolerance = self.world, self.wishes.tolerance
         for _ in range(ROUNDS):
             tracks = self._stored(samples, integers=integers)
-            shown_tracks = self._shown(tracks)
-            places, eighths = self.feet.slips(shown_tracks, MORE_SLIDE * self.size)
-            eighths *= PARTS
+            error, places, eighths = self._failures(self._shown(tracks))
             if not len(places):
-                error = world.largest_error(shown_tracks, world.eighths)
-                if error <= tolerance:
-                    return tracks, error
-                places, eighths = world.worst(shown_tracks, world.eighths, tolerance)
+                return tracks, error
             samples = self._with_more(samples, places, eighths)
         return None
+
+    def _failures(self, tracks: Tracks) -> tuple[float, np.ndarray, np.ndarray]:
+        """The largest error, and where tracks break what is promised: places of nodes, and eighths of moments.
+
+        What is quickly seen comes first, and hides the rest.
+        """
+        world, tolerance = self.world, self.wishes.tolerance
+        places, samples = self.feet.slips(tracks, MORE_SLIDE * self.size)
+        if len(places):
+            return np.inf, places, PARTS * samples
+        for times, parts in ((world.times, PARTS), (world.eighths, 1)):
+            error = world.largest_error(tracks, times)
+            if error > tolerance:
+                places, numbers = world.worst(tracks, times, tolerance)
+                return error, places, parts * numbers
+        return error, places, samples
 
     def _with_more(self, samples: list[np.ndarray], places: np.ndarray, eighths: np.ndarray) -> list[np.ndarray]:
         """Samples with those around some of the eighths, for the nodes at these places and all that they hang on."""

@@ -118,7 +118,7 @@ class World:
 
     def _looks(self, shown: Tracks, times: np.ndarray) -> Iterator[tuple[int, AffineMaps, AffineMaps, np.ndarray]]:
         """So many times at once: the first, where the balls are and should be, and bounds of their displacement."""
-        step = max(1, AT_ONCE // len(self.moving))
+        step = max(1, AT_ONCE // max(1, len(self.moving)))
         for first in range(0, len(times), step):
             maps = (
                 self.nodes.worlds(self.moving, tracks, times[first : first + step]) for tracks in (shown, self.truth)

@@ -42,12 +42,14 @@ class Feet:
 
     def slips(self, tracks: Tracks, more: float) -> tuple[np.ndarray, np.ndarray]:
         """Places of joints and samples at which one slides by more than this farther than before, and began to."""
-        places, samples = [], []
+        places, samples = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
         for (place, first, _), before, after in zip(self.spans, *self._ways(tracks), strict=True):
-            if after.max() > before.max() + more:
-                places += [place, place]
-                samples += [first, first + int(after.argmax())]
-        return np.array(places, dtype=np.int64), np.array(samples, dtype=np.int64)
+            padded = np.pad(after, 1)
+            peaks = (after > before.max() + more) & (after >= padded[:-2]) & (after >= padded[2:])
+            if peaks.any():
+                samples.append(first + np.append(0, np.flatnonzero(peaks)))
+                places.append(np.full(len(samples[-1]), place))
+        return np.concatenate(places), np.concatenate(samples)
 
     def _ways(self, tracks: Tracks) -> tuple[list[np.ndarray], list[np.ndarray]]:
         """How far each gets from where it stood at first, a row for each span, before and after."""

@@ -20,6 +20,9 @@ from .tracks import FARTHEST, ROTATION, SCALE, TO_WXYZ, TRANSLATION, WIDTHS, Tra
 REST = {TRANSLATION: (0.0, 0.0, 0.0), ROTATION: (0.0, 0.0, 0.0, 1.0), SCALE: (1.0, 1.0, 1.0)}
 """Of a node that says nothing."""
 
+DEEPEST = 1000
+"""How many nodes one may hang on."""
+
 Tracks = Mapping[tuple[int, str], Track]
 """By node and path."""
 
@@ -120,10 +123,11 @@ def _parents(nodes: list[Json]) -> np.ndarray:
                 raise GltfError(f"node {child} hangs on nodes {parents[child]} and {number}")
             parents[child] = number
     try:
-        if len(nodes):
-            Skeleton(parents)
+        deepest = Skeleton(parents).depths.max() if len(nodes) else 0
     except ValueError as error:
         raise GltfError(str(error).replace("joint", "node")) from None
+    if deepest > DEEPEST:
+        raise GltfError(f"more than {DEEPEST} nodes hang on one another", "export a shorter chain")
     return parents
 
 
