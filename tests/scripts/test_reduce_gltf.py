@@ -7,10 +7,11 @@ import re
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from rigid_motion_batch.cli import reduce
-from tests.gltf.making import walk
+from tests.gltf.making import Making, walk
 from tests.gltf.oracle import File, off
 
 WITHOUT_BLENDER = """
@@ -68,11 +69,24 @@ def test_a_gltf_finds_its_files_from_another_folder(tmp_path):
     assert off(File(source), File(tmp_path / "out" / "walk-reduced.gltf"), 0, 0.0) <= 2e-3
 
 
-def test_a_clip_that_needs_its_keys_stays_and_the_file_is_left_alone(tmp_path, capsys):
-    source = walk(joints=1, seconds=0.1).write(tmp_path / "walk.glb")
-    assert run(source, "--tolerance", "0.001mm") == 0
+def test_names_of_clips_do_nothing_to_the_terminal(tmp_path, capsys):
+    made = walk()
+    made.json["animations"][0]["name"] = "a\nb\x1b[2J"
+    assert run(made.write(tmp_path / "walk.glb")) == 0
+    said = capsys.readouterr().err
+    assert "\x1b" not in said
+    assert "a\nb" not in said
+
+
+def test_a_file_whose_clips_need_their_keys_is_left_alone(tmp_path, capsys):
+    made = Making()
+    made.json["nodes"] = [{}]
+    made.channel(0, "translation", made.times([0.0, 1.0, 2.0]), np.eye(3))
+    assert run(made.write(tmp_path / "walk.glb")) == 0
     said = capsys.readouterr()
-    assert said.out == str(tmp_path / "walk-reduced.glb") + "\n" or "stays as it was" in said.err
+    assert "Take0: stays as it was, 3 keys in 48 bytes: fewer keys would take more bytes" in said.err
+    assert "nothing could be reduced; left alone" in said.err
+    assert (said.out, os.listdir(tmp_path)) == ("", ["walk.glb"])
 
 
 @pytest.mark.parametrize(

@@ -203,16 +203,15 @@ class ClipReduction:
 
         What is quickly seen comes first, and hides the rest.
         """
-        world, tolerance = self.world, self.wishes.tolerance
+        world = self.world
         places, samples = self.feet.slips(tracks, MORE_SLIDE * self.size)
         if len(places):
             return np.inf, places, PARTS * samples
         for times, parts in ((world.times, PARTS), (world.eighths, 1)):
-            error = world.largest_error(tracks, times)
-            if error > tolerance:
-                places, numbers = world.worst(tracks, times, tolerance)
+            error, places, numbers = world.worst(tracks, times, self.wishes.tolerance)
+            if len(places):
                 return error, places, parts * numbers
-        return error, places, samples
+        return error, places, numbers
 
     def _with_more(self, samples: list[np.ndarray], places: np.ndarray, eighths: np.ndarray) -> list[np.ndarray]:
         """Samples with those around some of the eighths, for the nodes at these places and all that they hang on."""

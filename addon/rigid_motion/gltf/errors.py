@@ -6,7 +6,6 @@ is largest; a node that shrinks takes its ball along.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -23,6 +22,9 @@ AT_ONCE = 2**15
 
 EXACTLY = 64
 """Poses whose displacement is worked out at once, those with the largest bounds first."""
+
+
+NOWHERE = np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +54,7 @@ class World:
 
     @cached_property
     def _maps(self) -> AffineMaps:
-        return self.nodes.worlds(self.moving, self.truth, self.times)
+        return self._worlds(self.truth, self.times)
 
     @cached_property
     def positions(self) -> np.ndarray:
@@ -87,44 +89,47 @@ class World:
 
     def positions_of(self, shown: Tracks, places: np.ndarray) -> np.ndarray:
         """Where some nodes are at the moments as these tracks move them, shape (places, m, 3)."""
-        return self.nodes.worlds(self.moving, shown, self.times).origins[places]
+        return self._worlds(shown, self.times).origins[places]
 
     def largest_error(self, shown: Tracks, times: np.ndarray) -> float:
         """The largest displacement of any point of any ball at times (t,)."""
-        largest = 0.0
-        for _, there, truth, bounds in self._looks(shown, times):
-            waiting = np.flatnonzero(bounds > largest)
-            waiting = waiting[np.argsort(-bounds.ravel()[waiting])]
-            for first in range(0, len(waiting), EXACTLY):
-                some = waiting[first : first + EXACTLY]
-                if bounds.flat[some[0]] <= largest:
-                    break
-                largest = max(largest, float(self._displacements(there, truth, some).max()))
-        return largest
+        return self.worst(shown, times, np.inf)[0]
 
-    def worst(self, shown: Tracks, times: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-        """Places of nodes and numbers of times at which an error is over the tolerance, and not larger next to it."""
-        places, numbers = [], []
-        for first, there, truth, bounds in self._looks(shown, times):
-            over = np.flatnonzero(bounds > tolerance)
+    def worst(self, shown: Tracks, times: np.ndarray, tolerance: float) -> tuple[float, np.ndarray, np.ndarray]:
+        """Errors at times (t,): the largest, and where they are over a tolerance and not larger next to it.
+
+        Returns
+        -------
+        largest : float
+        places, numbers : array, shape (k,)
+            Of nodes, and of the times.
+        """
+        largest, places, numbers = 0.0, [NOWHERE], [NOWHERE]
+        step = max(1, AT_ONCE // max(1, len(self.moving)))
+        for first in range(0, len(times), step):
+            part = slice(first, first + step)
+            truth = self._maps[:, part] if times is self.times else self._worlds(self.truth, times[part])
+            maps = (self._worlds(shown, times[part]), truth)
+            there, truth = (AffineMaps(some.axes @ self._to_balls, some.origins) for some in maps)
+            bounds = displacement_bound(there, truth, self.radii[:, None])
             errors = np.zeros(bounds.shape)
-            errors.flat[over] = self._displacements(there, truth, over)
+            waiting = np.flatnonzero(bounds > min(largest, tolerance))
+            waiting = waiting[np.argsort(-bounds.flat[waiting])]
+            for begin in range(0, len(waiting), EXACTLY):
+                some = waiting[begin : begin + EXACTLY]
+                if bounds.flat[some[0]] <= min(largest, tolerance):
+                    break
+                errors.flat[some] = self._displacements(there, truth, some)
+                largest = max(largest, float(errors.flat[some].max()))
             padded = np.pad(errors, ((0, 0), (1, 1)))
             peaks = (errors > tolerance) & (errors >= padded[:, :-2]) & (errors >= padded[:, 2:])
             place, number = np.nonzero(peaks)
             places.append(place)
             numbers.append(number + first)
-        return np.concatenate(places), np.concatenate(numbers)
+        return largest, np.concatenate(places), np.concatenate(numbers)
 
-    def _looks(self, shown: Tracks, times: np.ndarray) -> Iterator[tuple[int, AffineMaps, AffineMaps, np.ndarray]]:
-        """So many times at once: the first, where the balls are and should be, and bounds of their displacement."""
-        step = max(1, AT_ONCE // max(1, len(self.moving)))
-        for first in range(0, len(times), step):
-            maps = (
-                self.nodes.worlds(self.moving, tracks, times[first : first + step]) for tracks in (shown, self.truth)
-            )
-            there, truth = (AffineMaps(some.axes @ self._to_balls, some.origins) for some in maps)
-            yield first, there, truth, displacement_bound(there, truth, self.radii[:, None])
+    def _worlds(self, tracks: Tracks, times: np.ndarray) -> AffineMaps:
+        return self.nodes.worlds(self.moving, tracks, times)
 
     def _displacements(self, there: AffineMaps, truth: AffineMaps, some: np.ndarray) -> np.ndarray:
         """Those of some of the balls, by their numbers, in the shape of these."""

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from rigid_motion.gltf import Document, GltfError, ReducedClip, Report, read_document, reduced
 from rigid_motion_batch.analysis.choices import Tolerance
+from rigid_motion_batch.command_line import printable
 from rigid_motion_batch.files import written_beside
 
 from .options import Job
@@ -63,9 +64,8 @@ class GltfRun:
         self._stop_if_asked()
         length = wishes.tolerance or Tolerance(f"{MILLIMETRES * report.tolerance:.6f}mm")
         for clip in report.clips:
-            self._note(
-                f"{job.source}: {clip.name}: {_told(clip, length, self._would, by_number=wishes.count is not None)}"
-            )
+            told = _told(clip, length, self._would, by_number=wishes.count is not None)
+            self._note(f"{job.source}: {printable(clip.name)}: {told}")
         size = f"{report.size:.3g} m large"
         self._note(f"{job.source}: {size}{doubt(report.size, wishes.tolerance, 1.0)}")
         outcome.clips += sum(clip.tracks is not None for clip in report.clips)
