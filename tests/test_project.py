@@ -25,6 +25,7 @@ SOURCES = sorted(path for folder in ("addon", "assets", "scripts") for path in (
 BLENDER = {"bpy", "bpy_extras", "mathutils"}
 FLOORS = {
     "motion": {"numpy"},
+    "gltf": {"numpy"},
     "animation": {"numpy", *BLENDER},
     "ui": {"numpy", *BLENDER, "addon_utils", "blf", "gpu", "gpu_extras", "rna_keymap_ui"},
     "translations": BLENDER,
