@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from .bodies import Body
 from .key_costs import Recording
 from .measures import largest_displacement
-from .piecewise import blocks
 from .poses import PackedPoses, Poses, inverse, placed, reshaped
 from .quaternions import components, conjugate, cross, matrices, multiply
 
@@ -44,7 +45,6 @@ class Level(Recording):
         weighty = [hanging[weighs[hanging]] for hanging in below]
         self.counts = np.array([len(hanging) for hanging in weighty])
         self.poses_each = self.counts.mean()
-        self.first = np.cumsum(self.counts) - self.counts
         there = body.skeleton.in_root_space(shown)
         above = body.skeleton.parents[joints]
         on_roots = above < 0
@@ -53,14 +53,22 @@ class Level(Recording):
         if parents.scales is not None:
             parents.scales[on_roots] = 1.0
         self.parents, self.back = (PackedPoses(reshaped(poses, -1)) for poses in (parents, inverse(there[joints])))
-        hanging = np.concatenate(weighty)
-        self.carried = _Carried(there[hanging], body.truth[hanging], body.radii[hanging], body.weights[hanging])
+        self.carried = [
+            _Carried(there[hanging], body.truth[hanging], body.radii[hanging], body.weights[hanging])
+            for hanging in weighty
+        ]
 
     def errors(self, samples: np.ndarray, shown: Poses) -> np.ndarray:
         track, moment = np.divmod(samples, len(self.body.times))
         # What moves a joint from where it is to where it would be moves all that hangs on it.
         by = placed(placed(self.parents[samples], shown), self.back[samples])
-        largest = self.carried.largest_errors(moment, self.first[track], self.counts[track], by)
+        rows = [*matrices(by.quaternions).reshape(9, -1), *components(by.positions), *components(by.quaternions)]
+        motions = np.stack(rows if by.scales is None else [*rows, by.scales])
+        largest = np.empty(len(samples))
+        # Samples come track by track, or nearly so.
+        for first, end in itertools.pairwise([0, *(np.flatnonzero(np.diff(track)) + 1).tolist(), len(samples)]):
+            some = slice(first, end)
+            largest[some] = self.carried[track[first]].largest_errors(moment[some], motions[:, some])
         return self.in_tolerances(largest, samples)
 
     def may_rest(self) -> np.ndarray:
@@ -77,30 +85,24 @@ class _Carried:
     """Balls on joints (j,) that are carried along: where they are and where they should be, poses (j, n)."""
 
     def __init__(self, there: Poses, wanted: Poses, radii: np.ndarray, weights: np.ndarray) -> None:
-        self.radii, self.joints = radii, len(radii)
+        self.radii = radii[:, None]
         turned = multiply(there.quaternions, conjugate(wanted.quaternions))
         rows = [weights, *components(there.positions), *components(wanted.positions), *components(turned)]
-        if there.scales is not None:
-            rows += [there.scales, wanted.scales]
-        # Moment by moment, so that what is looked at together is next to one another in memory.
-        self.rows = np.stack([row.T.ravel() for row in rows])
+        self.rows = np.stack(rows if there.scales is None else [*rows, there.scales, wanted.scales])
 
-    def largest_errors(self, moments: np.ndarray, first: np.ndarray, counts: np.ndarray, by: Poses) -> np.ndarray:
-        """The largest error of so many joints from `first` on that poses move at moments, all of them of shape (m,)."""
-        motions = [*matrices(by.quaternions).reshape(9, -1), *components(by.positions), *components(by.quaternions)]
-        motions = np.stack(motions if by.scales is None else [*motions, by.scales])
-        found = np.empty(len(moments))
-        for some, pairs in blocks(np.append(0, np.cumsum(counts)), AT_ONCE):
-            begins = np.cumsum(counts[some]) - counts[some]
-            joints = np.repeat(first[some] - begins, counts[some]) + np.arange(pairs.stop - pairs.start)
-            rows = self.rows.take(np.repeat(self.joints * moments[some], counts[some]) + joints, axis=1)
-            errors = rows[0] * _errors(np.repeat(motions[:, some], counts[some], axis=1), rows[1:], self.radii[joints])
-            found[some] = np.maximum.reduceat(errors, begins)
+    def largest_errors(self, moments: np.ndarray, motions: np.ndarray) -> np.ndarray:
+        """The largest error of any of them at moments (m,), each moved on by a motion (.., m), shape (m,)."""
+        found, step = np.empty(len(moments)), max(1, AT_ONCE // len(self.radii))
+        for first in range(0, len(moments), step):
+            some = slice(first, first + step)
+            rows = self.rows.take(moments[some], axis=2)
+            errors = rows[0] * _errors(motions[:, None, some], rows[1:], self.radii)
+            errors.max(axis=0, out=found[some])
         return found
 
 
 def _errors(motions: np.ndarray, rows: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """The shell errors (p,) of balls (.., p) as `_Carried` has them, each moved on by a motion (.., p)."""
+    """The shell errors (j, m) of balls (.., j, m) as `_Carried` has them, all moved on by motions (.., 1, m)."""
     turn, positions, quaternions = motions[:9], motions[9:12], motions[12:16]
     there, wanted, turned = rows[:3], rows[3:6], rows[6:10]
     d = turn[0::3] * there[0]
