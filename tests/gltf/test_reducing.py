@@ -48,7 +48,11 @@ def test_no_point_around_any_joint_is_off_by_more_than_the_tolerance(tmp_path, t
 def test_everything_else_of_the_file_stays(tmp_path):
     made = walk()
     image = made.view(bytes(range(256)))
-    made.json |= {"images": [{"bufferView": image, "mimeType": "image/png"}], "odd": [None, {"a": None}], "extras": 1.5}
+    made.json |= {
+        "images": [{"bufferView": image, "mimeType": "image/png"}],
+        "odd": [None, {"a": None}, "\ud800é"],
+        "extras": 1.5,
+    }
     positions = made.accessor(np.eye(3, dtype="<f4"))
     made.json["meshes"] = [{"primitives": [{"attributes": {"POSITION": positions}}]}]
     path = made.write(tmp_path / "walk.glb", [(b"ODD\0", b"some")])

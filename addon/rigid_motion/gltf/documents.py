@@ -29,6 +29,9 @@ MOST_BYTES = 2**32 - 1
 
 SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
 
+PLAIN = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-._~/")
+"""What a URI has as it is."""
+
 AGAIN = "export it again"
 
 Json = dict[str, Any]
@@ -81,10 +84,10 @@ class Document:
         for number, (buffer, data) in enumerate(zip(objects(self.json, "buffers"), self.buffers, strict=True)):
             if number in self.changed and data is not None and "uri" in buffer and not is_data(buffer["uri"]):
                 file = f"{Path(name).stem}{number or ''}.bin"
-                beside[file], buffer = data, {**buffer, "uri": _quoted(file)}
+                beside[file], buffer = data, {**buffer, "uri": quoted(file)}
             buffers.append(buffer)
         document = {**self.json, "buffers": buffers} if beside else self.json
-        text = json.dumps(document, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode()
+        text = _as_text(document)
         if self.chunks is None:
             return beside | {name: text}
         binary = self._binary
@@ -105,8 +108,9 @@ class Document:
         """Files that the document names and that have not changed, from its folder: names, and what is in them."""
         buffers = [buffer for number, buffer in enumerate(objects(self.json, "buffers")) if number not in self.changed]
         uris = [part.get("uri") for part in (*buffers, *objects(self.json, "images"))]
-        outside = [uri for uri in uris if isinstance(uri, str) and not is_data(uri)]
-        names = {name for name in map(_unquoted, outside) if is_inside(name)}
+        names = {
+            unquoted(uri) for uri in uris if isinstance(uri, str) and not is_data(uri) and is_inside(unquoted(uri))
+        }
         return {name: (folder / name).read_bytes() for name in names if (folder / name).is_file()}
 
     @property
@@ -222,6 +226,18 @@ def bytes_of_uri(uri: str) -> bytes:
     return base64.b64decode(data)
 
 
+def unquoted(uri: str) -> str:
+    """A path as it is on a disk, of a URI in which signs may be %20 and the like."""
+    return re.sub(
+        b"%([0-9A-Fa-f]{2})", lambda found: bytes.fromhex(found[1].decode()), uri.encode(errors="replace")
+    ).decode(errors="replace")
+
+
+def quoted(path: str) -> str:
+    """The URI of a path."""
+    return "".join(chr(byte) if chr(byte) in PLAIN else f"%{byte:02X}" for byte in path.encode())
+
+
 def is_inside(uri: str) -> bool:
     """Whether a path stays in its folder, on whatever system."""
     if SCHEME.match(uri) or PurePosixPath(uri).is_absolute() or PureWindowsPath(uri).anchor:
@@ -242,18 +258,18 @@ def file_of(folder: Path, number: int, uri: object) -> Path:
     GltfError
         Where it is not in the folder or below, or is no file.
     """
-    if not isinstance(uri, str) or not is_inside(uri) or not is_inside(_unquoted(uri)):
+    if not isinstance(uri, str) or not is_inside(uri) or not is_inside(unquoted(uri)):
         raise GltfError(
             f"buffer {number} is outside of its folder ({shown(uri)})", "export it as .glb, which is one file"
         )
-    path = folder / _unquoted(uri)
+    path = folder / unquoted(uri)
     try:
         is_there = path.is_file()
     except ValueError:
         is_there = False
     if not is_there:
         raise GltfError(
-            f"buffer {number}, {shown(_unquoted(uri))}, is not there",
+            f"buffer {number}, {shown(unquoted(uri))}, is not there",
             "bring that file along, or export it as .glb, which is one file",
         )
     return path
@@ -281,6 +297,13 @@ def _buffer(folder: Path, number: int, buffer: Json, binary: bytes | None) -> by
     return data[:length]
 
 
+def _as_text(document: Json) -> bytes:
+    try:
+        return json.dumps(document, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode()
+    except UnicodeEncodeError:  # Halves of signs, which JSON can have as numbers alone.
+        return json.dumps(document, allow_nan=False, separators=(",", ":")).encode()
+
+
 def _chunk(kind: bytes, content: bytes, padding: bytes) -> bytes:
     content += padding * (-len(content) % 4)
     return struct.pack("<I4s", len(content), kind) + content
@@ -291,15 +314,3 @@ def _finite(text: str) -> float:
     if not math.isfinite(number):
         raise ValueError(f"{text[:20]} is no number")
     return number
-
-
-def _quoted(name: str) -> str:
-    """A file's name as a URI, RFC 3986, section 2.1. The extension imports nothing that has a way to the network."""
-    plain = b"abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-._~"
-    return "".join(chr(byte) if byte in plain else f"%{byte:02X}" for byte in name.encode())
-
-
-def _unquoted(uri: str) -> str:
-    """The name that a URI stands for."""
-    found = re.sub(rb"%([0-9A-Fa-f]{2})", lambda match: bytes((int(match[1], 16),)), uri.encode())
-    return found.decode(errors="replace")

@@ -70,7 +70,9 @@ class Track:
         elif self.interpolation == CUBICSPLINE:
             found = self._on_spline(times)
         elif self.path == ROTATION:
-            return turned_at(self.times, self.values, times)
+            first = max(int(np.searchsorted(self.times, times[0], side="right")) - 1, 0)
+            near = slice(min(first, len(self.times) - 2), int(np.searchsorted(self.times, times[-1])) + 1)
+            return turned_at(self.times[near], self.values[near], times)
         else:
             found = np.stack([np.interp(times, self.times, column) for column in self.values.T], axis=1)
         return normalise(found) if self.path == ROTATION else found
