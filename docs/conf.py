@@ -36,7 +36,7 @@ templates_path = ["templates"]
 exclude_patterns = ["**/__pycache__", "extensions", "templates"]
 nitpicky = True
 nitpick_ignore_regex = [
-    ("py:.*", r"(collections|numpy|typing)\..*"),
+    ("py:.*", r"(collections|np|numpy|typing)\..*"),
     ("py:class", r"rigid_motion\.motion\.segments\..*"),
     ("py:class", r"rigid_motion_batch\.recordings\..*"),
 ]

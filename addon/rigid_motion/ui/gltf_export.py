@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -36,9 +36,12 @@ class RIGID_MOTION_OT_export_gltf(bpy.types.Operator, ExportHelper):
         "it, is off by more than the tolerance in any viewer. All other options are those that glTF 2.0 was exported "
         "with last"
     )
+    bl_options: ClassVar[set[str]] = {"REGISTER"}
 
     filename_ext = ".glb"
-    filter_glob: StringProperty(default="*.glb", options={"HIDDEN"})
+    filter_glob: StringProperty(
+        name="File Filter", description="Files that the dialog shows", default="*.glb", options={"HIDDEN"}
+    )
 
     tolerance: FloatProperty(
         name="Tolerance",
