@@ -70,12 +70,12 @@ def reduced(
     """
     with damage_refused():
         clips, nodes = read_clips(document), Nodes(document)
+        if not any(clip.tracks for clip in clips):
+            raise GltfError("no animation moves a node", "export it with its animations")
         joints = set(itertools.chain.from_iterable(joints_of(document)))
         moved = _moved(nodes, clips)
         size = size_of(nodes, moved)
         radii = np.full(len(moved), radius) if radius is not None else radii_of(nodes, moved, size)
-    if not any(clip.tracks for clip in clips):
-        raise GltfError("no animation moves a node", "export it with its animations")
     if tolerance is None:
         tolerance = (OF_KEY_POSES if shared else OF_A_BODY) * size or SOME
     elif tolerance > MOST * size > 0.0:

@@ -51,6 +51,7 @@ examples:
   python scripts/reduce.py walk.bvh dance.fbx --tolerance 1cm --output keyed
   python scripts/reduce.py walk.glb --tolerance 2mm
   python scripts/reduce.py walk.glb --key-poses 12
+  python scripts/reduce.py walk.fbx dance.bvh shot.blend --glb --tolerance 2mm
   blender --background --python scripts/reduce.py -- shot.blend
 
 .blend files:
@@ -80,12 +81,19 @@ recordings:
   are in metres and Blender's axes, with the mode on the keys; they play in any Blender, with or without the extension.
   The first sample is on frame 1.
 
+GLB files:
+  With --glb the program exports .blend and FBX files, and recordings, by Blender's own glTF exporter, sampled on every
+  frame as they are shown, and leaves the few keys that the motion needs, as it does for glTF files. A .blend or FBX
+  file keeps its meshes. A recording becomes a rig or an empty of its own, in metres. The modes of a .blend file are
+  sampled too: glTF knows lines and even turns alone.
+
 what is written:
-  NAME-reduced.blend for a .blend file, NAME-reduced.glb for a .glb file, NAME-keys.csv and NAME-keys.blend for a
-  recording, beside it or in --output. A file is moved into place when it is complete, and replaces an existing one
-  only with --overwrite, also where another run has written that meanwhile. With --in-place the program replaces a
-  .blend file itself, and keeps the one before as NAME.blend1. At the end the paths that were written are printed on
-  standard output, one a line; a path with a line break or another control character is printed as JSON, "a\\nb.csv".
+  NAME-reduced.blend for a .blend file, NAME-reduced.glb for a .glb file and with --glb for each, NAME-keys.csv and
+  NAME-keys.blend for a recording, beside it or in --output. A file is moved into place when it is complete, and
+  replaces an existing one only with --overwrite, also where another run has written that meanwhile. With --in-place the
+  program replaces a .blend file itself, and keeps the one before as NAME.blend1. At the end the paths that were written
+  are printed on standard output, one a line; a path with a line break or another control character is printed as JSON,
+  "a\\nb.csv".
   Everything else goes to standard error: for each object and rig the number of keys before and after, and the largest
   error.
 
@@ -144,19 +152,20 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     recordings = parser.add_argument_group("recordings")
     recordings.add_argument("--blend", action="store_true", help="also write rigid motions as .blend files")
     recordings.add_argument(
-        "--fps", type=_fps, metavar="N", help="frames a second of .blend files (the rate of the recording)"
+        "--fps", type=_fps, metavar="N", help="frames a second of .blend and GLB files (the rate of the recording)"
     )
     recordings.add_argument(
         "--axes", type=str.lower, choices=AXES, help="axes of the recordings (opengl for BVH, blender for others)"
     )
     add_reading_options(parser)
     gltf = parser.add_argument_group("glTF files")
+    gltf.add_argument("--glb", action="store_true", help="write GLB files of .blend and FBX files and of recordings")
     gltf.add_argument(
         "--vertices", action="store_true", help="also measure how far any vertex of a skin is off, which takes a while"
     )
     add_file_options(parser)
     options = parser.parse_args(arguments)
-    files, recorded = _sorted(options.inputs, blend=options.blend)
+    files, recorded = _sorted(options.inputs, blend=options.blend, glb=options.glb)
     gltf = [file for file in files if _is_gltf(file)]
     options.wishes = Wishes(
         options.mode or MODE,
@@ -175,6 +184,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
             raise ValueError(f"--in-place is for .blend files, and {recorded[0].source} is a recording: leave one out")
         if gltf and options.in_place:
             raise ValueError(f"--in-place is for .blend files, and {gltf[0]} is none: leave one out")
+        if options.glb:
+            _refuse_beside_glb(options, files)
         if gltf and options.mode:
             raise ValueError(
                 f"--mode is for .blend files and tables, and {gltf[0]} knows lines and even turns alone: leave it out, "
@@ -184,7 +195,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
             raise ValueError("--objects is for .blend files: of a recording name one body with FILE:BODY")
         options.reading = Reading(options.axes, reading_options(options))
         options.jobs = [
-            *jobs_of(files, SUFFIX, options.output, in_place=options.in_place),
+            *jobs_of(files, SUFFIX, options.output, in_place=options.in_place, ending=".glb" if options.glb else None),
             *recorded,
         ]
     except ValueError as error:
@@ -210,13 +221,19 @@ def _doing(
     gltf = GltfRun(wishes, **written, note=note, stop_if_asked=stop_if_asked)
     if not in_blender:
         return gltf.do
+    from rigid_motion_batch.keying.exporting import ExportRun
     from rigid_motion_batch.keying.jobs import BlendRun
     from rigid_motion_batch.keying.recordings import RecordingRun
     from rigid_motion_batch.keying.reducing import reducing
 
-    writing = Writing(options.output, options.overwrite, options.dry_run, options.blend, options.fps)
-    files = BlendRun(options, reducing(wishes, SUFFIX, options.objects), note, stop_if_asked)
-    recordings = RecordingRun(wishes, options.reading, writing, options.inputs, note, stop_if_asked)
+    writing = Writing(options.output, options.overwrite, options.dry_run, options.blend, options.fps, options.glb)
+    files: BlendRun | ExportRun = (
+        ExportRun(gltf, note, stop_if_asked)
+        if options.glb
+        else BlendRun(options, reducing(wishes, SUFFIX, options.objects), note, stop_if_asked)
+    )
+    taken = [job for job in options.jobs if isinstance(job, Job)]
+    recordings = RecordingRun(wishes, options.reading, writing, options.inputs, taken, note, stop_if_asked)
 
     def do(job: Job | Recorded) -> Outcome:
         if isinstance(job, Recorded):
@@ -230,12 +247,30 @@ def _is_gltf(path: Path) -> bool:
     return path.suffix.lower() in ENDINGS
 
 
-def _sorted(inputs: list[str], *, blend: bool) -> tuple[list[Path], list[Recorded]]:
+def _refuse_beside_glb(options: argparse.Namespace, files: list[Path]) -> None:
+    """Raise ValueError for options that say nothing of GLB files."""
+    if options.mode:
+        raise ValueError(
+            "--mode is for .blend files and tables, and GLB knows lines and even turns alone: leave it out"
+        )
+    for name in ("blend", "in_place", "objects", "discard"):
+        if getattr(options, name):
+            option = f"--{name.replace('_', '-')}"
+            raise ValueError(f"{option} is for .blend files, and --glb writes others: leave one of them out")
+    for path in files:
+        if path.suffix.lower() == ".gltf":
+            raise ValueError(f"{path} is reduced to a .gltf file: do it without --glb")
+        if path.suffix.lower() == ".fbx" and (options.axes or reading_options(options).given):
+            raise ValueError(f"with --glb Blender imports {path} whole: leave out --axes and what says how to read it")
+
+
+def _sorted(inputs: list[str], *, blend: bool, glb: bool) -> tuple[list[Path], list[Recorded]]:
     """The .blend and glTF files, and the recordings, each of these once.
 
-    A body of a file is a recording, and so is a glTF file of which a .blend file is to be made.
+    A body of a file is a recording, and so is a glTF file of which a .blend file is to be made. An FBX file is none
+    where it becomes a GLB file with all that is in it.
     """
-    endings = (".blend",) if blend else (".blend", *ENDINGS)
+    endings = (".blend", *(() if blend else ENDINGS), *((".fbx",) if glb else ()))
     files = [Path(source) for source in inputs if source.lower().endswith(endings)]
     recorded: dict[tuple[str, str | None], str] = {}
     for source in inputs:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 from rigid_motion.gltf import Document, GltfError, ReducedClip, Report, read_document, reduced
@@ -31,13 +33,13 @@ class GltfRun:
         self._note, self._stop_if_asked = note, stop_if_asked
         self._would = "would be " if dry_run else ""
 
-    def do(self, job: Job) -> Outcome:
-        """Read a file, reduce its clips, and write it."""
+    def do(self, job: Job, export: Callable[[Path], None] | None = None) -> Outcome:
+        """Read a file, or what `export` makes of it at a path, reduce its clips, and write it."""
         outcome = Outcome()
         try:
             refuse_to_replace(job.output, overwrite=self.overwrite)
             refuse_read_only(job.output)
-            self._do(job, outcome)
+            self.reduce(job, outcome, export)
         except FileProblem as problem:
             outcome.failed, outcome.unreadable = True, isinstance(problem, Unreadable)
             self._note(f"{job.source}: {problem}")
@@ -46,11 +48,17 @@ class GltfRun:
             tell_failure(self._note, job.source, error)
         return outcome
 
-    def _do(self, job: Job, outcome: Outcome) -> None:
+    def reduce(
+        self, job: Job, outcome: Outcome, export: Callable[[Path], None] | None = None, per_unit: float = 1.0
+    ) -> None:
+        """The same without refusals of places; raises FileProblem. A tolerance without a unit is in `per_unit` metres.
+
+        What was exported is written also where nothing of it could be reduced.
+        """
         wishes = self.wishes
         try:
-            document = _read(job.source)
-            tolerance = None if wishes.tolerance is None else wishes.tolerance.metres(1.0)
+            document = _read(job.source) if export is None else _exported(export)
+            tolerance = None if wishes.tolerance is None else wishes.tolerance.metres(per_unit)
             report = reduced(
                 document,
                 tolerance=tolerance,
@@ -63,13 +71,14 @@ class GltfRun:
             raise Unreadable(str(error)) from None
         self._stop_if_asked()
         length = wishes.tolerance or Tolerance(f"{MILLIMETRES * report.tolerance:.6f}mm")
+        by_number = wishes.count is not None
         for clip in report.clips:
-            told = _told(clip, length, self._would, by_number=wishes.count is not None)
+            told = _told(clip, length, per_unit, self._would, by_number=by_number)
             self._note(f"{job.source}: {printable(clip.name)}: {told}")
         size = f"{report.size:.3g} m large"
-        self._note(f"{job.source}: {size}{doubt(report.size, wishes.tolerance, 1.0)}")
+        self._note(f"{job.source}: {size}{doubt(report.size, wishes.tolerance, per_unit)}")
         outcome.clips += sum(clip.tracks is not None for clip in report.clips)
-        if not outcome.clips:
+        if not outcome.clips and export is None:
             self._note(f"{job.source}: nothing could be reduced; left alone")
             return
         self._write(job, document, report)
@@ -104,15 +113,22 @@ def _read(path: Path) -> Document:
         raise Unreadable(f"this cannot be read ({error.strerror}): see to its path, and who may read it") from None
 
 
-def _told(clip: ReducedClip, tolerance: Tolerance, would: str, *, by_number: bool) -> str:
+def _exported(export: Callable[[Path], None]) -> Document:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "exported.glb"
+        export(path)
+        return read_document(path)
+
+
+def _told(clip: ReducedClip, tolerance: Tolerance, per_unit: float, would: str, *, by_number: bool) -> str:
     """What became of a clip."""
     if clip.tracks is None:
         return f"stays as it was, {clip.before.keys} keys in {clip.before.size} bytes: {clip.reason}"
     told = f"{would}reduced{fewer(clip.before.keys, clip.after.keys)}, {clip.before.size} -> {clip.after.size} bytes"
-    told += off(tolerance, clip.error, 1.0, by_number=by_number)
+    told += off(tolerance, clip.error, per_unit, by_number=by_number)
     if clip.vertices is not None:
-        told += f"; vertices {tolerance.alike(clip.vertices, 1.0)} at most"
+        told += f"; vertices {tolerance.alike(clip.vertices, per_unit)} at most"
     if clip.slides[0] > 0.0:
-        before, after = (tolerance.alike(slide, 1.0) for slide in clip.slides)
+        before, after = (tolerance.alike(slide, per_unit) for slide in clip.slides)
         told += f"; feet slide {after}, and {before} before"
     return told

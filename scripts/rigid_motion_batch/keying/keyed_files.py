@@ -82,12 +82,18 @@ def new_file(clip: Clip, tolerance: float, fps: int | None) -> np.ndarray:
     return frames
 
 
+def key_densely(clip: Clip, frames: np.ndarray, name: str) -> None:
+    """Put axes or a rig into the open file that move as a recording did, with a key for every sample, frames (n,)."""
+    if clip.figure is None:
+        poses = to_blender(clip.in_metres(clip.poses), clip.axes)
+        animation.bake_poses(_axes(name), frames, poses, key_type="KEYFRAME")
+    else:
+        _rig(clip, frames, name)
+
+
 def key_object(clip: Clip, keys: np.ndarray, frames: np.ndarray, mode: str, name: str) -> bpy.types.Object:
     """Put axes into the open file that move as a rigid body did, with keys at these samples (k,) of all frames (n,)."""
-    obj = bpy.data.objects.new(name, None)
-    obj.empty_display_type, obj.empty_display_size = "ARROWS", ARROW
-    obj.rotation_mode = "QUATERNION"
-    bpy.context.scene.collection.objects.link(obj)
+    obj = _axes(name)
     poses = to_blender(clip.in_metres(clip.poses[keys]), clip.axes)
     animation.bake_poses(obj, frames[keys], poses, key_type="KEYFRAME")
     animation.set_mode(obj, mode)
@@ -102,12 +108,26 @@ def key_body(clip: Clip, frames: np.ndarray, wishes: Wishes, name: str) -> Resul
     Result
         What became of the bones that move; those that were left play straight from sample to sample.
     """
+    rig = _rig(clip, frames, name)
+    keyed = [transform_of(bone) for bone in rig.obj.pose.bones if len(animation.key_frames(bone))]
+    if not keyed:
+        return Result()
+    return reduced(keyed, replace(wishes, discard=True))  # The recording has the dense keys.
+
+
+def _axes(name: str) -> bpy.types.Object:
+    obj = bpy.data.objects.new(name, None)
+    obj.empty_display_type, obj.empty_display_size = "ARROWS", ARROW
+    obj.rotation_mode = "QUATERNION"
+    bpy.context.scene.collection.objects.link(obj)
+    return obj
+
+
+def _rig(clip: Clip, frames: np.ndarray, name: str) -> Rig:
+    """A rig in the open file with a key for every sample of a whole body, on frames (n,)."""
     rest = Rest.of(clip.figure, clip.metres_per_unit, clip.axes)
     rig = Rig(name, rest, clip.figure.joints, bpy.context.scene.collection)
     channels = rig.channels_of(to_blender(clip.in_metres(clip.poses), clip.axes))
     for bone in range(len(rig.bones)):
         rig.key(bone, frames, channels[bone])
-    keyed = [transform_of(bone) for bone in rig.obj.pose.bones if len(animation.key_frames(bone))]
-    if not keyed:
-        return Result()
-    return reduced(keyed, replace(wishes, discard=True))  # The recording has the dense keys.
+    return rig

@@ -24,8 +24,10 @@ class Job:
         return self.source.name
 
 
-def jobs_of(files: Sequence[Path], suffix: str, folder: Path | None, *, in_place: bool) -> list[Job]:
-    """What to read and where to write it; a file that is named twice is one.
+def jobs_of(
+    files: Sequence[Path], suffix: str, folder: Path | None, *, in_place: bool, ending: str | None = None
+) -> list[Job]:
+    """What to read and where to write it, with an ending of its own; a file that is named twice is one.
 
     Raises
     ------
@@ -37,7 +39,7 @@ def jobs_of(files: Sequence[Path], suffix: str, folder: Path | None, *, in_place
         sources.setdefault(place_of(path), path)
     jobs, places = [], {}
     for path in sources.values():
-        output = path if in_place else (folder or path.parent) / f"{path.stem}{suffix}{path.suffix.lower()}"
+        output = path if in_place else (folder or path.parent) / f"{path.stem}{suffix}{ending or path.suffix.lower()}"
         place = place_of(output)
         if place in places:
             raise ValueError(

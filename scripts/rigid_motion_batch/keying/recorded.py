@@ -56,6 +56,9 @@ class Writing:
     fps: int | None
     """None for the rate of each recording."""
 
+    glb: bool = False
+    """Whether GLB files are written, and nothing else."""
+
 
 def place_and_body(source: str) -> tuple[str, str | None]:
     """Where the file of a recording is, the same however it is written, and which body of it is meant."""

@@ -1,7 +1,7 @@
 """What `reduce.py` does to recordings: the few samples that a mode needs as keys, in a table or in a .blend file.
 
 A rigid motion becomes NAME-keys.csv, in the recording's own axes and units, and on request NAME-keys.blend; a whole
-body becomes NAME-keys.blend, with a rig.
+body becomes NAME-keys.blend, with a rig. With --glb either becomes NAME-reduced.glb instead.
 """
 
 from __future__ import annotations
@@ -16,8 +16,10 @@ from rigid_motion_batch.analysis.metrics import write_poses
 from rigid_motion_batch.analysis.radii import RIGID
 from rigid_motion_batch.analysis.reconstructions import fill_in
 from rigid_motion_batch.keying.blend_files import write_file
-from rigid_motion_batch.keying.keyed_files import key_body, key_object, new_file
-from rigid_motion_batch.keying.options import place_of
+from rigid_motion_batch.keying.exporting import export_glb
+from rigid_motion_batch.keying.gltf_files import GltfRun
+from rigid_motion_batch.keying.keyed_files import key_body, key_densely, key_object, new_file
+from rigid_motion_batch.keying.options import Job, place_of
 from rigid_motion_batch.keying.output_files import (
     FileProblem,
     Unreadable,
@@ -33,8 +35,8 @@ from rigid_motion_batch.recordings.clip_reading import folder_names, read_source
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.reading import split_source
 
-SUFFIX = "-keys"
-"""Of the names of files that are written."""
+SUFFIX, GLB_SUFFIX = "-keys", "-reduced"
+"""Of the names of files that are written, and of GLB files."""
 
 
 class RecordingRun:
@@ -47,6 +49,8 @@ class RecordingRun:
     writing : Writing
     inputs : iterable of str
         All that is to be read, which nothing is written over.
+    taken : iterable of Job
+        The other files of the run, whose places are theirs.
     note, stop_if_asked : callable
     """
 
@@ -56,6 +60,7 @@ class RecordingRun:
         reading: Reading,
         writing: Writing,
         inputs: Iterable[str],
+        taken: Iterable[Job],
         note: Note,
         stop_if_asked: StopIfAsked,
     ) -> None:
@@ -63,7 +68,10 @@ class RecordingRun:
         self._note, self._stop_if_asked = note, stop_if_asked
         self._would = "would be " if writing.dry_run else ""
         self._inputs = {place_of(_file_of(source)) for source in inputs}
-        self._written: dict[str, str] = {}
+        self._written = {place_of(job.output): str(job.source) for job in taken}
+        self._gltf = GltfRun(
+            wishes, overwrite=writing.overwrite, dry_run=writing.dry_run, note=note, stop_if_asked=stop_if_asked
+        )
 
     def do(self, job: Recorded) -> Outcome:
         """Read a recording, and write the keys of each of its bodies."""
@@ -107,7 +115,11 @@ class RecordingRun:
                 self.wishes.tolerance.require_within(clip, self.wishes.radius or RIGID)
             except ValueError as error:
                 raise Unreadable(str(error)) from None
-        begin = (self.writing.folder or file.parent) / f"{name}{SUFFIX}"
+        folder = self.writing.folder or file.parent
+        if self.writing.glb:
+            self._do_glb(title, clip, name, folder / f"{name}{GLB_SUFFIX}.glb", outcome)
+            return
+        begin = folder / f"{name}{SUFFIX}"
         if clip.figure is not None:
             self._do_body(title, clip, file, name, begin.with_name(f"{begin.name}.blend"), outcome)
             return
@@ -170,6 +182,14 @@ class RecordingRun:
         self._save(file, scene)
         outcome.bones += len(result.done)
         self._tell_written(title, scene, outcome)
+
+    def _do_glb(self, title: str, clip: Clip, name: str, path: Path, outcome: Outcome) -> None:
+        self._refuse(title, path)
+        tolerance = self.wishes.tolerance or TOLERANCE
+        frames = new_file(clip, tolerance.tolerance(clip), self.writing.fps)
+        key_densely(clip, frames, name)
+        self._stop_if_asked()
+        self._gltf.reduce(Job(Path(title), path), outcome, export_glb, clip.metres_per_unit)
 
     def _refuse(self, title: str, path: Path) -> None:
         """Raise FileProblem where a file must not or cannot be written: better said before hours go into it."""

@@ -276,7 +276,7 @@ def _imported(
         scene.render.fps, scene.render.fps_base = fps, 1.0
         # Importers go by what the window shows: an override is not enough for the mode that they edit bones in.
         window.scene = scene
-        with _enabled(path, addon):
+        with enabled(path, addon):
             _import(path, importer)
         for obj in scene.objects:
             _only_its_action(obj)
@@ -319,7 +319,7 @@ def _reason(path: Path, error: Exception) -> str:
 
 
 @contextmanager
-def _enabled(path: Path, addon: str) -> Iterator[None]:
+def enabled(path: Path, addon: str) -> Iterator[None]:
     """An add-on of Blender's own, switched on for as long as this lasts."""
     import addon_utils
 

@@ -1,0 +1,84 @@
+"""What `reduce.py --glb` does to .blend and FBX files: Blender's own glTF exporter, and then only the keys needed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+
+from rigid_motion_batch.hushing import hushed
+from rigid_motion_batch.recordings import TrajectoryError
+from rigid_motion_batch.recordings.fbx import ADDON as FBX_ADDON
+from rigid_motion_batch.recordings.fbx_records import refuse_damaged
+from rigid_motion_batch.recordings.importing import enabled, refuse_too_large
+
+from .blend_files import missing_data, open_file
+from .gltf_files import GltfRun
+from .options import Job
+from .output_files import FileProblem, Unreadable
+from .sessions import Note, Outcome, StopIfAsked
+
+GLTF_ADDON = "io_scene_gltf2"
+
+
+def export_glb(path: Path) -> None:
+    """Write the open file as GLB, every animation sampled on every frame. Raises FileProblem."""
+    try:
+        with enabled(path, GLTF_ADDON), hushed():
+            bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB")
+    except TrajectoryError as error:
+        raise FileProblem(error.problem) from None
+    except RuntimeError as error:
+        raise FileProblem(f"Blender cannot export this ({_reason(error)}): see whether it does in a window") from None
+
+
+class ExportRun:
+    """Doing .blend and FBX files, one after the other."""
+
+    def __init__(self, gltf: GltfRun, note: Note, stop_if_asked: StopIfAsked) -> None:
+        self._gltf, self._note, self._stop_if_asked = gltf, note, stop_if_asked
+
+    def do(self, job: Job) -> Outcome:
+        """Open or import a file, and write what it shows as GLB with few keys."""
+        incomplete = False
+
+        def export(path: Path) -> None:
+            nonlocal incomplete
+            if job.source.suffix.lower() == ".fbx":
+                _import_fbx(job.source)
+            else:
+                open_file(job.source)
+                missing = missing_data()
+                for library in missing.libraries:
+                    self._note(f"{job.source}: {library}")
+                incomplete = missing.hides_objects
+            self._stop_if_asked()
+            export_glb(path)
+
+        outcome = self._gltf.do(job, export)
+        outcome.incomplete = incomplete
+        return outcome
+
+
+def _import_fbx(path: Path) -> None:
+    """Import a file into an empty one, meshes and images with it. Raises Unreadable."""
+    if path.is_dir():
+        raise Unreadable(f"this is a folder: name the files in it, as in {path / '*.fbx'}")
+    try:
+        refuse_too_large(path)
+        refuse_damaged(path)
+        with hushed():
+            bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+            with enabled(path, FBX_ADDON):
+                bpy.ops.import_scene.fbx(filepath=str(path.absolute()))
+    except TrajectoryError as error:
+        raise Unreadable(error.problem) from None
+    except OSError as error:
+        raise Unreadable(f"this cannot be read ({error.strerror}): see to its path, and who may read it") from None
+    except RuntimeError as error:
+        raise Unreadable(f"Blender cannot import this ({_reason(error)}): export it again as binary FBX") from None
+
+
+def _reason(error: RuntimeError) -> str:
+    """The last line of what an operator said, which names the problem."""
+    return (str(error).strip().splitlines() or [""])[-1].removeprefix("Error: ")

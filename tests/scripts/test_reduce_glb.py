@@ -1,0 +1,193 @@
+"""`reduce.py --glb`: .blend files, FBX files and recordings as GLB files, by Blender's exporter and then reduced."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigid_motion_batch.keying import exporting, recordings
+from rigid_motion_batch.recordings.clip_reading import read_source
+from rigid_motion_batch.recordings.clips import Clip
+from tests.animation.farm import played_on_a_farm
+from tests.gltf.oracle import File, off
+from tests.scripts.baking import new_file, save
+from tests.scripts.reducing import FRAMES, WALK, exit_code, hand_made, object_file, rig_file, run, worlds_of, write_csv
+
+MM = 1e-3
+
+SINGLE = 2e-5
+"""Metres: what the single precision of GLB files and of Blender's matrices comes to."""
+
+
+@pytest.fixture
+def exported(monkeypatch, tmp_path) -> Path:
+    """A copy of what Blender's exporter wrote last."""
+    copy, export = tmp_path / "exported" / "sampled.glb", exporting.export_glb
+    copy.parent.mkdir()
+
+    def export_and_copy(path: Path) -> None:
+        export(path)
+        shutil.copy2(path, copy)
+
+    for module in (exporting, recordings):
+        monkeypatch.setattr(module, "export_glb", export_and_copy)
+    return copy
+
+
+def node_of(file: File, name: str) -> int:
+    (found,) = (number for number, node in enumerate(file.json["nodes"]) if node.get("name") == name)
+    return found
+
+
+def joints_in_metres(clip: Clip) -> np.ndarray:
+    """Where the joints of a whole body are, shape (joints, n, 3), by matrices."""
+    found: list[np.ndarray] = []
+    for joint, parent in enumerate(clip.figure.parents):
+        local = worlds_of(clip.poses[joint])
+        found.append(local if parent < 0 else found[parent] @ local)
+    return clip.metres_per_unit * np.array(found)[..., :3, 3]
+
+
+def require_joints(source: Path, made: Path, tolerance: float, *, fps: float) -> None:
+    """The joints are where the reader of recordings has them; glTF has the axes of BVH, and frame 1 is first."""
+    ((clip,), _), file = read_source(str(source), None), File(made)
+    worlds = file.worlds(0, clip.times - clip.times[0] + 1.0 / fps)
+    nodes = [node_of(file, joint) for joint in clip.figure.joints]
+    errors = np.linalg.norm(worlds[nodes][..., :3, 3] - joints_in_metres(clip), axis=-1)
+    assert 0.0 < errors.max() <= tolerance + SINGLE
+
+
+def require_near_export(made: Path, exported: Path, tolerance: float, radius: float) -> None:
+    """At eighths of the keys of both; and every clip that was exported is there."""
+    sampled, file = File(exported), File(made)
+    assert len(sampled.json["animations"]) == len(file.json["animations"])
+    for clip in range(len(sampled.json["animations"])):
+        assert off(sampled, file, clip, radius) <= tolerance + 1e-6
+
+
+def test_a_bvh_becomes_a_glb_in_metres_within_the_tolerance(tmp_path, capsys, exported):
+    body = hand_made(tmp_path)
+    assert run(body, "--glb", "--tolerance", "5mm", "--radius", "0.03") == 0
+    made = tmp_path / f"{body.stem}-reduced.glb"
+    said = capsys.readouterr()
+    assert said.out == f"{made}\n"
+    assert " bytes, " in said.err
+    assert " m large" in said.err
+    require_near_export(made, exported, 5 * MM, 0.03)
+    ((clip,), _) = read_source(str(body), None)
+    require_joints(body, made, 5 * MM, fps=clip.samples_a_second)
+    assert made.stat().st_size < exported.stat().st_size
+
+
+@pytest.mark.recordings
+def test_a_body_in_units_of_its_own_has_its_size_in_metres(tmp_path):
+    source = WALK.with_name("cmu_01_01.bvh")
+    assert run(source, "--glb", "--tolerance", "1cm", "--output", tmp_path) == 0
+    require_joints(source, tmp_path / "cmu_01_01-reduced.glb", 10 * MM, fps=120.0)
+
+
+@pytest.mark.recordings
+def test_an_fbx_keeps_its_meshes_and_skins(tmp_path, exported):
+    assert run(WALK, "--glb", "--tolerance", "2mm", "--radius", "0.03", "--output", tmp_path) == 0
+    made = tmp_path / "pab_walk-reduced.glb"
+    require_near_export(made, exported, 2 * MM, 0.03)
+    sampled, file = File(exported), File(made)
+    for what in ("nodes", "skins", "meshes", "materials"):
+        assert len(sampled.json.get(what, [])) == len(file.json.get(what, []))
+    assert made.stat().st_size < exported.stat().st_size
+
+
+@pytest.mark.parametrize("mode", ["blender", "motor_spline"])
+def test_a_blend_file_is_exported_as_it_plays(tmp_path, exported, mode):
+    source = rig_file(tmp_path / "shot.blend")
+    if mode != "blender":
+        assert run(source, "--mode", mode, "--tolerance", "5mm", "--radius", "0.1") == 0
+        source = tmp_path / "shot-reduced.blend"
+    assert run(source, "--glb", "--tolerance", "2mm", "--radius", "0.1") == 0
+    made = tmp_path / f"{source.stem}-reduced.glb"
+    require_near_export(made, exported, 2 * MM, 0.1)
+    probes = ["at Root", "at Arm", "at Hand"]
+    truth = played_on_a_farm(source, probes, FRAMES)[1][..., :3, 3]
+    file = File(made)
+    # The dense keys for Restore Keys are a clip of their own, before the one that plays.
+    clip = len(file.json["animations"]) - 1
+    worlds = file.worlds(clip, FRAMES / 24.0)[[node_of(file, name) for name in probes]][..., :3, 3]
+    x, y, z = np.moveaxis(truth, -1, 0)
+    assert np.linalg.norm(worlds - np.stack((x, z, -y), axis=-1), axis=-1).max() <= 2 * MM + SINGLE
+
+
+def test_a_rigid_recording_becomes_a_node(tmp_path):
+    path = tmp_path / "hand.csv"
+    times, poses = write_csv(path)
+    assert run(path, "--glb", "--tolerance", "5mm") == 0
+    file = File(tmp_path / "hand-reduced.glb")
+    worlds = file.worlds(0, times + 1.0 / 90.0)[node_of(file, "hand")]
+    x, y, z = poses.positions.T
+    assert np.linalg.norm(worlds[:, :3, 3] - np.column_stack((x, z, -y)), axis=-1).max() <= 5 * MM + SINGLE
+    assert len(file.moments(0)) < len(times)
+
+
+def test_what_is_there_stays_without_overwrite_and_a_dry_run_writes_nothing(tmp_path, capsys):
+    blend, body = object_file(tmp_path / "shot.blend"), hand_made(tmp_path)
+    before = sorted(os.listdir(tmp_path))
+    assert run(blend, body, "--glb", "--dry-run") == 0
+    assert sorted(os.listdir(tmp_path)) == before
+    made = [tmp_path / f"{path.stem}-reduced.glb" for path in (blend, body)]
+    for path in made:
+        path.write_bytes(b"mine")
+    assert run(blend, body, "--glb") == 1
+    said = capsys.readouterr().err
+    for path in made:
+        assert f"{path} is there already: add --overwrite, or another --output" in said
+        assert path.read_bytes() == b"mine"
+    assert run(blend, body, "--glb", "--overwrite") == 0
+    assert {path.read_bytes()[:4] for path in made} == {b"glTF"}
+
+
+def test_two_files_that_would_be_one_are_told(tmp_path, capsys):
+    body, blend = hand_made(tmp_path), object_file(tmp_path / "body.blend")
+    assert run(blend, body, "--glb", "--overwrite") == 1
+    assert f"{blend} was written to {tmp_path / 'body-reduced.glb'} too" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["none.fbx", "text.fbx", "none.blend", "text.blend"])
+def test_a_file_that_cannot_be_read_is_named_and_nothing_is_written(tmp_path, capsys, name):
+    path = tmp_path / name
+    if name.startswith("text"):
+        path.write_text("no such thing", encoding="utf-8")
+    assert run(path, "--glb") == 2
+    assert f"{path}: " in capsys.readouterr().err
+    assert not list(tmp_path.glob("*.glb"))
+
+
+def test_a_file_without_animation_is_told(tmp_path, capsys):
+    new_file()
+    path = save(tmp_path / "still.blend")
+    assert run(path, "--glb") == 2
+    assert f"{path}: no animation moves a node" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        (["shot.blend", "--mode", "dq_sclerp"], "GLB knows lines and even turns alone: leave it out"),
+        (
+            ["shot.blend", "--in-place"],
+            "--in-place is for .blend files, and --glb writes others: leave one of them out",
+        ),
+        (["walk.bvh", "--blend"], "--blend is for .blend files, and --glb writes others: leave one of them out"),
+        (
+            ["shot.blend", "--objects", "A"],
+            "--objects is for .blend files, and --glb writes others: leave one of them out",
+        ),
+        (["walk.fbx", "--start", "1"], "with --glb Blender imports walk.fbx whole"),
+        (["walk.gltf"], "walk.gltf is reduced to a .gltf file: do it without --glb"),
+    ],
+)
+def test_options_that_say_nothing_of_glb_files_are_refused(capsys, options, line):
+    assert exit_code(*options, "--glb") == 2
+    assert line in capsys.readouterr().err
