@@ -181,9 +181,8 @@ def test_rates_beside_adaptive_keys_are_kept_evenly(adaptive):
     assert sorted(path.name for path in (adaptive / "toss").iterdir()) == ["10", "tolerance-0.02", "tolerance-5mm"]
     evenly = [row for row in rows_of(adaptive / "metrics.csv") if row["decimation"] == "uniform"]
     assert {(row["rate_hz"], row["tolerance_m"], row["keys"]) for row in evenly} == {("10", "", "11")}
-    assert sorted(path.name for path in (adaptive / "toss" / "10").iterdir()) == sorted(
-        f"{name}.csv" for name in ("keys", *KEYFRAME_MODES)
-    )
+    tables = [f"{name}.csv" for name in ("keys", *KEYFRAME_MODES)]
+    assert sorted(path.name for path in (adaptive / "toss" / "10").iterdir()) == sorted([*tables, "comparison.glb"])
 
 
 def test_the_keys_needed_reach_the_error_of_the_reference(adaptive, short_clip):
@@ -245,7 +244,8 @@ def test_the_video_its_blend_and_the_report_are_written_and_nothing_else(short_c
     files = [path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file()]
     written = {str(path) for path in files if path.parts[0] != OWN}
     tables = {f"toss/10/{name}.csv" for name in ("keys", *KEYFRAME_MODES)}
-    assert written == tables | {*("metrics.csv", "report.html", "toss/10/comparison.mp4", "toss/10/comparison.blend")}
+    shown = {f"toss/10/comparison.{ending}" for ending in ("mp4", "blend", "glb")}
+    assert written == tables | shown | {"metrics.csv", "report.html"}
     assert capsys.readouterr().out.splitlines()[-1] == str((tmp_path / "report.html").resolve())
 
 
@@ -507,12 +507,12 @@ def test_workers_write_what_one_process_writes_to_the_byte(measured, tmp_path, c
 def test_a_second_run_does_nothing_and_another_rate_only_what_it_asks_for(short_clip, tmp_path, capsys):
     asked = (short_clip, "--no-video", "--output", tmp_path, "--json")
     assert run(*asked, "--rates", "10") == 0
-    assert tasks_of(capsys) == {"done": 4}
+    assert tasks_of(capsys) == {"done": 5}
     assert run(*asked, "--rates", "10") == 0
-    assert tasks_of(capsys) == {"up to date": 4}
+    assert tasks_of(capsys) == {"up to date": 5}
     written = (tmp_path / "toss" / "10" / "keys.csv").stat().st_mtime_ns
     assert run(*asked, "--rates", "10,20") == 0
-    assert tasks_of(capsys) == {"done": 3, "up to date": 2}
+    assert tasks_of(capsys) == {"done": 3, "up to date": 3}
     assert (tmp_path / "toss" / "10" / "keys.csv").stat().st_mtime_ns == written
     assert {row["rate_hz"] for row in rows_of(tmp_path / "metrics.csv")} == {"10", "20"}
 
@@ -525,8 +525,8 @@ def test_a_recording_that_changed_is_read_and_measured_anew_and_the_others_are_n
     capsys.readouterr()
     other.write_text("\n".join(short_clip.read_text().splitlines()[:60]))
     assert run(*asked) == 0
-    # Read, measured, and the two tables of all clips.
-    assert tasks_of(capsys) == {"done": 4, "up to date": 2}
+    # Read, measured, its GLB file, and the table and the page of all clips.
+    assert tasks_of(capsys) == {"done": 5, "up to date": 3}
 
 
 def test_one_bad_recording_is_said_and_the_others_go_on(short_clip, tmp_path, capsys):
@@ -538,7 +538,7 @@ def test_one_bad_recording_is_said_and_the_others_go_on(short_clip, tmp_path, ca
     complaints = [line.split(": ")[1] for line in said.err.splitlines() if line.startswith("compare.py:")]
     assert complaints == [f"{bad}:1", str(tmp_path / "nowhere.csv"), "2 failed, as said above"]
     found = json.loads(said.out)
-    assert found["tasks"] == {"done": 4, "failed": 2}
+    assert found["tasks"] == {"done": 5, "failed": 2}
     assert found["report"] == str(tmp_path / "out" / "report.html")
     assert [*found["failures"]] == [f"read {bad}", f"read {tmp_path / 'nowhere.csv'}"]
     assert found["exit_code"] == 1
@@ -657,7 +657,7 @@ def test_a_full_disk_is_said_and_the_next_run_goes_on(short_clip, tmp_path, caps
     assert "No space left on device; nothing that is done is lost" in said.err
     assert said.out == ""
     assert run(*asked, "--json") == 0
-    assert tasks_of(capsys) == {"done": 3, "up to date": 1}
+    assert tasks_of(capsys) == {"done": 4, "up to date": 1}
 
 
 def test_an_output_folder_that_cannot_be_made_is_said(short_clip, tmp_path, capsys):

@@ -109,10 +109,10 @@ def test_keys_are_in_a_table_for_all_modes_or_one_for_each_and_shared_by_the_joi
     walk, output = written
     folders = {path.name: path for path in (output / "walk").iterdir()}
     assert set(folders) == {"5", "10", "tolerance-1cm"}
-    assert [path.name for path in folders["5"].iterdir()] == ["keys.csv"]
-    assert sorted(path.name for path in folders["tolerance-1cm"].iterdir()) == sorted(
-        f"{mode}.keys.csv" for mode in MODES
-    )
+    assert [path.name for path in folders["10"].iterdir()] == ["keys.csv"]
+    assert sorted(path.name for path in folders["5"].iterdir()) == ["comparison.glb", "keys.csv"]
+    tables = [f"{mode}.keys.csv" for mode in MODES]
+    assert sorted(path.name for path in folders["tolerance-1cm"].iterdir()) == sorted(["comparison.glb", *tables])
     for path in output.glob("walk/*/*.csv"):
         moments = {}
         for row in rows_of(path):
@@ -160,7 +160,7 @@ def test_a_second_run_has_nothing_to_do(tmp_path: Path, capsys: pytest.CaptureFi
     before = (tmp_path / "output" / "metrics_joints.csv").read_bytes()
     capsys.readouterr()
     assert run(*asked, "--json") == 0
-    assert json.loads(capsys.readouterr().out)["tasks"] == {"up to date": 5}
+    assert json.loads(capsys.readouterr().out)["tasks"] == {"up to date": 6}
     assert (tmp_path / "output" / "metrics_joints.csv").read_bytes() == before
 
 

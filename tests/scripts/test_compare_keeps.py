@@ -125,7 +125,7 @@ def test_a_file_of_another_program_is_named_and_replaced_only_if_that_is_asked_f
 def test_without_its_own_folders_it_knows_no_file_for_its_own(folder: Path, capsys: pytest.CaptureFixture) -> None:
     shutil.rmtree(folder / "out" / OWN)
     said = refused(capsys, "toss.csv", "--output", "out")
-    assert "metrics.csv" in said
+    assert "lerp_slerp.csv" in said
     assert "were not written by this program" in said
 
 
@@ -255,11 +255,13 @@ def test_after_an_edit_of_the_page_the_page_alone_is_made_again(folder: Path, tm
     charts.write_text(charts.read_text(encoding="utf-8") + "\n# A chart.\n", encoding="utf-8")
     assert explained() == ["report.html: program changed (report)"]
     found = subprocess.run([*command, "--json"], check=True, capture_output=True, text=True).stdout
-    assert json.loads(found)["tasks"] == {"done": 1, "up to date": 3}
+    assert json.loads(found)["tasks"] == {"done": 1, "up to date": 4}
     assert "#b8580a" in (tmp_path / "output" / "report.html").read_text(encoding="utf-8")
     metrics = room / "analysis" / "metrics.py"
     metrics.write_text(metrics.read_text(encoding="utf-8") + "\n# A number.\n", encoding="utf-8")
-    assert [line.partition(":")[0] for line in explained()] == ["measure toss/10", "metrics.csv", "report.html"]
+    assert [line.partition(":")[0] for line in explained()] == [
+        *("measure toss/10", "model toss/10", "metrics.csv", "report.html")
+    ]
     steps_with_report = {name for name, one in vars(steps).items() if "report" in getattr(one, "rooms", ())}
     assert steps_with_report == {"page", "overview"}
 

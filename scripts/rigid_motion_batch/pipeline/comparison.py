@@ -59,6 +59,9 @@ MOST_DECIMATED = 50_000
 RATE_MARGIN = 0.01
 """By what share a rate may be above that of a recording: 90 Hz are often 89.9 in truth."""
 
+MOST_MODELLED = 100_000
+"""Samples times joints of a body that is written as GLB: a minute for a choice of keys."""
+
 TABLE_OF = {"measure": METRICS, "decimate": DECIMATED, "count_keys": KEYS_NEEDED}
 """What parts of pages are parts of, too."""
 
@@ -253,6 +256,11 @@ class ComparisonPlan:
                 else ", for there is no Blender here"
             )
             yield f"{study.name}: not compared with Blender's Decimate{reason}"
+        if not self.modelled(study):
+            yield (
+                f"{study.name}: no {steps.GLB}: {max(joints, 1)} joints with {samples} samples would take too long; "
+                f"cut it to {MOST_MODELLED // max(joints, 1)}"
+            )
 
     # -- comparing ----------------------------------------------------------------------------------------------------
 
@@ -275,6 +283,9 @@ class ComparisonPlan:
                 tables.setdefault(TABLE_OF[part.what], []).append(task.key)
                 if part.what == "measure" and study.facts.joints:
                     tables.setdefault(JOINT_METRICS, []).append(task.key)
+            for choice in self.modelled(study):
+                yield (task := self._model(study, choice, keys[Part("measure", study.clip, choice.name)]))
+                keys[Part("model", study.clip, choice.name)] = task.key
         for table, after in tables.items():
             parameters = steps.Join(steps.JOINT_ROWS if table == JOINT_METRICS else steps.ROWS)
             publish, weight = {"table.csv": table}, 0.002 * len(after)
@@ -303,8 +314,14 @@ class ComparisonPlan:
     def filmed(self, study: Study) -> list[Choice]:
         """The choices that there are films of."""
         stage = self.comparison.stage
-        asked = list(study.choices) if self.comparison.every_film else fewest_keys(study.choices)
-        return [choice for choice in asked if stage and study.frames(choice, stage) <= study.most_frames]
+        return [choice for choice in self._shown(study) if stage and study.frames(choice, stage) <= study.most_frames]
+
+    def modelled(self, study: Study) -> list[Choice]:
+        """The choices that there are GLB files of."""
+        return self._shown(study) if study.facts.samples * max(study.facts.joints, 1) <= MOST_MODELLED else []
+
+    def _shown(self, study: Study) -> list[Choice]:
+        return list(study.choices) if self.comparison.every_film else fewest_keys(study.choices)
 
     def _numbers(self, study: Study) -> Iterator[tuple[Part, Task]]:
         """The tasks of a clip's numbers, and what they are to pages."""
@@ -329,6 +346,19 @@ class ComparisonPlan:
             parameters = steps.CountKeys(clip, comparison.modes, comparison.radii, fit)
             about = {"title": f"{name}, keys needed", "weight": size * (0.03 if fit else 0.008), "group": name}
             yield Part("count_keys", clip), Task(steps.count_keys, parameters, f"count keys {name}", after, **about)
+
+    def _model(self, study: Study, choice: Choice, measured: str) -> Task:
+        comparison, folder = self.comparison, f"{study.name}/{choice.name}"
+        return Task(
+            steps.model,
+            steps.Model(study.clip, comparison.radii, comparison.shared),
+            f"model {folder}",
+            after=(study.reader, measured),
+            publish={steps.GLB: f"{folder}/{steps.GLB}"},
+            title=f"{study.name} {choice.phrase}, {steps.GLB}",
+            weight=0.1 + 5e-4 * study.facts.samples * max(study.facts.joints, 1),
+            group=study.name,
+        )
 
     def _film(self, study: Study, choice: Choice, measured: str) -> Iterator[Task]:
         """The tasks of a film; the last one makes it."""

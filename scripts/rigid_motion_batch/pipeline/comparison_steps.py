@@ -30,9 +30,10 @@ RECORDINGS = ("rigid_motion/motion", "recordings", "axes.py", "command_line.py",
 ANALYSIS = (*RECORDINGS, "analysis")
 SCENES = (*ANALYSIS, "rigid_motion/animation", "scenes", "palette.py", "hushing.py")
 REPORT = (*ANALYSIS, "report", "palette.py")
+MODEL = (*ANALYSIS, "rigid_motion/gltf", "report/glb.py", "report/mesh.py", "palette.py")
 
 ROWS, JOINT_ROWS, FILM, BLEND, PAGE = "rows.csv", "joints.csv", "comparison.mp4", "comparison.blend", "report.html"
-PIECE, MESH = "piece.mkv", "mesh.npz"
+PIECE, MESH, GLB = "piece.mkv", "mesh.npz", "comparison.glb"
 PAGE_DATA = "report_data/"
 """The folder of what is too large for a page."""
 
@@ -181,6 +182,29 @@ def decimate(job: Job, parameters: Measure) -> None:
         rows = beside_decimate(made, parameters.radii.of(clip.figure.joints), known)
     write_keys_of_bodies(job.folder / ROWS, rows)
     values.write(job.folder / "decimated", tuple(rows))
+
+
+@dataclass(frozen=True)
+class Model:
+    clip: ClipOf
+    radii: Radii
+    shared: bool
+
+
+@step(rooms=MODEL, stage="report")
+def model(job: Job, parameters: Model) -> None:
+    """Write all motions side by side, for any viewer. Before: the recording, and what was measured."""
+    from rigid_motion.gltf import GltfError
+    from rigid_motion_batch.analysis.results import made_again
+    from rigid_motion_batch.report.glb import comparison_glb
+
+    clip, found = parameters.clip.read(job.before[0]), result_in(job.before[1])
+    made = made_again(clip, found, parameters.radii, shared=parameters.shared)
+    try:
+        content = comparison_glb(made, [motion.modes for motion in found.motions])
+    except GltfError as error:
+        raise TaskError(f"{clip.name} {found.choice.phrase}: no {GLB}: {error}") from None
+    (job.folder / GLB).write_bytes(content)
 
 
 @dataclass(frozen=True)
@@ -345,11 +369,14 @@ def page(job: Job, parameters: Page) -> None:
     from rigid_motion_batch.report.pages import write_report
 
     films: dict[tuple[str, str], Path | None] = {}
+    models: dict[tuple[str, str], Path] = {}
     mesh = None
     for part, folder in zip_longest(parameters.parts, job.before):
         if part.what == "encode":
             there = folder or parameters.coming
             films[part.clip.name, part.choice] = Path(part.clip.name, part.choice, FILM) if there else None
+        elif part.what == "model" and folder:
+            models[part.clip.name, part.choice] = Path(part.clip.name, part.choice, GLB)
         elif part.what == "subject" and folder:
             mesh = Mesh(**np.load(folder / MESH))
     write_report(
@@ -357,6 +384,7 @@ def page(job: Job, parameters: Page) -> None:
         _clips(job, parameters),
         parameters.settings,
         films,
+        models,
         folder=Path(parameters.folder),
         mesh=mesh,
         overview=parameters.overview,

@@ -84,10 +84,10 @@ def output(tmp_path: Path) -> Path:
 def test_tables_are_published_and_their_numbers_are_those_of_the_analysis(output: Path, toss: Path) -> None:
     comparison = wanted(toss, count_keys=True)
     outcome, _ = compared(output, comparison)
-    assert states(outcome) == {"up to date": 1, "done": 5}
+    assert states(outcome) == {"up to date": 1, "done": 6}
     tables = ("lerp_slerp.csv", "motor_spline.csv", "keys.csv")
     assert {*published(output)} == {
-        *("metrics.csv", "keys_needed.csv"),
+        *("metrics.csv", "keys_needed.csv", "toss/5/comparison.glb"),
         *(f"toss/{choice}/{table}" for choice in ("5", "10") for table in tables),
     }
     ((clip,), _) = read_clips([str(toss)], None)
@@ -162,7 +162,7 @@ def test_a_whole_body_has_joints_films_and_a_comparison_with_decimate(output: Pa
     assert {*published(output)} == {
         *("metrics.csv", "metrics_joints.csv", "decimated.csv", "keys_needed.csv", "report.html"),
         *(f"{folder}/{name}" for name in ("lerp_slerp.keys.csv", "motor_spline.keys.csv")),
-        *(f"{folder}/{name}" for name in ("comparison.blend", "comparison.mp4")),
+        *(f"{folder}/{name}" for name in ("comparison.blend", "comparison.mp4", "comparison.glb")),
     }
     _, listener = compared(tmp_path / "without", wanted(body, choices=(Tolerance("2cm"),), blender=""))
     assert "body: not compared with Blender's Decimate, for there is no Blender here" in listener.notes
@@ -203,8 +203,8 @@ def test_a_source_that_is_given_twice_is_read_and_measured_under_two_names(outpu
     ("change", "redone"),
     [
         ({"choices": (Uniform("5"), Uniform("15"))}, {"measure toss/15", "metrics.csv"}),
-        ({"modes": ("lerp_slerp",)}, {"measure toss/5", "measure toss/10", "metrics.csv"}),
-        ({"axes": "unity"}, {"read toss", "measure toss/5", "measure toss/10", "metrics.csv"}),
+        ({"modes": ("lerp_slerp",)}, {"measure toss/5", "measure toss/10", "model toss/5", "metrics.csv"}),
+        ({"axes": "unity"}, {"read toss", "measure toss/5", "measure toss/10", "model toss/5", "metrics.csv"}),
     ],
 )
 def test_only_what_an_option_changes_is_done_again(
@@ -219,7 +219,7 @@ def test_a_recording_that_was_edited_is_read_and_measured_again(output: Path, to
     compared(output, wanted(toss))
     write_toss(toss, samples=70)
     _, listener = compared(output, wanted(toss))
-    assert len(listener.done) == 4
+    assert len(listener.done) == 5
 
 
 @pytest.mark.parametrize("place", ["metrics.csv", "toss/5/keys.csv"])
