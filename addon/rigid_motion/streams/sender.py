@@ -1,0 +1,312 @@
+"""A sender that sends when it must: it knows every pose, and what its receivers show of what they were sent.
+
+What is shown is a delay behind. When it gets to where a joint's ball would leave the tolerance, all of the window since
+then is known here, and is said at once. Until then nothing is sent, for the motion goes on at the receivers as it was
+going, and a body at rest costs a heartbeat.
+
+A message builds on one that is there: the newest that all receivers who answer have; where nobody answers, the last
+refresh, a message that builds on nothing and is sent twice.
+"""
+
+from __future__ import annotations
+
+import math
+import secrets
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..motion import Poses
+from ..motion.quaternions import align_signs, normalise
+from .bodies import Body, Forest
+from .fitting import Fitting
+from .knots import OLD, Scale, State
+from .messages import Codec, Said
+from .paths import Path
+from .wire import (
+    ANSWER,
+    NEEDS_DESCRIPTION,
+    NEEDS_REFRESH,
+    TICKS,
+    Entry,
+    Terms,
+    describe,
+    kind_of,
+    motion,
+    read_answer,
+    read_description,
+    read_piece,
+)
+
+HEARTBEAT = 0.5
+"""Seconds of silence after which something is said in any case."""
+
+REFRESH = 1.0
+"""Seconds between messages that build on nothing, where nobody answers."""
+
+AGAIN = 0.03
+"""Seconds after which a refresh is sent a second time, so that one loss does not lose both."""
+
+SILENT = 2.0
+"""Seconds after which somebody who does not answer any more is not waited for."""
+
+GRID = 10
+"""Ticks of the grid of knots for samples at any moments."""
+
+LAST = 0xFFFF
+"""The largest sequence number: behind it the sender begins again, with another identity."""
+
+STEP = 1.0
+"""Seconds between two samples that are no pause, but a clock that was set."""
+
+MOST_RECEIVERS = 256
+"""Receivers that are waited for."""
+
+
+@dataclass(eq=False)
+class _Receiver:
+    """Somebody who answers."""
+
+    entry: Entry
+    heard: float
+
+
+class Sender:
+    """Samples in, and out come the datagrams that are needed, each as soon as it is.
+
+    Parameters
+    ----------
+    bodies : sequence of Body
+    tolerance : float
+        Metres: no point within a joint's radius is shown further off, at any moment, where nothing is lost or late.
+    delay : float
+        Seconds by which what is shown is behind, beside what the network takes.
+    rate : float, optional
+        Samples a second, where they are even.
+    refresh, heartbeat : float
+        Seconds between them.
+
+    Raises
+    ------
+    ValueError
+        For numbers out of range.
+    """
+
+    def __init__(
+        self,
+        bodies: Sequence[Body],
+        tolerance: float = 0.005,
+        delay: float = 0.1,
+        rate: float | None = None,
+        refresh: float = REFRESH,
+        heartbeat: float = HEARTBEAT,
+    ) -> None:
+        for name, value in (("tolerance", tolerance), ("delay", delay), ("refresh", refresh), ("heartbeat", heartbeat)):
+            if not (math.isfinite(value) and value > 0.0):
+                raise ValueError(f"a {name} of {value} is not a positive number")
+        even = TICKS / rate if rate else GRID
+        grid = round(even) if abs(even - round(even)) < 0.01 and even >= 1.0 else GRID
+        self._terms = Terms(math.floor(tolerance * 1e6), round(delay * TICKS), grid)
+        self._given = Forest(bodies)
+        self.refresh, self.heartbeat = refresh, heartbeat
+        self._slip = 0.0
+        """What is added to the times of samples, so that a clock that was set makes no difference."""
+        self._times: list[float] = []
+        self._begin()
+
+    def _begin(self) -> None:
+        """Begin with a new identity."""
+        self.identity = secrets.token_bytes(3)
+        forest = _as_read(self.identity, self._given, self._terms)
+        self._forest = forest
+        self._scale = Scale(forest, self._terms.tolerance / 1e6)
+        self._fitting, self._codec = Fitting(self._scale), Codec(self._scale, self._terms)
+        self._rest = State.at_rest(self._scale)
+        self._states: dict[int, State] = {}
+        """Of messages that others may build on, by their sequence numbers."""
+        self._sequence = 0
+        self._path: Path | None = None
+        """What the receivers show who have everything."""
+        self._shown = -math.inf
+        """Until this moment it is known to be within the tolerance."""
+        self._receivers: dict[bytes, _Receiver] = {}
+        self._refreshed = -math.inf
+        self._sent = -math.inf
+        self._again: tuple[float, int, bytes] | None = None
+        self._base: int | None = None
+        """The last refresh that was sent twice."""
+        self._wanted = False
+        """Whether somebody cannot read what is sent."""
+
+    def add(self, time: float, poses: Poses | Mapping[str, Poses]) -> list[bytes]:
+        """Take a sample, and return what is to be sent now.
+
+        Parameters
+        ----------
+        time : float
+            Seconds. Where it goes back or jumps ahead by more than a second, a clock was set: the motion goes on.
+        poses : Poses, shape (joints,), or Poses for each body's name
+
+        Raises
+        ------
+        ValueError
+            Where poses are not as many as joints, or not finite.
+        """
+        poses = poses if isinstance(poses, Poses) else self._given.joined(poses)
+        finite = np.isfinite(poses.positions).all() and np.isfinite(poses.quaternions).all()
+        if poses.shape != (len(self._given),) or not (finite and math.isfinite(time)):
+            raise ValueError(f"a sample needs {len(self._given)} finite poses and a time")
+        now = self._remember(time, poses)
+        if self._sequence > LAST:
+            self._begin()
+        return [datagram for datagram in self._due(now)]
+
+    def finish(self) -> list[bytes]:
+        """What is still needed where no more samples are to come."""
+        if self._path is None or self._is_shown_until(self._times[-1]) is None:
+            return []
+        return [self._message(self._times[-1])]
+
+    def describe(self) -> list[bytes]:
+        """Names, parents and rest poses, for those who join."""
+        ticks = math.floor(self._times[-1] * TICKS) if self._times else 0
+        return describe(self.identity, max(ticks, 0), self._forest, self._terms)
+
+    def hear(self, datagram: bytes, now: float) -> list[bytes]:
+        """Take an answer, at a time by the clock of the samples, and return what is to be sent for it."""
+        read = read_answer(datagram) if kind_of(datagram) == ANSWER else None
+        if read is None:
+            return []
+        receiver, entries = read
+        entry = next((entry for entry in entries if entry.identity == self.identity), None)
+        if entry is None or (receiver not in self._receivers and len(self._receivers) == MOST_RECEIVERS):
+            return []
+        self._receivers[receiver] = _Receiver(entry, now + self._slip)
+        self._wanted |= bool(entry.needs & NEEDS_REFRESH)
+        return self.describe() if entry.needs & NEEDS_DESCRIPTION else []
+
+    # Samples
+
+    def _remember(self, time: float, poses: Poses) -> float:
+        """Keep a sample, and return its time by a clock that only goes on."""
+        poses = Poses(poses.positions, normalise(poses.quaternions))
+        now = time + self._slip
+        if self._times and not 0.0 < now - self._times[-1] <= STEP:
+            usual = self._times[-1] - self._times[-2] if len(self._times) > 1 else 1.0 / TICKS
+            self._slip += self._times[-1] + usual - now
+            now = time + self._slip
+        self._times.append(now)
+        if not hasattr(self, "_positions"):
+            self._positions, self._quaternions = poses.positions[None], poses.quaternions[None]
+        else:
+            self._positions = np.concatenate((self._positions, poses.positions[None]))
+            near = align_signs(np.stack((self._quaternions[-1], poses.quaternions), axis=1))[:, 1]
+            self._quaternions = np.concatenate((self._quaternions, near[None]))
+        kept = np.searchsorted(self._times, now - self._terms.delay / TICKS - self._longest) - 2
+        if kept > 32:
+            self._times = self._times[kept:]
+            self._positions, self._quaternions = self._positions[kept:], self._quaternions[kept:]
+        return now
+
+    _longest = STEP
+    """Seconds of samples that are kept beside the delay."""
+
+    @property
+    def _samples(self) -> Path:
+        still = np.zeros((len(self._forest), 3))
+        return Path(np.array(self._times), self._positions, self._quaternions, still, still)
+
+    # When
+
+    def _due(self, now: float) -> list[bytes]:
+        due = []
+        if self._again and now >= self._again[0]:
+            _, self._base, datagram = self._again
+            self._again = None
+            due.append(datagram)
+        if not self._answered(now) and now - self._refreshed >= self.refresh:
+            due += [*self.describe(), self._message(now, refresh=True)]
+        elif self._wanted:
+            due.append(self._message(now, refresh=True))
+        elif now - self._sent >= self.heartbeat:
+            due.append(self._message(now))
+        else:
+            off = self._is_shown_until(now)
+            interval = now - self._times[-2] if len(self._times) > 1 else 0.0
+            if off is not None and off <= now - self._terms.delay / TICKS + 1.01 * interval:
+                due.append(self._message(now))
+        return due
+
+    def _is_shown_until(self, now: float) -> float | None:
+        """The moment of the first sample until `now` that is shown further off than the tolerance, or None."""
+        displayed = now - self._terms.delay / TICKS
+        first = int(np.searchsorted(self._times, self._shown, side="right"))
+        rows = np.arange(first, len(self._times))
+        if not len(rows):
+            return None
+        moments = np.array(self._times)[rows]
+        poses = Poses(self._positions[rows].swapaxes(0, 1), self._quaternions[rows].swapaxes(0, 1))
+        truth = self._forest.skeleton.in_root_space(poses)
+        off = self._fitting.errors(self._path.at(moments), truth).max(axis=0) > self._scale.tolerance
+        off &= moments > displayed
+        if off.any():
+            self._shown = float(moments[np.argmax(off)]) - 1e-9
+            return float(moments[np.argmax(off)])
+        self._shown = float(moments[-1])
+        return None
+
+    def _answered(self, now: float) -> bool:
+        """Whether anybody answers; those who do not any more are forgotten."""
+        self._receivers = {own: who for own, who in self._receivers.items() if now - who.heard < SILENT}
+        return bool(self._receivers)
+
+    # What
+
+    def _message(self, now: float, refresh: bool = False) -> bytes:
+        """Say the window until now."""
+        end = math.floor(now * TICKS)
+        base = None if refresh else self._usable(now)
+        state = self._rest if base is None else self._states[base]
+        start = (end - self._terms.delay) / TICKS
+        times = np.array(self._times)
+        inside = times[(times > start) & (times < end / TICKS)]
+        moments = np.unique(np.append(inside, end / TICKS))
+        cells = np.unique(np.rint((end - inside * TICKS) / self._terms.grid).astype(int))
+        cells = cells[(cells > 0) & (cells <= self._terms.cells)]
+        grid = (end - cells[::-1] * self._terms.grid) / TICKS
+        fitted = self._fitting.fitted(self._path, state, start, self._samples, moments, grid)
+        inner = [round((end - moment * TICKS) / self._terms.grid) for moment in fitted.moments]
+        said = Said(fitted.finer, inner, np.array(fitted.numbers).tolist())
+        payload, memory = self._codec.write(said, fitted.window.kind, state)
+        back = 0 if base is None else self._sequence - base
+        datagram = motion(self.identity, self._sequence, end, back, payload)
+        path = self._codec.window(said, state, end).path()
+        self._states[self._sequence] = State(path, memory)
+        self._states = {number: old for number, old in self._states.items() if self._sequence - number < 64 or number == self._base}
+        self._path = path if self._path is None else self._path.followed(path).since(start - 0.05)
+        self._shown, self._sent = max(min(self._shown, end / TICKS), start), now
+        if base is None:
+            self._refreshed, self._wanted = now, False
+            self._again = (now + AGAIN, self._sequence, datagram)
+        self._sequence += 1
+        return datagram
+
+    def _usable(self, now: float) -> int | None:
+        """The message to build on, or None."""
+        if self._answered(now):
+            entries = [who.entry for who in self._receivers.values()]
+            for number in range(self._sequence - 1, max(self._sequence - 34, -1), -1):
+                state = self._states.get(number)
+                if state is not None and all(entry.has(number) for entry in entries):
+                    return number if now - state.moment < OLD + self.heartbeat else None
+        return self._base if self._base is not None and self._sequence - self._base < 256 else None
+
+
+def _as_read(identity: bytes, forest: Forest, terms: Terms) -> Forest:
+    """A forest as receivers read it, in single precision. Raises ValueError for what cannot be described."""
+    pieces = [read_piece(datagram) for datagram in describe(identity, 0, forest, terms)]
+    read = None if None in pieces else read_description(b"".join(piece.data for piece in pieces))
+    if read is None:
+        raise ValueError("the delay, the tolerance or the bodies are too large to be described")
+    return read[0]
