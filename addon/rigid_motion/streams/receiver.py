@@ -19,7 +19,7 @@ from .bodies import Body, Forest
 from .knots import Scale, State
 from .messages import Codec
 from .paths import Path
-from .playing import Playing
+from .playing import Fading, Playing
 from .wire import (
     DESCRIPTION,
     HEAD,
