@@ -48,7 +48,7 @@ class Playing:
         """The transit that is waited for."""
         self._transits: deque[tuple[float, float]] = deque(maxlen=MOST_TRANSITS)
         self._moment: float | None = None
-        self._last = 0.0
+        self._last = -np.inf
         self._unsure = False
         """Whether our clock leapt, and nothing came since."""
 
@@ -78,11 +78,10 @@ class Playing:
         wanted = now - self.longest - self.delay
         passed, self._last = now - self._last, now
         if self._moment is None:
-            self._moment = wanted
-            return wanted
-        if not 0.0 <= passed <= SET:
+            self._moment, passed = wanted, 0.0
+        if abs(passed) > SET:
             self._unsure = True
-        if self._unsure:
+        if self._unsure or passed <= 0.0:
             return self._moment
         gap = wanted - self._moment - passed
         if abs(gap) > SET:

@@ -131,6 +131,16 @@ class Receiver:
         shown = {stream: playback.show(now) for stream, playback in self._streams.items()}
         return {stream: what for stream, what in shown.items() if what is not None}
 
+    @property
+    def streams(self) -> list[Stream]:
+        """Those that can be shown, or soon can."""
+        return list(self._streams)
+
+    def due(self, stream: Stream, moment: float) -> float:
+        """When a moment of the sender's time is to be shown, by our clock; never, where nothing came yet."""
+        playback = self._streams.get(stream)
+        return playback.due(moment) if playback else np.inf
+
     def body(self, stream: Stream, name: str) -> Body | None:
         """A body of a stream, with its names, parents and rest poses."""
         playback = self._streams.get(stream)
@@ -275,6 +285,10 @@ class _Playback:
                 self._path = self._path.followed(other)
         if self._moment is not None and path.moments[0] < self._moment:
             self._fading.changed(_only(self._path.at(np.array([self._moment]))), now)
+
+    def due(self, moment: float) -> float:
+        """When a moment is to be shown."""
+        return np.inf if self._playing.longest is None else moment + self._playing.longest + self._playing.delay
 
     def show(self, now: float) -> Shown | None:
         """What is shown now."""
