@@ -23,6 +23,7 @@ from .playing import Fading, Playing
 from .wire import (
     DESCRIPTION,
     HEAD,
+    LATE,
     MOST_ENTRIES,
     MOTION,
     NEEDS_DESCRIPTION,
@@ -112,7 +113,7 @@ class Receiver:
     def take(self, datagram: bytes, arrival: float, source: Hashable = None) -> None:
         """Take a datagram that came at a time, by the clock of `show`, from somewhere."""
         kind = kind_of(datagram)
-        if kind not in (DESCRIPTION, MOTION):
+        if kind not in (DESCRIPTION, MOTION, LATE):
             self.refused += 1
             return
         stream = Stream(source, datagram[1 : HEAD.size])
@@ -175,8 +176,8 @@ class Receiver:
         self._begun.move_to_end(stream)
         if len(self._begun) > MOST_STREAMS:
             self._begun.popitem(last=False)
-        begun.unanswered = True
         if isinstance(read, Motion):
+            begun.unanswered = True
             begun.motions = [*begun.motions, (read, arrival)][-MOST_WAITING:]
             return
         if begun.pieces and len(begun.pieces) != read.pieces:
@@ -265,7 +266,8 @@ class _Playback:
         if newer:
             self._newest, self._ticks, self._came, self._needs = motion.sequence, float(end), arrival, 0
         self.heard = max(self.heard, arrival) if newer else self.heard
-        self._playing.heard(end / TICKS, arrival)
+        if not motion.late or self._playing.longest is None:
+            self._playing.heard(end / TICKS, arrival)
         self._put(motion.sequence, path, newer, arrival)
         return True
 

@@ -60,6 +60,12 @@ LAST = 0xFFFF
 STEP = 1.0
 """Seconds between two samples that are no pause, but a clock that was set."""
 
+ALMOST, SOON = 0.99, 1e-4
+"""Part of an interval, and seconds: clocks are not more even than that."""
+
+CALMER = 0.9
+"""What is left of the longest interval between samples with every sample that came sooner."""
+
 MOST_RECEIVERS = 256
 """Receivers that are waited for."""
 
@@ -113,6 +119,9 @@ class Sender:
         self._slip = 0.0
         """What is added to the times of samples, so that a clock that was set makes no difference."""
         self._times: list[float] = []
+        self._next = math.inf
+        self._interval = 0.0
+        """Within which the next sample is expected."""
         self._begin()
 
     def _begin(self) -> None:
@@ -160,7 +169,16 @@ class Sender:
         now = self._remember(time, poses)
         if self._sequence > LAST:
             self._begin()
-        return [datagram for datagram in self._due(now)]
+        return self._due(now, self._interval)
+
+    def poll(self, time: float) -> list[bytes]:
+        """What is to be sent at a time at which no sample came: worth asking at `next`, where one is overdue."""
+        return self._due(max(time + self._slip, self._times[-1]), 0.0) if self._times else []
+
+    @property
+    def next(self) -> float:
+        """When what is shown gets to a sample behind which it is off: by then something has to be sent."""
+        return self._next - self._slip
 
     def finish(self) -> list[bytes]:
         """What is still needed where no more samples are to come."""
@@ -196,6 +214,8 @@ class Sender:
             usual = self._times[-1] - self._times[-2] if len(self._times) > 1 else 1.0 / TICKS
             self._slip += self._times[-1] + usual - now
             now = time + self._slip
+        if self._times:
+            self._interval = max(now - self._times[-1], CALMER * self._interval)
         self._times.append(now)
         if not hasattr(self, "_positions"):
             self._positions, self._quaternions = poses.positions[None], poses.quaternions[None]
@@ -219,8 +239,9 @@ class Sender:
 
     # When
 
-    def _due(self, now: float) -> list[bytes]:
-        due = []
+    def _due(self, now: float, interval: float) -> list[bytes]:
+        """What is to be sent now, where nobody asks again before the interval is over."""
+        due, self._next = [], math.inf
         if self._again and now >= self._again[0]:
             _, self._base, datagram = self._again
             self._again = None
@@ -232,14 +253,16 @@ class Sender:
         elif now - self._sent >= self.heartbeat:
             due.append(self._message(now))
         else:
-            off = self._is_shown_until(now)
-            interval = now - self._times[-2] if len(self._times) > 1 else 0.0
-            if off is not None and off <= now - self._terms.delay / TICKS + 1.01 * interval:
+            good = self._is_shown_until(now)
+            delay = self._terms.delay / TICKS
+            if good is not None and good < now - delay + max(ALMOST * interval, SOON):
                 due.append(self._message(now))
+            elif good is not None:
+                self._next = good + delay
         return due
 
     def _is_shown_until(self, now: float) -> float | None:
-        """The moment of the first sample until `now` that is shown further off than the tolerance, or None."""
+        """The moment of the last sample before one that is shown further off than the tolerance; None for no such."""
         displayed = now - self._terms.delay / TICKS
         first = int(np.searchsorted(self._times, self._shown, side="right"))
         rows = np.arange(first, len(self._times))
@@ -251,8 +274,8 @@ class Sender:
         off = self._fitting.errors(self._path.at(moments), truth).max(axis=0) > self._scale.tolerance
         off &= moments > displayed
         if off.any():
-            self._shown = float(moments[np.argmax(off)]) - 1e-9
-            return float(moments[np.argmax(off)])
+            self._shown = self._times[max(first + int(np.argmax(off)) - 1, 0)]
+            return self._shown
         self._shown = float(moments[-1])
         return None
 
@@ -264,8 +287,8 @@ class Sender:
     # What
 
     def _message(self, now: float, refresh: bool = False) -> bytes:
-        """Say the window until now."""
-        end = math.floor(now * TICKS)
+        """Say the window until the last sample."""
+        end = math.floor(self._times[-1] * TICKS)
         base = None if refresh else self._usable(now)
         state = self._rest if base is None else self._states[base]
         start = (end - self._terms.delay) / TICKS
@@ -280,7 +303,8 @@ class Sender:
         said = Said(fitted.finer, inner, np.array(fitted.numbers).tolist())
         payload, memory = self._codec.write(said, fitted.window.kind, state)
         back = 0 if base is None else self._sequence - base
-        datagram = motion(self.identity, self._sequence, end, back, payload)
+        late = now - self._times[-1] > SOON
+        datagram = motion(self.identity, self._sequence, end, back, payload, late)
         path = self._codec.window(said, state, end).path()
         self._states[self._sequence] = State(path, memory)
         self._states = {number: old for number, old in self._states.items() if self._sequence - number < 64 or number == self._base}
@@ -288,7 +312,8 @@ class Sender:
         self._shown, self._sent = max(min(self._shown, end / TICKS), start), now
         if base is None:
             self._refreshed, self._wanted = now, False
-            self._again = (now + AGAIN, self._sequence, datagram)
+            again = motion(self.identity, self._sequence, end, back, payload, late=True)
+            self._again = (now + AGAIN, self._sequence, again)
         self._sequence += 1
         return datagram
 

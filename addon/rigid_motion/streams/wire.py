@@ -21,7 +21,8 @@ VERSION = 1
 TICKS = 3600
 """A second, in the unit of all times on the wire: whole numbers of it are the frames of 24, 25, 30, 60, 72, 90, 120."""
 
-DESCRIPTION, MOTION, ANSWER = range(3)
+DESCRIPTION, MOTION, LATE, ANSWER = range(4)
+"""Kinds of datagrams. `LATE` is a motion that was sent later than at the end of its window."""
 
 HEAD = struct.Struct("<B3s")
 """Version and kind; identity."""
@@ -81,6 +82,7 @@ class Motion:
     """The lowest 16 bits."""
     back: int
     payload: bytes
+    late: bool
 
 
 @dataclass(frozen=True)
@@ -121,9 +123,9 @@ def _first(kind: int) -> int:
     return VERSION << 4 | kind
 
 
-def motion(identity: bytes, sequence: int, ticks: int, back: int, payload: bytes) -> bytes:
+def motion(identity: bytes, sequence: int, ticks: int, back: int, payload: bytes, late: bool = False) -> bytes:
     """The datagram of a message."""
-    return MOTION_HEAD.pack(_first(MOTION), identity, sequence, ticks & 0xFFFF, back) + payload
+    return MOTION_HEAD.pack(_first(LATE if late else MOTION), identity, sequence, ticks & 0xFFFF, back) + payload
 
 
 def read_motion(datagram: bytes) -> Motion | None:
@@ -131,7 +133,7 @@ def read_motion(datagram: bytes) -> Motion | None:
     if len(datagram) < MOTION_HEAD.size:
         return None
     _, *head = MOTION_HEAD.unpack_from(datagram)
-    return Motion(*head, datagram[MOTION_HEAD.size :])
+    return Motion(*head, datagram[MOTION_HEAD.size :], datagram[0] & 15 == LATE)
 
 
 def answer(receiver: bytes, entries: Sequence[Entry]) -> bytes:

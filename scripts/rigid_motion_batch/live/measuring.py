@@ -159,16 +159,20 @@ def _send(link: _Link, sender: Sender, times: np.ndarray, poses: Poses, after: f
 
     def hear(now: float) -> None:
         for arrival, answer in link.until(now):
-            for datagram in sender.hear(answer, arrival):
-                link.post(datagram, arrival)
+            post(sender.hear(answer, arrival), arrival)
+
+    def post(datagrams: list[bytes], now: float) -> None:
+        for datagram in datagrams:
+            link.post(datagram, now)
 
     for sample, moment in enumerate(times.tolist()):
+        while (due := sender.next) < moment:
+            hear(due)
+            post(sender.poll(due), due)
         hear(moment)
-        for datagram in sender.add(moment, poses[:, sample]):
-            link.post(datagram, moment)
+        post(sender.add(moment, poses[:, sample]), moment)
         hear(moment)
-    for datagram in sender.finish():
-        link.post(datagram, float(times[-1]))
+    post(sender.finish(), float(times[-1]))
     hear(float(times[-1]) + after)
 
 
