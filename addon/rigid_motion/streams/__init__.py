@@ -34,7 +34,7 @@ tables     those tables, as `scripts/research/making/stream_tables.py` counted t
 paths      what is shown at any moment
 knots      what the numbers of a message are in metres and radians
 fitting    what a message has to say
-wire       datagrams
+
 sender     when it has to be said
 playing    the jitter buffer: which moment is shown when
 receiver   from datagrams to what is shown

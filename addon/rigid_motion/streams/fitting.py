@@ -47,7 +47,7 @@ class Fitting:
         """Of poses (joints, n) in their parents' spaces, and true ones in the root's, shape (joints, n)."""
         return shell_error(self.skeleton.in_root_space(shown), truth, self.radii[:, None])
 
-    def fitted(self, path: Path | None, state: State, start: float, samples: Path, moments: np.ndarray, grid: np.ndarray) -> Fitted:
+    def fitted(self, path: Path | None, state: State, kind: int, start: float, samples: Path, moments: np.ndarray, grid: np.ndarray) -> Fitted:
         """The window from `start` to the last of the moments (n,) that are looked at, of samples.
 
         Knots are among the moments of the grid (k,), rising.
@@ -58,7 +58,7 @@ class Fitting:
         ends, worst, finer, inner = transposed(samples.at(np.array([end])))[0], np.inf, 0, []
         free = grid[(grid > start) & (grid < end)]
         while True:
-            window = Window(self.scale, state, start, end, finer)
+            window = Window(self.scale, state, kind, start, end, finer)
             numbers = [window.fit(ends)]
             for moment in inner:
                 numbers.append(window.fit(transposed(samples.at(np.array([moment])))[0], window.insert(moment)))
@@ -84,16 +84,16 @@ class Fitting:
         )
         for margin in MARGINS:
             less = self._less(found, start, moments, local, truth, margin * limits)
-            tried = self.said(path, state, start, end, inner, less, finer)
+            tried = self.said(path, state, kind, start, end, inner, less, finer)
             tried.error = self.errors(tried.path.at(moments), truth).max()
             if tried.error <= max(self.scale.tolerance, found.error):
                 return tried
         return found
 
     def said(
-        self, path: Path | None, state: State, start: float, end: float, inner: list[float], numbers: list[np.ndarray], finer: int
+        self, path: Path | None, state: State, kind: int, start: float, end: float, inner: list[float], numbers: list[np.ndarray], finer: int
     ) -> Fitted:
-        window = Window(self.scale, state, start, end, finer)
+        window = Window(self.scale, state, kind, start, end, finer)
         window.say(numbers[0])
         for moment, knot in zip(inner, numbers[1:], strict=True):
             window.say(knot, window.insert(moment))

@@ -17,13 +17,14 @@ from ..motion import Poses
 from ..motion.quaternions import normalise
 from .bodies import Forest
 from .paths import Path, speeds, transposed, turned, turns_between
-from .residuals import FRESH, STALE, UNKNOWN, Walk
+from .residuals import FAR, NEAR, STALE, UNKNOWN, Walk
+from .wire import TICKS
 
 FINEST = 3
 """Steps are halved so many times at most."""
 
-OLD = 0.5
-"""Seconds after which a pose says nothing any more about how the motion goes on."""
+OLD = TICKS // 2
+"""Ticks after which a pose says nothing any more about how the motion goes on."""
 
 TURN_STEP, SLIDE_STEP = 0.7, 0.5
 """Steps, in tolerances: at the end of what hangs on a joint, and of its place."""
@@ -67,30 +68,27 @@ class State:
     memory: tuple[int, ...]
     """Of each group, how large its residuals were."""
 
-    known: bool = True
-    """Whether there was a message: at rest otherwise."""
+    end: int
+    """The ticks of the end of the window."""
 
     @classmethod
     def at_rest(cls, scale: Scale) -> State:
         """Before any message."""
         rest, still = scale.forest.rest, np.zeros((len(scale.forest), 3))
         path = Path(np.zeros(1), rest.positions[None], rest.quaternions[None], still, still)
-        return cls(path, (0,) * len(scale.walk), known=False)
+        return cls(path, (0,) * len(scale.walk), 0)
 
-    @property
-    def moment(self) -> float:
-        """The end of the window."""
-        return float(self.path.moments[-1])
-
-    def kind(self, moment: float) -> int:
-        """How the end of a window at a moment is coded against this."""
-        if not self.known:
+    def kind(self, end: int, back: int) -> int:
+        """How the end of a window, at some ticks, is coded against this, so many messages back."""
+        if not back:
             return UNKNOWN
-        return FRESH if moment - self.moment <= OLD else STALE
+        if not 0 <= end - self.end <= OLD:
+            return STALE
+        return NEAR if back == 1 else FAR
 
     def at(self, moments: np.ndarray, kind: int) -> Poses:
         """What the motion would do at moments (n,) if nothing new came, shape (n, joints)."""
-        if kind == FRESH:
+        if kind in (NEAR, FAR):
             return transposed(self.path.at(moments))
         rows = np.full(len(moments), -1)
         return Poses(self.path.positions[rows], self.path.quaternions[rows])
@@ -99,9 +97,8 @@ class State:
 class Window:
     """The knots of a window: the end, and then others, each between two that are there already."""
 
-    def __init__(self, scale: Scale, state: State, start: float, end: float, finer: int = 0) -> None:
-        self.scale, self.factor = scale, 0.5**finer
-        self.kind = state.kind(end)
+    def __init__(self, scale: Scale, state: State, kind: int, start: float, end: float, finer: int = 0) -> None:
+        self.scale, self.kind, self.factor = scale, kind, 0.5**finer
         expected = state.at(np.array([start, end]), self.kind)
         self.moments = [start, end]
         """Of the start and all knots, rising."""
@@ -114,7 +111,7 @@ class Window:
         """Move a knot by slides and rotation vectors (joints, 3): the end, which is the first that is put."""
         self.positions[at] = self.positions[at] + slides
         self.quaternions[at] = turned(self.quaternions[at], turns)
-        if at == len(self.moments) - 1 == 1 and self.kind != FRESH:
+        if at == len(self.moments) - 1 == 1 and self.kind not in (NEAR, FAR):
             # How the motion got there is not known.
             self.positions[0], self.quaternions[0] = self.positions[1], self.quaternions[1]
 
@@ -148,6 +145,6 @@ class Window:
         moments = np.array(self.moments)
         positions, quaternions = np.array(self.positions), normalise(np.array(self.quaternions))
         velocities = spins = np.zeros_like(positions[-1])
-        if len(moments) > 2 or self.kind == FRESH:
+        if len(moments) > 2 or self.kind in (NEAR, FAR):
             velocities, spins = speeds(moments[-1] - moments[-2], positions[-2:], quaternions[-2:])
         return Path(moments, positions, quaternions, velocities, spins)

@@ -63,10 +63,10 @@ class Codec:
         memory = self.scale.walk.through(coder, groups, kind, state.memory)
         return Said(finer, cells, groups), tuple(memory)
 
-    def window(self, said: Said, state: State, end: int) -> Window | None:
+    def window(self, said: Said, state: State, kind: int, end: int) -> Window | None:
         """The window of a message that ends at some ticks; None where that is nowhere."""
         terms = self.terms
-        window = Window(self.scale, state, (end - terms.delay) / TICKS, end / TICKS, said.finer)
+        window = Window(self.scale, state, kind, (end - terms.delay) / TICKS, end / TICKS, said.finer)
         numbers = np.array(said.groups, dtype=np.float64)
         window.say(numbers[0])
         for cell, own in zip(said.cells, numbers[1:], strict=True):

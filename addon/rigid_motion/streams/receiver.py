@@ -253,13 +253,13 @@ class _Playback:
             return False
         elapsed = min(max(arrival - self._came, 0.0), MOST_SILENCE) * TICKS if self._came else 0.0
         end = expanded(motion.ticks, self._ticks + elapsed)
-        kind = state.kind(end / TICKS)
+        kind = state.kind(end, motion.back)
         read = self._codec.read(motion.payload, kind, state)
-        window = read and self._codec.window(read[0], state, end)
+        window = read and self._codec.window(read[0], state, kind, end)
         if not window:
             return False
         path = window.path()
-        self._states[motion.sequence] = State(path, read[1])
+        self._states[motion.sequence] = State(path, read[1], end)
         if len(self._states) > MOST_STATES:
             self._states.pop(min(self._states))
         newer = motion.sequence > self._newest

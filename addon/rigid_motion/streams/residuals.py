@@ -14,10 +14,11 @@ from typing import Protocol
 from .bodies import Forest
 from .coding import Decoder, Encoder
 
-FRESH, STALE, UNKNOWN, MIDDLE, FINER = range(5)
-"""Kinds of knots: the last one coded against what was going on, against an old pose, against rest; those between."""
+NEAR, FAR, STALE, UNKNOWN, MIDDLE, FINER, STILL = range(7)
+"""Kinds of knots. The end of a window is coded against how the message before it goes on, or one before that; against
+an old pose; against rest. Then come the first knot within, the others; and those behind an old pose or rest."""
 
-KINDS = 5
+KINDS = 7
 
 LARGEST = 14
 """Magnitudes from here on are written in full."""
@@ -110,7 +111,8 @@ class Walk:
         """
         last = groups[0]
         for number, knot in enumerate(groups):
-            kind = kind if number == 0 else MIDDLE if number == 1 else FINER
+            if number:
+                kind = STILL if kind in (STALE, UNKNOWN, STILL) else MIDDLE if number == 1 else FINER
             above, before = self.above, 0
             sums = [0] * len(knot)
             for group, values in enumerate(knot):

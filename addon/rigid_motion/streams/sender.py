@@ -21,7 +21,7 @@ from ..motion import Poses
 from ..motion.quaternions import align_signs, normalise
 from .bodies import Body, Forest
 from .fitting import Fitting
-from .knots import OLD, Scale, State
+from .knots import Scale, State
 from .messages import Codec, Said
 from .paths import Path
 from .wire import (
@@ -65,6 +65,9 @@ ALMOST, SOON = 0.99, 1e-4
 
 CALMER = 0.9
 """What is left of the longest interval between samples with every sample that came sooner."""
+
+OLDEST = 2.0
+"""Seconds: what is older is not worth building on, and everything is said anew."""
 
 MOST_RECEIVERS = 256
 """Receivers that are waited for."""
@@ -130,7 +133,7 @@ class Sender:
         forest = _as_read(self.identity, self._given, self._terms)
         self._forest = forest
         self._scale = Scale(forest, self._terms.tolerance / 1e6)
-        self._fitting, self._codec = Fitting(self._scale), Codec(self._scale, self._terms)
+        self._fitting, self.codec = Fitting(self._scale), Codec(self._scale, self._terms)
         self._rest = State.at_rest(self._scale)
         self._states: dict[int, State] = {}
         """Of messages that others may build on, by their sequence numbers."""
@@ -298,15 +301,16 @@ class Sender:
         cells = np.unique(np.rint((end - inside * TICKS) / self._terms.grid).astype(int))
         cells = cells[(cells > 0) & (cells <= self._terms.cells)]
         grid = (end - cells[::-1] * self._terms.grid) / TICKS
-        fitted = self._fitting.fitted(self._path, state, start, self._samples, moments, grid)
+        back = 0 if base is None else self._sequence - base
+        kind = state.kind(end, back)
+        fitted = self._fitting.fitted(self._path, state, kind, start, self._samples, moments, grid)
         inner = [round((end - moment * TICKS) / self._terms.grid) for moment in fitted.moments]
         said = Said(fitted.finer, inner, np.array(fitted.numbers).tolist())
-        payload, memory = self._codec.write(said, fitted.window.kind, state)
-        back = 0 if base is None else self._sequence - base
+        payload, memory = self.codec.write(said, kind, state)
         late = now - self._times[-1] > SOON
         datagram = motion(self.identity, self._sequence, end, back, payload, late)
-        path = self._codec.window(said, state, end).path()
-        self._states[self._sequence] = State(path, memory)
+        path = self.codec.window(said, state, kind, end).path()
+        self._states[self._sequence] = State(path, memory, end)
         self._states = {number: old for number, old in self._states.items() if self._sequence - number < 64 or number == self._base}
         self._path = path if self._path is None else self._path.followed(path).since(start - 0.05)
         self._shown, self._sent = max(min(self._shown, end / TICKS), start), now
@@ -324,7 +328,7 @@ class Sender:
             for number in range(self._sequence - 1, max(self._sequence - 34, -1), -1):
                 state = self._states.get(number)
                 if state is not None and all(entry.has(number) for entry in entries):
-                    return number if now - state.moment < OLD + self.heartbeat else None
+                    return number if now - state.end / TICKS < OLDEST else None
         return self._base if self._base is not None and self._sequence - self._base < 256 else None
 
 
