@@ -22,7 +22,7 @@ MARGINS = (0.97, 0.85, 0.7)
 """Parts of the tolerance that letting go may use, one after another, where the outcome is off by more than that."""
 
 
-GOOD, END, TAPER = 0.9, 0.7, 0.4
+GOOD, END, TAPER = 0.97, 0.7, 0.4
 
 
 class Fitted:

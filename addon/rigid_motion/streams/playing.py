@@ -26,6 +26,9 @@ FEW = 4
 
 SHORT, SOONER = 0.3, 0.05
 
+SPREADS = 1.5
+"""How many times sooner than they differ from one another."""
+
 SET = 1.0
 """A transit that differs by more than this many seconds is that of another clock; a display may not leap further."""
 
@@ -64,7 +67,8 @@ class Playing:
         recent = [took for when, took in list(known)[-FEW:]]
         since = arrival - known[-FEW][0] if len(known) >= FEW else 0.0
         recent = [took for when, took in known if when >= arrival - max(SHORT, since)]
-        quicker = max(recent) < max(took for _, took in known) - SOONER
+        spread = max(recent) - min(recent)
+        quicker = max(recent) < max(took for _, took in known) - max(SOONER, SPREADS * spread)
         if quicker and len(recent) >= FEW and known[0][0] < arrival - SHORT:
             while known[0][0] < arrival - max(SHORT, since):
                 known.popleft()

@@ -236,6 +236,8 @@ class _Playback:
         self._newest, self._ticks, self._came = -1, float(ticks), 0.0
         self._playing, self._fading = Playing(terms.delay / TICKS), Fading()
         self._moment: float | None = None
+        self._begins = np.inf
+        """The first moment that can be shown."""
         self._kept = -np.inf
         """Until this moment keys were handed out."""
         self._needs = NEEDS_REFRESH
@@ -276,8 +278,11 @@ class _Playback:
         self._windows[sequence] = path
         for old in sorted(self._windows)[:-MOST_WINDOWS]:
             del self._windows[old]
-        if newer:
-            self._path = path if self._path is None else self._path.followed(path)
+        if self._path is None:
+            # How the motion got to the first knot is not known.
+            self._path, self._begins = path, float(path.moments[1])
+        elif newer:
+            self._path = self._path.followed(path)
             self._path = self._path.since(min(self._kept, self._moment or path.moments[0]) - 1e-6)
         else:
             before = self._path
@@ -295,7 +300,7 @@ class _Playback:
     def show(self, now: float) -> Shown | None:
         """What is shown now."""
         self._moment = self._playing.moment(now)
-        if self._path is None or self._moment is None:
+        if self._moment is None or self._moment < self._begins:
             return None
         poses = self._fading.show(_only(self._path.at(np.array([self._moment]))), now)
         return Shown(self._moment, self.forest.parted(poses))

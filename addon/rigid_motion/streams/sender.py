@@ -51,8 +51,11 @@ AGAIN = 0.03
 SILENT = 2.0
 """Seconds after which somebody who does not answer any more is not waited for."""
 
-GRID = 10
+GRID = 3
 """Ticks of the grid of knots for samples at any moments."""
+
+ROUNDING = 1e-3
+"""Ticks by which a sample may be before the one that it is at."""
 
 LAST = 0xFFFF
 """The largest sequence number: behind it the sender begins again, with another identity."""
@@ -62,6 +65,9 @@ STEP = 1.0
 
 ALMOST, SOON = 0.99, 1e-4
 """Part of an interval, and seconds: clocks are not more even than that."""
+
+OVERDUE = 1e-3
+"""Seconds that are waited for a sample, instead of sending without it."""
 
 CALMER = 0.9
 """What is left of the longest interval between samples with every sample that came sooner."""
@@ -261,7 +267,7 @@ class Sender:
             if good is not None and good < now - delay + max(ALMOST * interval, SOON):
                 due.append(self._message(now))
             elif good is not None:
-                self._next = good + delay
+                self._next = good + delay + OVERDUE
         return due
 
     def _is_shown_until(self, now: float) -> float | None:
@@ -291,7 +297,7 @@ class Sender:
 
     def _message(self, now: float, refresh: bool = False) -> bytes:
         """Say the window until the last sample."""
-        end = math.floor(self._times[-1] * TICKS)
+        end = math.floor(self._times[-1] * TICKS + ROUNDING)
         base = None if refresh else self._usable(now)
         state = self._rest if base is None else self._states[base]
         start = (end - self._terms.delay) / TICKS
