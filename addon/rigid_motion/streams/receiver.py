@@ -195,7 +195,7 @@ class Receiver:
         self._streams[stream] = playback
         for motion, when in begun.motions:
             playback.take(motion, when)
-        playback.heard, playback.unanswered = arrival, True
+        playback.heard = arrival
 
     def _room_for(self, stream: Stream, forest: Forest, now: float) -> bool:
         """Forget a stream that this one is instead of, and say whether there is room for it."""

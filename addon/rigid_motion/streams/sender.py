@@ -72,8 +72,14 @@ OVERDUE = 1e-3
 CALMER = 0.9
 """What is left of the longest interval between samples with every sample that came sooner."""
 
+MOST_BACK = 33
+"""Messages that an answer speaks of."""
+
 OLDEST = 2.0
 """Seconds: what is older is not worth building on, and everything is said anew."""
+
+FAR_APART, MOST_PARTS = 0.013, 8
+"""Seconds between samples beyond which it is looked at what is shown between them, and into how many parts at most."""
 
 MOST_RECEIVERS = 256
 """Receivers that are waited for."""
@@ -148,6 +154,8 @@ class Sender:
         """What the receivers show who have everything."""
         self._shown = -math.inf
         """Until this moment it is known to be within the tolerance."""
+        self._good: float | None = None
+        """The moment behind which it is not."""
         self._receivers: dict[bytes, _Receiver] = {}
         self._refreshed = -math.inf
         self._sent = -math.inf
@@ -241,10 +249,10 @@ class Sender:
     _longest = STEP
     """Seconds of samples that are kept beside the delay."""
 
-    @property
-    def _samples(self) -> Path:
+    def _samples(self, first: int = 0) -> Path:
+        """The samples from one on, with the straight way between them."""
         still = np.zeros((len(self._forest), 3))
-        return Path(np.array(self._times), self._positions, self._quaternions, still, still)
+        return Path(np.array(self._times[first:]), self._positions[first:], self._quaternions[first:], still, still)
 
     # When
 
@@ -254,7 +262,8 @@ class Sender:
         if self._again and now >= self._again[0]:
             _, self._base, datagram = self._again
             self._again = None
-            due.append(datagram)
+            if not (self._answered(now) and self._have(self._base)):
+                due.append(datagram)
         if not self._answered(now) and now - self._refreshed >= self.refresh:
             due += [*self.describe(), self._message(now, refresh=True)]
         elif self._wanted:
@@ -271,27 +280,26 @@ class Sender:
         return due
 
     def _is_shown_until(self, now: float) -> float | None:
-        """The moment of the last sample before one that is shown further off than the tolerance; None for no such."""
-        displayed = now - self._terms.delay / TICKS
-        first = int(np.searchsorted(self._times, self._shown, side="right"))
-        rows = np.arange(first, len(self._times))
-        if not len(rows):
-            return None
-        moments = np.array(self._times)[rows]
-        poses = Poses(self._positions[rows].swapaxes(0, 1), self._quaternions[rows].swapaxes(0, 1))
-        truth = self._forest.skeleton.in_root_space(poses)
-        off = self._fitting.errors(self._path.at(moments), truth).max(axis=0) > self._scale.tolerance
-        off &= moments > displayed
-        if off.any():
-            self._shown = self._times[max(first + int(np.argmax(off)) - 1, 0)]
-            return self._shown
-        self._shown = float(moments[-1])
-        return None
+        """The moment before one that is shown further off than the tolerance; None where there is none until now."""
+        if self._good is None and self._shown < self._times[-1]:
+            first = max(int(np.searchsorted(self._times, self._shown, side="right")) - 1, 0)
+            moments = closely(np.array(self._times[first:]))
+            moments = moments[moments > max(self._shown, now - self._terms.delay / TICKS)]
+            truth = self._forest.skeleton.in_root_space(self._samples(first).at(moments))
+            off = self._fitting.errors(self._path.at(moments), truth).max(axis=0) > self._scale.tolerance
+            before = np.append(self._shown, moments)[np.argmax(off)]
+            self._shown = float(before if off.any() else self._times[-1])
+            self._good = self._shown if off.any() else None
+        return self._good
 
     def _answered(self, now: float) -> bool:
         """Whether anybody answers; those who do not any more are forgotten."""
         self._receivers = {own: who for own, who in self._receivers.items() if now - who.heard < SILENT}
         return bool(self._receivers)
+
+    def _have(self, sequence: int) -> bool:
+        """Whether all who answer have a message."""
+        return all(who.entry.has(sequence) for who in self._receivers.values())
 
     # What
 
@@ -303,13 +311,13 @@ class Sender:
         start = (end - self._terms.delay) / TICKS
         times = np.array(self._times)
         inside = times[(times > start) & (times < end / TICKS)]
-        moments = np.unique(np.append(inside, end / TICKS))
+        moments = closely(np.unique(np.append(inside, end / TICKS)))
         cells = np.unique(np.rint((end - inside * TICKS) / self._terms.grid).astype(int))
         cells = cells[(cells > 0) & (cells <= self._terms.cells)]
         grid = (end - cells[::-1] * self._terms.grid) / TICKS
         back = 0 if base is None else self._sequence - base
         kind = state.kind(end, back)
-        fitted = self._fitting.fitted(self._path, state, kind, start, self._samples, moments, grid)
+        fitted = self._fitting.fitted(self._path, state, kind, start, self._samples(), moments, grid)
         inner = [round((end - moment * TICKS) / self._terms.grid) for moment in fitted.moments]
         said = Said(fitted.finer, inner, np.array(fitted.numbers).tolist())
         payload, memory = self.codec.write(said, kind, state)
@@ -317,9 +325,11 @@ class Sender:
         datagram = motion(self.identity, self._sequence, end, back, payload, late)
         path = self.codec.window(said, state, kind, end).path()
         self._states[self._sequence] = State(path, memory, end)
-        self._states = {number: old for number, old in self._states.items() if self._sequence - number < 64 or number == self._base}
+        kept = {*range(self._sequence - MOST_BACK, self._sequence + 1), self._base}
+        self._states = {number: old for number, old in self._states.items() if number in kept}
         self._path = path if self._path is None else self._path.followed(path).since(start - 0.05)
-        self._shown, self._sent = max(min(self._shown, end / TICKS), start), now
+        self._shown, self._good = end / TICKS if fitted.error <= self._scale.tolerance else start, None
+        self._sent = now
         if base is None:
             self._refreshed, self._wanted = now, False
             again = motion(self.identity, self._sequence, end, back, payload, late=True)
@@ -330,12 +340,20 @@ class Sender:
     def _usable(self, now: float) -> int | None:
         """The message to build on, or None."""
         if self._answered(now):
-            entries = [who.entry for who in self._receivers.values()]
-            for number in range(self._sequence - 1, max(self._sequence - 34, -1), -1):
+            for number in range(self._sequence - 1, max(self._sequence - 1 - MOST_BACK, -1), -1):
                 state = self._states.get(number)
-                if state is not None and all(entry.has(number) for entry in entries):
+                if state is not None and self._have(number):
                     return number if now - state.end / TICKS < OLDEST else None
         return self._base if self._base is not None and self._sequence - self._base < 256 else None
+
+
+def closely(moments: np.ndarray) -> np.ndarray:
+    """Moments (n,) with others between them, where they are far apart."""
+    parts = np.ceil(np.diff(moments) / FAR_APART).astype(int)
+    parts = np.clip(parts, 1, MOST_PARTS)
+    share = np.concatenate([np.arange(1, count + 1) / count for count in parts]) if len(parts) else np.empty(0)
+    before = np.repeat(moments[:-1], parts)
+    return np.append(moments[:1], before + share * np.repeat(np.diff(moments), parts))
 
 
 def _as_read(identity: bytes, forest: Forest, terms: Terms) -> Forest:
