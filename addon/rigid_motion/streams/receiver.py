@@ -256,7 +256,7 @@ class _Playback:
         elapsed = min(max(arrival - self._came, 0.0), MOST_SILENCE) * TICKS if self._came else 0.0
         end = expanded(motion.ticks, self._ticks + elapsed)
         kind = state.kind(end, motion.back)
-        read = self._codec.read(motion.payload, kind, state)
+        read = self._codec.read(motion.payload, kind, state, motion.late)
         window = read and self._codec.window(read[0], state, kind, end)
         if not window:
             return False
@@ -283,6 +283,8 @@ class _Playback:
             self._path, self._begins = path, float(path.moments[1])
         elif newer:
             self._path = self._path.followed(path)
+            if path.moments[0] < self._begins:
+                self._begins = float(path.moments[1])
             self._path = self._path.since(min(self._kept, self._moment or path.moments[0]) - 1e-6)
         else:
             before = self._path

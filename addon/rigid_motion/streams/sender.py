@@ -48,6 +48,9 @@ REFRESH = 1.0
 AGAIN = 0.03
 """Seconds after which a refresh is sent a second time, so that one loss does not lose both."""
 
+PATIENCE = 0.15
+"""Seconds that a refresh has to arrive, before another is sent to somebody who asks for one."""
+
 SILENT = 2.0
 """Seconds after which somebody who does not answer any more is not waited for."""
 
@@ -66,7 +69,7 @@ STEP = 1.0
 ALMOST, SOON = 0.99, 1e-4
 """Part of an interval, and seconds: clocks are not more even than that."""
 
-OVERDUE = 1e-3
+OVERDUE = 2e-4
 """Seconds that are waited for a sample, instead of sending without it."""
 
 CALMER = 0.9
@@ -217,8 +220,9 @@ class Sender:
         entry = next((entry for entry in entries if entry.identity == self.identity), None)
         if entry is None or (receiver not in self._receivers and len(self._receivers) == MOST_RECEIVERS):
             return []
-        self._receivers[receiver] = _Receiver(entry, now + self._slip)
-        self._wanted |= bool(entry.needs & NEEDS_REFRESH)
+        heard = now + self._slip
+        self._receivers[receiver] = _Receiver(entry, heard)
+        self._wanted |= bool(entry.needs & NEEDS_REFRESH) and heard - self._refreshed > PATIENCE
         return self.describe() if entry.needs & NEEDS_DESCRIPTION else []
 
     # Samples
@@ -308,21 +312,22 @@ class Sender:
         end = math.floor(self._times[-1] * TICKS + ROUNDING)
         base = None if refresh else self._usable(now)
         state = self._rest if base is None else self._states[base]
-        start = (end - self._terms.delay) / TICKS
+        is_late = now - self._times[-1] > SOON
+        late = min(math.floor(now * TICKS) - end, self._terms.delay - 1) if is_late else 0
+        start = (end + late - self._terms.delay) / TICKS
         times = np.array(self._times)
         inside = times[(times > start) & (times < end / TICKS)]
-        moments = closely(np.unique(np.append(inside, end / TICKS)))
+        moments = closely(np.unique(np.concatenate(([start], inside, [end / TICKS]))))[1:]
         cells = np.unique(np.rint((end - inside * TICKS) / self._terms.grid).astype(int))
-        cells = cells[(cells > 0) & (cells <= self._terms.cells)]
+        cells = cells[(cells > 0) & (cells * self._terms.grid < self._terms.delay - late)]
         grid = (end - cells[::-1] * self._terms.grid) / TICKS
         back = 0 if base is None else self._sequence - base
         kind = state.kind(end, back)
         fitted = self._fitting.fitted(self._path, state, kind, start, self._samples(), moments, grid)
         inner = [round((end - moment * TICKS) / self._terms.grid) for moment in fitted.moments]
-        said = Said(fitted.finer, inner, np.array(fitted.numbers).tolist())
-        payload, memory = self.codec.write(said, kind, state)
-        late = now - self._times[-1] > SOON
-        datagram = motion(self.identity, self._sequence, end, back, payload, late)
+        said = Said(fitted.finer, inner, np.array(fitted.numbers).tolist(), late)
+        payload, memory = self.codec.write(said, kind, state, is_late)
+        datagram = motion(self.identity, self._sequence, end, back, payload, is_late)
         path = self.codec.window(said, state, kind, end).path()
         self._states[self._sequence] = State(path, memory, end)
         kept = {*range(self._sequence - MOST_BACK, self._sequence + 1), self._base}
@@ -332,6 +337,7 @@ class Sender:
         self._sent = now
         if base is None:
             self._refreshed, self._wanted = now, False
+            payload, _ = self.codec.write(said, kind, state, True)
             again = motion(self.identity, self._sequence, end, back, payload, late=True)
             self._again = (now + AGAIN, self._sequence, again)
         self._sequence += 1

@@ -23,6 +23,8 @@ sys.path[:0] = [str(ROOT / "addon"), str(ROOT / "scripts")]
 from rigid_motion.motion import Poses
 from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.coding import TOTAL
+from rigid_motion.streams.knots import State
+from rigid_motion.streams.messages import Said
 from rigid_motion.streams.residuals import (
     FLAGS,
     HISTORIES,
@@ -53,7 +55,7 @@ PRIOR = 12.0
 TABLE_FILE = ROOT / "addon/rigid_motion/streams/tables.py"
 
 Message = tuple
-"""A codec, what is said, its kind and state."""
+"""A codec, and what it was given."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,9 +85,9 @@ def messages(sample: Sample, delay: float, latency: float | None) -> list[Messag
     sender, receiver = Sender([sample.body], 0.005, delay, even_rate(sample.times)), Receiver()
     write = sender.codec.write
 
-    def noted(said: object, kind: int, state: object) -> tuple:
-        found.append((sender.codec, said, kind, state))
-        return write(said, kind, state)
+    def noted(said: Said, kind: int, state: State, is_late: bool) -> tuple:
+        found.append((sender.codec, said, kind, state, is_late))
+        return write(said, kind, state, is_late)
 
     sender.codec.write = noted
     on_the_way: list[tuple[float, bytes]] = []
@@ -103,8 +105,8 @@ def counted(all_messages: list[Message]) -> list[np.ndarray]:
     """How often each symbol of each table occurs."""
     counts = [[0] * symbols_of(table) for table in range(TABLES)]
     coder = Counting(counts)
-    for codec, said, kind, state in all_messages:
-        codec.through(coder, said, kind, state)
+    for codec, *message in all_messages:
+        codec.through(coder, *message)
     return [np.array(own, dtype=np.float64) for own in counts]
 
 
@@ -138,8 +140,8 @@ def table_of(probability: np.ndarray) -> list[int]:
 def bits(all_messages: list[Message], tables: list[list[int]]) -> float:
     """What messages cost by some tables."""
     counting = Counting([[0] * symbols_of(table) for table in range(TABLES)])
-    for codec, said, kind, state in all_messages:
-        codec.through(counting, said, kind, state)
+    for codec, *message in all_messages:
+        codec.through(counting, *message)
     cost = sum(
         float(np.dot(counts, -np.log2(np.diff(table) / TOTAL)))
         for counts, table in zip(counting.counts, tables, strict=True)
