@@ -88,7 +88,7 @@ def test_datagrams_in_any_order_come_to_the_same_motion() -> None:
     outcome = run(own, *samples, latency=0.05, jitter=0.25)
     sequences = [int.from_bytes(datagram[4:6], "little") for _, datagram in outcome.datagrams]
     assert len(sequences) > 40
-    assert np.mean(outcome.between(3.0, 6.0) <= TOLERANCE) > 0.9
+    assert np.mean(outcome.between(3.0, 6.0) <= TOLERANCE) > 0.8
 
 
 @pytest.mark.parametrize("loss, within", [(0.01, 0.98), (0.05, 0.93), (0.2, 0.7)])

@@ -1,37 +1,81 @@
-"""What a message says: as little as keeps every joint's ball within the tolerance, at all samples of its window.
+"""What a message says: as little as keeps every joint's ball within the tolerance, at all moments that are looked at.
 
-All that is said is rounded first, and then numbers are let go one after another, from the ends of the limbs inwards,
-as long as the whole stays inside. What a number does to the joints that hang on it is reckoned to first order, and the
-outcome is looked at exactly. Arrays have joints first: (joints, n), as in `rigid_motion.motion.skeletons`.
+First come knots, where they are needed most, and all their numbers as near to the truth as steps are fine. Then numbers
+are made smaller one after another, from the ends of the limbs inwards, as long as the whole stays inside: a number that
+is 0 costs next to nothing. What a number does to all that hangs on its joint is reckoned to first order, and the outcome
+is looked at exactly. Arrays have joints first, (joints, n), and components before them where they are apart.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..motion import Poses, shell_error
-from ..motion.measures import largest_displacement
-from ..motion.quaternions import conjugate, matrices, multiply
+from ..motion.quaternions import conjugate, cross, matrices, multiply
 from .knots import FINEST, Scale, State, Window
-from .paths import Path, transposed
-from .residuals import MOST_KNOTS
+from .paths import Path, carried, transposed
+from .residuals import MOST_GROUPS, MOST_KNOTS
+
+NEAR = 0.97
+"""Part of the tolerance that rounding may use."""
 
 MARGINS = (0.97, 0.85, 0.7)
-"""Parts of the tolerance that letting go may use, one after another, where the outcome is off by more than that."""
+"""Parts of the tolerance that smaller numbers may use, one after another, where the outcome is off by more than that."""
+
+AT_END, TAPER = 0.85, 0.4
+"""Part of that at the end of a window, from where the motion has to go on well by itself; from this part of it on."""
+
+NOTHING = 1e-9
+"""Seconds."""
 
 
-GOOD, END, TAPER = 0.97, 0.7, 0.4
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What is to be said."""
+
+    path: Path | None
+    """What is shown so far."""
+
+    state: State
+    """What the message builds on, and how: a kind of `residuals`."""
+
+    kind: int
+
+    start: float
+    """Of the window."""
+
+    samples: Path
+
+    end: float
+
+    moments: np.ndarray
+    """What is looked at, rising; the last ones are where motion and picture go on beyond the window. Shape (n,)."""
+
+    grid: np.ndarray
+    """Where knots may be, rising. Shape (k,)."""
 
 
+@dataclass(eq=False)
 class Fitted:
     """A message that could be sent."""
 
-    def __init__(self, window: Window, moments: list[float], numbers: list[np.ndarray], finer: int) -> None:
-        self.window, self.moments, self.numbers, self.finer = window, moments, numbers, finer
-        self.path: Path | None = None
-        self.error = np.inf
+    finer: int
+
+    moments: list[float] = field(default_factory=list)
+    """Of the knots besides the end, in their order."""
+
+    numbers: list[np.ndarray] = field(default_factory=list)
+    """Of each knot, the end first, shape (groups, 3)."""
+
+    supports: list[tuple[float, float, float]] = field(default_factory=list)
+
+    path: Path | None = None
+    """What is shown with it."""
+
+    error: float = np.inf
+    """The largest at the moments that were looked at."""
 
 
 class Fitting:
@@ -39,130 +83,161 @@ class Fitting:
 
     def __init__(self, scale: Scale) -> None:
         self.scale = scale
-        self.skeleton = scale.forest.skeleton
-        self.radii = scale.forest.radii
-        self.below = [self.skeleton.below(joint) for joint in range(len(scale.forest))]
+        self.skeleton, self.radii = scale.forest.skeleton, scale.forest.radii
+        self._below = [self.skeleton.below(joint) for joint in range(len(scale.forest))]
+        self._most_knots = min(MOST_KNOTS, max(MOST_GROUPS // len(scale.walk), 1))
+        self._steps = np.zeros(len(scale.forest))
+        self._steps[scale.turning] = scale.turn_steps
 
     def errors(self, shown: Poses, truth: Poses) -> np.ndarray:
         """Of poses (joints, n) in their parents' spaces, and true ones in the root's, shape (joints, n)."""
         return shell_error(self.skeleton.in_root_space(shown), truth, self.radii[:, None])
 
-    def fitted(self, path: Path | None, state: State, kind: int, start: float, samples: Path, moments: np.ndarray, grid: np.ndarray) -> Fitted:
-        """The window from `start` to the last of the moments (n,) that are looked at, of samples.
-
-        Knots are among the moments of the grid (k,), rising.
-        """
-        local = samples.at(moments)
-        truth = self.skeleton.in_root_space(local)
-        end = float(moments[-1])
-        ends, worst, finer, inner = transposed(samples.at(np.array([end])))[0], np.inf, 0, []
-        free = grid[(grid > start) & (grid < end)]
-        while True:
-            window = Window(self.scale, state, kind, start, end, finer)
-            numbers = [window.fit(ends)]
-            for moment in inner:
-                numbers.append(window.fit(transposed(samples.at(np.array([moment])))[0], window.insert(moment)))
-            while True:
-                shown = path.followed(window.path()) if path else window.path()
-                errors = self.errors(shown.at(moments), truth).max(axis=0)
-                if errors.max() <= GOOD * self.scale.tolerance or not len(free) or len(numbers) == MOST_KNOTS:
-                    break
-                nearest = int(np.argmin(np.abs(free - moments[np.argmax(errors)])))
-                taken = np.array(window.moments[1:])
-                if np.abs(taken - moments[np.argmax(errors)]).min() < np.abs(free[nearest] - moments[np.argmax(errors)]):
-                    break
-                inner.append(float(free[nearest]))
-                free = np.delete(free, nearest)
-                numbers.append(window.fit(transposed(samples.at(np.array([inner[-1]])))[0], window.insert(inner[-1])))
-            if errors.max() <= GOOD * self.scale.tolerance or finer == FINEST:
+    def fitted(self, task: Task) -> Fitted:
+        """The message for a task."""
+        truth = self.skeleton.in_root_space(task.samples.at(task.moments))
+        knots: list[float] = []
+        for finer in range(FINEST + 1):
+            found = self._near(task, truth, knots, finer)
+            if found.error <= NEAR * self.scale.tolerance:
                 break
-            finer += 1
-        found = Fitted(window, inner, numbers, finer)
-        found.path, found.error = shown, errors.max()
-        limits = self.scale.tolerance * np.minimum(
-            1.0, END + (1 - END) * (moments[-1] - moments) / TAPER / (moments[-1] - start)
-        )
+        left = np.maximum(task.end - task.moments, 0.0) / (task.end - task.start)
+        most = self.scale.tolerance * np.minimum(AT_END + (1.0 - AT_END) * left / TAPER, 1.0)
         for margin in MARGINS:
-            less = self._less(found, start, moments, local, truth, margin * limits)
-            tried = self.said(path, state, kind, start, end, inner, less, finer)
-            tried.error = self.errors(tried.path.at(moments), truth).max()
-            if tried.error <= max(self.scale.tolerance, found.error):
-                return tried
+            smaller = self._smaller(task, truth, found, margin * most)
+            if smaller.error <= max(self.scale.tolerance, found.error):
+                return smaller
         return found
 
-    def said(
-        self, path: Path | None, state: State, kind: int, start: float, end: float, inner: list[float], numbers: list[np.ndarray], finer: int
-    ) -> Fitted:
-        window = Window(self.scale, state, kind, start, end, finer)
+    def _near(self, task: Task, truth: Poses, knots: list[float], finer: int) -> Fitted:
+        """The numbers nearest to the truth, with knots and, where that is not enough, with more of them."""
+        found = Fitted(finer, moments=knots)
+        window = Window(self.scale, task.state, task.kind, task.start, task.end, finer)
+        found.numbers.append(window.fit(_at(task.samples, task.end)))
+        for moment in knots:
+            found.numbers.append(window.fit(_at(task.samples, moment), window.insert(moment)))
+        while True:
+            errors = self._look(task, truth, found, window)
+            worst = task.moments[np.argmax(errors)]
+            free = task.grid[~np.isin(task.grid, window.moments)]
+            if found.error <= NEAR * self.scale.tolerance or not len(free) or len(knots) + 1 == self._most_knots:
+                return found
+            nearest = float(free[np.argmin(np.abs(free - worst))])
+            if np.abs(np.array(window.moments[1:]) - worst).min() < abs(nearest - worst):
+                return found
+            knots.append(nearest)
+            found.numbers.append(window.fit(_at(task.samples, nearest), window.insert(nearest)))
+
+    def _said(self, task: Task, truth: Poses, like: Fitted, numbers: np.ndarray) -> Fitted:
+        """A message with the knots of another, and other numbers (knots, groups, 3)."""
+        said = Fitted(like.finer, like.moments, list(numbers))
+        window = Window(self.scale, task.state, task.kind, task.start, task.end, like.finer)
         window.say(numbers[0])
-        for moment, knot in zip(inner, numbers[1:], strict=True):
-            window.say(knot, window.insert(moment))
-        said = Fitted(window, inner, numbers, finer)
-        said.path = path.followed(window.path()) if path else window.path()
+        for moment, own in zip(like.moments, numbers[1:], strict=True):
+            window.say(own, window.insert(moment))
+        self._look(task, truth, said, window)
         return said
 
-    def _less(
-        self, fitted: Fitted, start: float, moments: np.ndarray, local: Poses, truth: Poses, most: np.ndarray
-    ) -> list[np.ndarray]:
-        """The numbers of a message without those that are not needed."""
-        groups, window, finer = np.array(fitted.numbers), fitted.window, 0.5**fitted.finer
-        there = self.skeleton.in_root_space(fitted.path.at(moments))
-        places = np.ascontiguousarray(np.moveaxis(there.positions, -1, 0))
-        d = np.ascontiguousarray(np.moveaxis(there.positions - truth.positions, -1, 0))
+    def _look(self, task: Task, truth: Poses, found: Fitted, window: Window) -> np.ndarray:
+        """Note what a window shows, and return the largest error of each moment (n,)."""
+        path = window.path()
+        found.path = path if task.path is None else task.path.followed(path)
+        found.supports = window.supports
+        errors = self.errors(found.path.at(task.moments), truth).max(axis=0)
+        found.error = float(errors.max())
+        return errors
+
+    def _smaller(self, task: Task, truth: Poses, found: Fitted, most: np.ndarray) -> Fitted:
+        """A message with smaller numbers, with which no joint is off by more than `most` (n,)."""
+        there = self.skeleton.in_root_space(found.path.at(task.moments))
+        places, d = (_apart(part) for part in (there.positions, there.positions - truth.positions))
         turn = multiply(there.quaternions, conjugate(truth.quaternions))
-        v = np.moveaxis(2.0 * turn[..., 1:] * np.where(turn[..., :1] < 0.0, -1.0, 1.0), -1, 0) * self.radii[:, None]
-        axes = matrices(there.quaternions)
-        hats = hat_functions(window.supports, moments)
-        walk, parents = self.scale.walk, self.skeleton.parents
-        turn_steps = np.zeros(len(self.skeleton))
-        turn_steps[self.scale.turning] = self.scale.turn_steps
-        for number in range(len(groups) - 1, -1, -1):
-            seen = hats[number] > 0.0
-            if not seen.any():
-                groups[number] = 0
+        v = _apart(2.0 * turn[..., 1:] * np.where(turn[..., :1] < 0.0, -1.0, 1.0)) * self.radii[:, None]
+        axes, numbers, walk = matrices(there.quaternions), np.array(found.numbers), self.scale.walk
+        for number in range(len(numbers) - 1, -1, -1):
+            hat = _hat(found.supports[number], task.moments, task.end, max([task.start, *found.moments]))
+            seen = np.flatnonzero(hat)
+            if not len(seen):
+                numbers[number] = 0
                 continue
-            hat = hats[number][seen]
-            order = [group for group in range(len(walk) - 1, -1, -1) if groups[number, group].any()]
-            for group in order:
-                joint, values = walk.joints[group], groups[number, group]
-                hung = self.below[joint]
-                for less in lesser(values):
-                    change = (np.array(less) - values).astype(np.float64)
-                    if walk.slides[group]:
-                        change *= self.scale.slide_step * finer
-                        above = parents[joint]
-                        world = change[:, None] * hat if above < 0 else np.tensordot(
-                            axes[:, :, above][:, :, seen], change, axes=(1, 0)
-                        ) * hat
-                        moved = np.broadcast_to(world[:, None, :], (3, len(hung), len(hat)))
-                        new_d, new_v = d[:, hung][:, :, seen] + moved, v[:, hung][:, :, seen]
-                    else:
-                        change *= turn_steps[joint] * finer
-                        world = np.tensordot(axes[:, :, joint][:, :, seen], change, axes=(1, 0)) * hat
-                        arms = places[:, hung][:, :, seen] - places[:, joint][:, seen][:, None]
-                        new_d = d[:, hung][:, :, seen] + np.cross(world[:, None], arms, axis=0)
-                        new_v = v[:, hung][:, :, seen] + world[:, None] * self.radii[hung][:, None]
-                    squared = (new_d * new_d).sum(0) + (new_v * new_v).sum(0)
-                    squared += 2.0 * np.sqrt((np.cross(new_d, new_v, axis=0) ** 2).sum(0))
-                    if (squared <= (most * most)[seen]).all():
-                        groups[number, group] = less
-                        d[np.ix_(range(3), hung, seen)] = new_d
-                        v[np.ix_(range(3), hung, seen)] = new_v
-                        break
-        return list(groups)
+            near = [part[..., seen] for part in (d, v, places, axes)]
+            for group in range(len(walk) - 1, -1, -1):
+                if numbers[number, group].any():
+                    does = self._does(group, near[2], near[3] , 0.5**found.finer * hat[seen])
+                    self._reduce(numbers[number, group], walk.joints[group], near, does, most[seen] ** 2)
+            d[..., seen], v[..., seen] = near[:2]
+        return self._said(task, truth, found, numbers)
+
+    def _does(self, group: int, places: np.ndarray, axes: np.ndarray, hat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What one step of each number of a group does to what hangs on its joint.
+
+        Returns
+        -------
+        moved, turned : array, shape (3 components, 3 numbers, hung, n)
+            By how much places move, and the balls' shells turn.
+        """
+        joint = self.scale.walk.joints[group]
+        hung, parent = self._below[joint], self.skeleton.parents[joint]
+        if self.scale.walk.slides[group]:
+            along = np.eye(3)[:, :, None] if parent < 0 else axes[:, :, parent]
+            moved = np.broadcast_to((along * (self.scale.slide_step * hat))[:, :, None], (3, 3, len(hung), len(hat)))
+            return moved, np.zeros_like(moved)
+        about = (axes[:, :, joint] * (self._steps[joint] * hat))[:, :, None]
+        arms = (places[:, hung] - places[:, [joint]])[:, None]
+        return cross(about, arms), about * self.radii[hung][:, None]
+
+    def _reduce(
+        self,
+        values: np.ndarray,
+        joint: int,
+        near: list[np.ndarray],
+        does: tuple[np.ndarray, np.ndarray],
+        most: np.ndarray,
+    ) -> None:
+        """Put the smallest numbers that will do in the place of three, and what they do into the errors."""
+        hung = self._below[joint]
+        fewer = smaller_than(values)
+        changes = (fewer - values).astype(np.float64)
+        d, v = (
+            part[:, None, hung] + np.einsum("ca,wahn->wchn", changes, own)
+            for part, own in zip(near[:2], does, strict=True)
+        )
+        squared = (d * d).sum(axis=0) + (v * v).sum(axis=0)
+        across = cross(d, v)
+        squared += 2.0 * np.sqrt((across * across).sum(axis=0))
+        good = (squared <= most).all(axis=(1, 2))
+        if good.any():
+            first = int(np.argmax(good))
+            values[:] = fewer[first]
+            near[0][:, hung], near[1][:, hung] = d[:, first], v[:, first]
 
 
-def lesser(values: np.ndarray) -> list[tuple[int, int, int]]:
-    """Numbers that cost less than these three, the least first."""
-    a, b, c = values.tolist()
-    found = [(0, 0, 0)]
-    towards = lambda x: x - (x > 0) + (x < 0)
-    found += [(towards(a), towards(b), towards(c))]
-    found += [(towards(a), towards(b), c), (towards(a), b, towards(c)), (a, towards(b), towards(c))]
-    found += [(towards(a), b, c), (a, towards(b), c), (a, b, towards(c))]
-    return [few for few in dict.fromkeys(found) if few != (a, b, c)]
+def smaller_than(values: np.ndarray) -> np.ndarray:
+    """Numbers (c, 3) that cost less than three, the least first."""
+    towards = values - np.sign(values)
+    taken = CHOICES & (values != 0)
+    found = np.where(taken, towards, values)
+    found = np.concatenate((np.zeros((1, 3), dtype=values.dtype), found))
+    return found[(found != values).any(axis=1)]
 
 
-def hat_functions(supports: list[tuple[float, float, float]], moments: np.ndarray) -> np.ndarray:
-    """How much each knot's residual does at moments (n,), shape (knots, n)."""
-    return np.array([np.interp(moments, (start, own, max(end, own + 1e-9)), (0.0, 1.0, 1.0 if end == own else 0.0)) for start, own, end in supports])
+CHOICES = np.array([[1, 1, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=bool)
+"""Which of three numbers are made smaller."""
+
+
+def _hat(support: tuple[float, float, float], moments: np.ndarray, end: float, last: float) -> np.ndarray:
+    """How much of a residual of a knot is in what is shown (n,), where the motion beyond the end goes on as since `last`."""
+    before, own, after = support
+    line = (before, own, max(after, own + NOTHING)), (0.0, 1.0, float(after == own))
+    ends, lasts = np.interp((end, last), *line)
+    return np.interp(moments, *line) + (ends - lasts) / (end - last) * carried(moments - end)
+
+
+def _at(samples: Path, moment: float) -> Poses:
+    """The poses (joints,) of a moment."""
+    return transposed(samples.at(np.array([moment])))[0]
+
+
+def _apart(vectors: np.ndarray) -> np.ndarray:
+    """Vectors (joints, n, 3) as components (3, joints, n) that may be written to."""
+    return np.array(np.moveaxis(vectors, -1, 0), order="C")

@@ -26,7 +26,7 @@ FINEST = 3
 OLD = TICKS // 2
 """Ticks after which a pose says nothing any more about how the motion goes on."""
 
-TURN_STEP, SLIDE_STEP = 0.7, 0.5
+TURN_STEP, SLIDE_STEP = 1.0, 0.5
 """Steps, in tolerances: at the end of what hangs on a joint, and of its place."""
 
 

@@ -7,12 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .knots import FINEST, Scale, State, Window
-from .residuals import KNOT_COUNTS, Coder, Reading, Writing
+from .residuals import KNOT_COUNTS, MOST_GROUPS, Coder, Reading, Writing
 from .tables import TABLES
 from .wire import TICKS, Terms
-
-MOST_GROUPS = 4096
-"""Of all knots of a message together."""
 
 FURTHEST = 1e5
 """Metres from the middle of everything at which nothing is any more."""

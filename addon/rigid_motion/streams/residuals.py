@@ -64,6 +64,9 @@ KNOT_COUNTS = FLAGS + KINDS * 2 * HISTORIES * SIZES
 MOST_KNOTS = 16
 """Of a window."""
 
+MOST_GROUPS = 4096
+"""Of all knots of a message together, unless the end alone has more: so much work a datagram can make."""
+
 TABLES = KNOT_COUNTS + 1
 
 

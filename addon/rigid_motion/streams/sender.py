@@ -17,10 +17,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..motion import Poses
+from ..motion import Poses, shell_error
 from ..motion.quaternions import align_signs, normalise
 from .bodies import Body, Forest
-from .fitting import Fitting
+from .fitting import Fitting, Task
 from .knots import Scale, State
 from .messages import Codec, Said
 from .paths import Path
@@ -47,6 +47,9 @@ REFRESH = 1.0
 
 AGAIN = 0.03
 """Seconds after which a refresh is sent a second time, so that one loss does not lose both."""
+
+STILL, BEYOND = 0.25, 0.2
+"""Part of the tolerance within which a body does not move; and so many seconds later it is still where it was."""
 
 PATIENCE = 0.15
 """Seconds that a refresh has to arrive, before another is sent to somebody who asks for one."""
@@ -318,12 +321,17 @@ class Sender:
         times = np.array(self._times)
         inside = times[(times > start) & (times < end / TICKS)]
         moments = closely(np.unique(np.concatenate(([start], inside, [end / TICKS]))))[1:]
+        samples = self._samples()
+        ends = self._forest.skeleton.in_root_space(samples.at(np.array([start, end / TICKS])))
+        if shell_error(ends[:, 0], ends[:, 1], self._forest.radii).max() < STILL * self._scale.tolerance:
+            # A body that does not move is to come to rest, and not to be put right again and again.
+            moments = np.append(moments, end / TICKS + BEYOND)
         cells = np.unique(np.rint((end - inside * TICKS) / self._terms.grid).astype(int))
         cells = cells[(cells > 0) & (cells * self._terms.grid < self._terms.delay - late)]
         grid = (end - cells[::-1] * self._terms.grid) / TICKS
         back = 0 if base is None else self._sequence - base
         kind = state.kind(end, back)
-        fitted = self._fitting.fitted(self._path, state, kind, start, self._samples(), moments, grid)
+        fitted = self._fitting.fitted(Task(self._path, state, kind, start, samples, end / TICKS, moments, grid))
         inner = [round((end - moment * TICKS) / self._terms.grid) for moment in fitted.moments]
         said = Said(fitted.finer, inner, np.array(fitted.numbers).tolist(), late)
         payload, memory = self.codec.write(said, kind, state, is_late)
