@@ -75,7 +75,7 @@ class Fitted:
     """What is shown with it."""
 
     error: float = np.inf
-    """The largest at the moments that were looked at."""
+    """The largest within the window."""
 
 
 class Fitting:
@@ -143,7 +143,8 @@ class Fitting:
         path = window.path()
         found.path = path if task.path is None else task.path.followed(path)
         found.supports = window.supports
-        errors = self.errors(found.path.at(task.moments), truth).max(axis=0)
+        inside = task.moments <= task.end
+        errors = self.errors(found.path.at(task.moments[inside]), truth[:, inside]).max(axis=0)
         found.error = float(errors.max())
         return errors
 
@@ -202,10 +203,9 @@ class Fitting:
             part[:, None, hung] + np.einsum("ca,wahn->wchn", changes, own)
             for part, own in zip(near[:2], does, strict=True)
         )
-        squared = (d * d).sum(axis=0) + (v * v).sum(axis=0)
-        across = cross(d, v)
-        squared += 2.0 * np.sqrt((across * across).sum(axis=0))
-        good = (squared <= most).all(axis=(1, 2))
+        # Where it is off by more already, it may not become worse.
+        most = np.maximum(most, _squared_errors(near[0][:, hung], near[1][:, hung]))
+        good = (_squared_errors(d, v) <= most).all(axis=(1, 2))
         if good.any():
             first = int(np.argmax(good))
             values[:] = fewer[first]
@@ -223,6 +223,12 @@ def smaller_than(values: np.ndarray) -> np.ndarray:
 
 CHOICES = np.array([[1, 1, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=bool)
 """Which of three numbers are made smaller."""
+
+
+def _squared_errors(d: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Of balls that are off by d (3, ...), and whose shells are turned by v: see `motion.shell_error`."""
+    across = cross(d, v)
+    return (d * d).sum(axis=0) + (v * v).sum(axis=0) + 2.0 * np.sqrt((across * across).sum(axis=0))
 
 
 def _hat(support: tuple[float, float, float], moments: np.ndarray, end: float, last: float) -> np.ndarray:
