@@ -15,7 +15,7 @@ FURTHEST = 1e5
 """Metres from the middle of everything at which nothing is any more."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Said:
     """What a message says, in whole numbers."""
 
