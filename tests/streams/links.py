@@ -29,7 +29,10 @@ def dance(own: Body, seconds: float = 6.0, rate: float = 60.0, speed: float = 1.
     rng = np.random.default_rng(seed)
     times, joints = np.arange(round(seconds * rate)) / rate, len(own.joints)
     phases, speeds = rng.uniform(0.0, 6.0, (2, 3, joints, 3))
-    angles = sum(0.2 / (wave + 1) * np.sin(speed * speeds[wave][:, None] * times[:, None] + phases[wave][:, None]) for wave in range(3))
+    angles = sum(
+        0.2 / (wave + 1) * np.sin(speed * speeds[wave][:, None] * times[:, None] + phases[wave][:, None])
+        for wave in range(3)
+    )
     still = np.tile((1.0, 0.0, 0.0, 0.0), (joints, len(times), 1))
     positions = np.repeat(own.rest.positions[:, None], len(times), axis=1)
     positions[0] += 0.4 * np.sin(speed * times[:, None] * (1.0, 1.3, 0.4))

@@ -27,7 +27,7 @@ def test_somebody_who_joins_unheard_is_shown_it_within_one_refresh() -> None:
     assert outcome.errors.max() <= TOLERANCE
 
 
-@pytest.mark.parametrize("before, after", [(0.05, 0.35), (0.35, 0.05), (0.02, 0.08)])
+@pytest.mark.parametrize(("before", "after"), [(0.05, 0.35), (0.35, 0.05), (0.02, 0.08)])
 @pytest.mark.parametrize("answers", [True, False])
 def test_latency_that_changes_for_good(before: float, after: float, answers: bool) -> None:
     own = body()
@@ -91,7 +91,7 @@ def test_datagrams_in_any_order_come_to_the_same_motion() -> None:
     assert np.mean(outcome.between(3.0, 6.0) <= TOLERANCE) > 0.8
 
 
-@pytest.mark.parametrize("loss, within", [(0.01, 0.98), (0.05, 0.93), (0.2, 0.7)])
+@pytest.mark.parametrize(("loss", "within"), [(0.01, 0.98), (0.05, 0.93), (0.2, 0.7)])
 def test_loss(loss: float, within: float) -> None:
     own = body()
     rng = np.random.default_rng(3)
@@ -132,7 +132,7 @@ def test_several_senders_do_not_mix() -> None:
                     alone.take(datagram, time, number)
         shown, expected = receiver.show(time), alone.show(time)
     assert len(shown) == 3
-    (stream, only), = expected.items()
+    ((stream, only),) = expected.items()
     np.testing.assert_array_equal(only.poses[own.name].positions, shown[stream].poses[own.name].positions)
 
 
@@ -146,7 +146,8 @@ def test_keys_can_be_recorded() -> None:
             receiver.take(datagram, time, "sender")
         for _, answer in receiver.answers():
             sender.hear(answer, time)
-        for keys in receiver.keys():
+        new = receiver.keys()
+        for keys in new:
             moments += keys.moments.tolist()
             places += keys.poses[own.name].positions.tolist()
     assert np.diff(moments).min() > 0.0

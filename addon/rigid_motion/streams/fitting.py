@@ -2,8 +2,8 @@
 
 First come knots, where they are needed most, and all their numbers as near to the truth as steps are fine. Then numbers
 are made smaller one after another, from the ends of the limbs inwards, as long as the whole stays inside: a number that
-is 0 costs next to nothing. What a number does to all that hangs on its joint is reckoned to first order, and the outcome
-is looked at exactly. Arrays have joints first, (joints, n), and components before them where they are apart.
+is 0 costs next to nothing. What a number does to all that hangs on its joint is reckoned to first order, and the
+outcome is looked at exactly. Arrays have joints first, (joints, n), and components before them where they are apart.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ NEAR = 0.97
 """Part of the tolerance that rounding may use."""
 
 MARGINS = (0.97, 0.85, 0.7)
-"""Parts of the tolerance that smaller numbers may use, one after another, where the outcome is off by more than that."""
+"""Parts of the tolerance that smaller numbers may use, one after another, while the outcome is off by more."""
 
 AT_END, TAPER = 0.85, 0.4
 """Part of that at the end of a window, from where the motion has to go on well by itself; from this part of it on."""
@@ -164,7 +164,7 @@ class Fitting:
             near = [part[..., seen] for part in (d, v, places, axes)]
             for group in range(len(walk) - 1, -1, -1):
                 if numbers[number, group].any():
-                    does = self._does(group, near[2], near[3] , 0.5**found.finer * hat[seen])
+                    does = self._does(group, near[2], near[3], 0.5**found.finer * hat[seen])
                     self._reduce(numbers[number, group], walk.joints[group], near, does, most[seen] ** 2)
             d[..., seen], v[..., seen] = near[:2]
         return self._said(task, truth, found, numbers)
@@ -232,7 +232,7 @@ def _squared_errors(d: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 def _hat(support: tuple[float, float, float], moments: np.ndarray, end: float, last: float) -> np.ndarray:
-    """How much of a residual of a knot is in what is shown (n,), where the motion beyond the end goes on as since `last`."""
+    """How much of a knot's residual is in what is shown (n,), which beyond the end goes on as since `last`."""
     before, own, after = support
     line = (before, own, max(after, own + NOTHING)), (0.0, 1.0, float(after == own))
     ends, lasts = np.interp((end, last), *line)

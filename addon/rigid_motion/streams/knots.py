@@ -44,7 +44,7 @@ class Scale:
         self.slide_step = SLIDE_STEP * tolerance
 
     def residuals(self, numbers: np.ndarray, factor: float) -> tuple[np.ndarray, np.ndarray]:
-        """Slides and rotation vectors (joints, 3) of whole numbers (groups, 3), in steps that are a factor of theirs."""
+        """Slides and rotation vectors (joints, 3) of whole numbers (groups, 3), in steps times a factor."""
         slides, turns = np.zeros((2, len(self.forest), 3))
         slides[self.sliding] = numbers[self.slides] * (self.slide_step * factor)
         turns[self.turning] = numbers[self.turns] * (self.turn_steps * factor)[:, None]

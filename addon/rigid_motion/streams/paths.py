@@ -35,7 +35,7 @@ def turned(quaternions: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 
 
 def turns_between(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """The shortest rotation vectors (..., 3) that take unit quaternions (..., 4) to others, in the axes of the first."""
+    """The shortest rotation vectors (..., 3) from unit quaternions (..., 4) to others, in the axes of the first."""
     turns = multiply(conjugate(first), second)
     w = turns[..., 0]
     sine = np.sqrt(np.einsum("...i,...i->...", turns[..., 1:], turns[..., 1:]))
@@ -98,9 +98,7 @@ class Path:
     def since(self, moment: float) -> Path:
         """The same without knots that nothing from this moment on depends on."""
         kept = max(int(np.searchsorted(self.moments, moment, side="right")) - 1, 0)
-        return Path(
-            self.moments[kept:], self.positions[kept:], self.quaternions[kept:], self.velocities, self.spins
-        )
+        return Path(self.moments[kept:], self.positions[kept:], self.quaternions[kept:], self.velocities, self.spins)
 
 
 def speeds(span: float, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

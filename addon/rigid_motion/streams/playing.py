@@ -22,7 +22,7 @@ LOOK_BACK = 3.0
 MOST_TRANSITS = 512
 
 FEW = 4
-"""So many datagrams in a row, over `SHORT` seconds, that all came sooner by `SOONER` say that the network is quicker now."""
+"""So many datagrams in a row, over `SHORT` seconds, that all came sooner by `SOONER`: the network is quicker now."""
 
 SHORT, SOONER = 0.3, 0.05
 

@@ -74,6 +74,7 @@ def symbols_of(table: int) -> int:
     """How many symbols a table has."""
     return 2 if table < FLAGS else LARGEST + 1 if table < KNOT_COUNTS else MOST_KNOTS
 
+
 Groups = list[list[list[int]]]
 """Of each knot and each group three numbers."""
 

@@ -109,7 +109,9 @@ class Entry:
     def has(self, sequence: int) -> bool:
         """Whether a sequence is there, as far as this says."""
         back = (self.newest - sequence) & 0xFFFF
-        return not self.needs & NEEDS_DESCRIPTION and (back == 0 or (back <= 32 and bool(self.before >> (back - 1) & 1)))
+        return not self.needs & NEEDS_DESCRIPTION and (
+            back == 0 or (back <= 32 and bool(self.before >> (back - 1) & 1))
+        )
 
 
 def kind_of(datagram: bytes) -> int | None:

@@ -1,6 +1,6 @@
 """The tables of the coder of streams: how often each symbol occurs, on recordings and on motions of our own.
 
-    python scripts/research/making/stream_tables.py ../shared/data
+    python scripts/research stream_tables ../shared/data
 
 counts in every body and every single body of the folder and in the generated motions of assets/, at two delays, with
 receivers that answer soon, later, and not at all, and writes addon/rigid_motion/streams/tables.py. With --held-out it
@@ -10,15 +10,11 @@ writes nothing, and prints what each recording costs by tables that were counted
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-ROOT = Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(ROOT / "addon"), str(ROOT / "scripts")]
 
 from rigid_motion.motion import Poses
 from rigid_motion.streams import Body, Receiver, Sender
@@ -29,7 +25,6 @@ from rigid_motion.streams.residuals import (
     FLAGS,
     HISTORIES,
     KNOT_COUNTS,
-    LARGEST,
     NEIGHBOURS,
     SIZES,
     TABLES,
@@ -39,6 +34,8 @@ from rigid_motion.streams.residuals import (
 from rigid_motion_batch.cli.stream_measure import body_of, samples_of
 from rigid_motion_batch.live.measuring import even_rate
 from rigid_motion_batch.recordings.clip_reading import read_clips
+
+ROOT = Path(__file__).resolve().parents[3]
 
 SETTINGS = ((0.1, 0.0), (0.2, 0.0), (0.1, 0.06), (0.1, 0.15), (0.2, 0.15), (0.1, None))
 """Delays, and seconds that a datagram takes; None where nobody answers."""
@@ -151,11 +148,14 @@ def bits(all_messages: list[Message], tables: list[list[int]]) -> float:
 
 def written(tables: list[list[int]]) -> str:
     rows = "".join(f"    {tuple(table)},\n" for table in tables)
-    head = '"""Cumulative frequencies of the coder\'s symbols, in the order of `residuals`: made by stream_tables.py."""'
+    head = (
+        '"""Cumulative frequencies of the coder\'s symbols, in the order of `residuals`: made by stream_tables.py."""'
+    )
     return f"{head}\n\n# fmt: off\nTABLES: tuple[tuple[int, ...], ...] = (\n{rows})\n"
 
 
-def main(arguments: list[str]) -> None:
+def main(arguments: list[str]) -> int:
+    """Count, and write the tables or print what they cost; return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--held-out", action="store_true", help="write nothing; tables without each recording in turn")
@@ -169,15 +169,14 @@ def main(arguments: list[str]) -> None:
     whole = [sum(table) for table in zip(*counts, strict=True)]
     if not options.held_out:
         TABLE_FILE.write_text(written([table_of(own) for own in probabilities(whole)]), encoding="utf-8")
-        return
+        return 0
     shipped = [table_of(own) for own in probabilities(whole)]
-    print(f"{'bytes of payload a second':28}" + "".join(f"{f'{delay} s, {latency}':>20}" for delay, latency in SETTINGS))
+    print(
+        f"{'bytes of payload a second':28}" + "".join(f"{f'{delay} s, {latency}':>20}" for delay, latency in SETTINGS)
+    )
     for motion, own, counts_of_own in zip(motions, said, counts, strict=True):
         without = [table_of(rest) for rest in probabilities([a - b for a, b in zip(whole, counts_of_own, strict=True)])]
         seconds = motion.times[-1] - motion.times[0]
         costs = [tuple(bits(some, tables) / 8 / seconds for tables in (without, shipped)) for some in own]
         print(f"{motion.name:28}" + "".join(f"{f'{a:.0f} (shipped {b:.0f})':>20}" for a, b in costs), flush=True)
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])
+    return 0

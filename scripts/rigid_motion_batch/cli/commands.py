@@ -35,6 +35,7 @@ RESEARCH = {
     "benchmark_live": "benchmark_live",
     "reduction": "reduction",
     "subframes": "subframes",
+    "stream_tables": "making.stream_tables",
     "check_release": "check_release",
 }
 """What `python scripts/research NAME` runs of a checkout: the module of the package `research`."""

@@ -43,7 +43,6 @@ SLIDES = 1e-4
 """Metres by which a joint has to change its place in its parent's space to be sent with it."""
 
 
-
 def add_options(parser: argparse.ArgumentParser) -> None:
     """The options beside those of reading."""
     parser.add_argument("recording", metavar="RECORDING", help="a recording of a body; FILE:BODY takes one of several")
@@ -52,7 +51,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--radius", type=_delay, default=RADIUS, metavar="M", help="of each joint's ball (%(default)s)")
     parser.add_argument("--loss", type=_share, default=0.0, metavar="P", help="part of the datagrams to lose: 0.01")
     parser.add_argument("--latency", type=_seconds, default=0.0, metavar="S", help="seconds that a datagram takes")
-    parser.add_argument("--jitter", type=_seconds, default=0.0, metavar="S", help="seconds that one takes more, at most")
+    parser.add_argument(
+        "--jitter", type=_seconds, default=0.0, metavar="S", help="seconds that one takes more, at most"
+    )
     parser.add_argument("--no-answers", action="store_true", help="a receiver that says nothing, as in a multicast")
     parser.add_argument("--output", "-o", type=Path, metavar="FILE", help="write what was shown, as .bvh or .csv")
     parser.add_argument("--json", action="store_true", help="print numbers as JSON")

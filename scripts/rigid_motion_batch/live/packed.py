@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigid_motion.motion import Poses, shell_error
+from rigid_motion.motion import shell_error
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion.streams.bodies import Forest
 from rigid_motion.streams.paths import Path

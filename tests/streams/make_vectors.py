@@ -1,6 +1,6 @@
 """Test vectors of the wire format: datagrams, and what is in them.
 
-    python scripts/research/making/stream_vectors.py
+    PYTHONPATH=addon python -m tests.streams.make_vectors
 
 writes tests/streams/vectors.json, for whoever writes a sender or a receiver in another language (docs/wire.md).
 """
@@ -8,22 +8,20 @@ writes tests/streams/vectors.json, for whoever writes a sender or a receiver in 
 from __future__ import annotations
 
 import json
-import sys
+import math
 from pathlib import Path
 
 import numpy as np
-
-ROOT = Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(ROOT / "addon"), str(ROOT / "scripts"), str(ROOT)]
 
 from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.coding import Encoder
 from rigid_motion.streams.knots import State
 from rigid_motion.streams.messages import Said
 from rigid_motion.streams.tables import TABLES
-from tests.streams.links import body, dance
 
-VECTORS = ROOT / "tests/streams/vectors.json"
+from .links import body, dance
+
+VECTORS = Path(__file__).parent / "vectors.json"
 IDENTITY = bytes((1, 2, 3))
 
 
@@ -63,9 +61,10 @@ def stream() -> dict:
     datagrams, answers = [], []
     for row, time in enumerate(times.tolist()):
         sample = {own.name: poses[:, row], tool.name: poses[-1:, row]}
-        # A few samples are missing, and a datagram is late.
-        late = 16 <= row < 19
-        for datagram in sender.poll(time) if late else sender.add(time, sample):
+        # Samples that are needed do not come, and a datagram is late.
+        overdue = row > 12 and math.isfinite(sender.next) and not any(message["late"] for message in messages)
+        time = sender.next if overdue else time
+        for datagram in sender.poll(time) if overdue else sender.add(time, sample):
             receiver.take(datagram, time)
             datagrams.append({"time": time, "bytes": datagram.hex()})
         for _, answer in receiver.answers():
