@@ -95,6 +95,15 @@ def test_flipped_bits_from_the_sender_itself_do_no_lasting_harm(genuine: list[by
     assert receiver.show(times[-1])
 
 
+def test_a_sender_far_in_the_future_is_none(genuine: list[bytes]) -> None:
+    receiver = Receiver()
+    description, motion = genuine[:2]
+    for ticks in (1 << 47, 1 << 61, (1 << 64) - 1):
+        receiver.take(description[:6] + ticks.to_bytes(8, "little") + description[14:], 0.0, ticks)
+        receiver.take(motion, 0.0, ticks)
+    assert [stream.source for stream in receiver.streams] == [1 << 47]
+
+
 def test_strangers_cannot_fill_the_memory() -> None:
     receiver = Receiver()
     tracemalloc.start()

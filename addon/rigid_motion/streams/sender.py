@@ -69,6 +69,9 @@ LAST = 0xFFFF
 STEP = 1.0
 """Seconds between two samples that are no pause, but a clock that was set."""
 
+AT_ONCE = 32
+"""Samples that are let go together."""
+
 ALMOST, SOON = 0.99, 1e-4
 """Part of an interval, and seconds: clocks are not more even than that."""
 
@@ -140,6 +143,8 @@ class Sender:
         self._slip = 0.0
         """What is added to the times of samples, so that a clock that was set makes no difference."""
         self._times: list[float] = []
+        self._positions = np.empty((0, len(self._given), 3))
+        self._quaternions = np.empty((0, len(self._given), 4))
         self._next = math.inf
         self._interval = 0.0
         """Within which the next sample is expected."""
@@ -241,20 +246,16 @@ class Sender:
         if self._times:
             self._interval = max(now - self._times[-1], CALMER * self._interval)
         self._times.append(now)
-        if not hasattr(self, "_positions"):
-            self._positions, self._quaternions = poses.positions[None], poses.quaternions[None]
-        else:
-            self._positions = np.concatenate((self._positions, poses.positions[None]))
-            near = align_signs(np.stack((self._quaternions[-1], poses.quaternions), axis=1))[:, 1]
-            self._quaternions = np.concatenate((self._quaternions, near[None]))
-        kept = np.searchsorted(self._times, now - self._terms.delay / TICKS - self._longest) - 2
-        if kept > 32:
-            self._times = self._times[kept:]
-            self._positions, self._quaternions = self._positions[kept:], self._quaternions[kept:]
+        near = poses.quaternions
+        if len(self._quaternions):
+            near = align_signs(np.stack((self._quaternions[-1], near), axis=1))[:, 1]
+        self._positions = np.concatenate((self._positions, poses.positions[None]))
+        self._quaternions = np.concatenate((self._quaternions, near[None]))
+        past = int(np.searchsorted(self._times, now - self._terms.delay / TICKS - STEP)) - 2
+        if past > AT_ONCE:
+            self._times = self._times[past:]
+            self._positions, self._quaternions = self._positions[past:], self._quaternions[past:]
         return now
-
-    _longest = STEP
-    """Seconds of samples that are kept beside the delay."""
 
     def _samples(self, first: int = 0) -> Path:
         """The samples from one on, with the straight way between them."""

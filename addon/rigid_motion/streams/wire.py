@@ -46,6 +46,9 @@ LONGEST = 1200
 
 MOST_PIECES = 64
 
+MOST_TICKS = 1 << 48
+"""Of a sender's clock: seconds as floats still tell ticks apart."""
+
 MOST_DESCRIBED = 1 << 17
 """Bytes of a description, unpacked."""
 
@@ -176,7 +179,7 @@ def read_piece(datagram: bytes) -> Piece | None:
     if len(datagram) <= DESCRIPTION_HEAD.size:
         return None
     _, identity, number, pieces, ticks = DESCRIPTION_HEAD.unpack_from(datagram)
-    if not number < pieces <= MOST_PIECES or ticks >= 1 << 62:
+    if not number < pieces <= MOST_PIECES or ticks >= MOST_TICKS:
         return None
     return Piece(identity, number, pieces, ticks, datagram[DESCRIPTION_HEAD.size :])
 

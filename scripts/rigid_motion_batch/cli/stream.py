@@ -2,6 +2,7 @@
 
 Over UDP, between processes or machines: `send` plays a recording, `receive` writes down what a display would show at
 every frame, and `relay` is a room where everybody hears all others. docs/streaming.md says what goes over the wire.
+`measure` says what a recording costs by the codec of docs/wire.md.
 """
 
 from __future__ import annotations
@@ -73,7 +74,8 @@ and for many users, each with a sender and a receiver:
   python scripts/stream.py receive --from 127.0.0.1:9000 --output room.csv
   python scripts/stream.py send hand.csv --to 127.0.0.1:9000
 
-`python scripts/stream.py send --help`, `receive --help` and `relay --help` have the options, and more examples.
+`python scripts/stream.py send --help`, `receive --help`, `relay --help` and `measure --help` have the options, and more
+examples.
 Exit code: 0 done, 2 a wrong option or input, an address that is not available, or no sender to hear; 130 stopped by
 Ctrl-C, 143 by SIGTERM, with the statistics and the file of what was shown.
 """
