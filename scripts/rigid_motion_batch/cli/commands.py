@@ -36,6 +36,7 @@ RESEARCH = {
     "reduction": "reduction",
     "subframes": "subframes",
     "glb_sizes": "glb_sizes",
+    "stream_tables": "making.stream_tables",
     "check_release": "check_release",
 }
 """What `python scripts/research NAME` runs of a checkout: the module of the package `research`."""

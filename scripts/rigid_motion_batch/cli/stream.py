@@ -2,6 +2,7 @@
 
 Over UDP, between processes or machines: `send` plays a recording, `receive` writes down what a display would show at
 every frame, and `relay` is a room where everybody hears all others. docs/streaming.md says what goes over the wire.
+`measure` says what a recording costs by the codec of docs/wire.md.
 """
 
 from __future__ import annotations
@@ -44,6 +45,8 @@ from rigid_motion_batch.streaming.relay import Outgoing, Relay
 from rigid_motion_batch.streaming.sources import EvenSource, NeededSource, Source
 from rigid_motion_batch.supervising import report, stop_signals
 
+from . import stream_measure
+
 TOLERANCE, DELAY = "5mm", 0.1
 """Of a sender that sends when it must, unless they are given."""
 
@@ -71,7 +74,8 @@ and for many users, each with a sender and a receiver:
   python scripts/stream.py receive --from 127.0.0.1:9000 --output room.csv
   python scripts/stream.py send hand.csv --to 127.0.0.1:9000
 
-`python scripts/stream.py send --help`, `receive --help` and `relay --help` have the options, and more examples.
+`python scripts/stream.py send --help`, `receive --help`, `relay --help` and `measure --help` have the options, and more
+examples.
 Exit code: 0 done, 2 a wrong option or input, an address that is not available, or no sender to hear; 130 stopped by
 Ctrl-C, 143 by SIGTERM, with the statistics and the file of what was shown.
 """
@@ -192,8 +196,18 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     relaying.add_argument("--seconds", type=_positive, metavar="N", help="stop after so many seconds")
     _add_bind(relaying, "to listen at (loopback)")
 
+    measuring = commands.add_parser(
+        "measure",
+        help="what a recording costs as a stream",
+        description=stream_measure.__doc__,
+        epilog=as_called(stream_measure.EPILOG, SCRIPT),
+        **style,
+    )
+    stream_measure.add_options(measuring)
+    add_reading_options(measuring)
+
     options = parser.parse_args(arguments)
-    chosen = {"send": sending, "receive": receiving, "relay": relaying}[options.command]
+    chosen = {"send": sending, "receive": receiving, "relay": relaying, "measure": measuring}[options.command]
     try:
         _check(options)
     except ValueError as error:
@@ -204,6 +218,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
 def main(arguments: list[str]) -> int:
     """Send, receive or relay, and return the exit code."""
     options = parse(arguments)
+    if options.command == "measure":
+        return _measure(options)
     command = {"send": send, "receive": receive, "relay": relay}[options.command]
     try:
         with stopping() as stopped:
@@ -215,6 +231,18 @@ def main(arguments: list[str]) -> int:
     except OSError as error:
         complain(PROGRAM, error, getattr(options, "output", None) or options.command)
     return 128 + stopped[0] if stopped else 2
+
+
+def _measure(options: argparse.Namespace) -> int:
+    try:
+        stream_measure.run(options)
+        report(ended=True)
+        return 0
+    except (TrajectoryError, RuntimeError, ValueError) as error:
+        complain(PROGRAM, error)
+    except OSError as error:
+        complain(PROGRAM, error, options.output or options.command)
+    return 2
 
 
 # The commands
@@ -481,6 +509,8 @@ def _check(options: argparse.Namespace) -> None:
     if options.command == "relay":
         return
     options.reading = reading_options(options)
+    if options.command == "measure":
+        return
     if options.command == "receive":
         if options.port is None and not options.asked:
             raise ValueError("nobody knows where to send to: give --port P, or ask somebody with --from HOST:PORT")

@@ -1,0 +1,50 @@
+"""Bodies over a network: what is sent when it is needed, and what is shown of it. NumPy and the standard library alone.
+
+A sender knows what its receivers show, a delay behind, and says something only when a joint would leave the tolerance:
+
+    sender = Sender([Body.rigid("left hand"), Body("performer", joints, parents, rest)], tolerance=0.005, delay=0.1)
+    for datagram in sender.add(time, poses):      # at every sample; poses (joints,), or a Poses for each body's name
+        transport.send(datagram)
+    if now > sender.next:                         # a sample is overdue: what there is has to be said without it
+        sender.poll(now)
+    for datagram in transport.received():         # where receivers answer: what is lost then costs least
+        for reply in sender.hear(datagram, now):
+            transport.send(reply)
+    sender.describe()                             # names, parents and rest for somebody who joins, by a reliable way
+    sender.finish()                               # what is still needed where no more samples are to come
+
+A receiver takes any bytes, from anybody, without ever raising an exception:
+
+    receiver = Receiver()
+    receiver.take(datagram, arrival, source)      # `arrival` by a clock of this machine; `source` an address or key
+    for source, answer in receiver.answers():     # as often as one likes to answer; not at all is fine, too
+        transport.send(answer)
+    for stream, shown in receiver.show(now).items():
+        shown.moment                              # of the sender's time
+        shown.poses["performer"]                  # Poses (joints,), each joint in its parent's space
+        receiver.body(stream, "performer")        # its Body: names, parents, rest
+    for keys in receiver.keys():                  # since the last call: what was sent, to be recorded
+        keys.stream, keys.moments, keys.poses     # (k,) seconds; of each body Poses (k, joints)
+
+Between keys, places go straight and turns about one axis: `lerp_slerp`, and `dq_sclerp` hardly differs. Metres,
+seconds, Blender's axes, quaternions w, x, y, z. docs/wire.md has every byte. Each module uses only those above it:
+
+bodies     what is streamed, as one forest of joints
+wire       datagrams
+coding     whole numbers to bytes and back, by frequencies
+residuals  which table each number of a message is coded by
+tables     those tables, as `python scripts/research stream_tables` counted them
+paths      what is shown at any moment
+knots      what the numbers of a message are in metres and radians
+messages   what a message says as bytes, and back
+fitting    what a message has to say
+sender     when it has to be said
+playing    the jitter buffer: which moment is shown when
+receiver   from datagrams to what is shown
+"""
+
+from .bodies import Body
+from .receiver import Keys, Receiver, Shown
+from .sender import Sender
+
+__all__ = ["Body", "Keys", "Receiver", "Sender", "Shown"]

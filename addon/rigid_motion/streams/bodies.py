@@ -1,0 +1,129 @@
+"""What is streamed: rigid bodies and skeletons, as one forest of joints.
+
+A rigid body is a joint that hangs on nothing; a skeleton is a tree of joints. All bodies of a sender are sampled at the
+same moments, and are one array: poses of shape (joints,), each in its parent's space, metres and Blender's axes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..motion import Poses, Skeleton
+
+RADIUS = 0.03
+"""Of the ball at every joint, in metres, unless it is given."""
+
+MOST_JOINTS = 1024
+"""Of all bodies of a sender."""
+
+MOST_BODIES = 255
+
+LONGEST_NAME = 255
+"""Bytes of a name in UTF-8."""
+
+FINEST = 15
+"""The largest level of a joint: its steps are the tolerance, divided by 2^(level / 2) metres."""
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A rigid body or a skeleton, at rest.
+
+    Raises ValueError where names, parents and poses are not as many, or a joint comes before its parent.
+    """
+
+    name: str
+
+    joints: tuple[str, ...]
+
+    parents: np.ndarray
+    """The number of each joint's parent in this body, lower than its own, -1 for roots. Shape (joints,)."""
+
+    rest: Poses
+    """Each joint in its parent's space, shape (joints,)."""
+
+    radius: float = RADIUS
+    """Of the ball at every joint within which nothing may move off by more than the tolerance, in metres."""
+
+    sliding: np.ndarray | None = None
+    """Which joints change their places in their parents' space, shape (joints,). None for roots alone."""
+
+    def __post_init__(self) -> None:
+        parents = np.asarray(self.parents, dtype=np.int64)
+        count = len(self.joints)
+        sliding = parents < 0 if self.sliding is None else np.asarray(self.sliding, dtype=bool)
+        if not (count and parents.shape == sliding.shape == self.rest.shape == (count,)):
+            raise ValueError(f"{self.name}: names, parents and rest poses of its {count} joints are not as many")
+        if np.any(parents < -1) or np.any(parents >= np.arange(count)):
+            raise ValueError(f"{self.name}: a joint needs to come after its parent")
+        if not (math.isfinite(self.radius) and self.radius > 0.0):
+            raise ValueError(f"{self.name}: a radius of {self.radius} is not a positive number")
+        names = (self.name, *self.joints)
+        if not all(0 < len(name.encode(errors="replace")) <= LONGEST_NAME for name in names):
+            raise ValueError(f"{self.name}: a name needs 1 to {LONGEST_NAME} bytes")
+        if not (np.isfinite(self.rest.positions).all() and np.isfinite(self.rest.quaternions).all()):
+            raise ValueError(f"{self.name}: its rest pose is not finite")
+        object.__setattr__(self, "parents", parents)
+        object.__setattr__(self, "sliding", sliding)
+
+    @classmethod
+    def rigid(cls, name: str, pose: Poses | None = None, radius: float = RADIUS) -> Body:
+        """A single rigid body, at rest at `pose` (1,), or in the middle of everything."""
+        return cls(name, (name,), np.array([-1]), pose or Poses([[0.0, 0.0, 0.0]], [[1.0, 0.0, 0.0, 0.0]]), radius)
+
+
+class Forest:
+    """All bodies of a sender, as one array of joints."""
+
+    def __init__(self, bodies: Sequence[Body]) -> None:
+        if not bodies or len({body.name for body in bodies}) < len(bodies):
+            raise ValueError("a sender needs bodies, each with a name of its own")
+        counts = [len(body.joints) for body in bodies]
+        if len(bodies) > MOST_BODIES or sum(counts) > MOST_JOINTS:
+            raise ValueError(f"more than {MOST_BODIES} bodies or {MOST_JOINTS} joints are too many for one sender")
+        self.bodies = tuple(bodies)
+        ends = np.cumsum(counts).tolist()
+        self.slices = {
+            body.name: slice(end - count, end) for body, count, end in zip(bodies, counts, ends, strict=True)
+        }
+        """The joints of each body."""
+        starts = [end - count for count, end in zip(counts, ends, strict=True)]
+        self.parents = np.concatenate(
+            [np.where(body.parents < 0, -1, body.parents + start) for body, start in zip(bodies, starts, strict=True)]
+        )
+        self.rest = Poses(
+            np.concatenate([body.rest.positions for body in bodies]),
+            np.concatenate([body.rest.quaternions for body in bodies]),
+        )
+        self.radii = np.repeat([body.radius for body in bodies], counts)
+        self.sliding = np.concatenate([body.sliding for body in bodies])
+        self.skeleton = Skeleton(self.parents)
+
+    def __len__(self) -> int:
+        return len(self.parents)
+
+    def joined(self, poses: Mapping[str, Poses]) -> Poses:
+        """The poses of all joints (joints,), of those of each body by its name."""
+        parts = [poses[body.name] for body in self.bodies]
+        return Poses(
+            np.concatenate([part.positions for part in parts]), np.concatenate([part.quaternions for part in parts])
+        )
+
+    def parted(self, poses: Poses) -> dict[str, Poses]:
+        """The poses of each body by its name, of those of all joints (joints, ...)."""
+        return {name: poses[joints] for name, joints in self.slices.items()}
+
+    @cached_property
+    def reaches(self) -> np.ndarray:
+        """How far from each joint anything is that hangs on it, with the balls around it, shape (joints,)."""
+        reaches = self.radii.copy()
+        for joint in range(len(self) - 1, -1, -1):
+            if (parent := self.parents[joint]) >= 0:
+                arm = float(np.linalg.norm(self.rest.positions[joint]))
+                reaches[parent] = max(reaches[parent], arm + reaches[joint])
+        return reaches

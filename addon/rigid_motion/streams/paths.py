@@ -1,0 +1,106 @@
+"""Paths: what is shown of some messages, at any moment.
+
+All joints share the moments of their knots. Between two knots places go straight and turns go about one axis; beyond
+the last knot the motion goes on as it was going, and comes to rest. Arrays of poses have the shape (knots, joints)
+here; rotation vectors are radians in the joint's own axes. Seconds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..motion import Poses
+from ..motion.quaternions import conjugate, multiply
+
+CARRY = 0.15
+"""Seconds: a motion of velocity v goes on by v * CARRY * (1 - exp(-t / CARRY)) beyond the last knot."""
+
+SMALLEST = 1e-12
+"""Stands for the angle of no turn."""
+
+
+def carried(after: np.ndarray | float) -> np.ndarray | float:
+    """By how many seconds of its velocity a motion goes on, so many seconds after its last knot."""
+    return CARRY * -np.expm1(-np.maximum(after, 0.0) / CARRY)
+
+
+def turned(quaternions: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Unit quaternions (..., 4) turned by rotation vectors (..., 3) in their own axes."""
+    half = 0.5 * np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
+    share = 0.5 * np.sinc(half / np.pi)
+    turns = np.concatenate((np.cos(half)[..., None], share[..., None] * vectors), axis=-1)
+    return multiply(quaternions, turns)
+
+
+def turns_between(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """The shortest rotation vectors (..., 3) from unit quaternions (..., 4) to others, in the axes of the first."""
+    turns = multiply(conjugate(first), second)
+    w = turns[..., 0]
+    sine = np.sqrt(np.einsum("...i,...i->...", turns[..., 1:], turns[..., 1:]))
+    angle = 2.0 * np.arctan2(sine, np.abs(w))
+    return turns[..., 1:] * (np.where(w < 0.0, -1.0, 1.0) * angle / np.maximum(sine, SMALLEST))[..., None]
+
+
+def transposed(poses: Poses) -> Poses:
+    """Poses (a, b) as poses (b, a)."""
+    return Poses(poses.positions.swapaxes(0, 1), poses.quaternions.swapaxes(0, 1))
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """Knots of all joints, rising in time, and how the joints move at the last of them."""
+
+    moments: np.ndarray
+    """Shape (knots,)."""
+
+    positions: np.ndarray
+    """Shape (knots, joints, 3)."""
+
+    quaternions: np.ndarray
+    """Shape (knots, joints, 4)."""
+
+    velocities: np.ndarray
+    """Of places at the last knot, a second, shape (joints, 3)."""
+
+    spins: np.ndarray
+    """Angular velocities at the last knot, shape (joints, 3)."""
+
+    def at(self, moments: np.ndarray) -> Poses:
+        """The poses at moments (n,), shape (joints, n). Before the first knot those of the first."""
+        moments = np.asarray(moments, dtype=np.float64)
+        last = len(self.moments) - 1
+        before = np.clip(np.searchsorted(self.moments, moments, side="right") - 1, 0, last)
+        after = np.minimum(before + 1, last)
+        span = np.where(after > before, self.moments[after] - self.moments[before], 1.0)
+        share = np.clip((moments - self.moments[before]) / span, 0.0, 1.0)[:, None, None]
+        beyond = np.asarray(carried(moments - self.moments[last]))[:, None, None]
+        first, second = self.positions[before], self.positions[after]
+        positions = first + share * (second - first) + beyond * self.velocities
+        first = self.quaternions[before]
+        vectors = share * turns_between(first, self.quaternions[after]) + beyond * self.spins
+        return Poses(positions.swapaxes(0, 1), turned(first, vectors).swapaxes(0, 1))
+
+    def followed(self, other: Path) -> Path:
+        """This path until the start of another, and from there straight to the knots of that."""
+        start = other.moments[0]
+        here = self.at(other.moments[:1])
+        kept = int(np.searchsorted(self.moments, start))
+        return Path(
+            np.concatenate((self.moments[:kept], other.moments)),
+            np.concatenate((self.positions[:kept], here.positions.swapaxes(0, 1), other.positions[1:])),
+            np.concatenate((self.quaternions[:kept], here.quaternions.swapaxes(0, 1), other.quaternions[1:])),
+            other.velocities,
+            other.spins,
+        )
+
+    def since(self, moment: float) -> Path:
+        """The same without knots that nothing from this moment on depends on."""
+        kept = max(int(np.searchsorted(self.moments, moment, side="right")) - 1, 0)
+        return Path(self.moments[kept:], self.positions[kept:], self.quaternions[kept:], self.velocities, self.spins)
+
+
+def speeds(span: float, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The velocities and angular velocities (joints, 3) from a knot to the next, so much later, of arrays of two."""
+    return (positions[1] - positions[0]) / span, turns_between(quaternions[0], quaternions[1]) / span

@@ -1,0 +1,122 @@
+"""Playing out: which moment of a stream is shown when, and how the picture goes on where something came late.
+
+The moment that is shown is behind the newest that can have come: by the delay of the stream, and by the longest that a
+datagram took lately. It never goes back. Where the network takes longer for good, it waits; where it takes less for
+good, it hurries; a clock that was set is neither. Seconds; `transit` is arrival by our clock less sending by the
+sender's, so it is right up to what the clocks are apart.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from ..motion import Poses
+from ..motion.quaternions import normalise
+from .paths import turned, turns_between
+
+LOOK_BACK = 3.0
+"""Seconds of which the longest transit counts."""
+
+MOST_TRANSITS = 512
+
+FEW = 4
+"""So many datagrams in a row, over `SHORT` seconds, that all came sooner by `SOONER`: the network is quicker now."""
+
+SHORT, SOONER = 0.3, 0.05
+
+SPREADS = 1.5
+"""How many times sooner than they differ from one another."""
+
+SET = 1.0
+"""A transit that differs by more than this many seconds is that of another clock; a display may not leap further."""
+
+SETTLING = 0.15
+"""Seconds in which a third of a difference to the moment that should be shown is left."""
+
+HURRY = 0.6
+"""By which part faster than time the moment goes on at most."""
+
+FADE = 0.15
+"""Seconds in which a difference fades."""
+
+
+class Playing:
+    """The moment of a stream that is shown."""
+
+    def __init__(self, delay: float) -> None:
+        self.delay = delay
+        self.longest: float | None = None
+        """The transit that is waited for."""
+        self._transits: deque[tuple[float, float]] = deque(maxlen=MOST_TRANSITS)
+        self._moment: float | None = None
+        self._last = -np.inf
+        self._unsure = False
+        """Whether our clock leapt, and nothing came since."""
+
+    def heard(self, sent: float, arrival: float) -> None:
+        """Take into account when something was sent and came."""
+        transit = arrival - sent
+        known = self._transits
+        if known and (abs(transit - known[-1][1]) > SET or arrival < known[-1][0] - SET):
+            known.clear()
+        known.append((arrival, transit))
+        while known[0][0] < arrival - LOOK_BACK:
+            known.popleft()
+        recent = [took for when, took in list(known)[-FEW:]]
+        since = arrival - known[-FEW][0] if len(known) >= FEW else 0.0
+        recent = [took for when, took in known if when >= arrival - max(SHORT, since)]
+        spread = max(recent) - min(recent)
+        quicker = max(recent) < max(took for _, took in known) - max(SOONER, SPREADS * spread)
+        if quicker and len(recent) >= FEW and known[0][0] < arrival - SHORT:
+            while known[0][0] < arrival - max(SHORT, since):
+                known.popleft()
+        self.longest = max(took for _, took in known)
+        self._unsure = False
+
+    def moment(self, now: float) -> float | None:
+        """The moment to be shown now; None before anything came."""
+        if self.longest is None:
+            return None
+        wanted = now - self.longest - self.delay
+        passed, self._last = now - self._last, now
+        if self._moment is None:
+            self._moment, passed = wanted, 0.0
+        if abs(passed) > SET:
+            self._unsure = True
+        if self._unsure or passed <= 0.0:
+            return self._moment
+        gap = wanted - self._moment - passed
+        if abs(gap) > SET:
+            self._moment = wanted
+        else:
+            self._moment += passed + min(max(gap / SETTLING, -1.0), HURRY) * passed
+        return self._moment
+
+
+class Fading:
+    """What is shown of a path that changes under it: the difference fades."""
+
+    def __init__(self) -> None:
+        self._shown: Poses | None = None
+        self._began = 0.0
+        self._slides: np.ndarray | None = None
+        self._turns: np.ndarray | None = None
+
+    def changed(self, poses: Poses, now: float) -> None:
+        """Go on from what was shown last, where a new path would show poses (joints,)."""
+        if self._shown is not None:
+            self._slides = self._shown.positions - poses.positions
+            self._turns = turns_between(poses.quaternions, self._shown.quaternions)
+            self._began = now
+
+    def show(self, poses: Poses, now: float) -> Poses:
+        """Poses (joints,) of the path, with what is left of differences."""
+        if self._slides is not None:
+            left = max(1.0 - max(now - self._began, 0.0) / FADE, 0.0) ** 2
+            poses = Poses(poses.positions + left * self._slides, turned(poses.quaternions, left * self._turns))
+            if left == 0.0:
+                self._slides = self._turns = None
+        self._shown = Poses(poses.positions, normalise(poses.quaternions))
+        return self._shown

@@ -1,0 +1,332 @@
+"""From datagrams to what is shown. Whatever comes, from whomever: it is a message of a stream, or it changes nothing.
+
+Streams are told apart by where they come from and by their senders' identities, and know nothing of one another. What
+is remembered of each is bounded.
+"""
+
+from __future__ import annotations
+
+import secrets
+from collections import OrderedDict
+from collections.abc import Hashable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ..motion import Poses
+from .bodies import Body, Forest
+from .knots import Scale, State
+from .messages import Codec
+from .paths import Path
+from .playing import Fading, Playing
+from .wire import (
+    DESCRIPTION,
+    HEAD,
+    LATE,
+    MOST_ENTRIES,
+    MOTION,
+    NEEDS_DESCRIPTION,
+    NEEDS_REFRESH,
+    TICKS,
+    Entry,
+    Motion,
+    Piece,
+    Terms,
+    answer,
+    expanded,
+    kind_of,
+    read_description,
+    read_motion,
+    read_piece,
+)
+
+MOST_STREAMS = 64
+"""That are remembered; the one that was silent for longest is forgotten for a new one."""
+
+MOST_ALL_JOINTS = 4096
+"""Of all streams together."""
+
+MOST_STATES = 40
+"""Messages of a stream that others may build on."""
+
+MOST_KEYS = 4096
+"""Knots of a stream that wait for `keys`."""
+
+
+MOST_WINDOWS = 8
+"""Windows of a stream that one that came late can be put among."""
+
+MOST_WAITING = 4
+"""Messages of a stream that wait for its description."""
+
+SILENT = 10.0
+"""Seconds of silence after which a stream is forgotten."""
+
+MOST_SILENCE = 7.0
+"""Seconds of silence in which the ticks of a stream still go on for sure."""
+
+
+class Stream(NamedTuple):
+    """What tells streams apart."""
+
+    source: Hashable
+    identity: bytes
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What a stream shows."""
+
+    moment: float
+    """Seconds, by the sender's clock."""
+
+    poses: dict[str, Poses]
+    """Of each body, shape (joints,), each joint in its parent's space."""
+
+
+@dataclass(frozen=True, eq=False)
+class Keys:
+    """What was sent, to be recorded."""
+
+    stream: Stream
+
+    moments: np.ndarray
+    """Seconds by the sender's clock, rising, shape (k,)."""
+
+    poses: dict[str, Poses]
+    """Of each body, shape (k, joints)."""
+
+
+class Receiver:
+    """Takes datagrams of any number of streams, and shows them."""
+
+    def __init__(self) -> None:
+        self.own = secrets.token_bytes(3)
+        """Who answers."""
+        self.refused = 0
+        """Datagrams that were nothing, or nothing new."""
+        self._streams: dict[Stream, _Playback] = {}
+        self._begun: OrderedDict[Stream, _Begun] = OrderedDict()
+        """Streams whose description is not complete."""
+
+    def take(self, datagram: bytes, arrival: float, source: Hashable = None) -> None:
+        """Take a datagram that came at a time, by the clock of `show`, from somewhere."""
+        kind = kind_of(datagram)
+        if kind not in (DESCRIPTION, MOTION, LATE):
+            self.refused += 1
+            return
+        stream = Stream(source, datagram[1 : HEAD.size])
+        read = read_piece(datagram) if kind == DESCRIPTION else read_motion(datagram)
+        if read is None:
+            self.refused += 1
+        elif (playback := self._streams.get(stream)) is not None:
+            taken = isinstance(read, Motion) and playback.take(read, arrival)
+            self.refused += not (taken or isinstance(read, Piece))
+        else:
+            self._begin(stream, read, arrival)
+
+    def show(self, now: float) -> dict[Stream, Shown]:
+        """What every stream shows."""
+        self._streams = {own: it for own, it in self._streams.items() if -SILENT < now - it.heard < SILENT}
+        shown = {stream: playback.show(now) for stream, playback in self._streams.items()}
+        return {stream: what for stream, what in shown.items() if what is not None}
+
+    @property
+    def streams(self) -> list[Stream]:
+        """Those that can be shown, or soon can."""
+        return list(self._streams)
+
+    def due(self, stream: Stream, moment: float) -> float:
+        """When a moment of the sender's time is to be shown, by our clock; never, where nothing came yet."""
+        playback = self._streams.get(stream)
+        return playback.due(moment) if playback else np.inf
+
+    def body(self, stream: Stream, name: str) -> Body | None:
+        """A body of a stream, with its names, parents and rest poses."""
+        playback = self._streams.get(stream)
+        return next((body for body in playback.forest.bodies if body.name == name), None) if playback else None
+
+    def bodies(self, stream: Stream) -> tuple[Body, ...]:
+        """All bodies of a stream."""
+        playback = self._streams.get(stream)
+        return playback.forest.bodies if playback else ()
+
+    def answers(self) -> list[tuple[Hashable, bytes]]:
+        """What came since the last call, to be sent to where it came from."""
+        entries: dict[Hashable, list[Entry]] = {}
+        for stream, known in [*self._streams.items(), *self._begun.items()]:
+            if known.unanswered:
+                known.unanswered = False
+                entries.setdefault(stream.source, []).append(known.entry(stream.identity))
+        return [
+            (source, answer(self.own, few[first : first + MOST_ENTRIES]))
+            for source, few in entries.items()
+            for first in range(0, len(few), MOST_ENTRIES)
+        ]
+
+    def keys(self) -> list[Keys]:
+        """The knots that came since the last call and are not going to change any more."""
+        found = [playback.keys(stream) for stream, playback in self._streams.items()]
+        return [keys for keys in found if len(keys.moments)]
+
+    def _begin(self, stream: Stream, read: Motion | Piece, arrival: float) -> None:
+        """Collect what a stream needs before it can be shown."""
+        begun = self._begun.setdefault(stream, _Begun())
+        self._begun.move_to_end(stream)
+        if len(self._begun) > MOST_STREAMS:
+            self._begun.popitem(last=False)
+        if isinstance(read, Motion):
+            begun.unanswered = True
+            begun.motions = [*begun.motions, (read, arrival)][-MOST_WAITING:]
+            return
+        if begun.pieces and len(begun.pieces) != read.pieces:
+            begun.pieces = []
+        begun.pieces = begun.pieces or [None] * read.pieces
+        begun.pieces[read.number] = read.data
+        if None in begun.pieces:
+            return
+        del self._begun[stream]
+        described = read_description(b"".join(begun.pieces))
+        if described is None or not self._room_for(stream, described[0], arrival):
+            self.refused += 1
+            return
+        playback = _Playback(*described, read.ticks)
+        self._streams[stream] = playback
+        for motion, when in begun.motions:
+            playback.take(motion, when)
+        playback.heard = arrival
+
+    def _room_for(self, stream: Stream, forest: Forest, now: float) -> bool:
+        """Forget a stream that this one is instead of, and say whether there is room for it."""
+        names = {body.name for body in forest.bodies}
+        self._streams = {
+            other: it
+            for other, it in self._streams.items()
+            if -SILENT < now - it.heard < SILENT
+            and not (other.source == stream.source and {body.name for body in it.forest.bodies} == names)
+        }
+        joints = sum(len(playback.forest) for playback in self._streams.values())
+        return len(self._streams) < MOST_STREAMS and joints + len(forest) <= MOST_ALL_JOINTS
+
+
+class _Begun:
+    """A stream without its description."""
+
+    def __init__(self) -> None:
+        self.pieces: list[bytes | None] = []
+        self.motions: list[tuple[Motion, float]] = []
+        self.unanswered = False
+
+    def entry(self, identity: bytes) -> Entry:
+        return Entry(identity, 0, 0, NEEDS_DESCRIPTION | NEEDS_REFRESH)
+
+
+class _Playback:
+    """A stream with its description."""
+
+    def __init__(self, forest: Forest, terms: Terms, ticks: int) -> None:
+        self.forest, self._terms = forest, terms
+        self._codec = Codec(Scale(forest, terms.tolerance / 1e6), terms)
+        self._rest = State.at_rest(self._codec.scale)
+        self._states: OrderedDict[int, State] = OrderedDict()
+        self._windows: dict[int, Path] = {}
+        """Of the newest messages, by their sequence numbers."""
+        self._path: Path | None = None
+        self._newest, self._ticks, self._came = -1, float(ticks), 0.0
+        self._playing, self._fading = Playing(terms.delay / TICKS), Fading()
+        self._moment: float | None = None
+        self._begins = np.inf
+        """The first moment that can be shown."""
+        self._kept = -np.inf
+        """Until this moment keys were handed out."""
+        self._needs = NEEDS_REFRESH
+        self.heard = 0.0
+        self.unanswered = False
+
+    def take(self, motion: Motion, arrival: float) -> bool:
+        """Take a message, and say whether it was a new one that could be read."""
+        if motion.sequence in self._states or self._newest - motion.sequence > MOST_STATES:
+            return False
+        state = self._rest if motion.back == 0 else self._states.get(motion.sequence - motion.back)
+        self.unanswered = True
+        if state is None:
+            self._needs = NEEDS_REFRESH
+            return False
+        elapsed = min(max(arrival - self._came, 0.0), MOST_SILENCE) * TICKS if self._came else 0.0
+        end = expanded(motion.ticks, self._ticks + elapsed)
+        kind = state.kind(end, motion.back)
+        read = self._codec.read(motion.payload, kind, state, motion.late)
+        window = read and self._codec.window(read[0], state, kind, end)
+        if not window:
+            return False
+        path = window.path()
+        self._states[motion.sequence] = State(path, read[1], end)
+        if len(self._states) > MOST_STATES:
+            self._states.pop(min(self._states))
+        newer = motion.sequence > self._newest
+        if newer:
+            self._newest, self._ticks, self._came, self._needs = motion.sequence, float(end), arrival, 0
+        self.heard = max(self.heard, arrival) if newer else self.heard
+        if not motion.late or self._playing.longest is None:
+            self._playing.heard(end / TICKS, arrival)
+        self._put(motion.sequence, path, newer, arrival)
+        return True
+
+    def _put(self, sequence: int, path: Path, newer: bool, now: float) -> None:
+        """Let a window take part in what is shown."""
+        self._windows[sequence] = path
+        for old in sorted(self._windows)[:-MOST_WINDOWS]:
+            del self._windows[old]
+        if self._path is None:
+            # How the motion got to the first knot is not known.
+            self._path, self._begins = path, float(path.moments[1])
+        elif newer:
+            self._path = self._path.followed(path)
+            if path.moments[0] < self._begins:
+                self._begins = float(path.moments[1])
+            self._path = self._path.since(min(self._kept, self._moment or path.moments[0]) - 1e-6)
+        else:
+            before = self._path
+            first, *others = (self._windows[number] for number in sorted(self._windows))
+            self._path = before if before.moments[0] < first.moments[0] else first
+            for other in [first, *others] if self._path is before else others:
+                self._path = self._path.followed(other)
+        if self._moment is not None and path.moments[0] < self._moment:
+            self._fading.changed(_only(self._path.at(np.array([self._moment]))), now)
+
+    def due(self, moment: float) -> float:
+        """When a moment is to be shown."""
+        return np.inf if self._playing.longest is None else moment + self._playing.longest + self._playing.delay
+
+    def show(self, now: float) -> Shown | None:
+        """What is shown now."""
+        self._moment = self._playing.moment(now)
+        if self._moment is None or self._moment < self._begins:
+            return None
+        poses = self._fading.show(_only(self._path.at(np.array([self._moment]))), now)
+        return Shown(self._moment, self.forest.parted(poses))
+
+    def keys(self, stream: Stream) -> Keys:
+        """The knots until the start of the newest window that were not handed out yet."""
+        path = self._path
+        if path is None:
+            return Keys(stream, np.empty(0), {})
+        until = self._windows[max(self._windows)].moments[0]
+        rows = np.flatnonzero((path.moments > self._kept) & (path.moments <= until))
+        if len(rows):
+            self._kept = float(path.moments[rows[-1]])
+        poses = {
+            name: Poses(path.positions[rows][:, joints], path.quaternions[rows][:, joints])
+            for name, joints in self.forest.slices.items()
+        }
+        return Keys(stream, path.moments[rows], poses)
+
+    def entry(self, identity: bytes) -> Entry:
+        """What is answered."""
+        there = sum(1 << back for back in range(32) if self._newest - 1 - back in self._states)
+        return Entry(identity, max(self._newest, 0), there, self._needs)
+
+
+def _only(poses: Poses) -> Poses:
+    return poses[:, 0]

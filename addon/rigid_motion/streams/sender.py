@@ -1,0 +1,380 @@
+"""A sender that sends when it must: it knows every pose, and what its receivers show of what they were sent.
+
+What is shown is a delay behind. When it gets to where a joint's ball would leave the tolerance, all of the window since
+then is known here, and is said at once. Until then nothing is sent, for the motion goes on at the receivers as it was
+going, and a body at rest costs a heartbeat.
+
+A message builds on one that is there: the newest that all receivers who answer have; where nobody answers, the last
+refresh, a message that builds on nothing and is sent twice.
+"""
+
+from __future__ import annotations
+
+import math
+import secrets
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..motion import Poses, shell_error
+from ..motion.quaternions import align_signs, normalise
+from .bodies import Body, Forest
+from .fitting import Fitting, Task
+from .knots import Scale, State
+from .messages import Codec, Said
+from .paths import Path
+from .wire import (
+    ANSWER,
+    NEEDS_DESCRIPTION,
+    NEEDS_REFRESH,
+    TICKS,
+    Entry,
+    Terms,
+    describe,
+    kind_of,
+    motion,
+    read_answer,
+    read_description,
+    read_piece,
+)
+
+HEARTBEAT = 0.5
+"""Seconds of silence after which something is said in any case."""
+
+REFRESH = 1.0
+"""Seconds between messages that build on nothing, where nobody answers."""
+
+AGAIN = 0.03
+"""Seconds after which a refresh is sent a second time, so that one loss does not lose both."""
+
+STILL, BEYOND = 0.25, 0.2
+"""Part of the tolerance within which a body does not move; and so many seconds later it is still where it was."""
+
+PATIENCE = 0.15
+"""Seconds that a refresh has to arrive, before another is sent to somebody who asks for one."""
+
+SILENT = 2.0
+"""Seconds after which somebody who does not answer any more is not waited for."""
+
+GRID = 3
+"""Ticks of the grid of knots for samples at any moments."""
+
+ROUNDING = 1e-3
+"""Ticks by which a sample may be before the one that it is at."""
+
+LAST = 0xFFFF
+"""The largest sequence number: behind it the sender begins again, with another identity."""
+
+STEP = 1.0
+"""Seconds between two samples that are no pause, but a clock that was set."""
+
+AT_ONCE = 32
+"""Samples that are let go together."""
+
+ALMOST, SOON = 0.99, 1e-4
+"""Part of an interval, and seconds: clocks are not more even than that."""
+
+OVERDUE = 2e-4
+"""Seconds that are waited for a sample, instead of sending without it."""
+
+CALMER = 0.9
+"""What is left of the longest interval between samples with every sample that came sooner."""
+
+MOST_BACK = 33
+"""Messages that an answer speaks of."""
+
+OLDEST = 2.0
+"""Seconds: what is older is not worth building on, and everything is said anew."""
+
+FAR_APART, MOST_PARTS = 0.013, 8
+"""Seconds between samples beyond which it is looked at what is shown between them, and into how many parts at most."""
+
+MOST_RECEIVERS = 256
+"""Receivers that are waited for."""
+
+
+@dataclass(eq=False)
+class _Receiver:
+    """Somebody who answers."""
+
+    entry: Entry
+    heard: float
+
+
+class Sender:
+    """Samples in, and out come the datagrams that are needed, each as soon as it is.
+
+    Parameters
+    ----------
+    bodies : sequence of Body
+    tolerance : float
+        Metres: no point within a joint's radius is shown further off, at any moment, where nothing is lost or late.
+    delay : float
+        Seconds by which what is shown is behind, beside what the network takes.
+    rate : float, optional
+        Samples a second, where they are even.
+    refresh, heartbeat : float
+        Seconds between them.
+
+    Raises
+    ------
+    ValueError
+        For numbers out of range.
+    """
+
+    def __init__(
+        self,
+        bodies: Sequence[Body],
+        tolerance: float = 0.005,
+        delay: float = 0.1,
+        rate: float | None = None,
+        refresh: float = REFRESH,
+        heartbeat: float = HEARTBEAT,
+    ) -> None:
+        for name, value in (("tolerance", tolerance), ("delay", delay), ("refresh", refresh), ("heartbeat", heartbeat)):
+            if not (math.isfinite(value) and value > 0.0):
+                raise ValueError(f"a {name} of {value} is not a positive number")
+        even = TICKS / rate if rate else GRID
+        grid = round(even) if abs(even - round(even)) < 0.01 and even >= 1.0 else GRID
+        self._terms = Terms(math.floor(tolerance * 1e6), round(delay * TICKS), grid)
+        self._given = Forest(bodies)
+        self.refresh, self.heartbeat = refresh, heartbeat
+        self._slip = 0.0
+        """What is added to the times of samples, so that a clock that was set makes no difference."""
+        self._times: list[float] = []
+        self._positions = np.empty((0, len(self._given), 3))
+        self._quaternions = np.empty((0, len(self._given), 4))
+        self._next = math.inf
+        self._interval = 0.0
+        """Within which the next sample is expected."""
+        self._begin()
+
+    def _begin(self) -> None:
+        """Begin with a new identity."""
+        self.identity = secrets.token_bytes(3)
+        forest = _as_read(self.identity, self._given, self._terms)
+        self._forest = forest
+        self._scale = Scale(forest, self._terms.tolerance / 1e6)
+        self._fitting, self.codec = Fitting(self._scale), Codec(self._scale, self._terms)
+        self._rest = State.at_rest(self._scale)
+        self._states: dict[int, State] = {}
+        """Of messages that others may build on, by their sequence numbers."""
+        self._sequence = 0
+        self._path: Path | None = None
+        """What the receivers show who have everything."""
+        self._shown = -math.inf
+        """Until this moment it is known to be within the tolerance."""
+        self._good: float | None = None
+        """The moment behind which it is not."""
+        self._receivers: dict[bytes, _Receiver] = {}
+        self._refreshed = -math.inf
+        self._sent = -math.inf
+        self._again: tuple[float, int, bytes] | None = None
+        self._base: int | None = None
+        """The last refresh that was sent twice."""
+        self._wanted = False
+        """Whether somebody cannot read what is sent."""
+
+    def add(self, time: float, poses: Poses | Mapping[str, Poses]) -> list[bytes]:
+        """Take a sample, and return what is to be sent now.
+
+        Parameters
+        ----------
+        time : float
+            Seconds. Where it goes back or jumps ahead by more than a second, a clock was set: the motion goes on.
+        poses : Poses, shape (joints,), or Poses for each body's name
+
+        Raises
+        ------
+        ValueError
+            Where poses are not as many as joints, or not finite.
+        """
+        poses = poses if isinstance(poses, Poses) else self._given.joined(poses)
+        finite = np.isfinite(poses.positions).all() and np.isfinite(poses.quaternions).all()
+        if poses.shape != (len(self._given),) or not (finite and math.isfinite(time)):
+            raise ValueError(f"a sample needs {len(self._given)} finite poses and a time")
+        now = self._remember(time, poses)
+        if self._sequence > LAST:
+            self._begin()
+        return self._due(now, self._interval)
+
+    def poll(self, time: float) -> list[bytes]:
+        """What is to be sent at a time at which no sample came: worth asking at `next`, where one is overdue."""
+        return self._due(max(time + self._slip, self._times[-1]), 0.0) if self._times else []
+
+    @property
+    def next(self) -> float:
+        """When what is shown gets to a sample behind which it is off: by then something has to be sent."""
+        return self._next - self._slip
+
+    def finish(self) -> list[bytes]:
+        """What is still needed where no more samples are to come."""
+        if self._path is None or self._is_shown_until(self._times[-1]) is None:
+            return []
+        return [self._message(self._times[-1])]
+
+    def describe(self) -> list[bytes]:
+        """Names, parents and rest poses, for those who join."""
+        ticks = math.floor(self._times[-1] * TICKS) if self._times else 0
+        return describe(self.identity, max(ticks, 0), self._forest, self._terms)
+
+    def hear(self, datagram: bytes, now: float) -> list[bytes]:
+        """Take an answer, at a time by the clock of the samples, and return what is to be sent for it."""
+        read = read_answer(datagram) if kind_of(datagram) == ANSWER else None
+        if read is None:
+            return []
+        receiver, entries = read
+        entry = next((entry for entry in entries if entry.identity == self.identity), None)
+        if entry is None or (receiver not in self._receivers and len(self._receivers) == MOST_RECEIVERS):
+            return []
+        heard = now + self._slip
+        self._receivers[receiver] = _Receiver(entry, heard)
+        self._wanted |= bool(entry.needs & NEEDS_REFRESH) and heard - self._refreshed > PATIENCE
+        return self.describe() if entry.needs & NEEDS_DESCRIPTION else []
+
+    # Samples
+
+    def _remember(self, time: float, poses: Poses) -> float:
+        """Keep a sample, and return its time by a clock that only goes on."""
+        poses = Poses(poses.positions, normalise(poses.quaternions))
+        now = time + self._slip
+        if self._times and not 0.0 < now - self._times[-1] <= STEP:
+            usual = self._times[-1] - self._times[-2] if len(self._times) > 1 else 1.0 / TICKS
+            self._slip += self._times[-1] + usual - now
+            now = time + self._slip
+        if self._times:
+            self._interval = max(now - self._times[-1], CALMER * self._interval)
+        self._times.append(now)
+        near = poses.quaternions
+        if len(self._quaternions):
+            near = align_signs(np.stack((self._quaternions[-1], near), axis=1))[:, 1]
+        self._positions = np.concatenate((self._positions, poses.positions[None]))
+        self._quaternions = np.concatenate((self._quaternions, near[None]))
+        past = int(np.searchsorted(self._times, now - self._terms.delay / TICKS - STEP)) - 2
+        if past > AT_ONCE:
+            self._times = self._times[past:]
+            self._positions, self._quaternions = self._positions[past:], self._quaternions[past:]
+        return now
+
+    def _samples(self, first: int = 0) -> Path:
+        """The samples from one on, with the straight way between them."""
+        still = np.zeros((len(self._forest), 3))
+        return Path(np.array(self._times[first:]), self._positions[first:], self._quaternions[first:], still, still)
+
+    # When
+
+    def _due(self, now: float, interval: float) -> list[bytes]:
+        """What is to be sent now, where nobody asks again before the interval is over."""
+        due, self._next = [], math.inf
+        if self._again and now >= self._again[0]:
+            _, self._base, datagram = self._again
+            self._again = None
+            if not (self._answered(now) and self._have(self._base)):
+                due.append(datagram)
+        if not self._answered(now) and now - self._refreshed >= self.refresh:
+            due += [*self.describe(), self._message(now, refresh=True)]
+        elif self._wanted:
+            due.append(self._message(now, refresh=True))
+        elif now - self._sent >= self.heartbeat:
+            due.append(self._message(now))
+        else:
+            good = self._is_shown_until(now)
+            delay = self._terms.delay / TICKS
+            if good is not None and good < now - delay + max(ALMOST * interval, SOON):
+                due.append(self._message(now))
+            elif good is not None:
+                self._next = good + delay + OVERDUE
+        return due
+
+    def _is_shown_until(self, now: float) -> float | None:
+        """The moment before one that is shown further off than the tolerance; None where there is none until now."""
+        if self._good is None and self._shown < self._times[-1]:
+            first = max(int(np.searchsorted(self._times, self._shown, side="right")) - 1, 0)
+            moments = closely(np.array(self._times[first:]))
+            moments = moments[moments > max(self._shown, now - self._terms.delay / TICKS)]
+            truth = self._forest.skeleton.in_root_space(self._samples(first).at(moments))
+            off = self._fitting.errors(self._path.at(moments), truth).max(axis=0) > self._scale.tolerance
+            before = np.append(self._shown, moments)[np.argmax(off)]
+            self._shown = float(before if off.any() else self._times[-1])
+            self._good = self._shown if off.any() else None
+        return self._good
+
+    def _answered(self, now: float) -> bool:
+        """Whether anybody answers; those who do not any more are forgotten."""
+        self._receivers = {own: who for own, who in self._receivers.items() if now - who.heard < SILENT}
+        return bool(self._receivers)
+
+    def _have(self, sequence: int) -> bool:
+        """Whether all who answer have a message."""
+        return all(who.entry.has(sequence) for who in self._receivers.values())
+
+    # What
+
+    def _message(self, now: float, refresh: bool = False) -> bytes:
+        """Say the window until the last sample."""
+        end = math.floor(self._times[-1] * TICKS + ROUNDING)
+        base = None if refresh else self._usable(now)
+        state = self._rest if base is None else self._states[base]
+        is_late = now - self._times[-1] > SOON
+        late = min(math.floor(now * TICKS) - end, self._terms.delay - 1) if is_late else 0
+        start = (end + late - self._terms.delay) / TICKS
+        times = np.array(self._times)
+        inside = times[(times > start) & (times < end / TICKS)]
+        moments = closely(np.unique(np.concatenate(([start], inside, [end / TICKS]))))[1:]
+        samples = self._samples()
+        ends = self._forest.skeleton.in_root_space(samples.at(np.array([start, end / TICKS])))
+        if shell_error(ends[:, 0], ends[:, 1], self._forest.radii).max() < STILL * self._scale.tolerance:
+            # A body that does not move is to come to rest, and not to be put right again and again.
+            moments = np.append(moments, end / TICKS + BEYOND)
+        cells = np.unique(np.rint((end - inside * TICKS) / self._terms.grid).astype(int))
+        cells = cells[(cells > 0) & (cells * self._terms.grid < self._terms.delay - late)]
+        grid = (end - cells[::-1] * self._terms.grid) / TICKS
+        back = 0 if base is None else self._sequence - base
+        kind = state.kind(end, back)
+        fitted = self._fitting.fitted(Task(self._path, state, kind, start, samples, end / TICKS, moments, grid))
+        inner = [round((end - moment * TICKS) / self._terms.grid) for moment in fitted.moments]
+        said = Said(fitted.finer, inner, np.array(fitted.numbers).tolist(), late)
+        payload, memory = self.codec.write(said, kind, state, is_late)
+        datagram = motion(self.identity, self._sequence, end, back, payload, is_late)
+        path = self.codec.window(said, state, kind, end).path()
+        self._states[self._sequence] = State(path, memory, end)
+        kept = {*range(self._sequence - MOST_BACK, self._sequence + 1), self._base}
+        self._states = {number: old for number, old in self._states.items() if number in kept}
+        self._path = path if self._path is None else self._path.followed(path).since(start - 0.05)
+        self._shown, self._good = end / TICKS if fitted.error <= self._scale.tolerance else start, None
+        self._sent = now
+        if base is None:
+            self._refreshed, self._wanted = now, False
+            payload, _ = self.codec.write(said, kind, state, True)
+            again = motion(self.identity, self._sequence, end, back, payload, late=True)
+            self._again = (now + AGAIN, self._sequence, again)
+        self._sequence += 1
+        return datagram
+
+    def _usable(self, now: float) -> int | None:
+        """The message to build on, or None."""
+        if self._answered(now):
+            for number in range(self._sequence - 1, max(self._sequence - 1 - MOST_BACK, -1), -1):
+                state = self._states.get(number)
+                if state is not None and self._have(number):
+                    return number if now - state.end / TICKS < OLDEST else None
+        return self._base if self._base is not None and self._sequence - self._base < 256 else None
+
+
+def closely(moments: np.ndarray) -> np.ndarray:
+    """Moments (n,) with others between them, where they are far apart."""
+    parts = np.ceil(np.diff(moments) / FAR_APART).astype(int)
+    parts = np.clip(parts, 1, MOST_PARTS)
+    share = np.concatenate([np.arange(1, count + 1) / count for count in parts]) if len(parts) else np.empty(0)
+    before = np.repeat(moments[:-1], parts)
+    return np.append(moments[:1], before + share * np.repeat(np.diff(moments), parts))
+
+
+def _as_read(identity: bytes, forest: Forest, terms: Terms) -> Forest:
+    """A forest as receivers read it, in single precision. Raises ValueError for what cannot be described."""
+    pieces = [read_piece(datagram) for datagram in describe(identity, 0, forest, terms)]
+    read = None if None in pieces else read_description(b"".join(piece.data for piece in pieces))
+    if read is None:
+        raise ValueError("the delay, the tolerance or the bodies are too large to be described")
+    return read[0]

@@ -1,0 +1,244 @@
+"""Datagrams: descriptions, motions and answers. docs/wire.md draws their bytes. Little-endian throughout.
+
+Reading never raises: what is no datagram of this version is None.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..motion import Poses
+from .bodies import MOST_JOINTS, Body, Forest
+
+VERSION = 1
+
+TICKS = 3600
+"""A second, in the unit of all times on the wire: whole numbers of it are the frames of 24, 25, 30, 60, 72, 90, 120."""
+
+DESCRIPTION, MOTION, LATE, ANSWER = range(4)
+"""Kinds of datagrams. `LATE` is a motion that was sent later than at the end of its window."""
+
+HEAD = struct.Struct("<B3s")
+"""Version and kind; identity."""
+
+MOTION_HEAD = struct.Struct("<B3sHHB")
+"""Version and kind; identity; sequence; ticks of the end of the window; by how much to go back for the base, or 0."""
+
+DESCRIPTION_HEAD = struct.Struct("<B3sBBQ")
+"""Version and kind; identity; number of the piece; pieces; the sender's ticks."""
+
+TERMS = struct.Struct("<IHHB")
+"""Tolerance in micrometres; delay and grid in ticks; bodies."""
+
+ENTRY = struct.Struct("<3sHIB")
+"""Of an answer: identity; newest sequence; which of the 32 before it there are; what is missing."""
+
+NEEDS_DESCRIPTION, NEEDS_REFRESH = 1, 2
+
+LONGEST = 1200
+"""Bytes of a datagram."""
+
+MOST_PIECES = 64
+
+MOST_TICKS = 1 << 48
+"""Of a sender's clock: seconds as floats still tell ticks apart."""
+
+MOST_DESCRIBED = 1 << 17
+"""Bytes of a description, unpacked."""
+
+LONGEST_DELAY = 8 * TICKS
+"""Half of what 16 bits of ticks can tell apart is more."""
+
+
+@dataclass(frozen=True)
+class Terms:
+    """What sender and receivers agree on."""
+
+    tolerance: int
+    """Micrometres."""
+
+    delay: int
+    """Ticks by which what is shown is behind what is sent."""
+
+    grid: int
+    """Ticks between the moments at which knots may be, counted back from the end of a window."""
+
+    @property
+    def cells(self) -> int:
+        """Moments of the grid within a window."""
+        return max((self.delay - 1) // self.grid, 0)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A message, not yet decoded."""
+
+    identity: bytes
+    sequence: int
+    ticks: int
+    """The lowest 16 bits."""
+    back: int
+    payload: bytes
+    late: bool
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Of a description."""
+
+    identity: bytes
+    number: int
+    pieces: int
+    ticks: int
+    data: bytes
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What an answer says of one stream."""
+
+    identity: bytes
+    newest: int
+    before: int
+    """Bit i: sequence newest - 1 - i is there."""
+    needs: int
+
+    def has(self, sequence: int) -> bool:
+        """Whether a sequence is there, as far as this says."""
+        back = (self.newest - sequence) & 0xFFFF
+        return not self.needs & NEEDS_DESCRIPTION and (
+            back == 0 or (back <= 32 and bool(self.before >> (back - 1) & 1))
+        )
+
+
+def kind_of(datagram: bytes) -> int | None:
+    """The kind of a datagram of this version, or None."""
+    if len(datagram) < HEAD.size or len(datagram) > LONGEST or datagram[0] >> 4 != VERSION:
+        return None
+    return datagram[0] & 15
+
+
+def _first(kind: int) -> int:
+    return VERSION << 4 | kind
+
+
+def motion(identity: bytes, sequence: int, ticks: int, back: int, payload: bytes, late: bool = False) -> bytes:
+    """The datagram of a message."""
+    return MOTION_HEAD.pack(_first(LATE if late else MOTION), identity, sequence, ticks & 0xFFFF, back) + payload
+
+
+def read_motion(datagram: bytes) -> Motion | None:
+    """A message, or None."""
+    if len(datagram) < MOTION_HEAD.size:
+        return None
+    _, *head = MOTION_HEAD.unpack_from(datagram)
+    return Motion(*head, datagram[MOTION_HEAD.size :], datagram[0] & 15 == LATE)
+
+
+def answer(receiver: bytes, entries: Sequence[Entry]) -> bytes:
+    """The datagram of an answer."""
+    parts = [ENTRY.pack(entry.identity, entry.newest, entry.before, entry.needs) for entry in entries]
+    return HEAD.pack(_first(ANSWER), receiver) + b"".join(parts)
+
+
+MOST_ENTRIES = (LONGEST - HEAD.size) // ENTRY.size
+
+
+def read_answer(datagram: bytes) -> tuple[bytes, list[Entry]] | None:
+    """Who answers, and what; or None."""
+    if (len(datagram) - HEAD.size) % ENTRY.size:
+        return None
+    return datagram[1 : HEAD.size], [Entry(*fields) for fields in ENTRY.iter_unpack(datagram[HEAD.size :])]
+
+
+def describe(identity: bytes, ticks: int, forest: Forest, terms: Terms) -> list[bytes]:
+    """The datagrams of a description."""
+    parts = [TERMS.pack(terms.tolerance, terms.delay, terms.grid, len(forest.bodies))]
+    for body in forest.bodies:
+        parts += [_named(body.name), struct.pack("<IH", round(body.radius * 1e6), len(body.joints))]
+        for joint, parent in enumerate(body.parents.tolist()):
+            parts += [_named(body.joints[joint]), struct.pack("<hB", parent, int(body.sliding[joint]))]
+            parts.append(struct.pack("<7f", *body.rest.positions[joint], *body.rest.quaternions[joint]))
+    packed = zlib.compress(b"".join(parts), 9)
+    size = LONGEST - DESCRIPTION_HEAD.size
+    cut = [packed[at : at + size] for at in range(0, len(packed), size)]
+    return [
+        DESCRIPTION_HEAD.pack(_first(DESCRIPTION), identity, number, len(cut), ticks) + piece
+        for number, piece in enumerate(cut)
+    ]
+
+
+def read_piece(datagram: bytes) -> Piece | None:
+    """A piece of a description, or None."""
+    if len(datagram) <= DESCRIPTION_HEAD.size:
+        return None
+    _, identity, number, pieces, ticks = DESCRIPTION_HEAD.unpack_from(datagram)
+    if not number < pieces <= MOST_PIECES or ticks >= MOST_TICKS:
+        return None
+    return Piece(identity, number, pieces, ticks, datagram[DESCRIPTION_HEAD.size :])
+
+
+def read_description(packed: bytes) -> tuple[Forest, Terms] | None:
+    """The bodies and the terms of all pieces of a description, or None."""
+    try:
+        unpacking = zlib.decompressobj()
+        data = unpacking.decompress(packed, MOST_DESCRIBED)
+        if not unpacking.eof:
+            return None
+        return _described(data)
+    except (zlib.error, struct.error, ValueError, IndexError):
+        return None
+
+
+def _described(data: bytes) -> tuple[Forest, Terms] | None:
+    *numbers, count = TERMS.unpack_from(data)
+    terms, at = Terms(*numbers), TERMS.size
+    if not (terms.tolerance and terms.grid and 0 < terms.delay <= LONGEST_DELAY):
+        return None
+    bodies, total = [], 0
+    for _ in range(count):
+        name, at = _read_name(data, at)
+        radius, joints = struct.unpack_from("<IH", data, at)
+        at, total = at + 6, total + joints
+        if total > MOST_JOINTS:
+            return None
+        names, parents, sliding, rest = [], [], [], []
+        for _ in range(joints):
+            own, at = _read_name(data, at)
+            parent, slides = struct.unpack_from("<hB", data, at)
+            rest.append(struct.unpack_from("<7f", data, at + 3))
+            at += 31
+            names.append(own)
+            parents.append(parent)
+            sliding.append(bool(slides))
+        poses = np.array(rest, dtype=np.float64).reshape(-1, 7)
+        lengths = np.linalg.norm(poses[:, 3:], axis=1)
+        if not (np.abs(poses) < 1e6).all() or not (lengths > 0.5).all():
+            return None
+        poses = Poses(poses[:, :3], poses[:, 3:] / lengths[:, None])
+        bodies.append(Body(name, tuple(names), np.array(parents), poses, radius / 1e6, np.array(sliding)))
+    return (Forest(bodies), terms) if at == len(data) else None
+
+
+def _named(name: str) -> bytes:
+    data = name.encode(errors="replace")
+    return bytes([len(data)]) + data
+
+
+def _read_name(data: bytes, at: int) -> tuple[str, int]:
+    end = at + 1 + data[at]
+    if end > len(data):
+        raise IndexError("a name is cut off")
+    return data[at + 1 : end].decode(), end
+
+
+def expanded(ticks: int, near: float) -> int:
+    """The whole of a number of ticks, of which the lowest 16 bits are given, nearest to another number."""
+    nearest = math.floor(near)
+    return nearest + ((ticks - nearest + 0x8000) & 0xFFFF) - 0x8000

@@ -1,0 +1,174 @@
+"""Measure what a recording costs as a stream, and how well it is shown: `stream measure`.
+
+The recording is sent over UDP on loopback, by the codec of docs/wire.md; another process shows it. Both go by the clock
+of the recording, however busy the machine is. Beside it stand even streams of packed joints.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from rigid_motion.motion import Poses, rms
+from rigid_motion.motion.quaternions import align_signs
+from rigid_motion.streams import Body
+from rigid_motion.streams.bodies import RADIUS, Forest
+from rigid_motion_batch.analysis.choices import Tolerance
+from rigid_motion_batch.axes import AXES, from_blender, to_blender
+from rigid_motion_batch.command_line import number, path_line
+from rigid_motion_batch.files import replacing
+from rigid_motion_batch.live.measuring import Link, Measured, measure, straight
+from rigid_motion_batch.live.packed import WAYS, bytes_a_second, errors
+from rigid_motion_batch.live.written import write_bvh, write_csv
+from rigid_motion_batch.recordings import TrajectoryError
+from rigid_motion_batch.recordings.clip_reading import read_clips
+from rigid_motion_batch.recordings.clips import Clip
+
+EPILOG = """
+examples:
+  python scripts/stream.py measure walk.bvh
+  python scripts/stream.py measure walk.bvh --tolerance 5mm --delay 0.2 --loss 0.01 --output shown.bvh --json
+  python scripts/stream.py measure log.csv:left --output shown.csv
+
+Bytes a second leave out what somebody who joins is told once (names, parents, rest
+poses); they are a line of their own. Headers are those of UDP and IPv4, 28 bytes a datagram. shown.bvh is what was
+shown at the recording's moments, in its units and axes.
+"""
+
+SLIDES = 1e-4
+"""Metres by which a joint has to change its place in its parent's space to be sent with it."""
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options beside those of reading."""
+    parser.add_argument("recording", metavar="RECORDING", help="a recording of a body; FILE:BODY takes one of several")
+    parser.add_argument("--tolerance", default="5mm", metavar="LENGTH", help="largest error: 5mm, 0.5cm (%(default)s)")
+    parser.add_argument("--delay", type=_delay, default=0.1, metavar="S", help="seconds of delay (%(default)s)")
+    parser.add_argument("--radius", type=_delay, default=RADIUS, metavar="M", help="of each joint's ball (%(default)s)")
+    parser.add_argument("--loss", type=_share, default=0.0, metavar="P", help="part of the datagrams to lose: 0.01")
+    parser.add_argument("--latency", type=_seconds, default=0.0, metavar="S", help="seconds that a datagram takes")
+    parser.add_argument(
+        "--jitter", type=_seconds, default=0.0, metavar="S", help="seconds that one takes more, at most"
+    )
+    parser.add_argument("--no-answers", action="store_true", help="a receiver that says nothing, as in a multicast")
+    parser.add_argument("--output", "-o", type=Path, metavar="FILE", help="write what was shown, as .bvh or .csv")
+    parser.add_argument("--json", action="store_true", help="print numbers as JSON")
+    parser.add_argument("--axes", type=str.lower, choices=AXES, help="axes of the recording")
+
+
+def run(options: argparse.Namespace) -> None:
+    """Measure, print and write. Raises TrajectoryError, OSError, RuntimeError or ValueError with what went wrong."""
+    clips, _ = read_clips([options.recording], options.axes, options.reading)
+    if len(clips) > 1:
+        raise TrajectoryError(options.recording, f"{len(clips)} bodies", "name one, as FILE:BODY")
+    clip, tolerance = clips[0], Tolerance(options.tolerance).tolerance(clips[0])
+    times, poses = samples_of(clip)
+    body = body_of(clip, poses, options.radius)
+    if options.output and (options.output.suffix.lower() == ".bvh") != (clip.figure is not None):
+        raise ValueError(f"{options.output}: a body is written as .bvh, a single rigid body as .csv")
+    link = Link(options.latency, options.jitter, options.loss)
+    found = measure(body, times, poses, tolerance, options.delay, link, not options.no_answers)
+    beside = packed(body, times, poses)
+    if options.output:
+        write(options.output, clip, body, times, found.shown)
+    if options.json:
+        print(json.dumps({"recording": clip.name, **asdict(found.cost), "beside": beside}, indent=2))
+        return
+    for line in lines(found, beside, tolerance):
+        print(line)
+    if options.output:
+        print(path_line(options.output))
+
+
+def samples_of(clip: Clip) -> tuple[np.ndarray, Poses]:
+    """The moments (n,) of a clip and its poses (joints, n), in metres and Blender's axes.
+
+    Of a file whose keys are not at its frames those are what it shows at its frames.
+    """
+    poses = to_blender(clip.in_metres(clip.poses), clip.axes)
+    positions, quaternions = (part if part.ndim == 3 else part[None] for part in (poses.positions, poses.quaternions))
+    times, poses = clip.times, Poses(positions, quaternions)
+    if clip.rate and len(times) != round((times[-1] - times[0]) * clip.rate) + 1:
+        even = np.arange(times[0], times[-1] + 0.01 / clip.rate, 1.0 / clip.rate)
+        return even, straight(times, poses).at(even)
+    return times, poses
+
+
+def body_of(clip: Clip, poses: Poses, radius: float) -> Body:
+    """What is streamed of a clip. At rest it is as in its first sample."""
+    rest = poses[:, 0]
+    if clip.figure is None:
+        return Body.rigid(clip.name, rest, radius)
+    sliding = np.ptp(poses.positions, axis=1).max(axis=1) > SLIDES
+    return Body(clip.name, clip.figure.joints, clip.figure.parents, rest, radius, sliding | (clip.figure.parents < 0))
+
+
+def packed(body: Body, times: np.ndarray, poses: Poses) -> dict[str, dict[str, float]]:
+    """What even streams of packed joints cost, and how far off they are."""
+    forest, found = Forest([body]), {}
+    samples = straight(times, Poses(poses.positions, align_signs(poses.quaternions)))
+    for way in WAYS:
+        worst = errors(way, forest, samples).max(axis=0)
+        alone, with_headers = bytes_a_second(way, forest)
+        found[way.label] = {
+            "bytes_a_second": alone,
+            "bytes_a_second_with_headers": with_headers,
+            "rms_mm": 1000.0 * rms(worst),
+            "largest_mm": 1000.0 * float(worst.max()),
+        }
+    return found
+
+
+def write(path: Path, clip: Clip, body: Body, times: np.ndarray, shown: Poses) -> None:
+    """Write what was shown in the units and axes of the recording."""
+    there = from_blender(shown, clip.axes)
+    there = Poses(there.positions / clip.metres_per_unit, there.quaternions)
+    with replacing(path) as file:
+        if clip.figure is None:
+            write_csv(file, times, there[0])
+        else:
+            write_bvh(file, clip.figure, body.sliding, times, there)
+
+
+def lines(found: Measured, beside: dict[str, dict[str, float]], tolerance: float) -> list[str]:
+    """The numbers as text."""
+    cost = found.cost
+    rows = [
+        f"datagrams: {cost.datagrams}, of which {cost.lost} were lost, in {cost.seconds:.2f} s",
+        f"to join: {cost.joining_bytes} bytes",
+        f"answers: {cost.answers_a_second:.0f} bytes a second",
+        f"shown: {1000.0 * cost.delay_s:.0f} ms later, within {1000.0 * tolerance:g} mm for "
+        f"{100.0 * cost.share_within_tolerance:.2f} % of the samples",
+        "",
+        f"{'':36}{'bytes/s':>10}{'with headers':>14}{'RMS mm':>9}{'largest mm':>12}",
+    ]
+    own = {"sent when needed": asdict(cost)}
+    for label, row in {**own, **beside}.items():
+        alone, whole = row["bytes_a_second"], row["bytes_a_second_with_headers"]
+        rows.append(f"{label:36}{alone:10.0f}{whole:14.0f}{row['rms_mm']:9.2f}{row['largest_mm']:12.2f}")
+    return rows
+
+
+def _delay(text: str) -> float:
+    value = number(text)
+    if not 0.0 < value <= 4.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not more than 0 and at most 4")
+    return value
+
+
+def _seconds(text: str) -> float:
+    value = number(text)
+    if not 0.0 <= value <= 4.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not 0 to 4 seconds")
+    return value
+
+
+def _share(text: str) -> float:
+    value = number(text)
+    if not 0.0 <= value < 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is no part of all: give 0 to 1")
+    return value

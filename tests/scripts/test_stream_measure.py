@@ -1,0 +1,74 @@
+"""`stream measure`: what a recording costs, and what was shown of it, by another process."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigid_motion.streams.bodies import Forest
+from rigid_motion_batch.cli.stream import main
+from rigid_motion_batch.cli.stream_measure import body_of, samples_of
+from rigid_motion_batch.live.measuring import straight
+from rigid_motion_batch.live.packed import WAYS, errors, smallest_three
+from rigid_motion_batch.live.written import write_bvh
+from rigid_motion_batch.recordings.clip_reading import read_clips
+from rigid_motion_batch.recordings.figures import Figure
+from tests.streams.links import body, dance
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    own = body(6)
+    times, poses = dance(own, 1.5, 30.0)
+    path = tmp_path_factory.mktemp("walk") / "walk.bvh"
+    figure = Figure(own.joints, own.parents, own.rest, own.rest.positions)
+    with path.open("w", encoding="utf-8") as file:
+        write_bvh(file, figure, own.sliding, times, poses)
+    return path
+
+
+def test_a_body(walk: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    shown = tmp_path / "shown.bvh"
+    options = ["--axes", "blender", "--scale", "1", "--start", "0"]
+    assert main(["measure", str(walk), "--json", "--output", str(shown), *options]) == 0
+    found = json.loads(capfd.readouterr().out)
+    assert found["largest_mm"] <= 5.05
+    assert found["share_within_tolerance"] > 0.99
+    assert found["bytes_a_second_with_headers"] == pytest.approx(
+        found["bytes_a_second"] + 28 * (found["datagrams"] - 1) / found["seconds"]
+    )
+    assert found["bytes_a_second"] < found["beside"]["float32 at 30 Hz"]["bytes_a_second"]
+    # Anybody can check it by the file.
+    (before, after) = (read_clips([str(path)])[0][0] for path in (walk, shown))
+    true, there = (clip.figure.skeleton.in_root_space(clip.poses).positions for clip in (before, after))
+    assert true.shape == there.shape
+    assert 0.0005 < np.linalg.norm(true - there, axis=-1).max() * before.metres_per_unit < 0.0051
+
+
+def test_a_single_body_with_loss(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    source, shown = Path(__file__).parents[2] / "assets/reach.csv", tmp_path / "shown.csv"
+    options = ["--radius", "0.1", "--loss", "0.05", "--latency", "0.02", "--json"]
+    assert main(["measure", str(source), "--output", str(shown), *options]) == 0
+    found = json.loads(capfd.readouterr().out)
+    assert found["share_within_20_mm"] > 0.95
+    assert len(read_clips([str(shown)])[0][0].times) == len(read_clips([str(source)])[0][0].times)
+
+
+def test_a_body_is_no_table(walk: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert main(["measure", str(walk), "--output", str(tmp_path / "shown.csv")]) == 2
+    assert "a body is written as .bvh" in capfd.readouterr().err
+
+
+def test_packed_joints_are_as_far_off_as_their_bits_say(walk: Path) -> None:
+    (clip,) = read_clips([str(walk)])[0]
+    times, poses = samples_of(clip)
+    forest = Forest([body_of(clip, poses, 0.03)])
+    off = {way.label: errors(way, forest, straight(times, poses)).max() for way in WAYS}
+    assert off["float32 at 30 Hz"] < 1e-5 < off["29 bits at 30 Hz"] < off["29 bits at 12 Hz"]
+    random = np.random.default_rng(1).normal(size=(200, 4))
+    random /= np.linalg.norm(random, axis=1)[:, None]
+    near = np.abs(np.sum(random * smallest_three(random, 10), axis=1))
+    assert np.degrees(2.0 * np.arccos(np.minimum(near, 1.0))).max() < 0.3

@@ -1,0 +1,147 @@
+"""Senders and receivers on a link that a test makes up, in the time of the test."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rigid_motion.motion import Poses, shell_error
+from rigid_motion.streams import Body, Receiver, Sender
+from rigid_motion.streams.bodies import Forest
+from rigid_motion.streams.paths import Path, turned
+
+AHEAD = 1000.0
+"""By how many seconds the receiver's clock is ahead."""
+
+
+def body(joints: int = 8, radius: float = 0.03) -> Body:
+    """A chain of joints with two branches, a quarter of a metre from each to the next."""
+    parents = np.array([-1, *(max(joint - 1 - (joint == joints - 2), 0) for joint in range(1, joints))])
+    rest = Poses(np.tile((0.0, 0.0, 0.25), (joints, 1)), np.tile((1.0, 0.0, 0.0, 0.0), (joints, 1)))
+    return Body("performer", tuple(f"joint {joint}" for joint in range(joints)), parents, rest, radius)
+
+
+def dance(own: Body, seconds: float = 6.0, rate: float = 60.0, speed: float = 1.0, seed: int = 1) -> tuple:
+    """Moments (n,) and poses (joints, n) of smooth motion."""
+    rng = np.random.default_rng(seed)
+    times, joints = np.arange(round(seconds * rate)) / rate, len(own.joints)
+    phases, speeds = rng.uniform(0.0, 6.0, (2, 3, joints, 3))
+    angles = sum(
+        0.2 / (wave + 1) * np.sin(speed * speeds[wave][:, None] * times[:, None] + phases[wave][:, None])
+        for wave in range(3)
+    )
+    still = np.tile((1.0, 0.0, 0.0, 0.0), (joints, len(times), 1))
+    positions = np.repeat(own.rest.positions[:, None], len(times), axis=1)
+    positions[0] += 0.4 * np.sin(speed * times[:, None] * (1.0, 1.3, 0.4))
+    return times, Poses(positions, np.array(turned(still, angles)))
+
+
+def straight(times: np.ndarray, poses: Poses) -> Path:
+    """Samples (joints, n) and the straight way between them."""
+    still = np.zeros((poses.shape[0], 3))
+    return Path(times, poses.positions.swapaxes(0, 1), poses.quaternions.swapaxes(0, 1), still, still)
+
+
+@dataclass
+class Outcome:
+    """What a run showed."""
+
+    sender: Sender
+    receiver: Receiver
+    datagrams: list[tuple[float, bytes]] = field(default_factory=list)
+    """When they were sent."""
+    now: np.ndarray | None = None
+    """When it was drawn, by the sender's clock, shape (n,)."""
+    moments: np.ndarray | None = None
+    """What was drawn then."""
+    errors: np.ndarray | None = None
+    """The largest of any joint, metres."""
+    steps: np.ndarray | None = None
+    """How far any joint went from one picture to the next, metres, shape (n - 1,)."""
+
+    def between(self, first: float, last: float) -> np.ndarray:
+        """The errors of what was drawn from one time to another."""
+        return self.errors[(self.now >= first) & (self.now < last)]
+
+
+def run(
+    own: Body,
+    times: np.ndarray,
+    poses: Poses,
+    *,
+    delay: float = 0.1,
+    tolerance: float = 0.005,
+    latency: float | Callable[[float], float] = 0.02,
+    jitter: float = 0.0,
+    lost: Callable[[float, int], bool] = lambda now, number: False,
+    answers: bool = True,
+    clock: Callable[[float], float] = lambda now: now + AHEAD,
+    fps: float = 144.0,
+    copies: int = 1,
+    rate: float | None = None,
+    heard_from: float = 0.0,
+    seed: int = 1,
+) -> Outcome:
+    """Play samples (n,) of poses (joints, n), and draw what is shown.
+
+    `lost` says of the time and the number of a datagram whether it is lost; `heard_from` is when the receiver begins.
+    """
+    rng, sender, receiver = np.random.default_rng(seed), Sender([own], tolerance, delay, rate), Receiver()
+    outcome, pending, count = Outcome(sender, receiver), [], 0
+
+    def post(datagrams: list[bytes], now: float, back: bool = False) -> None:
+        nonlocal count
+        for datagram in datagrams:
+            if not back:
+                outcome.datagrams.append((now, datagram))
+            count += 1
+            if lost(now, count):
+                continue
+            for _ in range(copies):
+                takes = (latency(now) if callable(latency) else latency) + jitter * rng.random()
+                heapq.heappush(pending, (now + takes, count, back, datagram))
+
+    def come(until: float) -> None:
+        while pending and pending[0][0] <= until:
+            now, _, back, datagram = heapq.heappop(pending)
+            if back:
+                post(sender.hear(datagram, now), now)
+            elif now >= heard_from:
+                receiver.take(datagram, clock(now), "sender")
+                if answers:
+                    post([answer for _, answer in receiver.answers()], now, back=True)
+
+    drawn, frames = [], np.arange(times[0], times[-1], 1.0 / fps)
+    events = sorted([*((time, 0, row) for row, time in enumerate(times)), *((time, 1, 0) for time in frames)])
+    for now, frame, row in events:
+        while not frame and row and sender.next < now:
+            due = sender.next
+            come(due)
+            post(sender.poll(due), due)
+        come(now)
+        if frame:
+            drawn += [(now, shown.moment, shown.poses[own.name]) for shown in receiver.show(clock(now)).values()]
+        else:
+            post(sender.add(float(now), poses[:, row]), now)
+            come(now)
+    if drawn:
+        compare(outcome, own, straight(times, poses), drawn)
+    return outcome
+
+
+def compare(outcome: Outcome, own: Body, truth: Path, drawn: list) -> None:
+    """Note how far off was what was drawn, from when the motion had begun."""
+    drawn = [frame for frame in drawn if frame[1] >= truth.moments[0]]
+    outcome.now, outcome.moments = (np.array([frame[number] for frame in drawn]) for number in (0, 1))
+    shown = Poses(
+        np.stack([frame[2].positions for frame in drawn], axis=1),
+        np.stack([frame[2].quaternions for frame in drawn], axis=1),
+    )
+    forest = Forest([own])
+    there = forest.skeleton.in_root_space(shown)
+    true = forest.skeleton.in_root_space(truth.at(outcome.moments))
+    outcome.errors = shell_error(there, true, forest.radii[:, None]).max(axis=0)
+    outcome.steps = np.linalg.norm(np.diff(there.positions, axis=1), axis=-1).max(axis=0)

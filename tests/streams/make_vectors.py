@@ -1,0 +1,85 @@
+"""Test vectors of the wire format: datagrams, and what is in them.
+
+    PYTHONPATH=addon python -m tests.streams.make_vectors
+
+writes tests/streams/vectors.json, for whoever writes a sender or a receiver in another language (docs/wire.md).
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+
+from rigid_motion.streams import Body, Receiver, Sender
+from rigid_motion.streams.coding import Encoder
+from rigid_motion.streams.knots import State
+from rigid_motion.streams.messages import Said
+from rigid_motion.streams.tables import TABLES
+
+from .links import body, dance
+
+VECTORS = Path(__file__).parent / "vectors.json"
+IDENTITY = bytes((1, 2, 3))
+
+
+def coding() -> list[dict]:
+    """Symbols, the numbers of their tables, or how many a flat one could have been; and their bytes."""
+    rng, cases = np.random.default_rng(1), []
+    for length in (0, 1, 5, 40):
+        encoder, steps = Encoder(), []
+        for _ in range(length):
+            if rng.random() < 0.3:
+                count = int(rng.integers(1, 1 << 12))
+                steps.append({"flat": count, "symbol": int(rng.integers(count))})
+                encoder.write_flat(steps[-1]["symbol"], count)
+            else:
+                table = int(rng.integers(len(TABLES)))
+                steps.append({"table": table, "symbol": int(rng.integers(len(TABLES[table]) - 1))})
+                encoder.write(steps[-1]["symbol"], TABLES[table])
+        cases.append({"steps": steps, "bytes": encoder.finish().hex()})
+    return cases
+
+
+def stream() -> dict:
+    """The datagrams of two bodies for a second, and what each message says."""
+    own, tool = body(6), Body.rigid("tool", radius=0.1)
+    times, poses = dance(own, 1.2, 30.0)
+    sender, receiver, messages = Sender([own, tool], rate=30.0), Receiver(), []
+    sender.identity, receiver.own = IDENTITY, bytes((7, 8, 9))
+    write = sender.codec.write
+
+    def noted(said: Said, kind: int, state: State, is_late: bool) -> tuple:
+        payload, memory = write(said, kind, state, is_late)
+        messages.append({"late": said.late, "finer": said.finer, "cells": said.cells, "groups": said.groups})
+        messages[-1] |= {"kind": kind, "memory": list(memory), "payload": payload.hex()}
+        return payload, memory
+
+    sender.codec.write = noted
+    datagrams, answers = [], []
+    for row, time in enumerate(times.tolist()):
+        sample = {own.name: poses[:, row], tool.name: poses[-1:, row]}
+        # Samples that are needed do not come, and a datagram is late.
+        overdue = row > 12 and math.isfinite(sender.next) and not any(message["late"] for message in messages)
+        time = sender.next if overdue else time
+        for datagram in sender.poll(time) if overdue else sender.add(time, sample):
+            receiver.take(datagram, time)
+            datagrams.append({"time": time, "bytes": datagram.hex()})
+        for _, answer in receiver.answers():
+            answers.append({"time": time, "bytes": answer.hex()})
+            sender.hear(answer, time)
+    (keys,) = receiver.keys()
+    return {
+        "datagrams": datagrams,
+        "messages": messages,
+        "answers": answers,
+        "moments": keys.moments.tolist(),
+        "positions": {name: np.round(part.positions, 9).tolist() for name, part in keys.poses.items()},
+        "quaternions": {name: np.round(part.quaternions, 9).tolist() for name, part in keys.poses.items()},
+    }
+
+
+if __name__ == "__main__":
+    VECTORS.write_text(json.dumps({"version": 1, "coding": coding(), "stream": stream()}), encoding="utf-8")

@@ -1,0 +1,132 @@
+"""Whatever comes: no exception, a bounded memory, and no effect on other streams.
+
+RIGID_MOTION_FUZZ=10000000 tries as many datagrams as one has time for.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from rigid_motion.streams import Receiver, Sender
+from rigid_motion.streams.receiver import MOST_ALL_JOINTS, MOST_STREAMS
+from rigid_motion.streams.wire import LONGEST
+
+from .links import body, dance, run
+
+DATAGRAMS = int(os.environ.get("RIGID_MOTION_FUZZ", "6000"))
+
+MOST_BYTES = 128 << 20
+"""That a receiver ever holds."""
+
+
+@pytest.fixture(scope="module")
+def genuine() -> list[bytes]:
+    own = body()
+    outcome = run(own, *dance(own, 3.0), answers=False)
+    return [datagram for _, datagram in outcome.datagrams]
+
+
+def damaged(rng: np.random.Generator, genuine: list[bytes]) -> bytes:
+    """Random bytes; or a genuine datagram with bits flipped, cut off, prolonged, or put together of two."""
+    kind = rng.integers(6)
+    if kind == 0:
+        head = bytes([0x10 | int(rng.integers(5))]) if rng.random() < 0.8 else b""
+        return head + rng.bytes(int(rng.integers(0, 80)))
+    data = bytearray(genuine[rng.integers(len(genuine))])
+    if kind in (1, 2):
+        for _ in range(int(rng.integers(1, 6))):
+            data[rng.integers(len(data))] ^= 1 << int(rng.integers(8))
+    elif kind == 3:
+        del data[int(rng.integers(len(data))) :]
+    elif kind == 4:
+        data += rng.bytes(int(rng.integers(1, 2 * LONGEST if rng.random() < 0.1 else 20)))
+    else:
+        other, cut = genuine[rng.integers(len(genuine))], int(rng.integers(10))
+        data = data[:cut] + other[cut:]
+    return bytes(data)
+
+
+def test_any_datagram_does_no_harm(genuine: list[bytes]) -> None:
+    rng, own = np.random.default_rng(5), body()
+    times, poses = dance(own, 4.0)
+    receiver, alone, sender = Receiver(), Receiver(), Sender([own], rate=60.0)
+    a_sample = -(-DATAGRAMS // len(times))
+    tracemalloc.start()
+    for row, now in enumerate(times.tolist()):
+        for datagram in sender.add(now, poses[:, row]):
+            receiver.take(datagram, now, "friend")
+            alone.take(datagram, now, "friend")
+        for _ in range(a_sample):
+            datagram = damaged(rng, genuine)
+            receiver.take(datagram, now, f"stranger {rng.integers(3)}")
+            sender.hear(datagram, now)
+        shown, expected = receiver.show(now), alone.show(now)
+        receiver.keys()
+        receiver.answers()
+        assert len(shown) <= MOST_STREAMS
+        for stream, only in expected.items():
+            np.testing.assert_array_equal(shown[stream].poses[own.name].positions, only.poses[own.name].positions)
+        for strange in shown.values():
+            for part in strange.poses.values():
+                assert np.isfinite(part.positions).all()
+                assert np.isfinite(part.quaternions).all()
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert expected
+    assert most < MOST_BYTES
+
+
+def test_flipped_bits_from_the_sender_itself_do_no_lasting_harm(genuine: list[bytes]) -> None:
+    rng, own = np.random.default_rng(6), body()
+    times, poses = dance(own, 20.0 if DATAGRAMS > 10000 else 6.0)
+    receiver, sender = Receiver(), Sender([own], rate=60.0)
+    for row, now in enumerate(times.tolist()):
+        for datagram in sender.add(now, poses[:, row]):
+            data = bytearray(datagram)
+            if rng.random() < 0.2 and now < times[-1] - 2.5:
+                data[rng.integers(4, len(data))] ^= 1 << int(rng.integers(8))
+            receiver.take(bytes(data), now, "friend")
+        receiver.show(now)
+    assert receiver.show(times[-1])
+
+
+def test_a_sender_far_in_the_future_is_none(genuine: list[bytes]) -> None:
+    receiver = Receiver()
+    description, motion = genuine[:2]
+    for ticks in (1 << 47, 1 << 61, (1 << 64) - 1):
+        receiver.take(description[:6] + ticks.to_bytes(8, "little") + description[14:], 0.0, ticks)
+        receiver.take(motion, 0.0, ticks)
+    assert [stream.source for stream in receiver.streams] == [1 << 47]
+
+
+def test_strangers_cannot_fill_the_memory() -> None:
+    receiver = Receiver()
+    tracemalloc.start()
+    for number in range(3 * MOST_STREAMS):
+        own = body(200)
+        sender = Sender([own])
+        for datagram in sender.add(0.0, own.rest):
+            receiver.take(datagram, 0.0, number)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert sum(len(receiver.body(stream, "performer").joints) for stream in receiver.streams) <= MOST_ALL_JOINTS
+    assert most < MOST_BYTES
+
+
+def test_a_datagram_costs_little_time() -> None:
+    own = body(60)
+    sender = Sender([own])
+    receiver = Receiver()
+    for datagram in sender.add(0.0, own.rest):
+        receiver.take(datagram, 0.0)
+    rng = np.random.default_rng(1)
+    begun = time.process_time()
+    for number in range(200):
+        head = bytes([0x11]) + sender.identity + (100 + number).to_bytes(2, "little") + bytes(3)
+        receiver.take(head + rng.bytes(40), 0.1 + number)
+    assert time.process_time() - begun < 10.0

@@ -1,0 +1,164 @@
+"""What a receiver shows, whatever the network does."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigid_motion.streams import Receiver, Sender
+from rigid_motion.streams.wire import LATE, MOTION, kind_of
+
+from .links import body, dance, run
+
+TOLERANCE = 0.0051
+
+
+def test_somebody_who_joins_is_shown_the_motion_within_0_3_s() -> None:
+    own = body()
+    outcome = run(own, *dance(own, 5.0), heard_from=2.5)
+    assert outcome.now[0] < 2.8
+    assert outcome.errors.max() <= TOLERANCE
+
+
+def test_somebody_who_joins_unheard_is_shown_it_within_one_refresh() -> None:
+    own = body()
+    outcome = run(own, *dance(own, 5.0), heard_from=2.5, answers=False)
+    assert outcome.now[0] < 2.5 + 1.1
+    assert outcome.errors.max() <= TOLERANCE
+
+
+@pytest.mark.parametrize(("before", "after"), [(0.05, 0.35), (0.35, 0.05), (0.02, 0.08)])
+@pytest.mark.parametrize("answers", [True, False])
+def test_latency_that_changes_for_good(before: float, after: float, answers: bool) -> None:
+    own = body()
+    outcome = run(own, *dance(own, 8.0), latency=lambda now: before if now < 4.0 else after, answers=answers)
+    changed = 4.0 + max(before, after)
+    assert outcome.between(0.0, 4.0).max() <= TOLERANCE
+    assert outcome.between(changed + 1.0, 8.0).max() <= TOLERANCE
+    assert np.diff(outcome.moments).min() >= 0.0
+    # A second later what is shown is as fresh as the network lets it be.
+    late = outcome.now > changed + 1.0
+    assert (outcome.now - outcome.moments)[late].max() < after + 0.1 + 0.02
+    # No picture leaps: not much faster than the body itself ever is.
+    usual = outcome.steps[outcome.now[1:] < 4.0].max()
+    assert outcome.steps.max() < 3.0 * usual
+
+
+@pytest.mark.parametrize("step", [5.0, -5.0])
+def test_a_clock_that_steps_is_a_new_offset(step: float) -> None:
+    own = body()
+    outcome = run(own, *dance(own, 6.0), clock=lambda now: now + 1000.0 + step * (now > 3.0))
+    assert outcome.errors.max() <= TOLERANCE
+    assert np.diff(outcome.moments).min() >= 0.0
+    assert (outcome.now - outcome.moments)[outcome.now > 4.0].max() < 0.13
+
+
+def test_copies_and_old_datagrams_change_nothing() -> None:
+    own = body()
+    samples = dance(own, 5.0)
+    outcome, copied = run(own, *samples), run(own, *samples, copies=3)
+    np.testing.assert_allclose(copied.errors, outcome.errors, atol=2e-3)
+    receiver, now = outcome.receiver, 1005.0
+    before = next(iter(receiver.show(now).values()))
+    for _, datagram in outcome.datagrams[-60:]:
+        receiver.take(datagram, now + 0.001, "sender")
+    after = next(iter(receiver.show(now).values()))
+    assert after.moment == before.moment
+    np.testing.assert_array_equal(after.poses[own.name].positions, before.poses[own.name].positions)
+
+
+@pytest.mark.parametrize("number", range(4, 24, 4))
+@pytest.mark.parametrize("answers", [True, False])
+def test_a_datagram_that_is_lost_costs_no_later_one_its_meaning(number: int, answers: bool) -> None:
+    own = body()
+    sent: list[float] = []
+
+    def lost(now: float, count: int) -> bool:
+        if count == number:
+            sent.append(now)
+        return count == number
+
+    outcome = run(own, *dance(own, 4.0), lost=lost, answers=answers)
+    assert outcome.between(sent[0] + 0.5, 4.0).max() <= TOLERANCE
+
+
+def test_datagrams_in_any_order_come_to_the_same_motion() -> None:
+    own = body()
+    samples = dance(own, 6.0)
+    outcome = run(own, *samples, latency=0.05, jitter=0.25)
+    sequences = [int.from_bytes(datagram[4:6], "little") for _, datagram in outcome.datagrams]
+    assert len(sequences) > 40
+    assert np.mean(outcome.between(3.0, 6.0) <= TOLERANCE) > 0.8
+
+
+@pytest.mark.parametrize(("loss", "within"), [(0.01, 0.98), (0.05, 0.93), (0.2, 0.7)])
+def test_loss(loss: float, within: float) -> None:
+    own = body()
+    rng = np.random.default_rng(3)
+    outcome = run(own, *dance(own, 20.0), lost=lambda now, count: rng.random() < loss, latency=0.03)
+    assert np.mean(outcome.errors <= 0.02) >= within
+    bad = outcome.now[outcome.errors > 0.02]
+    for first in bad:
+        assert outcome.between(first, first + 0.5 + 0.4 * (loss > 0.1)).min() <= TOLERANCE
+
+
+def test_a_sender_that_begins_again_is_told_by_its_identity() -> None:
+    own = body()
+    times, poses = dance(own, 4.0)
+    receiver, again = Receiver(), Sender([own], rate=60.0)
+    sender = Sender([own], rate=60.0)
+    for row, time in enumerate(times.tolist()):
+        # It begins with times of its own.
+        datagrams = sender.add(time, poses[:, row]) if time < 2.0 else again.add(time - 2.0, poses[:, row])
+        for datagram in datagrams:
+            receiver.take(datagram, 50.0 + time, "somebody")
+        receiver.show(50.0 + time)
+    (stream, shown), *others = receiver.show(54.0).items()
+    assert not others
+    assert stream.identity == again.identity != sender.identity
+    assert 1.8 < shown.moment < 2.0
+
+
+def test_several_senders_do_not_mix() -> None:
+    own = body()
+    times, poses = dance(own, 2.0)
+    receiver, alone = Receiver(), Receiver()
+    senders = [Sender([own], rate=60.0) for _ in range(3)]
+    for row, time in enumerate(times.tolist()):
+        for number, sender in enumerate(senders):
+            for datagram in sender.add(time, poses[:, (row * (number + 1)) % len(times)]):
+                receiver.take(datagram, time, number)
+                if number == 1:
+                    alone.take(datagram, time, number)
+        shown, expected = receiver.show(time), alone.show(time)
+    assert len(shown) == 3
+    ((stream, only),) = expected.items()
+    np.testing.assert_array_equal(only.poses[own.name].positions, shown[stream].poses[own.name].positions)
+
+
+def test_keys_can_be_recorded() -> None:
+    own = body()
+    times, poses = dance(own, 4.0)
+    sender, receiver = Sender([own], rate=60.0), Receiver()
+    moments, places = [], []
+    for row, time in enumerate(times.tolist()):
+        for datagram in sender.add(time, poses[:, row]):
+            receiver.take(datagram, time, "sender")
+        for _, answer in receiver.answers():
+            sender.hear(answer, time)
+        new = receiver.keys()
+        for keys in new:
+            moments += keys.moments.tolist()
+            places += keys.poses[own.name].positions.tolist()
+    assert np.diff(moments).min() > 0.0
+    assert moments[-1] > 3.6
+    # Far fewer than samples, and the motion is in them.
+    assert len(moments) < 0.8 * len(times)
+    true = np.stack([np.interp(moments, times, column) for column in poses.positions[0].T], axis=-1)
+    assert np.abs(np.array(places)[:, 0] - true).max() < 0.006
+
+
+def test_motions_are_of_two_kinds() -> None:
+    own = body()
+    outcome = run(own, *dance(own, 1.0))
+    assert {kind_of(datagram) for _, datagram in outcome.datagrams[2:]} <= {MOTION, LATE}

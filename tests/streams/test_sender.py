@@ -1,0 +1,108 @@
+"""A sender sends when it must, and what is shown is within the tolerance, between samples as well."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigid_motion.motion import Poses
+from rigid_motion.streams import Body, Sender
+from rigid_motion.streams.paths import turned
+
+from .links import body, dance, run
+
+SLACK = 1.02
+"""Samples are promised; frames lie between them, where both motions bend a little."""
+
+
+@pytest.mark.parametrize("delay", [0.1, 0.2])
+@pytest.mark.parametrize("rate", [30.0, 60.0, 90.5])
+def test_what_is_shown_is_within_the_tolerance(rate: float, delay: float) -> None:
+    own = body()
+    outcome = run(own, *dance(own, 4.0, rate), delay=delay)
+    assert outcome.errors.max() <= 0.005 * SLACK
+    assert len(outcome.errors) > 400
+
+
+def swing(rate: float) -> tuple[Body, np.ndarray, Poses]:
+    """A hand on a long arm that gets to 22 m/s."""
+    times = np.arange(round(3.0 * rate)) / rate
+    angles = 1.6 * np.sin(9.0 * times) ** 3
+    turns = np.array(turned(np.tile((1.0, 0, 0, 0), (len(times), 1)), angles[:, None] * (0.0, 0.0, 1.0)))
+    places = 1.1 * np.stack((np.cos(angles), np.sin(angles), 0 * angles), axis=-1)
+    return Body.rigid("hand", radius=0.1), times, Poses(places[None], turns[None])
+
+
+@pytest.mark.parametrize("rate", [60.0, 91.0, 120.0])
+def test_a_fast_hand_is_within_the_tolerance_between_samples(rate: float) -> None:
+    own, times, poses = swing(rate)
+    speeds = np.linalg.norm(np.diff(poses.positions[0], axis=0), axis=-1) * rate
+    assert 18.0 < speeds.max() < 25.0
+    outcome = run(own, times, poses, fps=1000.0)
+    assert outcome.errors.max() <= 0.005 * SLACK
+
+
+def test_a_sample_that_is_overdue_is_not_waited_for() -> None:
+    own = body()
+    times, poses = dance(own, 4.0, 90.0)
+    rng = np.random.default_rng(2)
+    kept = np.cumsum(rng.integers(1, 7, len(times)))
+    kept = kept[kept < len(times)]
+    outcome = run(own, times[kept], poses[:, kept])
+    assert np.diff(times[kept]).max() > 0.06
+    assert outcome.errors.max() <= 0.005 * SLACK
+
+
+def test_a_body_at_rest_costs_heartbeats() -> None:
+    own = body()
+    times, poses = dance(own, 10.0)
+    still = poses[:, np.zeros(len(times), dtype=int)]
+    outcome = run(own, times, still)
+    late = [datagram for sent, datagram in outcome.datagrams if sent > 1.0]
+    assert 9.0 / 0.5 - 2 <= len(late) <= 9.0 / 0.5 + 2
+    assert np.ptp(outcome.errors[outcome.now > 5.0]) < 1e-4
+    assert max(map(len, late)) <= 12
+
+
+def test_it_builds_on_what_is_acknowledged() -> None:
+    own = body()
+    samples = dance(own, 4.0)
+    with_answers, without = (run(own, *samples, answers=answers) for answers in (True, False))
+    assert {datagram[8] for sent, datagram in with_answers.datagrams if sent > 0.5} == {1}
+    assert sum(len(d) for _, d in with_answers.datagrams) < 0.8 * sum(len(d) for _, d in without.datagrams)
+
+
+def test_finish_says_the_rest() -> None:
+    own = body()
+    times, poses = dance(own, 1.0)
+    said = []
+    for stop in range(40, 60):
+        sender = Sender([own], rate=60.0)
+        for row in range(stop):
+            sender.add(float(times[row]), poses[:, row])
+        said.append(len(sender.finish()))
+        assert sender.finish() == []
+    assert set(said) == {0, 1}
+
+
+def test_a_clock_that_is_set_makes_no_difference() -> None:
+    own = body()
+    times, poses = dance(own, 3.0)
+    sent = []
+    for set_by in (0.0, 5.0, -5.0):
+        sender, own_clock = Sender([own], rate=60.0), times + set_by * (times > 1.5)
+        sent.append([[d[4:] for d in sender.add(float(t), poses[:, row])] for row, t in enumerate(own_clock)])
+    usual, *others = (sum(len(datagram) for datagrams in run for datagram in datagrams) for run in sent)
+    assert others == pytest.approx([usual, usual], rel=0.03)
+
+
+@pytest.mark.parametrize("wrong", [{"tolerance": 0.0}, {"delay": float("nan")}, {"refresh": -1.0}])
+def test_numbers_that_are_none_are_refused(wrong: dict) -> None:
+    with pytest.raises(ValueError, match="is not a positive number"):
+        Sender([body()], **wrong)
+
+
+def test_poses_that_are_none_are_refused() -> None:
+    sender = Sender([body(3)])
+    with pytest.raises(ValueError, match="3 finite poses"):
+        sender.add(0.0, Poses(np.full((3, 3), np.nan), np.tile((1.0, 0, 0, 0), (3, 1))))
