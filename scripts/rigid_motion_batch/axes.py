@@ -58,12 +58,3 @@ def _changed(poses: Poses, change: np.ndarray) -> Poses:
     quaternions = poses.quaternions.copy()
     quaternions[..., 1:] = handedness * poses.quaternions[..., 1:] @ change.T
     return Poses(poses.positions @ change.T, quaternions, poses.scales)
-
-
-def from_blender(poses: Poses, axes: str) -> Poses:
-    """Poses (..., n) in Blender's axes, in those of a convention: the way back of `to_blender`, which see."""
-    change = AXES[axes].T
-    handedness = np.sign(np.linalg.det(change))
-    quaternions = poses.quaternions.copy()
-    quaternions[..., 1:] = handedness * poses.quaternions[..., 1:] @ change.T
-    return Poses(poses.positions @ change.T, quaternions, poses.scales)
