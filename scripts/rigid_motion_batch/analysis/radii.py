@@ -6,6 +6,7 @@ import csv
 import io
 import math
 import os
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from rigid_motion_batch.command_line import printable
+from rigid_motion_batch.recordings.column_names import METRES
 from rigid_motion_batch.rows import meant
 
 RIGID, JOINT = 0.1, 0.03
@@ -58,12 +60,12 @@ def read_radii(text: str) -> Radii:
         With the line of the table, what is wrong, and the way out.
     """
     try:
-        return Radii(rigid=_radius(text), joint=_radius(text))
+        return Radii(rigid=radius_in_metres(text), joint=radius_in_metres(text))
     except ValueError:
         # Not that of pathlib, for which a name that is too long for a file is an error.
         if not os.path.isfile(text):
             raise ValueError(
-                f"{text!r} is neither a number of metres above 0 nor a table of radii (CSV: joint,radius_m)"
+                f"{text!r} is neither a length above 0, such as 3cm or 0.03, nor a table of radii (CSV: joint,radius_m)"
             ) from None
     return Radii(named=tuple(_read_table(Path(text)).items()))
 
@@ -95,14 +97,19 @@ def _read_table(path: Path) -> dict[str, float]:
         if joint in radii:
             raise ValueError(f"{path}:{number}: the joint {joint!r} comes a second time; leave one")
         try:
-            radii[joint] = _radius(radius)
+            radii[joint] = _above_zero(float(radius))
         except ValueError:
             raise ValueError(f"{path}:{number}: {radius!r} is no number of metres above 0") from None
     return radii
 
 
-def _radius(text: str) -> float:
-    radius = float(text)
+def radius_in_metres(text: str) -> float:
+    """A radius as it is written: 3cm, 30mm, 0.03m, or 0.03. Raises ValueError where it is none above 0."""
+    number, unit = re.fullmatch(r"(.*?)\s*(mm|cm|m)?\s*", text, re.DOTALL).groups()
+    return _above_zero(float(number) * METRES[unit or "m"])
+
+
+def _above_zero(radius: float) -> float:
     if not 0.0 < radius < math.inf:
         raise ValueError
     return radius

@@ -160,9 +160,9 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         "--radius",
         type=_radii,
         default=EVERYWHERE,
-        metavar="M|CSV",
-        help=f"radius of the shell error, in metres ({RIGID}, around the joints of bodies {JOINT}); or a table "
-        "joint,radius_m for joints by name",
+        metavar="LENGTH|CSV",
+        help=f"radius of the shell error: 3cm, or 0.03 for metres ({RIGID}, around the joints of bodies {JOINT}); or a "
+        "table joint,radius_m for joints by name",
     )
     parser.add_argument(
         "--against",

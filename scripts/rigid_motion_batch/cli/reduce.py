@@ -9,11 +9,10 @@ result is a new file; the input stays as it is.
 from __future__ import annotations
 
 import argparse
-import math
 from collections.abc import Callable
 from pathlib import Path
 
-from rigid_motion_batch.command_line import not_empty, number, parser_of, program_of
+from rigid_motion_batch.command_line import not_empty, parser_of, program_of
 from rigid_motion_batch.system_libraries import require_blender
 
 SCRIPT = "reduce.py"
@@ -22,7 +21,7 @@ PROGRAM = program_of(SCRIPT)
 from rigid_motion.gltf.sizes import OF_A_BODY, OF_KEY_POSES
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.analysis.choices import Tolerance
-from rigid_motion_batch.analysis.radii import RIGID
+from rigid_motion_batch.analysis.radii import RIGID, radius_in_metres
 from rigid_motion_batch.axes import AXES
 from rigid_motion_batch.keying.gltf_files import ENDINGS, GltfRun
 from rigid_motion_batch.keying.options import Job, add_file_options, add_target_options, jobs_of, refuse_odd_places
@@ -137,9 +136,9 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     keys.add_argument(
         "--radius",
         type=_radius,
-        metavar="M",
-        help="metres around the origin within which no point is off by more (the size of an object, the length of a "
-        f"bone; for rigid recordings {RIGID})",
+        metavar="LENGTH",
+        help="how far around the origin no point is off by more: 3cm, or 0.03 for metres (the size of an object, the "
+        f"length of a bone; for rigid recordings {RIGID})",
     )
     keys.add_argument(
         "--shared", action="store_true", help="key poses: all bones of a rig get their keys on the same frames"
@@ -293,10 +292,10 @@ def _count(text: str) -> int:
 
 
 def _radius(text: str) -> float:
-    radius = number(text)
-    if not 0.0 < radius < math.inf:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of metres above 0")
-    return radius
+    try:
+        return radius_in_metres(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a length above 0, such as 3cm or 0.03") from None
 
 
 def _fps(text: str) -> int:

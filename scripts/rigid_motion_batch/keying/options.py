@@ -10,6 +10,9 @@ from pathlib import Path
 
 from rigid_motion_batch.command_line import folder_path
 
+NAMES_OF_FILES = {".blend", ".csv", ".glb", ".gltf", ".tum"}
+"""What a folder is not called."""
+
 
 @dataclass(frozen=True)
 class Job:
@@ -84,6 +87,8 @@ def refuse_odd_places(options: argparse.Namespace) -> None:
         raise ValueError("--in-place saves the files themselves, --output writes others: give one of them")
     if options.output and options.output.exists() and not options.output.is_dir():
         raise ValueError(f"--output {options.output} is a file: give a folder")
+    if options.output and options.output.suffix.lower() in NAMES_OF_FILES and not options.output.exists():
+        raise ValueError(f"--output {options.output} is the name of a file: give a folder")
 
 
 def _names(text: str) -> list[str]:

@@ -120,9 +120,11 @@ def test_a_table_that_is_too_large_or_has_an_endless_cell_is_refused(table: Call
         read_radii(table("joint,radius_m\n" + "x" * (MOST_BYTES // 2)))
 
 
-@pytest.mark.parametrize("text", ["", "0", "-1", "nan", "inf", "10cm", "no such.csv", ".", "a\0b", "x" * 5000, "*"])
+@pytest.mark.parametrize(
+    "text", ["", "0", "-1", "nan", "inf", "10km", "-3cm", "no such.csv", ".", "a\0b", "x" * 5000, "*"]
+)
 def test_what_is_neither_a_number_nor_a_table_is_told(text: str) -> None:
-    with pytest.raises(ValueError, match=r"is neither a number of metres above 0 nor a table of radii"):
+    with pytest.raises(ValueError, match=r"is neither a length above 0, such as 3cm or 0\.03, nor a table"):
         read_radii(text)
 
 
@@ -136,3 +138,8 @@ def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
 def test_a_name_from_a_table_of_ours_is_the_joint_that_was_meant(tmp_path: Path) -> None:
     (tmp_path / "radii.csv").write_text("joint,radius_m\n'=1+1,0.2\n'quoted',0.3\n", encoding="utf-8")
     assert list(read_radii(str(tmp_path / "radii.csv")).of(["=1+1", "'quoted'", "other"])) == [0.2, 0.3, JOINT]
+
+
+@pytest.mark.parametrize("text", ["0.03", "3cm", "3 cm", "30mm", "0.03m", "3e-2m"])
+def test_a_radius_may_have_its_unit(text: str) -> None:
+    assert read_radii(text).joint == pytest.approx(0.03)
