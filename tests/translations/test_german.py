@@ -61,6 +61,8 @@ UNSEEN = {
     "Which components of them, as bits",
     "Whether bones have modes, or constraints for them",
     "Whether the constraints of bones show nothing, for as long as the rig is in Edit Mode",
+    "File Filter",
+    "Files that the dialog shows",
     # For the log, and for those who call the program from Python
     "In-betweens could not be brought up to date",
     "neither an object nor a pose bone: ",
