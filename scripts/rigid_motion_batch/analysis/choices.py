@@ -20,13 +20,13 @@ from rigid_motion.motion import decimate, reduce_keys, reduce_skeleton_keys, she
 from rigid_motion_batch.recordings.clips import Clip
 
 MILLIMETRES = {"mm": 1, "cm": 10, "m": 1000}
-"""Units of a tolerance, and how many millimetres they have."""
+"""Units of tolerances and radii, and how many millimetres they have."""
 
 Radius = float | np.ndarray
 """Of the ball at every joint, in metres: one for all, or shape (joints,)."""
 
 METRES = {unit: length * 1e-3 for unit, length in MILLIMETRES.items()}
-"""Units of a tolerance, and their lengths."""
+"""Units of tolerances and radii, and their lengths."""
 
 NUMBER = r"\d{1,6}(?:\.\d{1,6})?"
 """What amounts are made of: names of folders as well."""

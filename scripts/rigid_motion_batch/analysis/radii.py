@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from rigid_motion_batch.command_line import printable
-from rigid_motion_batch.recordings.column_names import METRES
 from rigid_motion_batch.rows import meant
+
+from .choices import METRES
 
 RIGID, JOINT = 0.1, 0.03
 """Of what a hand holds, and of what is around a joint of a body."""
@@ -105,7 +106,7 @@ def _read_table(path: Path) -> dict[str, float]:
 
 def radius_in_metres(text: str) -> float:
     """A radius as it is written: 3cm, 30mm, 0.03m, or 0.03. Raises ValueError where it is none above 0."""
-    number, unit = re.fullmatch(r"(.*?)\s*(mm|cm|m)?\s*", text, re.DOTALL).groups()
+    number, unit = re.fullmatch(rf"(.*?)\s*({'|'.join(METRES)})?\s*", text, re.DOTALL).groups()
     return _above_zero(float(number) * METRES[unit or "m"])
 
 
