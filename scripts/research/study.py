@@ -17,7 +17,7 @@ from typing import Any
 from rigid_motion_batch.pipeline.steps import Job, Step, Task, TaskError
 from rigid_motion_batch.pipeline.store import Store
 
-ROOMS = ("rigid_motion/motion", "analysis", "recordings", "streaming")
+ROOMS = ("rigid_motion/motion", "analysis", "recordings")
 """What numbers may depend on."""
 
 PICTURE_ROOMS = (*ROOMS, "rigid_motion/animation", "scenes", "assets/models.blend", "research/making")

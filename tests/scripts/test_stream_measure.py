@@ -11,11 +11,11 @@ import pytest
 from rigid_motion.streams.bodies import Forest
 from rigid_motion_batch.cli.stream import main
 from rigid_motion_batch.cli.stream_measure import body_of, samples_of
-from rigid_motion_batch.live.measuring import straight
-from rigid_motion_batch.live.packed import WAYS, errors, smallest_three
-from rigid_motion_batch.live.written import write_bvh
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.figures import Figure
+from rigid_motion_batch.streaming.measuring import straight
+from rigid_motion_batch.streaming.packed import WAYS, errors, smallest_three
+from rigid_motion_batch.streaming.written import write_bvh
 from tests.streams.links import body, dance
 
 

@@ -32,8 +32,8 @@ from rigid_motion.streams.residuals import (
     symbols_of,
 )
 from rigid_motion_batch.cli.stream_measure import body_of, samples_of
-from rigid_motion_batch.live.measuring import even_rate
 from rigid_motion_batch.recordings.clip_reading import read_clips
+from rigid_motion_batch.streaming.measuring import even_rate
 
 ROOT = Path(__file__).resolve().parents[3]
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.streaming import PACKINGS, bandwidth, send
 
 from . import claims
+from .streaming import PACKINGS, bandwidth, send
 
 
 @dataclass(frozen=True)

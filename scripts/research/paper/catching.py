@@ -25,10 +25,10 @@ from rigid_motion_batch.scenes import captions, layout, trails
 from rigid_motion_batch.scenes.materials import surface
 from rigid_motion_batch.scenes.nodes import apply_group
 from rigid_motion_batch.scenes.subject import load_subject
-from rigid_motion_batch.streaming import Link, Playback, receive, send
-from rigid_motion_batch.streaming.smooth import joined
 
 from .picture import FAINT, INK, RULE, Sheet
+from .streaming import Link, Playback, receive, send
+from .streaming.smooth import joined
 from .table import PHASES
 
 ENGINES = ("lerp_slerp", "dq_sclerp", "pga_lerp", "motor_spline")

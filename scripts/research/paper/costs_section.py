@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rigid_motion_batch.report.numbers import listed
-from rigid_motion_batch.streaming.packets import HEADER
 
 from . import claims
 from .bandwidths import Bandwidth
 from .claims import BLEND
 from .results import Results
+from .streaming.packets import HEADER
 from .timing import ALGEBRA, AS_GOOD, CONFIDENCE, EQUAL, FAST, FRAMES_PER_S, PAPER, SINGLE, USERS, Timing
 from .wording import changed, doubt, grid, timed
 

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from research.markup import Markup, element
 from rigid_motion.motion import MODES
 from rigid_motion_batch.palette import colour_of
-from rigid_motion_batch.streaming import PACKINGS
+
+from .streaming import PACKINGS
 
 WIDTH = 480
 LINE = 15

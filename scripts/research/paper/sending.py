@@ -17,12 +17,11 @@ from rigid_motion.motion import measure, rms
 from rigid_motion_batch.analysis.metrics import NOTHING
 from rigid_motion_batch.analysis.modes import REFERENCE
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.streaming import PACKINGS, TWISTS, receive
-from rigid_motion_batch.streaming.needed import send_when_needed
-from rigid_motion_batch.streaming.playing import HEARTBEAT
-from rigid_motion_batch.streaming.wire import Layout
 
 from . import claims
+from .streaming import PACKINGS, TWISTS, receive
+from .streaming.needed import send_when_needed
+from .streaming.packets import HEADER
 from .table import RADIUS, UNIFORM, UPDATES, YARDSTICKS, Point, lowest, mean_rates, point, rates_for, senders
 
 DELAYS = (1.5, 2.0, 3.0, 4.0)
@@ -32,6 +31,9 @@ MODES_SENT = (REFERENCE, TWISTS)
 
 TOLERANCES = (1.0, 1.6, 2.4, 3.6, 5.2)
 """Multiples of the RMS shell error of the even stream."""
+
+HEARTBEAT = 0.5
+"""Seconds of silence after which the newest key is sent again."""
 
 AROUND_A_PACKET = 28
 """Bytes that UDP over IPv4 adds."""
@@ -148,7 +150,8 @@ def stream(clip: Clip, mode: str, even: int, delay: float, tolerance: float) -> 
 
 def packet_bytes(packing: str, mode: str) -> int:
     """Bytes of an update with everything around it."""
-    return AROUND_A_PACKET + Layout(PACKINGS[packing], mode == TWISTS).size
+    twist = PACKINGS[packing].twist_size if mode == TWISTS else 0
+    return AROUND_A_PACKET + HEADER.itemsize + PACKINGS[packing].size + twist
 
 
 def sending_needed(even: Iterable[Point], sent: Iterable[Sent]) -> list[SentNeeded]:

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from rigid_motion_batch.analysis.modes import REFERENCE
 from rigid_motion_batch.report.numbers import listed
-from rigid_motion_batch.streaming import TWISTS
 
 from . import claims
 from .sending import AROUND_A_PACKET, DELAYS, HEARTBEAT, MODES_SENT, SentNeeded, at_delay, packet_bytes
+from .streaming import TWISTS
 from .table import YARDSTICKS
 from .wording import grid, heads, holding, less, needed_cell, papers_row, percent, verdict
 

@@ -21,12 +21,12 @@ from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.axes import AXES, from_blender, to_blender
 from rigid_motion_batch.command_line import number, path_line
 from rigid_motion_batch.files import replacing
-from rigid_motion_batch.live.measuring import Link, Measured, measure, straight
-from rigid_motion_batch.live.packed import WAYS, bytes_a_second, errors
-from rigid_motion_batch.live.written import write_bvh, write_csv
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.streaming.measuring import Link, Measured, measure, straight
+from rigid_motion_batch.streaming.packed import WAYS, bytes_a_second, errors
+from rigid_motion_batch.streaming.written import write_bvh, write_csv
 
 EPILOG = """
 examples:

@@ -1,32 +1,7 @@
-"""Poses on the way: a sender, a link that delays and loses, and a receiver that shows a motion all the same.
+"""Streaming: `rigid_motion.streams` over a transport, and what it costs.
 
-    packets = send(times, poses, rate=20.0, packing=PACKINGS["double"])
-    arrivals = Link(latency=0.05, jitter=0.02, loss=0.1).carry(packets, np.random.default_rng(1))
-    playback = receive(packets, arrivals, display_times, "dq_sclerp")
-
-Seconds throughout; positions keep their unit. NumPy alone.
+transports  what carries datagrams: two methods, and UDP on this machine
+packed      what else one would send: floats, and the smallest three components, at even rates
+measuring   a recording sent to another process in real time, and what was shown there
+written     what was shown, as BVH or CSV
 """
-
-from .events import Event, What
-from .link import Link
-from .packets import Packets, bandwidth
-from .packing import PACKINGS, Packing, smallest_three
-from .receiver import Playback, PlayOut, receive
-from .sender import send
-from .smooth import TWISTS
-
-__all__ = [
-    "PACKINGS",
-    "TWISTS",
-    "Event",
-    "Link",
-    "Packets",
-    "Packing",
-    "PlayOut",
-    "Playback",
-    "What",
-    "bandwidth",
-    "receive",
-    "send",
-    "smallest_three",
-]

@@ -10,10 +10,10 @@ import pytest
 
 from research import reproduce_paper
 from research.paper import sending, steps, table, timing
+from research.paper.streaming import TWISTS
 from research.study import Study
 from rigid_motion.motion import MODES
 from rigid_motion_batch.pipeline.store import Store
-from rigid_motion_batch.streaming import TWISTS
 
 ASSETS = Path(__file__).resolve().parents[3] / "assets"
 

@@ -8,9 +8,9 @@ from xml.etree import ElementTree
 import pytest
 
 from research.paper import engines
+from research.paper.streaming import PACKINGS
 from rigid_motion.motion import MODES
 from rigid_motion.motion.modes import Mode
-from rigid_motion_batch.streaming import PACKINGS
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -11,13 +11,13 @@ from research.paper import claims, sending
 from research.paper.page import with_section
 from research.paper.sending import Sent, SentNeeded, at_delay, mean_sending, packet_bytes, sending_needed
 from research.paper.sending_section import HEADING, in_short, sending_section
+from research.paper.streaming import PACKINGS, TWISTS, Packets
+from research.paper.streaming.needed import send_when_needed
 from research.paper.table import UNIFORM, YARDSTICKS, Point
 from rigid_motion.motion import rms
 from rigid_motion_batch.analysis.modes import REFERENCE
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.streaming import PACKINGS, TWISTS, Packets
-from rigid_motion_batch.streaming.needed import send_when_needed
-from tests.scripts.streaming.motions import swinging
+from tests.scripts.research.paper.streaming.motions import swinging
 
 
 @pytest.fixture

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from research.paper.streaming.known_keys import NONE, KnownKeys
 from rigid_motion.motion import MODES
-from rigid_motion_batch.streaming.known_keys import NONE, KnownKeys
-from tests.scripts.streaming.motions import swinging
+from tests.scripts.research.paper.streaming.motions import swinging
 
 ALL_KNOWN = 100.0
 

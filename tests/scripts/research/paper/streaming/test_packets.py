@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from research.paper.streaming import PACKINGS, Packets, bandwidth, send
 from rigid_motion.motion import Poses, interpolate
 from rigid_motion.motion.quaternions import angle_between
-from rigid_motion_batch.streaming import PACKINGS, Packets, bandwidth, send
-from tests.scripts.streaming.motions import swinging
+from tests.scripts.research.paper.streaming.motions import swinging
 
 
 @pytest.mark.parametrize(("rate", "bytes_a_second"), [(20.0, 1120.0), (30.0, 1680.0)])

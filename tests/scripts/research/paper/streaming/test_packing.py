@@ -8,9 +8,9 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from research.paper.streaming import PACKINGS, smallest_three
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import angle_between, normalise
-from rigid_motion_batch.streaming import PACKINGS, smallest_three
 
 ONE = np.array([[1.0, 0.0, 0.0, 0.0]])
 HALF = np.sqrt(0.5)

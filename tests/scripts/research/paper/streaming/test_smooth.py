@@ -7,11 +7,11 @@ import pytest
 from scipy.linalg import expm, logm
 from scipy.spatial.transform import Rotation
 
+from research.paper.streaming import PACKINGS, TWISTS, Packets, receive
+from research.paper.streaming.smooth import between, fitted, moved
 from rigid_motion.motion import Poses, interpolate
 from rigid_motion.motion.quaternions import angle_between
-from rigid_motion_batch.streaming import PACKINGS, TWISTS, Packets, receive
-from rigid_motion_batch.streaming.smooth import between, fitted, moved
-from tests.scripts.streaming.motions import swinging
+from tests.scripts.research.paper.streaming.motions import swinging
 
 
 def matrices(poses: Poses) -> np.ndarray:

@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from research.paper.streaming import Link, PlayOut, What, receive, send
 from rigid_motion.motion import MODES, Poses
-from rigid_motion_batch.streaming import Link, PlayOut, What, receive, send
-from tests.scripts.streaming.motions import FRAME, SOURCES, clips, fastest, steps, swinging
+from tests.scripts.research.paper.streaming.motions import FRAME, SOURCES, clips, fastest, steps, swinging
 from tests.thoroughness import sample, tried
 
 FACTOR = 3.0

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from research.paper.streaming import fading
+from research.paper.streaming.fading import Jumps, fade
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import angle_between, normalise
-from rigid_motion_batch.streaming import fading
-from rigid_motion_batch.streaming.fading import Jumps, fade
 from tests.motion.cases import random_quaternions
 
 TIMES = np.arange(11.0)

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from research.paper.streaming import PACKINGS, TWISTS, Link, Packets, Playback, PlayOut, What, receive
+from research.paper.streaming.needed import Key, NeededSender, send_when_needed
 from rigid_motion.motion import MODES, Poses, decimate, interpolate, rms, shell_error
-from rigid_motion_batch.streaming import PACKINGS, TWISTS, Link, Packets, Playback, PlayOut, What, receive
-from rigid_motion_batch.streaming.needed import Key, NeededSender, send_when_needed
-from tests.scripts.streaming.motions import FRAME, clips, steps, swinging
+from tests.scripts.research.paper.streaming.motions import FRAME, clips, steps, swinging
 from tests.thoroughness import sample, tried
 
 RADIUS = 0.1

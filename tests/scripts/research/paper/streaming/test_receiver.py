@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from research.paper.streaming import PACKINGS, Link, Packets, Playback, PlayOut, What, receive, send
+from research.paper.streaming.packets import HEADER, sealed
 from rigid_motion.motion import MODES, Poses, interpolate, rms, shell_error
 from rigid_motion.motion.quaternions import angle_between
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.streaming import PACKINGS, Link, Packets, Playback, PlayOut, What, receive, send
-from rigid_motion_batch.streaming.packets import HEADER, sealed
-from tests.scripts.streaming.motions import FRAME, SOURCES, clips, swinging
+from tests.scripts.research.paper.streaming.motions import FRAME, SOURCES, clips, swinging
 from tests.thoroughness import sample, tried
 
 RATE = 20.0

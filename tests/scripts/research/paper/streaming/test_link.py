@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigid_motion_batch.streaming import Link, send
-from tests.scripts.streaming.motions import swinging
+from research.paper.streaming import Link, send
+from tests.scripts.research.paper.streaming.motions import swinging
 
 COUNT = 20_000
 SENT = np.arange(COUNT) * 0.05

@@ -11,15 +11,15 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
+from research.paper.streaming import PACKINGS, TWISTS, Link, Packets, Playback, PlayOut, What, receive, send
+from research.paper.streaming.admission import ENOUGH, FAR, NEAR
+from research.paper.streaming.packets import HEADER, sealed
+from research.paper.streaming.receiver import LONGEST_FADE
+from research.paper.streaming.smooth import fitted, reach_of
 from rigid_motion.motion import MODES
 from rigid_motion.motion.quaternions import angle_between
-from rigid_motion_batch.streaming import PACKINGS, TWISTS, Link, Packets, Playback, PlayOut, What, receive, send
-from rigid_motion_batch.streaming.admission import ENOUGH, FAR, NEAR
-from rigid_motion_batch.streaming.packets import HEADER, sealed
-from rigid_motion_batch.streaming.receiver import LONGEST_FADE
-from rigid_motion_batch.streaming.smooth import fitted, reach_of
-from tests.scripts.streaming.motions import FRAME, fastest, steps, swinging
-from tests.scripts.streaming.test_continuity import FACTOR
+from tests.scripts.research.paper.streaming.motions import FRAME, fastest, steps, swinging
+from tests.scripts.research.paper.streaming.test_continuity import FACTOR
 from tests.thoroughness import THOROUGH, sample, tried
 
 RATE = 20.0
