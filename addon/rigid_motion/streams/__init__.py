@@ -10,7 +10,7 @@ A sender knows what its receivers show, a delay behind, and says something only 
     for datagram in transport.received():         # where receivers answer: what is lost then costs least
         for reply in sender.hear(datagram, now):
             transport.send(reply)
-    sender.describe()                             # names, parents and rest for somebody who joins, by a reliable way
+    sender.join()                                 # names, parents and rest for somebody who joins, by a reliable way
     sender.finish()                               # what is still needed where no more samples are to come
 
 A receiver takes any bytes, from anybody, without ever raising an exception:

@@ -219,6 +219,11 @@ class Sender:
         ticks = math.floor(self._times[-1] * TICKS) if self._times else 0
         return describe(self.identity, max(ticks, 0), self._forest, self._terms)
 
+    def join(self) -> list[bytes]:
+        """What somebody who joins needs: the description. The next message then builds on nothing."""
+        self._wanted = True
+        return self.describe()
+
     def hear(self, datagram: bytes, now: float) -> list[bytes]:
         """Take an answer, at a time by the clock of the samples, and return what is to be sent for it."""
         read = read_answer(datagram) if kind_of(datagram) == ANSWER else None

@@ -18,7 +18,8 @@ from rigid_motion.motion.quaternions import align_signs
 from rigid_motion.streams import Body
 from rigid_motion.streams.bodies import RADIUS, Forest
 from rigid_motion_batch.analysis.choices import Tolerance
-from rigid_motion_batch.axes import AXES, from_blender, to_blender
+from rigid_motion_batch.analysis.metrics import write_poses
+from rigid_motion_batch.axes import AXES, from_blender
 from rigid_motion_batch.command_line import number, path_line
 from rigid_motion_batch.files import replacing
 from rigid_motion_batch.recordings import TrajectoryError
@@ -26,7 +27,8 @@ from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.streaming.measuring import Link, Measured, measure, straight
 from rigid_motion_batch.streaming.packed import WAYS, bytes_a_second, errors
-from rigid_motion_batch.streaming.written import write_bvh, write_csv
+from rigid_motion_batch.streaming.sending import body_of, samples_of
+from rigid_motion_batch.streaming.written import write_bvh
 
 EPILOG = """
 examples:
@@ -38,9 +40,6 @@ Bytes a second leave out what somebody who joins is told once (names, parents, r
 poses); they are a line of their own. Headers are those of UDP and IPv4, 28 bytes a datagram. shown.bvh is what was
 shown at the recording's moments, in its units and axes.
 """
-
-SLIDES = 1e-4
-"""Metres by which a joint has to change its place in its parent's space to be sent with it."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -84,29 +83,6 @@ def run(options: argparse.Namespace) -> None:
         print(path_line(options.output))
 
 
-def samples_of(clip: Clip) -> tuple[np.ndarray, Poses]:
-    """The moments (n,) of a clip and its poses (joints, n), in metres and Blender's axes.
-
-    Of a file whose keys are not at its frames those are what it shows at its frames.
-    """
-    poses = to_blender(clip.in_metres(clip.poses), clip.axes)
-    positions, quaternions = (part if part.ndim == 3 else part[None] for part in (poses.positions, poses.quaternions))
-    times, poses = clip.times, Poses(positions, quaternions)
-    if clip.rate and len(times) != round((times[-1] - times[0]) * clip.rate) + 1:
-        even = np.arange(times[0], times[-1] + 0.01 / clip.rate, 1.0 / clip.rate)
-        return even, straight(times, poses).at(even)
-    return times, poses
-
-
-def body_of(clip: Clip, poses: Poses, radius: float) -> Body:
-    """What is streamed of a clip. At rest it is as in its first sample."""
-    rest = poses[:, 0]
-    if clip.figure is None:
-        return Body.rigid(clip.name, rest, radius)
-    sliding = np.ptp(poses.positions, axis=1).max(axis=1) > SLIDES
-    return Body(clip.name, clip.figure.joints, clip.figure.parents, rest, radius, sliding | (clip.figure.parents < 0))
-
-
 def packed(body: Body, times: np.ndarray, poses: Poses) -> dict[str, dict[str, float]]:
     """What even streams of packed joints cost, and how far off they are."""
     forest, found = Forest([body]), {}
@@ -127,10 +103,10 @@ def write(path: Path, clip: Clip, body: Body, times: np.ndarray, shown: Poses) -
     """Write what was shown in the units and axes of the recording."""
     there = from_blender(shown, clip.axes)
     there = Poses(there.positions / clip.metres_per_unit, there.quaternions)
-    with replacing(path) as file:
-        if clip.figure is None:
-            write_csv(file, times, there[0])
-        else:
+    if clip.figure is None:
+        write_poses(path, times, there[0])
+    else:
+        with replacing(path) as file:
             write_bvh(file, clip.figure, body.sliding, times, there)
 
 

@@ -1,25 +1,83 @@
-"""What was shown as files: a body as BVH, a single rigid body as CSV. In the units and axes of the recording."""
+"""What was shown as files: CSV, TUM and BVH."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TextIO
 
 import numpy as np
 
-from rigid_motion.motion import Poses
+from rigid_motion.motion import Poses, Skeleton, interpolate
 from rigid_motion.motion.eulers import extrinsic_eulers_from_quaternions
-from rigid_motion_batch.analysis.metrics import lines_of_poses
+from rigid_motion.streams import Body
+from rigid_motion_batch.analysis.metrics import lines_of_poses, write_poses
+from rigid_motion_batch.axes import from_blender
+from rigid_motion_batch.files import replacing
+from rigid_motion_batch.recordings.clip_reading import folder_names
 from rigid_motion_batch.recordings.figures import Figure
 
 TURNS = "Zrotation Xrotation Yrotation"
 PLACES = "Xposition Yposition Zposition"
 
 
-def write_csv(file: TextIO, times: np.ndarray, poses: Poses) -> None:
-    """The poses (n,) of a rigid body."""
-    file.write("t,x,y,z,qw,qx,qy,qz\n")
-    for _, lines in lines_of_poses([times, *poses.positions.T, *poses.quaternions.T]):
-        file.write("".join(f"{line}\n" for line in lines))
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """What was shown of a body."""
+
+    name: str
+
+    body: Body
+
+    times: np.ndarray
+    """Shape (n,)."""
+
+    poses: Poses
+    """In metres and Blender's axes, each joint in its parent's space. Shape (joints, n)."""
+
+    def even(self, mode: str, fps: float) -> Motion:
+        """So many poses a second instead, with the in-betweens of a mode."""
+        times = self.times[0] + np.arange(int((self.times[-1] - self.times[0]) * fps + 1e-6) + 1) / fps
+        return replace(self, times=times, poses=interpolate(self.times, self.poses, times, mode))
+
+
+def write_motions(path: Path, motions: Sequence[Motion], fps: float) -> list[Path]:
+    """Write a table of all, `.csv`, or a file for each, `.bvh` or `.tum`, and return what was written.
+
+    In tables joints are where they are in the world, and TUM takes rigid bodies alone. BVH is y up, as it is elsewhere.
+    """
+    if path.suffix.lower() == ".csv":
+        with replacing(path) as file:
+            _write_table(file, motions)
+        return [path]
+    if path.suffix.lower() == ".tum":
+        motions = [motion for motion in motions if len(motion.body.joints) == 1]
+    names = folder_names(f"{path.stem}-{motion.name}" if len(motions) > 1 else path.stem for motion in motions)
+    paths = [path.with_name(f"{name}{path.suffix.lower()}") for name in names]
+    for place, motion in zip(paths, motions, strict=True):
+        if place.suffix == ".tum":
+            write_poses(place, motion.times, motion.poses[0])
+            continue
+        body, even = motion.body, motion.even("lerp_slerp", fps)
+        poses = from_blender(even.poses, "opengl")
+        # A bone ends as far behind its joint as that is behind its parent.
+        figure = Figure(body.joints, body.parents, body.rest, from_blender(body.rest, "opengl").positions)
+        with replacing(place) as file:
+            write_bvh(file, figure, body.sliding, even.times, poses)
+    return paths
+
+
+def _write_table(file: TextIO, motions: Sequence[Motion]) -> None:
+    file.write("device,t,x,y,z,qw,qx,qy,qz\n")
+    for motion in motions:
+        poses = Skeleton(motion.body.parents).in_root_space(motion.poses)
+        for joint, name in enumerate(motion.body.joints):
+            device = motion.name if len(motion.body.joints) == 1 else f"{motion.name}.{name}"
+            device = device.replace(",", "_").replace('"', "_")
+            own = poses[joint]
+            for _, lines in lines_of_poses([motion.times, *own.positions.T, *own.quaternions.T]):
+                file.write("".join(f"{device},{line}\n" for line in lines))
 
 
 def write_bvh(file: TextIO, figure: Figure, sliding: np.ndarray, times: np.ndarray, poses: Poses) -> None:

@@ -1,0 +1,215 @@
+"""Rooms, which Zenoh runs: who is there, and what they say.
+
+Keys are ROOM/USER/STREAM. A sender says its `motion`, best effort and at once, and its `skeleton`, which is sure to
+arrive; others say `answers` to it. Whoever listens has a token ROOM/USER/listening/ID, by which senders know that
+somebody came. Everything stays on loopback, and nobody is looked for, unless more is asked for.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import json
+import queue
+import re
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
+
+from rigid_motion.streams.wire import LONGEST
+from rigid_motion_batch.places import CHECKOUT
+
+if TYPE_CHECKING:
+    import zenoh
+
+PORT = 7447
+"""Zenoh's own."""
+
+HERE, EVERYWHERE = "127.0.0.1", "0.0.0.0"
+
+MOTION, SKELETON, ANSWERS, LISTENING = "motion", "skeleton", "answers", "listening"
+
+USER = re.compile(r"[\w.-]+")
+ROOM = re.compile(r"[\w.-]+(/[\w.-]+)*")
+
+WAIT_MS = 2000
+"""For which a router that cannot be reached is tried."""
+
+RETRY = {"period_init_ms": 100, "period_max_ms": 200, "period_increase_factor": 1.5}
+"""Milliseconds between attempts, at first and at most."""
+
+LARGEST = 1 << 16
+"""Bytes of what Zenoh takes from others at once."""
+
+MOST_WAITING = 4096
+"""Datagrams that wait to be looked at; others are dropped, as a network does."""
+
+
+class RoomError(ValueError):
+    """What ends a command, with the way out."""
+
+
+class Came(NamedTuple):
+    """What came."""
+
+    user: str
+    stream: str
+    datagram: bytes | None
+    """None where somebody has gone."""
+
+
+def locator(address: str) -> str:
+    """HOST, HOST:PORT or [IPV6]:PORT as Zenoh writes it; its own, such as tls/HOST:PORT, stay as they are."""
+    if "/" in address:
+        return address
+    has_port = re.fullmatch(r"(\[[^]]*\]|[^:]*):\d+", address)
+    return f"tcp/{address}" if has_port else f"tcp/{address}:{PORT}"
+
+
+def is_loopback(address: str) -> bool:
+    """Whether an address, as a locator or HOST:PORT, is of this machine alone."""
+    host = re.sub(r"^\w+/|[?#].*$|:\d+([?#].*)?$", "", address).strip("[]")
+    try:
+        return host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def settings(role: str, at: str | None, network: bool) -> dict[str, Any]:
+    """What is set of Zenoh's configuration, by its keys.
+
+    On loopback whoever comes first keeps the port, and brings the others together. Elsewhere a router is expected.
+    """
+    everywhere = EVERYWHERE if network else HERE
+    place = locator(at or (everywhere if role == "router" else HERE))
+    found: dict[str, Any] = {
+        "mode": role,
+        "scouting/multicast/enabled": network,
+        "connect/retry": RETRY,
+        "transport/link/rx/max_message_size": LARGEST,
+    }
+    if role == "router":
+        return found | {"listen/endpoints": [place]}
+    found["connect/endpoints"] = [place]
+    if is_loopback(place):
+        listen = {"listen/endpoints": [place, f"tcp/{everywhere}:0"], "listen/exit_on_failure": False}
+        return found | listen | {"connect/timeout_ms": 0, "connect/exit_on_failure": False}
+    return found | {"mode": "client", "connect/timeout_ms": WAIT_MS, "connect/exit_on_failure": True}
+
+
+def opened(role: str, at: str | None = None, network: bool = False, config: Path | None = None) -> zenoh.Session:
+    """A session as a `peer` or a `router`. A file of Zenoh's configuration says what is not said here.
+
+    Raises
+    ------
+    RoomError
+        Without Zenoh, for a file that it cannot read, and where nobody can be reached.
+    """
+    try:
+        import zenoh
+    except ImportError:
+        way = "python scripts/bootstrap.py stream" if CHECKOUT else "pip install 'rigid-motion[stream]'"
+        raise RoomError(f"rooms need Zenoh, which is not installed; `{way}` brings it") from None
+    chosen = settings(role, at, network)
+    try:
+        told = zenoh.Config.from_file(config) if config else zenoh.Config()
+        if config and not at:
+            side = f"{'listen' if role == 'router' else 'connect'}/endpoints"
+            if told.get_json(side) != zenoh.Config().get_json(side):
+                chosen = settings(role, "the file's", network)
+                del chosen[side]
+        for key, value in chosen.items():
+            told.insert_json5(key, json.dumps(value))
+    except (zenoh.ZError, OSError) as error:
+        raise RoomError(f"{config or at}: Zenoh does not take this: {_first_line(error)}") from None
+    try:
+        return zenoh.open(told)
+    except zenoh.ZError as error:
+        where = at or config or HERE
+        way = (
+            "another program may have this port"
+            if role == "router"
+            else f"start a router there: stream router --at {where}"
+        )
+        raise RoomError(f"{where}: there is no way to it ({_first_line(error)}); {way}") from None
+
+
+def _first_line(error: Exception) -> str:
+    return re.sub(r" at /\S+:\d+\.?", "", str(error).splitlines()[0]).strip()
+
+
+class Room:
+    """One room of a session, as a context that closes it. What comes waits until it is looked at."""
+
+    def __init__(self, session: zenoh.Session, name: str) -> None:
+        self.name = name
+        self._session = session
+        self._came: queue.Queue[Came] = queue.Queue(MOST_WAITING)
+        self._declared: dict[str, Any] = {}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._session.close()
+
+    def listen(self, user: str, stream: str) -> None:
+        """Take what a user says from now on, or everybody with `*`."""
+        key = f"{self.name}/{user}/{stream}"
+        self._declared[f"listen {key}"] = self._session.declare_subscriber(key, self._take)
+
+    def show_presence(self, user: str) -> None:
+        """Let senders know that somebody listens, now that everything is listened to."""
+        key = f"{self.name}/{user}/{LISTENING}/{self._session.zid()}"
+        self._declared[key] = self._session.liveliness().declare_token(key)
+
+    def watch_presence(self) -> None:
+        """Take it as something that came whenever somebody begins to listen, or does already."""
+        key = f"{self.name}/*/{LISTENING}/*"
+        self._declared[key] = self._session.liveliness().declare_subscriber(key, self._take, history=True)
+
+    def send(self, user: str, stream: str, datagram: bytes) -> None:
+        """Say something as a user, or answers to one."""
+        self._publisher(user, stream).put(datagram)
+
+    def leave(self, user: str, stream: str) -> None:
+        """Say that a stream is over."""
+        self._publisher(user, stream).delete()
+
+    def come(self, seconds: float) -> list[Came]:
+        """What came since the last call or, where that is nothing, the first thing within so many seconds."""
+        found = []
+        try:
+            found.append(self._came.get(timeout=seconds) if seconds > 0.0 else self._came.get_nowait())
+            while True:
+                found.append(self._came.get_nowait())
+        except queue.Empty:
+            return found
+
+    def wait(self, until: float) -> list[Came]:
+        """The same until a moment of `time.monotonic`."""
+        return self.come(until - time.monotonic())
+
+    def _publisher(self, user: str, stream: str) -> Any:
+        import zenoh
+
+        key = f"{self.name}/{user}/{stream}"
+        if key not in self._declared:
+            sure = stream == SKELETON
+            self._declared[key] = self._session.declare_publisher(
+                key,
+                reliability=zenoh.Reliability.RELIABLE if sure else zenoh.Reliability.BEST_EFFORT,
+                congestion_control=zenoh.CongestionControl.DROP,
+                express=not sure,
+            )
+        return self._declared[key]
+
+    def _take(self, sample: zenoh.Sample) -> None:
+        """Called by Zenoh, in a thread of its own."""
+        user, stream, *_ = str(sample.key_expr).removeprefix(f"{self.name}/").split("/")
+        gone = str(sample.kind) == "SampleKind.DELETE"
+        datagram = None if gone else sample.payload.to_bytes()
+        if gone or len(datagram) <= LONGEST:
+            try:
+                self._came.put_nowait(Came(user, stream, datagram))
+            except queue.Full:
+                return
