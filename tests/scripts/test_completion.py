@@ -39,7 +39,7 @@ def script(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (["compare", "--output", "ha"], ["hand.csv"]),
         (["reduce", "--sha"], ["--shared"]),
         (["stream", "s"], ["send"]),
-        (["stream", "send", "--packing", "small"], ["smallest_three"]),
+        (["stream", "receive", "--mode", "motor_spline_"], ["motor_spline_causal"]),
         (["completion", "zs"], ["zsh"]),
     ],
 )

@@ -85,7 +85,7 @@ def test_a_reader_at_work_does_not_keep_compare_from_its_end(tmp_path, jobs, by,
 @BOTH
 def test_a_reader_at_work_does_not_keep_a_sender_from_its_end(tmp_path, by, code):
     write_csv(tmp_path / "slow.csv")
-    run = start(tmp_path, "stream.py", "send", "slow.csv", "--to", "127.0.0.1:9", where="slow.csv")
+    run = start(tmp_path, "stream.py", "send", "slow.csv", "--room", "r", where="slow.csv")
     run.wait_until_stuck()
     run.process.send_signal(by)
     _, said, seconds = run.end()

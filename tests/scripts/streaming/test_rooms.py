@@ -1,0 +1,380 @@
+"""Rooms, by real processes and Zenoh over loopback: what one sends others show; strangers neither hear nor speak."""
+
+from __future__ import annotations
+
+import json
+import re
+import select
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigid_motion.streams import Receiver
+from rigid_motion_batch.cli.stream import main
+from rigid_motion_batch.recordings.clip_reading import read_clips
+from rigid_motion_batch.recordings.figures import Figure
+from rigid_motion_batch.streaming.receiving import Receiving
+from rigid_motion_batch.streaming.rooms import HERE, Room, RoomError, is_loopback, locator, opened, settings
+from rigid_motion_batch.streaming.written import write_bvh
+from tests.scripts.research.paper.streaming.motions import swinging
+from tests.streams.links import body, dance
+
+ROOT = Path(__file__).resolve().parents[3]
+COMMAND = (sys.executable, str(ROOT / "scripts" / "stream.py"))
+
+PATIENCE = 60.0
+"""Seconds that nothing takes, however busy the machine is."""
+
+MARGIN = ("--margin", "1")
+"""So that a busy machine is in time."""
+
+
+def free_port() -> int:
+    with socket.socket() as tried:
+        tried.bind((HERE, 0))
+        return tried.getsockname()[1]
+
+
+@pytest.fixture
+def at() -> str:
+    """A place that is nobody else's."""
+    return f"{HERE}:{free_port()}"
+
+
+@pytest.fixture(scope="module")
+def hand(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A rigid motion of two seconds."""
+    return write_csv(tmp_path_factory.mktemp("hand") / "hand.csv", 2.0)
+
+
+@pytest.fixture(scope="module")
+def endless(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One that does not end before a busy machine has got to it."""
+    return write_csv(tmp_path_factory.mktemp("endless") / "endless.csv", 2.0 * PATIENCE)
+
+
+def write_csv(path: Path, seconds: float) -> Path:
+    times, poses = swinging(3, seconds)
+    rows = np.column_stack((times, poses.positions, poses.quaternions)).tolist()
+    path.write_text("\n".join(["t,x,y,z,qw,qx,qy,qz", *(",".join(map(repr, row)) for row in rows)]))
+    return path
+
+
+@contextmanager
+def running(*arguments: object, cwd: Path | None = None) -> Iterator[subprocess.Popen]:
+    """A command, once it says that it runs."""
+    line = [*COMMAND, *map(str, arguments)]
+    process = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=cwd)
+    try:
+        ready, _, _ = select.select([process.stdout], [], [], PATIENCE)
+        assert ready, "it does not begin"
+        assert process.stdout.readline(), process.stderr.read()
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def done(process: subprocess.Popen, code: int = 0) -> str:
+    printed, said = process.communicate(timeout=PATIENCE)
+    assert process.returncode == code, said
+    return printed
+
+
+def run(*arguments: object, code: int = 0, cwd: Path | None = None) -> str:
+    """What a command prints; what it says where it fails."""
+    line = [*COMMAND, *map(str, arguments)]
+    ended = subprocess.run(line, capture_output=True, text=True, timeout=PATIENCE, cwd=cwd)
+    assert ended.returncode == code, ended.stderr
+    return ended.stderr if code else ended.stdout
+
+
+def largest_mm(printed: str) -> float:
+    return float(re.search(r"([\d.]+) mm at most", printed)[1])
+
+
+def test_a_hand_is_shown_within_the_tolerance(tmp_path, at, hand):
+    shown = tmp_path / "shown.csv"
+    with running("receive", "--room", "r", "--at", at, "--output", shown, "--truth", hand, *MARGIN) as receiver:
+        sent = run("send", hand, "--room", "r", "--user", "ada", "--at", at)
+        printed = done(receiver)
+    assert "joined: 1\n" in sent
+    assert largest_mm(printed) < 5.1
+    assert printed.splitlines()[-1] == str(shown)
+    (clip,), _ = read_clips([f"{shown}:ada-hand"])
+    assert len(clip.times) > 72
+
+
+def test_a_body_goes_to_several_receivers_in_the_formats_that_they_ask_for(tmp_path, at):
+    own = body(6)
+    times, poses = dance(own, 2.0, 60.0)
+    walk = tmp_path / "walk.bvh"
+    with walk.open("w", encoding="utf-8") as file:
+        write_bvh(file, Figure(own.joints, own.parents, own.rest, own.rest.positions), own.sliding, times, poses)
+    reading = ("--scale", "1", "--start", "0")
+    options = ("--room", "r", "--at", at, "--truth", walk, *reading, *MARGIN)
+    with (
+        running("receive", *options, "--output", tmp_path / "a.bvh") as first,
+        running("receive", *options, "--output", tmp_path / "b.csv", "--fps", "30") as second,
+    ):
+        run("send", walk, "--room", "r", "--at", at, *reading)
+        assert max(largest_mm(done(first)), largest_mm(done(second))) < 5.1
+    (clip,), _ = read_clips([str(tmp_path / "a.bvh")])
+    assert clip.figure.parents.tolist() == own.parents.tolist()
+    clips, _ = read_clips([f"{tmp_path / 'b.csv'}:*"])
+    assert len(clips) == 6
+    # Frames of a thirtieth, beside those of a seventy-second.
+    assert len(clips[0].times) < 0.6 * len(clip.times)
+
+
+def test_many_bodies_of_many_senders_are_told_apart(tmp_path, at, hand):
+    shutil.copy(hand, tmp_path / "left.csv")
+    shutil.copy(hand, tmp_path / "right.csv")
+    shown = tmp_path / "shown.tum"
+    with running("receive", "--room", "r", "--at", at, "--output", shown) as receiver:
+        with running("send", hand, "--room", "r", "--user", "bob", "--at", at) as other:
+            run("send", tmp_path / "left.csv", tmp_path / "right.csv", "--room", "r", "--user", "ada", "--at", at)
+            done(other)
+        done(receiver)
+    made = sorted(path.name for path in tmp_path.glob("*.tum"))
+    assert made == ["shown-ada-left.tum", "shown-ada-right.tum", "shown-bob-hand.tum"]
+
+
+def test_another_room_is_not_heard(at, hand):
+    with running("receive", "--room", "r", "--at", at, "--seconds", 4) as receiver:
+        run("send", hand, "--room", "q", "--at", at)
+        _, said = receiver.communicate(timeout=PATIENCE)
+    assert receiver.returncode == 2
+    assert "nobody sent anything in r" in said
+
+
+def test_an_even_rate_sends_a_key_at_each_tick_and_a_mode_is_of_these(tmp_path, at, hand):
+    errors = {}
+    options = ("--room", "r", "--at", at, "--truth", hand, *MARGIN)
+    with running("receive", *options) as shown, running("receive", *options, "--mode", "motor_spline") as smooth:
+        sent = run("send", hand, "--room", "r", "--at", at, "--rate", 10, "--tolerance", "1mm")
+        errors = [largest_mm(done(each)) for each in (shown, smooth)]
+    ticks = 2 * 10
+    assert ticks <= int(re.search(r"datagrams: (\d+)", sent)[1]) < 1.5 * ticks
+    assert errors[1] < 0.7 * errors[0]
+
+
+@pytest.mark.parametrize("what", ["receive", "send"])
+def test_ctrl_c_leaves_the_file_of_what_was_shown(tmp_path, at, endless, what):
+    shown = tmp_path / "shown.csv"
+    with running("receive", "--room", "r", "--at", at, "--output", shown) as receiver:
+        with running("send", endless, "--room", "r", "--at", at) as sender:
+            time.sleep(1.5)
+            if what == "receive":
+                receiver.send_signal(signal.SIGINT)
+                done(receiver, 130)
+            sender.send_signal(signal.SIGINT)
+            assert "datagrams: " in done(sender, 130)
+        if what == "send":
+            done(receiver)
+    assert len(shown.read_text().splitlines()) > 20
+
+
+def test_a_router_that_is_killed_and_started_again_is_found_again(tmp_path, endless):
+    place = f"{HERE}:{free_port()}"
+    config = tmp_path / "router.json5"
+    config.write_text(json.dumps({"connect": {"endpoints": [f"tcp/{place}"]}}))
+    with (
+        running("router", "--at", place) as router,
+        running("send", endless, "--room", "r", "--config", config),
+        Room(opened("peer", config=config), "r") as room,
+    ):
+        receiving = Receiving(room, "bob", 60.0, 0.0)
+        moments = []
+        receiving.on_frame.append(lambda shown: moments.extend(one.moment for one in shown.values()))
+        receiving.hear(time.monotonic() + 2.0, ())
+        assert moments
+        router.kill()
+        router.wait(PATIENCE)
+        receiving.hear(time.monotonic() + 1.0, ())
+        before = receiving.datagrams.total()
+        with running("router", "--at", place):
+            deadline = time.monotonic() + PATIENCE
+            while receiving.datagrams.total() == before and time.monotonic() < deadline:
+                receiving.hear(time.monotonic() + 0.05, ())
+            receiving.hear(time.monotonic() + 2.0, ())
+    assert receiving.datagrams.total() > before
+    # The picture goes on, forwards, and is a delay behind again.
+    assert np.all(np.diff(moments) >= 0.0)
+    assert moments[-1] - moments[0] > 3.0
+
+
+def test_whoever_joins_late_sees_a_body_at_rest_within_a_third_of_a_second(tmp_path, at):
+    statue = tmp_path / "statue.csv"
+    rows = [f"{sample / 60.0},0,0,1,1,0,0,0" for sample in range(int(60.0 * PATIENCE))]
+    statue.write_text("\n".join(["t,x,y,z,qw,qx,qy,qz", *rows]))
+    taken = []
+    with running("send", statue, "--room", "r", "--at", at):
+        for _ in range(3):
+            with Room(opened("peer", at), "r") as room:
+                joined, shown = time.monotonic(), []
+                receiving = Receiving(room, "bob", 60.0, 0.0)
+                receiving.on_frame.append(shown.extend)
+                while not shown and time.monotonic() < joined + PATIENCE:
+                    receiving.hear(time.monotonic() + 0.02, ())
+                taken.append(time.monotonic() - joined)
+    # A busy machine may take longer now and then.
+    assert min(taken) < 0.3
+
+
+@pytest.fixture(scope="module")
+def house(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the example in docs/rooms, with certificates and passwords, at a port of its own."""
+    folder, port = tmp_path_factory.mktemp("house"), free_port()
+    if not shutil.which("openssl"):
+        pytest.skip("makes certificates by OpenSSL")
+    new = ("openssl", "req", "-newkey", "rsa:2048", "-nodes", "-subj", "/CN=localhost")
+    (folder / "names").write_text("subjectAltName=DNS:localhost")
+    sign = ("-CA", "authority.crt", "-CAkey", "authority.key", "-CAcreateserial", "-extfile", "names")
+    for line in (
+        (*new, "-x509", "-keyout", "authority.key", "-out", "authority.crt"),
+        (*new, "-keyout", "router.key", "-out", "asked"),
+        ("openssl", "x509", "-req", "-in", "asked", "-out", "router.crt", *sign),
+    ):
+        subprocess.run(line, cwd=folder, check=True, capture_output=True)
+    (folder / "users.txt").write_text("ada:one\nbob:two\neve:three\n")
+    router, ada = ((ROOT / "docs" / "rooms" / f"{name}.json5").read_text() for name in ("router", "ada"))
+    (folder / "router.json5").write_text(router.replace("0.0.0.0:7447", f"{HERE}:{port}"))
+    ada = ada.replace("studio.example.org:7447", f"localhost:{port}")
+    for user, password in (("ada", "one"), ("bob", "two"), ("eve", "three"), ("mallory", "four")):
+        (folder / f"{user}.json5").write_text(ada.replace('"ada"', f'"{user}"').replace("change me", password))
+    return folder
+
+
+def test_a_stranger_without_rights_neither_hears_nor_speaks(house, hand):
+    def listening(user: str, seconds: float) -> contextmanager:
+        options = ("--room", "studio", "--user", user, "--config", f"{user}.json5", "--seconds", seconds)
+        return running("receive", *options, "--truth", hand, *MARGIN, cwd=house)
+
+    def send(user: str, name: str) -> str:
+        options = ("--room", "studio", "--user", name, "--config", f"{user}.json5")
+        return run("send", hand, *options, cwd=house)
+
+    with running("router", "--config", "router.json5", cwd=house):
+        with listening("bob", PATIENCE) as bob, listening("eve", 8.0) as eve:
+            # Neither a user of no rights, nor one who has taken somebody else's name.
+            send("eve", "eve")
+            send("eve", "ada")
+            send("bob", "ada")
+            assert "joined: 1\n" in send("ada", "ada")
+            printed, said = done(bob), eve.communicate(timeout=PATIENCE)[1]
+        assert re.findall(r"^(\w+): (?:\d+) datagrams", printed, re.MULTILINE) == ["ada"]
+        assert largest_mm(printed) < 5.1
+        assert "nobody sent anything" in said
+        said = run("receive", "--room", "studio", "--config", "mallory.json5", code=2, cwd=house)
+    assert "there is no way to it" in said
+
+
+def test_blender_gets_the_datagrams_as_they_are_and_its_answers_get_to_the_sender(at, endless):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as panel:
+        panel.bind((HERE, 0))
+        panel.settimeout(PATIENCE)
+        place = f"{HERE}:{panel.getsockname()[1]}"
+        with (
+            running("receive", "--room", "r", "--at", at, "--to-blender", place),
+            running("send", endless, "--room", "r", "--user", "ada", "--at", at),
+        ):
+            for _ in range(20):
+                panel.recvfrom(2048)
+            # As one that was started now: it knows nothing, and asks.
+            receiver = Receiver()
+            began = time.monotonic()
+            while not receiver.show(time.monotonic()) and time.monotonic() < began + PATIENCE:
+                datagram, source = panel.recvfrom(2048)
+                receiver.take(datagram, time.monotonic(), source)
+                for to, answer in receiver.answers():
+                    panel.sendto(answer, to)
+            (stream,) = receiver.streams
+    assert [own.name for own in receiver.bodies(stream)] == ["endless"]
+
+
+# Without a room
+
+
+def test_what_nobody_asked_for_stays_on_this_machine():
+    for role in ("peer", "router"):
+        found = settings(role, None, False)
+        assert found["scouting/multicast/enabled"] is False
+        assert all(is_loopback(place) for place in found["listen/endpoints"])
+    assert settings("peer", "studio.local", False)["mode"] == "client"
+    assert settings("router", None, True)["listen/endpoints"] == ["tcp/0.0.0.0:7447"]
+
+
+@pytest.mark.parametrize(
+    ("address", "written", "loopback"),
+    [
+        ("studio.local", "tcp/studio.local:7447", False),
+        ("127.0.0.1:9000", "tcp/127.0.0.1:9000", True),
+        ("[::1]:9000", "tcp/[::1]:9000", True),
+        ("localhost", "tcp/localhost:7447", True),
+        ("udp/10.0.0.1:9000", "udp/10.0.0.1:9000", False),
+        ("tls/localhost:9000?a=1", "tls/localhost:9000?a=1", True),
+    ],
+)
+def test_addresses(address, written, loopback):
+    assert locator(address) == written
+    assert is_loopback(address) is is_loopback(written) is loopback
+
+
+def test_a_router_that_is_not_there_is_one_line_with_the_way_out(tmp_path, hand):
+    config = tmp_path / "router.json5"
+    config.write_text(json.dumps({"connect": {"endpoints": [f"tcp/{HERE}:{free_port()}"]}}))
+    said = run("send", hand, "--room", "r", "--config", config, code=2)
+    assert len(said.splitlines()) == 1
+    assert "there is no way to it" in said
+    assert "start a router there" in said
+    config.write_text("{ connect: ")
+    assert str(config) in run("send", hand, "--room", "r", "--config", config, code=2)
+    assert str(tmp_path / "none") in run("router", "--config", tmp_path / "none", code=2)
+
+
+def test_a_port_that_is_taken_is_said(hand):
+    with socket.socket() as taken:
+        taken.bind((HERE, 0))
+        taken.listen()
+        said = run("router", "--at", f"{HERE}:{taken.getsockname()[1]}", code=2)
+    assert "another program may have this port" in said
+
+
+def test_without_zenoh_the_way_out_is_said(monkeypatch, capsys, hand):
+    monkeypatch.setitem(sys.modules, "zenoh", None)
+    with pytest.raises(RoomError, match="`python scripts/bootstrap"):
+        opened("peer")
+    monkeypatch.setattr("rigid_motion_batch.streaming.rooms.CHECKOUT", None)
+    assert main(["router"]) == 2
+    assert "pip install 'rigid-motion[stream]'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("send", "hand.csv"), "--room"),
+        (("send", "hand.csv", "--room", "a/*"), "no name of a room"),
+        (("send", "hand.csv", "--room", "r", "--user", "a/b"), "no name of a user"),
+        (("send", "hand.csv", "--room", "r", "--tolerance", "5 parsecs"), "5 parsecs"),
+        (("send", "hand.csv", "--room", "r", "--delay", "9"), "no number of seconds"),
+        (("receive", "--room", "r", "--output", "shown.txt"), "one that ends in .csv, .bvh, .tum"),
+        (("receive", "--room", "r", "--to-blender", "10.0.0.7:7800"), "give --network as well"),
+        (("receive", "--room", "r", "--to-blender", "7800"), "no address"),
+        (("relay", "--port", "9000"), "invalid choice: 'relay'"),
+    ],
+)
+def test_what_cannot_be_is_refused(capsys, options, said):
+    with pytest.raises(SystemExit) as ended:
+        main(list(options))
+    assert ended.value.code == 2
+    assert said in capsys.readouterr().err
