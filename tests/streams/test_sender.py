@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import Poses
-from rigid_motion.streams import Body, Sender
+from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.paths import turned
 
 from .links import body, dance, run
@@ -106,3 +106,25 @@ def test_poses_that_are_none_are_refused() -> None:
     sender = Sender([body(3)])
     with pytest.raises(ValueError, match="3 finite poses"):
         sender.add(0.0, Poses(np.full((3, 3), np.nan), np.tile((1.0, 0, 0, 0), (3, 1))))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_source_that_leaps_and_then_stops_leaves_heartbeats(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    times = np.arange(60) / 120.0 + rng.uniform(0.0, 0.003, 60)
+    places = np.cumsum(rng.normal(0.0, 0.2, (60, 3)), axis=0)
+    sender = Sender([Body.rigid("hand")], tolerance=0.0005)
+    for time, place in zip(times, places, strict=True):
+        sender.add(time, Poses(place[None], [[1.0, 0.0, 0.0, 0.0]]))
+    said = [len(sender.poll(times[-1] + pause)) for pause in np.arange(0.01, 3.0, 0.01)]
+    assert 3 <= sum(said[50:]) < 12
+
+
+def test_who_joins_gets_the_description_and_a_message_that_builds_on_nothing() -> None:
+    own, times, poses = swing(60.0)
+    sender, receiver = Sender([own], rate=60.0), Receiver()
+    for sample in range(40):
+        sender.add(times[sample], poses[:, sample])
+    for datagram in [*sender.join(), *sender.add(times[40], poses[:, 40])]:
+        receiver.take(datagram, 0.0)
+    assert receiver.show(0.1)

@@ -300,9 +300,10 @@ class Sender:
             moments = moments[moments > max(self._shown, now - self._terms.delay / TICKS)]
             truth = self._forest.skeleton.in_root_space(self._samples(first).at(moments))
             off = self._fitting.errors(self._path.at(moments), truth).max(axis=0) > self._scale.tolerance
-            before = np.append(self._shown, moments)[np.argmax(off)]
-            self._shown = float(before if off.any() else self._times[-1])
-            self._good = self._shown if off.any() else None
+            if off.any():
+                self._good = self._shown = float(np.append(self._shown, moments)[np.argmax(off)])
+            else:
+                self._shown = self._times[-1]
         return self._good
 
     def _answered(self, now: float) -> bool:
