@@ -22,7 +22,7 @@ from pathlib import Path
 DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("addon", "scripts")]
 
-from research.markdown_tables import numbers, tables, tables_of, titled
+from research.markdown_tables import tables, tables_of, titled
 from research.paper.table import RADIUS
 from research.summaries import SUMMARIES, with_summary
 from research.summaries.paper import TABLE_1, percent_saved
@@ -288,19 +288,7 @@ def throw_gains(sources: Sources, rate: str) -> str:
     return f"{100.0 * (1.0 - best / min(errors.values())):.0f} %"
 
 
-# -- streams, sub-frames and memory ------------------------------------------------------------------------------------
-
-
-def streamed(sources: Sources, what: str) -> str:
-    """What a stream sent when needed takes of an even one, at a delay of two intervals: updates or bytes."""
-    page, first = sources.page("paper.md"), "`motor_twists`, 2 intervals"
-    if what == "updates":
-        found = next(one for one in tables_of(page, "Sending when needed") if one.title == TABLE_1)
-        saved = [percent_saved(cell) for cell in found.row(first)[1:]]
-    else:
-        found = next(one for one in tables_of(page, "Sending when needed") if one.head[0] == "bytes saved")
-        saved = [numbers(cell)[1] for cell in found.row(first)[1:]]
-    return f"{spread([100.0 - share for share in saved])} %"
+# -- sub-frames and memory ------------------------------------------------------------------------------------
 
 
 def sub_frames(sources: Sources, motion: str, rotation: str, figure: str) -> str:
@@ -338,8 +326,6 @@ QUOTES: dict[str, Callable[[Sources], str]] = {
     "smooth-errors": smooth_errors,
     "throw-gain-5": lambda sources: throw_gains(sources, "5"),
     "throw-gain-10": lambda sources: throw_gains(sources, "10"),
-    "streamed-updates": lambda sources: streamed(sources, "updates"),
-    "streamed-bytes": lambda sources: streamed(sources, "bytes"),
     "sub-frames-brisk": lambda sources: sub_frames(sources, "Brisk", "QUATERNION", "live, mm"),
     "sub-frames-violent": lambda sources: sub_frames(sources, "Violent", "QUATERNION", "live, mm"),
     "sub-frames-exact": lambda sources: sub_frames(sources, "Violent", "QUATERNION", "exact, mm"),

@@ -91,13 +91,6 @@ def test_a_quote_of_nothing_known_is_refused():
             "adaptive-saves",
             "miss",
         ),
-        (
-            "paper.md",
-            "| 11.8 (61%) | 8.1 (59%) | 6.0 (60%) | 4.8 (60%) |",
-            "| 1 (50%) " * 4 + "|",
-            "streamed-updates",
-            "50 %",
-        ),
         ("figures/recordings.json", '"5": 0.82,', '"5": 0.7,', "errors-of-modes", "| 5 | 1.06 | 0.98 | 0.70 |"),
         ("figures/recordings.json", '"12": 0.423', '"12": 0.44', "own-count", "missed at 12"),
         ("subframes.md", "| 15.2 |", "| 99.9 |", "sub-frames-violent", "99.9"),

@@ -51,7 +51,7 @@ examples, in two terminals:
   python scripts/stream.py send walk.bvh --room studio
 and on several machines, of which one has the router:
   python scripts/stream.py router --network
-  python scripts/stream.py receive --room studio --at studio.local --to-blender 127.0.0.1:7800
+  python scripts/stream.py receive --room studio --at studio.local --to-blender 127.0.0.1:39539
   python scripts/stream.py send walk.bvh --room studio --at studio.local
 
 `python scripts/stream.py send --help`, `receive --help`, `router --help` and `measure --help` have the options.
@@ -72,7 +72,7 @@ RECEIVE_EPILOG = """
 examples:
   python scripts/stream.py receive --room studio --output shown.bvh --truth walk.bvh
   python scripts/stream.py receive --room studio --output shown.csv --mode motor_spline --seconds 20
-  python scripts/stream.py receive --room studio --at studio.local --to-blender 127.0.0.1:7800
+  python scripts/stream.py receive --room studio --at studio.local --to-blender 127.0.0.1:39539
 
 It ends when all who sent have gone, after --seconds, or at Ctrl-C. A .csv file has all bodies, in metres and Blender's
 axes: device,t,x,y,z,qw,qx,qy,qz, where t is the moment of the sender's motion. Of .bvh and .tum there is one for each
@@ -385,7 +385,7 @@ def _named(pattern: re.Pattern[str], what: str) -> Callable[[str], str]:
 def _address(text: str) -> tuple[str, int]:
     host, _, port = text.rpartition(":")
     if not (host and port.isascii() and port.isdecimal() and 0 < int(port) <= 65535):
-        raise argparse.ArgumentTypeError(f"{text!r} is no address; give one such as {HERE}:7800")
+        raise argparse.ArgumentTypeError(f"{text!r} is no address; give one such as {HERE}:39539")
     return host.strip("[]"), int(port)
 
 

@@ -368,8 +368,8 @@ def test_without_zenoh_the_way_out_is_said(monkeypatch, capsys, hand):
         (("send", "hand.csv", "--room", "r", "--tolerance", "5 parsecs"), "5 parsecs"),
         (("send", "hand.csv", "--room", "r", "--delay", "9"), "no number of seconds"),
         (("receive", "--room", "r", "--output", "shown.txt"), "one that ends in .csv, .bvh, .tum"),
-        (("receive", "--room", "r", "--to-blender", "10.0.0.7:7800"), "give --network as well"),
-        (("receive", "--room", "r", "--to-blender", "7800"), "no address"),
+        (("receive", "--room", "r", "--to-blender", "10.0.0.7:39539"), "give --network as well"),
+        (("receive", "--room", "r", "--to-blender", "39539"), "no address"),
         (("relay", "--port", "9000"), "invalid choice: 'relay'"),
     ],
 )
