@@ -107,7 +107,11 @@ def pytest_make_collect_report(collector: pytest.Collector):
     """Skip a file of tests that needs a library which is not installed, unless every test has to run."""
     report = yield
     error = report.call.excinfo.value.__cause__ if report.failed else None
-    if isinstance(error, ModuleNotFoundError) and error.name.split(".")[0] not in OURS and not os.environ.get(EVERY_TEST):
+    if (
+        isinstance(error, ModuleNotFoundError)
+        and error.name.split(".")[0] not in OURS
+        and not os.environ.get(EVERY_TEST)
+    ):
         report.outcome = "skipped"
         report.longrepr = (str(collector.path), 0, f"needs {error.name}")
     return report
