@@ -174,7 +174,7 @@ def send(options: argparse.Namespace, stopped: list[int]) -> None:
     bodies, moments, poses = together(clips, options.rate)
     delay = options.delay or (1.0 / options.rate if options.rate else DELAY)
     sender = sender_of(bodies, moments, Tolerance(options.tolerance).tolerance(clips[0]), delay, options.rate)
-    with Room(_opened(options), options.room) as room, Progress() as progress:
+    with _room(options) as room, Progress() as progress:
         sending = Sending(room, options.user, sender)
         _say(f"{options.user} sends {', '.join(body.name for body in bodies)} to {options.room}")
         with progress.stage("Sending", float(moments[-1] - moments[0])) as stage:
@@ -203,7 +203,7 @@ def receive(options: argparse.Namespace, stopped: list[int]) -> None:
     truth = _read([options.truth], options)[0] if options.truth else None
     handing = Handing(*options.to_blender) if options.to_blender else None
     with (
-        Room(_opened(options), options.room) as room,
+        _room(options) as room,
         Progress() as progress,
         closing(handing) if handing else nullcontext(),
     ):
@@ -232,7 +232,7 @@ def receive(options: argparse.Namespace, stopped: list[int]) -> None:
 
 def router(options: argparse.Namespace, stopped: list[int]) -> None:
     """Bring together all who come."""
-    session = _opened(options, "router")
+    session = opened("router", options.at, options.network, options.config)
     try:
         _say(f"Router at {options.at or options.config or (EVERYWHERE if options.network else HERE)}")
         until = time.monotonic() + (options.seconds or float("inf"))
@@ -271,8 +271,8 @@ def stopping() -> Iterator[list[int]]:
         restore()
 
 
-def _opened(options: argparse.Namespace, role: str = "peer"):
-    return opened(role, options.at, options.network, options.config)
+def _room(options: argparse.Namespace) -> Room:
+    return Room(opened("peer", options.at, options.network, options.config), options.room)
 
 
 def _read(recordings: list[str], options: argparse.Namespace) -> list[Clip]:
