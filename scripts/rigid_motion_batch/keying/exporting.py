@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
 
+import rigid_motion
 from rigid_motion_batch.hushing import hushed
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.fbx import ADDON as FBX_ADDON
@@ -22,14 +25,26 @@ GLTF_ADDON = "io_scene_gltf2"
 
 
 def export_glb(path: Path) -> None:
-    """Write the open file as GLB, every animation sampled on every frame. Raises FileProblem."""
+    """Write the open file as GLB, every animation sampled on every frame, a clip for an Action. Raises FileProblem."""
     try:
-        with enabled(path, GLTF_ADDON), hushed():
+        with enabled(path, GLTF_ADDON), _asking_extension(), hushed():
             bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB")
     except TrajectoryError as error:
         raise FileProblem(error.problem) from None
     except RuntimeError as error:
         raise FileProblem(f"Blender cannot export this ({_reason(error)}): see whether it does in a window") from None
+
+
+@contextmanager
+def _asking_extension() -> Iterator[None]:
+    """Have the exporter leave out clips of differences and of dense keys that are kept: it asks the listed add-ons."""
+    addons = bpy.context.preferences.addons
+    entry = addons.new()
+    entry.module = rigid_motion.__name__
+    try:
+        yield
+    finally:
+        addons.remove(entry)
 
 
 class ExportRun:
