@@ -56,6 +56,7 @@ ASK = getattr(signal, "SIGUSR1", None)
 """What the parent asks its child with to end. Any other signal may come to both of them, from a terminal or a farm, and
 would ask twice. On Windows, where there is none, the console sends Ctrl-C to both, and the parent waits."""
 
+_session = ""
 _journal: int | None = None
 _is_child = False
 
@@ -113,8 +114,8 @@ def supervise(program: str) -> int:
         journal = _Journal(folder)
         by = received[0][0] if received else -code if -code in before else 0
         stopped = bool(by) and code != 0
+        journal.remove_half_written()  # Also of workers that were killed.
         if code < 0 or (stopped and not journal.ended):
-            journal.remove_half_written()
             journal.say_last_words(None if stopped else f"{program}: {_death(code, journal.at)}")
         return 128 + by if stopped else 1 if code < 0 else code
     finally:
@@ -141,14 +142,12 @@ def begin_child() -> bool:
 
     It then reports in the journal, leaves what becomes of signals to its parent, and does not outlive that.
     """
-    global _journal, _is_child
+    global _is_child
     # Programs that the child starts are not to take themselves for children.
     folder = os.environ.pop(VARIABLE, None)
     if folder is None:
         return False
-    if folder:
-        with suppress(OSError):
-            _journal = os.open(Path(folder) / JOURNAL, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+    join_session(folder)
     end_with_parent()
     if ASK:
         parent, signals = os.getppid(), stop_signals()
@@ -162,6 +161,20 @@ def begin_child() -> bool:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, signals)
     _is_child = True
     return True
+
+
+def session() -> str:
+    """The temporary folder of this command, for `join_session`; empty where there is none."""
+    return _session
+
+
+def join_session(folder: str) -> None:
+    """Have this process report in the journal of a command: the child does so, and workers that it has started."""
+    global _session, _journal
+    if folder:
+        with suppress(OSError):
+            _journal = os.open(Path(folder) / JOURNAL, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+            _session = folder
 
 
 def end_with_parent() -> None:
@@ -221,9 +234,8 @@ class _Journal:
                     place.rmdir()
                     continue
                 # Blender writes beside it again, to NAME@.
-                for name in os.listdir(place.parent):
-                    if name in (place.name, f"{place.name}@"):
-                        place.with_name(name).unlink()
+                place.with_name(f"{place.name}@").unlink(missing_ok=True)
+                place.unlink(missing_ok=True)
 
     def say_last_words(self, crash: str | None) -> None:
         """Print what the child can no longer say."""
