@@ -163,6 +163,11 @@ def begin_child() -> bool:
     return True
 
 
+def blender_program() -> str:
+    """The Blender that this process is; empty in a Python, with or without bpy."""
+    return getattr(getattr(sys.modules.get("bpy"), "app", None), "binary_path", "")
+
+
 def session() -> str:
     """The temporary folder of this command, for `join_session`; empty where there is none."""
     return _session
@@ -194,6 +199,8 @@ def report(**facts: Any) -> None:
         A file that is being written, or a folder that was made for one; it is removed if the process is killed.
     written : str
         A file that is complete, and to be printed at the end.
+    source : str
+        The input that it was made of.
     summary : str
         What would be said if the process were stopped now.
     ended : bool
@@ -204,6 +211,11 @@ def report(**facts: Any) -> None:
             os.write(_journal, f"{json.dumps(facts)}\n".encode())
 
 
+def written_of(source: str) -> list[str]:
+    """The files that this process and its workers have reported as complete that were made of an input."""
+    return [path for path, made_of in _Journal(_session).written if made_of == source]
+
+
 class _Journal:
     """What the child reported."""
 
@@ -211,7 +223,7 @@ class _Journal:
         self.at = ""
         self.summary = STOPPED
         self.ended = False
-        self.written: list[str] = []
+        self.written: list[tuple[str, str | None]] = []
         self._making: list[Path] = []
         try:
             lines = (Path(folder or os.devnull) / JOURNAL).read_text(encoding="utf-8").splitlines()
@@ -223,7 +235,7 @@ class _Journal:
                 self.at = facts.get("at", self.at)
                 self.summary = facts.get("summary", self.summary)
                 self.ended = facts.get("ended", self.ended)
-                self.written += [facts["written"]] if "written" in facts else []
+                self.written += [(facts["written"], facts.get("source"))] if "written" in facts else []
                 self._making += [Path(facts["making"])] if "making" in facts else []
 
     def remove_half_written(self) -> None:
@@ -245,7 +257,7 @@ class _Journal:
         if errors and sys.stderr.isatty():
             print(SHOW_CURSOR, file=sys.stderr, flush=True)  # It is behind the progress bar, which has hidden it.
         if _writable(sys.stdout):
-            for path in self.written:
+            for path, _ in self.written:
                 print(path_line(path), flush=True)
         if errors:
             for line in filter(None, (crash, self.summary.removeprefix("Stopped. ") if crash else self.summary)):
@@ -266,7 +278,7 @@ def _environment(folder: str | None) -> dict[str, str]:
 
 def _this_command() -> Sequence[str]:
     """What this process was started with: Python, or a Blender that runs a script."""
-    blender = getattr(getattr(sys.modules.get("bpy"), "app", None), "binary_path", "")
+    blender = blender_program()
     return [blender, *sys.argv[1:]] if blender else [sys.executable, *sys.orig_argv[1:]]
 
 

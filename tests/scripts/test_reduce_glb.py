@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from pathlib import Path
 
@@ -15,7 +14,18 @@ from rigid_motion_batch.recordings.clips import Clip
 from tests.animation.farm import played_on_a_farm
 from tests.gltf.oracle import File, off
 from tests.scripts.baking import new_file, save
-from tests.scripts.reducing import FRAMES, WALK, exit_code, hand_made, object_file, rig_file, run, worlds_of, write_csv
+from tests.scripts.reducing import (
+    FRAMES,
+    WALK,
+    exit_code,
+    hand_made,
+    listed,
+    object_file,
+    rig_file,
+    run,
+    worlds_of,
+    write_csv,
+)
 
 MM = 1e-3
 
@@ -132,9 +142,9 @@ def test_a_rigid_recording_becomes_a_node(tmp_path):
 
 def test_what_is_there_stays_without_overwrite_and_a_dry_run_writes_nothing(tmp_path, capsys):
     blend, body = object_file(tmp_path / "shot.blend"), hand_made(tmp_path)
-    before = sorted(os.listdir(tmp_path))
+    before = listed(tmp_path)
     assert run(blend, body, "--glb", "--dry-run") == 0
-    assert sorted(os.listdir(tmp_path)) == before
+    assert listed(tmp_path) == before
     made = [tmp_path / f"{path.stem}-reduced.glb" for path in (blend, body)]
     for path in made:
         path.write_bytes(b"mine")
@@ -150,7 +160,7 @@ def test_what_is_there_stays_without_overwrite_and_a_dry_run_writes_nothing(tmp_
 def test_two_files_that_would_be_one_are_told(tmp_path, capsys):
     body, blend = hand_made(tmp_path), object_file(tmp_path / "body.blend")
     assert run(blend, body, "--glb", "--overwrite") == 1
-    assert f"{blend} was written to {tmp_path / 'body-reduced.glb'} too" in capsys.readouterr().err
+    assert f"{blend} is written to {tmp_path / 'body-reduced.glb'} too" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["none.fbx", "text.fbx", "none.blend", "text.blend"])

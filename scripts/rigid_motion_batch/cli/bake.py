@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
 from rigid_motion_batch.command_line import not_empty, number, parser_of, program_of
@@ -18,10 +19,12 @@ PROGRAM = program_of(SCRIPT)
 
 require_blender(SCRIPT)
 
-from rigid_motion_batch.keying.baking import baking, unbaking
+from rigid_motion_batch.keying.baking import BAKED, UNBAKED, baking, unbaking
 from rigid_motion_batch.keying.jobs import BlendRun
-from rigid_motion_batch.keying.options import add_file_options, add_target_options, jobs_of, refuse_odd_places
-from rigid_motion_batch.keying.sessions import Work, do_all
+from rigid_motion_batch.keying.options import add_file_options, add_target_options, refuse_odd_places
+from rigid_motion_batch.keying.planning import Job, named_file, planned
+from rigid_motion_batch.keying.records import Record, is_made
+from rigid_motion_batch.keying.sessions import Note, Outcome, Work, do_all
 
 SMALLEST_STEP = 0.01
 """Keys closer than that are one key to Blender."""
@@ -99,15 +102,10 @@ def parse(arguments: list[str]) -> argparse.Namespace:
                 parser.error(f"--{option} is for baking, and says nothing to --unbake: leave it out")
     if None not in (options.first, options.last) and options.first > options.last:
         parser.error(f"--last {options.last:g} is before --first {options.first:g}")
-    interpolation = "CONSTANT" if options.hold else "LINEAR"
-    options.action = (
-        unbaking() if options.unbake else baking(options.step or 1.0, options.first, options.last, interpolation)
-    )
     try:
         refuse_odd_places(options)
-        options.jobs = jobs_of(
-            list(map(Path, options.files)), options.action.suffix, options.output, in_place=options.in_place
-        )
+        options.work = Bake.of(options)
+        options.todo = _planned(options)
     except ValueError as error:
         parser.error(str(error))
     return options
@@ -116,9 +114,50 @@ def parse(arguments: list[str]) -> argparse.Namespace:
 def main(arguments: list[str]) -> int:
     """Do all files, and return the exit code."""
     options = parse(arguments)
-    action = options.action
-    work = Work(PROGRAM, action.doing, action.done, options.objects, options.dry_run)
-    return do_all(options.jobs, work, lambda *session: BlendRun(options, action, *session).do)
+    return do_all(PROGRAM, options.todo, options.work, options.jobs)
+
+
+@dataclass(frozen=True)
+class Bake(Work):
+    """Baking keys, or taking that back."""
+
+    unbake: bool
+    step: float
+    first: float | None
+    last: float | None
+    interpolation: str
+
+    @classmethod
+    def of(cls, options: argparse.Namespace) -> Bake:
+        """What the options say."""
+        doing, done = ("Un-baking", "un-baked") if options.unbake else ("Baking", "baked")
+        interpolation = "CONSTANT" if options.hold else "LINEAR"
+        where = options.objects, options.overwrite, options.dry_run
+        return cls(doing, done, *where, options.unbake, options.step or 1.0, options.first, options.last, interpolation)
+
+    def needs_blender(self, job: Job) -> bool:
+        return True
+
+    def do(self, job: Job, record: Record, note: Note) -> Outcome:
+        action = unbaking() if self.unbake else baking(self.step, self.first, self.last, self.interpolation)
+        return BlendRun(self, action, record, note).do(job)
+
+
+def _planned(options: argparse.Namespace) -> list[Job]:
+    suffix = UNBAKED if options.unbake else BAKED
+    named = named_file(options.output, options.files, (".blend",))
+
+    def job_of(source: str, folder: Path) -> Job:
+        file = Path(source)
+        made = file if options.in_place else named or folder / f"{file.stem}{suffix}{file.suffix.lower()}"
+        return Job(source, made.parent, made)
+
+    def is_result(path: Path) -> bool:
+        if options.unbake:
+            return not path.stem.endswith(BAKED)
+        return path.stem.endswith((BAKED, UNBAKED)) or is_made(path)
+
+    return planned(options.files, None if named else options.output, (".blend",), is_result, job_of)
 
 
 def _frame(text: str) -> float:

@@ -9,7 +9,7 @@ result is a new file; the input stays as it is.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 from rigid_motion_batch.command_line import not_empty, parser_of, program_of
@@ -24,16 +24,18 @@ from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.radii import RIGID, radius_in_metres
 from rigid_motion_batch.axes import AXES
 from rigid_motion_batch.keying.gltf_files import ENDINGS, GltfRun
-from rigid_motion_batch.keying.options import Job, add_file_options, add_target_options, jobs_of, refuse_odd_places
-from rigid_motion_batch.keying.recorded import RATES, TOLERANCE, Reading, Recorded, Writing, place_and_body
-from rigid_motion_batch.keying.sessions import Note, Outcome, StopIfAsked, Work, do_all
+from rigid_motion_batch.keying.options import add_file_options, add_target_options, refuse_odd_places
+from rigid_motion_batch.keying.planning import Job, file_and_body, named_file, planned
+from rigid_motion_batch.keying.recorded import GLB_SUFFIX, RATES, SUFFIX, TOLERANCE, Reading, Writing, name_of
+from rigid_motion_batch.keying.records import Record, is_made
+from rigid_motion_batch.keying.sessions import Note, Outcome, Work, do_all
 from rigid_motion_batch.keying.wishes import Wishes
 from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
 
-MODE = "motor_spline"
+IN_FOLDERS = (".blend", ".bvh", ".csv", ".fbx", ".glb", ".gltf", ".tsv", ".tum")
+"""Of the files that are taken of a folder. What else it reads may be anything: .json, .txt."""
 
-SUFFIX = "-reduced"
-"""Of the names of files that are written of .blend and glTF files."""
+MODE = "motor_spline"
 
 MOST = 1000000
 """Keys that can be asked for: Blender's last frame."""
@@ -164,39 +166,28 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     )
     add_file_options(parser)
     options = parser.parse_args(arguments)
-    files, recorded = _sorted(options.inputs, blend=options.blend, glb=options.glb)
-    gltf = [file for file in files if _is_gltf(file)]
-    options.wishes = Wishes(
-        options.mode or MODE,
-        options.tolerance,
-        options.radius,
-        options.shared,
-        options.discard,
-        options.keys,
-        options.vertices,
-    )
     try:
         refuse_odd_places(options)
-        if options.keys is not None and options.tolerance is not None:
-            raise ValueError("--keys and --tolerance exclude one another: each decides how many keys there are")
-        if recorded and options.in_place:
-            raise ValueError(f"--in-place is for .blend files, and {recorded[0].source} is a recording: leave one out")
-        if gltf and options.in_place:
-            raise ValueError(f"--in-place is for .blend files, and {gltf[0]} is none: leave one out")
-        if options.glb:
-            _refuse_beside_glb(options, files)
-        if gltf and options.mode:
-            raise ValueError(
-                f"--mode is for .blend files and tables, and {gltf[0]} knows lines and even turns alone: leave it out, "
-                "or add --blend, for a .blend file with that mode"
-            )
-        if options.objects and len(files) == len(gltf):
-            raise ValueError("--objects is for .blend files: of a recording name one body with FILE:BODY")
-        options.reading = Reading(options.axes, reading_options(options))
-        options.jobs = [
-            *jobs_of(files, SUFFIX, options.output, in_place=options.in_place, ending=".glb" if options.glb else None),
-            *recorded,
-        ]
+        options.work = work = Reduce(
+            doing="Reducing",
+            done="reduced",
+            objects=options.objects,
+            overwrite=options.overwrite,
+            dry_run=options.dry_run,
+            wishes=Wishes(
+                options.mode or MODE,
+                options.tolerance,
+                options.radius,
+                options.shared,
+                options.discard,
+                options.keys,
+                options.vertices,
+            ),
+            reading=Reading(options.axes, reading_options(options)),
+            writing=Writing(options.blend, options.fps, options.glb),
+        )
+        options.todo = _planned(options, work)
+        _refuse_odd(options)
     except ValueError as error:
         parser.error(str(error))
     return options
@@ -205,48 +196,91 @@ def parse(arguments: list[str]) -> argparse.Namespace:
 def main(arguments: list[str]) -> int:
     """Do all inputs, and return the exit code."""
     options = parse(arguments)
-    in_blender = not all(isinstance(job, Job) and _is_gltf(job.source) for job in options.jobs)
-    if in_blender:
+    if any(map(options.work.needs_blender, options.todo)):
         require_blender(SCRIPT)
-    work = Work(PROGRAM, "Reducing", "reduced", options.objects, options.dry_run, in_blender)
-    return do_all(options.jobs, work, lambda *session: _doing(options, in_blender, *session))
+    return do_all(PROGRAM, options.todo, options.work, options.jobs)
 
 
-def _doing(
-    options: argparse.Namespace, in_blender: bool, note: Note, stop_if_asked: StopIfAsked
-) -> Callable[[Job | Recorded], Outcome]:
-    """What does one input, be it a .blend file, a glTF file or a recording."""
-    wishes, written = options.wishes, {"overwrite": options.overwrite, "dry_run": options.dry_run}
-    gltf = GltfRun(wishes, **written, note=note, stop_if_asked=stop_if_asked)
-    if not in_blender:
-        return gltf.do
-    from rigid_motion_batch.keying.exporting import ExportRun
-    from rigid_motion_batch.keying.jobs import BlendRun
-    from rigid_motion_batch.keying.recordings import RecordingRun
-    from rigid_motion_batch.keying.reducing import reducing
+@dataclass(frozen=True)
+class Reduce(Work):
+    """Keeping few keys."""
 
-    writing = Writing(options.output, options.overwrite, options.dry_run, options.blend, options.fps, options.glb)
-    files: BlendRun | ExportRun = (
-        ExportRun(gltf, note, stop_if_asked)
-        if options.glb
-        else BlendRun(options, reducing(wishes, SUFFIX, options.objects), note, stop_if_asked)
-    )
-    taken = [job for job in options.jobs if isinstance(job, Job)]
-    recordings = RecordingRun(wishes, options.reading, writing, options.inputs, taken, note, stop_if_asked)
+    wishes: Wishes
+    reading: Reading
+    writing: Writing
 
-    def do(job: Job | Recorded) -> Outcome:
-        if isinstance(job, Recorded):
-            return recordings.do(job)
-        return gltf.do(job) if _is_gltf(job.source) else files.do(job)
+    def needs_blender(self, job: Job) -> bool:
+        return not job.problem and (job.is_recording or not _is_gltf(job.file))
 
-    return do
+    def do(self, job: Job, record: Record, note: Note) -> Outcome:
+        gltf = GltfRun(self.wishes, record, note, dry_run=self.dry_run)
+        if not self.needs_blender(job):
+            return gltf.do(job)
+        from rigid_motion_batch.keying.exporting import export_file
+        from rigid_motion_batch.keying.jobs import BlendRun
+        from rigid_motion_batch.keying.recordings import RecordingRun
+        from rigid_motion_batch.keying.reducing import reducing
+
+        if job.is_recording:
+            return RecordingRun(self.wishes, self.reading, self.writing, record, note, dry_run=self.dry_run).do(job)
+        if self.writing.glb:
+            return export_file(job, gltf, note)
+        return BlendRun(self, reducing(self.wishes, self.objects), record, note).do(job)
 
 
-def _is_gltf(path: Path) -> bool:
-    return path.suffix.lower() in ENDINGS
+def _planned(options: argparse.Namespace, work: Reduce) -> list[Job]:
+    """What is to be done: a body of a file is a recording, and so is a glTF file of which a .blend file is to be made.
+
+    An FBX file is none where it becomes a GLB file with all that is in it.
+    """
+    whole = (".blend", *(() if options.blend else ENDINGS), *((".fbx",) if options.glb else ()))
+    ending = ".glb" if options.glb else ""
+    first = Path(options.inputs[0])
+    if not first.name.lower().endswith(whole):
+        endings = (".glb",) if options.glb else (".csv", ".tum", ".blend")
+    else:
+        endings = (ending or first.suffix.lower(),)
+    named = named_file(options.output, options.inputs, endings)
+
+    def job_of(source: str, folder: Path) -> Job:
+        folder = named.parent if named else folder
+        if source.lower().endswith(whole):
+            file = Path(source)
+            kind = file.suffix.lower() if file.suffix.lower() == ".gltf" else ending or file.suffix.lower()
+            made = file if options.in_place else named or folder / f"{file.stem}{GLB_SUFFIX}{kind}"
+            return Job(source, made.parent, made)
+        name, suffix = name_of(*file_and_body(source)), GLB_SUFFIX if options.glb else SUFFIX
+        made = named.with_suffix("") if named else folder / f"{name}{suffix}"
+        kind = named.suffix.lower() if named else ""
+        possible = (".glb",) if options.glb else tuple({kind or ".csv", ".blend"})
+        return Job(source, folder, made, possible, kind, is_recording=True)
+
+    return planned(options.inputs, None if named else options.output, IN_FOLDERS, _is_result, job_of)
 
 
-def _refuse_beside_glb(options: argparse.Namespace, files: list[Path]) -> None:
+def _refuse_odd(options: argparse.Namespace) -> None:
+    """Raise ValueError for options that say nothing of the inputs."""
+    jobs = [job for job in options.todo if not job.problem]
+    recorded = [job for job in jobs if job.is_recording]
+    gltf = [job for job in jobs if not job.is_recording and _is_gltf(job.file)]
+    if options.keys is not None and options.tolerance is not None:
+        raise ValueError("--keys and --tolerance exclude one another: each decides how many keys there are")
+    if options.in_place and recorded:
+        raise ValueError(f"--in-place is for .blend files, and {recorded[0].source} is a recording: leave one out")
+    if options.in_place and gltf:
+        raise ValueError(f"--in-place is for .blend files, and {gltf[0].source} is none: leave one out")
+    if options.glb:
+        _refuse_beside_glb(options, jobs)
+    if gltf and options.mode:
+        raise ValueError(
+            f"--mode is for .blend files and tables, and {gltf[0].source} knows lines and even turns alone: leave it "
+            "out, or add --blend, for a .blend file with that mode"
+        )
+    if options.objects and jobs and len(jobs) == len(gltf) + len(recorded):
+        raise ValueError("--objects is for .blend files: of a recording name one body with FILE:BODY")
+
+
+def _refuse_beside_glb(options: argparse.Namespace, jobs: list[Job]) -> None:
     """Raise ValueError for options that say nothing of GLB files."""
     if options.mode:
         raise ValueError(
@@ -256,26 +290,21 @@ def _refuse_beside_glb(options: argparse.Namespace, files: list[Path]) -> None:
         if getattr(options, name):
             option = f"--{name.replace('_', '-')}"
             raise ValueError(f"{option} is for .blend files, and --glb writes others: leave one of them out")
-    for path in files:
-        if path.suffix.lower() == ".gltf":
-            raise ValueError(f"{path} is reduced to a .gltf file: do it without --glb")
-        if path.suffix.lower() == ".fbx" and (options.axes or reading_options(options).given):
-            raise ValueError(f"with --glb Blender imports {path} whole: leave out --axes and what says how to read it")
+    for job in jobs:
+        if job.file.suffix.lower() == ".gltf" and not job.is_found:
+            raise ValueError(f"{job.source} is reduced to a .gltf file: do it without --glb")
+        if job.file.suffix.lower() == ".fbx" and (options.axes or reading_options(options).given):
+            raise ValueError(
+                f"with --glb Blender imports {job.source} whole: leave out --axes and what says how to read it"
+            )
 
 
-def _sorted(inputs: list[str], *, blend: bool, glb: bool) -> tuple[list[Path], list[Recorded]]:
-    """The .blend and glTF files, and the recordings, each of these once.
+def _is_gltf(path: Path) -> bool:
+    return path.suffix.lower() in ENDINGS
 
-    A body of a file is a recording, and so is a glTF file of which a .blend file is to be made. An FBX file is none
-    where it becomes a GLB file with all that is in it.
-    """
-    endings = (".blend", *(() if blend else ENDINGS), *((".fbx",) if glb else ()))
-    files = [Path(source) for source in inputs if source.lower().endswith(endings)]
-    recorded: dict[tuple[str, str | None], str] = {}
-    for source in inputs:
-        if not source.lower().endswith(endings):
-            recorded.setdefault(place_and_body(source), source)
-    return files, list(map(Recorded, recorded.values()))
+
+def _is_result(path: Path) -> bool:
+    return path.stem.endswith(GLB_SUFFIX) or is_made(path)
 
 
 def _tolerance(text: str) -> Tolerance:

@@ -17,9 +17,9 @@ from rigid_motion_batch.recordings.importing import enabled, refuse_too_large
 
 from .blend_files import missing_data, open_file
 from .gltf_files import GltfRun
-from .options import Job
 from .output_files import FileProblem, Unreadable
-from .sessions import Note, Outcome, StopIfAsked
+from .planning import Job
+from .sessions import Note, Outcome, stop_if_asked
 
 GLTF_ADDON = "io_scene_gltf2"
 
@@ -47,38 +47,32 @@ def _asking_extension() -> Iterator[None]:
         addons.remove(entry)
 
 
-class ExportRun:
-    """Doing .blend and FBX files, one after the other."""
+def export_file(job: Job, gltf: GltfRun, note: Note) -> Outcome:
+    """Open or import a .blend or FBX file, and write what it shows as GLB with few keys."""
+    read: list[Path] = []
+    incomplete = False
 
-    def __init__(self, gltf: GltfRun, note: Note, stop_if_asked: StopIfAsked) -> None:
-        self._gltf, self._note, self._stop_if_asked = gltf, note, stop_if_asked
+    def export(path: Path) -> None:
+        nonlocal incomplete
+        if job.file.suffix.lower() == ".fbx":
+            _import_fbx(job.file)
+        else:
+            open_file(job.file)
+            missing = missing_data()
+            for library in missing.libraries:
+                note(f"{job.source}: {library}")
+            incomplete = missing.hides_objects
+        read.extend(map(Path, bpy.utils.blend_paths(absolute=True)))
+        stop_if_asked()
+        export_glb(path)
 
-    def do(self, job: Job) -> Outcome:
-        """Open or import a file, and write what it shows as GLB with few keys."""
-        incomplete = False
-
-        def export(path: Path) -> None:
-            nonlocal incomplete
-            if job.source.suffix.lower() == ".fbx":
-                _import_fbx(job.source)
-            else:
-                open_file(job.source)
-                missing = missing_data()
-                for library in missing.libraries:
-                    self._note(f"{job.source}: {library}")
-                incomplete = missing.hides_objects
-            self._stop_if_asked()
-            export_glb(path)
-
-        outcome = self._gltf.do(job, export)
-        outcome.incomplete = incomplete
-        return outcome
+    outcome = gltf.do(job, export)
+    outcome.incomplete, outcome.read = incomplete, read
+    return outcome
 
 
 def _import_fbx(path: Path) -> None:
     """Import a file into an empty one, meshes and images with it. Raises Unreadable."""
-    if path.is_dir():
-        raise Unreadable(f"this is a folder: name the files in it, as in {path / '*.fbx'}")
     try:
         refuse_too_large(path)
         refuse_damaged(path)

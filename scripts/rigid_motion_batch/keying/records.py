@@ -8,8 +8,9 @@ is that of a task, and what else was read for it. No Blender is needed here.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -67,31 +68,26 @@ class Record:
             refuse_came_meanwhile(path, error)
             raise
 
-    def keep(self, key: str, written: Iterable[Path], read: Iterable[Path], facts: Mapping[str, Any]) -> None:
-        """Note that the input is done, what was written, what was read beside it, and facts for JSON."""
+    def keep(
+        self, key: str, written: Sequence[Path], beside: Iterable[Path], read: Iterable[Path], facts: Mapping[str, Any]
+    ) -> None:
+        """Note that the input is done: what was written, and beside that, what was read, and facts for JSON."""
         line = {
             "source": self._source,
             "key": key,
             "written": [_from(self.folder, path) for path in written],
-            "read": {_from(self.folder, path): _digest(path) for path in read},
+            "files": {_from(self.folder, path): _digest(path) for path in (*written, *beside, *read)},
             "facts": dict(facts),
         }
         with suppress(OSError):
             append_lines(self._file, [line])
 
     def done(self, key: str) -> tuple[list[Path], Mapping[str, Any]] | None:
-        """The files that were made under a key, and facts; None where one is missing, or what was read has changed."""
-        lines = [line for line in lines_of(self._file) if line.get("source") == self._source and "key" in line]
+        """The files that were made under a key, and facts; None where one, or what was read, is not as it was."""
         with suppress(LookupError, TypeError, AttributeError):
-            line = lines[-1]
-            written = [self.folder / name for name in line["written"]]
-            read = line["read"].items()
-            if (
-                line["key"] == key
-                and all(map(self._is_own, written))
-                and all(_digest(self.folder / name) == digest for name, digest in read)
-            ):
-                return written, line["facts"]
+            line = [line for line in self._lines if line.get("key") == key][-1]
+            if all(_digest(self.folder / name) == digest for name, digest in line["files"].items()):
+                return [self.folder / name for name in line["written"]], line["facts"]
         return None
 
     def _may_replace(self, path: Path) -> bool:
@@ -100,14 +96,30 @@ class Record:
     def _is_own(self, path: Path) -> bool:
         """Whether a file is there as it was made of this input."""
         name = _from(self.folder, path)
-        digests = [line.get("sha256") for line in lines_of(self._file) if line.get("file") == name]
-        sources = [line.get("source") for line in lines_of(self._file) if line.get("file") == name]
-        return sources[-1:] == [self._source] and _digest(path) in digests
+        digests = {line.get("sha256") for line in self._lines if line.get("file") == name}
+        return bool(digests) and _digest(path) in digests
+
+    @property
+    def _lines(self) -> list[dict[str, Any]]:
+        return [line for line in _lines_of(self._file) if line.get("source") == self._source]
 
 
 def is_made(path: Path) -> bool:
     """Whether a file was written by this program, by the record of its folder."""
-    return any(line.get("file") == path.name for line in lines_of(path.parent / OWN / NAME))
+    return any(line.get("file") == path.name for line in _lines_of(path.parent / OWN / NAME))
+
+
+def _lines_of(file: Path) -> Sequence[dict[str, Any]]:
+    """The lines of a record, read anew when it has grown."""
+    try:
+        return _read(file, os.stat(file).st_size)
+    except OSError:
+        return ()
+
+
+@lru_cache(maxsize=8)
+def _read(file: Path, _size: int) -> Sequence[dict[str, Any]]:
+    return tuple(lines_of(file))
 
 
 def _from(folder: Path, path: str | os.PathLike[str]) -> str:
