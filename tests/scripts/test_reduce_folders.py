@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rigid_motion_batch.cli import reduce
 from tests.gltf.making import Making, walk
 from tests.scripts.reducing import hand_made, listed, object_file, run, write_csv
 from tests.scripts.stopping import ROOT, Started, alive, descendants, start
@@ -243,10 +244,23 @@ def test_processes_do_the_same_as_one_and_a_bad_file_stops_nobody(tmp_path):
     for name in made:
         assert (tmp_path / "two" / name).read_bytes() == (tmp_path / "one" / name).read_bytes()
     lines = done.stderr.splitlines()
-    assert lines[-1] == "1 object and 3 clips reduced; 5 files: 4 written, 1 failed."
-    own = [[place for place, line in enumerate(lines) if line.startswith(os.path.join("in", name))] for name in "abc"]
+    bad = os.path.join("in", "bad.glb")
+    assert lines[-2:] == [f"Failed: {bad}", "1 object and 3 clips reduced; 5 files: 4 written, 1 failed."]
+    own = [
+        [place for place, line in enumerate(lines) if line.startswith(os.path.join("in", f"{name}.glb"))]
+        for name in "abc"
+    ]
     for places in own:
         assert places == list(range(places[0], places[0] + len(places))), "what is said of a file stands together"
+
+
+def test_blenders_own_python_does_one_after_the_other(tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "rigid_motion_batch.pipeline.executors", None)
+    paths = [str(glb(tmp_path / f"{name}.glb")) for name in ("a", "b")]
+    assert reduce.main([*paths, "--jobs", "2"]) == 2
+    assert "; leave it out, and inputs are done one by one" in capsys.readouterr().err
+    assert reduce.main(paths) == 0
+    assert last_line(capsys) == "2 clips reduced; 2 files: 2 written."
 
 
 @ON_LINUX

@@ -33,6 +33,7 @@ EPILOG = """
 examples:
   python scripts/bake.py shot.blend
   python scripts/bake.py shots/*.blend --output farm
+  python scripts/bake.py shots --output farm --jobs 4
   python scripts/bake.py shot.blend --objects 'Camera,Tool*' --step 0.25
   python scripts/bake.py shot.blend --objects 'Rig/Hand*,Rig/Foot*'
   python scripts/bake.py shot.blend --dry-run
@@ -41,13 +42,21 @@ examples:
 
 what is written:
   NAME-baked.blend or NAME-unbaked.blend, beside the file or in --output. The program opens the new file again to check
-  it, and then moves it into place. It replaces an existing file only with --overwrite, also where another run has
-  written that meanwhile, and never one that is read-only. With --in-place it replaces the file itself in the same way,
-  and keeps the one before as NAME.blend1. A file in which there is nothing to do is not written. At the end the paths
-  that were written are printed on standard output, one a line; a path with a line break or another control character
-  is printed as JSON, "a\\nb.blend". Everything else goes to standard error.
+  it, and then moves it into place. It replaces a file that is not its own, or was edited since, only with --overwrite,
+  also where another run has written that meanwhile, and never one that is read-only. For a single input --output may be
+  the name of the file. With --in-place it replaces the file itself in the same way, and keeps the one before as
+  NAME.blend1. A file in which there is nothing to do is not written. At the end the paths of the results, also of those
+  that were there already, are printed on standard output, one a line; a path with a line break or another control
+  character is printed as JSON, "a\\nb.blend". Everything else goes to standard error.
   Textures and libraries are found from the new place, too. A relative output path of the render, and disk caches of
   simulations (blendcache_NAME), depend on the place and the name of the file, as after Save As.
+
+folders and many files:
+  A folder stands for the .blend files in it and in the folders below; the results lie below --output as these do. What
+  this program has written is no input, but for --unbake, which takes *-baked.blend alone. Several files are done at
+  once by as many processes as --jobs says. You can run the same command again: a file is "already baked" where its
+  result is there, made of the same bytes with the same options and version. The folder .rigid-motion beside the results
+  has the record of them.
 
 what is run:
   Nothing in the files: scripts and Python expressions stay in them, switched off. If a farm should run them, let it
@@ -64,7 +73,7 @@ exit code:
        python scripts/bake.py shot.blend --output farm && blender --background farm/shot-baked.blend --render-anim
   1    some objects, bones or files could not be done, and are named with the reason: a driven channel, an infinite
        key, a missing library, one damaged file of many, a full disk, an --objects NAME that nothing has. The others
-       are done. Or Blender crashed at a file, which is named: the files before it are done.
+       are done. With a single input or --jobs 0: or Blender crashed at a file, which is named; those before are done.
   2    a wrong option, or none of the files could be read: nothing was done
   130  stopped by Ctrl-C, and 143 by SIGTERM, within 2 s: the files written by then are complete, nothing else was
        changed
@@ -74,7 +83,7 @@ exit code:
 def parse(arguments: list[str]) -> argparse.Namespace:
     """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
     parser = parser_of(SCRIPT, __doc__, EPILOG)
-    parser.add_argument("files", nargs="+", type=not_empty, metavar="FILE.blend", help="files to bake")
+    parser.add_argument("files", nargs="+", type=not_empty, metavar="FILE.blend", help="files to bake, folders")
     parser.add_argument("--unbake", action="store_true", help="give baked objects and bones their own keys back")
     add_target_options(parser, "modes")
     keys = parser.add_argument_group("keys")

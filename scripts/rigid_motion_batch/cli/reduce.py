@@ -53,6 +53,9 @@ examples:
   python scripts/reduce.py walk.glb --tolerance 2mm
   python scripts/reduce.py walk.glb --key-poses 12
   python scripts/reduce.py walk.fbx dance.bvh shot.blend --glb --tolerance 2mm
+  python scripts/reduce.py walk.glb --output small/walk.glb
+  python scripts/reduce.py mocap --output small --glb --tolerance 2mm
+  python scripts/reduce.py mocap --output small --jobs 4
   blender --background --python scripts/reduce.py -- shot.blend
 
 .blend files:
@@ -71,8 +74,8 @@ glTF files:
   translations and scales have keys of their own; steps stay. Weights of morph targets are off by half a percent at
   most. A foot that stands slides at most a millimetre farther than before, for a body of 1.7 m. A clip that would not
   become smaller stays as it is. Without --tolerance it is a share of the size, without --radius a share of it for
-  joints, and for meshes the size of each. A tolerance above a tenth of the size is refused: the file is mostly in
-  another unit then.
+  joints, and for meshes the size of each; of recordings that become GLB files see --tolerance. A tolerance above a
+  tenth of the size is refused: the file is mostly in another unit then.
 
 recordings:
   The program reads what compare.py reads: CSV, TUM, EuRoC, Motive, A-Frame, BVH, FBX, glTF, and animated objects and
@@ -88,23 +91,35 @@ GLB files:
   file keeps its meshes. A recording becomes a rig or an empty of its own, in metres. The modes of a .blend file are
   sampled too: glTF knows lines and even turns alone.
 
+folders and many files:
+  A folder stands for the .blend, glTF, FBX, BVH, CSV (.csv, .tsv) and .tum files in it and in the folders below, in the
+  order of their names; the results lie below --output as the files lie in the folder. It does not stand for results of
+  this program (*-reduced.*, and what its records name), hidden files, and links that lead out of it. What does not move
+  in a folder is left alone.
+  Several inputs are done at once by as many processes as --jobs says; what is said of each comes when it is done. An
+  input that fails, or whose process dies, costs that input alone.
+  You can run the same command again, after a stop or with more files: an input is "already reduced" where its result is
+  there, made of the same bytes with the same options by the same version of the program and of Blender. All else is
+  done again, and takes the place of what this program made of the same input. It never replaces a file that was edited
+  since or that is not its own, without --overwrite. The folder .rigid-motion beside the results has the record of them;
+  without it the program does not know its own files.
+
 what is written:
   NAME-reduced.blend for a .blend file, NAME-reduced.glb for a .glb file and with --glb for each, NAME-keys.csv and
-  NAME-keys.blend for a recording, beside it or in --output. A file is moved into place when it is complete, and
-  replaces an existing one only with --overwrite, also where another run has written that meanwhile. With --in-place the
-  program replaces a .blend file itself, and keeps the one before as NAME.blend1. At the end the paths that were written
-  are printed on standard output, one a line; a path with a line break or another control character is printed as JSON,
-  "a\\nb.csv".
-  Everything else goes to standard error: for each object and rig the number of keys before and after, and the largest
-  error.
+  NAME-keys.blend for a recording, beside it or in --output. For a single input --output may be the name of the file:
+  small/walk.glb, keys.blend, and .csv or .tum for a table. A file is moved into place when it is complete. With
+  --in-place the program replaces a .blend file itself, and keeps the one before as NAME.blend1. At the end the paths of
+  the results, also of those that were there already, are printed on standard output, one a line; a path with a line
+  break or another control character is printed as JSON, "a\\nb.csv". Everything else goes to standard error: for each
+  object and rig the number of keys before and after, and the largest error.
 
 what is run:
   Nothing in the files: scripts and Python expressions stay in them, switched off.
 
 exit code:
   0    all done, or nothing to do
-  1    some objects, bones or files could not be done, and are named with the reason. The others are done. Or Blender
-       crashed at a file, which is named: the files before it are done.
+  1    some objects, bones or files could not be done, and are named with the reason. The others are done. With a
+       single input or --jobs 0: or Blender crashed at a file, which is named; the files before it are done.
   2    a wrong option, or none of the files could be read: nothing was done
   130  stopped by Ctrl-C, and 143 by SIGTERM, within 2 s: the files written by then are complete, nothing else was
        changed
@@ -115,7 +130,11 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
     parser = parser_of(SCRIPT, __doc__, EPILOG)
     parser.add_argument(
-        "inputs", nargs="+", type=not_empty, metavar="INPUT", help=".blend files, glTF files and recordings"
+        "inputs",
+        nargs="+",
+        type=not_empty,
+        metavar="INPUT",
+        help=".blend files, glTF files, recordings, folders",
     )
     add_target_options(parser, "keys")
     keys = parser.add_argument_group("keys")
@@ -124,7 +143,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         type=_tolerance,
         metavar="LENGTH",
         help="largest error on any frame: 5mm, 0.5cm, 0.005m; a plain number is in the unit of the file (in .blend "
-        f"files 1mm for objects and {OF_A_BODY:.1%}% of the size of a rig; for recordings {TOLERANCE.written}; with "
+        f"files 1mm for objects and {OF_A_BODY:.1%}% of the size of a rig; for recordings {TOLERANCE.written}, with "
+        f"--glb too; in glTF files, and of .blend and FBX files with --glb, {OF_A_BODY:.1%}% of the size; with "
         f"--shared {OF_KEY_POSES:.0%}% of the size of a rig or body)",
     )
     keys.add_argument(

@@ -19,7 +19,7 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from rigid_motion_batch.command_line import path_line
+from rigid_motion_batch.command_line import complain, path_line, printable
 from rigid_motion_batch.pipeline import steps
 from rigid_motion_batch.pipeline.performing import (
     Executor,
@@ -42,6 +42,9 @@ EXTENSION = "rigid_motion"
 
 LOOK = 0.2
 """Seconds between two looks at whether a session is to end."""
+
+NAMED = 5
+"""As many of the inputs that failed are named at the end."""
 
 ROOMS = (
     "rigid_motion/animation",
@@ -170,9 +173,14 @@ def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = 
         Processes; 0 for this one. One for each processor, and this one for a single input, where None.
     """
     stopped, unmatched = None, set()
+    try:
+        executor = _executor(workers, len(jobs))
+    except ExecutorError as error:
+        complain(program, error)
+        return 2
     with (
         Progress() as progress,
-        _executor(workers, len(jobs)) as executor,
+        executor,
         tempfile.TemporaryDirectory(prefix="rigid-motion-") as scratch,
         _stopped_between_steps(),
     ):
@@ -195,6 +203,10 @@ def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = 
     if not work.dry_run:
         for path in (path for one in outcomes for path in one.written):
             print(path_line(path), flush=True)
+    failed = [one.source for one in outcomes if one.failed]
+    if failed and len(jobs) > len(failed):  # What was said of them may be far above.
+        more = f" and {len(failed) - NAMED} more" if len(failed) > NAMED else ""
+        print(f"Failed: {printable(', '.join(failed[:NAMED]))}{more}", file=sys.stderr)
     print(_summary(outcomes, len(jobs), work, interrupted=stopped is not None), file=sys.stderr, flush=True)
     if stopped is not None:
         return 128 + stopped
