@@ -44,7 +44,7 @@ LOOK = 0.2
 """Seconds between two looks at whether a session is to end."""
 
 NAMED = 5
-"""As many of the inputs that failed are named at the end."""
+"""Of more inputs so many that failed are named again at the end."""
 
 ROOMS = (
     "rigid_motion/animation",
@@ -204,7 +204,7 @@ def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = 
         for path in (path for one in outcomes for path in one.written):
             print(path_line(path), flush=True)
     failed = [one.source for one in outcomes if one.failed]
-    if failed and len(jobs) > len(failed):  # What was said of them may be far above.
+    if failed and len(jobs) > NAMED:  # What was said of them is far above.
         more = f" and {len(failed) - NAMED} more" if len(failed) > NAMED else ""
         print(f"Failed: {printable(', '.join(failed[:NAMED]))}{more}", file=sys.stderr)
     print(_summary(outcomes, len(jobs), work, interrupted=stopped is not None), file=sys.stderr, flush=True)
