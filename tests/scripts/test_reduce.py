@@ -437,6 +437,7 @@ def test_an_error_that_nobody_foresaw_is_told_and_the_others_go_on(tmp_path, cap
         (["a.blend", "--tolerance", "0mm"], "is no tolerance"),
         (["a.blend", "--radius", "0"], "is not a length above 0, such as 3cm or 0.03"),
         (["a.glb", "b.glb", "--output", "c.glb"], "--output c.glb is a file, and there may be several results"),
+        (["a.csv", "--output", "b.glb"], "add --glb, and a.csv becomes a GLB file"),
         (["a.glb", "--output", "b.blend"], "a.glb becomes a .glb file here: name such a one"),
         (["a.csv", "--jobs", "-1"], "is no number of processes; give 0, 1, 2, ..."),
         (["a.blend", "--mode", "BLENDER"], "invalid choice"),

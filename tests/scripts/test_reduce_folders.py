@@ -76,6 +76,22 @@ def test_a_folder_with_nothing_in_it_is_told_in_a_line(tmp_path, capsys):
     assert (tmp_path / "walk-reduced.glb").is_file()
 
 
+def test_a_folder_that_cannot_be_read_is_named(tmp_path, capsys, monkeypatch):
+    glb(tmp_path / "walk.glb")
+    (tmp_path / "closed").mkdir()
+    scan = os.scandir
+
+    def scan_but_closed(folder: str) -> object:
+        if str(folder).endswith("closed"):
+            raise PermissionError(13, "Permission denied", folder)
+        return scan(folder)
+
+    monkeypatch.setattr(os, "scandir", scan_but_closed)
+    assert run(tmp_path) == 1
+    assert f"{tmp_path / 'closed'}: this folder cannot be read (Permission denied)" in capsys.readouterr().err
+    assert (tmp_path / "walk-reduced.glb").is_file()
+
+
 def test_links_out_of_a_folder_are_not_followed(tmp_path):
     shots = tmp_path / "shots"
     glb(shots / "walk.glb")
@@ -94,11 +110,14 @@ def test_what_does_not_move_is_left_alone_in_a_folder(tmp_path, capsys):
     still.view(b"mesh")
     del still.json["animations"]
     still.write(tmp_path / "prop.glb")
+    (tmp_path / "shots.csv").write_text("shot,artist\n010,Ann\n", encoding="utf-8")
     glb(tmp_path / "walk.glb")
     assert run(tmp_path) == 0
     said = capsys.readouterr().err
     assert f"{tmp_path / 'prop.glb'}: no animations; left alone" in said
-    assert said.endswith("2 files: 1 written, 1 left alone.\n")
+    assert f"{tmp_path / 'shots.csv'}: no column has a known name (found shot, artist); left alone" in said
+    assert said.endswith("3 files: 1 written, 2 left alone.\n")
+    assert run(tmp_path / "shots.csv") == 2
     assert run(tmp_path / "prop.glb") == 2, "by its name it is a mistake"
 
 

@@ -260,6 +260,8 @@ def _planned(options: argparse.Namespace, work: Reduce) -> list[Job]:
         endings = (".glb",) if options.glb else (".csv", ".tum", ".blend")
     else:
         endings = (ending or first.suffix.lower(),)
+    if (options.output or first).suffix.lower() == ".glb" and not (options.glb or _is_gltf(first)):
+        raise ValueError(f"--output {options.output}: add --glb, and {first} becomes a GLB file")
     named = named_file(options.output, options.inputs, endings)
 
     def job_of(source: str, folder: Path) -> Job:

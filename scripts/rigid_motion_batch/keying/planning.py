@@ -69,10 +69,15 @@ def file_and_body(source: str) -> tuple[Path, str | None]:
         return Path(source), None
 
 
-def found_below(folder: Path, endings: tuple[str, ...], made: Callable[[Path], bool]) -> Iterator[Path]:
-    """The files of a folder and of those below it, but for hidden ones, results, and links that lead out."""
+def found_below(
+    folder: Path, endings: tuple[str, ...], made: Callable[[Path], bool], problems: list[OSError]
+) -> Iterator[Path]:
+    """The files of a folder and of those below it, but for hidden ones, results, and links that lead out.
+
+    Why folders cannot be read is added to the problems.
+    """
     root = os.path.realpath(folder)
-    for place, folders, names in os.walk(folder):
+    for place, folders, names in os.walk(folder, onerror=problems.append):
         folders[:] = [name for name in folders if not name.startswith(".")]
         for path in (Path(place, name) for name in names if name.lower().endswith(endings)):
             is_inside = not path.is_symlink() or Path(os.path.realpath(path)).is_relative_to(root)
@@ -107,14 +112,18 @@ def planned(
             job = job_of(given, output or file_and_body(given)[0].parent)
             jobs.setdefault(_identity(job), job)
             continue
-        paths = sorted(found_below(Path(given), endings, made))
+        closed: list[OSError] = []
+        paths = sorted(found_below(Path(given), endings, made, closed))
         for path in paths:
             folder = output / path.parent.relative_to(given) if output else path.parent
             job = replace(job_of(os.fspath(path), folder), is_found=True)
             jobs.setdefault(_identity(job), job)
-        if not paths:
-            problem = f"there is nothing to be done in this folder: name one with {', '.join(endings)} files, or a file"
-            jobs.setdefault(given, Job(given, Path(given), Path(given), problem=problem))
+        problems = {error.filename: f"this folder cannot be read ({error.strerror}): allow it" for error in closed}
+        if not (paths or problems):
+            nothing = f"there is nothing to be done in this folder: name one with {', '.join(endings)} files, or a file"
+            problems = {given: nothing}
+        for place, problem in problems.items():
+            jobs.setdefault(place, Job(place, Path(place), Path(place), problem=problem))
     return list(_settled(list(jobs.values())))
 
 

@@ -27,6 +27,7 @@ from rigid_motion_batch.keying.wishes import Wishes, fewer, off
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import folder_names, read_source
 from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.recordings.recordings import NoMotion
 
 
 class RecordingRun:
@@ -50,6 +51,9 @@ class RecordingRun:
         try:
             clips, note = read_source(job.source, self.reading.axes, self.reading.options)
         except TrajectoryError as error:
+            if job.is_found and isinstance(error, NoMotion):
+                self._note(f"{job.source}: {error.problem}; left alone")
+                return outcome
             self._note(str(error))
             return Outcome(job.source, failed=True, unreadable=True)
         except Exception as error:

@@ -105,8 +105,9 @@ class Record:
 
 
 def is_made(path: Path) -> bool:
-    """Whether a file was written by this program, by the record of its folder."""
-    return any(line.get("file") == path.name for line in _lines_of(path.parent / OWN / NAME))
+    """Whether a file is as this program has written it, by the record of its folder."""
+    digests = {line.get("sha256") for line in _lines_of(path.parent / OWN / NAME) if line.get("file") == path.name}
+    return bool(digests) and _digest(path) in digests
 
 
 def _lines_of(file: Path) -> Sequence[dict[str, Any]]:
