@@ -28,7 +28,7 @@ from research.paper.steps import PAGE, SECTIONS, plan, plan_bodies, plan_sending
 from research.paper.timing import ROUNDS
 from research.study import Study
 from rigid_motion_batch.files import write_text, written_beside
-from rigid_motion_batch.pipeline.executors import SerialExecutor
+from rigid_motion_batch.pipeline.performing import SerialExecutor
 from rigid_motion_batch.pipeline.running import Outcome, Progress, State, run
 from rigid_motion_batch.pipeline.steps import Task
 from rigid_motion_batch.pipeline.store import FolderInUse, OutputError, Store

@@ -5,13 +5,14 @@ Text is UTF-8 with LF line ends on every system, so that two runs can be compare
 
 from __future__ import annotations
 
+import json
 import os
 import secrets
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 from rigid_motion_batch.supervising import report
 
@@ -101,3 +102,26 @@ def write_text(path: Path, text: str) -> None:
     """Write all of a text file, or nothing of it."""
     with replacing(path) as stream:
         stream.write(text)
+
+
+def append_lines(path: Path, lines: Iterable[Mapping[str, Any]]) -> None:
+    """Add objects to a file with a line of JSON for each: of two who do so at the same time each line stays whole."""
+    text = "".join(f"{json.dumps(line)}\n" for line in lines)
+    path.parent.mkdir(exist_ok=True)
+    opened = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+    try:
+        os.write(opened, f"\n{text}".encode())  # A line that was cut off ends here.
+    finally:
+        os.close(opened)
+
+
+def lines_of(path: Path) -> Iterator[dict[str, Any]]:
+    """The objects of such a file; lines that are damaged are left out."""
+    try:
+        text = path.read_bytes()
+    except OSError:
+        return
+    for line in text.splitlines():
+        with suppress(ValueError, RecursionError):
+            if isinstance(content := json.loads(line), dict):
+                yield content

@@ -56,6 +56,7 @@ ASK = getattr(signal, "SIGUSR1", None)
 """What the parent asks its child with to end. Any other signal may come to both of them, from a terminal or a farm, and
 would ask twice. On Windows, where there is none, the console sends Ctrl-C to both, and the parent waits."""
 
+_session = ""
 _journal: int | None = None
 _is_child = False
 
@@ -113,8 +114,8 @@ def supervise(program: str) -> int:
         journal = _Journal(folder)
         by = received[0][0] if received else -code if -code in before else 0
         stopped = bool(by) and code != 0
+        journal.remove_half_written()  # Also of workers that were killed.
         if code < 0 or (stopped and not journal.ended):
-            journal.remove_half_written()
             journal.say_last_words(None if stopped else f"{program}: {_death(code, journal.at)}")
         return 128 + by if stopped else 1 if code < 0 else code
     finally:
@@ -141,14 +142,12 @@ def begin_child() -> bool:
 
     It then reports in the journal, leaves what becomes of signals to its parent, and does not outlive that.
     """
-    global _journal, _is_child
+    global _is_child
     # Programs that the child starts are not to take themselves for children.
     folder = os.environ.pop(VARIABLE, None)
     if folder is None:
         return False
-    if folder:
-        with suppress(OSError):
-            _journal = os.open(Path(folder) / JOURNAL, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+    join_session(folder)
     end_with_parent()
     if ASK:
         parent, signals = os.getppid(), stop_signals()
@@ -162,6 +161,25 @@ def begin_child() -> bool:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, signals)
     _is_child = True
     return True
+
+
+def blender_program() -> str:
+    """The Blender that this process is; empty in a Python, with or without bpy."""
+    return getattr(getattr(sys.modules.get("bpy"), "app", None), "binary_path", "")
+
+
+def session() -> str:
+    """The temporary folder of this command, for `join_session`; empty where there is none."""
+    return _session
+
+
+def join_session(folder: str) -> None:
+    """Have this process report in the journal of a command: the child does so, and workers that it has started."""
+    global _session, _journal
+    if folder:
+        with suppress(OSError):
+            _journal = os.open(Path(folder) / JOURNAL, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+            _session = folder
 
 
 def end_with_parent() -> None:
@@ -181,6 +199,8 @@ def report(**facts: Any) -> None:
         A file that is being written, or a folder that was made for one; it is removed if the process is killed.
     written : str
         A file that is complete, and to be printed at the end.
+    source : str
+        The input that it was made of.
     summary : str
         What would be said if the process were stopped now.
     ended : bool
@@ -191,6 +211,11 @@ def report(**facts: Any) -> None:
             os.write(_journal, f"{json.dumps(facts)}\n".encode())
 
 
+def written_of(source: str) -> list[str]:
+    """The files that this process and its workers have reported as complete that were made of an input."""
+    return [path for path, made_of in _Journal(_session).written if made_of == source]
+
+
 class _Journal:
     """What the child reported."""
 
@@ -198,7 +223,7 @@ class _Journal:
         self.at = ""
         self.summary = STOPPED
         self.ended = False
-        self.written: list[str] = []
+        self.written: list[tuple[str, str | None]] = []
         self._making: list[Path] = []
         try:
             lines = (Path(folder or os.devnull) / JOURNAL).read_text(encoding="utf-8").splitlines()
@@ -210,7 +235,7 @@ class _Journal:
                 self.at = facts.get("at", self.at)
                 self.summary = facts.get("summary", self.summary)
                 self.ended = facts.get("ended", self.ended)
-                self.written += [facts["written"]] if "written" in facts else []
+                self.written += [(facts["written"], facts.get("source"))] if "written" in facts else []
                 self._making += [Path(facts["making"])] if "making" in facts else []
 
     def remove_half_written(self) -> None:
@@ -221,9 +246,8 @@ class _Journal:
                     place.rmdir()
                     continue
                 # Blender writes beside it again, to NAME@.
-                for name in os.listdir(place.parent):
-                    if name in (place.name, f"{place.name}@"):
-                        place.with_name(name).unlink()
+                place.with_name(f"{place.name}@").unlink(missing_ok=True)
+                place.unlink(missing_ok=True)
 
     def say_last_words(self, crash: str | None) -> None:
         """Print what the child can no longer say."""
@@ -233,7 +257,7 @@ class _Journal:
         if errors and sys.stderr.isatty():
             print(SHOW_CURSOR, file=sys.stderr, flush=True)  # It is behind the progress bar, which has hidden it.
         if _writable(sys.stdout):
-            for path in self.written:
+            for path, _ in self.written:
                 print(path_line(path), flush=True)
         if errors:
             for line in filter(None, (crash, self.summary.removeprefix("Stopped. ") if crash else self.summary)):
@@ -254,7 +278,7 @@ def _environment(folder: str | None) -> dict[str, str]:
 
 def _this_command() -> Sequence[str]:
     """What this process was started with: Python, or a Blender that runs a script."""
-    blender = getattr(getattr(sys.modules.get("bpy"), "app", None), "binary_path", "")
+    blender = blender_program()
     return [blender, *sys.argv[1:]] if blender else [sys.executable, *sys.orig_argv[1:]]
 
 

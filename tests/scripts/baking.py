@@ -21,7 +21,7 @@ LAST = 103
 
 
 def run(*arguments: object) -> int:
-    return bake.main([str(argument) for argument in arguments])
+    return bake.main([*map(str, arguments), "--jobs", "0"])
 
 
 def exit_code(*arguments: object) -> int:

@@ -12,6 +12,7 @@ from rigid_motion.animation import write_channel
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion_batch.cli import reduce
+from rigid_motion_batch.pipeline.steps import OWN
 from tests.animation.farm import on_a_farm, played_on_a_farm
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import new_object
@@ -36,7 +37,8 @@ BALL = RADIUS * normalise(np.random.default_rng(5).normal(size=(64, 3)))
 
 
 def run(*arguments: object) -> int:
-    return reduce.main([str(argument) for argument in arguments])
+    """The exit code, all of it being done in this process."""
+    return reduce.main([*map(str, arguments), "--jobs", "0"])
 
 
 def exit_code(*arguments: object) -> int:
@@ -93,6 +95,11 @@ def rig_file(path: Path) -> Path:
         probe = new_object(f"at {bone.name}")
         probe.parent, probe.parent_type, probe.parent_bone = rig, "BONE", bone.name
     return save(path)
+
+
+def listed(folder: Path) -> list[str]:
+    """The names in a folder, but for where the program keeps its own files."""
+    return sorted({path.name for path in folder.iterdir()} - {OWN})
 
 
 def reduced_name(path: Path) -> Path:

@@ -15,8 +15,8 @@ import pytest
 
 from rigid_motion import animation
 from rigid_motion.animation import is_baked, set_mode
+from rigid_motion_batch.cli import bake
 from rigid_motion_batch.keying import jobs
-from rigid_motion_batch.keying.options import jobs_of
 from tests.animation.farm import played_on_a_farm
 from tests.animation.oracle import curves_of, expected_worlds, shown_worlds, snapshot
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own_deltas
@@ -33,6 +33,7 @@ from tests.scripts.baking import (
     save,
     with_version,
 )
+from tests.scripts.reducing import listed
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -254,7 +255,7 @@ def test_objects_can_be_chosen_by_names_and_patterns(shot, tmp_path, capsys):
 def test_a_name_that_nothing_has_is_said(shot, tmp_path, capsys):
     assert run(shot, "--output", tmp_path, "--objects", "Camera,Camra") == 1
     assert "--objects Camra: no object or bone of that name" in capsys.readouterr().err
-    assert (tmp_path / "shot-baked.blend").is_file()
+    (tmp_path / "shot-baked.blend").write_bytes(b"mine")
     assert run(shot, "--output", tmp_path, "--objects", "Camra") == 1
     assert "Camra" not in capsys.readouterr().err, "a file that was not looked into may have it"
 
@@ -291,7 +292,7 @@ def test_a_file_without_modes_is_left_alone(tmp_path, capsys):
     path = save(tmp_path / "plain.blend")
     assert run(path) == run(path, "--unbake") == 0
     assert "nothing to be baked; left alone" in capsys.readouterr().err
-    assert os.listdir(tmp_path) == ["plain.blend"]
+    assert listed(tmp_path) == ["plain.blend"]
 
 
 def test_a_file_of_an_older_blender_is_said_to_be_of_this_one_afterwards(tmp_path, capsys, monkeypatch):
@@ -316,7 +317,7 @@ def test_an_error_that_nobody_foresaw_is_told_and_the_others_go_on(tmp_path, cap
     said = capsys.readouterr().err
     assert f"{paths[0]}: not written, for this program failed (ZeroDivisionError: nobody knows why)" in said
     assert "Traceback" in said
-    assert sorted(os.listdir(tmp_path)) == ["a.blend", "b-baked.blend", "b.blend"]
+    assert listed(tmp_path) == ["a.blend", "b-baked.blend", "b.blend"]
 
 
 # What is left alone, and what is kept
@@ -327,7 +328,7 @@ def test_the_file_itself_is_not_touched_and_nothing_else_is_left(tmp_path):
     before = path.read_bytes(), path.stat().st_mtime_ns
     assert run(path) == 0
     assert (path.read_bytes(), path.stat().st_mtime_ns) == before
-    assert sorted(os.listdir(tmp_path)) == ["shot-baked.blend", "shot.blend"]
+    assert listed(tmp_path) == ["shot-baked.blend", "shot.blend"]
 
 
 def test_a_file_that_is_there_is_left_alone_unless_it_may_be_overwritten(tmp_path, capsys):
@@ -347,7 +348,7 @@ def test_in_place_the_file_is_saved_and_the_one_before_kept_by_blender(tmp_path,
     capsys.readouterr()
     assert run(path, "--in-place") == 0
     assert capsys.readouterr().out == f"{path}\n"
-    assert sorted(os.listdir(tmp_path)) == ["shot.blend", "shot.blend1"]
+    assert listed(tmp_path) == ["shot.blend", "shot.blend1"]
     assert (tmp_path / "shot.blend1").read_bytes() == before
     open_again(path)
     assert len(frames_of_keys(bpy.data.objects["Tool"])) == 40
@@ -431,9 +432,8 @@ def test_no_python_of_a_file_is_run_and_all_of_it_stays(tmp_path):
         (["a.blend", "--unbake", "--step", "2"], "--step is for baking"),
         (["a.blend", "--unbake", "--first", "0"], "--first is for baking"),
         (["a.blend", "--in-place", "--output", "x"], "give one of them"),
-        (["a.blend", "--output", __file__], "is a file: give a folder"),
-        (["a/shot.blend", "b/shot.blend", "--output", "x"], "would both be written to"),
-        (["shot.blend", "shot-baked.blend"], "would be written over shot-baked.blend"),
+        (["a.blend", "--output", __file__], "a.blend becomes a .blend file here: name such a one"),
+        (["a.blend", "b.blend", "--output", __file__], "is a file, and there may be several results: give a folder"),
     ],
 )
 def test_a_wrong_option_ends_with_code_2_and_a_way_out(arguments, complaint, capsys):
@@ -442,8 +442,37 @@ def test_a_wrong_option_ends_with_code_2_and_a_way_out(arguments, complaint, cap
 
 
 def test_a_file_that_is_named_twice_is_done_once():
-    jobs = jobs_of([Path("a.blend"), Path("b.blend"), Path("x/../a.blend")], "-baked", None, in_place=False)
-    assert [job.source for job in jobs] == [Path("a.blend"), Path("b.blend")]
+    options = bake.parse(["a.blend", "b.blend", "x/../a.blend"])
+    assert [job.source for job in options.todo] == ["a.blend", "b.blend"]
+
+
+def test_what_would_be_written_over_another_is_named(tmp_path, capsys):
+    for name in ("a/shot", "b/shot", "b/shot-baked"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        one_object_file(tmp_path / f"{name}.blend")
+    assert run(tmp_path / "a" / "shot.blend", tmp_path / "b" / "shot.blend", "--output", tmp_path / "x") == 1
+    assert (
+        f"{tmp_path / 'a' / 'shot.blend'} is written to {tmp_path / 'x' / 'shot-baked.blend'} too"
+        in capsys.readouterr().err
+    )
+    before = (tmp_path / "b" / "shot-baked.blend").read_bytes()
+    assert run(tmp_path / "b" / "shot.blend", tmp_path / "b" / "shot-baked.blend") == 1
+    assert "which is to be read too: leave one of them out" in capsys.readouterr().err
+    assert (tmp_path / "b" / "shot-baked.blend").read_bytes() == before
+
+
+def test_a_folder_is_baked_and_what_was_baked_is_no_input(tmp_path, capsys):
+    (tmp_path / "a").mkdir()
+    for name in ("shot", "a/shot"):
+        one_object_file(tmp_path / f"{name}.blend")
+    capsys.readouterr()
+    for times, written in ((1, "2 written"), (2, "0 written, 2 already baked")):
+        assert run(tmp_path, "--output", tmp_path / "out") == 0, times
+        said = capsys.readouterr()
+        assert said.out.splitlines() == [str(tmp_path / "out" / f"{one}shot-baked.blend") for one in ("a/", "")]
+        assert said.err.splitlines()[-1].endswith(f"2 files: {written}.")
+    assert run(tmp_path / "out", "--unbake") == 0
+    assert listed(tmp_path / "out" / "a") == ["shot-baked-unbaked.blend", "shot-baked.blend"]
 
 
 def test_as_a_program_it_ends_by_itself_and_prints_the_path_alone(tmp_path):

@@ -31,6 +31,7 @@ from tests.scripts.baking import (
     run,
     with_version,
 )
+from tests.scripts.reducing import listed
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMAND = [sys.executable, ROOT / "scripts" / "bake.py"]
@@ -83,7 +84,7 @@ def newer(path: Path) -> None:
         (Path.touch, "this is no .blend file, it is empty"),
         (cut, "Blender cannot read this file, which looks damaged"),
         (newer, "and this is"),
-        (Path.mkdir, "this is a folder: name the files in it"),
+        (Path.mkdir, "there is nothing to be done in this folder"),
         (lambda path: None, "this cannot be opened (No such file or directory)"),
     ],
     ids=["text", "empty", "cut off", "newer", "folder", "missing"],
@@ -184,7 +185,7 @@ def test_a_name_that_is_too_long_for_the_result_is_told_before_the_work(tmp_path
     assert run(path, *options) == 1
     (line,) = (line for line in capsys.readouterr().err.splitlines() if line.startswith(f"{path}: "))
     assert line.endswith("of which file systems allow 255: give the input a shorter name")
-    assert os.listdir(tmp_path) == [path.name]
+    assert listed(tmp_path) == [path.name]
 
 
 def test_a_name_may_be_as_long_as_file_systems_allow(tmp_path):
@@ -192,7 +193,7 @@ def test_a_name_may_be_as_long_as_file_systems_allow(tmp_path):
     path = made.rename(tmp_path / f"{'x' * 243}.blend")
     assert run(path) == 0
     assert len(baked_name(path).name) == 255
-    assert sorted(os.listdir(tmp_path)) == sorted([path.name, baked_name(path).name])
+    assert listed(tmp_path) == sorted([path.name, baked_name(path).name])
 
 
 def test_a_file_where_a_folder_should_be_is_named(tmp_path, capsys):
@@ -202,7 +203,7 @@ def test_a_file_where_a_folder_should_be_is_named(tmp_path, capsys):
     said = capsys.readouterr().err.splitlines()
     assert any(line.startswith(f"{path}: {tmp_path / 'file'} is a file, and ") for line in said)
     assert said[-1] == "0 objects baked; 1 file: 0 written, 1 failed."
-    assert sorted(os.listdir(tmp_path)) == ["file", "shot.blend"]
+    assert listed(tmp_path) == ["file", "shot.blend"]
 
 
 def test_a_folder_of_the_name_of_the_output_is_left_alone(tmp_path, capsys):
@@ -247,7 +248,7 @@ def test_an_output_that_leads_to_the_file_itself_is_refused(tmp_path, capsys):
     path = one_object_file(tmp_path / "shot.blend")
     baked_name(path).symlink_to(path)
     before = path.read_bytes()
-    assert exit_code(path, "--overwrite") == 2
+    assert run(path, "--overwrite") == 2
     assert "which is to be read too" in capsys.readouterr().err
     assert path.read_bytes() == before
 
@@ -307,7 +308,7 @@ def test_un_baking_what_is_not_baked_leaves_it_alone(tmp_path, capsys):
     path = one_object_file(tmp_path / "shot.blend")
     assert run(path, "--unbake") == 0
     assert f"{path}: nothing to be un-baked; left alone" in capsys.readouterr().err
-    assert os.listdir(tmp_path) == ["shot.blend"]
+    assert listed(tmp_path) == ["shot.blend"]
 
 
 def test_a_baked_file_is_not_baked_again(tmp_path, capsys):
@@ -315,7 +316,7 @@ def test_a_baked_file_is_not_baked_again(tmp_path, capsys):
     assert run(path) == 0
     assert run(baked_name(path)) == 0
     assert f"{baked_name(path)}: nothing to be baked; left alone" in capsys.readouterr().err
-    assert sorted(os.listdir(tmp_path)) == ["shot-baked.blend", "shot.blend"]
+    assert listed(tmp_path) == ["shot-baked.blend", "shot.blend"]
 
 
 # Stopped half-way
@@ -334,7 +335,7 @@ def test_a_run_that_is_stopped_leaves_whole_files_only(tmp_path, stopped_by, cod
         ran.send_signal(stopped_by)
         printed, said = ran.communicate(timeout=60)
     assert ran.returncode == code, said
-    written = sorted(farm.iterdir())
+    written = [farm / name for name in listed(farm)]
     assert 0 < len(written) < len(paths)
     assert printed.decode().split() == [str(path) for path in written], "no name but those of files that are whole"
     assert f"{len(paths) - len(written)} not reached." in said.decode()
@@ -355,7 +356,7 @@ def test_ctrl_c_while_a_file_is_written_leaves_it_as_it_was(tmp_path, monkeypatc
 
     monkeypatch.setattr(blend_files, "refuse_cut_off", press_and_check)
     assert run(path, *options) == 130
-    assert os.listdir(tmp_path) == ["shot.blend"]
+    assert listed(tmp_path) == ["shot.blend"]
     assert path.read_bytes() == before
 
 
@@ -386,7 +387,7 @@ def test_ctrl_c_leaves_whole_files_only(tmp_path, capsys, monkeypatch, stopped_a
     before = signal.getsignal(signal.SIGINT)
     assert run(*paths) == 130
     assert signal.getsignal(signal.SIGINT) is before
-    assert sorted(os.listdir(tmp_path)) == ["a-baked.blend", "a.blend", "b.blend"][2 - stopped_at :][: stopped_at + 1]
+    assert listed(tmp_path) == ["a-baked.blend", "a.blend", "b.blend"][2 - stopped_at :][: stopped_at + 1]
     assert capsys.readouterr().err.splitlines()[-1].startswith("Stopped. ")
     assert not hasattr(bpy.types.Object, "rigid_motion")
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from pathlib import Path
 
@@ -15,7 +14,18 @@ from rigid_motion_batch.recordings.clips import Clip
 from tests.animation.farm import played_on_a_farm
 from tests.gltf.oracle import File, off
 from tests.scripts.baking import new_file, save
-from tests.scripts.reducing import FRAMES, WALK, exit_code, hand_made, object_file, rig_file, run, worlds_of, write_csv
+from tests.scripts.reducing import (
+    FRAMES,
+    WALK,
+    exit_code,
+    hand_made,
+    listed,
+    object_file,
+    rig_file,
+    run,
+    worlds_of,
+    write_csv,
+)
 
 MM = 1e-3
 
@@ -113,9 +123,8 @@ def test_a_blend_file_is_exported_as_it_plays(tmp_path, exported, mode):
     probes = ["at Root", "at Arm", "at Hand"]
     truth = played_on_a_farm(source, probes, FRAMES)[1][..., :3, 3]
     file = File(made)
-    # The dense keys for Restore Keys are a clip of their own, before the one that plays.
-    clip = len(file.json["animations"]) - 1
-    worlds = file.worlds(clip, FRAMES / 24.0)[[node_of(file, name) for name in probes]][..., :3, 3]
+    assert len(file.json["animations"]) == 1, "the dense keys for Restore Keys are no clip"
+    worlds = file.worlds(0, FRAMES / 24.0)[[node_of(file, name) for name in probes]][..., :3, 3]
     x, y, z = np.moveaxis(truth, -1, 0)
     assert np.linalg.norm(worlds - np.stack((x, z, -y), axis=-1), axis=-1).max() <= 2 * MM + SINGLE
 
@@ -133,9 +142,9 @@ def test_a_rigid_recording_becomes_a_node(tmp_path):
 
 def test_what_is_there_stays_without_overwrite_and_a_dry_run_writes_nothing(tmp_path, capsys):
     blend, body = object_file(tmp_path / "shot.blend"), hand_made(tmp_path)
-    before = sorted(os.listdir(tmp_path))
+    before = listed(tmp_path)
     assert run(blend, body, "--glb", "--dry-run") == 0
-    assert sorted(os.listdir(tmp_path)) == before
+    assert listed(tmp_path) == before
     made = [tmp_path / f"{path.stem}-reduced.glb" for path in (blend, body)]
     for path in made:
         path.write_bytes(b"mine")
@@ -151,7 +160,7 @@ def test_what_is_there_stays_without_overwrite_and_a_dry_run_writes_nothing(tmp_
 def test_two_files_that_would_be_one_are_told(tmp_path, capsys):
     body, blend = hand_made(tmp_path), object_file(tmp_path / "body.blend")
     assert run(blend, body, "--glb", "--overwrite") == 1
-    assert f"{blend} was written to {tmp_path / 'body-reduced.glb'} too" in capsys.readouterr().err
+    assert f"{blend} is written to {tmp_path / 'body-reduced.glb'} too" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["none.fbx", "text.fbx", "none.blend", "text.blend"])

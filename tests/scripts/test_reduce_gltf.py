@@ -13,6 +13,7 @@ import pytest
 from rigid_motion_batch.cli import reduce
 from tests.gltf.making import Making, walk
 from tests.gltf.oracle import File, off
+from tests.scripts.reducing import listed
 
 WITHOUT_BLENDER = """
 import sys
@@ -56,7 +57,7 @@ def test_a_tolerance_that_is_too_large_is_refused_and_nothing_is_written(tmp_pat
     source = walk(unit=0.01).write(tmp_path / "walk.glb")
     assert run(source, "--tolerance", "2mm") == 2
     assert "a tolerance of 0.002 m is more than a tenth of the size, which is 0.015 m" in capsys.readouterr().err
-    assert os.listdir(tmp_path) == ["walk.glb"]
+    assert listed(tmp_path) == ["walk.glb"]
 
 
 def test_a_gltf_finds_its_files_from_another_folder(tmp_path):
@@ -65,7 +66,7 @@ def test_a_gltf_finds_its_files_from_another_folder(tmp_path):
     (tmp_path / "skin a.png").write_bytes(b"some")
     source = made.write(tmp_path / "walk.gltf")
     assert run(source, "--output", tmp_path / "out", "--tolerance", "2mm") == 0
-    assert sorted(os.listdir(tmp_path / "out")) == ["skin a.png", "walk-reduced.bin", "walk-reduced.gltf"]
+    assert listed(tmp_path / "out") == ["skin a.png", "walk-reduced.bin", "walk-reduced.gltf"]
     assert off(File(source), File(tmp_path / "out" / "walk-reduced.gltf"), 0, 0.0) <= 2e-3
 
 
@@ -86,7 +87,7 @@ def test_a_file_whose_clips_need_their_keys_is_left_alone(tmp_path, capsys):
     said = capsys.readouterr()
     assert "Take0: stays as it was, 3 keys in 48 bytes: fewer keys would take more bytes" in said.err
     assert "nothing could be reduced; left alone" in said.err
-    assert (said.out, os.listdir(tmp_path)) == ("", ["walk.glb"])
+    assert (said.out, listed(tmp_path)) == ("", ["walk.glb"])
 
 
 @pytest.mark.parametrize(
@@ -108,7 +109,7 @@ def test_options_of_blend_files_are_refused(tmp_path, capsys, options, line):
 def test_what_is_there_stays_without_overwrite_and_a_dry_run_writes_nothing(tmp_path, capsys):
     source = walk().write(tmp_path / "walk.glb")
     assert run(source, "--dry-run") == 0
-    assert os.listdir(tmp_path) == ["walk.glb"]
+    assert listed(tmp_path) == ["walk.glb"]
     made = tmp_path / "walk-reduced.glb"
     made.write_bytes(b"mine")
     assert run(source) == 1
@@ -127,4 +128,4 @@ def test_key_poses_are_so_many_frames_of_all_joints(tmp_path):
 def test_a_rig_with_its_mode_comes_with_blend(tmp_path):
     source = walk().write(tmp_path / "walk.glb")
     assert run(source, "--blend", "--mode", "dq_sclerp") == 0
-    assert sorted(os.listdir(tmp_path)) == ["walk-keys.blend", "walk.glb"]
+    assert listed(tmp_path) == ["walk-keys.blend", "walk.glb"]

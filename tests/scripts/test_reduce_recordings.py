@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 
 import bpy
@@ -25,6 +24,7 @@ from tests.scripts.reducing import (
     hand_made,
     heads_at,
     heads_of,
+    listed,
     object_file,
     read_table,
     run,
@@ -111,7 +111,7 @@ def test_a_whole_body_becomes_a_rig_that_plays_like_it_in_any_blender(tmp_path, 
     source = recording(tmp_path)
     assert run(source, "--tolerance", "5mm", "--output", tmp_path / "keyed", *options) == 0
     made = tmp_path / "keyed" / f"{source.stem}-keys.blend"
-    assert os.listdir(made.parent) == [made.name]
+    assert listed(made.parent) == [made.name]
     shown, imported = heads_of(made, source, tmp_path)
     assert shown.shape == imported.shape
     assert 0.0 < np.linalg.norm(shown - imported, axis=-1).max() <= 5e-3 + ROUNDING
@@ -147,7 +147,7 @@ def test_a_body_that_does_not_move_is_left_alone_and_nothing_is_wrong(tmp_path, 
     write_body(tmp_path / "body.bvh", moves=False)
     assert run(tmp_path / "body.bvh") == 0
     assert "nothing of this body moves; left alone" in capsys.readouterr().err
-    assert os.listdir(tmp_path) == ["body.bvh"]
+    assert listed(tmp_path) == ["body.bvh"]
 
 
 def test_a_body_that_grows_has_its_size_in_the_table_and_in_the_file(tmp_path):
@@ -171,7 +171,7 @@ def test_one_body_of_a_file_and_all_of_them_are_files_of_their_own(tmp_path):
     assert run(f"{source}:LeftHand", "--tolerance", "1cm") == 0
     assert (tmp_path / "body-LeftHand-keys.csv").is_file()
     assert run(f"{source}:*", "--tolerance", "1cm", "--output", tmp_path / "all") == 0
-    assert sorted(os.listdir(tmp_path / "all")) == [f"body-{name}-keys.csv" for name in ("Head", "Hips", "LeftHand")]
+    assert listed(tmp_path / "all") == [f"body-{name}-keys.csv" for name in ("Head", "Hips", "LeftHand")]
 
 
 def test_an_object_of_a_blend_file_is_a_recording_where_it_is_named(tmp_path):

@@ -12,7 +12,7 @@ import pytest
 
 from rigid_motion_batch.recordings import importing
 from tests.scripts.baking import one_object_file
-from tests.scripts.reducing import object_file, write_csv
+from tests.scripts.reducing import listed, object_file, write_csv
 from tests.scripts.stopping import CRASH, alive, descendants, start
 
 SOON = 5.0
@@ -24,14 +24,14 @@ pytestmark = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="lo
 
 
 def files(folder: Path) -> list[str]:
-    return sorted(path.name for path in folder.iterdir() if path.name != "stuck")
+    return [name for name in listed(folder) if name != "stuck"]
 
 
 @BOTH
 def test_a_reader_at_work_does_not_keep_reduce_from_its_end(tmp_path, by, code):
     write_csv(tmp_path / "hand.csv")
     write_csv(tmp_path / "slow.csv")
-    run = start(tmp_path, "reduce.py", "hand.csv", "slow.csv", "hand.csv", where="slow.csv")
+    run = start(tmp_path, "reduce.py", "hand.csv", "slow.csv", "hand.csv", "--jobs", 0, where="slow.csv")
     run.wait_until_stuck()
     processes = descendants(run.process.pid)
     run.process.send_signal(by)
@@ -53,13 +53,14 @@ def test_what_is_half_written_is_gone(tmp_path, command, by, code):
     make(tmp_path / "shot.blend")
     run = start(tmp_path, command, "shot.blend", "--output", "new/farm", where="shot-")
     run.wait_until_stuck()
-    assert len(list((tmp_path / "new" / "farm").iterdir())) == 1
+    assert len(listed(tmp_path / "new" / "farm")) == 1
     run.process.send_signal(by)
     printed, said, seconds = run.end()
     assert (run.process.returncode, printed) == (code, ""), said
     assert said.splitlines()[-1].startswith("Stopped. 0 objects")
     assert seconds < SOON
-    assert files(tmp_path) == ["shot.blend"]
+    assert files(tmp_path) == ["new", "shot.blend"]
+    assert listed(tmp_path / "new" / "farm") == []
     assert list(run.temporary.iterdir()) == []
 
 
@@ -117,7 +118,7 @@ def test_ctrl_c_in_a_terminal_pressed_again_and_again_leaves_nothing_behind(tmp_
 def test_a_crash_names_the_file_that_it_came_at_and_what_is_complete(tmp_path):
     for name in ("hand", "slow", "last"):
         write_csv(tmp_path / f"{name}.csv")
-    run = start(tmp_path, "reduce.py", "hand.csv", "slow.csv", "last.csv", where="slow.csv", act=CRASH)
+    run = start(tmp_path, "reduce.py", "hand.csv", "slow.csv", "last.csv", "--jobs", 0, where="slow.csv", act=CRASH)
     printed, said, _ = run.end()
     assert (run.process.returncode, printed) == (1, "hand-keys.csv\n")
     assert said.splitlines()[-2:] == [

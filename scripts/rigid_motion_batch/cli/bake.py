@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
 from rigid_motion_batch.command_line import not_empty, number, parser_of, program_of
@@ -18,10 +19,12 @@ PROGRAM = program_of(SCRIPT)
 
 require_blender(SCRIPT)
 
-from rigid_motion_batch.keying.baking import baking, unbaking
+from rigid_motion_batch.keying.baking import BAKED, UNBAKED, baking, unbaking
 from rigid_motion_batch.keying.jobs import BlendRun
-from rigid_motion_batch.keying.options import add_file_options, add_target_options, jobs_of, refuse_odd_places
-from rigid_motion_batch.keying.sessions import Work, do_all
+from rigid_motion_batch.keying.options import add_file_options, add_target_options, refuse_odd_places
+from rigid_motion_batch.keying.planning import Job, named_file, planned
+from rigid_motion_batch.keying.records import Record, is_made
+from rigid_motion_batch.keying.sessions import Note, Outcome, Work, do_all
 
 SMALLEST_STEP = 0.01
 """Keys closer than that are one key to Blender."""
@@ -30,6 +33,7 @@ EPILOG = """
 examples:
   python scripts/bake.py shot.blend
   python scripts/bake.py shots/*.blend --output farm
+  python scripts/bake.py shots --output farm --jobs 4
   python scripts/bake.py shot.blend --objects 'Camera,Tool*' --step 0.25
   python scripts/bake.py shot.blend --objects 'Rig/Hand*,Rig/Foot*'
   python scripts/bake.py shot.blend --dry-run
@@ -38,13 +42,21 @@ examples:
 
 what is written:
   NAME-baked.blend or NAME-unbaked.blend, beside the file or in --output. The program opens the new file again to check
-  it, and then moves it into place. It replaces an existing file only with --overwrite, also where another run has
-  written that meanwhile, and never one that is read-only. With --in-place it replaces the file itself in the same way,
-  and keeps the one before as NAME.blend1. A file in which there is nothing to do is not written. At the end the paths
-  that were written are printed on standard output, one a line; a path with a line break or another control character
-  is printed as JSON, "a\\nb.blend". Everything else goes to standard error.
+  it, and then moves it into place. It replaces a file that is not its own, or was edited since, only with --overwrite,
+  also where another run has written that meanwhile, and never one that is read-only. For a single input --output may be
+  the name of the file. With --in-place it replaces the file itself in the same way, and keeps the one before as
+  NAME.blend1. A file in which there is nothing to do is not written. At the end the paths of the results, also of those
+  that were there already, are printed on standard output, one a line; a path with a line break or another control
+  character is printed as JSON, "a\\nb.blend". Everything else goes to standard error.
   Textures and libraries are found from the new place, too. A relative output path of the render, and disk caches of
   simulations (blendcache_NAME), depend on the place and the name of the file, as after Save As.
+
+folders and many files:
+  A folder stands for the .blend files in it and in the folders below; the results lie below --output as these do. What
+  this program has written is no input, but for --unbake, which takes *-baked.blend alone. Several files are done at
+  once by as many processes as --jobs says. You can run the same command again: a file is "already baked" where its
+  result is there, made of the same bytes with the same options and version. The folder .rigid-motion beside the results
+  has the record of them.
 
 what is run:
   Nothing in the files: scripts and Python expressions stay in them, switched off. If a farm should run them, let it
@@ -61,7 +73,7 @@ exit code:
        python scripts/bake.py shot.blend --output farm && blender --background farm/shot-baked.blend --render-anim
   1    some objects, bones or files could not be done, and are named with the reason: a driven channel, an infinite
        key, a missing library, one damaged file of many, a full disk, an --objects NAME that nothing has. The others
-       are done. Or Blender crashed at a file, which is named: the files before it are done.
+       are done. With a single input or --jobs 0: or Blender crashed at a file, which is named; those before are done.
   2    a wrong option, or none of the files could be read: nothing was done
   130  stopped by Ctrl-C, and 143 by SIGTERM, within 2 s: the files written by then are complete, nothing else was
        changed
@@ -71,7 +83,7 @@ exit code:
 def parse(arguments: list[str]) -> argparse.Namespace:
     """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
     parser = parser_of(SCRIPT, __doc__, EPILOG)
-    parser.add_argument("files", nargs="+", type=not_empty, metavar="FILE.blend", help="files to bake")
+    parser.add_argument("files", nargs="+", type=not_empty, metavar="FILE.blend", help="files to bake, folders")
     parser.add_argument("--unbake", action="store_true", help="give baked objects and bones their own keys back")
     add_target_options(parser, "modes")
     keys = parser.add_argument_group("keys")
@@ -99,15 +111,10 @@ def parse(arguments: list[str]) -> argparse.Namespace:
                 parser.error(f"--{option} is for baking, and says nothing to --unbake: leave it out")
     if None not in (options.first, options.last) and options.first > options.last:
         parser.error(f"--last {options.last:g} is before --first {options.first:g}")
-    interpolation = "CONSTANT" if options.hold else "LINEAR"
-    options.action = (
-        unbaking() if options.unbake else baking(options.step or 1.0, options.first, options.last, interpolation)
-    )
     try:
         refuse_odd_places(options)
-        options.jobs = jobs_of(
-            list(map(Path, options.files)), options.action.suffix, options.output, in_place=options.in_place
-        )
+        options.work = Bake.of(options)
+        options.todo = _planned(options)
     except ValueError as error:
         parser.error(str(error))
     return options
@@ -116,9 +123,50 @@ def parse(arguments: list[str]) -> argparse.Namespace:
 def main(arguments: list[str]) -> int:
     """Do all files, and return the exit code."""
     options = parse(arguments)
-    action = options.action
-    work = Work(PROGRAM, action.doing, action.done, options.objects, options.dry_run)
-    return do_all(options.jobs, work, lambda *session: BlendRun(options, action, *session).do)
+    return do_all(PROGRAM, options.todo, options.work, options.jobs)
+
+
+@dataclass(frozen=True)
+class Bake(Work):
+    """Baking keys, or taking that back."""
+
+    unbake: bool
+    step: float
+    first: float | None
+    last: float | None
+    interpolation: str
+
+    @classmethod
+    def of(cls, options: argparse.Namespace) -> Bake:
+        """What the options say."""
+        doing, done = ("Un-baking", "un-baked") if options.unbake else ("Baking", "baked")
+        interpolation = "CONSTANT" if options.hold else "LINEAR"
+        where = options.objects, options.overwrite, options.dry_run
+        return cls(doing, done, *where, options.unbake, options.step or 1.0, options.first, options.last, interpolation)
+
+    def needs_blender(self, job: Job) -> bool:
+        return True
+
+    def do(self, job: Job, record: Record, note: Note) -> Outcome:
+        action = unbaking() if self.unbake else baking(self.step, self.first, self.last, self.interpolation)
+        return BlendRun(self, action, record, note).do(job)
+
+
+def _planned(options: argparse.Namespace) -> list[Job]:
+    suffix = UNBAKED if options.unbake else BAKED
+    named = named_file(options.output, options.files, (".blend",))
+
+    def job_of(source: str, folder: Path) -> Job:
+        file = Path(source)
+        made = file if options.in_place else named or folder / f"{file.stem}{suffix}{file.suffix.lower()}"
+        return Job(source, made.parent, made)
+
+    def is_result(path: Path) -> bool:
+        if options.unbake:
+            return not path.stem.endswith(BAKED)
+        return path.stem.endswith((BAKED, UNBAKED)) or is_made(path)
+
+    return planned(options.files, None if named else options.output, (".blend",), is_result, job_of)
 
 
 def _frame(text: str) -> float:

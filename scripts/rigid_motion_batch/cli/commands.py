@@ -12,10 +12,10 @@ from pathlib import Path
 from rigid_motion_batch import standard_streams
 from rigid_motion_batch.command_line import INSTALLED, did_you_mean, own_arguments, printable, program_of
 from rigid_motion_batch.places import NAMED, manifest
-from rigid_motion_batch.supervising import begin_child, ended_at_once, stop_signals, supervise
+from rigid_motion_batch.supervising import begin_child, blender_program, ended_at_once, stop_signals, supervise
 from rigid_motion_batch.system_libraries import way_out
 
-from .in_blender import NoEnvironment, become, blender_program, elsewhere
+from .in_blender import NoEnvironment, become, elsewhere
 
 
 @dataclass(frozen=True)

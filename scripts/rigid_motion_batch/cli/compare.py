@@ -23,7 +23,6 @@ from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.needed import KeysNeeded
 from rigid_motion_batch.analysis.results import ChoiceNumbers
 from rigid_motion_batch.cli.compare_options import ALL, SCRIPT, own_recordings, parse
-from rigid_motion_batch.cli.in_blender import blender_program
 from rigid_motion_batch.command_line import as_typed, complain, path_line, program_of
 from rigid_motion_batch.pipeline import comparison_steps as steps
 from rigid_motion_batch.pipeline import values
@@ -38,9 +37,9 @@ from rigid_motion_batch.pipeline.comparison import (
     ComparisonPlan,
 )
 from rigid_motion_batch.pipeline.comparison_steps import PAGE
-from rigid_motion_batch.pipeline.executors import ProcessExecutor, SerialExecutor, processors
+from rigid_motion_batch.pipeline.executors import ProcessExecutor, processors
 from rigid_motion_batch.pipeline.explain import explain
-from rigid_motion_batch.pipeline.performing import Executor, ExecutorError
+from rigid_motion_batch.pipeline.performing import Executor, ExecutorError, SerialExecutor
 from rigid_motion_batch.pipeline.running import Outcome, Plan, Share, State, Survey, run
 from rigid_motion_batch.pipeline.running import Progress as Listener
 from rigid_motion_batch.pipeline.steps import OWN, Task
@@ -54,7 +53,7 @@ from rigid_motion_batch.report.numbers import Gathering, Numbers
 from rigid_motion_batch.report.settings import Settings
 from rigid_motion_batch.report.verdict import Verdict, verdict
 from rigid_motion_batch.scenes.settings import MODELS, SubjectError
-from rigid_motion_batch.supervising import report
+from rigid_motion_batch.supervising import blender_program, report
 from rigid_motion_batch.system_libraries import missing_for_rendering, way_out, without_blender
 
 from . import terminal

@@ -13,6 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from rigid_motion_batch.places import CHECKOUT
+from rigid_motion_batch.supervising import blender_program
 
 LIBRARIES = ("filelock", "jinja2", "numpy", "pebble", "rich", "vl_convert")
 """Modules of the packages that a comparison needs beside Blender."""
@@ -22,11 +23,6 @@ OPTION = "--environment"
 
 class NoEnvironment(Exception):
     """Why there is no Python to run in, and what to do about it."""
-
-
-def blender_program() -> str:
-    """The Blender that this process is; empty in a Python, with or without bpy."""
-    return getattr(getattr(sys.modules.get("bpy"), "app", None), "binary_path", "")
 
 
 def elsewhere(script: str, arguments: list[str]) -> list[str] | None:

@@ -9,7 +9,7 @@ result is a new file; the input stays as it is.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 from rigid_motion_batch.command_line import not_empty, parser_of, program_of
@@ -24,16 +24,18 @@ from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.radii import RIGID, radius_in_metres
 from rigid_motion_batch.axes import AXES
 from rigid_motion_batch.keying.gltf_files import ENDINGS, GltfRun
-from rigid_motion_batch.keying.options import Job, add_file_options, add_target_options, jobs_of, refuse_odd_places
-from rigid_motion_batch.keying.recorded import RATES, TOLERANCE, Reading, Recorded, Writing, place_and_body
-from rigid_motion_batch.keying.sessions import Note, Outcome, StopIfAsked, Work, do_all
+from rigid_motion_batch.keying.options import add_file_options, add_target_options, refuse_odd_places
+from rigid_motion_batch.keying.planning import Job, file_and_body, named_file, planned
+from rigid_motion_batch.keying.recorded import GLB_SUFFIX, RATES, SUFFIX, TOLERANCE, Reading, Writing, name_of
+from rigid_motion_batch.keying.records import Record, is_made
+from rigid_motion_batch.keying.sessions import Note, Outcome, Work, do_all
 from rigid_motion_batch.keying.wishes import Wishes
 from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
 
-MODE = "motor_spline"
+IN_FOLDERS = (".blend", ".bvh", ".csv", ".fbx", ".glb", ".gltf", ".tsv", ".tum")
+"""Of the files that are taken of a folder. What else it reads may be anything: .json, .txt."""
 
-SUFFIX = "-reduced"
-"""Of the names of files that are written of .blend and glTF files."""
+MODE = "motor_spline"
 
 MOST = 1000000
 """Keys that can be asked for: Blender's last frame."""
@@ -51,6 +53,9 @@ examples:
   python scripts/reduce.py walk.glb --tolerance 2mm
   python scripts/reduce.py walk.glb --key-poses 12
   python scripts/reduce.py walk.fbx dance.bvh shot.blend --glb --tolerance 2mm
+  python scripts/reduce.py walk.glb --output small/walk.glb
+  python scripts/reduce.py mocap --output small --glb --tolerance 2mm
+  python scripts/reduce.py mocap --output small --jobs 4
   blender --background --python scripts/reduce.py -- shot.blend
 
 .blend files:
@@ -69,8 +74,8 @@ glTF files:
   translations and scales have keys of their own; steps stay. Weights of morph targets are off by half a percent at
   most. A foot that stands slides at most a millimetre farther than before, for a body of 1.7 m. A clip that would not
   become smaller stays as it is. Without --tolerance it is a share of the size, without --radius a share of it for
-  joints, and for meshes the size of each. A tolerance above a tenth of the size is refused: the file is mostly in
-  another unit then.
+  joints, and for meshes the size of each; of recordings that become GLB files see --tolerance. A tolerance above a
+  tenth of the size is refused: the file is mostly in another unit then.
 
 recordings:
   The program reads what compare.py reads: CSV, TUM, EuRoC, Motive, A-Frame, BVH, FBX, glTF, and animated objects and
@@ -86,23 +91,35 @@ GLB files:
   file keeps its meshes. A recording becomes a rig or an empty of its own, in metres. The modes of a .blend file are
   sampled too: glTF knows lines and even turns alone.
 
+folders and many files:
+  A folder stands for the .blend, glTF, FBX, BVH, CSV (.csv, .tsv) and .tum files in it and in the folders below, in the
+  order of their names; the results lie below --output as the files lie in the folder. It does not stand for results of
+  this program (*-reduced.*, and what its records name), hidden files, and links that lead out of it. What does not move
+  in a folder is left alone.
+  Several inputs are done at once by as many processes as --jobs says; what is said of each comes when it is done. An
+  input that fails, or whose process dies, costs that input alone.
+  You can run the same command again, after a stop or with more files: an input is "already reduced" where its result is
+  there, made of the same bytes with the same options by the same version of the program and of Blender. All else is
+  done again, and takes the place of what this program made of the same input. It never replaces a file that was edited
+  since or that is not its own, without --overwrite. The folder .rigid-motion beside the results has the record of them;
+  without it the program does not know its own files.
+
 what is written:
   NAME-reduced.blend for a .blend file, NAME-reduced.glb for a .glb file and with --glb for each, NAME-keys.csv and
-  NAME-keys.blend for a recording, beside it or in --output. A file is moved into place when it is complete, and
-  replaces an existing one only with --overwrite, also where another run has written that meanwhile. With --in-place the
-  program replaces a .blend file itself, and keeps the one before as NAME.blend1. At the end the paths that were written
-  are printed on standard output, one a line; a path with a line break or another control character is printed as JSON,
-  "a\\nb.csv".
-  Everything else goes to standard error: for each object and rig the number of keys before and after, and the largest
-  error.
+  NAME-keys.blend for a recording, beside it or in --output. For a single input --output may be the name of the file:
+  small/walk.glb, keys.blend, and .csv or .tum for a table. A file is moved into place when it is complete. With
+  --in-place the program replaces a .blend file itself, and keeps the one before as NAME.blend1. At the end the paths of
+  the results, also of those that were there already, are printed on standard output, one a line; a path with a line
+  break or another control character is printed as JSON, "a\\nb.csv". Everything else goes to standard error: for each
+  object and rig the number of keys before and after, and the largest error.
 
 what is run:
   Nothing in the files: scripts and Python expressions stay in them, switched off.
 
 exit code:
   0    all done, or nothing to do
-  1    some objects, bones or files could not be done, and are named with the reason. The others are done. Or Blender
-       crashed at a file, which is named: the files before it are done.
+  1    some objects, bones or files could not be done, and are named with the reason. The others are done. With a
+       single input or --jobs 0: or Blender crashed at a file, which is named; the files before it are done.
   2    a wrong option, or none of the files could be read: nothing was done
   130  stopped by Ctrl-C, and 143 by SIGTERM, within 2 s: the files written by then are complete, nothing else was
        changed
@@ -113,7 +130,11 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
     parser = parser_of(SCRIPT, __doc__, EPILOG)
     parser.add_argument(
-        "inputs", nargs="+", type=not_empty, metavar="INPUT", help=".blend files, glTF files and recordings"
+        "inputs",
+        nargs="+",
+        type=not_empty,
+        metavar="INPUT",
+        help=".blend files, glTF files, recordings, folders",
     )
     add_target_options(parser, "keys")
     keys = parser.add_argument_group("keys")
@@ -122,7 +143,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         type=_tolerance,
         metavar="LENGTH",
         help="largest error on any frame: 5mm, 0.5cm, 0.005m; a plain number is in the unit of the file (in .blend "
-        f"files 1mm for objects and {OF_A_BODY:.1%}% of the size of a rig; for recordings {TOLERANCE.written}; with "
+        f"files 1mm for objects and {OF_A_BODY:.1%}% of the size of a rig; for recordings {TOLERANCE.written}, with "
+        f"--glb too; in glTF files, and of .blend and FBX files with --glb, {OF_A_BODY:.1%}% of the size; with "
         f"--shared {OF_KEY_POSES:.0%}% of the size of a rig or body)",
     )
     keys.add_argument(
@@ -164,39 +186,28 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     )
     add_file_options(parser)
     options = parser.parse_args(arguments)
-    files, recorded = _sorted(options.inputs, blend=options.blend, glb=options.glb)
-    gltf = [file for file in files if _is_gltf(file)]
-    options.wishes = Wishes(
-        options.mode or MODE,
-        options.tolerance,
-        options.radius,
-        options.shared,
-        options.discard,
-        options.keys,
-        options.vertices,
-    )
     try:
         refuse_odd_places(options)
-        if options.keys is not None and options.tolerance is not None:
-            raise ValueError("--keys and --tolerance exclude one another: each decides how many keys there are")
-        if recorded and options.in_place:
-            raise ValueError(f"--in-place is for .blend files, and {recorded[0].source} is a recording: leave one out")
-        if gltf and options.in_place:
-            raise ValueError(f"--in-place is for .blend files, and {gltf[0]} is none: leave one out")
-        if options.glb:
-            _refuse_beside_glb(options, files)
-        if gltf and options.mode:
-            raise ValueError(
-                f"--mode is for .blend files and tables, and {gltf[0]} knows lines and even turns alone: leave it out, "
-                "or add --blend, for a .blend file with that mode"
-            )
-        if options.objects and len(files) == len(gltf):
-            raise ValueError("--objects is for .blend files: of a recording name one body with FILE:BODY")
-        options.reading = Reading(options.axes, reading_options(options))
-        options.jobs = [
-            *jobs_of(files, SUFFIX, options.output, in_place=options.in_place, ending=".glb" if options.glb else None),
-            *recorded,
-        ]
+        options.work = work = Reduce(
+            doing="Reducing",
+            done="reduced",
+            objects=options.objects,
+            overwrite=options.overwrite,
+            dry_run=options.dry_run,
+            wishes=Wishes(
+                options.mode or MODE,
+                options.tolerance,
+                options.radius,
+                options.shared,
+                options.discard,
+                options.keys,
+                options.vertices,
+            ),
+            reading=Reading(options.axes, reading_options(options)),
+            writing=Writing(options.blend, options.fps, options.glb),
+        )
+        options.todo = _planned(options, work)
+        _refuse_odd(options)
     except ValueError as error:
         parser.error(str(error))
     return options
@@ -205,48 +216,93 @@ def parse(arguments: list[str]) -> argparse.Namespace:
 def main(arguments: list[str]) -> int:
     """Do all inputs, and return the exit code."""
     options = parse(arguments)
-    in_blender = not all(isinstance(job, Job) and _is_gltf(job.source) for job in options.jobs)
-    if in_blender:
+    if any(map(options.work.needs_blender, options.todo)):
         require_blender(SCRIPT)
-    work = Work(PROGRAM, "Reducing", "reduced", options.objects, options.dry_run, in_blender)
-    return do_all(options.jobs, work, lambda *session: _doing(options, in_blender, *session))
+    return do_all(PROGRAM, options.todo, options.work, options.jobs)
 
 
-def _doing(
-    options: argparse.Namespace, in_blender: bool, note: Note, stop_if_asked: StopIfAsked
-) -> Callable[[Job | Recorded], Outcome]:
-    """What does one input, be it a .blend file, a glTF file or a recording."""
-    wishes, written = options.wishes, {"overwrite": options.overwrite, "dry_run": options.dry_run}
-    gltf = GltfRun(wishes, **written, note=note, stop_if_asked=stop_if_asked)
-    if not in_blender:
-        return gltf.do
-    from rigid_motion_batch.keying.exporting import ExportRun
-    from rigid_motion_batch.keying.jobs import BlendRun
-    from rigid_motion_batch.keying.recordings import RecordingRun
-    from rigid_motion_batch.keying.reducing import reducing
+@dataclass(frozen=True)
+class Reduce(Work):
+    """Keeping few keys."""
 
-    writing = Writing(options.output, options.overwrite, options.dry_run, options.blend, options.fps, options.glb)
-    files: BlendRun | ExportRun = (
-        ExportRun(gltf, note, stop_if_asked)
-        if options.glb
-        else BlendRun(options, reducing(wishes, SUFFIX, options.objects), note, stop_if_asked)
-    )
-    taken = [job for job in options.jobs if isinstance(job, Job)]
-    recordings = RecordingRun(wishes, options.reading, writing, options.inputs, taken, note, stop_if_asked)
+    wishes: Wishes
+    reading: Reading
+    writing: Writing
 
-    def do(job: Job | Recorded) -> Outcome:
-        if isinstance(job, Recorded):
-            return recordings.do(job)
-        return gltf.do(job) if _is_gltf(job.source) else files.do(job)
+    def needs_blender(self, job: Job) -> bool:
+        return not job.problem and (job.is_recording or not _is_gltf(job.file))
 
-    return do
+    def do(self, job: Job, record: Record, note: Note) -> Outcome:
+        gltf = GltfRun(self.wishes, record, note, dry_run=self.dry_run)
+        if not self.needs_blender(job):
+            return gltf.do(job)
+        from rigid_motion_batch.keying.exporting import export_file
+        from rigid_motion_batch.keying.jobs import BlendRun
+        from rigid_motion_batch.keying.recordings import RecordingRun
+        from rigid_motion_batch.keying.reducing import reducing
+
+        if job.is_recording:
+            return RecordingRun(self.wishes, self.reading, self.writing, record, note, dry_run=self.dry_run).do(job)
+        if self.writing.glb:
+            return export_file(job, gltf, note)
+        return BlendRun(self, reducing(self.wishes, self.objects), record, note).do(job)
 
 
-def _is_gltf(path: Path) -> bool:
-    return path.suffix.lower() in ENDINGS
+def _planned(options: argparse.Namespace, work: Reduce) -> list[Job]:
+    """What is to be done: a body of a file is a recording, and so is a glTF file of which a .blend file is to be made.
+
+    An FBX file is none where it becomes a GLB file with all that is in it.
+    """
+    whole = (".blend", *(() if options.blend else ENDINGS), *((".fbx",) if options.glb else ()))
+    ending = ".glb" if options.glb else ""
+    first = Path(options.inputs[0])
+    if not first.name.lower().endswith(whole):
+        endings = (".glb",) if options.glb else (".csv", ".tum", ".blend")
+    else:
+        endings = (ending or first.suffix.lower(),)
+    if (options.output or first).suffix.lower() == ".glb" and not (options.glb or _is_gltf(first)):
+        raise ValueError(f"--output {options.output}: add --glb, and {first} becomes a GLB file")
+    named = named_file(options.output, options.inputs, endings)
+
+    def job_of(source: str, folder: Path) -> Job:
+        folder = named.parent if named else folder
+        if source.lower().endswith(whole):
+            file = Path(source)
+            kind = file.suffix.lower() if file.suffix.lower() == ".gltf" else ending or file.suffix.lower()
+            made = file if options.in_place else named or folder / f"{file.stem}{GLB_SUFFIX}{kind}"
+            return Job(source, made.parent, made)
+        name, suffix = name_of(*file_and_body(source)), GLB_SUFFIX if options.glb else SUFFIX
+        made = named.with_suffix("") if named else folder / f"{name}{suffix}"
+        kind = named.suffix.lower() if named else ""
+        possible = (".glb",) if options.glb else tuple({kind or ".csv", ".blend"})
+        return Job(source, folder, made, possible, kind, is_recording=True)
+
+    return planned(options.inputs, None if named else options.output, IN_FOLDERS, _is_result, job_of)
 
 
-def _refuse_beside_glb(options: argparse.Namespace, files: list[Path]) -> None:
+def _refuse_odd(options: argparse.Namespace) -> None:
+    """Raise ValueError for options that say nothing of the inputs."""
+    jobs = [job for job in options.todo if not job.problem]
+    recorded = [job for job in jobs if job.is_recording]
+    gltf = [job for job in jobs if not job.is_recording and _is_gltf(job.file)]
+    if options.keys is not None and options.tolerance is not None:
+        raise ValueError("--keys and --tolerance exclude one another: each decides how many keys there are")
+    if options.in_place and recorded:
+        raise ValueError(f"--in-place is for .blend files, and {recorded[0].source} is a recording: leave one out")
+    if options.in_place and gltf:
+        raise ValueError(f"--in-place is for .blend files, and {gltf[0].source} is none: leave one out")
+    if options.glb:
+        _refuse_beside_glb(options, jobs)
+    if gltf and options.mode:
+        raise ValueError(
+            f"--mode is for .blend files and tables, and {gltf[0].source} knows lines and even turns alone: leave it "
+            "out, or add --blend, for a .blend file with that mode"
+        )
+    if options.objects and jobs and len(jobs) == len(gltf) + len(recorded):
+        raise ValueError("--objects is for .blend files: of a recording name one body with FILE:BODY")
+
+
+def _refuse_beside_glb(options: argparse.Namespace, jobs: list[Job]) -> None:
     """Raise ValueError for options that say nothing of GLB files."""
     if options.mode:
         raise ValueError(
@@ -256,26 +312,21 @@ def _refuse_beside_glb(options: argparse.Namespace, files: list[Path]) -> None:
         if getattr(options, name):
             option = f"--{name.replace('_', '-')}"
             raise ValueError(f"{option} is for .blend files, and --glb writes others: leave one of them out")
-    for path in files:
-        if path.suffix.lower() == ".gltf":
-            raise ValueError(f"{path} is reduced to a .gltf file: do it without --glb")
-        if path.suffix.lower() == ".fbx" and (options.axes or reading_options(options).given):
-            raise ValueError(f"with --glb Blender imports {path} whole: leave out --axes and what says how to read it")
+    for job in jobs:
+        if job.file.suffix.lower() == ".gltf" and not job.is_found:
+            raise ValueError(f"{job.source} is reduced to a .gltf file: do it without --glb")
+        if job.file.suffix.lower() == ".fbx" and (options.axes or reading_options(options).given):
+            raise ValueError(
+                f"with --glb Blender imports {job.source} whole: leave out --axes and what says how to read it"
+            )
 
 
-def _sorted(inputs: list[str], *, blend: bool, glb: bool) -> tuple[list[Path], list[Recorded]]:
-    """The .blend and glTF files, and the recordings, each of these once.
+def _is_gltf(path: Path) -> bool:
+    return path.suffix.lower() in ENDINGS
 
-    A body of a file is a recording, and so is a glTF file of which a .blend file is to be made. An FBX file is none
-    where it becomes a GLB file with all that is in it.
-    """
-    endings = (".blend", *(() if blend else ENDINGS), *((".fbx",) if glb else ()))
-    files = [Path(source) for source in inputs if source.lower().endswith(endings)]
-    recorded: dict[tuple[str, str | None], str] = {}
-    for source in inputs:
-        if not source.lower().endswith(endings):
-            recorded.setdefault(place_and_body(source), source)
-    return files, list(map(Recorded, recorded.values()))
+
+def _is_result(path: Path) -> bool:
+    return path.stem.endswith(GLB_SUFFIX) or is_made(path)
 
 
 def _tolerance(text: str) -> Tolerance:

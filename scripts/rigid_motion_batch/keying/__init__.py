@@ -1,6 +1,7 @@
 """Keys in files, without a window: what bake.py and reduce.py do to .blend files and recordings.
 
-sessions     inputs one after another, each wholly or not at all    jobs        what is done to a .blend file
+planning     which inputs there are, and where results go           records     what was made of what, beside it
+sessions     inputs side by side, each wholly or not at all         jobs        what is done to a .blend file
 targets      which objects and bones of it are meant                baking      keys instead of modes, and back
 reducing     few keys instead of many                               recordings  few keys of a recording
 blend_files  opening files safely, saving them whole                keyed_files recordings as files of their own

@@ -17,6 +17,9 @@ from rigid_motion.animation.transforms import Transform
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.keying.targets import Action, Result
 
+BAKED, UNBAKED = "-baked", "-unbaked"
+"""Of the names of files that are written."""
+
 FEW = 4
 """As many bones are named; of more it is said how many they are."""
 
@@ -35,7 +38,7 @@ def baking(step: float, first: float | None, last: float | None, interpolation: 
         )
         return _result(targets, modes, problems | _by_target(refusals, fit), f", frames {begin:g} to {end:g}")
 
-    return Action("Baking", "baked", "-baked", with_rigid_segments, bake)
+    return Action("Baking", "baked", with_rigid_segments, bake)
 
 
 def unbaking() -> Action:
@@ -46,9 +49,7 @@ def unbaking() -> Action:
         animation.unbake(targets, refused=refusals)
         return _result(targets, modes_of(targets), _by_target(refusals, targets))
 
-    return Action(
-        "Un-baking", "un-baked", "-unbaked", lambda targets: list(filter(animation.is_baked, targets)), unbake
-    )
+    return Action("Un-baking", "un-baked", lambda targets: list(filter(animation.is_baked, targets)), unbake)
 
 
 def _result(

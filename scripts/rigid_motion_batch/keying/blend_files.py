@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,7 +12,9 @@ import bpy
 from rigid_motion_batch.files import written_beside
 from rigid_motion_batch.hushing import hushed
 
-from .output_files import FileProblem, Unreadable, changed_at, refuse_came_meanwhile
+from .output_files import FileProblem, Unreadable, changed_at
+from .records import Record
+from .sessions import stop_if_asked
 
 HERE = bpy.app.version[:2]
 """The Blender that this runs in."""
@@ -45,8 +46,6 @@ class Missing:
 
 def open_file(path: Path) -> None:
     """Open a .blend file, without running anything that is in it. Raises `Unreadable`."""
-    if os.path.isdir(path):
-        raise Unreadable(f"this is a folder: name the files in it, as in {path / '*.blend'}")
     if os.path.exists(path) and not os.path.isfile(path):
         raise Unreadable("this is no file on a disk: save it as one first")
     try:
@@ -120,46 +119,41 @@ def only_overridden() -> set[bpy.types.Object]:
     return linked
 
 
-def write_file(
-    source: Path, output: Path, stop_if_asked: Callable[[], None], *, overwrite: bool, opened: int | None = None
-) -> None:
-    """Save what is open, whole or not at all; where it is `source` itself, that is kept as NAME.blend1.
+def write_file(output: Path, record: Record | None, opened: int | None = None) -> None:
+    """Save what is open, whole or not at all; in place of its file, which is kept as NAME.blend1, without a record.
 
     Parameters
     ----------
-    source, output : Path
-    stop_if_asked : callable
-    overwrite : bool
-        Whether to replace what is at `output`.
+    output : Path
+    record : Record, optional
     opened : int, optional
-        When `source` was changed last before it was opened, in nanoseconds, where it is to be replaced.
+        When the file was changed last before it was opened, in nanoseconds, where it is to be replaced.
 
     Raises
     ------
     FileProblem
-        Where it cannot be written, or `source` was changed meanwhile.
+        Where it cannot be written, or was changed meanwhile.
     """
     try:
-        with hushed(errors=True), written_beside(output, overwrite=overwrite) as beside:
+        with hushed(errors=True), record.writing(output) if record else written_beside(output) as beside:
             # Blender 4.5 takes a relative one to be one of $PWD, wherever it runs.
             bpy.ops.wm.save_as_mainfile(
                 filepath=str(beside.absolute()), copy=True, check_existing=False, relative_remap=True
             )
             refuse_cut_off(beside)
             stop_if_asked()
-            if output == source:
-                if changed_at(source) != opened:
+            if not record:
+                if changed_at(output) != opened:
                     raise FileProblem("it was changed while this program was at it, and stays so: do it again")
-                kept = Path(os.path.realpath(source))
+                kept = Path(os.path.realpath(output))
                 with written_beside(kept.with_name(f"{kept.name}1")) as copy:
-                    shutil.copy2(source, copy)
+                    shutil.copy2(output, copy)
     except RuntimeError as error:
         said = " ".join(str(error).split()).removeprefix("Error: ")
         # What it says of a file is of the name that it writes under, and without any it is of no use.
         reason = said.rpartition(": ")[2].replace(beside.name, output.name) if ": " in said else CUT_OFF
         raise FileProblem(f"{output} could not be written ({reason}): write elsewhere with --output") from None
     except OSError as error:
-        refuse_came_meanwhile(output, error)
         place, reason = error.filename or output, error.strerror or error
         raise FileProblem(f"{place} could not be written ({reason}): write elsewhere with --output") from None
 

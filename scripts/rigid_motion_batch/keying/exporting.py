@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
 
+import rigid_motion
 from rigid_motion_batch.hushing import hushed
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.fbx import ADDON as FBX_ADDON
@@ -14,17 +17,17 @@ from rigid_motion_batch.recordings.importing import enabled, refuse_too_large
 
 from .blend_files import missing_data, open_file
 from .gltf_files import GltfRun
-from .options import Job
 from .output_files import FileProblem, Unreadable
-from .sessions import Note, Outcome, StopIfAsked
+from .planning import Job
+from .sessions import Note, Outcome, stop_if_asked
 
 GLTF_ADDON = "io_scene_gltf2"
 
 
 def export_glb(path: Path) -> None:
-    """Write the open file as GLB, every animation sampled on every frame. Raises FileProblem."""
+    """Write the open file as GLB, every animation sampled on every frame, a clip for an Action. Raises FileProblem."""
     try:
-        with enabled(path, GLTF_ADDON), hushed():
+        with enabled(path, GLTF_ADDON), _asking_extension(), hushed():
             bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB")
     except TrajectoryError as error:
         raise FileProblem(error.problem) from None
@@ -32,38 +35,44 @@ def export_glb(path: Path) -> None:
         raise FileProblem(f"Blender cannot export this ({_reason(error)}): see whether it does in a window") from None
 
 
-class ExportRun:
-    """Doing .blend and FBX files, one after the other."""
+@contextmanager
+def _asking_extension() -> Iterator[None]:
+    """Have the exporter leave out clips of differences and of dense keys that are kept: it asks the listed add-ons."""
+    addons = bpy.context.preferences.addons
+    entry = addons.new()
+    entry.module = rigid_motion.__name__
+    try:
+        yield
+    finally:
+        addons.remove(entry)
 
-    def __init__(self, gltf: GltfRun, note: Note, stop_if_asked: StopIfAsked) -> None:
-        self._gltf, self._note, self._stop_if_asked = gltf, note, stop_if_asked
 
-    def do(self, job: Job) -> Outcome:
-        """Open or import a file, and write what it shows as GLB with few keys."""
-        incomplete = False
+def export_file(job: Job, gltf: GltfRun, note: Note) -> Outcome:
+    """Open or import a .blend or FBX file, and write what it shows as GLB with few keys."""
+    read: list[Path] = []
+    incomplete = False
 
-        def export(path: Path) -> None:
-            nonlocal incomplete
-            if job.source.suffix.lower() == ".fbx":
-                _import_fbx(job.source)
-            else:
-                open_file(job.source)
-                missing = missing_data()
-                for library in missing.libraries:
-                    self._note(f"{job.source}: {library}")
-                incomplete = missing.hides_objects
-            self._stop_if_asked()
-            export_glb(path)
+    def export(path: Path) -> None:
+        nonlocal incomplete
+        if job.file.suffix.lower() == ".fbx":
+            _import_fbx(job.file)
+        else:
+            open_file(job.file)
+            missing = missing_data()
+            for library in missing.libraries:
+                note(f"{job.source}: {library}")
+            incomplete = missing.hides_objects
+        read.extend(map(Path, bpy.utils.blend_paths(absolute=True)))
+        stop_if_asked()
+        export_glb(path)
 
-        outcome = self._gltf.do(job, export)
-        outcome.incomplete = incomplete
-        return outcome
+    outcome = gltf.do(job, export)
+    outcome.incomplete, outcome.read = incomplete, read
+    return outcome
 
 
 def _import_fbx(path: Path) -> None:
     """Import a file into an empty one, meshes and images with it. Raises Unreadable."""
-    if path.is_dir():
-        raise Unreadable(f"this is a folder: name the files in it, as in {path / '*.fbx'}")
     try:
         refuse_too_large(path)
         refuse_damaged(path)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -10,11 +9,11 @@ from pathlib import Path
 from rigid_motion.gltf import Document, GltfError, ReducedClip, Report, read_document, reduced
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.command_line import printable
-from rigid_motion_batch.files import written_beside
 
-from .options import Job
-from .output_files import FileProblem, Unreadable, refuse_came_meanwhile, refuse_read_only, refuse_to_replace
-from .sessions import Note, Outcome, StopIfAsked, tell_failure
+from .output_files import FileProblem, Unreadable, refuse_read_only
+from .planning import Job, place_of
+from .records import Record
+from .sessions import Note, Outcome, stop_if_asked, tell_failure
 from .wishes import Wishes, doubt, fewer, off
 
 ENDINGS = (".glb", ".gltf")
@@ -24,20 +23,18 @@ MILLIMETRES = 1e3
 
 
 class GltfRun:
-    """Doing glTF files, one after the other."""
+    """Doing a glTF file."""
 
-    def __init__(
-        self, wishes: Wishes, *, overwrite: bool, dry_run: bool, note: Note, stop_if_asked: StopIfAsked
-    ) -> None:
-        self.wishes, self.overwrite, self.dry_run = wishes, overwrite, dry_run
-        self._note, self._stop_if_asked = note, stop_if_asked
+    def __init__(self, wishes: Wishes, record: Record, note: Note, *, dry_run: bool) -> None:
+        self.wishes, self.dry_run = wishes, dry_run
+        self._record, self._note = record, note
         self._would = "would be " if dry_run else ""
 
     def do(self, job: Job, export: Callable[[Path], None] | None = None) -> Outcome:
         """Read a file, or what `export` makes of it at a path, reduce its clips, and write it."""
-        outcome = Outcome()
+        outcome = Outcome(job.source)
         try:
-            refuse_to_replace(job.output, overwrite=self.overwrite)
+            self._record.refuse_to_replace(job.output)
             refuse_read_only(job.output)
             self.reduce(job, outcome, export)
         except FileProblem as problem:
@@ -57,7 +54,10 @@ class GltfRun:
         """
         wishes = self.wishes
         try:
-            document = _read(job.source) if export is None else _exported(export)
+            document = _read(job.file) if export is None else _exported(export)
+            if job.is_found and not document.json.get("animations"):
+                self._note(f"{job.source}: no animations; left alone")
+                return
             tolerance = None if wishes.tolerance is None else wishes.tolerance.metres(per_unit)
             report = reduced(
                 document,
@@ -69,48 +69,60 @@ class GltfRun:
             )
         except GltfError as error:
             raise Unreadable(str(error)) from None
-        self._stop_if_asked()
+        stop_if_asked()
         length = wishes.tolerance or Tolerance(f"{MILLIMETRES * report.tolerance:.6f}mm")
         by_number = wishes.count is not None
         for clip in report.clips:
             told = _told(clip, length, per_unit, self._would, by_number=by_number)
             self._note(f"{job.source}: {printable(clip.name)}: {told}")
-        size = f"{report.size:.3g} m large"
-        self._note(f"{job.source}: {size}{doubt(report.size, wishes.tolerance, per_unit)}")
+        if report.size:
+            size = f"{report.size:.3g} m large"
+            self._note(f"{job.source}: {size}{doubt(report.size, wishes.tolerance, per_unit)}")
         outcome.clips += sum(clip.tracks is not None for clip in report.clips)
         if not outcome.clips and export is None:
             self._note(f"{job.source}: nothing could be reduced; left alone")
             return
-        self._write(job, document, report)
+        self._write(job, document, report, outcome)
         self._note(f"{job.source}: {self._would}written to {job.output}")
         outcome.add_written(job.output)
 
-    def _write(self, job: Job, document: Document, report: Report) -> None:
+    def _write(self, job: Job, document: Document, report: Report, outcome: Outcome) -> None:
+        files = report.document.files(job.output.name)
+        if document.chunks is None:
+            beside = document.companions(job.file.parent)
+            outcome.read = [job.file.parent / name for name in beside]
+            if place_of(job.output.parent) != place_of(job.file.parent):
+                files = report.document.companions(job.file.parent) | files
         if self.dry_run:
             return
-        folder, files = job.output.parent, report.document.files(job.output.name)
-        if os.path.realpath(folder) != os.path.realpath(job.source.parent):
-            files = report.document.companions(job.source.parent) | files
         for name, content in files.items():
-            place = folder / name
+            place = job.output.parent / name
             try:
                 if place != job.output:
-                    refuse_to_replace(place, overwrite=self.overwrite)
-                with written_beside(place, overwrite=self.overwrite) as beside:
+                    outcome.beside.append(place)
+                    if _holds(place, content):
+                        continue  # Several files may share an image.
+                    self._record.refuse_to_replace(place)
+                with self._record.writing(place) as beside:
                     beside.write_bytes(content)
             except OSError as error:
-                refuse_came_meanwhile(place, error)
                 reason = error.strerror or error
                 raise FileProblem(f"{place} could not be written ({reason}): write elsewhere with --output") from None
 
 
 def _read(path: Path) -> Document:
-    if path.is_dir():
-        raise Unreadable(f"this is a folder: name the files in it, as in {path / '*.glb'}")
     try:
         return read_document(path)
     except OSError as error:
         raise Unreadable(f"this cannot be read ({error.strerror}): see to its path, and who may read it") from None
+
+
+def _holds(path: Path, content: bytes) -> bool:
+    """Whether a file has this content already."""
+    try:
+        return path.read_bytes() == content
+    except OSError:
+        return False
 
 
 def _exported(export: Callable[[Path], None]) -> Document:

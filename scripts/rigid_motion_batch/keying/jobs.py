@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
+from pathlib import Path
 
 import bpy
 
@@ -17,43 +17,44 @@ from rigid_motion_batch.keying.blend_files import (
     open_file,
     write_file,
 )
-from rigid_motion_batch.keying.options import Job
 from rigid_motion_batch.keying.output_files import (
     FileProblem,
     Unreadable,
     changed_at,
     refuse_long_name,
     refuse_read_only,
-    refuse_to_replace,
 )
-from rigid_motion_batch.keying.sessions import Note, Outcome, StopIfAsked, tell_failure
+from rigid_motion_batch.keying.planning import Job
+from rigid_motion_batch.keying.records import Record
+from rigid_motion_batch.keying.sessions import Note, Outcome, Work, stop_if_asked, tell_failure
 from rigid_motion_batch.keying.targets import Action, Result, groups_of, matching, matching_missing, title_of
 
 
 class BlendRun:
-    """Doing files, one after the other."""
+    """Doing a file."""
 
-    def __init__(self, options: argparse.Namespace, action: Action, note: Note, stop_if_asked: StopIfAsked) -> None:
-        self.options, self.action = options, action
-        self._note, self._stop_if_asked = note, stop_if_asked
-        self._would = "would be " if options.dry_run else ""
+    def __init__(self, work: Work, action: Action, record: Record, note: Note) -> None:
+        self.work, self.action = work, action
+        self._record, self._note = record, note
+        self._would = "would be " if work.dry_run else ""
         self._changed: int | None = None
 
     def do(self, job: Job) -> Outcome:
         """Open a file, do what is in it, and write it."""
-        outcome = Outcome()
+        outcome = Outcome(job.source)
         try:
-            if job.output == job.source:
-                refuse_long_name(job.source.with_name(f"{job.source.name}1"))
+            if job.in_place:
+                refuse_long_name(job.file.with_name(f"{job.file.name}1"))
             else:
-                refuse_to_replace(job.output, overwrite=self.options.overwrite)
-            self._changed = changed_at(job.source)
-            open_file(job.source)
-            self._stop_if_asked()
+                self._record.refuse_to_replace(job.output)
+            self._changed = changed_at(job.file)
+            open_file(job.file)
+            outcome.read = [Path(bpy.path.abspath(library.filepath)) for library in bpy.data.libraries]
+            stop_if_asked()
             missing = missing_data()
             for library in missing.libraries:
                 self._note(f"{job.source}: {library}")
-            if missing.hides_objects and self.options.objects is None:
+            if missing.hides_objects and self.work.objects is None:
                 outcome.incomplete = True
                 self._note(
                     f"{job.source}: incomplete, for there may be objects to be {self.action.done} in what is missing"
@@ -61,10 +62,12 @@ class BlendRun:
             self._do_objects(job, outcome, missing)
             self._finish(job, outcome)
         except FileProblem as problem:
-            outcome = Outcome(failed=True, unreadable=isinstance(problem, Unreadable), matched=outcome.matched)
+            outcome = Outcome(
+                job.source, failed=True, unreadable=isinstance(problem, Unreadable), matched=outcome.matched
+            )
             self._note(f"{job.source}: {problem}")
         except Exception as error:
-            outcome = Outcome(failed=True, matched=outcome.matched)
+            outcome = Outcome(job.source, failed=True, matched=outcome.matched)
             tell_failure(self._note, job.source, error)
         return outcome
 
@@ -85,11 +88,11 @@ class BlendRun:
                 if concerned:
                     self._begin(job, outcome, set().union(*(fitting[target] for target in concerned)))
                     self._do_targets(job, outcome, concerned)
-                    self._stop_if_asked()
+                    stop_if_asked()
 
     @property
     def _asked(self) -> list[str] | None:
-        return self.options.objects
+        return self.work.objects
 
     def _begin(self, job: Job, outcome: Outcome, fitting: set[str]) -> None:
         """Note which names and patterns there is something to do for."""
@@ -133,8 +136,7 @@ class BlendRun:
             self._note(
                 f"{job.source}: was saved by Blender {named(before)}; what is written is of Blender {named(HERE)}"
             )
-        if not self.options.dry_run:
-            overwrite = self.options.overwrite or job.output == job.source
-            write_file(job.source, job.output, self._stop_if_asked, overwrite=overwrite, opened=self._changed)
+        if not self.work.dry_run:
+            write_file(job.output, None if job.in_place else self._record, self._changed)
         self._note(f"{job.source}: {self._would}written to {job.output}")
         outcome.add_written(job.output)

@@ -1,64 +1,10 @@
-"""What is to be done, and where the result goes, as the commands that key files are told. No Blender is needed here."""
+"""Options that the commands have in common that key files. No Blender is needed here."""
 
 from __future__ import annotations
 
 import argparse
-import os
-from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
 
 from rigid_motion_batch.command_line import folder_path
-
-NAMES_OF_FILES = {".blend", ".csv", ".glb", ".gltf", ".tum"}
-"""What a folder is not called."""
-
-
-@dataclass(frozen=True)
-class Job:
-    """A file to be done."""
-
-    source: Path
-    output: Path
-    """The same where it is done in place."""
-
-    @property
-    def title(self) -> str:
-        return self.source.name
-
-
-def jobs_of(
-    files: Sequence[Path], suffix: str, folder: Path | None, *, in_place: bool, ending: str | None = None
-) -> list[Job]:
-    """What to read and where to write it, with an ending of its own; a file that is named twice is one.
-
-    Raises
-    ------
-    ValueError
-        Where two files would be written to one place, or one over another that is to be read.
-    """
-    sources: dict[str, Path] = {}
-    for path in files:
-        sources.setdefault(place_of(path), path)
-    jobs, places = [], {}
-    for path in sources.values():
-        output = path if in_place else (folder or path.parent) / f"{path.stem}{suffix}{ending or path.suffix.lower()}"
-        place = place_of(output)
-        if place in places:
-            raise ValueError(
-                f"{places[place]} and {path} would both be written to {output}: do them one after the other, with "
-                "another --output"
-            )
-        if not in_place and place in sources:
-            raise ValueError(f"{path} would be written over {output}, which is to be read too: leave one of them out")
-        places[place] = path
-        jobs.append(Job(path, output))
-    return jobs
-
-
-def place_of(path: Path) -> str:
-    """Where a path leads to; the same for all paths that lead there."""
-    return os.path.normcase(os.path.realpath(path))  # Path.resolve of Python 3.11 fails where links go in circles.
 
 
 def add_target_options(parser: argparse.ArgumentParser, which: str) -> None:
@@ -76,19 +22,34 @@ def add_target_options(parser: argparse.ArgumentParser, which: str) -> None:
 def add_file_options(parser: argparse.ArgumentParser) -> None:
     """Add a group of options that say where to write."""
     places = parser.add_argument_group("files")
-    places.add_argument("--output", type=folder_path, metavar="FOLDER", help="where to write (beside each file)")
-    places.add_argument("--overwrite", action="store_true", help="replace files of an earlier run")
+    places.add_argument(
+        "--output",
+        type=folder_path,
+        metavar="FOLDER",
+        help="where to write (beside each file); for a single input also the name of a file",
+    )
+    places.add_argument(
+        "--overwrite", action="store_true", help="replace files that are of others, or were edited since"
+    )
     places.add_argument("--in-place", action="store_true", help="save the .blend files themselves")
+    places.add_argument(
+        "--jobs",
+        type=_jobs,
+        metavar="N",
+        help="worker processes for several inputs; 0 to work in this one (one for each processor)",
+    )
 
 
 def refuse_odd_places(options: argparse.Namespace) -> None:
-    """Raise ValueError where the options of that group do not go together, or say no folder."""
+    """Raise ValueError where the options of that group do not go together."""
     if options.in_place and options.output:
         raise ValueError("--in-place saves the files themselves, --output writes others: give one of them")
-    if options.output and options.output.exists() and not options.output.is_dir():
-        raise ValueError(f"--output {options.output} is a file: give a folder")
-    if options.output and options.output.suffix.lower() in NAMES_OF_FILES and not options.output.exists():
-        raise ValueError(f"--output {options.output} is the name of a file: give a folder")
+
+
+def _jobs(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and len(text) <= 3):
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of processes; give 0, 1, 2, ...")
+    return int(text)
 
 
 def _names(text: str) -> list[str]:

@@ -25,15 +25,6 @@ def changed_at(path: Path) -> int | None:
         return None
 
 
-def refuse_to_replace(path: Path, *, overwrite: bool) -> None:
-    """Raise `FileProblem` where there is something already that is not to be replaced, or the name is too long."""
-    refuse_long_name(path)
-    if os.path.isdir(path):
-        raise FileProblem(f"{path} is a folder: rename it, or give another --output")
-    if os.path.lexists(path) and not overwrite:
-        raise FileProblem(f"{path} is there already: add --overwrite, or another --output")
-
-
 def refuse_long_name(path: Path) -> None:
     """Raise `FileProblem` where a file system allows no name that is as long as this one."""
     length = len(os.fsencode(path.name))

@@ -2,33 +2,21 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
 from rigid_motion_batch.analysis.choices import Tolerance
-from rigid_motion_batch.recordings import ReadingOptions, TrajectoryError
-from rigid_motion_batch.recordings.reading import split_source
-
-from .options import place_of
+from rigid_motion_batch.recordings import ReadingOptions
+from rigid_motion_batch.recordings.clip_reading import folder_names
 
 RATES = 1, 240
 """Frames a second that a .blend file may be given for the rate of its recording."""
 
 TOLERANCE = Tolerance("5mm")
-"""Where none is given."""
+"""Where none is given, of tables and .blend files."""
 
-
-@dataclass(frozen=True)
-class Recorded:
-    """A recording to be done."""
-
-    source: str
-    """The file, and the body where one was named."""
-
-    @property
-    def title(self) -> str:
-        return os.path.basename(self.source)
+SUFFIX, GLB_SUFFIX = "-keys", "-reduced"
+"""Of the names of files that are written, and of GLB files."""
 
 
 @dataclass(frozen=True)
@@ -43,13 +31,8 @@ class Reading:
 
 @dataclass(frozen=True)
 class Writing:
-    """What is to be written of recordings, and where."""
+    """What is to be written of recordings."""
 
-    folder: Path | None
-    """None for beside each recording."""
-
-    overwrite: bool
-    dry_run: bool
     blend: bool
     """Whether rigid motions become .blend files too."""
 
@@ -60,10 +43,6 @@ class Writing:
     """Whether GLB files are written, and nothing else."""
 
 
-def place_and_body(source: str) -> tuple[str, str | None]:
-    """Where the file of a recording is, the same however it is written, and which body of it is meant."""
-    try:
-        file, body = split_source(source)
-    except TrajectoryError:
-        file, body = Path(source), None
-    return place_of(file), body
+def name_of(file: Path, body: str | None) -> str:
+    """What the files of a body are called: as the recording, and where the body was named, as that too."""
+    return "-".join([file.stem, *(folder_names([body]) if body else [])])

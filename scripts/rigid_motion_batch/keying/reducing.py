@@ -23,7 +23,7 @@ LEAST = 1e-6
 """Millimetres: no tolerance is smaller."""
 
 
-def reducing(wishes: Wishes, suffix: str, asked: Sequence[str] | None = None) -> Action:
+def reducing(wishes: Wishes, asked: Sequence[str] | None = None) -> Action:
     """Fewer keys for what has more than two; and for what was asked for by its very name, if only to say why not."""
 
     def concerned(targets: Sequence[Transform]) -> list[Transform]:
@@ -34,7 +34,7 @@ def reducing(wishes: Wishes, suffix: str, asked: Sequence[str] | None = None) ->
     def reduce(targets: Sequence[Transform]) -> Result:
         return reduced(targets, wishes)
 
-    return Action("Reducing", "reduced", suffix, concerned, reduce, whole_rigs=True)
+    return Action("Reducing", "reduced", concerned, reduce, whole_rigs=True)
 
 
 def reduced(targets: Sequence[Transform], wishes: Wishes) -> Result:

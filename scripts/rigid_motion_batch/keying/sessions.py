@@ -1,7 +1,9 @@
-"""A session, mostly in Blender: inputs done one after another, each wholly or not at all, and summed up in a line.
+"""A session: inputs done one after another or side by side, each wholly or not at all, and summed up in a line.
 
-Ctrl-C ends it between two steps: what was written by then is whole, and nothing else was touched. `supervising` has
-what is between them ended, from outside.
+What an input needs is done by an executor of the pipeline, here or in a worker process. What was made of the same
+input before, by the same version and with the same options, is not made again. Ctrl-C ends a session between two
+steps: what was written by then is whole, and nothing else was touched. `supervising` has what is between them ended,
+from outside.
 """
 
 from __future__ import annotations
@@ -9,63 +11,98 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import tempfile
 import traceback
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Protocol, TypeVar
 
-from rigid_motion_batch.command_line import path_line
-from rigid_motion_batch.progress import Progress
-from rigid_motion_batch.supervising import report, stop_signals
+from rigid_motion_batch.command_line import complain, path_line, printable
+from rigid_motion_batch.pipeline import steps
+from rigid_motion_batch.pipeline.performing import (
+    Executor,
+    ExecutorError,
+    Failed,
+    Lost,
+    Made,
+    Order,
+    SerialExecutor,
+    Told,
+)
+from rigid_motion_batch.progress import Progress, Stage
+from rigid_motion_batch.supervising import blender_program, report, stop_signals, written_of
+
+from .planning import Job
+from .records import Record
 
 EXTENSION = "rigid_motion"
 """The id in blender_manifest.toml, which the name of the installed module ends with."""
 
+LOOK = 0.2
+"""Seconds between two looks at whether a session is to end."""
+
+NAMED = 5
+"""Of more inputs so many that failed are named again at the end."""
+
+ROOMS = (
+    "rigid_motion/animation",
+    "rigid_motion/gltf",
+    "rigid_motion/motion",
+    "analysis",
+    "keying",
+    "recordings",
+    "scenes/armature.py",
+)
+"""What the files that are written depend on."""
+
 Note = Callable[[str], None]
 """Writes a line for the user."""
 
-StopIfAsked = Callable[[], None]
-"""Raises `Stopped` after Ctrl-C or SIGTERM."""
-
-
-class Input(Protocol):
-    """What is to be done."""
-
-    @property
-    def source(self) -> str | os.PathLike[str]:
-        """The file, as the user has named it."""
-
-    @property
-    def title(self) -> str:
-        """What the progress bar calls it."""
-
-
-SomeInput = TypeVar("SomeInput", bound=Input)
-
 
 @dataclass(frozen=True)
-class Work:
-    """What a session does, in words."""
+class Work(ABC):
+    """What is done to inputs, and how: plain data, which goes to worker processes and into the keys of results."""
 
-    program: str
     doing: str
     """As a heading: "Baking"."""
 
     done: str
     """What becomes of objects: "baked"."""
 
-    asked: Sequence[str] | None = None
+    objects: Sequence[str] | None
     """The names and patterns of the objects that are meant; None for all."""
 
-    dry_run: bool = False
-    in_blender: bool = True
+    overwrite: bool
+    """Whether files that were not made of an input may be replaced."""
+
+    dry_run: bool
+
+    @abstractmethod
+    def needs_blender(self, job: Job) -> bool: ...
+
+    @abstractmethod
+    def do(self, job: Job, record: Record, note: Note) -> Outcome:
+        """Do one input, and write what comes of it."""
+
+    def task(self, job: Job) -> steps.Task:
+        """What has the key of a result: the input, these options, the version of the program and of Blender."""
+        blender = ""
+        if self.needs_blender(job):
+            import bpy
+
+            blender = bpy.app.version_string
+        options = replace(self, overwrite=False, dry_run=False)
+        body = job.source.removeprefix(os.fspath(job.file))
+        return steps.Task(keyed, (options, body, job.output.name, blender), job.title, inputs=_inputs(job))
 
 
 @dataclass
 class Outcome:
     """What became of an input."""
+
+    source: str
 
     objects: int = 0
     bones: int = 0
@@ -80,8 +117,17 @@ class Outcome:
     incomplete: bool = False
     """Whether there may be objects in it that nobody can look at, for a library is missing."""
 
+    is_old: bool = False
+    """Whether it was done by an earlier run."""
+
     written: list[Path] = field(default_factory=list)
     """Where to, or where it would have been."""
+
+    beside: list[Path] = field(default_factory=list)
+    """Files that belong to those."""
+
+    read: list[Path] = field(default_factory=list)
+    """The files that were read beside the input."""
 
     matched: set[str] = field(default_factory=set)
     """Of the names and patterns that were asked for, those that there was an object or a bone for."""
@@ -89,58 +135,204 @@ class Outcome:
     def add_written(self, path: Path) -> None:
         """Note that a file is complete at its place."""
         self.written.append(path)
-        report(written=os.fspath(path))
+        report(written=os.fspath(path), source=self.source)
 
     @property
     def done(self) -> int:
         return self.objects + self.bones + self.clips
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether something was written, and nothing is left to be done."""
+        return bool(self.written) and not (self.failed or self.refused or self.incomplete)
 
-def do_all(
-    inputs: Sequence[SomeInput], work: Work, begin: Callable[[Note, StopIfAsked], Callable[[SomeInput], Outcome]]
-) -> int:
-    """Do all inputs, print the paths that were written, and return the exit code.
+
+@steps.step(rooms=ROOMS)
+def keyed(task: steps.Job, parameters: tuple[Work, Job]) -> dict[str, Outcome]:
+    """Do one input, wherever that is."""
+    work, job = parameters
+    blender = nullcontext()
+    if work.needs_blender(job):
+        import bpy  # noqa: F401  It brings addon_utils.
+
+        blender = _extension()
+    with blender:
+        return {"outcome": work.do(job, _record_of(work, job), task.note)}
+
+
+def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = None) -> int:
+    """Do all inputs, print the paths of what was written, and return the exit code.
 
     Parameters
     ----------
-    inputs : sequence of Input
+    program : str
+        What users call it.
+    jobs : sequence of Job
     work : Work
-    begin : callable
-        Given what writes notes and what ends the session, returns what does one input.
+    workers : int, optional
+        Processes; 0 for this one. One for each processor, and this one for a single input, where None.
     """
-    outcomes: list[Outcome] = []
     stopped, unmatched = None, set()
-    extension = _extension() if work.in_blender else nullcontext()
-    with Progress() as progress, extension, _stopped_between_steps() as stop_if_asked:
-        do = begin(progress.note, stop_if_asked)
+    try:
+        executor = _executor(workers, len(jobs))
+    except ExecutorError as error:
+        complain(program, error)
+        return 2
+    with (
+        Progress() as progress,
+        executor,
+        tempfile.TemporaryDirectory(prefix="rigid-motion-") as scratch,
+        _stopped_between_steps(),
+    ):
+        session = _Session(jobs, work, executor, progress, Path(scratch))
         try:
-            with progress.stage(work.doing, len(inputs)) as stage:
-                for one in inputs:
-                    stage.say(one.title)
-                    summary = _summary(outcomes, len(inputs), work, interrupted=True)
-                    report(at=os.fspath(one.source), summary=summary)
-                    outcomes.append(do(one))
-                    stage.advance()
+            with progress.stage(work.doing, len(jobs)) as stage:
+                session.run(stage)
         except Stopped as signalled:
             stopped = signalled.args[0]
-            outcomes += [signalled.partly] if signalled.partly and signalled.partly.written else []
+            executor.stop()
+            session.take_partly(signalled)
         else:
-            seen = [one for one in outcomes if not one.failed]
-            unmatched = set(work.asked or ()).difference(*(one.matched for one in outcomes)) if seen else set()
+            unmatched = session.unmatched()
             for name in sorted(unmatched):
                 progress.note(
-                    f"{work.program}: --objects {name}: no object or bone of that name has anything to be {work.done}"
+                    f"{program}: --objects {name}: no object or bone of that name has anything to be {work.done}"
                 )
+    outcomes = session.in_order
     report(ended=True)
     if not work.dry_run:
         for path in (path for one in outcomes for path in one.written):
             print(path_line(path), flush=True)
-    print(_summary(outcomes, len(inputs), work, interrupted=stopped is not None), file=sys.stderr, flush=True)
+    failed = [one.source for one in outcomes if one.failed]
+    if failed and len(jobs) > NAMED:  # What was said of them is far above.
+        more = f" and {len(failed) - NAMED} more" if len(failed) > NAMED else ""
+        print(f"Failed: {printable(', '.join(failed[:NAMED]))}{more}", file=sys.stderr)
+    print(_summary(outcomes, len(jobs), work, interrupted=stopped is not None), file=sys.stderr, flush=True)
     if stopped is not None:
         return 128 + stopped
     if all(one.unreadable for one in outcomes):
         return 2
     return int(bool(unmatched) or any(one.refused or one.failed or one.incomplete for one in outcomes))
+
+
+class _Session:
+    """Inputs that are being done."""
+
+    def __init__(self, jobs: Sequence[Job], work: Work, executor: Executor, progress: Progress, scratch: Path) -> None:
+        self._jobs, self._work, self._executor, self._note = jobs, work, executor, progress.note
+        self._scratch = scratch
+        self._outcomes: dict[int, Outcome] = {}
+        """By the places of the inputs."""
+        self._at_work: dict[str, tuple[int, str]] = {}
+        """The folder of an order to the place of its input, and the key of its result."""
+
+    @property
+    def in_order(self) -> list[Outcome]:
+        return [outcome for _, outcome in sorted(self._outcomes.items())]
+
+    def run(self, stage: Stage) -> None:
+        waiting = iter(enumerate(self._jobs))
+        more = True
+        while more or self._at_work:
+            stop_if_asked()
+            while more and len(self._at_work) < self._executor.capacity:
+                place, job = next(waiting, (0, None))
+                if more := job is not None:
+                    self._begin(place, job)
+                    self._show(stage)
+                    stop_if_asked()
+            if self._at_work:
+                self._executor.wait(self._hear, LOOK)
+                self._show(stage)
+
+    def take_partly(self, stopped: Stopped) -> None:
+        """Count what is complete of inputs that were stopped in this process, or in workers."""
+        for place, _ in self._at_work.values():
+            source = self._jobs[place].source
+            outcome = stopped.partly or Outcome(source, written=list(map(Path, written_of(source))))
+            if outcome.written:
+                self._outcomes[place] = outcome
+
+    def unmatched(self) -> set[str]:
+        """The names and patterns that were asked for, and that nothing has."""
+        outcomes = self._outcomes.values()
+        seen = any(not one.failed for one in outcomes)
+        return set(self._work.objects or ()).difference(*(one.matched for one in outcomes)) if seen else set()
+
+    def _show(self, stage: Stage) -> None:
+        at_work = [self._jobs[place] for place, _ in self._at_work.values()]
+        stage.reach(len(self._outcomes), ", ".join(job.title for job in at_work))
+        summary = _summary(self.in_order, len(self._jobs), self._work, interrupted=True)
+        report(at=", ".join(job.source for job in at_work), summary=summary)
+
+    def _begin(self, place: int, job: Job) -> None:
+        """Have an input done, unless it is done already or cannot be."""
+        if job.problem:
+            self._note(f"{job.source}: {job.problem}")
+            self._outcomes[place] = Outcome(job.source, failed=True, unreadable=True)
+            return
+        task = self._work.task(job)
+        key = task.key if task.inputs else ""
+        if key and (found := _record_of(self._work, job).done(key)):
+            written, facts = found
+            self._note(f"{job.source}: already {self._work.done}: {', '.join(map(str, written))}")
+            self._outcomes[place] = outcome = Outcome(job.source, is_old=True, matched=set(facts.get("matched", ())))
+            for path in written:
+                outcome.add_written(path)
+            return
+        order = Order(
+            keyed, (self._work, job), (), task.inputs, {}, os.fspath(job.folder), os.fspath(self._scratch / str(place))
+        )
+        self._at_work[order.folder] = place, key
+        self._executor.submit(order)
+
+    def _hear(self, order: Order, message: Told | Made | Failed | Lost) -> None:
+        if isinstance(message, Told):
+            return
+        place, key = self._at_work.pop(order.folder)
+        job = self._jobs[place]
+        for note in message.notes:
+            self._note(note)
+        if isinstance(message, Made):
+            outcome = message.index["facts"]["outcome"]
+            if key and outcome.is_whole and not self._work.dry_run:
+                facts = {"matched": sorted(outcome.matched)}
+                _record_of(self._work, job).keep(key, outcome.written, outcome.beside, outcome.read, facts)
+        else:
+            way_out = ": leave it out, or see whether Blender opens it" if isinstance(message, Lost) else ""
+            self._note(f"{job.source}: {message.message.removeprefix(f'{job.source}: ')}{way_out}")
+            outcome = Outcome(job.source, failed=True)
+        self._outcomes[place] = outcome
+
+
+def _record_of(work: Work, job: Job) -> Record:
+    return Record(job.folder, job.source, overwrite=work.overwrite)
+
+
+def _inputs(job: Job) -> tuple[steps.Input, ...]:
+    """The file of an input as it is now; none where that is no file, or is to be replaced."""
+    try:
+        if job.in_place or not job.file.is_file():
+            return ()
+        found = os.stat(job.file)
+        return (steps.Input(os.fspath(job.file), steps.sha256_of(job.file), found.st_size, found.st_mtime_ns),)
+    except (OSError, ValueError):
+        return ()
+
+
+def _executor(workers: int | None, count: int) -> Executor:
+    """Who does so many inputs. Raises ExecutorError where there cannot be that many processes."""
+    if workers == 0 or (workers is None and count == 1):
+        return SerialExecutor()
+    try:
+        if blender_program():
+            raise ImportError("Blender itself starts no workers")
+        from rigid_motion_batch.pipeline.executors import ProcessExecutor, processors
+    except ImportError as error:
+        if workers is None:
+            return SerialExecutor()
+        raise ExecutorError(f"--jobs {workers}: {error}; leave it out, and inputs are done one by one") from None
+    return ProcessExecutor(min(workers or processors(), count))
 
 
 def _summary(outcomes: Sequence[Outcome], count: int, work: Work, *, interrupted: bool) -> str:
@@ -149,8 +341,10 @@ def _summary(outcomes: Sequence[Outcome], count: int, work: Work, *, interrupted
     objects, bones, clips = (sum(getattr(one, what) for one in outcomes) for what in ("objects", "bones", "clips"))
     refused = sum(one.refused for one in outcomes)
     written, failed = sum(bool(one.written) for one in outcomes), sum(one.failed for one in outcomes)
+    old = sum(one.is_old for one in outcomes)
     idle = sum(not (one.written or one.failed) for one in outcomes)
-    parts = [f"{written} {would}written"]
+    parts = [f"{written - old} {would}written"]
+    parts += [f"{old} already {work.done}"] if old else []
     parts += [f"{idle} left alone"] if idle else []
     parts += [f"{failed} failed"] if failed else []
     parts += [f"{incomplete} incomplete"] if (incomplete := sum(one.incomplete for one in outcomes)) else []
@@ -170,7 +364,8 @@ def counted(count: int, what: str) -> str:
 def tell_failure(note: Note, title: object, error: Exception) -> None:
     """Say where the program failed: what nobody foresaw in one input must not keep the others from being done."""
     note(f"{title}: not written, for this program failed ({type(error).__name__}: {error}):")
-    traceback.print_exception(error)
+    for line in "".join(traceback.format_exception(error)).splitlines():
+        note(line)
 
 
 @contextmanager
@@ -201,22 +396,28 @@ class Stopped(KeyboardInterrupt):
     """What became of the input that it came in."""
 
 
-@contextmanager
-def _stopped_between_steps() -> Iterator[StopIfAsked]:
-    """A function that raises `Stopped` after Ctrl-C or SIGTERM. Blender swallows what is raised while it works.
+_received: list[int] = []
+"""Signals that are to stop this process."""
 
-    A step that takes too long is ended by the parent of this process: see `supervising`.
+
+def stop_if_asked() -> None:
+    """Raise `Stopped` after Ctrl-C or SIGTERM. Blender swallows what is raised while it works.
+
+    A step that takes too long, or is done in a worker, is ended from outside.
     """
-    received: list[int] = []
-    before = {one: signal.signal(one, lambda number, _: received.append(number)) for one in stop_signals()}
+    if _received:
+        raise Stopped(_received[0])
 
-    def stop_if_asked() -> None:
-        if received:
-            raise Stopped(received[0])
 
+@contextmanager
+def _stopped_between_steps() -> Iterator[None]:
+    """Have the signals that stop a command wait for `stop_if_asked`."""
+    _received.clear()
+    before = {one: signal.signal(one, lambda number, _: _received.append(number)) for one in stop_signals()}
     try:
-        yield stop_if_asked
+        yield
     finally:
+        _received.clear()
         for one, handler in before.items():
             # None stands for the Blender program's own, which Python cannot put back.
             signal.signal(one, signal.SIG_DFL if handler is None else handler)

@@ -52,9 +52,6 @@ class Action:
     done: str
     """What becomes of targets: "baked"."""
 
-    suffix: str
-    """Of the names of files that are written."""
-
     concerned: Callable[[Sequence[Transform]], list[Transform]]
     """Those of several that there is something to do to, possible or not."""
 

@@ -1,4 +1,4 @@
-"""Who does orders on this machine: this process, or worker processes of `pebble`.
+"""Worker processes of `pebble` that do orders on this machine.
 
 Each worker has a pool for itself, so that whatever kills it costs the task that it was at, and nothing else. In a
 worker tasks run in the main thread, as Blender wants it.
@@ -14,8 +14,7 @@ import signal
 import sys
 import tempfile
 import time
-from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -23,42 +22,15 @@ from typing import Self
 
 from pebble import CONSTS, ProcessExpired, ProcessFuture, ProcessPool
 
-from rigid_motion_batch.supervising import end_with_parent
+from rigid_motion_batch.supervising import end_with_parent, join_session, session
 
-from .performing import Failed, Lost, Made, Order, Told, perform, progress_of
+from .performing import Failed, Lost, Made, Order, Tell, Told, perform, progress_of
 
 CONSTS.term_timeout = 0.2
 """Seconds that a worker has to end by itself before it is killed: Blender at work does not listen."""
 
 LOOK = 0.2
 """Seconds between two looks at how far tasks are."""
-
-Tell = Callable[[Order, Told | Made | Failed | Lost], object]
-
-
-class SerialExecutor:
-    """Does one order after the other in this process."""
-
-    capacity = 1
-
-    def __init__(self) -> None:
-        self._waiting: deque[Order] = deque()
-
-    def submit(self, order: Order) -> None:
-        self._waiting.append(order)
-
-    def wait(self, tell: Tell, seconds: float) -> None:
-        order = self._waiting.popleft()
-        tell(order, perform(order, lambda share, doing: tell(order, Told(order, share, doing))))
-
-    def stop(self) -> None:
-        self._waiting.clear()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.stop()
 
 
 class ProcessExecutor:
@@ -130,7 +102,7 @@ class ProcessExecutor:
         if self._logs is None:
             self._logs = tempfile.TemporaryDirectory(prefix="rigid-motion-", ignore_cleanup_errors=True)
         spawn = multiprocessing.get_context("spawn")
-        return ProcessPool(1, initializer=_begin, initargs=(self._logs.name,), context=spawn)
+        return ProcessPool(1, initializer=_begin, initargs=(self._logs.name, session()), context=spawn)
 
     def _message(self, future: ProcessFuture) -> Made | Failed | Lost:
         try:
@@ -154,9 +126,10 @@ def processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _begin(logs: str) -> None:
+def _begin(logs: str, command: str) -> None:
     """Begin a worker: it ends with its parent, and what libraries print in it goes into a file."""
     end_with_parent()
+    join_session(command)
     # Where Blender is loaded in the parent, its own modules hide what brings them.
     sys.path[:] = [folder for folder in sys.path if not os.path.exists(os.path.join(folder, "addon_utils.py"))]
     log = os.open(Path(logs, f"{os.getpid()}"), os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)

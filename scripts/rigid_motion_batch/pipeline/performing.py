@@ -13,11 +13,12 @@ import shutil
 import stat
 import time
 import traceback
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 from .steps import Input, Job, Step, TaskError, sha256_of
 
@@ -95,6 +96,9 @@ class Lost:
     notes: Sequence[str] = ()
 
 
+Tell = Callable[[Order, Told | Made | Failed | Lost], object]
+
+
 class Executor(Protocol):
     """Who does orders. A context; may be used again after `stop`."""
 
@@ -103,7 +107,7 @@ class Executor(Protocol):
 
     def submit(self, order: Order) -> None: ...
 
-    def wait(self, tell: Callable[[Order, Told | Made | Failed | Lost], object], seconds: float) -> None:
+    def wait(self, tell: Tell, seconds: float) -> None:
         """Pass on what has happened, or wait for it for so long. Raises ExecutorError where nothing can any more."""
 
     def stop(self) -> None:
@@ -112,6 +116,31 @@ class Executor(Protocol):
     def __enter__(self) -> Executor: ...
 
     def __exit__(self, *_: object) -> None: ...
+
+
+class SerialExecutor:
+    """Does one order after the other in this process."""
+
+    capacity = 1
+
+    def __init__(self) -> None:
+        self._waiting: deque[Order] = deque()
+
+    def submit(self, order: Order) -> None:
+        self._waiting.append(order)
+
+    def wait(self, tell: Tell, seconds: float) -> None:
+        order = self._waiting.popleft()
+        tell(order, perform(order, lambda share, doing: tell(order, Told(order, share, doing))))
+
+    def stop(self) -> None:
+        self._waiting.clear()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
 
 
 class ExecutorError(Exception):

@@ -31,7 +31,7 @@ from typing import Any, Self
 
 from filelock import FileLock, Timeout
 
-from rigid_motion_batch.files import write_text, written_beside
+from rigid_motion_batch.files import append_lines, lines_of, write_text, written_beside
 
 from .steps import OWN, Input, Task, sha256_of
 from .values import to_plain
@@ -251,7 +251,7 @@ class Store:
                 self.discard(key)
                 self._results.mkdir(exist_ok=True)  # A worker that made nothing may have taken it away.
                 os.rename(made, target)
-        self._append(self.own / "latest.jsonl", [{"name": task.name, "key": key}])
+        append_lines(self.own / "latest.jsonl", [{"name": task.name, "key": key}])
         return Result(target, content)
 
     def discard(self, key: str) -> None:
@@ -274,7 +274,7 @@ class Store:
 
     def latest(self) -> dict[str, str]:
         """Task to the key of its last result, of all tasks that were ever done."""
-        return {line["name"]: line["key"] for line in _lines(self.own / "latest.jsonl") if {"name", "key"} <= {*line}}
+        return {line["name"]: line["key"] for line in lines_of(self.own / "latest.jsonl") if {"name", "key"} <= {*line}}
 
     # -- published files ----------------------------------------------------------------------------------------------
 
@@ -319,7 +319,7 @@ class Store:
             found, (_, _, digest) = os.lstat(original), result.index["files"][name]
             line = {"path": path, "size": found.st_size, "mtime_ns": found.st_mtime_ns, "sha256": digest}
             # Killed from here on, what was moved is known to be the program's own.
-            self._append(self._record_of(path), [line])
+            append_lines(self._record_of(path), [line])
             beside = self.new_scratch()
             try:
                 os.link(original, beside)
@@ -384,20 +384,10 @@ class Store:
     def _published(self, path: str) -> Iterator[dict[str, Any]]:
         """What was ever published at a path, on file systems that ignore case under names that differ in it alone."""
         wanted = {"path": str, "size": int, "mtime_ns": int, "sha256": str}
-        for line in _lines(self._record_of(path)):
+        for line in lines_of(self._record_of(path)):
             is_whole = all(isinstance(line.get(name), kind) for name, kind in wanted.items())
             if is_whole and line["path"].casefold() == path.casefold():
                 yield line
-
-    def _append(self, path: Path, lines: Iterable[Mapping[str, Any]]) -> None:
-        """Add lines to a file at once: of two who do so at the same time each line stays whole."""
-        text = "".join(f"{json.dumps(line)}\n" for line in lines)
-        path.parent.mkdir(exist_ok=True)
-        opened = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
-        try:
-            os.write(opened, f"\n{text}".encode())  # A line that was cut off ends here.
-        finally:
-            os.close(opened)
 
 
 def not_written(paths: list[str]) -> str:
@@ -416,18 +406,6 @@ def _inputs_known(output: Path) -> dict[str, list[Any]]:
         return {path: seen for path, seen in content.items() if len(seen) == 5 and isinstance(seen[-1], str)}
     except (OSError, ValueError, TypeError, AttributeError, RecursionError):
         return {}
-
-
-def _lines(path: Path) -> Iterator[dict[str, Any]]:
-    """The objects of a file with a line of JSON for each; lines that are damaged are left out."""
-    try:
-        text = path.read_bytes()
-    except OSError:
-        return
-    for line in text.splitlines():
-        with suppress(ValueError, RecursionError):
-            if isinstance(content := json.loads(line), dict):
-                yield content
 
 
 def _remove_if_empty(folder: Path) -> bool:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from .column_names import DEVICES, METRES, TURNS, ColumnName, column_name, unit_in
 from .options import TICKS, ReadingOptions
-from .recordings import TrajectoryError, listed, shown
+from .recordings import NoMotion, TrajectoryError, listed, shown
 from .tables import is_number
 
 POSITION = ("x", "y", "z")
@@ -29,14 +29,14 @@ MOST_FOUND = 12
 class ColumnProblem(ValueError):
     """Why a header does not do."""
 
-    def __init__(self, problem: str, way_out: str, known: int) -> None:
-        self.problem, self.way_out = problem, way_out
+    def __init__(self, problem: str, way_out: str, known: int, kind: type[TrajectoryError] = TrajectoryError) -> None:
+        self.problem, self.way_out, self.kind = problem, way_out, kind
         self.known = known
         """How many columns mean something: of the lines that could be the header, that with the most is believed."""
 
     def at(self, path: Path, line: int) -> TrajectoryError:
         """The same of a line of a file, for the user."""
-        return TrajectoryError(path, self.problem, self.way_out, line)
+        return self.kind(path, self.problem, self.way_out, line)
 
 
 @dataclass(frozen=True)
@@ -186,9 +186,11 @@ def _missing(
     others = ",".join(f"{one}=NAME" for one in missing[:3]) + ",..." * (len(missing) > 3)
     way_out = f"known are {KNOWN}; or --columns {others}"
     if not any(names) and not explicit:
+        kind = NoMotion
         if all(map(is_number, cells)):
+            kind = TrajectoryError
             way_out = f"write a first line of names: {','.join(('t', *needed))}"
-        return ColumnProblem(f"no column has a known name (found {columns_found(cells)})", way_out, 0)
+        return ColumnProblem(f"no column has a known name (found {columns_found(cells)})", way_out, 0, kind)
     lacking = f" for {shown(label)}" if label else ""
     return ColumnProblem(
         f"no column named {', '.join(missing)}{lacking} (found {columns_found(cells)})", way_out, known

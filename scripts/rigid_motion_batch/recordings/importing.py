@@ -21,7 +21,7 @@ import numpy as np
 from rigid_motion_batch.hushing import hushed
 
 from .key_moments import BONE_CHANNEL, curves_that_move, fcurves_of, keys_of, moments_of, with_parents
-from .recordings import ALL, Selection, Trajectory, TrajectoryError, listed
+from .recordings import ALL, NoMotion, Selection, Trajectory, TrajectoryError, listed
 from .rigs import LAST_FRAME, joints_of, refuse_too_many, single_joints, whole_body
 from .sampling import LEAD, SAME, Moments, away, merged
 from .tables import LARGEST_FILE
@@ -128,7 +128,7 @@ def _read(
     moving = {name: span for name, obj in rigs.items() if (span := _frames_of_keys(obj)) is not None}
     if not moving:
         problem = "no skeleton that moves" if rigs else "no skeleton"
-        raise TrajectoryError(path, f"{problem} in this file", "export the armature together with its animation")
+        raise NoMotion(path, f"{problem} in this file", "export the armature together with its animation")
     bones = {name: rig.data.bones.keys() for name, rig in rigs.items()}
     selection.match([*rigs, *(bone for own in bones.values() for bone in own)])
     selection.match(f"{name}/{bone}" for name, own in bones.items() for bone in own)

@@ -95,6 +95,10 @@ class TrajectoryError(ValueError):
         super().__init__(printable(f"{where}: {problem}; {way_out}"))
 
 
+class NoMotion(TrajectoryError):
+    """Why a file holds no recording, which need not be wrong: a table of other things, or a body that stands still."""
+
+
 class Selection:
     """Which bodies of a file are wanted: the first, all, or one by name."""
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rigid_motion_batch.pipeline.bundle import FarmProgress
 from rigid_motion_batch.pipeline.comparison import ComparisonPlan
-from rigid_motion_batch.pipeline.executors import SerialExecutor
+from rigid_motion_batch.pipeline.performing import SerialExecutor
 from rigid_motion_batch.pipeline.running import Share, run
 from rigid_motion_batch.pipeline.store import Store
 from tests.scripts.pipeline.test_comparison import ABOUT, STAGE, wanted

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from rigid_motion_batch.pipeline.blender import version_of
-from rigid_motion_batch.pipeline.executors import ProcessExecutor, SerialExecutor
-from rigid_motion_batch.pipeline.performing import ExecutorError
+from rigid_motion_batch.pipeline.executors import ProcessExecutor
+from rigid_motion_batch.pipeline.performing import ExecutorError, SerialExecutor
 from rigid_motion_batch.pipeline.running import Outcome, run
 from rigid_motion_batch.pipeline.steps import OWN, Task
 from rigid_motion_batch.pipeline.store import INDEX, Store

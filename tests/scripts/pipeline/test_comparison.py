@@ -20,8 +20,8 @@ from rigid_motion_batch.analysis.results import compare_clip
 from rigid_motion_batch.pipeline import values
 from rigid_motion_batch.pipeline.comparison import Comparison, ComparisonPlan
 from rigid_motion_batch.pipeline.comparison_steps import result_in
-from rigid_motion_batch.pipeline.executors import ProcessExecutor, SerialExecutor
-from rigid_motion_batch.pipeline.performing import Executor
+from rigid_motion_batch.pipeline.executors import ProcessExecutor
+from rigid_motion_batch.pipeline.performing import Executor, SerialExecutor
 from rigid_motion_batch.pipeline.running import Outcome, Share, run
 from rigid_motion_batch.pipeline.steps import OWN, Task
 from rigid_motion_batch.pipeline.store import OutputError, Store
@@ -372,7 +372,7 @@ sys.modules["bpy"] = sys.modules["mathutils"] = None
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.pipeline.comparison import Comparison, ComparisonPlan
 from rigid_motion_batch.report.settings import Settings
-from rigid_motion_batch.pipeline.executors import SerialExecutor
+from rigid_motion_batch.pipeline.performing import SerialExecutor
 from rigid_motion_batch.pipeline.running import run
 from rigid_motion_batch.pipeline.store import Store
 

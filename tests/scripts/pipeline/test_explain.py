@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from rigid_motion_batch.pipeline import steps as pipeline_steps
-from rigid_motion_batch.pipeline.executors import SerialExecutor
 from rigid_motion_batch.pipeline.explain import explain
+from rigid_motion_batch.pipeline.performing import SerialExecutor
 from rigid_motion_batch.pipeline.running import run
 from rigid_motion_batch.pipeline.steps import OWN, Step, Task, digest_of
 from rigid_motion_batch.pipeline.store import Store

@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 
 from rigid_motion_batch.pipeline import running
-from rigid_motion_batch.pipeline.executors import ProcessExecutor, SerialExecutor
+from rigid_motion_batch.pipeline.executors import ProcessExecutor
+from rigid_motion_batch.pipeline.performing import SerialExecutor
 from rigid_motion_batch.pipeline.running import Outcome, Share, State, run
 from rigid_motion_batch.pipeline.steps import OWN, Task
 from rigid_motion_batch.pipeline.store import Store

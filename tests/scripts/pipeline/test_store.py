@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from rigid_motion_batch.pipeline import steps as pipeline_steps
-from rigid_motion_batch.pipeline.executors import SerialExecutor
+from rigid_motion_batch.pipeline.performing import SerialExecutor
 from rigid_motion_batch.pipeline.running import run
 from rigid_motion_batch.pipeline.steps import OWN, Task
 from rigid_motion_batch.pipeline.store import FolderInUse, OutputError, Store

@@ -1,0 +1,139 @@
+"""What was made of an input, beside it: so a command that is run again goes on, and replaces nothing of others.
+
+A folder that something was written to has a file with lines of JSON, `.rigid-motion/keyed.jsonl`: of every file its
+digest and the input that it was made of, before it is moved into place; and of every input that is done its key, which
+is that of a task, and what else was read for it. No Blender is needed here.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from rigid_motion_batch.files import append_lines, lines_of, written_beside
+from rigid_motion_batch.pipeline.steps import OWN, sha256_of
+
+from .output_files import FileProblem, refuse_came_meanwhile, refuse_long_name
+
+NAME = "keyed.jsonl"
+
+
+class Record:
+    """What was made of an input.
+
+    Parameters
+    ----------
+    folder : Path
+        Where to, or above it.
+    source : path or str
+        The file, and the body where one is meant.
+    overwrite : bool
+        Whether files may be replaced that were not made of it, or edited since.
+    """
+
+    def __init__(self, folder: Path, source: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+        self.folder, self.overwrite = folder, overwrite
+        self._file = folder / OWN / NAME
+        self._source = _from(folder, source)
+
+    def refuse_to_replace(self, path: Path) -> None:
+        """Raise `FileProblem` where there is something already that is not to be replaced, or the name is too long."""
+        refuse_long_name(path)
+        if os.path.isdir(path):
+            raise FileProblem(f"{path} is a folder: rename it, or give another --output")
+        if os.path.lexists(path) and not self._may_replace(path):
+            raise FileProblem(f"{path} is there already: add --overwrite, or another --output")
+
+    @contextmanager
+    def writing(self, path: Path) -> Iterator[Path]:
+        """A path for a file that takes its place at `path` when the block ends well: see `written_beside`.
+
+        Raises
+        ------
+        FileProblem
+            Where another run has put something there meanwhile.
+        OSError
+        """
+        try:
+            with written_beside(path, overwrite=self._may_replace(path)) as beside:
+                yield beside
+                # Killed from here on, what was moved is known to be the program's own.
+                line = {"file": _from(self.folder, path), "sha256": sha256_of(beside), "source": self._source}
+                append_lines(self._file, [line])
+        except OSError as error:
+            refuse_came_meanwhile(path, error)
+            raise
+
+    def keep(
+        self, key: str, written: Sequence[Path], beside: Iterable[Path], read: Iterable[Path], facts: Mapping[str, Any]
+    ) -> None:
+        """Note that the input is done: what was written, and beside that, what was read, and facts for JSON."""
+        line = {
+            "source": self._source,
+            "key": key,
+            "written": [_from(self.folder, path) for path in written],
+            "files": {_from(self.folder, path): _digest(path) for path in (*written, *beside, *read)},
+            "facts": dict(facts),
+        }
+        with suppress(OSError):
+            append_lines(self._file, [line])
+
+    def done(self, key: str) -> tuple[list[Path], Mapping[str, Any]] | None:
+        """The files that were made under a key, and facts; None where one, or what was read, is not as it was."""
+        with suppress(LookupError, TypeError, AttributeError):
+            line = [line for line in self._lines if line.get("key") == key][-1]
+            if all(_digest(self.folder / name) == digest for name, digest in line["files"].items()):
+                return [self.folder / name for name in line["written"]], line["facts"]
+        return None
+
+    def _may_replace(self, path: Path) -> bool:
+        return self.overwrite or self._is_own(path)
+
+    def _is_own(self, path: Path) -> bool:
+        """Whether a file is there as it was made of this input."""
+        name = _from(self.folder, path)
+        digests = {line.get("sha256") for line in self._lines if line.get("file") == name}
+        return bool(digests) and _digest(path) in digests
+
+    @property
+    def _lines(self) -> list[dict[str, Any]]:
+        return [line for line in _lines_of(self._file) if line.get("source") == self._source]
+
+
+def is_made(path: Path) -> bool:
+    """Whether a file is as this program has written it, by the record of its folder."""
+    digests = {line.get("sha256") for line in _lines_of(path.parent / OWN / NAME) if line.get("file") == path.name}
+    return bool(digests) and _digest(path) in digests
+
+
+def _lines_of(file: Path) -> Sequence[dict[str, Any]]:
+    """The lines of a record, read anew when it has grown."""
+    try:
+        return _read(file, os.stat(file).st_size)
+    except OSError:
+        return ()
+
+
+@lru_cache(maxsize=8)
+def _read(file: Path, _size: int) -> Sequence[dict[str, Any]]:
+    return tuple(lines_of(file))
+
+
+def _from(folder: Path, path: str | os.PathLike[str]) -> str:
+    """A path as it counts from a folder, so that both can be moved."""
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:  # On another drive.
+        return Path(os.path.abspath(path)).as_posix()
+
+
+def _digest(path: Path) -> str:
+    """Of a file; empty where it cannot be read."""
+    try:
+        return sha256_of(path) if path.is_file() else ""
+    except OSError:
+        return ""

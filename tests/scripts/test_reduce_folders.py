@@ -1,0 +1,346 @@
+"""reduce.py on folders and many files: which are done, by how many processes, and what is left when it is run again."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigid_motion_batch.cli import reduce
+from tests.gltf.making import Making, walk
+from tests.scripts.reducing import hand_made, listed, object_file, run, write_csv
+from tests.scripts.stopping import ROOT, Started, alive, descendants, start
+
+SOON = 5.0
+"""Seconds: on a machine with nothing else to do it is 1.3."""
+
+SLEEP = "import time; time.sleep(99)"
+
+KILL = "os.kill(os.getpid(), signal.SIGKILL)"
+
+BOTH = pytest.mark.parametrize(("by", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+
+ON_LINUX = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes where Linux has them")
+
+
+def glb(path: Path) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return walk(joints=2, seconds=1.0).write(path)
+
+
+def last_line(capsys: pytest.CaptureFixture[str]) -> str:
+    return capsys.readouterr().err.splitlines()[-1]
+
+
+# Which files
+
+
+def test_a_folder_stands_for_all_that_is_in_it_and_the_results_lie_as_it_does(tmp_path, capsys):
+    shots = tmp_path / "shots"
+    for name in ("walk.glb", "b/run.glb", "b/c/Turn.GLB", ".hidden/no.glb", "b/.no.glb", "walk-reduced.glb"):
+        glb(shots / name)
+    write_csv(shots / "b" / "hand.csv")
+    (shots / "readme.txt").write_text("no recording")
+    assert run(shots, "--output", tmp_path / "out") == 0
+    made = ["b/c/Turn-reduced.glb", "b/hand-keys.csv", "b/run-reduced.glb", "walk-reduced.glb"]
+    assert capsys.readouterr().out.splitlines() == [str(tmp_path / "out" / name) for name in made]
+    assert listed(shots) == [".hidden", "b", "readme.txt", "walk-reduced.glb", "walk.glb"]
+
+
+def test_what_was_written_is_no_input_by_whatever_name(tmp_path, capsys):
+    glb(tmp_path / "walk.glb")
+    write_csv(tmp_path / "hand.csv")
+    assert run(tmp_path / "walk.glb", "--output", tmp_path / "small.glb") == 0
+    for _ in range(2):
+        assert run(tmp_path) == 0
+    assert listed(tmp_path) == ["hand-keys.csv", "hand.csv", "small.glb", "walk-reduced.glb", "walk.glb"]
+    capsys.readouterr()
+    assert run(*sorted(tmp_path.glob("*.csv"))) == 0, "as a shell names them the next time"
+    assert last_line(capsys).endswith("1 file: 0 written, 1 already reduced.")
+
+
+def test_a_folder_with_nothing_in_it_is_told_in_a_line(tmp_path, capsys):
+    (tmp_path / "empty").mkdir()
+    assert run(tmp_path / "empty") == 2
+    said = capsys.readouterr().err.splitlines()
+    assert said[0].startswith(f"{tmp_path / 'empty'}: there is nothing to be done in this folder: name one with .blend")
+    assert len(said) == 2
+    glb(tmp_path / "walk.glb")
+    assert run(tmp_path / "walk.glb", tmp_path / "empty") == 1
+    assert (tmp_path / "walk-reduced.glb").is_file()
+
+
+def test_a_folder_that_cannot_be_read_is_named(tmp_path, capsys, monkeypatch):
+    glb(tmp_path / "walk.glb")
+    (tmp_path / "closed").mkdir()
+    scan = os.scandir
+
+    def scan_but_closed(folder: str) -> object:
+        if str(folder).endswith("closed"):
+            raise PermissionError(13, "Permission denied", folder)
+        return scan(folder)
+
+    monkeypatch.setattr(os, "scandir", scan_but_closed)
+    assert run(tmp_path) == 1
+    assert f"{tmp_path / 'closed'}: this folder cannot be read (Permission denied)" in capsys.readouterr().err
+    assert (tmp_path / "walk-reduced.glb").is_file()
+
+
+def test_links_out_of_a_folder_are_not_followed(tmp_path):
+    shots = tmp_path / "shots"
+    glb(shots / "walk.glb")
+    glb(tmp_path / "other" / "run.glb")
+    (shots / "folder").symlink_to(tmp_path / "other")
+    (shots / "file.glb").symlink_to(tmp_path / "other" / "run.glb")
+    (shots / "up").symlink_to(shots)
+    assert run(shots) == 0
+    assert listed(tmp_path / "other") == ["run.glb"]
+    assert listed(shots) == ["file.glb", "folder", "up", "walk-reduced.glb", "walk.glb"]
+
+
+def test_what_does_not_move_is_left_alone_in_a_folder(tmp_path, capsys):
+    still = Making()
+    still.json["nodes"] = [{}]
+    still.view(b"mesh")
+    del still.json["animations"]
+    still.write(tmp_path / "prop.glb")
+    (tmp_path / "shots.csv").write_text("shot,artist\n010,Ann\n", encoding="utf-8")
+    glb(tmp_path / "walk.glb")
+    assert run(tmp_path) == 0
+    said = capsys.readouterr().err
+    assert f"{tmp_path / 'prop.glb'}: no animations; left alone" in said
+    assert f"{tmp_path / 'shots.csv'}: no column has a known name (found shot, artist); left alone" in said
+    assert said.endswith("3 files: 1 written, 2 left alone.\n")
+    assert run(tmp_path / "shots.csv") == 2
+    assert run(tmp_path / "prop.glb") == 2, "by its name it is a mistake"
+
+
+@pytest.mark.parametrize(
+    ("make", "name", "options"),
+    [
+        (glb, "small.glb", ()),
+        (lambda path: object_file(path.with_suffix(".blend")), "small.blend", ()),
+        (lambda path: hand_made(path.parent), "small.blend", ()),
+        (lambda path: hand_made(path.parent), "small.glb", ("--glb",)),
+    ],
+)
+def test_the_output_of_one_input_may_be_a_file(tmp_path, make, name, options):
+    source = make(tmp_path / "in.glb")
+    assert run(source, *options, "--output", tmp_path / "new" / name) == 0
+    assert listed(tmp_path / "new") == [name]
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "made"), [("a.tum", (), 1), ("a.csv", (), 1), ("a.blend", ("--blend",), 2)]
+)
+def test_the_table_of_a_recording_may_be_named(tmp_path, name, options, made):
+    write_csv(tmp_path / "hand.csv")
+    assert run(tmp_path / "hand.csv", *options, "--output", tmp_path / "new" / name) == 0
+    assert name in listed(tmp_path / "new")
+    assert len(listed(tmp_path / "new")) == made
+
+
+@pytest.mark.parametrize(("name", "way_out"), [("a.blend", "or add --blend"), ("a.csv", "name that with --output")])
+def test_a_name_that_does_not_fit_the_recording_is_refused(tmp_path, capsys, name, way_out):
+    body, hand = hand_made(tmp_path), tmp_path / "hand.csv"
+    write_csv(hand)
+    assert run(body if name == "a.csv" else hand, "--output", tmp_path / "new" / name) == 1
+    assert way_out in capsys.readouterr().err
+    assert not (tmp_path / "new").exists()
+
+
+# What is there already
+
+
+def test_what_is_done_is_not_done_again(tmp_path, capsys):
+    write_csv(tmp_path / "hand.csv")
+    glb(tmp_path / "walk.glb")
+    object_file(tmp_path / "shot.blend")
+    assert run(tmp_path) == 0
+    capsys.readouterr()
+    names = ["hand-keys.csv", "shot-reduced.blend", "walk-reduced.glb"]
+    before = [(tmp_path / name).stat().st_mtime_ns for name in names]
+    assert run(tmp_path, "--overwrite") == 0
+    said = capsys.readouterr()
+    assert f"{tmp_path / 'hand.csv'}: already reduced: {tmp_path / 'hand-keys.csv'}" in said.err.splitlines()
+    assert said.err.endswith("3 files: 0 written, 3 already reduced.\n")
+    assert said.out.splitlines() == [str(tmp_path / name) for name in names]
+    assert [(tmp_path / name).stat().st_mtime_ns for name in names] == before
+
+
+def test_another_input_or_option_is_another_result_which_takes_the_place_of_ours(tmp_path, capsys):
+    source, made = glb(tmp_path / "walk.glb"), tmp_path / "walk-reduced.glb"
+    assert run(source) == 0
+    first = made.read_bytes()
+    assert run(source, "--tolerance", "2cm") == 0
+    second = made.read_bytes()
+    assert len(second) < len(first)
+    walk(joints=3).write(source)
+    assert run(source, "--tolerance", "2cm") == 0
+    assert made.read_bytes() not in (first, second)
+    made.unlink()
+    capsys.readouterr()
+    assert run(source, "--tolerance", "2cm") == 0
+    assert last_line(capsys) == "1 clip reduced; 1 file: 1 written."
+
+
+def test_what_was_edited_since_or_made_of_another_stays(tmp_path, capsys):
+    source, made = glb(tmp_path / "walk.glb"), tmp_path / "walk-reduced.glb"
+    assert run(source) == 0
+    made.write_bytes(edited := made.read_bytes() + b"edited")
+    assert run(source) == 1
+    assert f"{made} is there already: add --overwrite, or another --output" in capsys.readouterr().err
+    assert made.read_bytes() == edited
+    assert run(source, "--overwrite") == 0
+    before = made.read_bytes()
+    other = glb(tmp_path / "b" / "walk.glb")
+    assert run(other, "--tolerance", "2cm", "--output", tmp_path) == 1
+    assert made.read_bytes() == before
+
+
+def test_a_gltf_is_done_again_where_one_of_its_files_has_changed(tmp_path, capsys):
+    made = walk()
+    made.json["images"] = [{"uri": "skin.png"}]
+    (tmp_path / "skin.png").write_bytes(b"some")
+    for name in ("a", "b"):
+        made.write(tmp_path / f"{name}.gltf")
+    out = tmp_path / "out"
+    assert run(tmp_path, "--output", out) == 0, "both have the same image"
+    assert listed(out) == ["a-reduced.bin", "a-reduced.gltf", "b-reduced.bin", "b-reduced.gltf", "skin.png"]
+    values = np.frombuffer((tmp_path / "a 0.bin").read_bytes(), dtype="<f4").copy()
+    values[-5:] *= 0.5
+    (tmp_path / "a 0.bin").write_bytes(values.tobytes())
+    capsys.readouterr()
+    assert run(tmp_path, "--output", out) == 0
+    assert last_line(capsys).endswith("2 files: 1 written, 1 already reduced.")
+    (out / "b-reduced.bin").unlink()
+    assert run(tmp_path, "--output", out) == 0
+    assert (out / "b-reduced.bin").is_file()
+
+
+def test_a_folder_may_be_moved_with_its_results(tmp_path, capsys):
+    glb(tmp_path / "shots" / "a" / "walk.glb")
+    assert run(tmp_path / "shots") == 0
+    (tmp_path / "shots").rename(tmp_path / "moved")
+    assert run(tmp_path / "moved") == 0
+    assert last_line(capsys).endswith("1 file: 0 written, 1 already reduced.")
+
+
+def test_a_damaged_record_does_no_harm(tmp_path):
+    source = glb(tmp_path / "walk.glb")
+    assert run(source) == 0
+    record = tmp_path / ".rigid-motion" / "keyed.jsonl"
+    record.write_text('{"source": 3, "key"\n[]\n{"source": "walk.glb", "key": {}, "written": 3}\n')
+    assert run(source) == 1, "whose it is nobody knows"
+    assert run(source, "--overwrite") == 0
+
+
+# Several at once
+
+
+def started(folder: Path, *arguments: object, where: str, act: str) -> Started:
+    return start(folder, "reduce.py", *arguments, where=where, act=act)
+
+
+def test_processes_do_the_same_as_one_and_a_bad_file_stops_nobody(tmp_path):
+    for name in "abcd":
+        glb(tmp_path / "in" / f"{name}.glb")
+    (tmp_path / "in" / "bad.glb").write_bytes(b"glTF, but no more")
+    write_csv(tmp_path / "in" / "hand.csv")
+    assert run(tmp_path / "in", "--output", tmp_path / "one") == 1
+    command = [sys.executable, ROOT / "scripts" / "reduce.py", "in", "--output", "two", "--jobs", "2"]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=120)
+    assert done.returncode == 1
+    made = ["a-reduced.glb", "b-reduced.glb", "c-reduced.glb", "d-reduced.glb", "hand-keys.csv"]
+    assert done.stdout.splitlines() == [os.path.join("two", name) for name in made]
+    assert listed(tmp_path / "two") == listed(tmp_path / "one") == made
+    for name in made:
+        assert (tmp_path / "two" / name).read_bytes() == (tmp_path / "one" / name).read_bytes()
+    lines = done.stderr.splitlines()
+    bad = os.path.join("in", "bad.glb")
+    assert lines[-2:] == [f"Failed: {bad}", "1 object and 4 clips reduced; 6 files: 5 written, 1 failed."]
+    own = [
+        [place for place, line in enumerate(lines) if line.startswith(os.path.join("in", f"{name}.glb"))]
+        for name in "abcd"
+    ]
+    for places in own:
+        assert places == list(range(places[0], places[0] + len(places))), "what is said of a file stands together"
+
+
+def test_blenders_own_python_does_one_after_the_other(tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "rigid_motion_batch.pipeline.executors", None)
+    paths = [str(glb(tmp_path / f"{name}.glb")) for name in ("a", "b")]
+    assert reduce.main([*paths, "--jobs", "2"]) == 2
+    assert "; leave it out, and inputs are done one by one" in capsys.readouterr().err
+    assert reduce.main(paths) == 0
+    assert last_line(capsys) == "2 clips reduced; 2 files: 2 written."
+
+
+@ON_LINUX
+def test_a_killed_worker_costs_its_file_alone(tmp_path):
+    for name in ("a", "slow", "z"):
+        glb(tmp_path / f"{name}.glb")
+    # Killed where the result is moved into place: a part of it is there already.
+    run = started(tmp_path, ".", "--jobs", "2", where="slow-reduced.glb", act=KILL)
+    printed, said, _ = run.end()
+    assert run.process.returncode == 1, said
+    assert printed.split() == ["a-reduced.glb", "z-reduced.glb"]
+    assert "slow.glb: its process died (SIGKILL, perhaps for want of memory): leave it out" in said
+    assert said.splitlines()[-1] == "2 clips reduced; 3 files: 2 written, 1 failed."
+    names = ["a-reduced.glb", "a.glb", "slow.glb", "stuck", "z-reduced.glb", "z.glb"]
+    assert listed(tmp_path) == names
+    assert list(run.temporary.iterdir()) == []
+
+
+@ON_LINUX
+@BOTH
+def test_a_stopped_folder_ends_soon_and_keeps_what_is_complete(tmp_path, by, code):
+    for name in ("a", "slow", "slower"):
+        glb(tmp_path / f"{name}.glb")
+    run = started(
+        tmp_path,
+        "a.glb",
+        "slow.glb",
+        "slower.glb",
+        "--jobs",
+        "1",
+        where="slow-reduced",
+        act=SLEEP,
+    )
+    run.wait_until_stuck()
+    processes = descendants(run.process.pid)
+    run.process.send_signal(by)
+    printed, said, seconds = run.end()
+    assert (run.process.returncode, printed) == (code, "a-reduced.glb\n"), said
+    assert said.splitlines()[-1] == "Stopped. 1 clip reduced; 3 files: 1 written, 2 not reached."
+    assert "Traceback" not in said
+    assert seconds < SOON
+    assert listed(tmp_path) == ["a-reduced.glb", "a.glb", "slow.glb", "slower.glb", "stuck"]
+    assert len(processes) > 1
+    assert not any(map(alive, processes))
+
+
+@ON_LINUX
+@pytest.mark.parametrize("jobs", [0, 2])
+def test_after_a_kill_the_same_command_goes_on(tmp_path, jobs):
+    for name in ("a", "b", "slow", "z"):
+        glb(tmp_path / "in" / f"{name}.glb")
+    arguments = ("in", "--output", "out", "--jobs", jobs)
+    run = started(tmp_path, *arguments, where="slow-reduced", act=SLEEP)
+    run.wait_until_stuck()
+    os.killpg(run.process.pid, signal.SIGKILL)
+    run.end()
+    shutil.rmtree(tmp_path / "stuck")
+    assert "slow-reduced.glb" not in os.listdir(tmp_path / "out")
+    command = [sys.executable, ROOT / "scripts" / "reduce.py", *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert ".glb: already reduced: out" in done.stderr
+    visible = [name for name in listed(tmp_path / "out") if not name.startswith(".")]
+    assert visible == [f"{name}-reduced.glb" for name in ("a", "b", "slow", "z")]
