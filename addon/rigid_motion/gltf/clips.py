@@ -41,20 +41,23 @@ NEEDED, LARGER = "all of its keys are needed", "fewer keys would take more bytes
 
 
 @dataclass(frozen=True)
-class Wishes:
+class Options:
     """How few keys are wanted. Lengths are in the unit of the document."""
 
-    tolerance: float
-    """Of the displacement of any point of the balls around nodes, in the world."""
+    tolerance: float | None = None
+    """How far off any point within the radius of any node may be in the world; a share of the size where None."""
+
+    radius: float | None = None
+    """The same for all nodes; where None that of meshes is theirs, and that of joints a share of the size."""
 
     shared: bool = False
-    """Whether all nodes get their keys at the same times."""
+    """Whether all nodes of a clip get their keys at the same times."""
 
     count: int | None = None
-    """So many key poses of all nodes, whatever they are off by."""
+    """So many key poses of each clip instead of a tolerance."""
 
     vertices: bool = False
-    """Whether vertices of skins are measured."""
+    """Whether the largest displacement of any vertex of a skin is measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +99,8 @@ class ClipReduction:
         Nodes that are joints, some of which may be feet.
     size : float
         Of the body.
-    wishes : Wishes
+    options : Options
+        With a tolerance.
     """
 
     def __init__(
@@ -107,14 +111,14 @@ class ClipReduction:
         radii: np.ndarray,
         joints: Iterable[int],
         size: float,
-        wishes: Wishes,
+        options: Options,
     ) -> None:
-        self.clip, self.wishes, self.size = clip, wishes, size
+        self.clip, self.options, self.size = clip, options, size
         self.before = amount_before(nodes.document, clip)
         span = np.unique([track.times[end] for track in clip.tracks for end in (0, -1)])[[0, -1]]
         world = World(nodes, moving, radii, by_target(clip.tracks), np.unique(span))
-        self.world = replace(world, times=moments(world, clip, wishes.tolerance))
-        found = settled(self.world, clip, wishes.tolerance)
+        self.world = replace(world, times=moments(world, clip, options.tolerance))
+        found = settled(self.world, clip, options.tolerance)
         self.settled = {target: track for target, track in found.items() if track is not None}
         times = self.world.times
         self.dense = {
@@ -130,7 +134,7 @@ class ClipReduction:
         if not self.dense:
             found = self._proven([], integers=False)
         else:
-            found = self._key_poses() if self.wishes.shared or self.wishes.count else self._own_keys()
+            found = self._key_poses() if self.options.shared or self.options.count else self._own_keys()
         if found is None:
             return self._kept(NEEDED)
         tracks, error = found
@@ -138,7 +142,7 @@ class ClipReduction:
         if after.size >= self.before.size:
             return self._kept(LARGER)
         shown_tracks = self._shown(tracks)
-        off = largest_displacement(self.world, shown_tracks) if self.wishes.vertices else None
+        off = largest_displacement(self.world, shown_tracks) if self.options.vertices else None
         slides, name = self.feet.slides(shown_tracks), self.clip.name
         return ReducedClip(self.clip.number, name, tuple(tracks), "", self.before, after, error, slides, off)
 
@@ -146,19 +150,19 @@ class ClipReduction:
         return ReducedClip(self.clip.number, self.clip.name, None, reason, self.before, self.before)
 
     def _key_poses(self) -> tuple[list[StoredTrack], float] | None:
-        wishes = self.wishes
+        options = self.options
         search, integers, taken = self._search(), *self._storing()
-        tolerance = None if wishes.count else wishes.tolerance - taken
-        keys = search.key_poses(tolerance=tolerance, count=wishes.count)
+        tolerance = None if options.count else options.tolerance - taken
+        keys = search.key_poses(tolerance=tolerance, count=options.count)
         tracks = self._stored([keys] * len(self.dense), integers=integers)
         error = self.world.largest_error(self._shown(tracks), self.world.eighths)
-        return (tracks, error) if wishes.count or error <= wishes.tolerance else self._own_keys()
+        return (tracks, error) if options.count or error <= options.tolerance else self._own_keys()
 
     def _own_keys(self) -> tuple[list[StoredTrack], float] | None:
         """Tracks with keys of their own that keep to the tolerance, and the largest error; None where none do."""
         search, integers, taken = self._search(), *self._storing()
-        allowed = self.wishes.tolerance - taken
-        while allowed > LEAST * self.wishes.tolerance:
+        allowed = self.options.tolerance - taken
+        while allowed > LEAST * self.options.tolerance:
             found = self._proven(self._samples(search.keys(allowed)), integers=integers)
             if found is not None:
                 return found
@@ -176,7 +180,7 @@ class ClipReduction:
         for integers in (True, False):
             tracks = self._with_settled([stored(track, integers=integers) for track in self.dense.values()], integers)
             taken = self.world.largest_error(self._shown(tracks), self.world.times)
-            if taken <= OF_INTEGERS * self.wishes.tolerance:
+            if taken <= OF_INTEGERS * self.options.tolerance:
                 break
         return integers, taken
 
@@ -208,7 +212,7 @@ class ClipReduction:
         if len(places):
             return np.inf, places, PARTS * samples
         for times, parts in ((world.times, PARTS), (world.eighths, 1)):
-            error, places, numbers = world.worst(tracks, times, self.wishes.tolerance)
+            error, places, numbers = world.worst(tracks, times, self.options.tolerance)
             if len(places):
                 return error, places, parts * numbers
         return error, places, numbers

@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from rigid_motion.gltf import Document, GltfError, ReducedClip, Report, read_document, reduced
+from rigid_motion.gltf import Document, GltfError, Options, ReducedClip, Report, read_document, reduced
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.command_line import printable
 from rigid_motion_batch.files import written_beside
@@ -59,14 +59,7 @@ class GltfRun:
         try:
             document = _read(job.source) if export is None else _exported(export)
             tolerance = None if wishes.tolerance is None else wishes.tolerance.metres(per_unit)
-            report = reduced(
-                document,
-                tolerance=tolerance,
-                radius=wishes.radius,
-                shared=wishes.shared,
-                count=wishes.count,
-                vertices=wishes.vertices,
-            )
+            report = reduced(document, Options(tolerance, wishes.radius, wishes.shared, wishes.count, wishes.vertices))
         except GltfError as error:
             raise Unreadable(str(error)) from None
         self._stop_if_asked()

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from rigid_motion.gltf import Document, reduced
+from rigid_motion.gltf import Document, Options, reduced
 from rigid_motion.motion import Poses, interpolate
 from rigid_motion.motion.quaternions import align_signs
 from rigid_motion_batch.analysis.modes import label_of
@@ -77,7 +77,7 @@ def comparison_glb(made: Made, groups: Iterable[tuple[str, ...]]) -> bytes:
         name = " = ".join(label_of(mode).partition(" (")[0] for mode in modes)
         lanes.append(Lane(name, colour_of(modes[0]), _shown(clip, made.filled_in(modes[0], times))))
     document = _document(clip, times - times[0], lanes)
-    return reduced(document, tolerance=TOLERANCE).document.files("comparison.glb")["comparison.glb"]
+    return reduced(document, Options(TOLERANCE)).document.files("comparison.glb")["comparison.glb"]
 
 
 def _dense(times: np.ndarray) -> np.ndarray:
