@@ -13,13 +13,13 @@ import numpy as np
 from ..motion import SeparateKeys
 from .errors import PARTS, World
 from .feet import Feet
-from .nodes import Nodes, Tracks, by_target
+from .nodes import Nodes, by_target, steadied
 from .rewriting import StoredTrack
 from .search import Search
 from .settling import moments, settled
-from .storing import Amount, amount, amount_before, key_size, shown, stored
+from .storing import Amount, EveryKey, amount, amount_before, key_size, shown, stored
 from .thinning import shared_times
-from .tracks import LINEAR, ROTATION, TRANSLATION, Clip, Track
+from .tracks import ROTATION, TRANSLATION, Clip, Track, Tracks
 from .vertices import largest_displacement
 
 OF_INTEGERS = 0.25
@@ -30,6 +30,9 @@ MORE_SLIDE = 0.001 / 1.7
 
 TIGHTER = 0.7
 """How much smaller the tolerance of the next search is, where no keys that are put back help."""
+
+FEET_WEIGH = (1.0, 4.0, 16.0, 64.0)
+"""How many times the errors of feet that stand count in the search for so many key poses, one after the other."""
 
 ROUNDS = 24
 """How often keys are put back where the proof fails."""
@@ -116,25 +119,17 @@ class ClipReduction:
         self.clip, self.options, self.size = clip, options, size
         self.before = amount_before(nodes.document, clip)
         span = np.unique([track.times[end] for track in clip.tracks for end in (0, -1)])[[0, -1]]
-        world = World(nodes, moving, radii, by_target(clip.tracks), np.unique(span))
+        world = World(nodes, moving, radii, steadied(clip.tracks), np.unique(span))
         self.world = replace(world, times=moments(world, clip, options.tolerance))
         found = settled(self.world, clip, options.tolerance)
         self.settled = {target: track for target, track in found.items() if track is not None}
-        times = self.world.times
-        self.dense = {
-            (track.node, track.path): replace(track, interpolation=LINEAR, times=times, values=track.at(times))
-            for track in clip.tracks
-            if (track.node, track.path) not in found
-        }
-        """The tracks that are to have fewer keys, with a key at every moment."""
+        self.dense = {target: track for target, track in by_target(clip.tracks).items() if target not in found}
+        """The tracks that are to have fewer keys."""
         self.feet = Feet(self.world, joints)
 
     def reduced(self) -> ReducedClip:
         """The clip with fewer keys, or as it was."""
-        if not self.dense:
-            found = self._proven([], integers=False)
-        else:
-            found = self._key_poses() if self.options.shared or self.options.count else self._own_keys()
+        found = self._so_many() if self.dense and self.options.count else self._within_tolerance()
         if found is None:
             return self._kept(NEEDED)
         tracks, error = found
@@ -149,21 +144,34 @@ class ClipReduction:
     def _kept(self, reason: str) -> ReducedClip:
         return ReducedClip(self.clip.number, self.clip.name, None, reason, self.before, self.before)
 
-    def _key_poses(self) -> tuple[list[StoredTrack], float] | None:
-        options = self.options
-        search, integers, taken = self._search(), *self._storing()
-        tolerance = None if options.count else options.tolerance - taken
-        keys = search.key_poses(tolerance=tolerance, count=options.count)
-        tracks = self._stored([keys] * len(self.dense), integers=integers)
-        error = self.world.largest_error(self._shown(tracks), self.world.eighths)
-        return (tracks, error) if options.count or error <= options.tolerance else self._own_keys()
+    def _so_many(self) -> tuple[list[StoredTrack], float]:
+        """Tracks with so many key poses, those under which feet slide least, and the largest error."""
+        search, (integers, _) = self._search(), self._storing()
+        best, farthest = [], np.inf
+        for weight in FEET_WEIGH:
+            weights = np.ones((len(self.world.moving), len(self.world.times)))
+            weights[self.feet.places] += (weight - 1.0) * self.feet.stand
+            keys = search.so_many_key_poses(self.options.count, weights)
+            tracks = self._stored([keys] * len(self.dense), integers=integers)
+            farther = self.feet.farther(self._shown(tracks))
+            if farther < farthest:
+                best, farthest = tracks, farther
+            if farther <= MORE_SLIDE * self.size:
+                break
+        return best, self.world.largest_error(self._shown(best))
 
-    def _own_keys(self) -> tuple[list[StoredTrack], float] | None:
-        """Tracks with keys of their own that keep to the tolerance, and the largest error; None where none do."""
-        search, integers, taken = self._search(), *self._storing()
+    def _within_tolerance(self) -> tuple[list[StoredTrack], float] | None:
+        """Tracks with few keys that keep to the tolerance, and the largest error; None where none do."""
+        if not self.dense:
+            return self._proven([], integers=False)
+        search, (integers, taken) = self._search(), self._storing()
         allowed = self.options.tolerance - taken
         while allowed > LEAST * self.options.tolerance:
-            found = self._proven(self._samples(search.keys(allowed)), integers=integers)
+            if self.options.shared:
+                samples = [search.key_poses(allowed)] * len(self.dense)
+            else:
+                samples = self._samples(search.keys(allowed))
+            found = self._proven(samples, integers=integers)
             if found is not None:
                 return found
             allowed *= TIGHTER
@@ -177,9 +185,14 @@ class ClipReduction:
 
     def _storing(self) -> tuple[bool, float]:
         """Whether rotations may be integers, and how far off all is with all keys, by storing and what is settled."""
+        times = self.world.times
         for integers in (True, False):
-            tracks = self._with_settled([stored(track, integers=integers) for track in self.dense.values()], integers)
-            taken = self.world.largest_error(self._shown(tracks), self.world.times)
+            dense = {
+                target: replace(track.keyed(times[:1]), times=times, values=EveryKey(track, times, integers))
+                for target, track in self.dense.items()
+            }
+            shown_tracks = self._shown(self._with_settled([], integers)) | dense
+            taken = self.world.largest_error(shown_tracks, parts=1)
             if taken <= OF_INTEGERS * self.options.tolerance:
                 break
         return integers, taken
@@ -211,10 +224,10 @@ class ClipReduction:
         places, samples = self.feet.slips(tracks, MORE_SLIDE * self.size)
         if len(places):
             return np.inf, places, PARTS * samples
-        for times, parts in ((world.times, PARTS), (world.eighths, 1)):
-            error, places, numbers = world.worst(tracks, times, self.options.tolerance)
+        for parts in (1, PARTS):
+            error, places, numbers = world.worst(tracks, self.options.tolerance, parts=parts)
             if len(places):
-                return error, places, parts * numbers
+                return error, places, PARTS // parts * numbers
         return error, places, numbers
 
     def _with_more(self, samples: list[np.ndarray], places: np.ndarray, eighths: np.ndarray) -> list[np.ndarray]:
@@ -224,6 +237,8 @@ class ClipReduction:
         for place in range(len(wanted) - 1, -1, -1):
             if (parent := self.world.parents[place]) >= 0:
                 wanted[parent] |= wanted[place]
+        if self.options.shared:
+            wanted[:] = wanted.any(axis=0)
         ends = (0, len(self.world.times) - 1)
         more = [np.flatnonzero(wanted[self.world.places[node]]) for node, _ in self.dense]
         return [
@@ -236,17 +251,16 @@ class ClipReduction:
         times, tracks = self.world.times, []
         moving = [number for number, own in enumerate(samples) if len(own) > 1]
         dense = list(self.dense.values())
-        widths = [key_size(dense[number], integers=integers) for number in moving]
+        widths = [key_size(dense[number].path, integers=integers) for number in moving]
         shared = shared_times([samples[number] for number in moving], widths, len(times))
         together = dict(zip(moving, shared, strict=True))
         for number, (track, own) in enumerate(zip(dense, samples, strict=True)):
+            thinned = track.keyed(times[own])
             if number not in together:
-                thinned = replace(track, times=times[:1], values=track.values[own])
+                thinned = replace(thinned, times=times[:1])
             else:
-                thinned = replace(track, times=times[own], values=track.values[own])
                 # Keys for the sake of others change nothing of what is shown.
-                key_times = times[together[number]]
-                thinned = replace(track, times=key_times, values=thinned.at(key_times))
+                thinned = thinned.keyed(times[together[number]])
             tracks.append(stored(thinned, integers=integers))
         return self._spanning(self._with_settled(tracks, integers))
 
@@ -261,13 +275,11 @@ class ClipReduction:
             return tracks
         if not tracks:
             first = self.clip.tracks[0]
-            still = replace(first, interpolation=LINEAR, times=ends[:1], values=first.at(ends[:1]))
-            tracks = [stored(still, integers=False)]
+            tracks = [stored(first.keyed(ends[:1]), integers=False)]
         number = min(range(len(tracks)), key=lambda number: len(tracks[number].times))
         integers = tracks[number].values.dtype.kind == "i"
         track = shown(self._of_channel[tracks[number].channel], tracks[number])
-        times = np.union1d(track.times, ends)
-        tracks[number] = stored(replace(track, times=times, values=track.at(times)), integers=integers)
+        tracks[number] = stored(track.keyed(np.union1d(track.times, ends)), integers=integers)
         return tracks
 
     @property

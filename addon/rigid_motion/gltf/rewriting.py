@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from .accessors import KINDS, raw_numbers
-from .documents import Document, Json, data_uri, objects
+from .documents import Document, FileBytes, Json, data_uri, objects
 from .tracks import LINEAR
 
 KNOWN = re.compile(
@@ -304,6 +304,6 @@ def _cuts(removed: list[Range], kept: list[Range]) -> list[Range]:
     return [(first, end) for first, end in aligned if first < end]
 
 
-def _without(data: bytes, cuts: list[Range]) -> bytes:
+def _without(data: bytes | FileBytes, cuts: list[Range]) -> bytes:
     begins, ends = [0, *(end for _, end in cuts)], [*(first for first, _ in cuts), len(data)]
-    return b"".join(data[first:end] for first, end in zip(begins, ends, strict=True))
+    return b"".join(bytes(data[first:end]) for first, end in zip(begins, ends, strict=True))

@@ -175,7 +175,7 @@ def reduce_skeleton_keys(
             f"is {DEEPEST} at most: shared=True finds key poses for longer chains"
         )
     if stretch is not None and len(times) > stretch + 1:
-        recording = LongRecording(times, poses, skeleton, mode, radii, weights, free)
+        recording = LongRecording(times, skeleton, mode, radii, weights, free, lambda some: poses[:, some])
         return keys_in_stretches(recording, tolerance, separate, stretch, run)
     poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
     body = Body(times, poses, skeleton, mode, radii, weights, free)

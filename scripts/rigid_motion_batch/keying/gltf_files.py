@@ -110,7 +110,7 @@ def _exported(export: Callable[[Path], None]) -> Document:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "exported.glb"
         export(path)
-        return read_document(path)
+        return read_document(path, in_memory=True)
 
 
 def _told(clip: ReducedClip, tolerance: Tolerance, per_unit: float, would: str, *, by_number: bool) -> str:
