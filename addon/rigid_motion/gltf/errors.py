@@ -6,7 +6,7 @@ is largest; a node that shrinks takes its ball along. Of a long clip no more is 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -83,11 +83,16 @@ class World:
         count = len(self.times)
         return stretches(count, STRETCH) if count > LONG * STRETCH else [slice(0, count)]
 
-    def seen(self, *tracks: Tracks, parts: int = 1) -> Iterator[Block]:
-        """What the moments look like as each of these tracks move the nodes, and so many parts of the gaps between."""
+    def seen(self, *tracks: Tracks, parts: int = 1, among: Collection[int] | None = None) -> Iterator[Block]:
+        """What the moments look like as each of these tracks move the nodes, and so many parts of the gaps between.
+
+        Where that is asked for, among some of the stretches alone, by their numbers.
+        """
         step = max(1, AT_ONCE // (parts * max(1, len(self.moving))))
         last = len(self.times) - 1
-        for stretch in self.stretches:
+        for number, stretch in enumerate(self.stretches):
+            if among is not None and number not in among:
+                continue
             end = stretch.stop if stretch.stop > last else stretch.stop - 1
             ends = self.times[[stretch.start, stretch.stop - 1]].tolist()
             near = [{target: track.near(*ends) for target, track in some.items()} for some in tracks]
@@ -107,9 +112,9 @@ class World:
 
     def lengths_above(self, times: np.ndarray) -> np.ndarray:
         """How long the axes of each node's parent are in the world at times (m,), shape (n, m, 3), or (n, 1, 3)."""
-        grows = any(path == SCALE and len(track.times) > 1 for (_, path), track in self.truth.items())
-        lengths = np.linalg.norm(self.worlds(self.truth, times if grows else times[:1]).axes, axis=-2)
-        return self._above(lengths)
+        if any(path == SCALE and len(track.times) > 1 for (_, path), track in self.truth.items()):
+            return self._above(np.linalg.norm(self.worlds(self.truth, times).axes, axis=-2))
+        return self._above(self._extremes[1][:, None])
 
     def _above(self, lengths: np.ndarray) -> np.ndarray:
         """Those of nodes' parents, where these are of the nodes, shape (n, ..., 3)."""
@@ -157,7 +162,9 @@ class World:
         """The largest displacement of any point of any ball at the moments, and so many parts of the gaps between."""
         return self.worst(shown, np.inf, parts=parts)[0]
 
-    def worst(self, shown: Tracks, tolerance: float, *, parts: int = PARTS) -> tuple[float, np.ndarray, np.ndarray]:
+    def worst(
+        self, shown: Tracks, tolerance: float, *, parts: int = PARTS, among: Collection[int] | None = None
+    ) -> tuple[float, np.ndarray, np.ndarray]:
         """Errors at the moments and parts of the gaps: the largest, and where it is over a tolerance and a peak.
 
         Returns
@@ -167,7 +174,7 @@ class World:
             Of nodes, and of the times.
         """
         largest, places, numbers = 0.0, [NOWHERE], [NOWHERE]
-        for block in self.seen(shown, self.truth, parts=parts):
+        for block in self.seen(shown, self.truth, parts=parts, among=among):
             there, truth = (AffineMaps(some.axes @ self._to_balls, some.origins) for some in block.maps)
             bounds = displacement_bound(there, truth, self.radii[:, None])
             errors = np.zeros(bounds.shape)

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..motion import Poses, interpolate
 from ..motion.quaternions import normalise
 from .accessors import EVERY, Rows, numbers
 from .documents import Document, GltfError, Json, entry, objects, shown
@@ -25,6 +24,9 @@ WIDTHS = {TRANSLATION: 3, ROTATION: 4, SCALE: 3}
 """Numbers of a key."""
 
 TO_WXYZ, TO_XYZW = [3, 0, 1, 2], [1, 2, 3, 0]
+
+NARROWEST = 1e-9
+"""An angle that stands for none: its sine is itself."""
 
 AT_ONCE = 2**14
 """Keys of a track that are looked at in one go."""
@@ -94,7 +96,7 @@ class Track:
         elif self.interpolation == CUBICSPLINE:
             found = self._on_spline(times)
         elif self.path == ROTATION:
-            return turned_at(self.times, self.values, times)
+            found = turned_at(self.times, self.values, times)
         else:
             found = np.stack([np.interp(times, self.times, column) for column in self.values.T], axis=1)
         return normalise(found) if self.path == ROTATION else found
@@ -109,8 +111,17 @@ class Track:
 
 
 def turned_at(key_times: np.ndarray, keys: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Quaternions (m, 4) at times between keys (n, 4), each on the short way at an even speed."""
-    return interpolate(key_times, Poses(np.zeros((len(keys), 3)), keys), times, "lerp_slerp").quaternions
+    """Unit quaternions (m, 4) at times between keys (n, 4), each on the short way at an even speed."""
+    keys = normalise(keys)
+    first, second = keys[:-1], keys[1:]
+    second = np.where(np.einsum("ij,ij->i", first, second)[:, None] < 0.0, -second, second)
+    angles = 2.0 * np.arctan2(np.linalg.norm(second - first, axis=1), np.linalg.norm(second + first, axis=1))
+    angles = np.maximum(angles, NARROWEST)
+    segments = np.clip(np.searchsorted(key_times, times, side="right") - 1, 0, len(first) - 1)
+    share = (times - key_times[segments]) / np.diff(key_times)[segments]
+    angles, sines = angles[segments], np.sin(angles)[segments]
+    begin, end = np.sin((1.0 - share) * angles) / sines, np.sin(share * angles) / sines
+    return begin[:, None] * first[segments] + end[:, None] * second[segments]
 
 
 Tracks = Mapping[tuple[int, str], Track]

@@ -10,15 +10,15 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .bodies import SOME_TURN, Body
+from .bodies import Body
 from .measures import shell_error
 from .poses import Poses
-from .quaternions import align_signs, normalise
-from .skeleton_channels import NO_TURN, Channels, SeparateKeys
+from .quaternions import align_signs
+from .skeleton_channels import NO_TURN, Channels, SeparateKeys, changes
 from .skeleton_search import TINY, ChannelKeys, OwnKeys
 from .skeletons import Skeleton
 
@@ -100,82 +100,52 @@ def _rests(
     Samples are of shape (joints, channels), -1 where one has to move. By the triangle inequality all of them together
     are not off by more than their part of the tolerance.
     """
-    skeleton, start = recording.skeleton, recording.part(slice(0, 1)).poses
-
-    def each(look: Callable, *known: object) -> tuple[tuple, ...]:
-        return tuple(zip(*run(look, ((recording.part(some), separate, *known) for some in bounds)), strict=True))
-
-    reaches, sums, grows = each(_survey, start)
-    reaches, mean = np.max(reaches, axis=0)[:, None], _mean(sums, [some.stop - some.start for some in bounds])
-    samples, errors, poses = each(_nearest, reaches, mean)
-    stretch = np.argmin(errors, axis=0)
-    joints, channels = np.indices(stretch.shape)
-    samples = (np.array(samples) + [[[some.start]] for some in bounds])[stretch, joints, channels]
-    still = Poses(
-        np.array([some.positions for some in poses])[stretch, joints, channels],
-        np.array([some.quaternions for some in poses])[stretch, joints, channels],
-        None if start.scales is None else np.array([some.scales for some in poses])[stretch, joints, channels],
+    skeleton, joints = recording.skeleton, np.arange(len(recording.skeleton))
+    reaches, samples, poses, grows = zip(*run(_survey, map(recording.part, bounds)), strict=True)
+    # Of the middles of stretches that in the middle.
+    candidates = _joined(poses)
+    middles = replace(recording.part(slice(0, len(bounds))), poses=candidates).body.middles
+    still = candidates[joints, middles]
+    reaches, samples = (
+        np.max(reaches, axis=0),
+        np.array([some.start for some in bounds])[middles] + np.array(samples)[middles, joints],
     )
-    errors = np.max(each(_farthest, reaches, still)[0], axis=0)
+    errors = np.max([*run(_farthest, ((recording.part(some), separate, reaches, still) for some in bounds))], axis=0)
     chains = skeleton.longest_chains(np.count_nonzero(errors > 0.0, axis=1) * recording.free)
     weights = skeleton.most_below(recording.weights.max(axis=1))
     allowed = AT_REST * tolerance / np.maximum(chains, 1) / np.maximum(weights, TINY)
-    if start.scales is not None:
-        above = skeleton.in_root_space(start).scales[skeleton.parents, 0]
+    if still.scales is not None:
+        above = skeleton.in_root_space(still).scales[skeleton.parents]
         allowed /= np.where(skeleton.parents < 0, 1.0, above)
-        allowed *= not np.any(grows)
+        allowed *= not (np.any(grows) or changes(candidates.scales).any())
     allowed[~recording.free] = 0.0 if separate else -1.0
-    rests = np.where(errors <= allowed[:, None], samples, -1)
-    return rests, Poses(still.positions[:, -1], still.quaternions[:, 0])
+    return np.where(errors <= allowed[:, None], samples[:, None], -1), still
 
 
-def _survey(task: tuple[Stretch, bool, Poses]) -> tuple[np.ndarray, Poses, bool]:
+def _survey(part: Stretch) -> tuple[np.ndarray, np.ndarray, Poses, bool]:
     """How far what hangs on each joint gets from it, with the balls around it, in the joint's unit, shape (joints,).
 
-    And the sums of poses (joints, 1), with quaternions on the side of those at the start; and whether scales change.
+    And the samples in the middle of their poses (joints,), those poses (joints, 1), and whether scales change.
     """
-    part, _, start = task
-    body, poses = part.body, part.poses
-    sides = np.where(np.einsum("jni,jni->jn", poses.quaternions, start.quaternions) < 0.0, -1.0, 1.0)
-    sums = Poses(
-        poses.positions.sum(axis=1, keepdims=True),
-        np.einsum("jn,jni->ji", sides, poses.quaternions)[:, None],
-        None if poses.scales is None else poses.scales.sum(axis=1, keepdims=True),
-    )
-    reaches = (body.sizes if body.truth.scales is None else body.sizes / body.truth.scales).max(axis=1)
-    return reaches, sums, poses.scales is not None and bool(np.any(poses.scales != start.scales))
+    body, scales = part.body, part.poses.scales
+    sizes = body.sizes if body.truth.scales is None else body.sizes / body.truth.scales
+    return sizes.max(axis=1), body.middles, body.at_rest(), scales is not None and bool(changes(scales).any())
 
 
-def _mean(sums: Sequence[Poses], counts: Sequence[int]) -> Poses:
-    """The mean of poses of which these are sums, shape (joints, 1)."""
-    count = sum(counts)
-    return Poses(
-        np.sum([some.positions for some in sums], axis=0) / count,
-        normalise(np.sum([some.quaternions for some in sums], axis=0) / count + SOME_TURN),
-        None if sums[0].scales is None else np.sum([some.scales for some in sums], axis=0) / count,
-    )
-
-
-def _nearest(task: tuple[Stretch, bool, np.ndarray, Poses]) -> tuple[np.ndarray, np.ndarray, Poses]:
-    """The samples nearest to poses (joints, 1), their errors and their poses, each of shape (joints, channels)."""
-    part, separate, reaches, poses = task
-    joints = np.arange(len(part.poses))[:, None]
-    errors = [
-        shell_error(some, pose, reaches)
-        for some, pose in zip(_channels(part.poses, separate), _channels(poses, separate), strict=True)
-    ]
-    samples = np.argmin(errors, axis=2).T
-    return samples, np.min(errors, axis=2).T, part.poses[joints, samples]
-
-
-def _farthest(task: tuple[Stretch, bool, np.ndarray, Poses]) -> tuple[np.ndarray]:
-    """How far channels are off poses (joints, channels) at most, shape (joints, channels)."""
+def _farthest(task: tuple[Stretch, bool, np.ndarray, Poses]) -> np.ndarray:
+    """How far channels are off where joints are still (joints,) at most, shape (joints, channels)."""
     part, separate, reaches, still = task
-    errors = [
-        shell_error(some, _channels(still[:, [channel]], separate)[channel], reaches).max(axis=1)
-        for channel, some in enumerate(_channels(part.poses, separate))
-    ]
-    return (np.stack(errors, axis=1),)
+    pairs = zip(_channels(part.poses, separate), _channels(still[:, None], separate), strict=True)
+    return np.stack([shell_error(own, held, reaches[:, None]).max(axis=1) for own, held in pairs], axis=1)
+
+
+def _joined(parts: Sequence[Poses]) -> Poses:
+    """Poses (joints, n) one after the other."""
+    positions, quaternions = (
+        np.concatenate([getattr(some, name) for some in parts], axis=1) for name in ("positions", "quaternions")
+    )
+    scales = None if parts[0].scales is None else np.concatenate([some.scales for some in parts], axis=1)
+    return Poses(positions, align_signs(quaternions), scales)
 
 
 def _channels(poses: Poses, separate: bool) -> tuple[Poses, ...]:
