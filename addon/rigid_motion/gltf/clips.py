@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..motion import SeparateKeys
-from .errors import PARTS, World
+from .errors import NOWHERE, PARTS, World
 from .feet import Feet
 from .nodes import Nodes, by_target, steadied
 from .rewriting import StoredTrack
@@ -207,35 +207,37 @@ class ClipReduction:
 
         None where the proof fails with more and more of them.
         """
-        among, bounds = None, np.array([some.start for some in self.world.stretches])
+        sound: dict[int, tuple[int, float]] = {}
         for _ in range(ROUNDS):
             tracks = self._stored(samples, integers=integers)
-            error, places, eighths = self._failures(self._shown(tracks), among)
-            if among is not None and not len(places):
-                among = None
-                error, places, eighths = self._failures(self._shown(tracks), among)
+            places, eighths = self._failures(self._shown(tracks), sound)
             if not len(places):
-                return tracks, error
+                return tracks, max(error for _, error in sound.values())
             samples = self._with_more(samples, places, eighths)
-            if len(bounds) > 1:
-                among = set((np.searchsorted(bounds, eighths / PARTS, side="right") - 1).tolist())
         return None
 
-    def _failures(self, tracks: Tracks, among: set[int] | None) -> tuple[float, np.ndarray, np.ndarray]:
-        """The largest error, and where tracks break what is promised: places of nodes, and eighths of moments.
+    def _failures(self, tracks: Tracks, sound: dict[int, tuple[int, float]]) -> tuple[np.ndarray, np.ndarray]:
+        """Where tracks break what is promised: places of nodes, and eighths of moments.
 
-        What is quickly seen comes first, and hides the rest. Among some of the stretches alone feet do not count.
+        What is quickly seen comes first, and hides the rest. Of stretches that are sound, their digest and their
+        largest error are noted: they are not looked at again for as long as they stay the same.
         """
         world = self.world
-        if among is None:
-            places, samples = self.feet.slips(tracks, MORE_SLIDE * self.size)
-            if len(places):
-                return np.inf, places, PARTS * samples
-        for parts in (1, PARTS):
-            error, places, numbers = world.worst(tracks, self.options.tolerance, parts=parts, among=among)
-            if len(places):
-                return error, places, PARTS // parts * numbers
-        return error, places, numbers
+        places, samples = self.feet.slips(tracks, MORE_SLIDE * self.size)
+        if len(places):
+            return places, PARTS * samples
+        failures = [(NOWHERE, NOWHERE)]
+        for number, digest in enumerate(world.digests(tracks)):
+            if number in sound and sound[number][0] == digest:
+                continue
+            for parts in (1, PARTS):
+                error, places, numbers = world.worst(tracks, self.options.tolerance, parts=parts, among=(number,))
+                if len(places):
+                    failures.append((places, PARTS // parts * numbers))
+                    break
+            else:
+                sound[number] = digest, error
+        return tuple(map(np.concatenate, zip(*failures, strict=True)))
 
     def _with_more(self, samples: list[np.ndarray], places: np.ndarray, eighths: np.ndarray) -> list[np.ndarray]:
         """Samples with those around some of the eighths, for the nodes at these places and all that they hang on."""

@@ -224,10 +224,12 @@ def objects(parent: Json, name: str) -> list[Json]:
 
 def entry(parent: Json, name: str, number: object) -> Json:
     """The object of a number in a list of the document."""
-    found = objects(parent, name)
-    if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < len(found):
+    found = parent.get(name, [])
+    is_there = isinstance(found, list) and isinstance(number, int) and not isinstance(number, bool)
+    if not is_there or not 0 <= number < len(found):
+        objects(parent, name)
         raise GltfError(f"{name} has no entry {shown(number)}, which something in the file names")
-    return found[number]
+    return found[number] if isinstance(found[number], dict) else objects(parent, name)[number]
 
 
 def whole(parent: Json, name: str, default: int | None = None, least: int = 0) -> int:

@@ -94,11 +94,23 @@ class World:
             if among is not None and number not in among:
                 continue
             end = stretch.stop if stretch.stop > last else stretch.stop - 1
-            ends = self.times[[stretch.start, stretch.stop - 1]].tolist()
-            near = [{target: track.near(*ends) for target, track in some.items()} for some in tracks]
+            near = [self._near(some, stretch) for some in tracks]
             for first in range(stretch.start, end, step):
                 times = self.parted(first, min(first + step, end), parts)
                 yield Block(parts * first, times, tuple(self.worlds(some, times) for some in near))
+
+    def digests(self, tracks: Tracks) -> list[int]:
+        """What tells apart, of each stretch, whether tracks have the same keys there."""
+        near = (self._near(tracks, stretch) for stretch in self.stretches)
+        return [
+            hash(tuple(part.tobytes() for track in some.values() for part in (track.times, track.values)))
+            for some in near
+        ]
+
+    def _near(self, tracks: Tracks, stretch: slice) -> Tracks:
+        """The keys of tracks that say what is shown in a stretch."""
+        ends = self.times[[stretch.start, stretch.stop - 1]].tolist()
+        return {target: track.near(*ends) for target, track in tracks.items()}
 
     def parted(self, first: int, end: int, parts: int) -> np.ndarray:
         """Some of the moments, and so many parts of the gaps behind them."""

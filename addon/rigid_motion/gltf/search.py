@@ -13,7 +13,7 @@ from ..motion import Poses, SeparateKeys, Skeleton, reduce_skeleton_keys
 from ..motion.quaternions import align_signs, from_matrices
 from ..motion.skeleton_stretches import LongRecording, keys_in_stretches
 from .accessors import EVERY
-from .errors import STRETCH, World
+from .errors import World
 from .tracks import ROTATION, TRANSLATION, Tracks
 
 MODE = "lerp_slerp"
@@ -43,7 +43,7 @@ class Search:
         weights = np.broadcast_to(1.0, (len(world.moving), len(world.times)))
         skeleton, free = Skeleton(world.parents), ~self.fixed
         recording = LongRecording(world.times, skeleton, MODE, world.radii, weights, free, self._poses)
-        return keys_in_stretches(recording, tolerance, True, STRETCH, map)
+        return keys_in_stretches(recording, tolerance, True, world.stretches, map)
 
     def key_poses(self, tolerance: float) -> np.ndarray:
         """The samples that are keys of all nodes, those where stretches meet among them."""

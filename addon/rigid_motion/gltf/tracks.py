@@ -96,7 +96,7 @@ class Track:
         elif self.interpolation == CUBICSPLINE:
             found = self._on_spline(times)
         elif self.path == ROTATION:
-            found = turned_at(self.times, self.values, times)
+            return turned_at(self.times, self.values, times)
         else:
             found = np.stack([np.interp(times, self.times, column) for column in self.values.T], axis=1)
         return normalise(found) if self.path == ROTATION else found

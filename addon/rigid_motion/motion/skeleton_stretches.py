@@ -75,10 +75,9 @@ def stretches(samples: int, stretch: int) -> list[slice]:
 
 
 def keys_in_stretches(
-    recording: LongRecording, tolerance: float, separate: bool, stretch: int, run: Run
+    recording: LongRecording, tolerance: float, separate: bool, bounds: list[slice], run: Run
 ) -> tuple[np.ndarray, ...] | tuple[SeparateKeys, ...]:
-    """The keys of all joints, or of their channels: all that moves has keys where stretches of so many samples meet."""
-    bounds = stretches(len(recording.times), stretch)
+    """The keys of all joints, or of their channels: all that moves has keys where the stretches meet."""
     rests, still = _rests(recording, bounds, tolerance, separate, run)
     tasks = ((recording.part(some), tolerance, separate, rests < 0, still) for some in bounds)
     moved = [[] for _ in rests.flat]
