@@ -84,22 +84,21 @@ def test_what_hardly_moves_has_one_key_throughout(tmp_path):
 
 
 def standing_body(path: Path) -> tuple[Path, float, float]:
-    """A body on whose hips a leg hangs that gives way to their swaying: its foot stands from one time to another."""
+    """A body whose leg turns to and fro below its hips, which go along: its foot stands from one time to another."""
     made = Making()
     begin, end, times = 1.0, 6.0, np.arange(241) / 30.0
     made.json["nodes"] = [
-        {"translation": [0.0, 1.0, 0.0], "children": [1, 3]},
+        {"children": [1, 3]},
         {"children": [2]},
         {"translation": [0.0, -1.0, 0.0]},
         {"translation": [0.0, 0.7, 0.0]},
     ]
     made.json["skins"] = [{"joints": [0, 1, 2, 3]}]
-    sway = 0.08 * np.sin(2.0 * times) + 0.03 * np.sin(7.3 * times)
-    leg = np.zeros((len(times), 3))
-    leg[:, 0] = np.where((times >= begin) & (times <= end), -sway, 0.3 * np.sin(5.0 * times) - sway)
-    own = made.times(times)
-    made.channel(0, "translation", own, np.column_stack((sway, np.ones_like(times), np.zeros_like(times))))
-    made.channel(1, "translation", own, leg)
+    angles = 0.3 * np.sin(2.0 * times) + 0.1 * np.sin(7.3 * times)
+    walks = 0.3 * np.minimum(times - begin, 0.0) + 0.3 * np.maximum(times - end, 0.0)
+    own, none = made.times(times), np.zeros_like(times)
+    made.channel(0, "translation", own, np.column_stack((walks - np.sin(angles), np.cos(angles), none)))
+    made.channel(1, "rotation", own, np.column_stack((none, none, np.sin(angles / 2), np.cos(angles / 2))))
     made.channel(3, "rotation", own, turns(times, 4))
     return made.write(path), begin, end
 
