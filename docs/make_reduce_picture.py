@@ -17,7 +17,7 @@ import numpy as np
 DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
-from rigid_motion.gltf import read_document, reduce_file
+from rigid_motion.gltf import Options, read_document, reduce_file
 from rigid_motion.gltf.nodes import Nodes, by_target
 from rigid_motion.gltf.tracks import Clip, read_clips
 from rigid_motion_batch.files import write_text
@@ -43,7 +43,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         before, after = Path(folder, "dancer.glb"), Path(folder, "dancer-reduced.glb")
         _export(before)
-        report = reduce_file(before, after, tolerance=TOLERANCE, radius=RADIUS)
+        report = reduce_file(before, after, Options(TOLERANCE, RADIUS))
         (clip,) = report.clips
         sizes = [f"{when.keys} keys, {when.size / 1000:.0f} kB" for when in (clip.before, clip.after)]
         off = f"{1000 * clip.error:.1f} mm off at most"

@@ -28,7 +28,7 @@ import bpy
 import numpy as np
 
 from research.publishing import opening
-from rigid_motion.gltf import reduce_file
+from rigid_motion.gltf import Options, reduce_file
 from rigid_motion_batch.command_line import parser_of
 from rigid_motion_batch.files import write_text
 
@@ -228,7 +228,7 @@ def tools_in(folder: Path | None) -> dict[str, Callable[[Path, Path], None]]:
     """Return what makes a file smaller, by its name."""
 
     def reduced(tolerance: float) -> Callable[[Path, Path], None]:
-        return lambda path, output: reduce_file(path, output, tolerance=tolerance, radius=RADIUS) and None
+        return lambda path, output: reduce_file(path, output, Options(tolerance, RADIUS)) and None
 
     def program(name: str, arguments: Callable[[Path, Path], Sequence[object]]) -> Callable[[Path, Path], None] | None:
         found = shutil.which(name, path=str(folder)) if folder else None

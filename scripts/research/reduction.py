@@ -4,15 +4,14 @@
     python scripts/research reduction --recordings FOLDER --bodies FOLDER_OR_FILES
     python scripts/research reduction --output docs/reduction.md
 
-Each recording is imported as Blender's users do it, with a key of location and rotation on every frame. *Reduce Keys to
-Poses* keeps the shell error on every frame within `--tolerance`: the largest displacement of any point in a ball of
-`--radius`. Decimate works on each channel by itself, and shapes the curve between its keys with free handles. So there
-are three ways to compare the two: *as many keys* in each channel; keys on *as many frames*, which is how many poses an
-animator has to look after; and *as good*, the fewest keys without a larger shell error, found by trying error margins.
-All errors are measured on what Blender shows, on every frame. The column *numbers* counts what has to be stored: 6 for
-a key with free handles (frame, value, two handles of two numbers each), and for a pose its frame and a value in each
-channel, since straight keys need no handles. The in-betweens of a mode are in the file, too, on every frame, but the
-program makes them anew from the keys, so they are not counted.
+Each recording is an object with a key of location and rotation on every frame, as Blender's users import it. *Reduce
+Keys to Poses* leaves the fewest keys that keep every point within `--radius` of the object's origin within
+`--tolerance`. Blender's Decimate thins each channel by itself, with free handles between its keys, and gets the largest
+error margin with which it is no worse, found by trials. Each cell has what *Reduce Keys to Poses* leaves, and then what
+Decimate does: frames with a key in any channel, which is how many poses an animator has to look after; keys in a
+channel; numbers to be stored, 6 for a key with free handles, and for a pose its frame and a value in each channel; and
+the largest error. The last column has Decimate's error where it may have keys on no more frames than the other. All
+errors are those of what Blender shows, on every frame.
 """
 
 from __future__ import annotations
@@ -31,24 +30,32 @@ from research.whole_bodies import rigs
 from research.whole_bodies.section import section
 from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate, repair, shell_error
-from rigid_motion.motion.measures import rms
 from rigid_motion_batch.command_line import parser_of
 from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings import TrajectoryError, read_trajectories
 from rigid_motion_batch.recordings.reading import FORMATS
 from rigid_motion_batch.scenes.decimated_bodies import decimate
 
-ROTATION_MODES = ("QUATERNION", "XYZ")
+ROTATION_MODES = {"QUATERNION": "quaternions", "XYZ": "Euler angles"}
+"""What they are called on the page."""
+
+COLUMNS = (
+    "recording",
+    "frames",
+    "frames with keys",
+    "keys in a channel",
+    "numbers",
+    "largest error, mm",
+    "Decimate's on as few frames, mm",
+)
+
+MULTIPLES = "*Decimate's, in multiples of the other's*"
 
 TRIALS = 14
 """Error margins tried until Decimate is as good as the reduced poses."""
 
 MARGINS = (1e-6, 1.0)
 """The smallest and the largest of them, in the units of the channels."""
-
-
-FIGURES = ("keys", "frames", "numbers", "largest", "rms")
-"""Of an outcome."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +74,6 @@ class Recording:
 class Outcome:
     """What is left of the keys, and how far off the motion is."""
 
-    how: str
     keys: float
     """In a channel, on average."""
 
@@ -76,7 +82,7 @@ class Outcome:
 
     numbers: int
     largest: float
-    rms: float
+    """Error, in metres."""
 
 
 def read(path: Path, rate: float) -> Recording:
@@ -102,7 +108,7 @@ def import_recording(recording: Recording, rotation_mode: str) -> bpy.types.Obje
     return obj
 
 
-def outcome(obj: bpy.types.Object, how: str, recording: Recording, truth: Poses, radius: float) -> Outcome:
+def outcome(obj: bpy.types.Object, recording: Recording, truth: Poses, radius: float) -> Outcome:
     """What an object has now for keys, and shows."""
     curves = [
         [key.co.x for key in fcurve.keyframe_points]
@@ -112,83 +118,80 @@ def outcome(obj: bpy.types.Object, how: str, recording: Recording, truth: Poses,
     frames, count = len(set().union(*curves)), sum(map(len, curves))
     numbers = frames * (1 + len(curves)) if animation.is_reduced(obj) else 6 * count
     error = shell_error(animation.read_poses(obj, recording.frames), truth, radius)
-    return Outcome(how, count / len(curves), frames, numbers, float(error.max()), rms(error))
+    return Outcome(count / len(curves), frames, numbers, float(error.max()))
 
 
-def measure(recording: Recording, rotation_mode: str, tolerance: float, radius: float) -> list[Outcome]:
-    """Of reducing to poses; of Decimate with as many keys, with keys on as many frames, and as good."""
+def measure(
+    recording: Recording, rotation_mode: str, tolerance: float, radius: float
+) -> tuple[Outcome, Outcome | None, Outcome | None]:
+    """Of reducing to poses; of Decimate as good as that, and with keys on as few frames; None where it cannot be."""
     obj = import_recording(recording, rotation_mode)
     truth = animation.read_poses(obj, recording.frames)
     animation.reduce_keys_of(obj, "motor_spline", tolerance, radius)
-    reduced = outcome(obj, "Reduce Keys to Poses", recording, truth, radius)
+    reduced = outcome(obj, recording, truth, radius)
 
-    def decimated(how: str, **options: object) -> Outcome:
+    def decimated(**options: object) -> Outcome:
         obj = import_recording(recording, rotation_mode)
         decimate(obj, **options)
-        return outcome(obj, f"Decimate, {how}", recording, truth, radius)
+        return outcome(obj, recording, truth, radius)
 
-    def by_ratio(how: str, keys: float) -> Outcome:
-        return decimated(how, mode="RATIO", factor=1.0 - keys / len(recording.frames))
-
-    as_many_frames = None
+    as_few = None
     fewest, most = 2, round(reduced.keys)
     while fewest < most:
         keys = (fewest + most + 1) // 2
-        tried = by_ratio("as many frames", keys)
+        tried = decimated(mode="RATIO", factor=1.0 - keys / len(recording.frames))
         if tried.frames <= reduced.frames:
-            fewest, as_many_frames = keys, tried
+            fewest, as_few = keys, tried
         else:
             most = keys - 1
 
     as_good, (low, high) = None, np.log(MARGINS)
     for _ in range(TRIALS):
         margin = 0.5 * (low + high)
-        tried = decimated("as good", mode="ERROR", remove_error_margin=float(np.exp(margin)))
+        tried = decimated(mode="ERROR", remove_error_margin=float(np.exp(margin)))
         if tried.largest <= reduced.largest:
             low = margin
             as_good = tried if as_good is None or tried.keys < as_good.keys else as_good
         else:
             high = margin
-    found = (reduced, by_ratio("as many keys", reduced.keys), as_many_frames, as_good)
-    return [one for one in found if one is not None]
+    return reduced, as_good, as_few
 
 
 def report(recordings: Iterable[Recording], rotation_mode: str, tolerance: float, radius: float) -> Iterator[str]:
     """The figures of an object that turns in this way, as lines of Markdown."""
-    yield f"## Turned by {rotation_mode}"
+    yield f"## Turned by {ROTATION_MODES[rotation_mode]}"
     yield ""
+    yield f"| {' | '.join(COLUMNS)} |"
+    yield "|---|" + "---:|" * (len(COLUMNS) - 1)
     outcomes = []
-    yield "| recording | | keys in a channel | frames with keys | numbers | largest error, mm | RMS, mm |"
-    yield "|---|---|---:|---:|---:|---:|---:|"
     for recording in recordings:
         print(f"{recording.name}, {rotation_mode} ...", file=sys.stderr, flush=True)
-        first = f"{recording.name}, {len(recording.frames)} frames"
         outcomes.append(measure(recording, rotation_mode, tolerance, radius))
-        for one in outcomes[-1]:
-            yield (
-                f"| {first} | {one.how} | {one.keys:.0f} | {one.frames} | {one.numbers} "
-                f"| {1e3 * one.largest:.2f} | {1e3 * one.rms:.2f} |"
-            )
-            first = ""
-    yield ""
-    yield from summary(outcomes)
+        yield row(recording, *outcomes[-1])
+    yield means(outcomes)
     yield ""
 
 
-def summary(outcomes: list[list[Outcome]]) -> Iterator[str]:
-    """What Decimate has of the figures of reduced poses: geometric means over the recordings."""
-    yield "| Decimate, in multiples of the reduced poses | recordings | keys | frames | numbers | largest error | RMS |"
-    yield "|---|---:|---:|---:|---:|---:|---:|"
-    ratios: dict[str, list[list[float]]] = {}
-    for reduced, *others in outcomes:
-        for one in others:
-            row = [getattr(one, name) / getattr(reduced, name) for name in FIGURES]
-            ratios.setdefault(one.how, []).append(row)
-    for how, rows in ratios.items():
-        means = np.exp(np.log(rows).mean(axis=0))
-        yield (
-            f"| {how.removeprefix('Decimate, ')} | {len(rows)} | " + " | ".join(f"{mean:.2f}" for mean in means) + " |"
-        )
+def row(recording: Recording, reduced: Outcome, as_good: Outcome | None, as_few: Outcome | None) -> str:
+    """The figures of a recording, empty where there are none."""
+    cells = (
+        [f"{reduced.frames} / {as_good.frames}", f"{reduced.keys:.0f} / {as_good.keys:.0f}"] if as_good else ["", ""]
+    )
+    cells += [f"{reduced.numbers} / {as_good.numbers}"] if as_good else [""]
+    cells += [f"{1e3 * reduced.largest:.2f} / {1e3 * as_good.largest:.2f}"] if as_good else [""]
+    cells += [f"{1e3 * as_few.largest:.2f}"] if as_few else [""]
+    return f"| {recording.name} | {len(recording.frames)} | {' | '.join(cells)} |"
+
+
+def means(outcomes: list[tuple[Outcome, Outcome | None, Outcome | None]]) -> str:
+    """What Decimate has in multiples of reduced poses: geometric means over the recordings."""
+
+    def mean(name: str, which: int) -> str:
+        ratios = [getattr(one[which], name) / getattr(one[0], name) for one in outcomes if one[which]]
+        return f"{np.exp(np.log(ratios).mean()):.2f}" if ratios else ""
+
+    cells = [mean(name, 1) for name in ("frames", "keys", "numbers", "largest")]
+    return f"| {MULTIPLES} | | {' | '.join((*cells, mean('largest', 2)))} |"
 
 
 def files(folder: Path | None) -> list[Path]:

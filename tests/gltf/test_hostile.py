@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigid_motion.gltf import GltfError, documents, read_document, reduce_file, reduced
+from rigid_motion.gltf import GltfError, Options, documents, read_document, reduce_file, reduced
 from rigid_motion_batch.cli import reduce
 from tests.gltf.making import glb, walk
 from tests.gltf.oracle import File
@@ -152,8 +152,8 @@ def test_whatever_is_damaged_is_refused_or_does_no_harm(tmp_path):
             part[key] = values[int(random.integers(len(values)))]
         path.write_bytes(glb(json.dumps(document).encode(), file.buffers[0]))
         try:
-            reduce_file(path, tmp_path / "made.glb", tolerance=1e-3)
-            reduced(read_document(tmp_path / "made.glb"))
+            reduce_file(path, tmp_path / "made.glb", Options(1e-3))
+            reduced(read_document(tmp_path / "made.glb"), Options())
         except GltfError as error:
             lines = str(error).splitlines()
             refused += len(lines)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_motion.gltf import GltfError, Report, read_document, reduce_file, reduced
+from rigid_motion.gltf import GltfError, Options, Report, read_document, reduce_file, reduced
 from tests.gltf.making import Making, turns, walk
 from tests.gltf.oracle import File, off
 
@@ -25,7 +25,7 @@ def both(
 ) -> tuple[File, File, Report]:
     path = made.write(folder / name)
     output = path.with_stem(f"{path.stem}-reduced")
-    report = reduce_file(path, output, tolerance=tolerance, radius=RADIUS, **more)
+    report = reduce_file(path, output, Options(tolerance, RADIUS, **more))
     return File(path), File(output), report
 
 
@@ -56,7 +56,7 @@ def test_everything_else_of_the_file_stays(tmp_path):
     positions = made.accessor(np.eye(3, dtype="<f4"))
     made.json["meshes"] = [{"primitives": [{"attributes": {"POSITION": positions}}]}]
     path = made.write(tmp_path / "walk.glb", [(b"ODD\0", b"some")])
-    reduce_file(path, tmp_path / "made.glb", tolerance=1e-3)
+    reduce_file(path, tmp_path / "made.glb", Options(1e-3))
     before, after = File(path), File(tmp_path / "made.glb")
     assert [kind for kind, _ in after.chunks] == [b"JSON", b"BIN\0", b"ODD\0"]
     assert after.chunks[2] == before.chunks[2]
@@ -91,7 +91,7 @@ def test_constant_channels_have_one_key_and_those_at_rest_none(tmp_path):
 @pytest.mark.parametrize("unit", [1.0, 0.01, 100.0])
 def test_units_of_all_sizes_are_the_same_motion(tmp_path, unit):
     path = walk(unit=unit).write(tmp_path / "walk.glb")
-    report = reduced(read_document(path), tolerance=2e-3 * unit, radius=RADIUS * unit)
+    report = reduced(read_document(path), Options(2e-3 * unit, RADIUS * unit))
     (clip,) = report.clips
     assert 0.0 < clip.error <= 2e-3 * unit
     assert clip.after.size < 0.6 * clip.before.size
@@ -256,7 +256,7 @@ def test_channels_of_extensions_stay(tmp_path):
     channel = made.json["animations"][0]["channels"][-1]
     channel["target"] = {"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": "/materials/0"}}}
     path = made.write(tmp_path / "walk.glb")
-    reduce_file(path, tmp_path / "made.glb", tolerance=2e-3)
+    reduce_file(path, tmp_path / "made.glb", Options(2e-3))
     after = File(tmp_path / "made.glb")
     animation = after.json["animations"][0]
     (found,) = [some for some in animation["channels"] if some["target"] == channel["target"]]
@@ -265,7 +265,7 @@ def test_channels_of_extensions_stay(tmp_path):
 
 def test_key_poses_are_so_many_times_of_all_nodes(tmp_path):
     path = walk().write(tmp_path / "walk.glb")
-    report = reduce_file(path, tmp_path / "made.glb", count=7)
+    report = reduce_file(path, tmp_path / "made.glb", Options(count=7))
     after = File(tmp_path / "made.glb")
     assert len(after.moments(0)) == 7
     assert {len(times) for _, times, _ in after.tracks(0).values()} == {7}
@@ -277,7 +277,7 @@ def test_a_tolerance_above_a_tenth_of_the_size_is_refused_with_the_way_out(tmp_p
     with pytest.raises(
         GltfError, match=r"a tolerance of 0\.01 m is more than a tenth .* 0\.015 m .*; give one below 0\.0015 m"
     ):
-        reduced(document, tolerance=0.01)
+        reduced(document, Options(0.01))
 
 
 @settings(max_examples=25, deadline=None)
@@ -314,8 +314,8 @@ def test_whatever_hangs_on_whatever_keeps_to_the_tolerance(tmp_path_factory, see
         return
     path = made.write(folder / "made.glb")
     document = read_document(path)
-    size = reduced(document, radius=RADIUS * unit, tolerance=None).size
-    report = reduce_file(path, folder / "out.glb", tolerance=0.01 * size or unit, radius=RADIUS * unit)
+    size = reduced(document, Options(radius=RADIUS * unit)).size
+    report = reduce_file(path, folder / "out.glb", Options(0.01 * size or unit, RADIUS * unit))
     error = off(File(path), File(folder / "out.glb"), 0, RADIUS * unit)
     assert error <= report.tolerance * (1.0 + 1e-4) + ROUNDING * unit * 10.0
     assert report.clips[0].after.size <= report.clips[0].before.size

@@ -4,8 +4,8 @@
 document. NumPy and the standard library alone.
 """
 
-from .clips import ReducedClip
+from .clips import Options, ReducedClip
 from .documents import Document, GltfError, read_document
 from .files import Report, reduce_file, reduced
 
-__all__ = ["Document", "GltfError", "ReducedClip", "Report", "read_document", "reduce_file", "reduced"]
+__all__ = ["Document", "GltfError", "Options", "ReducedClip", "Report", "read_document", "reduce_file", "reduced"]

@@ -6,6 +6,8 @@ the specification has it (glTF 2.0, sections 3.6 and 3.11): -1 to 1, or 0 to 1.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from .documents import Document, GltfError, Json, entry, shown, whole
@@ -22,8 +24,34 @@ COMPRESSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 """What bytes of a view are not what its accessors say."""
 
 
-def raw_numbers(document: Document, number: object) -> np.ndarray:
-    """The numbers of an accessor as they are kept, shape (count, components).
+EVERY = slice(None)
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """The numbers of an accessor, read where they are sliced: like an array of shape (n, *shape), float64."""
+
+    document: Document
+    number: int
+    count: int
+    """How many rows there are, each of as many elements as make it."""
+
+    shape: tuple[int, ...]
+    order: list[int] | slice = EVERY
+    """Of the columns."""
+
+    def __len__(self) -> int:
+        return self.count
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        first, end, _ = rows.indices(self.count)
+        each = whole(entry(self.document.json, "accessors", self.number), "count") // self.count
+        found = numbers(self.document, self.number, slice(first * each, end * each))
+        return found.reshape(end - first, *self.shape)[..., self.order]
+
+
+def raw_numbers(document: Document, number: object, rows: slice = EVERY) -> np.ndarray:
+    """The numbers of an accessor, or of some of its elements, as they are kept, shape (count, components).
 
     Raises
     ------
@@ -35,21 +63,21 @@ def raw_numbers(document: Document, number: object) -> np.ndarray:
     if count * columns > MOST_NUMBERS:
         raise GltfError(f"accessor {number} has {count} elements, more than are read")
     if "bufferView" in accessor:
-        found = _in_view(document, accessor, kind, columns, count, f"accessor {number}")
+        found = _in_view(document, accessor, kind, columns, count, f"accessor {number}", rows)
     else:
-        found = np.zeros((count, columns), kind)
-    return _with_sparse(document, accessor, found, f"accessor {number}") if "sparse" in accessor else found
+        found = np.zeros((len(range(*rows.indices(count))), columns), kind)
+    return _with_sparse(document, accessor, found, f"accessor {number}", rows) if "sparse" in accessor else found
 
 
-def numbers(document: Document, number: object) -> np.ndarray:
-    """The numbers of an accessor, shape (count, components), float64.
+def numbers(document: Document, number: object, rows: slice = EVERY) -> np.ndarray:
+    """The numbers of an accessor, or of some of its elements, shape (count, components), float64.
 
     Raises
     ------
     GltfError
         As `raw_numbers`, and for what is not finite.
     """
-    raw = raw_numbers(document, number)
+    raw = raw_numbers(document, number, rows)
     if not np.isfinite(raw).all():
         raise GltfError(f"accessor {number} has numbers that are not finite")
     normalised = entry(document.json, "accessors", number).get("normalized") is True
@@ -87,8 +115,10 @@ def _columns(accessor: Json) -> int:
     return COMPONENTS[kind]
 
 
-def _in_view(document: Document, part: Json, kind: np.dtype, columns: int, count: int, what: str) -> np.ndarray:
-    """The elements that a part of the document names by its view and an offset in it."""
+def _in_view(
+    document: Document, part: Json, kind: np.dtype, columns: int, count: int, what: str, rows: slice = EVERY
+) -> np.ndarray:
+    """The elements, or some of them, that a part of the document names by its view and an offset in it."""
     view = entry(document.json, "bufferViews", part.get("bufferView"))
     extensions = view.get("extensions")
     if isinstance(extensions, dict) and any(name in extensions for name in COMPRESSIONS):
@@ -104,19 +134,24 @@ def _in_view(document: Document, part: Json, kind: np.dtype, columns: int, count
     stride, offset = whole(view, "byteStride", width, least=1), whole(part, "byteOffset", 0)
     if first + length > len(data) or offset + (count - 1) * stride + width > length or stride < width:
         raise GltfError(f"{what} reaches beyond the bytes that it names")
-    return np.ndarray((count, columns), kind, data, first + offset, (stride, kind.itemsize))
+    some = range(*rows.indices(count))
+    begin = first + offset + some.start * stride
+    content = bytes(data[begin : begin + max(len(some) - 1, 0) * stride + width])
+    return np.ndarray((len(some), columns), kind, content, 0, (stride, kind.itemsize))
 
 
-def _with_sparse(document: Document, accessor: Json, found: np.ndarray, what: str) -> np.ndarray:
-    """The elements with those put in that a sparse accessor keeps apart."""
+def _with_sparse(document: Document, accessor: Json, found: np.ndarray, what: str, rows: slice) -> np.ndarray:
+    """Some of the elements with those put in that a sparse accessor keeps apart."""
     sparse = accessor["sparse"]
     if not all(isinstance(part, dict) for part in (sparse, sparse.get("indices"), sparse.get("values"))):
         raise GltfError(f"{what} is sparse, and does not say what is where")
     count, kind = whole(sparse, "count", least=1), _kind(sparse["indices"])
     indices = _in_view(document, sparse["indices"], kind, 1, count, what)[:, 0].astype(np.int64)
     values = _in_view(document, sparse["values"], found.dtype, found.shape[1], count, what)
-    if kind.kind != "u" or indices.max() >= len(found) or np.any(np.diff(indices) <= 0):
+    if kind.kind != "u" or indices.max() >= whole(accessor, "count") or np.any(np.diff(indices) <= 0):
         raise GltfError(f"{what} is sparse, and its indices do not rise to its last element")
+    first, end, _ = rows.indices(whole(accessor, "count"))
+    here = (indices >= first) & (indices < end)
     found = found.copy()
-    found[indices] = values
+    found[indices[here] - first] = values[here]
     return found

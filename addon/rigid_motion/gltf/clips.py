@@ -11,15 +11,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..motion import SeparateKeys
-from .errors import PARTS, World
+from .errors import NOWHERE, PARTS, World
 from .feet import Feet
-from .nodes import Nodes, Tracks, by_target
+from .nodes import Nodes, by_target, steadied
 from .rewriting import StoredTrack
 from .search import Search
 from .settling import moments, settled
-from .storing import Amount, amount, amount_before, key_size, shown, stored
+from .storing import Amount, EveryKey, amount, amount_before, key_size, shown, stored
 from .thinning import shared_times
-from .tracks import LINEAR, ROTATION, TRANSLATION, Clip, Track
+from .tracks import ROTATION, TRANSLATION, Clip, Track, Tracks
 from .vertices import largest_displacement
 
 OF_INTEGERS = 0.25
@@ -31,6 +31,9 @@ MORE_SLIDE = 0.001 / 1.7
 TIGHTER = 0.7
 """How much smaller the tolerance of the next search is, where no keys that are put back help."""
 
+FEET_WEIGH = (1.0, 4.0, 16.0, 64.0)
+"""How many times the errors of feet that stand count in the search for so many key poses, one after the other."""
+
 ROUNDS = 24
 """How often keys are put back where the proof fails."""
 
@@ -41,20 +44,23 @@ NEEDED, LARGER = "all of its keys are needed", "fewer keys would take more bytes
 
 
 @dataclass(frozen=True)
-class Wishes:
+class Options:
     """How few keys are wanted. Lengths are in the unit of the document."""
 
-    tolerance: float
-    """Of the displacement of any point of the balls around nodes, in the world."""
+    tolerance: float | None = None
+    """How far off any point within the radius of any node may be in the world; a share of the size where None."""
+
+    radius: float | None = None
+    """The same for all nodes; where None that of meshes is theirs, and that of joints a share of the size."""
 
     shared: bool = False
-    """Whether all nodes get their keys at the same times."""
+    """Whether all nodes of a clip get their keys at the same times."""
 
     count: int | None = None
-    """So many key poses of all nodes, whatever they are off by."""
+    """So many key poses of each clip instead of a tolerance."""
 
     vertices: bool = False
-    """Whether vertices of skins are measured."""
+    """Whether the largest displacement of any vertex of a skin is measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +102,8 @@ class ClipReduction:
         Nodes that are joints, some of which may be feet.
     size : float
         Of the body.
-    wishes : Wishes
+    options : Options
+        With a tolerance.
     """
 
     def __init__(
@@ -107,30 +114,22 @@ class ClipReduction:
         radii: np.ndarray,
         joints: Iterable[int],
         size: float,
-        wishes: Wishes,
+        options: Options,
     ) -> None:
-        self.clip, self.wishes, self.size = clip, wishes, size
+        self.clip, self.options, self.size = clip, options, size
         self.before = amount_before(nodes.document, clip)
         span = np.unique([track.times[end] for track in clip.tracks for end in (0, -1)])[[0, -1]]
-        world = World(nodes, moving, radii, by_target(clip.tracks), np.unique(span))
-        self.world = replace(world, times=moments(world, clip, wishes.tolerance))
-        found = settled(self.world, clip, wishes.tolerance)
+        world = World(nodes, moving, radii, steadied(clip.tracks), np.unique(span))
+        self.world = replace(world, times=moments(world, clip, options.tolerance))
+        found = settled(self.world, clip, options.tolerance)
         self.settled = {target: track for target, track in found.items() if track is not None}
-        times = self.world.times
-        self.dense = {
-            (track.node, track.path): replace(track, interpolation=LINEAR, times=times, values=track.at(times))
-            for track in clip.tracks
-            if (track.node, track.path) not in found
-        }
-        """The tracks that are to have fewer keys, with a key at every moment."""
+        self.dense = {target: track for target, track in by_target(clip.tracks).items() if target not in found}
+        """The tracks that are to have fewer keys."""
         self.feet = Feet(self.world, joints)
 
     def reduced(self) -> ReducedClip:
         """The clip with fewer keys, or as it was."""
-        if not self.dense:
-            found = self._proven([], integers=False)
-        else:
-            found = self._key_poses() if self.wishes.shared or self.wishes.count else self._own_keys()
+        found = self._so_many() if self.dense and self.options.count else self._within_tolerance()
         if found is None:
             return self._kept(NEEDED)
         tracks, error = found
@@ -138,28 +137,41 @@ class ClipReduction:
         if after.size >= self.before.size:
             return self._kept(LARGER)
         shown_tracks = self._shown(tracks)
-        off = largest_displacement(self.world, shown_tracks) if self.wishes.vertices else None
+        off = largest_displacement(self.world, shown_tracks) if self.options.vertices else None
         slides, name = self.feet.slides(shown_tracks), self.clip.name
         return ReducedClip(self.clip.number, name, tuple(tracks), "", self.before, after, error, slides, off)
 
     def _kept(self, reason: str) -> ReducedClip:
         return ReducedClip(self.clip.number, self.clip.name, None, reason, self.before, self.before)
 
-    def _key_poses(self) -> tuple[list[StoredTrack], float] | None:
-        wishes = self.wishes
-        search, integers, taken = self._search(), *self._storing()
-        tolerance = None if wishes.count else wishes.tolerance - taken
-        keys = search.key_poses(tolerance=tolerance, count=wishes.count)
-        tracks = self._stored([keys] * len(self.dense), integers=integers)
-        error = self.world.largest_error(self._shown(tracks), self.world.eighths)
-        return (tracks, error) if wishes.count or error <= wishes.tolerance else self._own_keys()
+    def _so_many(self) -> tuple[list[StoredTrack], float]:
+        """Tracks with so many key poses, those under which feet slide least, and the largest error."""
+        search, (integers, _) = self._search(), self._storing()
+        best, farthest = [], np.inf
+        for weight in FEET_WEIGH:
+            weights = np.ones((len(self.world.moving), len(self.world.times)))
+            weights[self.feet.places] += (weight - 1.0) * self.feet.stand
+            keys = search.so_many_key_poses(self.options.count, weights)
+            tracks = self._stored([keys] * len(self.dense), integers=integers)
+            farther = self.feet.farther(self._shown(tracks))
+            if farther < farthest:
+                best, farthest = tracks, farther
+            if farther <= MORE_SLIDE * self.size:
+                break
+        return best, self.world.largest_error(self._shown(best))
 
-    def _own_keys(self) -> tuple[list[StoredTrack], float] | None:
-        """Tracks with keys of their own that keep to the tolerance, and the largest error; None where none do."""
-        search, integers, taken = self._search(), *self._storing()
-        allowed = self.wishes.tolerance - taken
-        while allowed > LEAST * self.wishes.tolerance:
-            found = self._proven(self._samples(search.keys(allowed)), integers=integers)
+    def _within_tolerance(self) -> tuple[list[StoredTrack], float] | None:
+        """Tracks with few keys that keep to the tolerance, and the largest error; None where none do."""
+        if not self.dense:
+            return self._proven([], integers=False)
+        search, (integers, taken) = self._search(), self._storing()
+        allowed = self.options.tolerance - taken
+        while allowed > LEAST * self.options.tolerance:
+            if self.options.shared:
+                samples = [search.key_poses(allowed)] * len(self.dense)
+            else:
+                samples = self._samples(search.keys(allowed))
+            found = self._proven(samples, integers=integers)
             if found is not None:
                 return found
             allowed *= TIGHTER
@@ -173,10 +185,15 @@ class ClipReduction:
 
     def _storing(self) -> tuple[bool, float]:
         """Whether rotations may be integers, and how far off all is with all keys, by storing and what is settled."""
+        times = self.world.times
         for integers in (True, False):
-            tracks = self._with_settled([stored(track, integers=integers) for track in self.dense.values()], integers)
-            taken = self.world.largest_error(self._shown(tracks), self.world.times)
-            if taken <= OF_INTEGERS * self.wishes.tolerance:
+            dense = {
+                target: replace(track.keyed(times[:1]), times=times, values=EveryKey(track, times, integers))
+                for target, track in self.dense.items()
+            }
+            shown_tracks = self._shown(self._with_settled([], integers)) | dense
+            taken = self.world.largest_error(shown_tracks, parts=1)
+            if taken <= OF_INTEGERS * self.options.tolerance:
                 break
         return integers, taken
 
@@ -190,28 +207,37 @@ class ClipReduction:
 
         None where the proof fails with more and more of them.
         """
+        sound: dict[int, tuple[int, float]] = {}
         for _ in range(ROUNDS):
             tracks = self._stored(samples, integers=integers)
-            error, places, eighths = self._failures(self._shown(tracks))
+            places, eighths = self._failures(self._shown(tracks), sound)
             if not len(places):
-                return tracks, error
+                return tracks, max(error for _, error in sound.values())
             samples = self._with_more(samples, places, eighths)
         return None
 
-    def _failures(self, tracks: Tracks) -> tuple[float, np.ndarray, np.ndarray]:
-        """The largest error, and where tracks break what is promised: places of nodes, and eighths of moments.
+    def _failures(self, tracks: Tracks, sound: dict[int, tuple[int, float]]) -> tuple[np.ndarray, np.ndarray]:
+        """Where tracks break what is promised: places of nodes, and eighths of moments.
 
-        What is quickly seen comes first, and hides the rest.
+        What is quickly seen comes first, and hides the rest. Of stretches that are sound, their digest and their
+        largest error are noted: they are not looked at again for as long as they stay the same.
         """
         world = self.world
         places, samples = self.feet.slips(tracks, MORE_SLIDE * self.size)
         if len(places):
-            return np.inf, places, PARTS * samples
-        for times, parts in ((world.times, PARTS), (world.eighths, 1)):
-            error, places, numbers = world.worst(tracks, times, self.wishes.tolerance)
-            if len(places):
-                return error, places, parts * numbers
-        return error, places, numbers
+            return places, PARTS * samples
+        failures = [(NOWHERE, NOWHERE)]
+        for number, digest in enumerate(world.digests(tracks)):
+            if number in sound and sound[number][0] == digest:
+                continue
+            for parts in (1, PARTS):
+                error, places, numbers = world.worst(tracks, self.options.tolerance, parts=parts, among=(number,))
+                if len(places):
+                    failures.append((places, PARTS // parts * numbers))
+                    break
+            else:
+                sound[number] = digest, error
+        return tuple(map(np.concatenate, zip(*failures, strict=True)))
 
     def _with_more(self, samples: list[np.ndarray], places: np.ndarray, eighths: np.ndarray) -> list[np.ndarray]:
         """Samples with those around some of the eighths, for the nodes at these places and all that they hang on."""
@@ -220,6 +246,8 @@ class ClipReduction:
         for place in range(len(wanted) - 1, -1, -1):
             if (parent := self.world.parents[place]) >= 0:
                 wanted[parent] |= wanted[place]
+        if self.options.shared:
+            wanted[:] = wanted.any(axis=0)
         ends = (0, len(self.world.times) - 1)
         more = [np.flatnonzero(wanted[self.world.places[node]]) for node, _ in self.dense]
         return [
@@ -232,17 +260,16 @@ class ClipReduction:
         times, tracks = self.world.times, []
         moving = [number for number, own in enumerate(samples) if len(own) > 1]
         dense = list(self.dense.values())
-        widths = [key_size(dense[number], integers=integers) for number in moving]
+        widths = [key_size(dense[number].path, integers=integers) for number in moving]
         shared = shared_times([samples[number] for number in moving], widths, len(times))
         together = dict(zip(moving, shared, strict=True))
         for number, (track, own) in enumerate(zip(dense, samples, strict=True)):
+            thinned = track.keyed(times[own])
             if number not in together:
-                thinned = replace(track, times=times[:1], values=track.values[own])
+                thinned = replace(thinned, times=times[:1])
             else:
-                thinned = replace(track, times=times[own], values=track.values[own])
                 # Keys for the sake of others change nothing of what is shown.
-                key_times = times[together[number]]
-                thinned = replace(track, times=key_times, values=thinned.at(key_times))
+                thinned = thinned.keyed(times[together[number]])
             tracks.append(stored(thinned, integers=integers))
         return self._spanning(self._with_settled(tracks, integers))
 
@@ -257,13 +284,11 @@ class ClipReduction:
             return tracks
         if not tracks:
             first = self.clip.tracks[0]
-            still = replace(first, interpolation=LINEAR, times=ends[:1], values=first.at(ends[:1]))
-            tracks = [stored(still, integers=False)]
+            tracks = [stored(first.keyed(ends[:1]), integers=False)]
         number = min(range(len(tracks)), key=lambda number: len(tracks[number].times))
         integers = tracks[number].values.dtype.kind == "i"
         track = shown(self._of_channel[tracks[number].channel], tracks[number])
-        times = np.union1d(track.times, ends)
-        tracks[number] = stored(replace(track, times=times, values=track.at(times)), integers=integers)
+        tracks[number] = stored(track.keyed(np.union1d(track.times, ends)), integers=integers)
         return tracks
 
     @property

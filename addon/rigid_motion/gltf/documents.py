@@ -15,7 +15,7 @@ import struct
 from binascii import Error as NotBase64
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
@@ -54,6 +54,35 @@ def damage_refused() -> Iterator[None]:
         raise GltfError(f"this glTF is damaged ({' '.join(str(error).split())[:80]})") from error
 
 
+@dataclass(frozen=True)
+class FileBytes:
+    """Bytes of a file that are read where `bytes` is made of them. Slices are of the same kind."""
+
+    path: Path
+    first: int
+    end: int
+
+    @classmethod
+    def of(cls, path: Path) -> FileBytes:
+        """All of a file."""
+        return cls(path, 0, path.stat().st_size)
+
+    def __len__(self) -> int:
+        return self.end - self.first
+
+    def __getitem__(self, part: slice) -> FileBytes:
+        first, end, _ = part.indices(len(self))
+        return replace(self, first=self.first + first, end=self.first + max(first, end))
+
+    def __bytes__(self) -> bytes:
+        with self.path.open("rb") as file:
+            file.seek(self.first)
+            content = file.read(len(self))
+        if len(content) < len(self):
+            raise GltfError(f"{self.path.name} has become shorter while it was read", "do it again")
+        return content
+
+
 @dataclass(frozen=True, eq=False)
 class Document:
     """A glTF document and the bytes that belong to it.
@@ -62,17 +91,17 @@ class Document:
     ----------
     json : dict
         As it is in the file.
-    buffers : tuple of bytes or None
+    buffers : tuple of bytes, FileBytes or None
         What each buffer holds; None for one that stands for compressed data alone.
-    chunks : tuple of (bytes, bytes), optional
+    chunks : tuple of (bytes, bytes or FileBytes), optional
         Kinds and contents of all chunks of a GLB, in their order. None for a .gltf file.
     changed : frozenset of int
         The buffers that are not what their files hold.
     """
 
     json: Json
-    buffers: tuple[bytes | None, ...]
-    chunks: tuple[tuple[bytes, bytes], ...] | None = None
+    buffers: tuple[bytes | FileBytes | None, ...]
+    chunks: tuple[tuple[bytes, bytes | FileBytes], ...] | None = None
     changed: frozenset[int] = frozenset()
 
     def files(self, name: str) -> dict[str, bytes]:
@@ -84,7 +113,7 @@ class Document:
         for number, (buffer, data) in enumerate(zip(objects(self.json, "buffers"), self.buffers, strict=True)):
             if number in self.changed and data is not None and "uri" in buffer and not is_data(buffer["uri"]):
                 file = f"{Path(name).stem}{number or ''}.bin"
-                beside[file], buffer = data, {**buffer, "uri": quoted(file)}
+                beside[file], buffer = bytes(data), {**buffer, "uri": quoted(file)}
             buffers.append(buffer)
         document = {**self.json, "buffers": buffers} if beside else self.json
         text = _as_text(document)
@@ -114,14 +143,16 @@ class Document:
         return {name: (folder / name).read_bytes() for name in names if (folder / name).is_file()}
 
     @property
-    def _binary(self) -> bytes | None:
+    def _binary(self) -> bytes | FileBytes | None:
         """What the first buffer holds, where it is the one inside of the GLB."""
         first = objects(self.json, "buffers")[:1]
         return self.buffers[0] if self.chunks is not None and first and "uri" not in first[0] else None
 
 
-def read_document(path: Path) -> Document:
-    """Read a .glb or .gltf file, and the files that its buffers are in.
+def read_document(path: Path, *, in_memory: bool = False) -> Document:
+    """Read a .glb or .gltf file, and of the files that its buffers are in what is needed, when it is.
+
+    With `in_memory` all is read at once, of a file that will not stay where it is.
 
     Raises
     ------
@@ -130,9 +161,9 @@ def read_document(path: Path) -> Document:
     OSError
         Where the file cannot be read.
     """
-    content = path.read_bytes()
-    chunks = chunks_of(content) if content.startswith(MAGIC) else None
-    document = parsed(content if chunks is None else next(data for kind, data in chunks if kind == JSON_CHUNK))
+    content = path.read_bytes() if in_memory else FileBytes.of(path)
+    chunks = chunks_of(content) if bytes(content[:4]) == MAGIC else None
+    document = parsed(bytes(content if chunks is None else next(data for kind, data in chunks if kind == JSON_CHUNK)))
     binary = next((data for kind, data in chunks or () if kind == BINARY_CHUNK), None)
     buffers = [
         _buffer(path.parent, number, buffer, binary if number == 0 else None)
@@ -141,19 +172,19 @@ def read_document(path: Path) -> Document:
     return Document(document, tuple(buffers), chunks)
 
 
-def chunks_of(content: bytes) -> tuple[tuple[bytes, bytes], ...]:
+def chunks_of(content: bytes | FileBytes) -> tuple[tuple[bytes, bytes | FileBytes], ...]:
     """The kinds and contents of all chunks of a GLB file, the JSON among them."""
-    found: list[tuple[bytes, bytes]] = []
+    found: list[tuple[bytes, bytes | FileBytes]] = []
     place, whole = 12, len(content)
     if whole >= place:
-        version, length = struct.unpack_from("<II", content, 4)
+        version, length = struct.unpack("<II", bytes(content[4:12]))
         if version != 2:
             raise GltfError(f"this is GLB {version}, and 2 is known", "export it as glTF 2.0")
         if length > whole:
             raise GltfError(f"{whole} of {length} bytes are here", "copy the file again, or export it anew")
         whole = length
     while place + 8 <= whole:
-        length, kind = struct.unpack_from("<I4s", content, place)
+        length, kind = struct.unpack("<I4s", bytes(content[place : place + 8]))
         place += 8
         if place + length > whole:
             raise GltfError("a part of this file is longer than the whole")
@@ -193,10 +224,12 @@ def objects(parent: Json, name: str) -> list[Json]:
 
 def entry(parent: Json, name: str, number: object) -> Json:
     """The object of a number in a list of the document."""
-    found = objects(parent, name)
-    if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < len(found):
+    found = parent.get(name, [])
+    is_there = isinstance(found, list) and isinstance(number, int) and not isinstance(number, bool)
+    if not is_there or not 0 <= number < len(found):
+        objects(parent, name)
         raise GltfError(f"{name} has no entry {shown(number)}, which something in the file names")
-    return found[number]
+    return found[number] if isinstance(found[number], dict) else objects(parent, name)[number]
 
 
 def whole(parent: Json, name: str, default: int | None = None, least: int = 0) -> int:
@@ -279,7 +312,7 @@ def data_uri(data: bytes) -> str:
     return f"data:application/octet-stream;base64,{base64.b64encode(data).decode()}"
 
 
-def _buffer(folder: Path, number: int, buffer: Json, binary: bytes | None) -> bytes | None:
+def _buffer(folder: Path, number: int, buffer: Json, binary: bytes | FileBytes | None) -> bytes | FileBytes | None:
     uri, length = buffer.get("uri"), whole(buffer, "byteLength", least=1)
     if uri is None:
         data = binary
@@ -289,7 +322,7 @@ def _buffer(folder: Path, number: int, buffer: Json, binary: bytes | None) -> by
         except (NotBase64, ValueError):
             raise GltfError(f"buffer {number} is text that is not in base64") from None
     else:
-        data = file_of(folder, number, uri).read_bytes()
+        data = FileBytes.of(file_of(folder, number, uri))
     if data is None:
         return None
     if len(data) < length:
@@ -304,8 +337,8 @@ def _as_text(document: Json) -> bytes:
         return json.dumps(document, allow_nan=False, separators=(",", ":")).encode()
 
 
-def _chunk(kind: bytes, content: bytes, padding: bytes) -> bytes:
-    content += padding * (-len(content) % 4)
+def _chunk(kind: bytes, content: bytes | FileBytes, padding: bytes) -> bytes:
+    content = bytes(content) + padding * (-len(content) % 4)
     return struct.pack("<I4s", len(content), kind) + content
 
 

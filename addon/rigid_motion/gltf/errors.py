@@ -1,21 +1,27 @@
 """How far off nodes are in the world, where other tracks move them: proven between keys, too.
 
 What counts is a ball around each node: no point of it is off by more. Its radius is that in the world, where the node
-is largest; a node that shrinks takes its ball along.
+is largest; a node that shrinks takes its ball along. Of a long clip no more is looked at at once than a stretch of it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from ..motion.affine import AffineMaps, ball_displacement, displacement_bound
-from .nodes import Nodes, Tracks
+from ..motion.skeleton_stretches import stretches
+from .nodes import Nodes
+from .tracks import SCALE, Tracks
 
 PARTS = 8
 """Of every gap between keys: that is how closely it is looked at."""
+
+STRETCH, LONG = 1500, 2
+"""Samples of a clip that are looked at and searched at once, where there are more than so many times as many."""
 
 AT_ONCE = 2**15
 """Poses that are looked at in one go."""
@@ -23,8 +29,26 @@ AT_ONCE = 2**15
 EXACTLY = 64
 """Poses whose displacement is worked out at once, those with the largest bounds first."""
 
-
 NOWHERE = np.empty(0, dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """What is seen of nodes at some moments that follow one another."""
+
+    first: int
+    """The number of the first of them."""
+
+    times: np.ndarray
+    """Shape (m,)."""
+
+    maps: tuple[AffineMaps, ...]
+    """Where the nodes are, as each of several tracks move them, shape (n, m)."""
+
+    @property
+    def samples(self) -> slice:
+        """The numbers of the moments."""
+        return slice(self.first, self.first + len(self.times))
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,21 +74,62 @@ class World:
     @cached_property
     def parents(self) -> np.ndarray:
         """The place of each node's parent, -1 where that does not move, shape (n,)."""
-        return np.array([self.places.get(parent, -1) for parent in self.nodes.parents[self.moving].tolist()])
+        above = self.nodes.parents[self.moving].tolist()
+        return np.array([self.places.get(parent, -1) for parent in above], dtype=np.int64)
 
     @cached_property
-    def _maps(self) -> AffineMaps:
-        return self._worlds(self.truth, self.times)
+    def stretches(self) -> list[slice]:
+        """Moments that are looked at in one go, each from the last of those before on; all, if they are few."""
+        count = len(self.times)
+        return stretches(count, STRETCH) if count > LONG * STRETCH else [slice(0, count)]
 
-    @cached_property
-    def positions(self) -> np.ndarray:
-        """Where the nodes are at the moments, shape (n, m, 3)."""
-        return self._maps.origins
+    def seen(self, *tracks: Tracks, parts: int = 1, among: Collection[int] | None = None) -> Iterator[Block]:
+        """What the moments look like as each of these tracks move the nodes, and so many parts of the gaps between.
 
-    @cached_property
-    def lengths_above(self) -> np.ndarray:
-        """How long the axes of each node's parent are in the world, shape (n, m, 3)."""
-        lengths = np.linalg.norm(self._maps.axes, axis=-2)
+        Where that is asked for, among some of the stretches alone, by their numbers.
+        """
+        step = max(1, AT_ONCE // (parts * max(1, len(self.moving))))
+        last = len(self.times) - 1
+        for number, stretch in enumerate(self.stretches):
+            if among is not None and number not in among:
+                continue
+            end = stretch.stop if stretch.stop > last else stretch.stop - 1
+            near = [self._near(some, stretch) for some in tracks]
+            for first in range(stretch.start, end, step):
+                times = self.parted(first, min(first + step, end), parts)
+                yield Block(parts * first, times, tuple(self.worlds(some, times) for some in near))
+
+    def digests(self, tracks: Tracks) -> list[int]:
+        """What tells apart, of each stretch, whether tracks have the same keys there."""
+        near = (self._near(tracks, stretch) for stretch in self.stretches)
+        return [
+            hash(tuple(part.tobytes() for track in some.values() for part in (track.times, track.values)))
+            for some in near
+        ]
+
+    def _near(self, tracks: Tracks, stretch: slice) -> Tracks:
+        """The keys of tracks that say what is shown in a stretch."""
+        ends = self.times[[stretch.start, stretch.stop - 1]].tolist()
+        return {target: track.near(*ends) for target, track in tracks.items()}
+
+    def parted(self, first: int, end: int, parts: int) -> np.ndarray:
+        """Some of the moments, and so many parts of the gaps behind them."""
+        times = self.times[first : end + 1]
+        gaps = (times[:-1, None] + np.diff(times)[:, None] * np.arange(parts) / parts).ravel()
+        return gaps if len(times) > end - first else np.append(gaps, times[-1])
+
+    def worlds(self, tracks: Tracks, times: np.ndarray) -> AffineMaps:
+        """Where the nodes are at times (m,) as tracks move them, shape (n, m)."""
+        return self.nodes.worlds(self.moving, tracks, times)
+
+    def lengths_above(self, times: np.ndarray) -> np.ndarray:
+        """How long the axes of each node's parent are in the world at times (m,), shape (n, m, 3), or (n, 1, 3)."""
+        if any(path == SCALE and len(track.times) > 1 for (_, path), track in self.truth.items()):
+            return self._above(np.linalg.norm(self.worlds(self.truth, times).axes, axis=-2))
+        return self._above(self._extremes[1][:, None])
+
+    def _above(self, lengths: np.ndarray) -> np.ndarray:
+        """Those of nodes' parents, where these are of the nodes, shape (n, ..., 3)."""
         found = lengths[self.parents]
         for place in np.flatnonzero(self.parents < 0).tolist():
             parent = self.nodes.parents[self.moving[place]]
@@ -72,31 +137,47 @@ class World:
         return found
 
     @cached_property
-    def reaches(self) -> np.ndarray:
-        """How far what hangs on each node is from it at most, with the balls around it, shape (n,); an upper bound."""
-        found = self.radii.copy()
-        for place in range(len(found) - 1, -1, -1):
-            if (parent := self.parents[place]) >= 0:
-                away = np.linalg.norm(self.positions[place] - self.positions[parent], axis=-1).max()
-                found[parent] = max(found[parent], away + found[place])
-        return found
+    def _extremes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of each node: its axes where they are largest (n, 3, 3), their lengths at most (n, 3), and how far it gets
+        from its parent (n,).
+        """
+        count = len(self.moving)
+        axes, sizes = np.zeros((count, 3, 3)), np.full(count, -1.0)
+        lengths, away = np.zeros((count, 3)), np.zeros(count)
+        hangs, every = self.parents >= 0, np.arange(count)
+        for block in self.seen(self.truth):
+            (maps,) = block.maps
+            squares = np.einsum("nmij,nmij->nm", maps.axes, maps.axes)
+            largest = np.argmax(squares, axis=1)
+            larger = squares[every, largest] > sizes
+            sizes[larger], axes[larger] = squares[every, largest][larger], maps.axes[every, largest][larger]
+            lengths = np.maximum(lengths, np.linalg.norm(maps.axes, axis=-2).max(axis=1))
+            from_parents = maps.origins[hangs] - maps.origins[self.parents[hangs]]
+            away[hangs] = np.maximum(away[hangs], np.linalg.norm(from_parents, axis=-1).max(axis=1))
+        return axes, lengths, away
 
     @cached_property
-    def eighths(self) -> np.ndarray:
-        """The moments, and so many parts of the gaps between them."""
-        gaps = self.times[:-1, None] + np.diff(self.times)[:, None] * np.arange(PARTS) / PARTS
-        return np.append(gaps.ravel(), self.times[-1])
+    def longest_above(self) -> np.ndarray:
+        """How long any axis of each node's parent gets in the world, shape (n,)."""
+        return self._above(self._extremes[1]).max(axis=-1)
 
-    def positions_of(self, shown: Tracks, places: np.ndarray) -> np.ndarray:
-        """Where some nodes are at the moments as these tracks move them, shape (places, m, 3)."""
-        return self._worlds(shown, self.times).origins[places]
+    @cached_property
+    def reaches(self) -> np.ndarray:
+        """How far what hangs on each node is from it at most, with the balls around it, shape (n,); an upper bound."""
+        found, away = self.radii.copy(), self._extremes[2]
+        for place in range(len(found) - 1, -1, -1):
+            if (parent := self.parents[place]) >= 0:
+                found[parent] = max(found[parent], away[place] + found[place])
+        return found
 
-    def largest_error(self, shown: Tracks, times: np.ndarray) -> float:
-        """The largest displacement of any point of any ball at times (t,)."""
-        return self.worst(shown, times, np.inf)[0]
+    def largest_error(self, shown: Tracks, *, parts: int = PARTS) -> float:
+        """The largest displacement of any point of any ball at the moments, and so many parts of the gaps between."""
+        return self.worst(shown, np.inf, parts=parts)[0]
 
-    def worst(self, shown: Tracks, times: np.ndarray, tolerance: float) -> tuple[float, np.ndarray, np.ndarray]:
-        """Errors at times (t,): the largest, and where they are over a tolerance and not larger next to it.
+    def worst(
+        self, shown: Tracks, tolerance: float, *, parts: int = PARTS, among: Collection[int] | None = None
+    ) -> tuple[float, np.ndarray, np.ndarray]:
+        """Errors at the moments and parts of the gaps: the largest, and where it is over a tolerance and a peak.
 
         Returns
         -------
@@ -105,12 +186,8 @@ class World:
             Of nodes, and of the times.
         """
         largest, places, numbers = 0.0, [NOWHERE], [NOWHERE]
-        step = max(1, AT_ONCE // max(1, len(self.moving)))
-        for first in range(0, len(times), step):
-            part = slice(first, first + step)
-            truth = self._maps[:, part] if times is self.times else self._worlds(self.truth, times[part])
-            maps = (self._worlds(shown, times[part]), truth)
-            there, truth = (AffineMaps(some.axes @ self._to_balls, some.origins) for some in maps)
+        for block in self.seen(shown, self.truth, parts=parts, among=among):
+            there, truth = (AffineMaps(some.axes @ self._to_balls, some.origins) for some in block.maps)
             bounds = displacement_bound(there, truth, self.radii[:, None])
             errors = np.zeros(bounds.shape)
             waiting = np.flatnonzero(bounds > min(largest, tolerance))
@@ -125,11 +202,8 @@ class World:
             peaks = (errors > tolerance) & (errors >= padded[:, :-2]) & (errors >= padded[:, 2:])
             place, number = np.nonzero(peaks)
             places.append(place)
-            numbers.append(number + first)
+            numbers.append(number + block.first)
         return largest, np.concatenate(places), np.concatenate(numbers)
-
-    def _worlds(self, tracks: Tracks, times: np.ndarray) -> AffineMaps:
-        return self.nodes.worlds(self.moving, tracks, times)
 
     def _displacements(self, there: AffineMaps, truth: AffineMaps, some: np.ndarray) -> np.ndarray:
         """Those of some of the balls, by their numbers, in the shape of these."""
@@ -139,6 +213,4 @@ class World:
     @cached_property
     def _to_balls(self) -> np.ndarray:
         """From axes of nodes to those of their balls, which are even where the node is largest, (n, 1, 3, 3)."""
-        axes = self._maps.axes
-        largest = np.argmax(np.einsum("nmij,nmij->nm", axes, axes), axis=1)
-        return np.linalg.pinv(axes[np.arange(len(axes)), largest])[:, None]
+        return np.linalg.pinv(self._extremes[0])[:, None]

@@ -7,9 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
-from ..motion.contacts import spans, standing
-from .errors import World
-from .nodes import Tracks
+from ..motion.contacts import LOW, SLOW, contacts, spans
+from .errors import NOWHERE, World
+from .tracks import Tracks
+
+UPWARDS = 1
+"""The axis of glTF that is."""
 
 
 class Feet:
@@ -27,23 +30,51 @@ class Feet:
         self.places = np.flatnonzero(np.isin(world.moving, list(joints)))
 
     @cached_property
-    def spans(self) -> list[tuple[int, int, int]]:
-        """The place of a joint, and the first and the last sample of a time in which it stands."""
-        if not len(self.places) or len(self.world.times) < 2:
-            return []
-        x, y, z = np.moveaxis(self.world.positions[self.places], -1, 0)
-        stands = standing(self.world.times, np.stack((x, -z, y), axis=-1))  # glTF has the second axis upwards.
-        return [(int(self.places[joint]), first, last) for joint, first, last in spans(stands)]
+    def stand(self) -> np.ndarray:
+        """Which joints stand, and when, shape (places, m)."""
+        world, times, shape = self.world, self.world.times, (len(self.places), len(self.world.times))
+        if not len(self.places) or len(times) < 2:
+            return np.zeros(shape, dtype=bool)
+        heights, lowest = np.empty(len(times)), np.inf
+        for block in world.seen(world.truth):
+            upwards = block.maps[0].origins[self.places, :, UPWARDS]
+            heights[block.samples], lowest = np.ptp(upwards, axis=0), min(lowest, float(upwards.min()))
+        height, low, slow = float(np.median(heights)), np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
+        before = None
+        for block in world.seen(world.truth):
+            positions = block.maps[0].origins[self.places]
+            low[:, block.samples] = positions[..., UPWARDS] - lowest <= LOW * height
+            before = positions[:, :1] if before is None else before
+            ways = np.linalg.norm(np.diff(np.concatenate((before, positions), axis=1), axis=1), axis=-1)
+            slow[:, block.samples] = ways <= SLOW * height * np.diff(times, prepend=times[0])[block.samples]
+            before = positions[:, -1:]
+        return contacts(times, low, slow[:, 1:])
+
+    @cached_property
+    def spans(self) -> np.ndarray:
+        """The place of a joint, and the first and the last sample of a time in which it stands, shape (s, 3)."""
+        found = np.array(spans(self.stand), dtype=np.int64).reshape(-1, 3)
+        found[:, 0] = self.places[found[:, 0]]
+        return found
+
+    @cached_property
+    def _before(self) -> list[np.ndarray]:
+        return self._ways(self.world.truth)
 
     def slides(self, tracks: Tracks) -> tuple[float, float]:
         """The farthest that any of them gets from where it stood at first, before and after."""
-        before, after = (max(map(max, all_ways), default=0.0) for all_ways in self._ways(tracks))
+        before, after = (max(map(np.max, ways), default=0.0) for ways in (self._before, self._ways(tracks)))
         return float(before), float(after)
+
+    def farther(self, tracks: Tracks) -> float:
+        """How much farther than before any of them slides, at most."""
+        ways = zip(self._before, self._ways(tracks), strict=True)
+        return max((float(after.max() - before.max()) for before, after in ways), default=0.0)
 
     def slips(self, tracks: Tracks, more: float) -> tuple[np.ndarray, np.ndarray]:
         """Places of joints and samples at which one slides by more than this farther than before, and began to."""
-        places, samples = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
-        for (place, first, _), before, after in zip(self.spans, *self._ways(tracks), strict=True):
+        places, samples = [NOWHERE], [NOWHERE]
+        for (place, first, _), before, after in zip(self.spans, self._before, self._ways(tracks), strict=True):
             padded = np.pad(after, 1)
             peaks = (after > before.max() + more) & (after >= padded[:-2]) & (after >= padded[2:])
             if peaks.any():
@@ -51,16 +82,19 @@ class Feet:
                 places.append(np.full(len(samples[-1]), place))
         return np.concatenate(places), np.concatenate(samples)
 
-    def _ways(self, tracks: Tracks) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        """How far each gets from where it stood at first, a row for each span, before and after."""
-        if not self.spans:
-            return [], []
-        shown = dict(zip(self.places.tolist(), self.world.positions_of(tracks, self.places), strict=True))
-        before, after = (
-            [
-                np.linalg.norm(positions[place][first : last + 1] - positions[place][first], axis=1)
-                for place, first, last in self.spans
-            ]
-            for positions in (self.world.positions, shown)
-        )
-        return before, after
+    def _ways(self, tracks: Tracks) -> list[np.ndarray]:
+        """How far each gets from where it stood at first, an array for each span."""
+        if not len(self.spans):
+            return []
+        places, firsts, lasts = self.spans.T
+        found, starts = [np.empty(length) for length in lasts - firsts + 1], np.empty((len(places), 3))
+        for block in self.world.seen(tracks):
+            origins, samples = block.maps[0].origins, block.samples
+            for number in np.flatnonzero((firsts < samples.stop) & (lasts >= samples.start)).tolist():
+                begin, end = max(firsts[number], samples.start), min(lasts[number] + 1, samples.stop)
+                positions = origins[places[number], begin - samples.start : end - samples.start]
+                if begin == firsts[number]:
+                    starts[number] = positions[0]
+                ways = np.linalg.norm(positions - starts[number], axis=1)
+                found[number][begin - firsts[number] : end - firsts[number]] = ways
+        return found

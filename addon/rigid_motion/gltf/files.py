@@ -6,12 +6,12 @@ import itertools
 import os
 import secrets
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from .clips import ClipReduction, ReducedClip, Wishes
+from .clips import ClipReduction, Options, ReducedClip
 from .documents import Document, GltfError, damage_refused, read_document
 from .nodes import Nodes
 from .rewriting import rewritten
@@ -38,30 +38,8 @@ class Report:
     """With fewer keys; the same where no clip needs fewer."""
 
 
-def reduced(
-    document: Document,
-    *,
-    tolerance: float | None = None,
-    radius: float | None = None,
-    shared: bool = False,
-    count: int | None = None,
-    vertices: bool = False,
-) -> Report:
+def reduced(document: Document, options: Options) -> Report:
     """A document with fewer keys in all of its clips.
-
-    Parameters
-    ----------
-    document : Document
-    tolerance : float, optional
-        How far off any point within the radius of any node may be in the world; a share of the size where None.
-    radius : float, optional
-        The same for all nodes; otherwise that of meshes is theirs, and that of joints a share of the size.
-    shared : bool
-        Whether all nodes of a clip get their keys at the same times.
-    count : int, optional
-        So many key poses of each clip instead of a tolerance.
-    vertices : bool
-        Whether the largest displacement of any vertex of a skin is measured.
 
     Raises
     ------
@@ -75,42 +53,32 @@ def reduced(
         joints = set(itertools.chain.from_iterable(joints_of(document)))
         moved = _moved(nodes, clips)
         size = size_of(nodes, moved)
-        radii = np.full(len(moved), radius) if radius is not None else radii_of(nodes, moved, size)
+        radii = radii_of(nodes, moved, size) if options.radius is None else np.full(len(moved), options.radius)
+    tolerance = options.tolerance
     if tolerance is None:
-        tolerance = (OF_KEY_POSES if shared else OF_A_BODY) * size or SOME
+        tolerance = (OF_KEY_POSES if options.shared else OF_A_BODY) * size or SOME
     elif tolerance > MOST * size > 0.0:
         raise GltfError(
             f"a tolerance of {tolerance:.3g} m is more than a tenth of the size, which is {size:.3g} m in this file",
             f"give one below {MOST * size:.2g} m",
         )
-    wishes = Wishes(tolerance, shared, count, vertices)
+    options = replace(options, tolerance=tolerance)
     found = []
     for clip in clips:
         if clip.tracks:
             own = np.isin(moved, _moved(nodes, (clip,)))
-            found.append(ClipReduction(nodes, clip, moved[own], radii[own], joints, size, wishes).reduced())
+            found.append(ClipReduction(nodes, clip, moved[own], radii[own], joints, size, options).reduced())
     tracks = {clip.number: clip.tracks for clip in found if clip.tracks is not None}
     with damage_refused():
         return Report(size, tolerance, tuple(found), rewritten(document, tracks) if tracks else document)
 
 
-def reduce_file(
-    path: Path,
-    output: Path,
-    *,
-    tolerance: float | None = None,
-    radius: float | None = None,
-    shared: bool = False,
-    count: int | None = None,
-    vertices: bool = False,
-) -> Report:
+def reduce_file(path: Path, output: Path, options: Options) -> Report:
     """Write a .glb or .gltf file with fewer keys, and the file of its buffer beside a .gltf: see `reduced`.
 
     What is at the place of the output is replaced once all is written. Files that a .gltf names are not copied.
     """
-    report = reduced(
-        read_document(path), tolerance=tolerance, radius=radius, shared=shared, count=count, vertices=vertices
-    )
+    report = reduced(read_document(path), options)
     for name, content in report.document.files(output.name).items():
         beside = output.with_name(f".{secrets.token_hex(4)}{output.suffix}")
         try:

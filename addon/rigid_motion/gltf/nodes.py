@@ -6,7 +6,7 @@ Source: the glTF 2.0 specification, Khronos 2021, section 3.5.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -15,16 +15,13 @@ from ..motion import Skeleton
 from ..motion.affine import AffineMaps
 from ..motion.quaternions import matrices, normalise
 from .documents import Document, GltfError, Json, entry, objects, shown
-from .tracks import FARTHEST, ROTATION, SCALE, TO_WXYZ, TRANSLATION, WIDTHS, Track
+from .tracks import FARTHEST, LINEAR, ROTATION, SCALE, TO_WXYZ, TRANSLATION, WIDTHS, Track, Tracks
 
 REST = {TRANSLATION: (0.0, 0.0, 0.0), ROTATION: (0.0, 0.0, 0.0, 1.0), SCALE: (1.0, 1.0, 1.0)}
 """Of a node that says nothing."""
 
 DEEPEST = 1000
 """How many nodes one may hang on."""
-
-Tracks = Mapping[tuple[int, str], Track]
-"""By node and path."""
 
 
 class Nodes:
@@ -109,6 +106,16 @@ class Nodes:
 
 def by_target(tracks: tuple[Track, ...]) -> Tracks:
     return {(track.node, track.path): track for track in tracks}
+
+
+def steadied(tracks: tuple[Track, ...]) -> Tracks:
+    """The same by node and path, where what is constant has one key."""
+    kept = [
+        replace(track, times=track.times[:1], values=track.points[:1], interpolation=LINEAR)
+        for track in tracks
+        if track.is_constant
+    ]
+    return by_target(tracks) | by_target(tuple(kept))
 
 
 def _parents(nodes: list[Json]) -> np.ndarray:

@@ -15,9 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from .accessors import KINDS, raw_numbers
-from .documents import Document, Json, data_uri, objects
+from .accessors import raw_numbers
+from .documents import Document, FileBytes, Json, data_uri, objects
 from .tracks import LINEAR
+from .writing import GrowingView
 
 KNOWN = re.compile(
     "(?:KHR|EXT)_(?:materials|texture|lights|mesh|animation|node|xmp)_.*|.*_meshopt_compression"
@@ -26,10 +27,6 @@ KNOWN = re.compile(
 """Extensions whose numbers of accessors and views are found below, or that have none."""
 
 INSTANCES = "EXT_mesh_gpu_instancing"
-
-TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
-
-COMPONENT_TYPES = {kind.lstrip("<"): number for number, kind in KINDS.items()}
 
 ALIGNED = 8
 """Bytes go out of buffers in multiples of it, so that what stays is aligned as it was."""
@@ -68,9 +65,8 @@ class _Rewriting:
     def __init__(self, document: Document, tracks: Mapping[int, Sequence[StoredTrack]]) -> None:
         self.before, self.tracks = document, tracks
         self.json: Json = copy.deepcopy(document.json)
-        self.accessors, self.views = (self.json.setdefault(name, []) for name in ("accessors", "bufferViews"))
-        self.data = bytearray()
-        self.known: dict[tuple[str, int, bytes], int] = {}
+        self.view = GrowingView(self.json)
+        self.accessors, self.views = self.json["accessors"], self.json["bufferViews"]
         self.first_new = len(self.accessors)
         self.keeps_numbers = not all(
             isinstance(name, str) and KNOWN.fullmatch(name) for name in self.json.get("extensionsUsed", ())
@@ -79,31 +75,32 @@ class _Rewriting:
     def done(self) -> Document:
         before = {container[key] for container, key in _sampler_slots(self.json)}
         others = {container[key] for container, key in _other_slots(self.json)}
-        view = len(self.views)
         for number, tracks in self.tracks.items():
-            self._put(objects(self.json, "animations")[number], tracks, view)
+            self._put(objects(self.json, "animations")[number], tracks)
         after = {container[key] for container, key in _sampler_slots(self.json)}
         unused = before - after - others
         removed = self._views_without(unused, before - others)
         for number in after - others:
             if number < self.first_new and removed & set(_views_of(self.accessors[number])):
-                self._move(number, view)
-        self.views.append({"buffer": 0, "byteLength": max(len(self.data), 1)})
+                self._move(number)
+        self.view.json["byteLength"] = max(len(self.view.data), 1)
         self._renumber(
             "accessors", unused, list(_accessor_slots(self.json)), {"componentType": 5126, "count": 1, "type": "SCALAR"}
         )
         buffers = self._buffers(removed)
-        self._renumber("bufferViews", removed, list(_view_slots(self.json)), {**self.views[view], "byteLength": 1})
+        self._renumber("bufferViews", removed, list(_view_slots(self.json)), {**self.view.json, "byteLength": 1})
         return buffers
 
-    def _put(self, animation: Json, tracks: Sequence[StoredTrack], view: int) -> None:
+    def _put(self, animation: Json, tracks: Sequence[StoredTrack]) -> None:
         """Give an animation these tracks and no others."""
         new = {track.channel: track for track in tracks}
         channels, samplers = [], []
         for number, channel in enumerate(animation["channels"]):
             sampler = dict(animation["samplers"][channel["sampler"]])
             if number in new:
-                times, values = (self._add(numbers, view) for numbers in new[number].accessors)
+                times, values = (
+                    self.view.add(numbers, bounds=numbers.shape[1] == 1) for numbers in new[number].accessors
+                )
                 sampler |= {"input": times, "output": values}
                 if sampler.get("interpolation", LINEAR) != new[number].interpolation:
                     sampler["interpolation"] = new[number].interpolation
@@ -113,33 +110,12 @@ class _Rewriting:
             channels.append({**channel, "sampler": len(samplers) - 1})
         animation["channels"], animation["samplers"] = channels, samplers
 
-    def _add(self, numbers: np.ndarray, view: int) -> int:
-        """The number of an accessor of these (count, columns), the same where there is one already."""
-        kind = numbers.dtype.str.lstrip("<|")
-        content = numbers.tobytes()
-        known = (kind, numbers.shape[1], content)
-        if known not in self.known:
-            accessor: Json = self._placed(content, view) | {"componentType": COMPONENT_TYPES[kind]}
-            accessor |= {"normalized": True} if kind != "f4" else {}
-            accessor |= {"count": len(numbers), "type": TYPES[numbers.shape[1]]}
-            if numbers.shape[1] == 1:
-                accessor |= {"min": [float(numbers.min())], "max": [float(numbers.max())]}
-            self.known[known] = len(self.accessors)
-            self.accessors.append(accessor)
-        return self.known[known]
-
-    def _placed(self, content: bytes, view: int) -> Json:
-        self.data += bytes(-len(self.data) % 4)
-        offset = len(self.data)
-        self.data += content
-        return {"bufferView": view} | ({"byteOffset": offset} if offset else {})
-
-    def _move(self, number: int, view: int) -> None:
+    def _move(self, number: int) -> None:
         """Bring what an accessor has into the new view: that which it is in goes."""
         accessor, content = self.accessors[number], raw_numbers(self.before, number)
         accessor.pop("byteOffset", None)
         accessor.pop("sparse", None)
-        accessor |= self._placed(content.tobytes(), view)
+        accessor |= self.view.placed(content.tobytes())
 
     def _views_without(self, unused: set[int], of_animations: set[int]) -> set[int]:
         """The views that animations alone use, and some of which they use no more."""
@@ -193,12 +169,12 @@ class _Rewriting:
                 if (moved := offset - sum(end - first for first, end in cuts if end <= offset)) != offset:
                     user["byteOffset"] = moved
             contents[buffer] = _without(contents[buffer], cuts)
-        view = self.views[-1]
+        view = self.view.json
         view["buffer"] = target
         padded = contents[target] + bytes(-len(contents[target]) % ALIGNED)
         if padded:
             view |= {"byteOffset": len(padded)}
-        contents[target] = padded + bytes(self.data or b"\0")
+        contents[target] = padded + bytes(self.view.data or b"\0")
         for buffer in {*ranges, target}:
             described = json["buffers"][buffer]
             described["byteLength"] = len(contents[buffer])
@@ -304,6 +280,6 @@ def _cuts(removed: list[Range], kept: list[Range]) -> list[Range]:
     return [(first, end) for first, end in aligned if first < end]
 
 
-def _without(data: bytes, cuts: list[Range]) -> bytes:
+def _without(data: bytes | FileBytes, cuts: list[Range]) -> bytes:
     begins, ends = [0, *(end for _, end in cuts)], [*(first for first, _ in cuts), len(data)]
-    return b"".join(data[first:end] for first, end in zip(begins, ends, strict=True))
+    return b"".join(bytes(data[first:end]) for first, end in zip(begins, ends, strict=True))

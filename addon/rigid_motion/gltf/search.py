@@ -9,17 +9,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..motion import Poses, SeparateKeys, reduce_skeleton_keys
+from ..motion import Poses, SeparateKeys, Skeleton, reduce_skeleton_keys
 from ..motion.quaternions import align_signs, from_matrices
+from ..motion.skeleton_stretches import LongRecording, keys_in_stretches
+from .accessors import EVERY
 from .errors import World
-from .nodes import Tracks
-from .tracks import ROTATION, TRANSLATION
+from .tracks import ROTATION, TRANSLATION, Tracks
 
 MODE = "lerp_slerp"
 """What glTF calls LINEAR."""
-
-STRETCH, LONG = 1500, 2
-"""Samples of a recording that are searched at once, where there are more than so many times as many."""
 
 
 class Search:
@@ -35,51 +33,51 @@ class Search:
     """
 
     def __init__(self, world: World, tracks: Tracks, fixed: np.ndarray) -> None:
-        self.world, self.fixed = world, fixed
-        shape = (len(world.moving), len(world.times))
-        positions, quaternions = np.empty((*shape, 3)), np.empty((*shape, 4))
-        for place, node in enumerate(world.moving.tolist()):
-            positions[place], quaternions[place] = _pose(world, tracks, node)
-        self.poses = Poses(positions * world.lengths_above, align_signs(quaternions))
+        self.world, self.tracks, self.fixed = world, tracks, fixed
 
     def keys(self, tolerance: float) -> tuple[SeparateKeys, ...]:
         """The samples that are keys of each node."""
-        return reduce_skeleton_keys(
-            self.world.times,
-            self.poses,
-            self.world.parents,
-            MODE,
-            tolerance=tolerance,
-            radius=self.world.radii,
-            separate=True,
-            fixed=self.fixed,
-            stretch=STRETCH if len(self.world.times) > LONG * STRETCH else None,
-        )
+        world = self.world
+        if len(world.stretches) == 1:
+            return self._reduced(EVERY, tolerance=tolerance, separate=True, fixed=self.fixed)
+        weights = np.broadcast_to(1.0, (len(world.moving), len(world.times)))
+        skeleton, free = Skeleton(world.parents), ~self.fixed
+        recording = LongRecording(world.times, skeleton, MODE, world.radii, weights, free, self._poses)
+        return keys_in_stretches(recording, tolerance, True, world.stretches, map)
 
-    def key_poses(self, *, tolerance: float | None, count: int | None) -> np.ndarray:
-        """The samples that are keys of all nodes."""
-        keys = reduce_skeleton_keys(
-            self.world.times,
-            self.poses,
-            self.world.parents,
-            MODE,
-            tolerance=tolerance,
-            budget=None if count is None else min(count, len(self.world.times)),
-            radius=self.world.radii,
-            shared=True,
-        )
-        return keys[0]
+    def key_poses(self, tolerance: float) -> np.ndarray:
+        """The samples that are keys of all nodes, those where stretches meet among them."""
+        found = [some.start + self._reduced(some, tolerance=tolerance, shared=True)[0] for some in self.world.stretches]
+        return np.unique(np.concatenate(found))
+
+    def so_many_key_poses(self, count: int, weights: np.ndarray) -> np.ndarray:
+        """The samples that are keys of all nodes, whose errors count so many times (n, m)."""
+        return self._reduced(EVERY, budget=min(count, len(self.world.times)), shared=True, weights=weights)[0]
+
+    def _reduced(self, samples: slice, **options: object) -> tuple[np.ndarray, ...] | tuple[SeparateKeys, ...]:
+        world = self.world
+        times, poses = world.times[samples], self._poses(samples)
+        return reduce_skeleton_keys(times, poses, world.parents, MODE, radius=world.radii, **options)
+
+    def _poses(self, samples: slice) -> Poses:
+        """Those of the nodes at some of the moments."""
+        world, times = self.world, self.world.times[samples]
+        shape = (len(world.moving), len(times))
+        positions, quaternions = np.empty((*shape, 3)), np.empty((*shape, 4))
+        for place, node in enumerate(world.moving.tolist()):
+            positions[place], quaternions[place] = _pose(world, self.tracks, node, times)
+        return Poses(positions * world.lengths_above(times), align_signs(quaternions))
 
 
-def _pose(world: World, tracks: Tracks, node: int) -> tuple[np.ndarray, np.ndarray]:
-    """The translation and rotation of a node in its parent's space at all times, or where it always is."""
+def _pose(world: World, tracks: Tracks, node: int, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The translation and rotation of a node in its parent's space at these times, or where it always is."""
     if node in world.nodes.matrices:
         matrix = world.nodes.matrices[node]
         left, _, right = np.linalg.svd(matrix[:3, :3])
         turn = left @ np.diag((1.0, 1.0, np.linalg.det(left @ right))) @ right
         return matrix[:3, 3], from_matrices(turn)
     translation, rotation = (
-        tracks[node, path].at(world.times) if (node, path) in tracks else world.nodes.rest[path][node]
+        tracks[node, path].at(times) if (node, path) in tracks else world.nodes.rest[path][node]
         for path in (TRANSLATION, ROTATION)
     )
     return translation, rotation

@@ -31,9 +31,11 @@ HALVINGS = 8
 def moments(world: World, clip: Clip, tolerance: float) -> np.ndarray:
     """The moments between which everything runs evenly, as close as turns and splines need it, shape (m,), rising."""
     moved = [track for track in clip.tracks if track.path != WEIGHTS and not track.is_constant]
-    times = np.unique(np.concatenate([world.times, *(track.times for track in moved)]))
+    different = {id(track.times): track.times for track in moved}
+    times = np.unique(np.concatenate([world.times, *different.values()]))
     smooth = [track for track in moved if track.interpolation != STEP]
-    reaches = replace(world, times=times).reaches
+    curved = any(track.interpolation == CUBICSPLINE for track in smooth)
+    reaches = replace(world, times=times).reaches if curved else None
     for _ in range(HALVINGS):
         halved = np.zeros(len(times) - 1, dtype=bool)
         for track in smooth:
@@ -62,8 +64,8 @@ def settled(world: World, clip: Clip, tolerance: float) -> dict[tuple[int, str],
         elif settling.is_constant:
             found[target] = replace(track, interpolation=LINEAR, times=world.times[:1], values=settling.values[:1])
         elif track.interpolation == STEP:
-            keys = without_repeats(track.values)
-            found[target] = replace(track, times=track.times[keys], values=track.values[keys])
+            keys = without_repeats(track.points)
+            found[target] = replace(track, times=track.times[keys], values=track.points[keys])
         elif track.path in (SCALE, WEIGHTS):
             keys = on_lines(settling.times, settling.values, settling.within)
             times, values = settling.times[keys], settling.values[keys]
@@ -113,7 +115,7 @@ class _Settling:
             return 2.0 * reach * np.minimum(*(np.linalg.norm(values + sign * value, axis=1) for sign in (1.0, -1.0)))
         if self.track.path == SCALE:
             return reach * np.abs(values / np.where(value == 0.0, 1.0, value) - 1.0).max(axis=1)
-        return np.linalg.norm(values - value, axis=1) * float(self.world.lengths_above[self.place].max())
+        return np.linalg.norm(values - value, axis=1) * self.world.longest_above[self.place]
 
 
 def _bows(track: Track, times: np.ndarray, values: np.ndarray) -> np.ndarray:

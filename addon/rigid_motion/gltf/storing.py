@@ -10,13 +10,29 @@ import numpy as np
 from .accessors import denormalised, stored_size
 from .documents import Document
 from .rewriting import StoredTrack
-from .tracks import LINEAR, ROTATION, TO_WXYZ, TO_XYZW, WEIGHTS, Clip, Track
+from .tracks import LINEAR, ROTATION, TO_WXYZ, TO_XYZW, WEIGHTS, WIDTHS, Clip, Track
 
 INTEGER = np.iinfo(np.int16).max
 """What stands for 1 where 16-bit integers are normalised."""
 
 NUMBER, SHORT = 4, 2
 """Bytes."""
+
+
+@dataclass(frozen=True, eq=False)
+class EveryKey:
+    """The values of a track with a key at all of these times (n,), as they are shown: like an array (n, width)."""
+
+    track: Track
+    times: np.ndarray
+    integers: bool
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        keyed = self.track.keyed(self.times[rows])
+        return shown(keyed, stored(keyed, integers=self.integers)).values
 
 
 @dataclass(frozen=True)
@@ -55,9 +71,9 @@ def shown(track: Track, stored: StoredTrack) -> Track:
     return replace(track, interpolation=stored.interpolation, times=stored.times.astype(np.float64), values=values)
 
 
-def key_size(track: Track, *, integers: bool) -> int:
-    """The bytes of a key's value."""
-    return (SHORT if integers and is_integral(track) else NUMBER) * track.values[0].size
+def key_size(path: str, *, integers: bool) -> int:
+    """The bytes of the value of a key of rotation or translation."""
+    return (SHORT if integers and path == ROTATION else NUMBER) * WIDTHS[path]
 
 
 def amount(tracks: Iterable[StoredTrack]) -> Amount:

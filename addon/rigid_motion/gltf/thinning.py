@@ -9,6 +9,9 @@ import numpy as np
 TIME = 4
 """Bytes of a key's time."""
 
+AT_ONCE = 2**13
+"""Samples that are looked at in one go."""
+
 
 def on_lines(times: np.ndarray, values: np.ndarray, within: float) -> np.ndarray:
     """The keys that straight lines need to stay within a distance of values (n, width), rising, shape (k,).
@@ -52,12 +55,21 @@ def shared_times(keys: Sequence[np.ndarray], widths: Sequence[int], samples: int
     list of array of int
         Rising.
     """
-    marked = np.zeros((len(keys), samples), dtype=np.float32)
+    marked = np.zeros((len(keys), samples), dtype=bool)
     for row, own in zip(marked, keys, strict=True):
-        row[own] = 1.0
+        row[own] = True
     groups = [[channel] for channel in range(len(keys))]
     counts, sizes = marked.sum(axis=1), np.array(widths, dtype=np.float64)
-    both = marked @ marked.T
+
+    def in_common(rows: np.ndarray) -> np.ndarray:
+        """How many keys each channel has that are among those of the rows."""
+        found = np.zeros((len(marked), *rows.shape[:-1]))
+        for first in range(0, samples, AT_ONCE):
+            some = slice(first, first + AT_ONCE)
+            found += marked[:, some].astype(np.float32) @ rows[..., some].astype(np.float32).T
+        return found
+
+    both = in_common(marked)
 
     def saved(first: int) -> np.ndarray:
         """The bytes that each other group needs less together with this one."""
@@ -71,9 +83,9 @@ def shared_times(keys: Sequence[np.ndarray], widths: Sequence[int], samples: int
         first, second = divmod(int(np.argmax(savings)), len(groups))
         groups[first] += groups[second]
         groups[second] = []
-        marked[first] = np.maximum(marked[first], marked[second])
+        marked[first] |= marked[second]
         counts[first], sizes[first] = marked[first].sum(), sizes[first] + sizes[second]
-        both[first] = both[:, first] = marked @ marked[first]
+        both[first] = both[:, first] = in_common(marked[first])
         savings[second] = savings[:, second] = -np.inf
         savings[first] = savings[:, first] = saved(first)
     found = list(keys)

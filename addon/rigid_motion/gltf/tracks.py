@@ -7,13 +7,13 @@ Source: the glTF 2.0 specification, Khronos 2021, section 3.11 and appendix C.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..motion import Poses, interpolate
 from ..motion.quaternions import normalise
-from .accessors import numbers
+from .accessors import EVERY, Rows, numbers
 from .documents import Document, GltfError, Json, entry, objects, shown
 
 TRANSLATION, ROTATION, SCALE, WEIGHTS = PATHS = ("translation", "rotation", "scale", "weights")
@@ -24,6 +24,12 @@ WIDTHS = {TRANSLATION: 3, ROTATION: 4, SCALE: 3}
 """Numbers of a key."""
 
 TO_WXYZ, TO_XYZW = [3, 0, 1, 2], [1, 2, 3, 0]
+
+NARROWEST = 1e-9
+"""An angle that stands for none: its sine is itself."""
+
+AT_ONCE = 2**14
+"""Keys of a track that are looked at in one go."""
 
 FARTHEST = 1e30
 """Numbers beyond it are damage: their squares would be no floats in single precision."""
@@ -46,33 +52,51 @@ class Track:
     times: np.ndarray
     """Of the keys in seconds, shape (n,), strictly rising."""
 
-    values: np.ndarray
+    values: np.ndarray | Rows
     """Shape (n, width); of a cubic spline (n, 3, width): tangent before the key, its value, tangent after it."""
 
     @property
     def points(self) -> np.ndarray:
         """The values of the keys without their tangents, shape (n, width)."""
-        return self.values[:, 1] if self.interpolation == CUBICSPLINE else self.values
+        values = self.values[:]
+        return values[:, 1] if self.interpolation == CUBICSPLINE else values
 
     @property
     def is_constant(self) -> bool:
         """Whether it is the same at all times."""
-        tangents = self.interpolation == CUBICSPLINE and len(self.times) > 1 and self.values[:, [0, 2]].any()
-        return not tangents and bool(np.all(self.points == self.points[0]))
+        tangents = self.interpolation == CUBICSPLINE and len(self.times) > 1 and self.values[:][:, [0, 2]].any()
+        points = self.points
+        return not tangents and bool(np.all(points == points[0]))
+
+    def near(self, first: float, last: float) -> Track:
+        """The keys that say what is shown from one time to another, which are read where they are not yet."""
+        begin = max(int(np.searchsorted(self.times, first, side="right")) - 1, 0)
+        some = slice(begin, max(int(np.searchsorted(self.times, last)) + 1, begin + 1))
+        return replace(self, times=self.times[some], values=self.values[some])
+
+    def keyed(self, times: np.ndarray) -> Track:
+        """What it shows at these times (m,), with lines in between."""
+        return replace(self, interpolation=LINEAR, times=times, values=self.at(times))
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """What is shown at `times`, which rise, shape (m, width). Quaternions are normalised."""
+        first, last = np.searchsorted(self.times, times[[0, -1]]).tolist()
+        if last - first > AT_ONCE and len(times) > 1:
+            return np.concatenate([self.at(some) for some in np.array_split(times, 2)])
+        return self.near(times[0], times[-1])._at(times)
+
+    def _at(self, times: np.ndarray) -> np.ndarray:
         times = np.clip(times, self.times[0], self.times[-1])
         if len(self.times) == 1:
             found = np.repeat(self.points, len(times), axis=0)
+        elif np.array_equal(times, self.times):
+            found = self.points
         elif self.interpolation == STEP:
             found = self.values[np.searchsorted(self.times, times, side="right") - 1]
         elif self.interpolation == CUBICSPLINE:
             found = self._on_spline(times)
         elif self.path == ROTATION:
-            first = max(int(np.searchsorted(self.times, times[0], side="right")) - 1, 0)
-            near = slice(min(first, len(self.times) - 2), int(np.searchsorted(self.times, times[-1])) + 1)
-            return turned_at(self.times[near], self.values[near], times)
+            return turned_at(self.times, self.values, times)
         else:
             found = np.stack([np.interp(times, self.times, column) for column in self.values.T], axis=1)
         return normalise(found) if self.path == ROTATION else found
@@ -87,8 +111,21 @@ class Track:
 
 
 def turned_at(key_times: np.ndarray, keys: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Quaternions (m, 4) at times between keys (n, 4), each on the short way at an even speed."""
-    return interpolate(key_times, Poses(np.zeros((len(keys), 3)), keys), times, "lerp_slerp").quaternions
+    """Unit quaternions (m, 4) at times between keys (n, 4), each on the short way at an even speed."""
+    keys = normalise(keys)
+    first, second = keys[:-1], keys[1:]
+    second = np.where(np.einsum("ij,ij->i", first, second)[:, None] < 0.0, -second, second)
+    angles = 2.0 * np.arctan2(np.linalg.norm(second - first, axis=1), np.linalg.norm(second + first, axis=1))
+    angles = np.maximum(angles, NARROWEST)
+    segments = np.clip(np.searchsorted(key_times, times, side="right") - 1, 0, len(first) - 1)
+    share = (times - key_times[segments]) / np.diff(key_times)[segments]
+    angles, sines = angles[segments], np.sin(angles)[segments]
+    begin, end = np.sin((1.0 - share) * angles) / sines, np.sin(share * angles) / sines
+    return begin[:, None] * first[segments] + end[:, None] * second[segments]
+
+
+Tracks = Mapping[tuple[int, str], Track]
+"""By node and path."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +153,7 @@ def _clip(document: Document, number: int) -> Clip:
     animation = document.json["animations"][number]
     name = animation.get("name")
     name = name if isinstance(name, str) and name else f"animation {number}"
-    tracks, targets = [], set()
+    tracks, targets, times = [], set(), {}
     for place, channel in enumerate(objects(animation, "channels")):
         target = channel.get("target")
         if not isinstance(target, dict):
@@ -124,7 +161,7 @@ def _clip(document: Document, number: int) -> Clip:
         if "node" not in target or target.get("path") not in PATHS:
             continue
         try:
-            track = _track(document, animation, place, channel)
+            track = _track(document, animation, place, channel, times)
         except GltfError as error:
             raise GltfError(f"{shown(name)}: channel {place}: {error.problem}", error.way_out) from None
         if (track.node, track.path) in targets:
@@ -134,7 +171,8 @@ def _clip(document: Document, number: int) -> Clip:
     return Clip(number, name, tuple(tracks))
 
 
-def _track(document: Document, animation: Json, place: int, channel: Json) -> Track:
+def _track(document: Document, animation: Json, place: int, channel: Json, known: dict[int, np.ndarray]) -> Track:
+    """A channel as a track, with the times that are known of the accessor, or that are so from now on."""
     node, path = channel["target"]["node"], channel["target"]["path"]
     moved = entry(document.json, "nodes", node)
     if "matrix" in moved and path != WEIGHTS:
@@ -143,21 +181,30 @@ def _track(document: Document, animation: Json, place: int, channel: Json) -> Tr
     interpolation = sampler.get("interpolation", LINEAR)
     if interpolation not in INTERPOLATIONS:
         raise GltfError(f"the interpolation {shown(interpolation)} is none of {', '.join(INTERPOLATIONS)}")
-    times, values = numbers(document, sampler.get("input")), numbers(document, sampler.get("output"))
-    if times.shape[1] != 1 or np.any(np.diff(times[:, 0]) <= 0.0):
-        raise GltfError("its times do not rise")
+    if (given := sampler.get("input")) not in known:
+        known[given] = _times(document, given)
+    times, values = known[given], numbers(document, sampler.get("output"))
     rows = len(times) * (3 if interpolation == CUBICSPLINE else 1)
     width, uneven = divmod(values.size, rows)
     if uneven or not width or width != WIDTHS.get(path, width) or (path == WEIGHTS) != (values.shape[1] == 1):
         raise GltfError(f"{len(values)} values do not fit {len(times)} keys of {path}")
     if interpolation == CUBICSPLINE and len(times) < 2:
         raise GltfError("a spline needs two keys at least")
-    if np.abs(values).max() > FARTHEST or np.abs(times).max() > FARTHEST:
+    if np.abs(values).max() > FARTHEST:
         raise GltfError("it has numbers that are too large")
-    values = values.reshape((len(times), 3, width) if interpolation == CUBICSPLINE else (len(times), width))
-    if path == ROTATION:
-        values = values[..., TO_WXYZ]
-    track = Track(place, node, path, interpolation, times[:, 0], values)
+    shape = (3, width) if interpolation == CUBICSPLINE else (width,)
+    rows = Rows(document, sampler["output"], len(times), shape, TO_WXYZ if path == ROTATION else EVERY)
+    track = Track(place, node, path, interpolation, times, rows)
     if path == ROTATION and not np.linalg.norm(track.points, axis=1).all():
         raise GltfError("it has a quaternion of length zero")
     return track
+
+
+def _times(document: Document, number: object) -> np.ndarray:
+    """Those of keys, shape (n,)."""
+    times = numbers(document, number)
+    if times.shape[1] != 1 or np.any(np.diff(times[:, 0]) <= 0.0):
+        raise GltfError("its times do not rise")
+    if np.abs(times).max() > FARTHEST:
+        raise GltfError("it has numbers that are too large")
+    return times[:, 0]

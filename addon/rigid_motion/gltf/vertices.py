@@ -10,7 +10,7 @@ import numpy as np
 from .accessors import denormalised, numbers, raw_numbers
 from .documents import Document, GltfError, Json, entry, objects
 from .errors import World
-from .nodes import Tracks
+from .tracks import Tracks
 
 DRACO = "KHR_draco_mesh_compression"
 
@@ -49,11 +49,17 @@ def largest_displacement(world: World, shown: Tracks) -> float | None:
 def _of_skin(world: World, shown: Tracks, skin: Skin, least: float) -> float:
     places = np.array([world.places.get(node, -1) for node in skin.joints.tolist()])
     moves = places >= 0
-    differences = np.zeros((len(places), len(world.times), 3, 4))
-    for tracks, sign in ((shown, 1.0), (world.truth, -1.0)):
-        maps = world.nodes.worlds(world.moving, tracks, world.times)[places[moves]]
-        differences[moves] += sign * np.concatenate((maps.axes, maps.origins[..., None]), axis=-1)
-    differences = np.einsum("jmab,jbc->jmac", differences, skin.inverse)
+    for block in world.seen(shown, world.truth):
+        differences = np.zeros((len(places), len(block.times), 3, 4))
+        for maps, sign in zip(block.maps, (1.0, -1.0), strict=True):
+            own = maps[places[moves]]
+            differences[moves] += sign * np.concatenate((own.axes, own.origins[..., None]), axis=-1)
+        least = _largest(np.einsum("jmab,jbc->jmac", differences, skin.inverse), skin, least)
+    return least
+
+
+def _largest(differences: np.ndarray, skin: Skin, least: float) -> float:
+    """The largest displacement of any vertex by joints that are so far off (j, m, 3, 4), or `least` if that is more."""
     bounds = _bounds(differences, skin)
     order, step = np.argsort(-bounds), max(1, AT_ONCE // len(skin.vertices))
     for first in range(0, len(order), step):

@@ -65,8 +65,12 @@ def standing(times: ArrayLike, positions: ArrayLike) -> np.ndarray:
     height = float(np.median(np.ptp(heights, axis=0)))
     ways = np.linalg.norm(np.diff(positions, axis=1), axis=-1)
     slow = ways <= SLOW * height * np.diff(times)
-    at_rest = np.concatenate((slow[:, :1], slow), axis=1) & np.concatenate((slow, slow[:, -1:]), axis=1)
-    stands = at_rest & (heights - heights.min() <= LOW * height)
+    return contacts(times, heights - heights.min() <= LOW * height, slow)
+
+
+def contacts(times: np.ndarray, low: np.ndarray, slow: np.ndarray) -> np.ndarray:
+    """When joints stand that are low at times (joints, n), and slow between them (joints, n - 1)."""
+    stands = low & np.concatenate((slow[:, :1], slow), axis=1) & np.concatenate((slow, slow[:, -1:]), axis=1)
     for joint, first, last in spans(stands):
         if times[last] - times[first] < SHORTEST:
             stands[joint, first : last + 1] = False

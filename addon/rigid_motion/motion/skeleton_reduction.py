@@ -27,7 +27,7 @@ from .poses import LIMIT, PackedPoses, Poses, numbers
 from .quaternions import align_signs
 from .skeleton_channels import Channels, SeparateKeys, check_separable
 from .skeleton_search import TINY, ChannelKeys, OwnKeys, that_move
-from .skeleton_stretches import LongRecording, Run, keys_in_stretches
+from .skeleton_stretches import LongRecording, Run, keys_in_stretches, stretches
 from .skeletons import Skeleton
 
 BUDGET_STEPS = 9
@@ -175,8 +175,8 @@ def reduce_skeleton_keys(
             f"is {DEEPEST} at most: shared=True finds key poses for longer chains"
         )
     if stretch is not None and len(times) > stretch + 1:
-        recording = LongRecording(times, poses, skeleton, mode, radii, weights, free)
-        return keys_in_stretches(recording, tolerance, separate, stretch, run)
+        recording = LongRecording(times, skeleton, mode, radii, weights, free, lambda some: poses[:, some])
+        return keys_in_stretches(recording, tolerance, separate, stretches(len(times), stretch), run)
     poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
     body = Body(times, poses, skeleton, mode, radii, weights, free)
     channels = Channels(body) if separate else None

@@ -9,15 +9,15 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .bodies import SOME_TURN, Body
+from .bodies import Body
 from .measures import shell_error
 from .poses import Poses
-from .quaternions import align_signs, normalise
+from .quaternions import align_signs
 from .skeleton_channels import NO_TURN, Channels, SeparateKeys, changes
 from .skeleton_search import TINY, ChannelKeys, OwnKeys
 from .skeletons import Skeleton
@@ -31,98 +31,131 @@ Run = Callable[[Callable, Iterable], Iterable]
 
 @dataclass(frozen=True, eq=False)
 class LongRecording:
-    """A body as `reduce_skeleton_keys` gets it."""
+    """A body as `reduce_skeleton_keys` gets it, but for its poses, which are looked at part by part."""
 
     times: np.ndarray
-    poses: Poses
     skeleton: Skeleton
     mode: str
     radii: np.ndarray
     weights: np.ndarray
     free: np.ndarray
+    poses: Callable[[slice], Poses]
+    """Those of some of the samples, shape (joints, samples)."""
 
-    def part(self, samples: slice) -> LongRecording:
-        """Some of the samples. Views."""
-        return replace(self, times=self.times[samples], poses=self.poses[:, samples], weights=self.weights[:, samples])
+    def part(self, samples: slice) -> Stretch:
+        poses = self.poses(samples)
+        poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
+        return Stretch(
+            self.times[samples], poses, self.weights[:, samples], self.skeleton, self.mode, self.radii, self.free
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A part of a long recording."""
+
+    times: np.ndarray
+    poses: Poses
+    weights: np.ndarray
+    skeleton: Skeleton
+    mode: str
+    radii: np.ndarray
+    free: np.ndarray
 
     @property
     def body(self) -> Body:
-        """The recorded body."""
-        poses = Poses(self.poses.positions, align_signs(self.poses.quaternions), self.poses.scales)
-        return Body(self.times, poses, self.skeleton, self.mode, self.radii, self.weights, self.free)
+        return Body(self.times, self.poses, self.skeleton, self.mode, self.radii, self.weights, self.free)
+
+
+def stretches(samples: int, stretch: int) -> list[slice]:
+    """Stretches of so many samples, or fewer, each of which begins with the last sample of that before it."""
+    last = samples - 1
+    bounds = np.linspace(0, last, 1 + math.ceil(last / stretch)).round().astype(np.int64).tolist()
+    return [slice(first, end + 1) for first, end in itertools.pairwise(bounds)]
 
 
 def keys_in_stretches(
-    recording: LongRecording, tolerance: float, separate: bool, stretch: int, run: Run
+    recording: LongRecording, tolerance: float, separate: bool, bounds: list[slice], run: Run
 ) -> tuple[np.ndarray, ...] | tuple[SeparateKeys, ...]:
-    """The keys of all joints, or of their channels: all that moves has keys where stretches of so many samples meet."""
-    last = len(recording.times) - 1
-    bounds = np.linspace(0, last, 1 + math.ceil(last / stretch)).round().astype(np.int64).tolist()
-    parts = [recording.part(slice(first, end + 1)) for first, end in itertools.pairwise(bounds)]
-    rests = _rests(recording, tolerance, separate, np.max([*run(_reaches, parts)], axis=0))
-    joints = np.arange(len(rests))
-    still = Poses(recording.poses.positions[joints, rests[:, -1]], recording.poses.quaternions[joints, rests[:, 0]])
-    found = run(_keys, [(part, tolerance, separate, rests < 0, still) for part in parts])
-    # The first key of a stretch is the last one of the stretch before.
-    moved = [[first + keys[1 if first else 0 :] for keys in some] for first, some in zip(bounds, found, strict=False)]
-    joined = [np.array([rest]) for rest in rests.flat]
-    for channel in np.flatnonzero(rests < 0).tolist():
-        joined[channel] = np.concatenate([keys[channel] for keys in moved])
+    """The keys of all joints, or of their channels: all that moves has keys where the stretches meet."""
+    rests, still = _rests(recording, bounds, tolerance, separate, run)
+    tasks = ((recording.part(some), tolerance, separate, rests < 0, still) for some in bounds)
+    moved = [[] for _ in rests.flat]
+    for some, found in zip(bounds, run(_keys, tasks), strict=True):
+        for channel, keys in zip(moved, found, strict=True):
+            # The first key of a stretch is the last one of the stretch before.
+            channel.append(some.start + keys[1 if some.start else 0 :])
+    joined = [
+        np.concatenate(keys) if rest < 0 else np.array([rest]) for keys, rest in zip(moved, rests.flat, strict=True)
+    ]
     return tuple(map(SeparateKeys, joined[::2], joined[1::2])) if separate else tuple(joined)
 
 
-def _reaches(part: LongRecording) -> np.ndarray:
-    """How far what hangs on each joint gets from it, with the balls around it, in the joint's unit, shape (joints,)."""
-    body = part.body
-    return (body.sizes if body.truth.scales is None else body.sizes / body.truth.scales).max(axis=1)
+def _rests(
+    recording: LongRecording, bounds: list[slice], tolerance: float, separate: bool, run: Run
+) -> tuple[np.ndarray, Poses]:
+    """The sample that each joint, or each of its channels, may stay at, and the poses of joints there (joints,).
 
-
-def _rests(recording: LongRecording, tolerance: float, separate: bool, reaches: np.ndarray) -> np.ndarray:
-    """The sample that each joint, or each of its channels, may stay at, -1 where it has to move, (joints, channels).
-
-    By the triangle inequality all of them together are not off by more than their part of the tolerance.
+    Samples are of shape (joints, channels), -1 where one has to move. By the triangle inequality all of them together
+    are not off by more than their part of the tolerance.
     """
-    skeleton, poses, free = recording.skeleton, recording.poses, recording.free
-    found = np.array(
-        [
-            [_rest(part, reach) for part in _channels(joint, separate)]
-            for joint, reach in zip(poses, reaches, strict=True)
-        ]
+    skeleton, joints = recording.skeleton, np.arange(len(recording.skeleton))
+    reaches, samples, poses, grows = zip(*run(_survey, map(recording.part, bounds)), strict=True)
+    # Of the middles of stretches that in the middle.
+    candidates = _joined(poses)
+    middles = replace(recording.part(slice(0, len(bounds))), poses=candidates).body.middles
+    still = candidates[joints, middles]
+    reaches, samples = (
+        np.max(reaches, axis=0),
+        np.array([some.start for some in bounds])[middles] + np.array(samples)[middles, joints],
     )
-    samples, errors = found[..., 0].astype(np.int64), found[..., 1]
-    chains = skeleton.longest_chains(np.count_nonzero(errors > 0.0, axis=1) * free)
+    errors = np.max([*run(_farthest, ((recording.part(some), separate, reaches, still) for some in bounds))], axis=0)
+    chains = skeleton.longest_chains(np.count_nonzero(errors > 0.0, axis=1) * recording.free)
     weights = skeleton.most_below(recording.weights.max(axis=1))
     allowed = AT_REST * tolerance / np.maximum(chains, 1) / np.maximum(weights, TINY)
-    if poses.scales is not None:
-        above = skeleton.in_root_space(poses[:, :1]).scales[skeleton.parents, 0]
+    if still.scales is not None:
+        above = skeleton.in_root_space(still).scales[skeleton.parents]
         allowed /= np.where(skeleton.parents < 0, 1.0, above)
-        allowed *= not changes(poses.scales).any()
-    allowed[~free] = 0.0 if separate else -1.0
-    return np.where(errors <= allowed[:, None], samples, -1)
+        allowed *= not (np.any(grows) or changes(candidates.scales).any())
+    allowed[~recording.free] = 0.0 if separate else -1.0
+    return np.where(errors <= allowed[:, None], samples[:, None], -1), still
 
 
-def _channels(joint: Poses, separate: bool) -> tuple[Poses, ...]:
-    """A joint's poses (n,), or its rotation and its location as poses."""
-    if not separate:
-        return (joint,)
-    nowhere, unturned = (np.broadcast_to(row, (len(joint), len(row))) for row in (np.zeros(3), NO_TURN))
-    return Poses(nowhere, joint.quaternions, joint.scales), Poses(joint.positions, unturned, joint.scales)
+def _survey(part: Stretch) -> tuple[np.ndarray, np.ndarray, Poses, bool]:
+    """How far what hangs on each joint gets from it, with the balls around it, in the joint's unit, shape (joints,).
+
+    And the samples in the middle of their poses (joints,), those poses (joints, 1), and whether scales change.
+    """
+    body, scales = part.body, part.poses.scales
+    sizes = body.sizes if body.truth.scales is None else body.sizes / body.truth.scales
+    return sizes.max(axis=1), body.middles, body.at_rest(), scales is not None and bool(changes(scales).any())
 
 
-def _rest(poses: Poses, reach: float) -> tuple[int, float]:
-    """The sample nearest to the mean of poses (n,), and how far they are off it at most."""
-    quaternions = align_signs(poses.quaternions)
-    scales = None if poses.scales is None else poses.scales.mean(keepdims=True)
-    mean = Poses(
-        poses.positions.mean(axis=0, keepdims=True),
-        normalise(quaternions.mean(axis=0, keepdims=True) + SOME_TURN),
-        scales,
+def _farthest(task: tuple[Stretch, bool, np.ndarray, Poses]) -> np.ndarray:
+    """How far channels are off where joints are still (joints,) at most, shape (joints, channels)."""
+    part, separate, reaches, still = task
+    pairs = zip(_channels(part.poses, separate), _channels(still[:, None], separate), strict=True)
+    return np.stack([shell_error(own, held, reaches[:, None]).max(axis=1) for own, held in pairs], axis=1)
+
+
+def _joined(parts: Sequence[Poses]) -> Poses:
+    """Poses (joints, n) one after the other."""
+    positions, quaternions = (
+        np.concatenate([getattr(some, name) for some in parts], axis=1) for name in ("positions", "quaternions")
     )
-    sample = int(np.argmin(shell_error(poses, mean, reach)))
-    return sample, float(shell_error(poses, poses[[sample]], reach).max())
+    scales = None if parts[0].scales is None else np.concatenate([some.scales for some in parts], axis=1)
+    return Poses(positions, align_signs(quaternions), scales)
 
 
-def _keys(task: tuple[LongRecording, float, bool, np.ndarray, Poses]) -> list[np.ndarray]:
+def _channels(poses: Poses, separate: bool) -> tuple[Poses, ...]:
+    """Poses (joints, n), or their rotations and their locations as poses."""
+    if not separate:
+        return (poses,)
+    nowhere, unturned = (np.broadcast_to(row, (*poses.shape, len(row))) for row in (np.zeros(3), NO_TURN))
+    return Poses(nowhere, poses.quaternions, poses.scales), Poses(poses.positions, unturned, poses.scales)
+
+
+def _keys(task: tuple[Stretch, float, bool, np.ndarray, Poses]) -> list[np.ndarray]:
     """The keys of each channel of a stretch, of which some move (joints, channels) and others are still (joints,)."""
     part, tolerance, separate, moves, still = task
     recorded, ends = part.body, np.array((0, len(part.times) - 1))

@@ -12,7 +12,7 @@ from bpy.app.translations import pgettext_tip as tip_
 from bpy.props import BoolProperty, FloatProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
-from ..gltf import GltfError, Report, reduce_file
+from ..gltf import GltfError, Options, Report, reduce_file
 
 EXPORTER = "export_scene.gltf"
 
@@ -85,7 +85,7 @@ class RIGID_MOTION_OT_export_gltf(bpy.types.Operator, ExportHelper):
                     use_selection=self.use_selection,
                     **_last_options(context),
                 )
-                report = reduce_file(exported, output, tolerance=self.tolerance, radius=self.radius)
+                report = reduce_file(exported, output, Options(self.tolerance, self.radius))
         except (GltfError, OSError, RuntimeError) as error:
             self.report({"ERROR"}, str(error).strip())
             return {"CANCELLED"}

@@ -72,88 +72,52 @@ def _goals(page: str) -> str:
 
 def of_reduction(page: str) -> list[str]:
     """Of the page of `reduction.py`."""
-    return facts(
-        page,
-        (_decimate_as_good, _bodies_beside_decimate, _bodies_beside_greedy, _beside_ozz, _feet, _time_of_reduction),
-    )
+    return facts(page, (_beside_decimate, _bodies_beside_others, _where_reduction_hurts))
 
 
-def _decimate_as_good(page: str) -> str:
-    told, recordings = [], ""
-    for one in tables(page):
-        if one.head[0] == "Decimate, in multiples of the reduced poses":
-            _, recordings, keys, frames, count, *_ = one.row("as good")
-            told.append(
-                f"{one.section[0].lower()}{one.section[1:]}, keys on {frames} times the frames, {count} times the "
-                f"numbers, {keys} times the keys in a channel"
-            )
+def _beside_decimate(page: str) -> str:
+    told = [(one, one.rows[-1]) for one in tables(page) if "frames with keys" in one.head and "recording" in one.head]
     if not told:
         raise LookupError("no recordings")
+
+    def both(place: int) -> str:
+        return " and ".join(row[place] for _, row in told)
+
+    turned = " and ".join(one.section.removeprefix("Turned by ") for one, _ in told)
     return (
-        f"Measured: *Reduce Keys to Poses* beside Blender's Decimate on {recordings} recordings. To be as good, "
-        f"Decimate needs, {'; '.join(told)}."
+        f"Measured: *Reduce Keys to Poses* beside Blender's Decimate on {len(told[0][0].rows) - 1} recordings. To be "
+        f"as good, Decimate needs keys on {both(2)} times as many frames (with {turned}), and {both(4)} times the "
+        f"numbers; in each channel it has {both(3)} times the keys. With keys on as few frames it is off by {both(6)} times as much."
     )
 
 
-def _bodies_beside_decimate(page: str) -> str:
-    (_, found) = tables_of(page, "Keys beside Blender's Decimate")
-    own, poses = found.row("each joint its own"), found.row("key poses")
+def _bodies_beside_others(page: str) -> str:
+    (_, decimate) = tables_of(page, "Keys beside Blender's Decimate")
+    (greedy,) = tables_of(page, "Key poses beside greedy insertion")
+    (ozz,) = tables_of(page, "Beside ozz-animation")
+    known = [keys == best for keys, best in zip(greedy.column(OURS), greedy.column("optimum"), strict=True) if best]
+    own, poses = decimate.row("each joint its own"), decimate.row("key poses")
+    ratios = [float(row[3]) for row in ozz.rows if row[4]]
     return (
         f"Of whole bodies Decimate needs {own[2]} times the numbers of keys of each joint's own, and {poses[2]} times "
-        "those of key poses."
+        f"those of key poses, which are as few as can be in {sum(known)} of the {len(known)} cases where that is "
+        f"known; ozz-animation needs {span([1.0 / ratio for ratio in ratios[::-1]], 2)} times the keys."
     )
 
 
-def _bodies_beside_greedy(page: str) -> str:
-    (found,) = tables_of(page, "Key poses beside greedy insertion")
-    ratios = [float(cell) for cell in found.column("ratio")]
-    missed = sum("missed" in cell for cell in found.column("goal"))
-    known = [
-        (int(keys), int(best)) for keys, best in zip(found.column(OURS), found.column("optimum"), strict=True) if best
-    ]
-    optimal = sum(keys == best for keys, best in known)
-    return (
-        f"Key poses of whole bodies are {span(ratios, 2)} times as many as by greedy insertion; the goal was missed in "
-        f"{missed} of {len(ratios)} cases. In {optimal} of the {len(known)} cases whose optimum is known, they are the "
-        "optimum."
-    )
-
-
-def _beside_ozz(page: str) -> str:
-    (found,) = tables_of(page, "Beside ozz-animation")
-    rows = [row for row in found.rows if row[4]]
-    missed = sum("missed" in row[4] for row in rows)
-    return (
-        f"For the same error it takes {span([float(row[3]) for row in rows], 2)} times the keys of ozz-animation; the "
-        f"goal was missed by {missed} of {len(rows)} modes."
-    )
-
-
-def _feet(page: str) -> str:
-    (found,) = tables_of(page, "Feet that stand")
+def _where_reduction_hurts(page: str) -> str:
+    (feet,) = tables_of(page, "Feet that stand")
     slides: dict[str, list[float]] = {}
-    for row in found.rows:
-        if row[5]:
+    for row in feet.rows:
+        if row[5] or row[1] == "recording":
             slides.setdefault(row[1], []).append(numbers(row[3])[0])
-    own, heavy = (max(slides[f"each joint its own{how}"]) for how in ("", ", feet weigh 4"))
-    recorded = max(numbers(row[3])[0] for row in found.rows if row[1] == "recording")
-    return (
-        f"Where it hurts: feet that stand slide by up to {own:.1f} mm with keys of each joint's own, {heavy:.1f} mm "
-        f"where feet weigh more, and {recorded:.1f} mm in the recordings."
+    own, heavy, recorded = (
+        f"{max(slides[how]):.1f} mm" for how in ("each joint its own", "each joint its own, feet weigh 4", "recording")
     )
-
-
-def _time_of_reduction(page: str) -> str:
-    every = tables_of(page, "Time")
-    of_bodies, single = every[0], every[-1]
-    goals = [cell for one in every for row in one.rows for cell in row if cell in ("met", "**missed**")]
-    ratios = [float(cell) for cell in single.column("time in multiples of it")]
-    (slow,) = [row for row in single.rows if float(row[-1]) == max(ratios)]
-    told = span([float(cell) for cell in of_bodies.column("of greedy insertion's")], 2)
+    goals = [cell for one in tables(page) for row in one.rows for cell in row if cell in ("met", "**missed**")]
     return (
-        f"Time beside greedy insertion: {told} times for whole bodies; {span(ratios, 2)} times for single recordings, "
-        f"the most for `{slow[0]}`, which takes {slow[2]} s. Goals of time missed: {goals.count('**missed**')} of "
-        f"{len(goals)}."
+        f"Where it hurts: feet that stand slide by up to {own}, by {heavy} where they weigh more, and by {recorded} in "
+        f"the recordings; and {goals.count('**missed**')} of {len(goals)} goals were missed, each marked below."
     )
 
 

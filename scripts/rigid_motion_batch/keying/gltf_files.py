@@ -6,7 +6,7 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from rigid_motion.gltf import Document, GltfError, ReducedClip, Report, read_document, reduced
+from rigid_motion.gltf import Document, GltfError, Options, ReducedClip, Report, read_document, reduced
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.command_line import printable
 
@@ -59,14 +59,7 @@ class GltfRun:
                 self._note(f"{job.source}: no animations; left alone")
                 return
             tolerance = None if wishes.tolerance is None else wishes.tolerance.metres(per_unit)
-            report = reduced(
-                document,
-                tolerance=tolerance,
-                radius=wishes.radius,
-                shared=wishes.shared,
-                count=wishes.count,
-                vertices=wishes.vertices,
-            )
+            report = reduced(document, Options(tolerance, wishes.radius, wishes.shared, wishes.count, wishes.vertices))
         except GltfError as error:
             raise Unreadable(str(error)) from None
         stop_if_asked()
@@ -129,7 +122,7 @@ def _exported(export: Callable[[Path], None]) -> Document:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "exported.glb"
         export(path)
-        return read_document(path)
+        return read_document(path, in_memory=True)
 
 
 def _told(clip: ReducedClip, tolerance: Tolerance, per_unit: float, would: str, *, by_number: bool) -> str:

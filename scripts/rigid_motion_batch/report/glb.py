@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from rigid_motion.gltf import Document, reduced
+from rigid_motion.gltf import Document, Options, reduced
+from rigid_motion.gltf.writing import GrowingView, in_one_buffer
 from rigid_motion.motion import Poses, interpolate
 from rigid_motion.motion.quaternions import align_signs
 from rigid_motion_batch.analysis.modes import label_of
@@ -47,10 +48,6 @@ CUBE = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
 SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 TRIANGLES = np.array([corners for a, b, c, d in SIDES for corners in ((a, b, c), (a, c, d))])
 
-FLOAT, INDEX = 5126, 5125
-
-COLUMNS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
-
 
 @dataclass(frozen=True, eq=False)
 class Lane:
@@ -77,7 +74,7 @@ def comparison_glb(made: Made, groups: Iterable[tuple[str, ...]]) -> bytes:
         name = " = ".join(label_of(mode).partition(" (")[0] for mode in modes)
         lanes.append(Lane(name, colour_of(modes[0]), _shown(clip, made.filled_in(modes[0], times))))
     document = _document(clip, times - times[0], lanes)
-    return reduced(document, tolerance=TOLERANCE).document.files("comparison.glb")["comparison.glb"]
+    return reduced(document, Options(TOLERANCE)).document.files("comparison.glb")["comparison.glb"]
 
 
 def _dense(times: np.ndarray) -> np.ndarray:
@@ -178,38 +175,30 @@ class _Writer:
             "nodes": [],
             "materials": [],
             "meshes": [],
-            "accessors": [],
-            "bufferViews": [],
         }
-        self._data = bytearray()
+        self.keys = GrowingView(self.json)
+        self.vertices = GrowingView(self.json, target=34962, byteStride=12)
+        self.triangles = GrowingView(self.json, target=34963)
 
-    def numbers(self, values: np.ndarray, *, bounds: bool = False, kind: int = FLOAT, target: int | None = None) -> int:
-        """Add an accessor of rows (n, columns), and return its number."""
-        stored = values.astype("<f4" if kind == FLOAT else "<u4")
-        view = {"buffer": 0, "byteOffset": len(self._data), "byteLength": stored.nbytes}
-        self.json["bufferViews"].append(view | ({"target": target} if target else {}))
-        self._data += stored.tobytes()
-        accessor = {"bufferView": len(self.json["bufferViews"]) - 1, "componentType": kind}
-        accessor |= {"count": len(stored), "type": COLUMNS[stored.shape[1]]}
-        if bounds:
-            accessor |= {"min": stored.min(axis=0).tolist(), "max": stored.max(axis=0).tolist()}
-        self.json["accessors"].append(accessor)
-        return len(self.json["accessors"]) - 1
+    def numbers(self, values: np.ndarray, *, bounds: bool = False) -> int:
+        """The number of an accessor of keys (n, columns)."""
+        return self.keys.add(values.astype("<f4"), bounds=bounds)
 
     def surface(self, mesh: Mesh) -> dict[str, Any]:
         """Add the triangles of a mesh, and return what a primitive says of them."""
         corners = mesh.corners()[:6].T
         places, order = np.unique(corners.astype(np.float32), axis=0, return_inverse=True)
-        vertices, normals = places[:, :3].astype(np.float64), places[:, 3:].astype(np.float64)
+        normals = places[:, 3:].astype(np.float64)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
         attributes = {
-            "POSITION": self.numbers(vertices, bounds=True, target=34962),
-            "NORMAL": self.numbers(normals, target=34962),
+            "POSITION": self.vertices.add(places[:, :3], bounds=True),
+            "NORMAL": self.vertices.add(normals.astype("<f4")),
         }
-        return {"attributes": attributes, "indices": self.numbers(order.reshape(-1, 1), kind=INDEX, target=34963)}
+        return {"attributes": attributes, "indices": self.triangles.add(order.reshape(-1, 1).astype("<u4"))}
 
     def document(self, name: str, samplers: list[Any], channels: list[Any]) -> Document:
         """All of it, with one animation."""
         animations = [{"name": name, "samplers": samplers, "channels": channels}] if channels else []
         json = self.json | ({"animations": animations} if animations else {})
-        return Document(json | {"buffers": [{"byteLength": len(self._data)}]}, (bytes(self._data),), ())
+        data = in_one_buffer((self.keys, self.vertices, self.triangles))
+        return Document(json | {"buffers": [{"byteLength": len(data)}]}, (data,), ())

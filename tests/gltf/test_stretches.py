@@ -1,0 +1,146 @@
+"""Long clips, stretch by stretch: the promise holds across, feet stand across, and memory stays flat."""
+
+from __future__ import annotations
+
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rigid_motion.gltf import Options, errors, read_document, reduce_file, reduced
+from tests.gltf.making import Making, turns, walk
+from tests.gltf.oracle import File, off
+from tests.thoroughness import tried
+
+RADIUS, TOLERANCE = 0.03, 3e-3
+
+SINGLE = 1e-6
+"""Metres, of single precision."""
+
+STRETCH = 40
+
+
+@pytest.fixture(autouse=True)
+def short_stretches(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(errors, "STRETCH", STRETCH)
+
+
+def trembling(seed: int, seconds: float = 4.0, joints: int = 3) -> Making:
+    """A chain that swings, where every joint turns and moves and is noisy, with steps, splines and scales as well."""
+    made, random = walk(joints, seconds), np.random.default_rng(seed)
+    times = np.arange(round(seconds * 30.0) + 1) / 30.0
+    own = made.times(times)
+    for joint in range(1, joints):
+        swing = 0.02 * np.sin(random.uniform(3.0, 9.0) * times)[:, None] + random.normal(0.0, 4e-4, (len(times), 3))
+        made.channel(joint, "translation", own, np.array([0.0, 0.3, 0.0]) + swing)
+    made.json["nodes"] += [{"translation": [0.0, 0.2, 0.0]}, {"translation": [0.1, 0.2, 0.0]}]
+    made.json["nodes"][joints - 1]["children"] = [joints, joints + 1]
+    splines = np.zeros((len(times), 3, 4))
+    splines[:, 1] = turns(times, seed % 97)
+    splines[:, [0, 2]] = random.normal(0.0, 0.2, (len(times), 2, 4))
+    made.channel(joints, "rotation", own, splines.reshape(-1, 4), "CUBICSPLINE")
+    made.channel(joints, "translation", own, random.normal(0.0, 0.1, (len(times), 3)), "STEP")
+    made.channel(joints + 1, "scale", own, np.repeat(1.0 + 0.3 * np.sin(times)[:, None], 3, axis=1))
+    made.channel(joints + 1, "rotation", own, turns(times, seed % 89))
+    return made
+
+
+@settings(max_examples=tried(12), deadline=None)
+@given(st.integers(0, 10**9), st.booleans())
+def test_no_point_is_off_by_more_anywhere_across_the_borders(tmp_path_factory, seed, shared):
+    folder = tmp_path_factory.mktemp("long")
+    path = trembling(seed).write(folder / "long.glb")
+    report = reduce_file(path, folder / "out.glb", Options(TOLERANCE, RADIUS, shared=shared))
+    assert report.clips[0].tracks is not None or shared
+    error = off(File(path), File(folder / "out.glb"), 0, RADIUS)
+    assert error <= min(TOLERANCE, report.clips[0].error) + SINGLE
+
+
+def test_all_that_moves_has_keys_where_stretches_meet_and_few_more_elsewhere(tmp_path, monkeypatch):
+    document = read_document(walk(seconds=20.0).write(tmp_path / "walk.glb"))
+    (found,) = reduced(document, Options(TOLERANCE, RADIUS)).clips
+    meeting = np.float32(np.linspace(0, 600, 16).round() / 30.0)
+    assert all(np.isin(meeting, track.times).all() for track in found.tracks if len(track.times) > 1)
+    monkeypatch.setattr(errors, "STRETCH", 10**6)
+    (whole,) = reduced(document, Options(TOLERANCE, RADIUS)).clips
+    assert found.after.keys <= 1.15 * whole.after.keys
+
+
+def test_what_hardly_moves_has_one_key_throughout(tmp_path):
+    made = walk(seconds=8.0)
+    times = np.arange(241) / 30.0
+    made.json["nodes"].append({"translation": [0.0, 0.2, 0.0]})
+    made.json["nodes"][5]["children"] = [6]
+    tremble = np.random.default_rng(3).normal(0.0, 4e-5, (241, 3))
+    made.channel(6, "translation", made.times(times), np.array([0.0, 0.2, 0.0]) + tremble)
+    path = made.write(tmp_path / "walk.glb")
+    report = reduce_file(path, tmp_path / "out.glb", Options(TOLERANCE, RADIUS))
+    after = File(tmp_path / "out.glb")
+    assert len(after.tracks(0)[6, "translation"][1]) == 1
+    assert off(File(path), after, 0, RADIUS) <= report.tolerance + SINGLE
+
+
+def standing_body(path: Path) -> tuple[Path, float, float]:
+    """A body whose leg turns to and fro below its hips, which go along: its foot stands from one time to another."""
+    made = Making()
+    begin, end, times = 1.0, 6.0, np.arange(241) / 30.0
+    made.json["nodes"] = [
+        {"children": [1, 3]},
+        {"children": [2]},
+        {"translation": [0.0, -1.0, 0.0]},
+        {"translation": [0.0, 0.7, 0.0]},
+    ]
+    made.json["skins"] = [{"joints": [0, 1, 2, 3]}]
+    angles = 0.3 * np.sin(2.0 * times) + 0.1 * np.sin(7.3 * times)
+    walks = 0.3 * np.minimum(times - begin, 0.0) + 0.3 * np.maximum(times - end, 0.0)
+    own, none = made.times(times), np.zeros_like(times)
+    made.channel(0, "translation", own, np.column_stack((walks - np.sin(angles), np.cos(angles), none)))
+    made.channel(1, "rotation", own, np.column_stack((none, none, np.sin(angles / 2), np.cos(angles / 2))))
+    made.channel(3, "rotation", own, turns(times, 4))
+    return made.write(path), begin, end
+
+
+def slide(file: File, begin: float, end: float) -> float:
+    """How far the foot gets from where it is at first, at the samples from one time to another."""
+    samples = np.arange(round(30 * begin) + 1, round(30 * end)) / 30.0
+    places = file.worlds(0, samples)[2, :, :3, 3]
+    return float(np.linalg.norm(places - places[0], axis=1).max())
+
+
+@pytest.mark.parametrize("stretch", [STRETCH, 10**6], ids=["in stretches", "whole"])
+@pytest.mark.parametrize("how", [{}, {"shared": True}], ids=["keys of their own", "key poses"])
+def test_feet_that_stand_across_borders_slide_by_no_more_than_a_millimetre(tmp_path, monkeypatch, how, stretch):
+    monkeypatch.setattr(errors, "STRETCH", stretch)
+    path, begin, end = standing_body(tmp_path / "body.glb")
+    report = reduce_file(path, tmp_path / "out.glb", Options(2e-2, RADIUS, **how))
+    before, after = File(path), File(tmp_path / "out.glb")
+    assert report.clips[0].tracks is not None
+    assert slide(before, begin, end) < SINGLE
+    assert slide(after, begin, end) <= 1e-3 * report.size / 1.7 + SINGLE
+    assert off(before, after, 0, RADIUS) <= report.tolerance + SINGLE
+
+
+def test_feet_count_where_so_many_key_poses_are_wanted(tmp_path):
+    path, begin, end = standing_body(tmp_path / "body.glb")
+    report = reduce_file(path, tmp_path / "out.glb", Options(radius=RADIUS, count=60))
+    after = File(tmp_path / "out.glb")
+    assert len(after.moments(0)) == 60
+    assert slide(after, begin, end) <= 1e-3 * report.size / 1.7 + SINGLE
+
+
+def test_memory_hardly_grows_with_the_length(tmp_path, monkeypatch):
+    monkeypatch.setattr(errors, "STRETCH", 300)
+
+    def peak(seconds: float) -> int:
+        path = walk(4, seconds).write(tmp_path / f"{seconds}.glb")
+        tracemalloc.start()
+        reduce_file(path, tmp_path / "out.glb", Options(2e-2, RADIUS))
+        found = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return found
+
+    # The 31 numbers that a frame has in the file, in double precision: not even they are all there at once.
+    assert peak(140.0) - peak(30.0) < 110 * 30 * 31 * 8
