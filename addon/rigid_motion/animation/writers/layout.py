@@ -161,7 +161,7 @@ class Layout:
     def modify(self, fcurve: bpy.types.FCurve, pieces: Sequence[Piece] = ()) -> None:
         """Give an F-curve the modifiers that it needs, in place of those it has, and add these to it."""
         present = fcurve.modifiers[:]
-        wanted = [*self._modifiers, *(piece.modifier for piece in pieces)]
+        wanted = self._modifiers + [piece.modifier for piece in pieces]
         if not (present or wanted) or _are(present, wanted):
             return
         for modifier in present:
