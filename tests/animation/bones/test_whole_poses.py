@@ -132,12 +132,19 @@ def test_a_single_property_is_moved_on_from_what_is_seen(rig):
 
 
 @pytest.mark.parametrize("keyed", ["at once", "later"])
-def test_rigify_keeps_a_transform_where_it_is_seen_when_a_parent_is_switched(rig, live_file, keyed):
-    """What its *Switch Parent* does: matrices as they are, the switch, and each matrix set again."""
+@pytest.mark.parametrize("applied", [False, True], ids=["as it is", "with the visual transform applied"])
+def test_rigify_keeps_a_transform_where_it_is_seen_when_a_parent_is_switched(rig, live_file, applied, keyed):
+    """What its switches do: matrices as they are, the switch, and each matrix set again.
+
+    Those of limbs take the matrices with constraints; *Switch Parent* takes that of the properties alone, in which what
+    is seen has to be.
+    """
     # Its functions alone: as an add-on it would leave classes behind, which the tests of its human register anew.
     tools = importlib.import_module("rigify.utils.animation")
     seen, hand = placed(rig), rig.pose.bones["Hand"]
-    matrix = tools.get_transform_matrix(rig, "Hand")
+    if applied:
+        apply_visual_transform(rig)
+    matrix = tools.get_transform_matrix(rig, "Hand", with_constraints=not applied)
     # The switch: what the hand hangs on is elsewhere from now on.
     switch = hand.parent.constraints.new("COPY_ROTATION")
     switch.target, switch.subtarget = rig, "Body"

@@ -77,7 +77,7 @@ def write_channel(
             fcurves.remove(old)
         fcurve = fcurves.new(data_path, index=index)
         if group:
-            fcurve.group = channelbag.groups.get(group) or channelbag.groups.new(group)
+            fcurve.group = ensure_group(channelbag, group)
         replace_keys(fcurve, frames, column, interpolation=interpolation, key_type=key_type)
 
 
@@ -143,12 +143,16 @@ def set_key_fields(fcurve: bpy.types.FCurve, fields: KeyFields) -> None:
     fcurve.update()
 
 
+def ensure_group(channelbag: bpy.types.ActionChannelbag, name: str) -> bpy.types.ActionGroup:
+    """The group of this name, made where there is none yet."""
+    return channelbag.groups.get(name) or channelbag.groups.new(name)
+
+
 def copy_fcurve(fcurve: bpy.types.FCurve, channelbag: bpy.types.ActionChannelbag) -> bpy.types.FCurve:
     """A copy of an F-curve with keys in another slot or Action, in a group of the same name. It has none there yet."""
     copy = channelbag.fcurves.new(fcurve.data_path, index=fcurve.array_index)
     if fcurve.group is not None:
-        name = fcurve.group.name
-        copy.group = channelbag.groups.get(name) or channelbag.groups.new(name)
+        copy.group = ensure_group(channelbag, fcurve.group.name)
     set_key_fields(copy, key_fields(fcurve))
     for modifier in fcurve.modifiers:
         _copy_settings(modifier, copied := copy.modifiers.new(modifier.type))

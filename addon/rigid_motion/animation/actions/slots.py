@@ -110,17 +110,12 @@ class SlotTransform:
         group = None if channelbag is None else channelbag.groups.get(name)
         if group is None:
             return {}
+        is_own = {self.prefix + prop for prop in WIDTHS}.__contains__ if apart else _is_difference
         return {
-            (fcurve.data_path, fcurve.array_index): fcurve
+            (path, fcurve.array_index): fcurve
             for fcurve in group.channels
-            if not fcurve.keyframe_points
-            and (self._has_difference(fcurve.data_path) if apart else _is_difference(fcurve.data_path))
+            if not fcurve.keyframe_points and is_own(path := fcurve.data_path)
         }
-
-    def _has_difference(self, path: str) -> bool:
-        """Whether a data path in a slot of differences is that of one of its own."""
-        prefix, prop = split_path(path)
-        return prefix == self.prefix and prop in WIDTHS
 
     def has_filled(self, curves: Curves) -> None:
         """Take note of the F-curves that in-betweens are in by now."""

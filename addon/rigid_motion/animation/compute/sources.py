@@ -191,7 +191,7 @@ class Source:
         """Where any of the channels has a key of the animator's, shape (k,)."""
         return np.unique(np.concatenate([keys.times for keys in self.curves]))
 
-    @property
+    @cached_property
     def key_frames(self) -> np.ndarray:
         """The same without keys that are one to Blender, and with the copies that cycles make, (n,).
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...motion.quaternions import conjugate, rotate
 from ...motion.spins import FULL_TURN
-from ..actions.channels import replace_keys
+from ..actions.channels import ensure_group, replace_keys
 from ..actions.records import recorded_digest
 from ..actions.slots import SlotTransform
 from ..compute.components import LOCATION, ROWS
@@ -90,8 +90,8 @@ def _is_among(chosen: np.ndarray, frames: np.ndarray) -> np.ndarray:
 
 
 def _new(place: SlotTransform, channel: Channel) -> bpy.types.FCurve:
-    fcurve, channelbag, group = place.ensure_curve(channel), place.channelbag, place.users[0].group
-    fcurve.group = channelbag.groups.get(group) or channelbag.groups.new(group)
+    fcurve = place.ensure_curve(channel)
+    fcurve.group = ensure_group(place.channelbag, place.users[0].group)
     return fcurve
 
 

@@ -295,11 +295,11 @@ def _at_rest(channelbag: bpy.types.ActionChannelbag) -> dict[Channel, bpy.types.
 
 def _make_room(place: SlotTransform, points: Collection[Channel]) -> None:
     """Take out what holds quaternions that get samples."""
-    channelbag = place.slot.bones_channelbag
-    if channelbag is not None:
-        present = _at_rest(channelbag)
-        for channel in present.keys() & points:
-            channelbag.fcurves.remove(present[channel])
+    if place.kind.is_part or (channelbag := place.slot.bones_channelbag) is None:
+        return
+    present = _at_rest(channelbag)
+    for channel in present.keys() & points:
+        channelbag.fcurves.remove(present[channel])
 
 
 def _keep_at_rest(place: SlotTransform, points: Collection[Channel]) -> None:
@@ -307,8 +307,7 @@ def _keep_at_rest(place: SlotTransform, points: Collection[Channel]) -> None:
 
     Blender evaluates the slot on an object whose quaternions are zero, and takes these for half a turn.
     """
-    channelbag = place.slot.bones_channelbag
-    if place.kind.is_part or channelbag is None:
+    if place.kind.is_part or (channelbag := place.slot.bones_channelbag) is None:
         return
     held = set()
     if points and place.users[0].rotation == "rotation_quaternion":

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from ..actions.records import record_in_betweens, recorded, recorded_digest, recorded_rows
-from ..actions.slots import SlotTransform, slot_transforms_in
+from ..actions.slots import SlotTransform, slot_transforms_in, slots_in
 from ..compute.source_cache import cached_source
 from ..compute.sources import Source
 from .table import writer_of
@@ -37,10 +37,12 @@ def begin_drafts(readings: Sequence[tuple[SlotTransform, Source]]) -> None:
 
 def _begin_draft(action: bpy.types.Action, known: Iterable[SlotTransform]) -> None:
     """Take out of an Action the samples between frames. `known` are some of its places."""
-    places = {(place.slot.handle, place.prefix): place for place in (*slot_transforms_in([action]), *known)}
     # Strips may show what is between the frames of an Action on whole frames of the scene.
-    if not any(place.slot.in_nla for place in places.values()):
-        action.rigid_motion.is_draft = action.rigid_motion.has_longer = True
+    if any(slot.in_nla for slot in slots_in([action])):
+        return
+    action.rigid_motion.is_draft = action.rigid_motion.has_longer = True
+    if any(record.rate > 1 for record in action.rigid_motion.slots):
+        places = {(place.slot.handle, place.prefix): place for place in (*slot_transforms_in([action]), *known)}
         for place in places.values():
             _take_out_between_frames(place)
 

@@ -255,21 +255,19 @@ def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.type
         # Those of bones first: one that lies outside is enough to know, and in a draft any is going to again.
         most = 1 if is_draft(action) else None
         samples = [fcurve for bag in bags if bag.slot_handle in apart for fcurve in bag.fcurves[:most]]
-        begin, end, span = math.inf, -math.inf, None
-        for bag in bags:
-            for fcurve in bag.fcurves if bag.slot_handle not in apart else ():
-                # There may be thousands, most with keys on the same frames: no more is asked than is needed.
-                if (own := fcurve.range()) == span:
-                    continue
-                first, last = own
-                if begin <= first and last <= end:
-                    continue
-                if not _has_range(fcurve):
-                    continue
-                if is_filled_in(fcurve) or is_time(fcurve):
-                    samples.append(fcurve)
-                else:
-                    begin, end, span = min(begin, first), max(end, last), own
+        begin, end = math.inf, -math.inf
+        farthest = tuple(action.curve_frame_range)
+        for fcurve in (fcurve for bag in bags if bag.slot_handle not in apart for fcurve in bag.fcurves):
+            # There may be thousands: no more are asked than can say anything.
+            if samples and (begin, end) == farthest:
+                break
+            first, last = fcurve.range()
+            if (begin <= first and last <= end) or not _has_range(fcurve):
+                continue
+            if is_filled_in(fcurve) or is_time(fcurve):
+                samples.append(fcurve)
+            else:
+                begin, end = min(begin, first), max(end, last)
         is_outside = (samples and is_draft(action)) or any(_is_outside(fcurve, begin, end) for fcurve in samples)
         if begin <= end and is_outside:
             if (action.use_frame_range, action.frame_start, action.frame_end) != (True, begin, end):

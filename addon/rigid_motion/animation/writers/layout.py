@@ -92,7 +92,7 @@ class Layout:
         """In an F-curve that is read as the frames pass."""
         first, last = source.frame_range
         cycles = source.cyclic.cycles if source.repeats else None
-        return cls(first, last, _ends(source, 1), cycles, first < 0 and cycles is None, steps=source.steps)
+        return cls(first, last, _ends(source, first, last), cycles, first < 0 and cycles is None, steps=source.steps)
 
     @classmethod
     def apart(cls, source: Source, rate: int) -> Layout:
@@ -100,7 +100,8 @@ class Layout:
         first, last = source.sample_range(rate)
         cycles = source.cyclic.cycles if source.repeats else None
         shift, steps = max(0, -source.frame_range[0]), source.steps
-        return cls(first, last, _ends(source, rate), cycles, shift=shift, is_apart=True, steps=steps, rate=rate)
+        ends = _ends(source, first / rate, last / rate)
+        return cls(first, last, ends, cycles, shift=shift, is_apart=True, steps=steps, rate=rate)
 
     @property
     def frames(self) -> tuple[int, int]:
@@ -161,7 +162,7 @@ class Layout:
     def modify(self, fcurve: bpy.types.FCurve, pieces: Sequence[Piece] = ()) -> None:
         """Give an F-curve the modifiers that it needs, in place of those it has, and add these to it."""
         present = fcurve.modifiers[:]
-        wanted = [*self._modifiers, *(piece.modifier for piece in pieces)]
+        wanted = self._modifiers + [piece.modifier for piece in pieces]
         if not (present or wanted) or _are(present, wanted):
             return
         for modifier in present:
@@ -222,9 +223,8 @@ def _are(modifiers: Sequence[bpy.types.FModifier], wanted: Sequence[Modifier]) -
     )
 
 
-def _ends(source: Source, rate: int) -> tuple[float, float]:
-    """The frames on which the outermost samples of a source lie, of so many a frame."""
-    first, last = (number / rate for number in source.sample_range(rate))
+def _ends(source: Source, first: float, last: float) -> tuple[float, float]:
+    """The frames on which the outermost samples of a source lie, which are for these."""
     if source.goes_on and not source.repeats:
         return first, last
     begin, end = source.keyed_range

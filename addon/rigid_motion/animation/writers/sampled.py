@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import bpy
 import numpy as np
 
+from ..actions.channels import ensure_group
 from ..actions.records import recorded_rows
 from ..actions.slots import Curves, SlotTransform
 from ..transforms import Channel
@@ -46,10 +47,12 @@ def replace_samples(
         The F-curves by now, and the channels of those that were taken out.
     """
     curves: Curves = {}
+    # Blender goes through all groups for a name.
+    home = ensure_group(channelbag, group) if points.keys() - present.keys() else None
     for channel, samples in points.items():
         fcurve = present.get(channel)
         if fcurve is None:
-            fcurve = _new(channelbag, group, channel, layout.count)
+            fcurve = _new(channelbag, home, channel, layout.count)
         elif len(fcurve.sampled_points) != layout.count:
             _resize(fcurve, layout.count)
         fcurve.sampled_points.foreach_set("co", samples)
@@ -85,9 +88,9 @@ def _constant(fcurve: bpy.types.FCurve) -> float | None:
     return next((point.co[1] for point in fcurve.sampled_points), None)
 
 
-def hide_fcurve(channelbag: bpy.types.ActionChannelbag, group: str, fcurve: bpy.types.FCurve) -> None:
+def hide_fcurve(fcurve: bpy.types.FCurve, group: bpy.types.ActionGroup) -> None:
     """Take an F-curve out of the animator's way: into a group, locked, and hidden in the Graph Editor."""
-    fcurve.group = channelbag.groups.get(group) or channelbag.groups.new(group)
+    fcurve.group = group
     fcurve.lock = fcurve.hide = True
     fcurve.select = False
 
@@ -105,7 +108,7 @@ def regroup(place: SlotTransform) -> None:
     for channel in {of_rotation[row] for of_rotation in channels for row in rows if row in of_rotation}:
         fcurve = channelbag.fcurves.find(channel[0], index=channel[1])
         if fcurve is not None and channel not in place.filled and not fcurve.keyframe_points:
-            hide_fcurve(channelbag, group, fcurve)
+            hide_fcurve(fcurve, ensure_group(channelbag, group))
             place.has_filled({**place.filled, channel: fcurve})
 
 
@@ -116,10 +119,12 @@ def remove_if_empty(channelbag: bpy.types.ActionChannelbag, group: str) -> None:
         channelbag.groups.remove(found)
 
 
-def _new(channelbag: bpy.types.ActionChannelbag, group: str, channel: Channel, count: int) -> bpy.types.FCurve:
+def _new(
+    channelbag: bpy.types.ActionChannelbag, group: bpy.types.ActionGroup, channel: Channel, count: int
+) -> bpy.types.FCurve:
     path, index = channel
     fcurve = channelbag.fcurves.new(path, index=index)
-    hide_fcurve(channelbag, group, fcurve)
+    hide_fcurve(fcurve, group)
     fcurve.keyframe_points.add(1)
     fcurve.convert_to_samples(0, count)
     return fcurve

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 
-from ..actions.channels import add_cycles, replace_keys
+from ..actions.channels import add_cycles, ensure_group, replace_keys
 from ..actions.key_reading import read_steps
 from ..actions.records import recorded
 from ..actions.slots import Slot, SlotTransform, strips_of
@@ -146,7 +146,7 @@ def write_time(place: SlotTransform, layout: Layout) -> None:
     replace_keys(fcurve, frames, times)
     add_cycles(fcurve, _without_offset(layout.cycles))
     add_modifiers(fcurve, layout.stepping)
-    hide_fcurve(place.channelbag, place.kind.difference_group(place.prefix), fcurve)
+    hide_fcurve(fcurve, ensure_group(place.channelbag, place.kind.difference_group(place.prefix)))
 
 
 def write_line(place: SlotTransform, path: str, line: Line) -> bpy.types.FCurve:
@@ -163,7 +163,7 @@ def new_line(channelbag: bpy.types.ActionChannelbag, group: str, channel: Channe
     generator = fcurve.modifiers.new("GENERATOR")
     generator.poly_order = 1
     generator.coefficients = line
-    hide_fcurve(channelbag, group, fcurve)
+    hide_fcurve(fcurve, ensure_group(channelbag, group))
     return fcurve
 
 
