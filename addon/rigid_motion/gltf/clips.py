@@ -5,8 +5,10 @@ A clip that would not become smaller stays as it was.
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -146,13 +148,13 @@ class ClipReduction:
 
     def _so_many(self) -> tuple[list[StoredTrack], float]:
         """Tracks with so many key poses, those under which feet slide least, and the largest error."""
-        search, (integers, _) = self._search(), self._storing()
+        search = self._search()
         best, farthest = [], np.inf
         for weight in FEET_WEIGH:
             weights = np.ones((len(self.world.moving), len(self.world.times)))
             weights[self.feet.places] += (weight - 1.0) * self.feet.stand
             keys = search.so_many_key_poses(self.options.count, weights)
-            tracks = self._stored([keys] * len(self.dense), integers=integers)
+            tracks = self._stored([keys] * len(self.dense))
             farther = self.feet.farther(self._shown(tracks))
             if farther < farthest:
                 best, farthest = tracks, farther
@@ -163,15 +165,14 @@ class ClipReduction:
     def _within_tolerance(self) -> tuple[list[StoredTrack], float] | None:
         """Tracks with few keys that keep to the tolerance, and the largest error; None where none do."""
         if not self.dense:
-            return self._proven([], integers=False)
-        search, (integers, taken) = self._search(), self._storing()
-        allowed = self.options.tolerance - taken
+            return self._proven([])
+        search, allowed = self._search(), self.options.tolerance - self.storing[1]
         while allowed > LEAST * self.options.tolerance:
             if self.options.shared:
                 samples = [search.key_poses(allowed)] * len(self.dense)
             else:
                 samples = self._samples(search.keys(allowed))
-            found = self._proven(samples, integers=integers)
+            found = self._proven(samples)
             if found is not None:
                 return found
             allowed *= TIGHTER
@@ -183,33 +184,47 @@ class ClipReduction:
         steps = [node for node, path in moved if path in (TRANSLATION, ROTATION)]
         return Search(self.world, self.settled | self.dense, np.isin(self.world.moving, steps))
 
-    def _storing(self) -> tuple[bool, float]:
-        """Whether rotations may be integers, and how far off all is with all keys, by storing and what is settled."""
-        times = self.world.times
-        for integers in (True, False):
+    @cached_property
+    def storing(self) -> tuple[frozenset[tuple[int, str]], float]:
+        """The rotations that are stored as integers, and how far off all is with all keys, by that and what is settled.
+
+        What moves least by its own rotation comes first.
+        """
+        reaches, places = self.world.reaches, self.world.places
+        turned = [target for target in (*self.dense, *self.settled) if target[1] == ROTATION]
+        turned.sort(key=lambda target: reaches[places[target[0]]])
+
+        def taken(count: int) -> float:
+            integers, times = frozenset(turned[:count]), self.world.times
             dense = {
-                target: replace(track.keyed(times[:1]), times=times, values=EveryKey(track, times, integers))
+                target: replace(track.keyed(times[:1]), times=times, values=EveryKey(track, times, target in integers))
                 for target, track in self.dense.items()
             }
-            shown_tracks = self._shown(self._with_settled([], integers)) | dense
-            taken = self.world.largest_error(shown_tracks, parts=1)
-            if taken <= OF_INTEGERS * self.options.tolerance:
-                break
-        return integers, taken
+            held = [stored(track, integers=target in integers) for target, track in self.settled.items()]
+            return self.world.largest_error(self._shown(held) | dense, parts=1)
+
+        count, allowed = len(turned), OF_INTEGERS * self.options.tolerance
+        if (off := taken(count)) > allowed:
+            count = max(bisect_right(range(count), allowed, key=taken) - 1, 0)
+            off = taken(count)
+        return frozenset(turned[:count]), off
+
+    def _stored_track(self, track: Track) -> StoredTrack:
+        return stored(track, integers=(track.node, track.path) in self.storing[0])
 
     def _samples(self, keys: Sequence[SeparateKeys]) -> list[np.ndarray]:
         """Those that are keys of each dense track."""
         of_nodes = [(path, keys[self.world.places[node]]) for node, path in self.dense]
         return [own.rotation if path == ROTATION else own.location for path, own in of_nodes]
 
-    def _proven(self, samples: list[np.ndarray], *, integers: bool) -> tuple[list[StoredTrack], float] | None:
+    def _proven(self, samples: list[np.ndarray]) -> tuple[list[StoredTrack], float] | None:
         """Stored tracks with keys at these samples, and at more of them where the proof fails, and their largest error.
 
         None where the proof fails with more and more of them.
         """
         sound: dict[int, tuple[int, float]] = {}
         for _ in range(ROUNDS):
-            tracks = self._stored(samples, integers=integers)
+            tracks = self._stored(samples)
             places, eighths = self._failures(self._shown(tracks), sound)
             if not len(places):
                 return tracks, max(error for _, error in sound.values())
@@ -255,12 +270,13 @@ class ClipReduction:
             for own, new in zip(samples, more, strict=True)
         ]
 
-    def _stored(self, samples: Sequence[np.ndarray], *, integers: bool) -> list[StoredTrack]:
+    def _stored(self, samples: Sequence[np.ndarray]) -> list[StoredTrack]:
         """All tracks as they are to be stored, the dense ones with keys at these samples."""
         times, tracks = self.world.times, []
         moving = [number for number, own in enumerate(samples) if len(own) > 1]
         dense = list(self.dense.values())
-        widths = [key_size(dense[number].path, integers=integers) for number in moving]
+        targets = list(self.dense)
+        widths = [key_size(targets[number][1], integers=targets[number] in self.storing[0]) for number in moving]
         shared = shared_times([samples[number] for number in moving], widths, len(times))
         together = dict(zip(moving, shared, strict=True))
         for number, (track, own) in enumerate(zip(dense, samples, strict=True)):
@@ -270,11 +286,8 @@ class ClipReduction:
             else:
                 # Keys for the sake of others change nothing of what is shown.
                 thinned = thinned.keyed(times[together[number]])
-            tracks.append(stored(thinned, integers=integers))
-        return self._spanning(self._with_settled(tracks, integers))
-
-    def _with_settled(self, tracks: list[StoredTrack], integers: bool) -> list[StoredTrack]:
-        return tracks + [stored(track, integers=integers) for track in self.settled.values()]
+            tracks.append(self._stored_track(thinned))
+        return self._spanning(tracks + [self._stored_track(track) for track in self.settled.values()])
 
     def _spanning(self, tracks: list[StoredTrack]) -> list[StoredTrack]:
         """The same with keys at both ends of the clip in one of them at least: it lasts as long as before."""
@@ -286,9 +299,8 @@ class ClipReduction:
             first = self.clip.tracks[0]
             tracks = [stored(first.keyed(ends[:1]), integers=False)]
         number = min(range(len(tracks)), key=lambda number: len(tracks[number].times))
-        integers = tracks[number].values.dtype.kind == "i"
         track = shown(self._of_channel[tracks[number].channel], tracks[number])
-        tracks[number] = stored(track.keyed(np.union1d(track.times, ends)), integers=integers)
+        tracks[number] = self._stored_track(track.keyed(np.union1d(track.times, ends)))
         return tracks
 
     @property
