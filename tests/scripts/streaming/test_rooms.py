@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import zenoh  # noqa: F401 - without it these tests are skipped
 
 from rigid_motion.streams import Receiver
 from rigid_motion_batch.cli.stream import main
