@@ -207,7 +207,8 @@ def receive(options: argparse.Namespace, stopped: list[int]) -> None:
         Progress() as progress,
         closing(handing) if handing else nullcontext(),
     ):
-        receiving = Receiving(room, options.user, options.fps, options.margin, handing)
+        keeps = bool(options.output or truth)
+        receiving = Receiving(room, options.user, options.fps, options.margin, handing, keeps)
         _say(f"{options.user} listens in {options.room}")
         until = time.monotonic() + (options.seconds or float("inf"))
         with _stage(progress, "Receiving", options.seconds) as stage:
@@ -219,7 +220,7 @@ def receive(options: argparse.Namespace, stopped: list[int]) -> None:
     for user, datagrams in receiving.datagrams.items():
         _say(f"{user}: {datagrams} datagrams, {receiving.bytes[user]} bytes")
     motions = _motions(receiving.shown)
-    if not motions:
+    if not (motions if keeps else receiving.datagrams):
         came = "nothing that could be shown came" if receiving.datagrams else f"nobody sent anything in {options.room}"
         raise RoomError(f"{came}, so nothing is written; see --room and --at of the sender")
     if options.mode:

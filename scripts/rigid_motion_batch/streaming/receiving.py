@@ -15,7 +15,7 @@ import numpy as np
 from rigid_motion.motion import Poses, shell_error
 from rigid_motion.streams import Body, Receiver, Shown
 from rigid_motion.streams.bodies import Forest
-from rigid_motion.streams.receiver import Stream
+from rigid_motion.streams.receiver import MOST_STREAMS, Stream
 
 from .rooms import ANSWERS, MOTION, SKELETON, Came, Room
 from .transports import LONGEST
@@ -95,9 +95,14 @@ class Handing:
                     found.append((user, own.recv(LONGEST)))
         return found
 
-    def close(self) -> None:
-        for own in self._sockets.values():
+    def forget(self, user: str) -> None:
+        """Close the port of a user who has gone."""
+        if own := self._sockets.pop(user, None):
             own.close()
+
+    def close(self) -> None:
+        for user in list(self._sockets):
+            self.forget(user)
 
 
 class Receiving:
@@ -113,10 +118,14 @@ class Receiving:
     margin : float
         Seconds that are waited longer for each datagram.
     handing : Handing, optional
+    keeps : bool
+        Whether what was shown, and the keys, are to be there in the end.
     """
 
-    def __init__(self, room: Room, user: str, fps: float, margin: float, handing: Handing | None = None) -> None:
-        self.room, self.fps, self.margin, self.handing = room, fps, margin, handing
+    def __init__(
+        self, room: Room, user: str, fps: float, margin: float, handing: Handing | None = None, keeps: bool = True
+    ) -> None:
+        self.room, self.fps, self.margin, self.handing, self.keeps = room, fps, margin, handing, keeps
         self.receiver = Receiver()
         self.shown, self.keys = Tracks(), Tracks()
         self.datagrams, self.bytes = Counter(), Counter()
@@ -146,7 +155,9 @@ class Receiving:
 
     def _take(self, came: Came, now: float) -> None:
         if came.datagram is None:
-            self._heard.pop(came.user, None)
+            self._leave(came.user)
+            return
+        if came.user not in self._heard and len(self._heard) == MOST_STREAMS:
             return
         self._heard[came.user], self._silent = now, math.inf
         self.datagrams[came.user] += 1
@@ -165,6 +176,16 @@ class Receiving:
 
     def _show(self, now: float) -> None:
         shown = self.receiver.show(now)
+        for act in self.on_frame:
+            act(shown)
+        if self.keeps:
+            self._keep(shown)
+        for user in [user for user, heard in self._heard.items() if now - heard > SILENT]:
+            self._leave(user)
+        if self.datagrams and not self._heard and self._silent == math.inf:
+            self._silent = now
+
+    def _keep(self, shown: dict[Stream, Shown]) -> None:
         for stream, what in shown.items():
             self.shown.add(self.receiver, stream, what.moment, what.poses)
         came = self.receiver.keys()
@@ -172,9 +193,8 @@ class Receiving:
             for row, moment in enumerate(keys.moments.tolist()):
                 poses = {name: poses[row] for name, poses in keys.poses.items()}
                 self.keys.add(self.receiver, keys.stream, moment, poses)
-        for act in self.on_frame:
-            act(shown)
-        for user in [user for user, heard in self._heard.items() if now - heard > SILENT]:
-            del self._heard[user]
-        if self.datagrams and not self._heard and self._silent == math.inf:
-            self._silent = now
+
+    def _leave(self, user: str) -> None:
+        self._heard.pop(user, None)
+        if self.handing:
+            self.handing.forget(user)

@@ -31,7 +31,7 @@ MOTION, SKELETON, ANSWERS, LISTENING = "motion", "skeleton", "answers", "listeni
 USER = re.compile(r"[\w.-]+")
 ROOM = re.compile(r"[\w.-]+(/[\w.-]+)*")
 
-WAIT_MS = 2000
+WAIT_MS = 4000
 """For which a router that cannot be reached is tried."""
 
 RETRY = {"period_init_ms": 100, "period_max_ms": 200, "period_increase_factor": 1.5}
@@ -39,6 +39,9 @@ RETRY = {"period_init_ms": 100, "period_max_ms": 200, "period_increase_factor": 
 
 LARGEST = 1 << 16
 """Bytes of what Zenoh takes from others at once."""
+
+BATCHES = 16
+"""That may be on the way out at once before some are dropped: in a room of many each datagram is one."""
 
 MOST_WAITING = 4096
 """Datagrams that wait to be looked at; others are dropped, as a network does."""
@@ -86,6 +89,7 @@ def settings(role: str, at: str | None, network: bool) -> dict[str, Any]:
         "scouting/multicast/enabled": network,
         "connect/retry": RETRY,
         "transport/link/rx/max_message_size": LARGEST,
+        "transport/link/tx/queue/size/data": BATCHES,
     }
     if role == "router":
         return found | {"listen/endpoints": [place]}
@@ -124,13 +128,11 @@ def opened(role: str, at: str | None = None, network: bool = False, config: Path
     try:
         return zenoh.open(told)
     except zenoh.ZError as error:
-        where = at or config or HERE
-        way = (
-            "another program may have this port"
-            if role == "router"
-            else f"start a router there: stream router --at {where}"
-        )
-        raise RoomError(f"{where}: there is no way to it ({_first_line(error)}); {way}") from None
+        if role == "router":
+            way = "another program may have this port, or a file is missing"
+        else:
+            way = "is its router running, as stream router --network on that machine?"
+        raise RoomError(f"{at or config or HERE}: there is no way to it ({_first_line(error)}); {way}") from None
 
 
 def _first_line(error: Exception) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterable, Sequence
 
@@ -25,6 +26,9 @@ LOOK = 0.02
 
 ALMOST = 0.9
 """Part of the interval of an even stream after which a key is due."""
+
+AGAIN = 0.03
+"""Seconds after which the description is sent again; many may ask for it at once."""
 
 AFTER = 0.3
 """Seconds for which a sender stays behind the end, beside the delay: what was lost is asked for."""
@@ -89,6 +93,7 @@ class Sending:
     def __init__(self, room: Room, user: str, sender: Sender) -> None:
         self.room, self.user, self.sender = room, user, sender
         self.datagrams = self.bytes = self.joined = 0
+        self._described = -math.inf
         room.listen(user, ANSWERS)
         room.watch_presence()
 
@@ -101,11 +106,15 @@ class Sending:
 
     def take(self, came: Came, now: float) -> None:
         """Deal with an answer, or with somebody who joins, at a time of the motion."""
+        said = []
         if came.stream == LISTENING and came.datagram is not None:
             self.joined += 1
-            self.say(self.sender.join())
+            said = self.sender.join()
         elif came.stream == ANSWERS and came.datagram:
-            self.say(self.sender.hear(came.datagram, now))
+            said = self.sender.hear(came.datagram, now)
+        if said and now - self._described > AGAIN:
+            self._described = now
+            self.say(said)
 
     def until(self, moment: float, clock: Callable[[], float], stopped: Sequence[int]) -> None:
         """Wait for a moment of the motion, and meanwhile answer and say what is due without a sample."""
