@@ -90,8 +90,8 @@ def run(
     """Play samples (n,) of poses (joints, n), and draw what is shown.
 
     `lost` says of the time and the number of a datagram whether it is lost; `set_by` is what somebody added to the
-    sender's clock; `drained` says when what came is taken out of the receiver's socket; `heard_from` is when the receiver
-    begins.
+    sender's clock; `drained` says when what came is taken out of the receiver's socket; `heard_from` is when the
+    receiver begins.
     """
     rng, sender, receiver = np.random.default_rng(seed), Sender([own], tolerance, delay, rate), Receiver()
     outcome, pending, count = Outcome(sender, receiver), [], 0
@@ -134,7 +134,7 @@ def run(
         else:
             post(sender.add(float(now + set_now), poses[:, row]), now)
             come(now)
-        before = now
+            before = now
     if drawn:
         compare(outcome, own, straight(times, poses), drawn)
     return outcome
