@@ -90,6 +90,9 @@ OLDEST = 2.0
 FAR_APART, MOST_PARTS = 0.013, 8
 """Seconds between samples beyond which it is looked at what is shown between them, and into how many parts at most."""
 
+LOSSY = 2
+"""Of the 32 messages before the newest: where so many are missing, each is sent twice until none is."""
+
 MOST_RECEIVERS = 256
 """Receivers that are waited for."""
 
@@ -175,6 +178,7 @@ class Sender:
         """The last refresh that was sent twice."""
         self._wanted = False
         """Whether somebody cannot read what is sent."""
+        self._lossy = False
 
     def add(self, time: float, poses: Poses | Mapping[str, Poses]) -> list[bytes]:
         """Take a sample, and return what is to be sent now.
@@ -235,6 +239,8 @@ class Sender:
         if self._times and abs(heard - self._times[-1]) > STEP:
             heard = self._times[-1]
         self._receivers[receiver] = _Receiver(entry, heard)
+        missing = entry.before.bit_length() - entry.before.bit_count()
+        self._lossy = missing >= LOSSY or (self._lossy and missing > 0)
         self._wanted |= bool(entry.needs & NEEDS_REFRESH) and heard - self._refreshed > PATIENCE
         return self.describe() if entry.needs & NEEDS_DESCRIPTION else []
 
@@ -290,7 +296,7 @@ class Sender:
                 due.append(self._message(now))
             elif good is not None:
                 self._next = good + delay + OVERDUE
-        return due
+        return due * (1 + self._lossy)
 
     def _is_shown_until(self, now: float) -> float | None:
         """The moment before one that is shown further off than the tolerance; None where there is none until now."""
