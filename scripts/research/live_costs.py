@@ -129,9 +129,9 @@ def _table(title: str, rows: list[Measured]) -> list[str]:
     saved = [f"{100.0 * (1.0 - median(share)):.0f} % less" for share in shares]
     lines += [
         f"In the words of the paper: shown within {1000.0 * TOLERANCE:g} mm, a body that is sent when needed has "
-        f"{saved[0]} bandwidth at a delay of {1000.0 * DELAYS[0]:.0f} ms, and {saved[1]} at {1000.0 * DELAYS[1]:.0f} ms, "
-        "than position and rotation of every joint 30 times a second in single precision (medians). The paper has 33 to "
-        "58 % less for single hands, at equal errors.",
+        f"{saved[0]} bandwidth at a delay of {1000.0 * DELAYS[0]:.0f} ms, and {saved[1]} at "
+        f"{1000.0 * DELAYS[1]:.0f} ms, than position and rotation of every joint 30 times a second in single precision "
+        "(medians). The paper has 33 to 58 % less for single hands, at equal errors.",
         "",
     ]
     return lines

@@ -159,6 +159,17 @@ def test_an_outage_of_2_s_heals_within_half_a_second(loss: float, answers: bool)
     assert (outcome.now - outcome.moments)[outcome.now > 6.5].max() < 0.1 + 0.03 + 0.02
 
 
+def test_where_much_is_lost_everything_is_sent_twice() -> None:
+    own, rng = body(3), np.random.default_rng(3)
+    outcome = run(own, *dance(own, 8.0), lost=lambda now, count: now < 4.0 and rng.random() < 0.2)
+    sent = {True: [], False: []}
+    for now, datagram in outcome.datagrams:
+        if 1.0 < now < 4.0 or now > 7.5:
+            sent[now < 4.0].append(datagram)
+    assert len(sent[True]) > 1.5 * len(set(sent[True]))
+    assert len(sent[False]) == len(set(sent[False]))
+
+
 def test_a_sender_that_begins_again_is_told_by_its_identity() -> None:
     own = body()
     times, poses = dance(own, 4.0)

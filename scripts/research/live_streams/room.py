@@ -42,20 +42,21 @@ def figures(users: int, seconds: float) -> Room:
         free.bind(("127.0.0.1", 0))
         place = f"tcp/127.0.0.1:{free.getsockname()[1]}"
     datagrams = _datagrams()
-    start = time.time() + 10.0 + 0.7 * users
     ends = []
     for user in (None, *range(users)):
         here, there = context.Pipe()
-        process = context.Process(target=_run, args=(there, user, place, datagrams, start, seconds), daemon=True)
+        process = context.Process(target=_run, args=(there, user, place, datagrams, seconds), daemon=True)
         process.start()
         ends.append((here, process))
-        if user is None:
-            here.recv()
+        here.recv()
+    start = time.time() + 1.0
+    for here, _ in ends:
+        here.send(start)
     found = [here.recv() for here, _ in ends]
     for _, process in ends:
         process.join()
-    (router, _, _), *people = found
-    latencies = np.concatenate([np.frombuffer(own[1]) for own in people])
+    (router, _), *people = found
+    latencies = np.concatenate([own[1] for own in people])
     return Room(
         bytes=float(np.mean([len(datagram) for datagram in datagrams])),
         heard=len(latencies),
@@ -80,7 +81,7 @@ def _datagrams() -> list[bytes]:
     return [datagram for datagram in found if len(datagram) < 200]
 
 
-def _run(pipe: Connection, user: int | None, place: str, datagrams: list[bytes], start: float, seconds: float) -> None:
+def _run(pipe: Connection, user: int | None, place: str, datagrams: list[bytes], seconds: float) -> None:
     """A user, or the router, in a process of its own."""
     import zenoh
 
@@ -88,30 +89,28 @@ def _run(pipe: Connection, user: int | None, place: str, datagrams: list[bytes],
     config.insert_json5("mode", json.dumps("client" if user is not None else "router"))
     config.insert_json5("connect/endpoints" if user is not None else "listen/endpoints", json.dumps([place]))
     config.insert_json5("scouting/multicast/enabled", "false")
-    taken: list[float] = []
+    taken: list[tuple[float, float]] = []
 
     def hear(sample: zenoh.Sample) -> None:
-        now = time.time()
-        (sent,) = STAMP.unpack_from(sample.payload.to_bytes())
-        if start + SETTLING <= sent < start + SETTLING + seconds:
-            taken.append(now - sent)
+        taken.append((time.time(), *STAMP.unpack_from(sample.payload.to_bytes())))
 
     with zenoh.open(config) as session:
-        if user is None:
-            pipe.send(None)
-        else:
+        if user is not None:
             express = {"congestion_control": zenoh.CongestionControl.DROP, "express": True}
             publisher = session.declare_publisher(f"room/{user}/motion", **express)
             session.declare_subscriber("room/*/motion", hear, allowed_origin=zenoh.Locality.REMOTE)
-        begun = None
+        pipe.send(None)
+        start, begun = pipe.recv(), 0.0
         for number in range(round((seconds + SETTLING) * RATE)):
             due = start + (number + (user or 0) / 30.0) / RATE
             time.sleep(max(due - time.time(), 0.0))
-            if due >= start + SETTLING and begun is None:
+            if number == SETTLING * RATE:
                 begun = time.process_time()
             if user is not None:
                 publisher.put(STAMP.pack(time.time()) + datagrams[number % len(datagrams)])
-        spent = time.process_time() - (begun or 0.0)
+        spent = time.process_time() - begun
         time.sleep(2.0)
-        pipe.send((spent, np.array(taken).tobytes(), None))
+        times = np.array(taken).reshape(-1, 2)
+        latencies = (times[:, 0] - times[:, 1])[times[:, 1] >= start + SETTLING]
+        pipe.send((spent, latencies))
         time.sleep(2.0)
