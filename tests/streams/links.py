@@ -79,6 +79,8 @@ def run(
     lost: Callable[[float, int], bool] = lambda now, number: False,
     answers: bool = True,
     clock: Callable[[float], float] = lambda now: now + AHEAD,
+    set_by: Callable[[float], float] = lambda now: 0.0,
+    drained: Callable[[float], float] = lambda now: now,
     fps: float = 144.0,
     copies: int = 1,
     rate: float | None = None,
@@ -87,7 +89,9 @@ def run(
 ) -> Outcome:
     """Play samples (n,) of poses (joints, n), and draw what is shown.
 
-    `lost` says of the time and the number of a datagram whether it is lost; `heard_from` is when the receiver begins.
+    `lost` says of the time and the number of a datagram whether it is lost; `set_by` is what somebody added to the
+    sender's clock; `drained` says when what came is taken out of the receiver's socket; `heard_from` is when the
+    receiver begins.
     """
     rng, sender, receiver = np.random.default_rng(seed), Sender([own], tolerance, delay, rate), Receiver()
     outcome, pending, count = Outcome(sender, receiver), [], 0
@@ -102,13 +106,14 @@ def run(
                 continue
             for _ in range(copies):
                 takes = (latency(now) if callable(latency) else latency) + jitter * rng.random()
-                heapq.heappush(pending, (now + takes, count, back, datagram))
+                arrival = now + takes if back else drained(now + takes)
+                heapq.heappush(pending, (arrival, count, back, datagram))
 
     def come(until: float) -> None:
         while pending and pending[0][0] <= until:
             now, _, back, datagram = heapq.heappop(pending)
             if back:
-                post(sender.hear(datagram, now), now)
+                post(sender.hear(datagram, now + set_by(now)), now)
             elif now >= heard_from:
                 receiver.take(datagram, clock(now), "sender")
                 if answers:
@@ -116,17 +121,20 @@ def run(
 
     drawn, frames = [], np.arange(times[0], times[-1], 1.0 / fps)
     events = sorted([*((time, 0, row) for row, time in enumerate(times)), *((time, 1, 0) for time in frames)])
+    before = -np.inf
     for now, frame, row in events:
-        while not frame and row and sender.next < now:
-            due = sender.next
+        set_now = set_by(now)
+        while not frame and row and sender.next - set_now < now:
+            due = max(sender.next - set_now, before)
             come(due)
-            post(sender.poll(due), due)
+            post(sender.poll(due + set_now), due)
         come(now)
         if frame:
             drawn += [(now, shown.moment, shown.poses[own.name]) for shown in receiver.show(clock(now)).values()]
         else:
-            post(sender.add(float(now), poses[:, row]), now)
+            post(sender.add(float(now + set_now), poses[:, row]), now)
             come(now)
+            before = now
     if drawn:
         compare(outcome, own, straight(times, poses), drawn)
     return outcome

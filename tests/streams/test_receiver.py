@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigid_motion.streams import Receiver, Sender
+from rigid_motion.streams import Body, Receiver, Sender
+from rigid_motion.streams.receiver import MOST_JOINT_KNOTS
 from rigid_motion.streams.wire import LATE, MOTION, kind_of
 
 from .links import body, dance, run
@@ -13,17 +14,20 @@ from .links import body, dance, run
 TOLERANCE = 0.0051
 
 
-def test_somebody_who_joins_is_shown_the_motion_within_0_3_s() -> None:
+@pytest.mark.parametrize("joins", np.arange(0.3, 2.5, 0.37).round(2))
+def test_somebody_who_joins_is_shown_the_motion_within_0_3_s(joins: float) -> None:
     own = body()
-    outcome = run(own, *dance(own, 5.0), heard_from=2.5)
-    assert outcome.now[0] < 2.8
+    outcome = run(own, *dance(own, joins + 1.5), heard_from=joins)
+    assert outcome.now[0] < joins + 0.3
     assert outcome.errors.max() <= TOLERANCE
 
 
-def test_somebody_who_joins_unheard_is_shown_it_within_one_refresh() -> None:
+@pytest.mark.parametrize("joins", np.arange(0.3, 2.5, 0.37).round(2))
+def test_somebody_who_joins_unheard_is_shown_it_within_one_refresh(joins: float) -> None:
     own = body()
-    outcome = run(own, *dance(own, 5.0), heard_from=2.5, answers=False)
-    assert outcome.now[0] < 2.5 + 1.1
+    outcome = run(own, *dance(own, joins + 2.0), heard_from=joins, answers=False)
+    # A refresh, and from its first knot on the delay.
+    assert outcome.now[0] < joins + 1.0 + 0.02 + 0.1
     assert outcome.errors.max() <= TOLERANCE
 
 
@@ -53,6 +57,33 @@ def test_a_clock_that_steps_is_a_new_offset(step: float) -> None:
     assert (outcome.now - outcome.moments)[outcome.now > 4.0].max() < 0.13
 
 
+@pytest.mark.parametrize("step", [5.0, -5.0, -0.7])
+@pytest.mark.parametrize("answers", [True, False])
+def test_a_sender_s_clock_that_steps_is_no_motion(step: float, answers: bool) -> None:
+    own = body()
+    outcome = run(own, *dance(own, 6.0), set_by=lambda now: step * (now > 3.008), answers=answers)
+    assert outcome.errors.max() <= TOLERANCE
+    assert np.diff(outcome.moments).min() >= 0.0
+
+
+@pytest.mark.parametrize("bursts", [0.1, 0.25])
+@pytest.mark.parametrize("answers", [True, False])
+def test_a_receiver_with_a_busy_processor(bursts: float, answers: bool) -> None:
+    own = body()
+
+    def drained(now: float) -> float:
+        return np.ceil(now / bursts) * bursts if now > 3.0 else now
+
+    outcome = run(own, *dance(own, 8.0), drained=drained, answers=answers)
+    assert outcome.between(0.0, 3.0).max() <= TOLERANCE
+    adapted = outcome.between(4.0 + bursts, 8.0)
+    # A datagram may still come that waited longer than all before.
+    assert np.mean(adapted <= TOLERANCE) > 0.98
+    assert adapted.max() <= 0.02
+    assert np.diff(outcome.moments).min() >= 0.0
+    assert (outcome.now - outcome.moments)[outcome.now > 4.5].max() < 0.1 + 0.02 + bursts + 0.02
+
+
 def test_copies_and_old_datagrams_change_nothing() -> None:
     own = body()
     samples = dance(own, 5.0)
@@ -67,7 +98,7 @@ def test_copies_and_old_datagrams_change_nothing() -> None:
     np.testing.assert_array_equal(after.poses[own.name].positions, before.poses[own.name].positions)
 
 
-@pytest.mark.parametrize("number", range(4, 24, 4))
+@pytest.mark.parametrize("number", [1, 2, 3, *range(4, 24, 4)])
 @pytest.mark.parametrize("answers", [True, False])
 def test_a_datagram_that_is_lost_costs_no_later_one_its_meaning(number: int, answers: bool) -> None:
     own = body()
@@ -79,6 +110,7 @@ def test_a_datagram_that_is_lost_costs_no_later_one_its_meaning(number: int, ans
         return count == number
 
     outcome = run(own, *dance(own, 4.0), lost=lost, answers=answers)
+    assert outcome.now[0] < (0.3 if answers else 1.1 + 0.1)
     assert outcome.between(sent[0] + 0.5, 4.0).max() <= TOLERANCE
 
 
@@ -102,6 +134,42 @@ def test_loss(loss: float, within: float) -> None:
         assert outcome.between(first, first + 0.5 + 0.4 * (loss > 0.1)).min() <= TOLERANCE
 
 
+@pytest.mark.parametrize("answers", [True, False])
+@pytest.mark.parametrize(("loss", "within"), [(0.0, 1.0), (0.01, 0.98), (0.05, 0.93), (0.2, 0.6)])
+def test_a_long_way_with_jitter_loss_and_duplicates(loss: float, within: float, answers: bool) -> None:
+    own, rng = body(), np.random.default_rng(3)
+    lost = lambda now, count: rng.random() < loss  # noqa: E731
+    outcome = run(
+        own, *dance(own, 12.0), lost=lost, latency=0.21, jitter=0.08, copies=1 + (loss > 0.0), answers=answers
+    )
+    assert np.mean(outcome.between(2.0, 12.0) <= 0.02) >= within
+    assert np.diff(outcome.moments).min() >= 0.0
+
+
+@pytest.mark.parametrize("answers", [True, False])
+@pytest.mark.parametrize("loss", [0.0, 0.01])
+def test_an_outage_of_2_s_heals_within_half_a_second(loss: float, answers: bool) -> None:
+    own, rng = body(), np.random.default_rng(4)
+    lost = lambda now, count: 4.0 <= now < 6.0 or rng.random() < loss  # noqa: E731
+    outcome = run(own, *dance(own, 12.0), lost=lost, latency=0.03, answers=answers)
+    there = np.concatenate((outcome.between(0.0, 4.0), outcome.between(6.5, 12.0)))
+    assert np.mean(there <= 0.02) >= 0.98
+    assert outcome.between(6.5, 7.0).max() <= (TOLERANCE if not loss else 0.02)
+    assert np.diff(outcome.moments).min() >= 0.0
+    assert (outcome.now - outcome.moments)[outcome.now > 6.5].max() < 0.1 + 0.03 + 0.02
+
+
+def test_where_much_is_lost_everything_is_sent_twice() -> None:
+    own, rng = body(3), np.random.default_rng(3)
+    outcome = run(own, *dance(own, 8.0), lost=lambda now, count: now < 4.0 and rng.random() < 0.2)
+    sent = {True: [], False: []}
+    for now, datagram in outcome.datagrams:
+        if 1.0 < now < 4.0 or now > 7.5:
+            sent[now < 4.0].append(datagram)
+    assert len(sent[True]) > 1.5 * len(set(sent[True]))
+    assert len(sent[False]) == len(set(sent[False]))
+
+
 def test_a_sender_that_begins_again_is_told_by_its_identity() -> None:
     own = body()
     times, poses = dance(own, 4.0)
@@ -117,6 +185,23 @@ def test_a_sender_that_begins_again_is_told_by_its_identity() -> None:
     assert not others
     assert stream.identity == again.identity != sender.identity
     assert 1.8 < shown.moment < 2.0
+
+
+def test_replays_of_a_sender_that_is_gone_change_nothing() -> None:
+    own = body()
+    times, poses = dance(own, 4.0)
+    receiver, old = Receiver(), []
+    first, sender = Sender([own], rate=60.0), Sender([own], rate=60.0)
+    for row, time in enumerate(times.tolist()):
+        datagrams = (first if time < 2.0 else sender).add(time, poses[:, row])
+        old += datagrams if time < 2.0 else []
+        for datagram in datagrams:
+            receiver.take(datagram, time, "somebody")
+        if time > 3.0:
+            receiver.take(old[row % len(old)], time, "somebody")
+        shown = receiver.show(time)
+        if time > 2.2:
+            assert [stream.identity for stream in shown] == [sender.identity]
 
 
 def test_several_senders_do_not_mix() -> None:
@@ -156,6 +241,17 @@ def test_keys_can_be_recorded() -> None:
     assert len(moments) < 0.8 * len(times)
     true = np.stack([np.interp(moments, times, column) for column in poses.positions[0].T], axis=-1)
     assert np.abs(np.array(places)[:, 0] - true).max() < 0.006
+
+
+def test_keys_that_nobody_records_are_forgotten() -> None:
+    own = Body.rigid("hand")
+    times, poses = dance(own, 60.0, speed=8.0)
+    sender, receiver = Sender([own], 0.001, rate=60.0), Receiver()
+    for row, time in enumerate(times.tolist()):
+        for datagram in sender.add(time, poses[:, row]):
+            receiver.take(datagram, time, "sender")
+    (keys,) = receiver.keys()
+    assert 500 < len(keys.moments) <= MOST_JOINT_KNOTS
 
 
 def test_motions_are_of_two_kinds() -> None:

@@ -24,6 +24,24 @@ def test_what_is_shown_is_within_the_tolerance(rate: float, delay: float) -> Non
     assert len(outcome.errors) > 400
 
 
+def test_messages_of_many_joints_are_as_long_as_they_have_to_be() -> None:
+    own = body(60)
+    outcome = run(own, *dance(own, 0.8), answers=False)
+    assert max(len(datagram) for _, datagram in outcome.datagrams) > 1200
+    assert outcome.errors.max() <= 0.005 * SLACK
+
+
+@pytest.mark.parametrize("gap", [0.0021, 0.0028, 0.0035])
+def test_a_jump_between_two_uneven_samples_is_within_the_tolerance(gap: float) -> None:
+    """As a tracker's that was lost, at moments that are on no grid."""
+    times = np.cumsum(np.random.default_rng(3).uniform(0.0105, 0.0125, 60))
+    times[30:] += gap - (times[30] - times[29])
+    places = np.where(np.arange(60)[:, None] < 30, 0.0, (0.037, 0.029, 0.02))
+    poses = Poses(places[None], np.tile((1.0, 0, 0, 0), (1, 60, 1)))
+    outcome = run(Body.rigid("hand"), times, poses, fps=1000.0)
+    assert outcome.errors.max() <= 0.005 * SLACK
+
+
 def swing(rate: float) -> tuple[Body, np.ndarray, Poses]:
     """A hand on a long arm that gets to 22 m/s."""
     times = np.arange(round(3.0 * rate)) / rate

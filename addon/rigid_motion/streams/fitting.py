@@ -123,7 +123,8 @@ class Fitting:
             if found.error <= NEAR * self.scale.tolerance or not len(free) or len(knots) + 1 == self._most_knots:
                 return found
             nearest = float(free[np.argmin(np.abs(free - worst))])
-            if np.abs(np.array(window.moments[1:]) - worst).min() < abs(nearest - worst):
+            good = finer < FINEST or found.error <= self.scale.tolerance
+            if good and np.abs(np.array(window.moments[1:]) - worst).min() < abs(nearest - worst):
                 return found
             knots.append(nearest)
             found.numbers.append(window.fit(_at(task.samples, nearest), window.insert(nearest)))

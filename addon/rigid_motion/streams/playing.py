@@ -21,13 +21,11 @@ LOOK_BACK = 3.0
 
 MOST_TRANSITS = 512
 
-FEW = 4
-"""So many datagrams in a row, over `SHORT` seconds, that all came sooner by `SOONER`: the network is quicker now."""
+FEW, SHORT, SOONER = 4, 0.3, 0.05
+"""So many datagrams in a row, over so many seconds, that all came sooner by so much than the longest took..."""
 
-SHORT, SOONER = 0.3, 0.05
-
-SPREADS = 1.5
-"""How many times sooner than they differ from one another."""
+QUICK = 0.1
+"""... and sooner than all but this part of those before: the network is quicker now, and does not only vary."""
 
 SET = 1.0
 """A transit that differs by more than this many seconds is that of another clock; a display may not leap further."""
@@ -64,14 +62,14 @@ class Playing:
         known.append((arrival, transit))
         while known[0][0] < arrival - LOOK_BACK:
             known.popleft()
-        recent = [took for when, took in list(known)[-FEW:]]
-        since = arrival - known[-FEW][0] if len(known) >= FEW else 0.0
-        recent = [took for when, took in known if when >= arrival - max(SHORT, since)]
-        spread = max(recent) - min(recent)
-        quicker = max(recent) < max(took for _, took in known) - max(SOONER, SPREADS * spread)
-        if quicker and len(recent) >= FEW and known[0][0] < arrival - SHORT:
-            while known[0][0] < arrival - max(SHORT, since):
-                known.popleft()
+        # As they were sent: those of a quick way overtake.
+        by_sent = sorted((when - took, when, took) for when, took in known)
+        begun = min(by_sent[-FEW:][0][0], by_sent[-1][0] - SHORT)
+        recent = [took for left, _, took in by_sent if left >= begun]
+        older = sorted(took for left, _, took in by_sent if left < begun)
+        if older and len(recent) >= FEW and max(recent) < min(older[int(QUICK * len(older))], older[-1] - SOONER):
+            known.clear()
+            known.extend(sorted((when, took) for left, when, took in by_sent if left >= begun))
         self.longest = max(took for _, took in known)
         self._unsure = False
 

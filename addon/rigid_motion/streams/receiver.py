@@ -7,8 +7,8 @@ is remembered of each is bounded.
 from __future__ import annotations
 
 import secrets
-from collections import OrderedDict
-from collections.abc import Hashable
+from collections import OrderedDict, deque
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -50,9 +50,11 @@ MOST_ALL_JOINTS = 4096
 MOST_STATES = 40
 """Messages of a stream that others may build on."""
 
-MOST_KEYS = 4096
-"""Knots of a stream that wait for `keys`."""
+MOST_GONE = 256
+"""Streams that are gone, and known again where somebody replays them."""
 
+MOST_KNOTS, MOST_JOINT_KNOTS = 256, 1 << 14
+"""Knots of a stream that wait for `keys`, or as many more as a body of few joints has in so many poses of joints."""
 
 MOST_WINDOWS = 8
 """Windows of a stream that one that came late can be put among."""
@@ -109,6 +111,7 @@ class Receiver:
         self._streams: dict[Stream, _Playback] = {}
         self._begun: OrderedDict[Stream, _Begun] = OrderedDict()
         """Streams whose description is not complete."""
+        self._gone: deque[Stream] = deque(maxlen=MOST_GONE)
 
     def take(self, datagram: bytes, arrival: float, source: Hashable = None) -> None:
         """Take a datagram that came at a time, by the clock of `show`, from somewhere."""
@@ -128,7 +131,7 @@ class Receiver:
 
     def show(self, now: float) -> dict[Stream, Shown]:
         """What every stream shows."""
-        self._streams = {own: it for own, it in self._streams.items() if -SILENT < now - it.heard < SILENT}
+        self._forget_silent(now)
         shown = {stream: playback.show(now) for stream, playback in self._streams.items()}
         return {stream: what for stream, what in shown.items() if what is not None}
 
@@ -199,15 +202,26 @@ class Receiver:
 
     def _room_for(self, stream: Stream, forest: Forest, now: float) -> bool:
         """Forget a stream that this one is instead of, and say whether there is room for it."""
+        self._forget_silent(now)
         names = {body.name for body in forest.bodies}
-        self._streams = {
-            other: it
+        same = [
+            other
             for other, it in self._streams.items()
-            if -SILENT < now - it.heard < SILENT
-            and not (other.source == stream.source and {body.name for body in it.forest.bodies} == names)
-        }
+            if other.source == stream.source and {body.name for body in it.forest.bodies} == names
+        ]
+        if same and stream in self._gone:
+            return False  # Somebody replays what was sent before the sender began again.
+        self._forget(same)
         joints = sum(len(playback.forest) for playback in self._streams.values())
         return len(self._streams) < MOST_STREAMS and joints + len(forest) <= MOST_ALL_JOINTS
+
+    def _forget_silent(self, now: float) -> None:
+        self._forget([stream for stream, it in self._streams.items() if not -SILENT < now - it.heard < SILENT])
+
+    def _forget(self, streams: Iterable[Stream]) -> None:
+        for stream in streams:
+            del self._streams[stream]
+            self._gone.append(stream)
 
 
 class _Begun:
@@ -285,7 +299,9 @@ class _Playback:
             self._path = self._path.followed(path)
             if path.moments[0] < self._begins:
                 self._begins = float(path.moments[1])
-            self._path = self._path.since(min(self._kept, self._moment or path.moments[0]) - 1e-6)
+            first = -min(max(MOST_JOINT_KNOTS // len(self.forest), MOST_KNOTS), len(self._path.moments))
+            shown = path.moments[0] if self._moment is None else self._moment
+            self._path = self._path.since(max(min(self._kept, shown) - 1e-6, self._path.moments[first]))
         else:
             before = self._path
             first, *others = (self._windows[number] for number in sorted(self._windows))

@@ -90,6 +90,9 @@ OLDEST = 2.0
 FAR_APART, MOST_PARTS = 0.013, 8
 """Seconds between samples beyond which it is looked at what is shown between them, and into how many parts at most."""
 
+LOSSY = 2
+"""Of the 32 messages before the newest: where so many are missing, each is sent twice until none is."""
+
 MOST_RECEIVERS = 256
 """Receivers that are waited for."""
 
@@ -175,6 +178,7 @@ class Sender:
         """The last refresh that was sent twice."""
         self._wanted = False
         """Whether somebody cannot read what is sent."""
+        self._lossy = False
 
     def add(self, time: float, poses: Poses | Mapping[str, Poses]) -> list[bytes]:
         """Take a sample, and return what is to be sent now.
@@ -201,7 +205,10 @@ class Sender:
 
     def poll(self, time: float) -> list[bytes]:
         """What is to be sent at a time at which no sample came: worth asking at `next`, where one is overdue."""
-        return self._due(max(time + self._slip, self._times[-1]), 0.0) if self._times else []
+        now = time + self._slip
+        if not self._times or now > self._times[-1] + STEP:
+            return []  # Somebody set the clock, as the next sample will tell; or no sample is going to come.
+        return self._due(max(now, self._times[-1]), 0.0)
 
     @property
     def next(self) -> float:
@@ -234,7 +241,11 @@ class Sender:
         if entry is None or (receiver not in self._receivers and len(self._receivers) == MOST_RECEIVERS):
             return []
         heard = now + self._slip
+        if self._times and abs(heard - self._times[-1]) > STEP:
+            heard = self._times[-1]
         self._receivers[receiver] = _Receiver(entry, heard)
+        missing = entry.before.bit_length() - entry.before.bit_count()
+        self._lossy = missing >= LOSSY or (self._lossy and missing > 0)
         self._wanted |= bool(entry.needs & NEEDS_REFRESH) and heard - self._refreshed > PATIENCE
         return self.describe() if entry.needs & NEEDS_DESCRIPTION else []
 
@@ -290,7 +301,7 @@ class Sender:
                 due.append(self._message(now))
             elif good is not None:
                 self._next = good + delay + OVERDUE
-        return due
+        return due * (1 + self._lossy)
 
     def _is_shown_until(self, now: float) -> float | None:
         """The moment before one that is shown further off than the tolerance; None where there is none until now."""
@@ -324,6 +335,8 @@ class Sender:
         state = self._rest if base is None else self._states[base]
         is_late = now - self._times[-1] > SOON
         late = min(math.floor(now * TICKS) - end, self._terms.delay - 1) if is_late else 0
+        back = 0 if base is None else self._sequence - base
+        kind = state.kind(end, back)
         start = (end + late - self._terms.delay) / TICKS
         times = np.array(self._times)
         inside = times[(times > start) & (times < end / TICKS)]
@@ -333,12 +346,15 @@ class Sender:
         if shell_error(ends[:, 0], ends[:, 1], self._forest.radii).max() < STILL * self._scale.tolerance:
             # A body that does not move is to come to rest, and not to be put right again and again.
             moments = np.append(moments, end / TICKS + BEYOND)
-        cells = np.unique(np.rint((end - inside * TICKS) / self._terms.grid).astype(int))
-        cells = cells[(cells > 0) & (cells * self._terms.grid < self._terms.delay - late)]
-        grid = (end - cells[::-1] * self._terms.grid) / TICKS
-        back = 0 if base is None else self._sequence - base
-        kind = state.kind(end, back)
-        fitted = self._fitting.fitted(Task(self._path, state, kind, start, samples, end / TICKS, moments, grid))
+        exact = (end - inside * TICKS) / self._terms.grid
+        # A jump between two cells takes both of them, everything else the nearest.
+        for cells in (np.rint(exact), np.concatenate((np.floor(exact), np.ceil(exact)))):
+            cells = np.unique(cells.astype(int))
+            cells = cells[(cells > 0) & (cells * self._terms.grid < self._terms.delay - late)]
+            grid = (end - cells[::-1] * self._terms.grid) / TICKS
+            fitted = self._fitting.fitted(Task(self._path, state, kind, start, samples, end / TICKS, moments, grid))
+            if fitted.error <= self._scale.tolerance:
+                break
         inner = [round((end - moment * TICKS) / self._terms.grid) for moment in fitted.moments]
         said = Said(fitted.finer, inner, np.array(fitted.numbers).tolist(), late)
         payload, memory = self.codec.write(said, kind, state, is_late)

@@ -41,8 +41,11 @@ ENTRY = struct.Struct("<3sHIB")
 
 NEEDS_DESCRIPTION, NEEDS_REFRESH = 1, 2
 
-LONGEST = 1200
-"""Bytes of a datagram."""
+LONGEST = 65_000
+"""Bytes of a datagram, as UDP carries them: a message of 4096 groups is never longer."""
+
+UNCUT = 1200
+"""Bytes of a datagram that no network cuts up: so long are descriptions and answers at most, and most messages."""
 
 MOST_PIECES = 64
 
@@ -147,7 +150,7 @@ def answer(receiver: bytes, entries: Sequence[Entry]) -> bytes:
     return HEAD.pack(_first(ANSWER), receiver) + b"".join(parts)
 
 
-MOST_ENTRIES = (LONGEST - HEAD.size) // ENTRY.size
+MOST_ENTRIES = (UNCUT - HEAD.size) // ENTRY.size
 
 
 def read_answer(datagram: bytes) -> tuple[bytes, list[Entry]] | None:
@@ -166,7 +169,7 @@ def describe(identity: bytes, ticks: int, forest: Forest, terms: Terms) -> list[
             parts += [_named(body.joints[joint]), struct.pack("<hB", parent, int(body.sliding[joint]))]
             parts.append(struct.pack("<7f", *body.rest.positions[joint], *body.rest.quaternions[joint]))
     packed = zlib.compress(b"".join(parts), 9)
-    size = LONGEST - DESCRIPTION_HEAD.size
+    size = UNCUT - DESCRIPTION_HEAD.size
     cut = [packed[at : at + size] for at in range(0, len(packed), size)]
     return [
         DESCRIPTION_HEAD.pack(_first(DESCRIPTION), identity, number, len(cut), ticks) + piece

@@ -150,6 +150,10 @@ def _in_short(found: Results) -> list[str]:
             "- Running time of a frame by multivectors, in this program's own form and at equal rates: "
             f"{changed(blend.relative)}{doubt(blend)}. The paper: {claims.TIME_SAVED:.1%} less."
         )
+    lines.append(
+        "- Whole bodies live, within 5 mm, beside packed poses at even rates and beside game engines: "
+        "[what bodies cost live](live_costs.md)."
+    )
     return lines
 
 

@@ -33,6 +33,7 @@ RESEARCH = {
     "benchmark": "benchmark",
     "benchmark_batch": "benchmark_batch",
     "benchmark_live": "benchmark_live",
+    "live_costs": "live_costs",
     "reduction": "reduction",
     "subframes": "subframes",
     "glb_sizes": "glb_sizes",

@@ -6,14 +6,12 @@ import select
 import socket
 from typing import Protocol, Self
 
-from rigid_motion.streams.wire import DESCRIPTION, kind_of
+from rigid_motion.streams.wire import DESCRIPTION, LONGEST, kind_of
 
 LOOPBACK = "127.0.0.1"
 
 HEADERS = 28
 """Bytes of UDP and IPv4 in front of every datagram."""
-
-LONGEST = 2048
 
 PENDING = 1 << 20
 """Bytes that the system keeps of what was not read yet."""

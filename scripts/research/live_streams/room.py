@@ -1,0 +1,116 @@
+"""Many users in one room: each a process that sends datagrams of the codec by a Zenoh router, and hears the others."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import socket
+import struct
+import time
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+
+import numpy as np
+
+RATE = 20.0
+"""Datagrams a second of each user."""
+
+STAMP = struct.Struct("<d")
+
+SETTLING = 5.0
+"""Seconds in which all have to hear of one another, and that do not count."""
+
+
+@dataclass(frozen=True)
+class Room:
+    """What came out. Processor time is of one processor; `rate` are datagrams heard a second by all."""
+
+    bytes: float
+    heard: int
+    expected: int
+    rate: float
+    median_ms: float
+    p99_ms: float
+    router: float
+    users: float
+
+
+def figures(users: int, seconds: float) -> Room:
+    """Play a room for so many seconds."""
+    context = multiprocessing.get_context("spawn")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        place = f"tcp/127.0.0.1:{free.getsockname()[1]}"
+    datagrams = _datagrams()
+    ends = []
+    for user in (None, *range(users)):
+        here, there = context.Pipe()
+        process = context.Process(target=_run, args=(there, user, place, datagrams, seconds), daemon=True)
+        process.start()
+        ends.append((here, process))
+        here.recv()
+    start = time.time() + 1.0
+    for here, _ in ends:
+        here.send(start)
+    found = [here.recv() for here, _ in ends]
+    for _, process in ends:
+        process.join()
+    (router, _), *people = found
+    latencies = np.concatenate([own[1] for own in people])
+    return Room(
+        bytes=float(np.mean([len(datagram) for datagram in datagrams])),
+        heard=len(latencies),
+        expected=round(users * (users - 1) * RATE * seconds),
+        rate=len(latencies) / seconds,
+        median_ms=1e3 * float(np.median(latencies)),
+        p99_ms=1e3 * float(np.percentile(latencies, 99.0)),
+        router=router / seconds,
+        users=sum(own[0] for own in people) / seconds,
+    )
+
+
+def _datagrams() -> list[bytes]:
+    """Of a hand that swings, said anew at every sample."""
+    from rigid_motion.motion import Poses
+    from rigid_motion.streams import Body, Sender
+
+    times = np.arange(400) / RATE
+    sender, found = Sender([Body.rigid("hand")], 0.002, 0.1, RATE, heartbeat=0.9 / RATE), []
+    for time_, place in zip(times.tolist(), np.sin(times[:, None] * (3.0, 4.1, 2.3)), strict=True):
+        found += sender.add(time_, Poses(place[None], np.array(((1.0, 0.0, 0.0, 0.0),))))
+    return [datagram for datagram in found if len(datagram) < 200]
+
+
+def _run(pipe: Connection, user: int | None, place: str, datagrams: list[bytes], seconds: float) -> None:
+    """A user, or the router, in a process of its own."""
+    import zenoh
+
+    config = zenoh.Config()
+    config.insert_json5("mode", json.dumps("client" if user is not None else "router"))
+    config.insert_json5("connect/endpoints" if user is not None else "listen/endpoints", json.dumps([place]))
+    config.insert_json5("scouting/multicast/enabled", "false")
+    taken: list[tuple[float, float]] = []
+
+    def hear(sample: zenoh.Sample) -> None:
+        taken.append((time.time(), *STAMP.unpack_from(sample.payload.to_bytes())))
+
+    with zenoh.open(config) as session:
+        if user is not None:
+            express = {"congestion_control": zenoh.CongestionControl.DROP, "express": True}
+            publisher = session.declare_publisher(f"room/{user}/motion", **express)
+            session.declare_subscriber("room/*/motion", hear, allowed_origin=zenoh.Locality.REMOTE)
+        pipe.send(None)
+        start, begun = pipe.recv(), 0.0
+        for number in range(round((seconds + SETTLING) * RATE)):
+            due = start + (number + (user or 0) / 30.0) / RATE
+            time.sleep(max(due - time.time(), 0.0))
+            if number == SETTLING * RATE:
+                begun = time.process_time()
+            if user is not None:
+                publisher.put(STAMP.pack(time.time()) + datagrams[number % len(datagrams)])
+        spent = time.process_time() - begun
+        time.sleep(2.0)
+        times = np.array(taken).reshape(-1, 2)
+        latencies = (times[:, 0] - times[:, 1])[times[:, 1] >= start + SETTLING]
+        pipe.send((spent, latencies))
+        time.sleep(2.0)

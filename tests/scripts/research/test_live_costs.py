@@ -1,0 +1,31 @@
+"""Models of game engines, on a link that does nothing but take its time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from research.live_streams.engines import ENGINES, FPS, Way, by_engine, seen, truth_of
+from rigid_motion.motion import Poses
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_steady_hand_is_shown_steadily(engine: str) -> None:
+    times = np.arange(900) / 90.0
+    hand = Poses(times[:, None] * (0.5, 0.0, 0.0), np.tile((1.0, 0.0, 0.0, 0.0), (900, 1)))
+    truth, frames = truth_of(times, hand), np.arange(0.5, 9.9, 1.0 / FPS)
+    found = seen(by_engine(engine, truth, Way(0.02, 0.02, 0.0), frames), truth, frames)
+    # By half an update at most: an engine without a buffer holds each until the next.
+    assert found.largest_mm < 1e3 * 0.5 / 30.0 + 3.0
+    assert (found.freezes, found.jumps_back) == (0, 0)
+    assert 0.02 < found.delay < 0.3
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_nobody_is_shown_what_has_not_come(engine: str) -> None:
+    times = np.arange(900) / 90.0
+    hand = Poses(np.where(times > 5.0, 1.0, 0.0)[:, None] * (1.0, 0.0, 0.0), np.tile((1.0, 0.0, 0.0, 0.0), (900, 1)))
+    truth, frames = truth_of(times, hand), np.arange(0.5, 9.9, 1.0 / FPS)
+    shown = by_engine(engine, truth, Way(0.25, 0.25, 0.0), frames)[0].positions[:, 0]
+    assert np.abs(shown[frames < 5.25]).max() < 1e-9
+    assert shown[-1] == pytest.approx(1.0, abs=1e-3)
