@@ -162,8 +162,9 @@ def engines(path: Path) -> list[str]:
         "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
     ]
     for label, way in WAYS.items():
-        for engine in ENGINES:
-            lines.append(_seen(label, engine, even, seen(by_engine(engine, truth, way, frames), truth, frames)))
+        lines += [
+            _seen(label, engine, even, seen(by_engine(engine, truth, way, frames), truth, frames)) for engine in ENGINES
+        ]
         shown, size = by_codec(truth, way, frames, TOLERANCE, DELAYS[0])
         lines.append(_seen(label, "sent when needed", size, seen(shown, truth, frames)))
     return [*lines, ""]
