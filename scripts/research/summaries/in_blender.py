@@ -87,8 +87,8 @@ def _beside_decimate(page: str) -> str:
     return (
         f"Measured: *Reduce Keys to Poses* beside Blender's Decimate on {len(told[0][0].rows) - 1} recordings. To be "
         f"as good, Decimate needs keys on {both(2)} times as many frames (with {turned}), and {both(4)} times the "
-        f"numbers; in each channel it has {both(3)} times the keys. With keys on as few frames it is off by {both(6)} times "
-        "as much."
+        f"numbers; in each channel it has {both(3)} times the keys. With keys on as few frames it is off by {both(6)} "
+        "times as much."
     )
 
 

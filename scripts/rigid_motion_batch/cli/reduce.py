@@ -188,7 +188,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     options = parser.parse_args(arguments)
     try:
         refuse_odd_places(options)
-        options.work = work = Reduce(
+        options.work = Reduce(
             doing="Reducing",
             done="reduced",
             objects=options.objects,
@@ -206,7 +206,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
             reading=Reading(options.axes, reading_options(options)),
             writing=Writing(options.blend, options.fps, options.glb),
         )
-        options.todo = _planned(options, work)
+        options.todo = _planned(options)
         _refuse_odd(options)
     except ValueError as error:
         parser.error(str(error))
@@ -248,7 +248,7 @@ class Reduce(Work):
         return BlendRun(self, reducing(self.wishes, self.objects), record, note).do(job)
 
 
-def _planned(options: argparse.Namespace, work: Reduce) -> list[Job]:
+def _planned(options: argparse.Namespace) -> list[Job]:
     """What is to be done: a body of a file is a recording, and so is a glTF file of which a .blend file is to be made.
 
     An FBX file is none where it becomes a GLB file with all that is in it.

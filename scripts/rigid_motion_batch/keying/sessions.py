@@ -281,7 +281,13 @@ class _Session:
                 outcome.add_written(path)
             return
         order = Order(
-            keyed, (self._work, job), (), task.inputs, {}, os.fspath(job.folder), os.fspath(self._scratch / str(place))
+            step=keyed,
+            parameters=(self._work, job),
+            before=(),
+            inputs=task.inputs,
+            wanted={},
+            output=os.fspath(job.folder),
+            folder=os.fspath(self._scratch / str(place)),
         )
         self._at_work[order.folder] = place, key
         self._executor.submit(order)
