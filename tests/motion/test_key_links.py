@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import MODES, Poses, reduce_keys
-from rigid_motion.motion.key_links import _links, _neighbours, _shortest, _with_neighbours, traded_keys
+from rigid_motion.motion.key_links import _links, _neighbours, _Ways, _with_neighbours, joined_keys, traded_keys
 from rigid_motion.motion.key_search import Recording, Search, _spaced
 from tests.motion.test_reduction import RADIUS, shell_errors, wandering
 
@@ -48,7 +48,7 @@ def test_the_shortest_way_is_that_of_an_exhaustive_programme(mode, seed):
     search = Search(Recording(times, poses, mode, RADIUS, TOLERANCES[seed]))
     samples = np.arange(len(times))
     links = _links(search.costs, samples, [samples], 1.0, np.inf)
-    keys = _shortest(links, np.ones(len(links)), samples)
+    keys = _Ways(links, samples).shortest()
     assert len(keys) == fewest_of_a_programme(times, poses, mode, TOLERANCES[seed])
     assert 2 < len(keys) < len(times)
     assert shell_errors(times, poses, keys, mode).max() <= TOLERANCES[seed] * (1.0 + 1e-9)
@@ -109,6 +109,21 @@ def test_more_searches_leave_fewer_keys_of_the_same_mean_square_error(mode):
     assert fewer >= 2
 
 
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("mode", ["lerp_slerp", "motor_spline"])
+def test_joined_keys_are_no_worse_than_any_that_were_found(mode, seed):
+    times, poses = wandering(60, seed, 0.01, 40.0)
+    costs = Search(Recording(times, poses, mode, RADIUS)).costs
+    random = np.random.default_rng(seed)
+    found = [np.array((0, *np.sort(random.choice(np.arange(1, 59), 8, replace=False)), 59)) for _ in range(4)]
+    keys = joined_keys(costs, found, 10)
+    assert len(keys) <= 10
+    assert (keys[0], keys[-1]) == (0, 59)
+    least = min(map(costs.peak, found))
+    # Keys at random are often joined by too many links of smooth modes for them to be looked at.
+    assert costs.peak(keys) < least if mode == "lerp_slerp" else costs.peak(keys) <= least
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_links_are_all_pairs_with_all_their_neighbours(seed):
     random = np.random.default_rng(seed)
@@ -147,7 +162,7 @@ def test_the_shortest_way_by_links_is_the_shortest_of_all_ways(seed):
         return all(ended[place : place + 4] in allowed for place in range(len(way) - 1))
 
     ways = [(0, *inner, count - 1) for size in range(count - 1) for inner in itertools.combinations(chain[1:-1], size)]
-    found = tuple(_shortest(links, np.ones(len(links)), np.arange(count)).tolist())
+    found = tuple(_Ways(links, np.arange(count)).shortest().tolist())
     assert leads(found)
     assert len(found) == min(len(way) for way in ways if leads(way))
 
@@ -158,7 +173,7 @@ def test_the_shortest_way_by_links_is_the_shortest_of_all_ways(seed):
         ended = (-1, *way, -1)
         return sum(of_link[ended[place : place + 4]] for place in range(len(way) - 1))
 
-    found = tuple(_shortest(links, lengths, np.arange(count)).tolist())
+    found = tuple(_Ways(links, np.arange(count)).shortest(lengths).tolist())
     assert length_of(found) == pytest.approx(min(length_of(way) for way in ways if leads(way)))
 
 

@@ -1,8 +1,10 @@
 """The search for so many keys that are as near to a recording as can be.
 
 Keys are taken out until so many are left. For the largest error they are laid out anew and moved together, a few times,
-or, where there are few samples for each, some are taken out and put in elsewhere;
-for its mean square some more are put in, moved, and as many taken out.
+or, where there are few samples for each, some are taken out and put in elsewhere; then the best is put together of all
+that this has led to. Where a segment depends on its two keys alone and there are few samples for each key, all of them
+are candidates, and the first layout is the best there is but for a few hundredths. For the mean square some more keys
+are put in, moved, and as many taken out.
 """
 
 from __future__ import annotations
@@ -12,15 +14,18 @@ import math
 import numpy as np
 
 from .key_costs import Recording
-from .key_links import traded_keys
-from .key_search import ROUNDS, Keys, Search
+from .key_links import beside, joined_keys, traded_keys
+from .key_search import ROUNDS, SHORT, Keys, Search
 from .key_spread import moved_together, spread_keys
 
 SPREAD = 6, 8
 """Candidates for each key of a budget, at least and at most, when its keys are first laid out anew."""
 
 SPARSER = 3
-"""How many times as few candidates there are from then on."""
+"""How many times as few candidates there are each time after that, where a segment depends on other keys too."""
+
+BESIDE = 1
+"""Samples on either side of all keys so far that are candidates then, where it depends on these alone."""
 
 LENGTHS = 5, 10, 50
 """Samples for each key that settings change at. In the middle, from 10 to 50, there is time for every step.
@@ -38,6 +43,9 @@ TOGETHER = {0: ((5, 6), (5, 12), (5, 24)), 1: ((2, 6), (3, 12), (2, 24), (2, 48)
 STEPS = slice(1, 2), slice(2), slice(None), slice(2)
 """Which of these are done, by the lengths."""
 
+AGAIN = slice(1)
+"""The same once some keys have been put in elsewhere."""
+
 KEPT = 0.9
 """Of the keys: what is left of them when some are taken out, for others to be put in elsewhere."""
 
@@ -54,13 +62,15 @@ class BudgetSearch(Search):
         self._length = int(np.searchsorted(LENGTHS, len(recording.times) / budget, side="right"))
         self._is_short = self._length < 2
         """Whether there are few samples for each key."""
+        self._takes_all = self._is_short and self.reach == 0
+        """Whether all samples are candidates."""
 
     def least(self, tries: int) -> np.ndarray:
         """So many samples that are keys with as small an error as can be found."""
         count = len(self.recording.times)
         least, most = (self.budget * spread for spread in SPREAD)
         keys = self.thinned(self.measured(np.arange(count)), math.inf, max(least, min(most, count // 4)))
-        candidates = keys.indices
+        candidates = np.arange(count) if self._takes_all else keys.indices
         keys = self.thinned(keys, math.inf, self.budget)
         if self.power == 2:
             return self._least_squares(self._settled(keys), tries)
@@ -70,20 +80,31 @@ class BudgetSearch(Search):
         """The keys with the smallest largest error of all that tries lead to from some."""
         enough = math.inf if self._is_short else ENOUGH[self._length - 2] * self.costs.looked
         best = samples = (self.moved(keys, math.inf) if self._length == 2 else keys).indices
-        for number in range(min(tries, 1 + self.reach) if self._is_short else tries):
+        found = [best]
+        for number in range(min(tries, 2) if self._is_short else tries):
             if self.costs.peak(best) == 0.0 or self.costs.looked > enough:
                 break
-            if number and self._is_short:
+            steps, is_complete = STEPS[self._length], False
+            if number and self._is_short and self.reach:
                 # Those that matter least go where the motion is off most.
                 fewest = max(2, int(KEPT * self.budget))
-                samples = self.thinned(self.measured(best), math.inf, fewest).indices
+                samples, steps = self.thinned(self.measured(best), math.inf, fewest).indices, AGAIN
             else:
-                samples = spread_keys(self.costs, candidates[:: SPARSER if number else 1], samples, self.budget)
+                samples, is_complete = spread_keys(self.costs, candidates, samples, self.budget)
             samples = self._filled(self.measured(samples)).indices
-            for ways, part in TOGETHER[self.reach][STEPS[self._length]]:
+            found.append(samples)
+            for ways, part in TOGETHER[self.reach][steps]:
                 samples = moved_together(self.costs, samples, ways, part)
+                found.append(samples)
                 best = min(best, samples, key=self.costs.peak)
-        return best
+            if self._takes_all and is_complete:
+                break
+            candidates = candidates[::SPARSER] if self.reach else beside(self.costs, found, BESIDE)
+        # Without neighbours there is little left to gain, and in long recordings it takes long.
+        is_long = len(self.recording.times) > SHORT and not self.reach
+        if self._takes_all or is_long or not self.is_linkable:
+            return best
+        return joined_keys(self.costs, found, self.budget)
 
     def _least_squares(self, best: Keys, tries: int) -> np.ndarray:
         """The same for the mean square, from keys that are many enough."""
@@ -121,12 +142,12 @@ class BudgetSearch(Search):
         """Keys with more of them where the motion is off most, as many as the budget, or this, has left."""
         most = min(most or self.budget, len(self.recording.times))
         while (left := most - len(keys.indices)) > 0:
-            errors = self.costs.errors(self.segments(keys)[1])
-            errors[keys.indices] = -1.0
-            order = np.argsort(-errors, kind="stable")
-            segments = np.searchsorted(keys.indices, order, side="right")
-            # The first of each segment is where it is off most.
-            worst = order[np.sort(np.unique(segments, return_index=True)[1])]
-            worst = worst[errors[worst] >= 0.0][: (left + 1) // 2]
+            # The segments that are off most get one each, where they are so: half as many as there are keys left.
+            between, segments = np.diff(keys.indices) > 1, self.segments(keys)[1]
+            order = np.argsort(np.where(between, -keys.peak[:-1], 1.0), kind="stable")[: (left + 1) // 2]
+            picked = order[between[order]]
+            errors = self.costs.errors(segments[np.sort(picked)])
+            ends = zip(keys.indices[picked] + 1, keys.indices[picked + 1], strict=True)
+            worst = [first + errors[first:second].argmax() for first, second in ends]
             keys = self.measured(np.union1d(keys.indices, worst))
         return keys

@@ -32,11 +32,8 @@ REMEMBERED = 2**18
 REMEMBERED_EACH = 16
 """Segments for each sample of a shorter recording."""
 
-FACTORS = np.array((0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9, 0xD6E8FEB86659FD93), dtype=np.uint64)
-"""Odd numbers that spread segments over the places they are remembered in."""
-
-NO_SAMPLE = -2
-"""Where nothing is remembered yet: -1 is where a segment has no key."""
+FACTOR = np.uint64(0x9E3779B97F4A7C15)
+"""Spreads segments over the places that they are remembered in: 2^64 over the golden ratio."""
 
 Found = tuple[np.ndarray, np.ndarray]
 """The costs and the peaks of segments."""
@@ -109,7 +106,7 @@ class Costs:
         self.looked = 0.0
         """How many poses have been looked at so far."""
         self._first = 0 if recording.off_at_keys else 1
-        self._memory = _Memory(self.keys, min(REMEMBERED, REMEMBERED_EACH * len(recording.times)))
+        self._memory = _Memory(min(REMEMBERED, REMEMBERED_EACH * len(recording.times)))
 
     def of(self, segments: np.ndarray) -> Found:
         """Costs and peaks (...) of segments (..., keys), zero where no sample counts."""
@@ -118,7 +115,7 @@ class Costs:
         found = np.zeros((len(rows), 2))
         for first in range(0, len(filled), LOOKED_UP):
             some = filled[first : first + LOOKED_UP]
-            found[some] = self._memory.find(rows[some], self._work_out)
+            found[some] = self._memory.find(rows[some], len(self.recording.times), self._work_out)
         return found[:, 0].reshape(segments.shape[:-1]), found[:, 1].reshape(segments.shape[:-1])
 
     def total(self, keys: np.ndarray) -> float:
@@ -186,6 +183,8 @@ class Costs:
         progress = (recording.times[samples] - np.repeat(starts, counts)) * np.repeat(rates, counts)
         together = keys.shape[:-2]
         within = prepare_within(MODES[recording.mode].curves, key_times, keys, slice(before, before + 1))
+        if not together:
+            return samples, np.minimum(recording.errors(samples, within(counts, progress, slice(None))), WORST)
         of_all = (np.concatenate([numbers] * math.prod(together)) for numbers in (counts, progress))
         shown = within(*of_all, slice(None))
         return samples, np.minimum(recording.errors(samples, reshaped(shown, *together, -1)), WORST)
@@ -194,38 +193,37 @@ class Costs:
 class _Memory:
     """Costs and peaks of segments, each in a place that its samples make; another one for that place replaces it."""
 
-    def __init__(self, keys: int, most: int) -> None:
+    def __init__(self, most: int) -> None:
         bits = max(1, (most - 1).bit_length())
         self._shift = np.uint64(64 - bits)
-        self._rows, self._found = np.full((2**bits, keys), NO_SAMPLE), np.empty((2**bits, 2))
+        self._numbers, self._found = np.zeros(2**bits, dtype=np.uint64), np.empty((2**bits, 2))
         self._last = np.empty(2**bits, dtype=np.int64)
 
-    def find(self, rows: np.ndarray, work_out: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """Return what there is for segments (s, keys), shape (s, 2), worked out where it is not remembered."""
-        places = self._places(rows)
-        found = self._found.take(places, axis=0)
-        new = np.flatnonzero((self._rows.take(places, axis=0) != rows).any(axis=1))
-        if len(new):
-            rows, places, numbers = rows[new], places[new], np.arange(len(new))
-            # Of those for one place the last stays: others are worked out only where they are not the same.
-            self._last[places] = numbers
-            last = self._last[places]
-            differs = (rows != rows[last]).any(axis=1)
-            stays = last == numbers
-            needed = stays | differs
-            of_needed = work_out(rows[needed])
-            found[new] = of_needed[(np.cumsum(needed) - 1)[np.where(differs, numbers, last)]]
-            self._rows[places[stays]], self._found[places[stays]] = rows[stays], of_needed[stays[needed]]
-        return found
+    def find(self, rows: np.ndarray, samples: int, work_out: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """Return what there is for segments (s, keys), shape (s, 2), worked out where it is not remembered.
 
-    def _places(self, rows: np.ndarray) -> np.ndarray:
-        mixed = np.zeros(len(rows), dtype=np.uint64)
+        `samples` is how many there are: a segment is the number that has its samples for digits. Where that has more
+        than 64 bits, another one with the same last bits is none that anybody will ever see.
+        """
+        numbers = np.zeros(len(rows), dtype=np.uint64)
         for column in range(rows.shape[1]):
-            mixed ^= rows[:, column].astype(np.uint64)
-            mixed *= FACTORS[column % len(FACTORS)]
-            mixed ^= mixed >> np.uint64(29)
-        mixed *= FACTORS[0]
-        return (mixed >> self._shift).astype(np.int64)
+            numbers *= np.uint64(samples + 1)
+            numbers += (rows[:, column] + 1).astype(np.uint64)
+        places = ((numbers * FACTOR) >> self._shift).astype(np.int64)
+        found = self._found.take(places, axis=0)
+        new = np.flatnonzero(self._numbers.take(places) != numbers)
+        if len(new):
+            numbers, places, order = numbers[new], places[new], np.arange(len(new))
+            # Of those for one place the last stays: others are worked out only where they are not the same.
+            self._last[places] = order
+            last = self._last[places]
+            differs = numbers != numbers[last]
+            stays = last == order
+            needed = stays | differs
+            of_needed = work_out(rows[new[needed]])
+            found[new] = of_needed[(np.cumsum(needed) - 1)[np.where(differs, order, last)]]
+            self._numbers[places[stays]], self._found[places[stays]] = numbers[stays], of_needed[stays[needed]]
+        return found
 
 
 def _at(numbers: np.ndarray, samples: np.ndarray) -> np.ndarray:

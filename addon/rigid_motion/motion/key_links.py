@@ -4,7 +4,8 @@ Of two good sets of keys each may be better than the other in places. The candid
 those next to them; every segment that joins two and keeps to the tolerance is a link, and the fewest links from the
 first sample to the last are found by dynamic programming. Where a segment depends on its two keys alone that is exact
 for these candidates. Where it depends on one key more on either side, a link is made of four keys; segments that are
-far from the tolerance with neighbours as far away as they are long are left out.
+far from the tolerance with neighbours as far away as they are long are left out. Of links that are off by less and less
+the same tells how small the largest error of so many keys can be.
 
 Where the mean square of the errors counts, no link is good enough or too bad by itself. There a key has a price, and
 the way is the cheapest, errors and keys together: the highest price at which the errors keep to the tolerance leaves
@@ -16,6 +17,7 @@ keyframe selection for motion capture", 2019.
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -31,10 +33,19 @@ WIDTHS = {0: (3, 1), 1: (1, 0)}
 EFFORT = 100
 """Times that every sample may be looked at, on average."""
 
+BESIDE = {0: 2, 1: 0}
+"""The same for keys of a budget, whatever the effort."""
+
+NEAR = 1.2, 1.4
+"""How many times the least error so far a segment may be off by for these, and for a longer one to be looked at."""
+
+JOINED = 150
+"""Times that every sample may be looked at, on average, for these."""
+
 WITHIN = 1.0 + 1e-12
 """Tolerances that a link may be off by: those of the keys that were found are among them, whatever the rounding."""
 
-TOGETHER = 4
+TOGETHER = 8
 """Lengths of segments that are looked at in one go, though that of some would be enough, where a pose costs little."""
 
 DEAR = 3.0
@@ -58,12 +69,12 @@ def linked_keys(costs: Costs, found: list[np.ndarray]) -> np.ndarray:
         Keys that keep to the tolerance, each from the first sample to the last.
     """
     for width in WIDTHS[costs.reach]:
-        candidates = _beside(costs, found, width)
+        candidates = beside(costs, found, width)
         links = _links(costs, candidates, found, 1.0 if costs.reach == 0 else ALIVE, ALIVE**2)
         if links is not None:
             _, peak = costs.of(links)
             links = links[peak <= WITHIN]
-            return _fewest(links, candidates)
+            return _Ways(links, candidates).shortest()
     return min(found, key=len)
 
 
@@ -87,15 +98,15 @@ def traded_keys(costs: Costs, found: list[np.ndarray], *, budget: int | None = N
     if max(counts) == min(counts) or max(totals) == min(totals):
         return best
     price = (max(totals) - min(totals)) / (max(counts) - min(counts))
-    candidates = _beside(costs, found, 0)
+    candidates = beside(costs, found, 0)
     links = _links(costs, candidates, found, DEAR * price, DEAR**2 * price)
     if links is None:
         return best
-    cost, _ = costs.of(links)
+    (cost, _), ways = costs.of(links), _Ways(links, candidates)
     low, high = -math.log(PRICES), math.log(PRICES)
     for _ in range(PRICE_STEPS):
         middle = 0.5 * (low + high)
-        keys = _shortest(links, cost + price * math.exp(middle), candidates)
+        keys = ways.shortest(cost + price * math.exp(middle))
         total = costs.total(keys)
         worth = (len(keys), total) if budget is None else (total, len(keys))
         fits = total <= allowed if budget is None else len(keys) <= budget
@@ -106,14 +117,50 @@ def traded_keys(costs: Costs, found: list[np.ndarray], *, budget: int | None = N
     return best
 
 
-def _beside(costs: Costs, found: list[np.ndarray], width: int) -> np.ndarray:
-    """The samples that are keys in what was found, and so many on either side of each."""
+def joined_keys(costs: Costs, found: list[np.ndarray], budget: int) -> np.ndarray:
+    """The keys within a budget with the smallest largest error that candidates allow, or the best that were found.
+
+    Parameters
+    ----------
+    costs : Costs
+        Of one track, for the largest error, under a mode that reaches no further than one key beyond a segment.
+    found : list of array of int
+        Keys within the budget, each from the first sample to the last.
+    budget : int
+    """
+    best = min(found, key=costs.peak)
+    high, candidates = costs.peak(best), beside(costs, found, BESIDE[costs.reach])
+    links = _links(costs, candidates, found, *(high * times for times in NEAR), JOINED)
+    if links is None:
+        return best
+    _, peak = costs.of(links)
+    better = peak < high
+    links, peak = links[better], peak[better]
+    ways, levels = _Ways(links, candidates), _rising(peak)
+    low, high = 0, len(levels)
+    while low < high:
+        middle = (low + high) // 2
+        keys = ways.shortest(among=peak <= levels[middle])
+        if keys is None or len(keys) > budget:
+            low = middle + 1
+        else:
+            best, high = keys, middle
+    return best
+
+
+def beside(costs: Costs, found: list[np.ndarray], width: int) -> np.ndarray:
+    """Return the samples that are keys in what was found, and so many on either side of each."""
     beside = np.concatenate(found)[:, None] + np.arange(-width, width + 1)
-    return np.unique(np.clip(beside, 0, len(costs.recording.times) - 1))
+    return _rising(np.clip(beside, 0, len(costs.recording.times) - 1).ravel())
 
 
 def _links(
-    costs: Costs, candidates: np.ndarray, found: list[np.ndarray], good: float, alive: float
+    costs: Costs,
+    candidates: np.ndarray,
+    found: list[np.ndarray],
+    good: float,
+    alive: float,
+    effort: float = EFFORT,
 ) -> np.ndarray | None:
     """The links that candidates allow: samples, -1 beyond the ends, (l, keys of a segment); None where there are many.
 
@@ -126,7 +173,7 @@ def _links(
     before, after = _neighbours(pairs, len(candidates))
     # Links are many times the pairs: they are counted before any is made.
     poses = (before * after * (candidates[pairs[:, 1]] - candidates[pairs[:, 0]] - 1)).sum()
-    if poses > EFFORT * len(costs.recording.times):
+    if poses > effort * len(costs.recording.times):
         return None
     numbers = _with_neighbours(pairs, len(candidates))
     return np.where(numbers >= 0, candidates[np.maximum(numbers, 0)], -1)
@@ -154,7 +201,14 @@ def _pairs(costs: Costs, candidates: np.ndarray, found: list[np.ndarray], good: 
         pairs.append(np.stack((np.broadcast_to(first[:, None], is_good.shape)[is_good], second[is_good]), axis=1))
         first, gap = first[lives[:, -1]], gap + len(gaps)
         first = first[first + gap <= last]
-    return np.unique(np.concatenate(pairs), axis=0)
+    numbers = np.concatenate(pairs) @ (last + 1, 1)
+    return np.stack(np.divmod(_rising(numbers), last + 1), axis=1)
+
+
+def _rising(numbers: np.ndarray) -> np.ndarray:
+    """Each of some numbers once, rising. Quicker than `np.unique` where most of them differ."""
+    numbers = np.sort(numbers)
+    return numbers[np.append(True, numbers[1:] != numbers[:-1])[: len(numbers)]]
 
 
 def _neighbours(pairs: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -184,50 +238,41 @@ def _with_neighbours(pairs: np.ndarray, count: int) -> np.ndarray:
     )
 
 
-def _fewest(links: np.ndarray, candidates: np.ndarray) -> np.ndarray | None:
-    """The way over the fewest links, rising by the key that they begin at; None where they lead nowhere."""
-    if links.shape[1] > 2:
-        return _shortest(links, np.ones(len(links)), candidates)
-    begins = np.searchsorted(links[:, 0], candidates, side="left"), np.searchsorted(links[:, 0], candidates, "right")
-    ends = np.searchsorted(candidates, links[:, 1])
-    steps, back = np.full(len(candidates), len(candidates)), np.zeros(len(candidates), dtype=np.int64)
-    steps[0] = 0
-    for number, (begin, end) in enumerate(zip(*(bounds.tolist() for bounds in begins), strict=True)):
-        onwards = ends[begin:end]
-        onwards = onwards[steps[onwards] > steps[number] + 1]
-        steps[onwards], back[onwards] = steps[number] + 1, number
-    if steps[-1] == len(candidates):
-        return None
-    way = [len(candidates) - 1]
-    while way[-1]:
-        way.append(int(back[way[-1]]))
-    return candidates[way[::-1]]
+class _Ways:
+    """Ways over links (l, keys) from the first candidate to the last: successive links share all keys but one."""
 
+    def __init__(self, links: np.ndarray, candidates: np.ndarray) -> None:
+        second = links.shape[1] // 2
+        self._order = np.argsort(links[:, second - 1], kind="stable")
+        links, self._end = links[self._order], int(candidates[-1])
+        self._begins = links[:, second - 1]
+        # What a link shares with the one before it and the one after it, as numbers: 0 at the start, 1 at the end.
+        shared = np.zeros((2, len(links)), dtype=np.int64)
+        for column in range(links.shape[1] - 1):
+            shared = shared * (self._end + 2) + links[:, column : column + 2].T + 1
+        shared[0, self._begins == candidates[0]] = -2
+        shared[1, links[:, second] == self._end] = -1
+        found, numbers = np.unique(np.append(shared, (-2, -1)), return_inverse=True)
+        self._from, self._to, self._count = *numbers[:-2].reshape(2, -1), len(found)
 
-def _shortest(links: np.ndarray, lengths: np.ndarray, candidates: np.ndarray) -> np.ndarray | None:
-    """The way from the first candidate to the last that is shortest, by the length of each link; all samples on it.
+    def shortest(self, lengths: np.ndarray | None = None, among: np.ndarray | None = None) -> np.ndarray | None:
+        """All samples on the way that is shortest by the length of each link (l,), or has the fewest of them.
 
-    None where they do not lead there.
-
-    Successive links have all keys in common but one.
-    """
-    start, end = candidates[[0, -1]].tolist()
-    second = links.shape[1] // 2
-    reached: dict[tuple[int, ...], float] = {}
-    back: dict[tuple[int, ...], tuple[int, ...]] = {}
-    shortest, last = math.inf, ()
-    order = np.argsort(links[:, second - 1], kind="stable")
-    for link, length in zip(map(tuple, links[order].tolist()), lengths[order].tolist(), strict=True):
-        way = length + (0.0 if link[second - 1] == start else reached.get(link[:-1], math.inf))
-        if link[second] == end:
-            if way < shortest:
-                shortest, last = way, link
-        elif way < reached.get(link[1:], math.inf):
-            reached[link[1:]], back[link[1:]] = way, link
-    if not last:
-        return None
-    samples = [end, last[second - 1]]
-    while samples[-1] != start:
-        last = back[last[:-1]]
-        samples.append(last[second - 1])
-    return np.array(samples[::-1])
+        Only over links that are `among` them (l,), where that is given. None where they lead nowhere.
+        """
+        taken = slice(None) if among is None else among[self._order]
+        begins, ends = self._from[taken].tolist(), self._to[taken].tolist()
+        each = itertools.repeat(1) if lengths is None else lengths[self._order][taken].tolist()
+        reached, back = [math.inf] * self._count, [-1] * self._count
+        reached[0] = 0.0
+        for number, (begin, end, length) in enumerate(zip(begins, ends, each, strict=False)):
+            way = reached[begin] + length
+            if way < reached[end]:
+                reached[end], back[end] = way, number
+        if back[1] < 0:
+            return None
+        samples, way, place = self._begins[taken].tolist(), [self._end], 1
+        while place:
+            way.append(samples[back[place]])
+            place = begins[back[place]]
+        return np.array(way[::-1])

@@ -55,7 +55,7 @@ WAYS = np.array((0, 1, -1, 2, -2))
 """Where a key may go, in steps towards the worse one of the segments beside it."""
 
 
-def spread_keys(costs: Costs, candidates: np.ndarray, keys: np.ndarray, budget: int) -> np.ndarray:
+def spread_keys(costs: Costs, candidates: np.ndarray, keys: np.ndarray, budget: int) -> tuple[np.ndarray, bool]:
     """Keys laid out anew: as many as a budget at most, whose worst segment is as good as candidates allow.
 
     Parameters
@@ -71,7 +71,9 @@ def spread_keys(costs: Costs, candidates: np.ndarray, keys: np.ndarray, budget: 
 
     Returns
     -------
-    array of int, rising
+    keys : array of int, rising
+    is_complete : bool
+        Whether all segments that might have been better were looked at.
     """
     ways = _Ways(costs, np.union1d(candidates, keys), keys)
     worst = costs.peak(keys)
@@ -81,7 +83,7 @@ def spread_keys(costs: Costs, candidates: np.ndarray, keys: np.ndarray, budget: 
     low = high
     while best is None:
         if high >= worst:
-            return keys
+            return keys, False
         low, high = high, min(RAISED * high, worst)
         ways.look(high)
         best = ways.fewest(high, budget)
@@ -93,7 +95,7 @@ def spread_keys(costs: Costs, candidates: np.ndarray, keys: np.ndarray, budget: 
         middle = math.sqrt(low * high)
         better = ways.fewest(middle, budget)
         low, high, best = (middle, high, best) if better is None else (low, middle, better)
-    return best
+    return best, ways.is_complete
 
 
 class _Ways:
@@ -117,6 +119,11 @@ class _Ways:
         own = np.searchsorted(candidates, keys)
         self._pairs = [np.stack((own[:-1], own[1:]))]
         self._peaks = [costs.of(self._windows(*self._pairs[0]))[1]]
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether there was time to look at all segments for the errors that were asked for."""
+        return self._left >= 0.0
 
     def _windows(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """The samples of all keys with a say in segments between candidates (...), shape (..., keys)."""
@@ -154,13 +161,23 @@ class _Ways:
         self._peaks.append(peak[rows, columns])
 
     def fewest(self, error: float, budget: int) -> np.ndarray | None:
-        """The samples of a way with the fewest keys of segments that are off by an error at most.
+        """The samples of a way of segments that are off by an error at most, with as few keys as a budget.
 
-        None where that is more than the budget.
+        None where there is no such way.
         """
         pairs, peaks = np.concatenate(self._pairs, axis=1), np.concatenate(self._peaks)
         self._pairs, self._peaks = [pairs], [peaks]
         first, second = pairs[:, peaks <= error]
+        # How far each candidate gets at once, and how far it or any before it does.
+        last, farthest = len(self._candidates) - 1, np.arange(len(self._candidates))
+        np.maximum.at(farthest, first, second)
+        if _steps(np.maximum.accumulate(farthest).tolist(), last, budget) is None:
+            return None
+        way = _steps(farthest.tolist(), last, budget)
+        return self._candidates[way] if way else self._exactly(first, second, budget)
+
+    def _exactly(self, first: np.ndarray, second: np.ndarray, budget: int) -> np.ndarray | None:
+        """The same over segments that join these candidates."""
         order = np.argsort(first, kind="stable")
         bounds = np.searchsorted(first[order], np.arange(len(self._candidates) + 1)).tolist()
         onwards, back = second[order].tolist(), [0] * len(self._candidates)
@@ -176,6 +193,16 @@ class _Ways:
         while way[-1]:
             way.append(back[way[-1]])
         return self._candidates[way[::-1]]
+
+
+def _steps(farthest: list[int], last: int, budget: int) -> list[int] | None:
+    """From the first candidate to the last, always as far as one gets; None where that takes more than the budget."""
+    way = [0]
+    while way[-1] < last:
+        if len(way) == budget:
+            return None
+        way.append(farthest[way[-1]])
+    return way
 
 
 def moved_together(costs: Costs, keys: np.ndarray, ways: int, part: int) -> np.ndarray:
