@@ -164,14 +164,14 @@ def test_ctrl_c_within_an_importer_is_no_fault_of_the_file(tmp_path):
 
 @pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_to_all_processes_at_once_leaves_the_film_of_a_receiver(tmp_path, by):
-    options = ("receive", "--port", 0, "--output", "shown.csv")
+    options = ("receive", "--room", "nobody", "--user", "ada", "--output", "shown.csv")
     run = start(tmp_path, "stream.py", *options, where="no such file")
-    assert run.process.stdout.readline().startswith("Listening on 127.0.0.1:")
+    assert run.process.stdout.readline() == "ada listens in nobody\n"
     time.sleep(0.3)
     os.killpg(run.process.pid, by)
     printed, said, seconds = run.end()
     assert run.process.returncode == 128 + by
-    assert "no sender came" in said
+    assert "nobody sent anything" in said
     assert "Traceback" not in printed + said
     assert seconds < SOON
 

@@ -1,7 +1,10 @@
 """Streaming: `rigid_motion.streams` over a transport, and what it costs.
 
+rooms       who is where, by Zenoh
+sending     recordings into a room
+receiving   what a room shows, and what is handed on to Blender
 transports  what carries datagrams: two methods, and UDP on this machine
 packed      what else one would send: floats, and the smallest three components, at even rates
 measuring   a recording sent to another process in real time, and what was shown there
-written     what was shown, as BVH or CSV
+written     what was shown, as CSV, BVH or TUM
 """

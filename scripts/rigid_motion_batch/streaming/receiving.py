@@ -16,9 +16,9 @@ from rigid_motion.motion import Poses, shell_error
 from rigid_motion.streams import Body, Receiver, Shown
 from rigid_motion.streams.bodies import Forest
 from rigid_motion.streams.receiver import MOST_STREAMS, Stream
+from rigid_motion.streams.wire import LONGEST
 
 from .rooms import ANSWERS, MOTION, SKELETON, Came, Room
-from .transports import LONGEST
 
 ANSWERS_A_SECOND = 100.0
 """To all streams together."""

@@ -137,17 +137,18 @@ def test_a_body_goes_to_several_receivers_in_the_formats_that_they_ask_for(tmp_p
     assert len(clips[0].times) < 0.6 * len(clip.times)
 
 
-def test_many_bodies_of_many_senders_are_told_apart(tmp_path, at, hand):
+def test_many_bodies_of_many_senders_are_told_apart(tmp_path, at, hand, endless):
     shutil.copy(hand, tmp_path / "left.csv")
     shutil.copy(hand, tmp_path / "right.csv")
     shown = tmp_path / "shown.tum"
     with running("receive", "--room", "r", "--at", at, "--output", shown) as receiver:
-        with running("send", hand, "--room", "r", "--user", "bob", "--at", at) as other:
+        with running("send", endless, "--room", "r", "--user", "bob", "--at", at) as other:
             run("send", tmp_path / "left.csv", tmp_path / "right.csv", "--room", "r", "--user", "ada", "--at", at)
-            done(other)
+            other.send_signal(signal.SIGINT)
+            done(other, 130)
         done(receiver)
     made = sorted(path.name for path in tmp_path.glob("*.tum"))
-    assert made == ["shown-ada-left.tum", "shown-ada-right.tum", "shown-bob-hand.tum"]
+    assert made == ["shown-ada-left.tum", "shown-ada-right.tum", "shown-bob-endless.tum"]
 
 
 def test_another_room_is_not_heard(at, hand):
