@@ -143,7 +143,8 @@ def test_a_long_way_with_jitter_loss_and_duplicates(loss: float, within: float, 
         own, *dance(own, 12.0), lost=lost, latency=0.21, jitter=0.08, copies=1 + (loss > 0.0), answers=answers
     )
     assert np.mean(outcome.between(2.0, 12.0) <= 0.02) >= within
-    assert np.diff(outcome.moments).min() >= 0.0
+    # No freeze, and no jump back.
+    assert np.diff(outcome.moments).min() > 0.0
 
 
 @pytest.mark.parametrize("answers", [True, False])
@@ -155,7 +156,8 @@ def test_an_outage_of_2_s_heals_within_half_a_second(loss: float, answers: bool)
     there = np.concatenate((outcome.between(0.0, 4.0), outcome.between(6.5, 12.0)))
     assert np.mean(there <= 0.02) >= 0.98
     assert outcome.between(6.5, 7.0).max() <= (TOLERANCE if not loss else 0.02)
-    assert np.diff(outcome.moments).min() >= 0.0
+    # No freeze, and no jump back.
+    assert np.diff(outcome.moments).min() > 0.0
     assert (outcome.now - outcome.moments)[outcome.now > 6.5].max() < 0.1 + 0.03 + 0.02
 
 
