@@ -123,10 +123,10 @@ many clips:
   The work is split into small tasks, done by as many processes as --jobs says. Results are kept: after Ctrl-C, a full
   disk or a crash, the same command continues from there; with other options it does only what these change. A recording
   that cannot be read, or a video that cannot be rendered, is reported, and the others go on. With --scheduler, the
-  processes of all machines that a Dask scheduler knows do the work; docs/farm.md says how.
+  machines of a Dask scheduler do the work; docs/farm.md says how.
 
 Exit code: 0 done, 1 some recordings or videos could not be done, 2 nothing could be done, or a wrong option, 130
-stopped by Ctrl-C, and 143 by SIGTERM; the report then holds what was ready.
+stopped by Ctrl-C, and 143 by SIGTERM.
 """
 
 
@@ -279,6 +279,14 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     if options.against and len(options.inputs) != 1:
         parser.error(f"--against is a motion of one clip, and there are {len(options.inputs)}: name one recording")
     return options
+
+
+def without(arguments: list[str], *options: str) -> list[str]:
+    """Arguments of a comparison but for some options and their values."""
+    parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    for option in options:
+        parser.add_argument(option)
+    return parser.parse_known_args(arguments)[1]
 
 
 def own_recordings() -> list[str]:

@@ -1,58 +1,42 @@
-"""Who does orders on this machine: this process, or worker processes of `pebble`.
+"""Who does orders: this process, or worker processes of `pebble`, where whatever kills one costs its task alone.
 
-Each worker has a pool for itself, so that whatever kills it costs the task that it was at, and nothing else. In a
-worker tasks run in the main thread, as Blender wants it.
+In a worker tasks run in the main thread, as Blender wants it.
 """
 
 from __future__ import annotations
 
-import faulthandler
 import multiprocessing
 import os
-import queue
 import signal
 import sys
-import tempfile
-import time
-from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import CancelledError
+from concurrent.futures import CancelledError, Future
 from contextlib import contextmanager, suppress
-from pathlib import Path
-from typing import Self
+from typing import Protocol, Self
 
-from pebble import CONSTS, ProcessExpired, ProcessFuture, ProcessPool
+from pebble import CONSTS, ProcessExpired, ProcessPool
 
 from rigid_motion_batch.supervising import end_with_parent
 
-from .performing import Failed, Lost, Made, Order, Told, perform, progress_of
+from .performing import Failed, Lost, Made, Order, perform
 
-CONSTS.term_timeout = 0.2
+CONSTS.term_timeout = 0.05
 """Seconds that a worker has to end by itself before it is killed: Blender at work does not listen."""
 
-LOOK = 0.2
-"""Seconds between two looks at how far tasks are."""
-
-Tell = Callable[[Order, Told | Made | Failed | Lost], object]
+Tell = Callable[[float, str], object]
 
 
-class SerialExecutor:
-    """Does one order after the other in this process."""
+class Executor(Protocol):
+    """Who does orders. A context; may be used again after `stop`."""
 
-    capacity = 1
+    capacity: int
+    """How many orders it takes at a time."""
 
-    def __init__(self) -> None:
-        self._waiting: deque[Order] = deque()
-
-    def submit(self, order: Order) -> None:
-        self._waiting.append(order)
-
-    def wait(self, tell: Tell, seconds: float) -> None:
-        order = self._waiting.popleft()
-        tell(order, perform(order, lambda share, doing: tell(order, Told(order, share, doing))))
+    def submit(self, order: Order, tell: Tell) -> Future[Made | Failed | Lost]:
+        """Begin an order. How far it is, is told here, or written for `progress_of`."""
 
     def stop(self) -> None:
-        self._waiting.clear()
+        """End what is at work, within a second."""
 
     def __enter__(self) -> Self:
         return self
@@ -61,8 +45,22 @@ class SerialExecutor:
         self.stop()
 
 
-class ProcessExecutor:
-    """Does orders in processes, which are started when there is work for them.
+class SerialExecutor(Executor):
+    """Does an order at once, in this process."""
+
+    capacity = 1
+
+    def submit(self, order: Order, tell: Tell) -> Future[Made | Failed | Lost]:
+        future: Future[Made | Failed | Lost] = Future()
+        future.set_result(perform(order, tell))
+        return future
+
+    def stop(self) -> None:
+        pass
+
+
+class ProcessExecutor(Executor):
+    """Does orders in processes, each with a pool for itself, which are started when there is work for them.
 
     Parameters
     ----------
@@ -72,81 +70,40 @@ class ProcessExecutor:
 
     def __init__(self, jobs: int) -> None:
         self.capacity = max(1, jobs)
+        self._pools: list[ProcessPool] = []
         self._idle: list[ProcessPool] = []
-        self._at_work: dict[ProcessFuture, tuple[Order, ProcessPool]] = {}
-        self._ended: queue.SimpleQueue[ProcessFuture] = queue.SimpleQueue()
-        self._logs: tempfile.TemporaryDirectory | None = None
 
-    def submit(self, order: Order) -> None:
+    def submit(self, order: Order, tell: Tell) -> Future[Made | Failed | Lost]:
         with _without_interrupts():
             pool = self._pool()
             future = pool.schedule(perform, (order,))
-        self._at_work[future] = order, pool
-        future.add_done_callback(self._ended.put)
-
-    def wait(self, tell: Tell, seconds: float) -> None:
-        ends = time.monotonic() + seconds
-        while self._at_work:
-            try:
-                future = self._ended.get(timeout=max(0.0, min(LOOK, ends - time.monotonic())))
-            except queue.Empty:
-                for order, _ in self._at_work.values():
-                    if progress := progress_of(order):
-                        tell(order, Told(order, *progress))
-                if time.monotonic() >= ends:
-                    return
-                continue
-            if future in self._at_work:
-                order, pool = self._at_work.pop(future)
-                message = self._message(future)
-                if isinstance(message, Lost) and not pool.active:
-                    _stop([pool])
-                else:
-                    self._idle.append(pool)
-                tell(order, message)
-                return
+        future.add_done_callback(lambda _: self._idle.append(pool))
+        return future
 
     def stop(self) -> None:
-        pools = [*self._idle, *(pool for _, pool in self._at_work.values())]
-        self._idle.clear()
-        self._at_work.clear()
-        _stop(pools)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.stop()
-        if self._logs:
-            self._logs.cleanup()
-            self._logs = None
+        pools, self._pools, self._idle = self._pools, [], []
+        for pool in pools:
+            pool.stop()
+        for pool in pools:
+            with suppress(RuntimeError):
+                pool.join()
 
     def _pool(self) -> ProcessPool:
         while self._idle:
-            pool = self._idle.pop()
-            if pool.active:
+            if (pool := self._idle.pop()).active:  # And not killed while it had nothing to do.
                 return pool
-            _stop([pool])  # Its worker was killed while it had nothing to do.
-        if self._logs is None:
-            self._logs = tempfile.TemporaryDirectory(prefix="rigid-motion-", ignore_cleanup_errors=True)
-        spawn = multiprocessing.get_context("spawn")
-        return ProcessPool(1, initializer=_begin, initargs=(self._logs.name,), context=spawn)
+        self._pools.append(ProcessPool(1, initializer=_begin, context=multiprocessing.get_context("spawn")))
+        return self._pools[-1]
 
-    def _message(self, future: ProcessFuture) -> Made | Failed | Lost:
-        try:
-            return future.result()
-        except ProcessExpired as error:
-            return Lost(f"its process died ({_death(error.exitcode)}){self._last_words(error.pid)}")
-        except (CancelledError, Exception) as error:  # Of pebble's, or at unpickling; not of the task's.
-            return Lost(f"its process failed: {type(error).__name__}: {error}")
 
-    def _last_words(self, process: int | None) -> str:
-        try:
-            lines = Path(self._logs.name, f"{process}").read_text(encoding="utf-8", errors="replace").split("\n")
-        except (OSError, AttributeError):
-            return ""
-        said = next((line.strip() for line in reversed(lines) if line.strip()), "")
-        return f": {said[:200]}" if said else ""
+def outcome_of(future: Future[Made | Failed | Lost]) -> Made | Failed | Lost:
+    """What became of an order."""
+    try:
+        return future.result()
+    except ProcessExpired as error:
+        return Lost(f"its process died ({_death(error.exitcode)})")
+    except (CancelledError, Exception) as error:  # Of pebble's, or at unpickling; not of the task's.
+        return Lost(f"its process failed: {type(error).__name__}: {error}")
 
 
 def processors() -> int:
@@ -154,23 +111,14 @@ def processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _begin(logs: str) -> None:
-    """Begin a worker: it ends with its parent, and what libraries print in it goes into a file."""
+def _begin() -> None:
+    """Begin a worker: it ends with its parent, and nobody sees what libraries print in it."""
     end_with_parent()
     # Where Blender is loaded in the parent, its own modules hide what brings them.
     sys.path[:] = [folder for folder in sys.path if not os.path.exists(os.path.join(folder, "addon_utils.py"))]
-    log = os.open(Path(logs, f"{os.getpid()}"), os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
     for stream in (1, 2):
-        os.dup2(log, stream)
-    faulthandler.enable()
-
-
-def _stop(pools: list[ProcessPool]) -> None:
-    for pool in pools:
-        pool.stop()
-    for pool in pools:
-        with suppress(RuntimeError):
-            pool.join()
+        os.dup2(nowhere, stream)
 
 
 def _death(code: int) -> str:

@@ -1,7 +1,7 @@
 """Doing one task, wherever that is: from an order to a folder with files, and a message of what came of it.
 
-Nothing here touches a store, so it does not matter where it happens or how it ends: here, in a worker, on another
-machine. Orders and messages are pickled. How far a task is, it writes into a file beside its folder.
+Nothing here touches a store, so it does not matter where it happens or how it ends: here, in a worker, in a Blender.
+Orders and messages are pickled. How far a task is, it writes into a file beside its folder.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from .steps import Input, Job, Step, TaskError, sha256_of
 
@@ -51,18 +51,6 @@ class Order:
     blender: str = ""
     """The program that does it, if that is not to be this one."""
 
-    here: str = ""
-    """The folder that relative inputs start from, where that is not the current one."""
-
-
-@dataclass(frozen=True)
-class Told:
-    """How far a task is."""
-
-    order: Order
-    share: float
-    doing: str
-
 
 @dataclass(frozen=True)
 class Made:
@@ -95,25 +83,6 @@ class Lost:
     notes: Sequence[str] = ()
 
 
-class Executor(Protocol):
-    """Who does orders. A context; may be used again after `stop`."""
-
-    capacity: int
-    """How many orders it takes at a time; 0 where there is nobody to do one yet."""
-
-    def submit(self, order: Order) -> None: ...
-
-    def wait(self, tell: Callable[[Order, Told | Made | Failed | Lost], object], seconds: float) -> None:
-        """Pass on what has happened, or wait for it for so long. Raises ExecutorError where nothing can any more."""
-
-    def stop(self) -> None:
-        """End what is at work, and forget what is waiting, within a second."""
-
-    def __enter__(self) -> Executor: ...
-
-    def __exit__(self, *_: object) -> None: ...
-
-
 class ExecutorError(Exception):
     """Why nothing can be done by these means, and the way out, in one line."""
 
@@ -127,8 +96,6 @@ def perform(order: Order, tell: Callable[[float, str], object] | None = None) ->
     tell : callable, optional
         Takes the share that is done and what is being done; written into a file for `progress_of` unless given.
     """
-    if order.here and os.path.isdir(order.here):
-        os.chdir(order.here)
     if order.step.blender and order.blender:
         from .blender import perform_in_blender
 
@@ -176,12 +143,6 @@ def perform(order: Order, tell: Callable[[float, str], object] | None = None) ->
     return done
 
 
-def write_progress(order: Order, share: float, doing: str) -> None:
-    """Say how far an order is to whoever asks `progress_of`."""
-    with suppress(OSError):
-        Path(f"{order.folder}.progress").write_text(json.dumps([share, doing]), encoding="utf-8")
-
-
 def progress_of(order: Order) -> tuple[float, str] | None:
     """How far an order is that is done elsewhere, and what is being done; None where nothing is known."""
     try:
@@ -192,14 +153,15 @@ def progress_of(order: Order) -> tuple[float, str] | None:
 
 
 def _writing(order: Order) -> Callable[[float, str], None]:
-    """What writes how far a task is, not too often."""
+    """What writes how far a task is for `progress_of`, not too often."""
     said_at = 0.0
 
     def tell(share: float, doing: str) -> None:
         nonlocal said_at
         if time.monotonic() - said_at >= INTERVAL:
             said_at = time.monotonic()
-            write_progress(order, share, doing)
+            with suppress(OSError):
+                Path(f"{order.folder}.progress").write_text(json.dumps([share, doing]), encoding="utf-8")
 
     return tell
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from rigid_motion_batch.pipeline.executors import ProcessExecutor, SerialExecutor
-from rigid_motion_batch.pipeline.performing import Executor
+from rigid_motion_batch.pipeline.executors import Executor, ProcessExecutor, SerialExecutor
 from rigid_motion_batch.pipeline.running import Outcome, Progress, State, run
 from rigid_motion_batch.pipeline.steps import OWN, Step, Task
 from rigid_motion_batch.pipeline.store import Store
