@@ -260,7 +260,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     video.add_argument(
         "--antialiasing",
         choices=ANTIALIASING,
-        help="for workbench: OFF, FXAA or a number of samples; 8 for a talk (edges smoothed by the compositor)",
+        help="for workbench: OFF, FXAA or a number of samples; 8 for a talk (softened by the compositor)",
     )
     video.add_argument("--samples", type=int, default=16, help="samples for eevee and cycles (%(default)s)")
     options = parser.parse_args(arguments)
