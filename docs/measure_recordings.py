@@ -31,6 +31,7 @@ sys.path[:0] = [str(DOCS.parent / folder) for folder in ("addon", "scripts")]
 from research.paper.motions import RECORDINGS, read_motion, recordings_in, sampling_rate
 from research.paper.table import RADIUS, SAMPLES_AN_UPDATE
 from rigid_motion.motion import curves, decimate
+from rigid_motion.motion.segments import Curves, Segments
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.analysis.modes import BEST_OF, REFERENCE
 from rigid_motion_batch.analysis.needed import TABLE_RATES, KeysNeeded, OfRigidBody, keys_needed, overall
@@ -139,9 +140,9 @@ def _errors_of_clips(clips: Sequence[Clip], part: float) -> dict[str, float]:
     """By rate, the error of `motor_spline_causal` where keys have another part of what the parabola adds."""
     bent = curves._bent
 
-    def with_part(segments, at_keys):
-        def changed(leaving, arriving, before, after, rests):
-            found = at_keys(leaving, arriving, before, after, rests)
+    def with_part(segments: Segments, at_keys: Callable[..., np.ndarray]) -> Curves:
+        def changed(leaving: np.ndarray, arriving: np.ndarray, *others: np.ndarray) -> np.ndarray:
+            found, rests = at_keys(leaving, arriving, *others), others[-1]
             added = np.where(rests[:, 1:], 0.0, found[..., 2:] - leaving[..., 1:])
             return np.concatenate((found[..., :2], found[..., 2:] + (2.0 * part - 1.0) * added), axis=-1)
 

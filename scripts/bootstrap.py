@@ -58,7 +58,7 @@ COMMANDS = {
     "docs": ([ROOT / "scripts" / "build_site.py"], ("benchmark", "docs")),
     "completion": (["-m", "rigid_motion_batch", "completion"], ()),
 }
-"""Command to what Python runs for it, and the extras of pyproject.toml that it needs."""
+"""Command to what Python runs for it, and the dependency groups of pyproject.toml that it needs."""
 
 ENVIRONMENT = "environment"
 """Sets up all but Blender, and prints the folder."""
@@ -102,8 +102,8 @@ def main(arguments: list[str]) -> int:
         without = "; or add --no-video, for the numbers and the report" if command in FILMING else ""
         fitting = " or ".join(known)
         return _fail(f"Blender has no wheel for Python {PYTHON}: run this with Python {fitting}{without}")
-    run, extras = COMMANDS[command]
-    python = install(blender, _requirements(project, blender, extras))
+    run, groups = COMMANDS[command]
+    python = install(blender, _requirements(project, blender, groups))
     if python is None or (needed and not _blender_starts(python)):
         return 1
     # Paths that a user gives count from where the user is; those of pytest from where its configuration is.
@@ -183,13 +183,13 @@ def _project() -> dict:
     return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
 
-def _requirements(project: dict, blender: str | None, extras: tuple[str, ...]) -> list[str]:
+def _requirements(project: dict, blender: str | None, groups: tuple[str, ...]) -> list[str]:
     """The pinned packages of pyproject.toml, with this Blender."""
-    pins = project["tool"]["rigid-motion"]
-    numpy = pins["numpy"].get(PYTHON) or [*pins["numpy"].values()][-1]
-    listed = [*([f"bpy=={blender}"] if blender else []), f"numpy=={numpy}", *pins["libraries"]]
-    for extra in extras:
-        listed += project["project"]["optional-dependencies"][extra]
+    pins = project["tool"]["rigid-motion"]["numpy"]
+    numpy = pins.get(PYTHON) or [*pins.values()][-1]
+    listed = [*([f"bpy=={blender}"] if blender else []), f"numpy=={numpy}"]
+    for group in ("libraries", *groups):
+        listed += project["dependency-groups"][group]
     return listed
 
 

@@ -1,24 +1,22 @@
-"""Blender in the test process: `bpy` first, since `mathutils` comes with it; an empty file and the zip for who asks.
+"""How all tests run: markers, libraries that are not installed, and several files side by side.
 
-More than one file of tests runs side by side, in a Blender for each processor; see `pytest_cmdline_main`.
+Nothing here needs Blender: `tests/motion` runs with NumPy and pytest alone. What tests in Blender share is in
+`tests/in_blender.py`. More than one file of tests runs side by side, in a process for each processor; see
+`pytest_cmdline_main`.
 """
 
 from __future__ import annotations
 
 import os
 import signal
-import sys
+from importlib.util import find_spec
 from pathlib import Path
 
-import bpy
 import pytest
 
-from rigid_motion_batch.cli.build_extension import build
-from rigid_motion_batch.pipeline.executors import processors
-from tests import thoroughness  # noqa: F401 - loads the profile of Hypothesis
-from tests.blank import blank
 from tests.recordings import RECORDINGS
-from tests.rigs import human as rigify
+
+pytest_plugins = ["tests.in_blender"] if find_spec("bpy") else []
 
 ROOT = Path(__file__).resolve().parents[1]
 os.environ["PYTHONPATH"] = os.pathsep.join(str(ROOT / folder) for folder in ("", "addon", "scripts"))
@@ -35,8 +33,11 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "LP_NUM_THREADS")
 BLENDERS_OWN = ("OCIO", "SYCL_UR_USE_LEVEL_ZERO_V2")
 """What Blender 5.2 puts into the environment of its process, past `os.environ`; another Blender complains of it."""
 
-STATUS = pytest.StashKey[int]()
-"""How the session ended."""
+OURS = {"assets", "examples", "research", "rigid_motion", "rigid_motion_batch", "tests"}
+"""A part of these that is not there is a fault, and no missing library."""
+
+IN_BLENDER = {"empty_file", "human"}
+"""Fixtures that begin a new file."""
 
 LOST = pytest.StashKey[bool]()
 """Whether a worker ended before its time."""
@@ -61,6 +62,8 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
+    from rigid_motion_batch.pipeline.executors import processors
+
     return min(processors(), WORKERS)
 
 
@@ -70,6 +73,8 @@ def pytest_xdist_setupnodes(specs: list) -> None:
     for name in BLENDERS_OWN:
         if name not in os.environ:
             os.unsetenv(name)
+    from rigid_motion_batch.pipeline.executors import processors
+
     for name in THREADS:
         os.environ.setdefault(name, str(max(1, processors() // len(specs))))
 
@@ -86,16 +91,6 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
         terminalreporter.write_line("A worker ended before its time, so this run has failed.", red=True)
 
 
-@pytest.hookimpl(trylast=True)
-def pytest_unconfigure(config: pytest.Config) -> None:
-    """Blender 4.5's module can wait forever while it is taken down, long after the last test: leave without that."""
-    status = config.stash.get(STATUS, None)
-    if bpy.app.version < (5, 0) and status is not None:
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(status)
-
-
 def pytest_configure(config: pytest.Config) -> None:
     """A shell lets what it runs in the background ignore Ctrl-C, and all that is started from there."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -105,7 +100,30 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_sessionfinish(session: pytest.Session) -> None:
     if session.config.stash.get(LOST, False):
         session.exitstatus = session.exitstatus or pytest.ExitCode.TESTS_FAILED
-    session.config.stash[STATUS] = int(session.exitstatus)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(collector: pytest.Collector):
+    """Skip a file of tests that needs a library which is not installed, unless every test has to run."""
+    report = yield
+    error = report.call.excinfo.value.__cause__ if report.failed else None
+    if (
+        isinstance(error, ModuleNotFoundError)
+        and error.name.split(".")[0] not in OURS
+        and not os.environ.get(EVERY_TEST)
+    ):
+        report.outcome = "skipped"
+        report.longrepr = (str(collector.path), 0, f"needs {error.name}")
+    return report
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what needs Blender in this process, and what opens windows of it."""
+    for item in items:
+        if hasattr(item.module, "bpy") or IN_BLENDER & {*item.fixturenames}:
+            item.add_marker("blender")
+        if (ROOT / "tests" / "gui") in item.path.parents:
+            item.add_marker("gui")
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
@@ -125,24 +143,3 @@ def pytest_runtest_makereport(item: pytest.Item):
         report.outcome = "failed"
         report.longrepr = f"skipped, which {EVERY_TEST} forbids: {report.longrepr}"
     return report
-
-
-@pytest.fixture
-def empty_file() -> bpy.types.Context:
-    """A new file without objects, at factory settings."""
-    return blank()
-
-
-@pytest.fixture
-def human(empty_file: bpy.types.Context) -> bpy.types.Object:
-    """Rigify's human in a new file."""
-    try:
-        return rigify.human()
-    except rigify.NoRigify as error:
-        pytest.skip(str(error))
-
-
-@pytest.fixture(scope="session")
-def extension_zip(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What users install, built from this checkout."""
-    return build(tmp_path_factory.mktemp("dist"))

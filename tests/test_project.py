@@ -50,6 +50,13 @@ def test_style(command):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+def test_commits_are_checked_with_the_ruff_that_is_tested():
+    groups = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["dependency-groups"]
+    (pinned,) = (one for one in groups["test"] if one.startswith("ruff=="))
+    hooks = (ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8")
+    assert re.findall(r"ruff==[\d.]+", hooks) == [pinned] * 2
+
+
 def test_the_extension_is_valid_for_blender(tmp_path):
     package = tmp_path / "rigid_motion"
     shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))

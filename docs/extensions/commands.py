@@ -36,8 +36,7 @@ class Command(SphinxDirective):
         name = "-".join([*([Path(asked).stem] if asked.endswith(".py") else []), *subcommands])
         usage = re.sub(r"\n\s+", "\n    ", told["usage"])
         found = [*prose(told["description"]), nodes.literal_block(usage, usage, language="text")]
-        for group in told["groups"]:
-            found.append(option_list(name, group["options"]))
+        found += [option_list(name, group["options"]) for group in told["groups"]]
         return found + epilog(told["epilog"])
 
 

@@ -50,8 +50,8 @@ def test_a_blender_that_does_not_fit_the_python_is_refused(given):
 
 def test_every_package_is_pinned():
     project = bootstrap._project()
-    extras = tuple(project["project"]["optional-dependencies"])
-    for requirement in bootstrap._requirements(project, "5.2.3", extras):
+    groups = tuple(project["dependency-groups"])
+    for requirement in bootstrap._requirements(project, "5.2.3", groups):
         assert re.match(r"[\w.-]+==\d[\w.]*(;|$)", requirement), requirement
 
 

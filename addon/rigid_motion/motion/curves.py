@@ -20,7 +20,7 @@ from dataclasses import replace
 import numpy as np
 
 from .poses import LIMIT
-from .segments import SMALLEST_ANGLE, Curves, Segments
+from .segments import SMALLEST_ANGLE, Basis, Curves, Rows, Segments
 from .trigonometry import fill_sine_and_cosine
 
 LATE = 2.0
@@ -33,7 +33,7 @@ MOST = float(np.log(LIMIT))
 def lerp_slerp(segments: Segments) -> Curves:
     """Straight line and great arc."""
 
-    def basis(s, parameters, narrow):
+    def basis(s: np.ndarray, parameters: list[np.ndarray], narrow: bool) -> Rows:
         rows = np.empty((4, s.size))
         _slerp(s, parameters[0], narrow, rows[:2])
         rows[2], rows[3] = 1.0, s
@@ -45,7 +45,7 @@ def lerp_slerp(segments: Segments) -> Curves:
 def screw(segments: Segments) -> Curves:
     """The screw motion from key to key: ScLERP, and the SLERP of motors."""
 
-    def basis(s, parameters, narrow):
+    def basis(s: np.ndarray, parameters: list[np.ndarray], narrow: bool) -> Rows:
         rows = np.empty((6, s.size))
         _slerp(s, parameters[0], narrow, rows[:2])
         rows[2], rows[3] = 1.0, s
@@ -61,7 +61,7 @@ def screw(segments: Segments) -> Curves:
 def motor_lerp(segments: Segments) -> Curves:
     """The normalised blend of two motors: of PGA, of CGA without scale, or of dual quaternions."""
 
-    def basis(s, parameters, narrow):
+    def basis(s: np.ndarray, parameters: list[np.ndarray], narrow: bool) -> Rows:
         rows = np.empty((5, s.size))
         _lerp(s, parameters[0], rows[:2])
         rows[2] = 1.0
@@ -88,7 +88,9 @@ def motor_spline(segments: Segments, tangents: np.ndarray | None = None, spins: 
     the twist that goes on through a key is that with them.
     """
 
-    def at_keys(leaving, arriving, before, after, rests):
+    def at_keys(
+        leaving: np.ndarray, arriving: np.ndarray, before: np.ndarray, after: np.ndarray, rests: np.ndarray
+    ) -> np.ndarray:
         share = _shares(before, after)
         inner = share * arriving[..., :-1] + (1.0 - share) * leaving[..., 1:]
         if rests.any():
@@ -107,7 +109,9 @@ def motor_spline_causal(segments: Segments) -> Curves:
     that it is left with dies away in that time, and the screw goes on alone.
     """
 
-    def at_keys(twists, _, before, after, rests):
+    def at_keys(
+        twists: np.ndarray, _: np.ndarray, before: np.ndarray, after: np.ndarray, rests: np.ndarray
+    ) -> np.ndarray:
         share = np.minimum(after / (before + after), before / after)
         inner = twists[..., 1:] + 0.5 * share * (twists[..., 1:] - twists[..., :-1])
         if rests.any():
@@ -182,7 +186,7 @@ def similarity_slerp(segments: Segments) -> Curves:
     if segments.scales is None:
         return screw(segments)
 
-    def basis(s, parameters, narrow):
+    def basis(s: np.ndarray, parameters: list[np.ndarray], narrow: bool) -> Rows:
         quarter_angle, half_growth, mean, least, most = parameters
         rows = np.empty((6, s.size))
         _slerp(s, quarter_angle, narrow, rows[:2])
@@ -223,7 +227,7 @@ def similarity_lerp(segments: Segments) -> Curves:
     if segments.scales is None:
         return motor_lerp(segments)
 
-    def basis(s, parameters, narrow):
+    def basis(s: np.ndarray, parameters: list[np.ndarray], narrow: bool) -> Rows:
         cosine, last, *roots = parameters
         s = np.clip(s, -last, last)
         # A versor of scale k has 1 / sqrt(k) for the weight of its translation, and the mean of that and its inverse
@@ -232,7 +236,7 @@ def similarity_lerp(segments: Segments) -> Curves:
         shrinking, growing = shares / roots, shares * roots
         rotor = 0.5 * (shrinking + growing)
 
-        def dot(a, b):
+        def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
             return a[0] * b[0] + a[1] * b[1] + cosine * (a[0] * b[1] + a[1] * b[0])
 
         weight = dot(shrinking, shrinking)
@@ -255,7 +259,7 @@ def similarity_lerp(segments: Segments) -> Curves:
     )
 
 
-def _curves(segments: Segments, positions: tuple, parameters: tuple, basis) -> Curves:
+def _curves(segments: Segments, positions: tuple, parameters: tuple, basis: Basis) -> Curves:
     """Curves that turn about one axis and, where there are scales, grow geometrically."""
     if segments.scales is not None:
         logarithms = np.log(segments.scales)

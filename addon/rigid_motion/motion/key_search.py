@@ -170,9 +170,7 @@ class Search:
         """Keys put together from those of several tolerances, where they are fewer than the best of this one."""
         if not (self.is_linkable and tries):
             return best
-        found = [best.indices]
-        for other in OTHERS[:tries]:
-            found.append(self._first(other).indices)
+        found = [best.indices, *(self._first(other).indices for other in OTHERS[:tries])]
         traded = traded_keys(self.costs, found)
         return self.refined(self.measured(traded)) if len(traded) < len(best.indices) else best
 

@@ -196,7 +196,7 @@ class Poses:
             raise TypeError("a single pose, of shape (), has nothing to go through")
         return (self[index] for index in range(len(self)))
 
-    def __array__(self, dtype: DTypeLike = None, copy: bool | None = None) -> np.ndarray:
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> np.ndarray:
         """Refuse to be one array: NumPy would take means and sums of quaternions, and leave out scales."""
         raise TypeError(
             "poses are no single array: take poses.positions and poses.quaternions, or rows of x, y, z, w, x, y, z by "

@@ -50,14 +50,13 @@ def conjugate(q: np.ndarray) -> np.ndarray:
 def rotate(q: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Points of shape (..., 3) turned by unit quaternions of shape (..., 4). A view, components apart in memory."""
     w, *xyz = (q[..., row] for row in range(4))
-    points = [points[..., row] for row in range(3)]
-    across = cross(xyz, points)
+    across = cross(xyz, [points[..., row] for row in range(3)])
     across *= 2.0
     turned = cross(xyz, across)
     across *= w
     turned += across
     for axis in range(3):
-        turned[axis] += points[axis]
+        turned[axis] += points[..., axis]
     return vectors(turned)
 
 
@@ -89,7 +88,7 @@ def from_matrices(rotations: np.ndarray) -> np.ndarray:
     return normalise(np.take_along_axis(candidates, largest[..., None, None], axis=-2)[..., 0, :])
 
 
-def cross(a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> np.ndarray:
+def cross(a: np.ndarray | Sequence[np.ndarray], b: np.ndarray | Sequence[np.ndarray]) -> np.ndarray:
     """The vector product of vectors (3, ...), components first."""
     product = np.empty((3, *np.broadcast(a[0], b[0]).shape))
     for axis in range(3):

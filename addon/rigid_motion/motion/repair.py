@@ -127,7 +127,7 @@ def repair(times: ArrayLike, poses: Poses, rate: float | None = None) -> tuple[n
         nonlocal times, poses, rows
         if not good.all():
             repairs.append(Repair(fault, rows[~good]))
-            times, poses, rows = times[good], poses[..., good], rows[good]
+            times, poses, rows = np.asarray(times)[good], poses[..., good], rows[good]
 
     of_joints = tuple(range(len(poses.shape) - 1))
     finite = _usable(poses.positions).all(axis=-1) & _usable(poses.quaternions).all(axis=-1)

@@ -58,7 +58,7 @@ class Segments:
     """
 
     start: np.ndarray
-    """Shape (S,), seconds."""
+    """Rows (S,), seconds."""
 
     rate: np.ndarray
     """Change of s in a second, shape (S,)."""
@@ -159,7 +159,8 @@ class Segments:
         return along, self.chord - along, cross(n, self.chord)
 
 
-Basis = Callable[[np.ndarray, list[np.ndarray], bool], tuple[np.ndarray, "np.ndarray | None"]]
+Rows = tuple[np.ndarray, "np.ndarray | None"]
+Basis = Callable[[np.ndarray, list[np.ndarray], bool], Rows]
 
 
 @dataclass(frozen=True, eq=False)

@@ -106,8 +106,7 @@ def measure_sending(clip: Clip, advance: Callable[[], object] = lambda: None) ->
         for delay in DELAYS:
             for mode in MODES_SENT:
                 if reference.rms_shell_m > NOTHING:
-                    for factor in TOLERANCES:
-                        sent.append(stream(clip, mode, rate, delay, factor * reference.rms_shell_m))
+                    sent += [stream(clip, mode, rate, delay, factor * reference.rms_shell_m) for factor in TOLERANCES]
                 advance()
     return even, sent
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import bpy
@@ -105,7 +105,7 @@ def plan(
     study.add("Table 1", tabulate, tables, after=measuring, arguments={"names": names})
     shown = ["Table 1"]
 
-    def show(name: str, function, outputs: Sequence[str], **options) -> None:
+    def show(name: str, function: Callable[..., object], outputs: Sequence[str], **options: object) -> None:
         shown.append(study.add(name, function, outputs, **options))
 
     reach, throw = asset["reach"], asset["throw"]

@@ -178,9 +178,11 @@ key poses takes for the same in this run. Seconds are those of one machine, whic
     if CYCLE in found:
         on = repeated(found[CYCLE].of_size(HEIGHT), CYCLE_FRAMES)
         timed.append((replace(on, name=f"{CYCLE}, walking on"), CYCLE_SECONDS))
-    for path in paths:
-        if path.stem == LONG:
-            timed.append((import_rig(path, most_frames=sys.maxsize).body().of_size(HEIGHT), LONG_SECONDS))
+    timed += [
+        (import_rig(path, most_frames=sys.maxsize).body().of_size(HEIGHT), LONG_SECONDS)
+        for path in paths
+        if path.stem == LONG
+    ]
     yield from timing.bodies(timed or [(body.of_size(HEIGHT), None) for body in found.values()], TOLERANCE)
     yield ""
     if CYCLE in found:

@@ -59,10 +59,12 @@ class Body:
         if data is None:
             return None
         ranges = [(strip.frame_start, strip.frame_end) for track in data.nla_tracks for strip in track.strips]
-        for fcurve in curves_that_move(data.action, data.action_slot, bones=self.bone is not None):
-            # One that only its modifiers make has no keys, and says that they are on frame 0.
-            if fcurve.keyframe_points or fcurve.sampled_points:
-                ranges.append(tuple(fcurve.range()))
+        # One that only its modifiers make has no keys, and says that they are on frame 0.
+        ranges += [
+            tuple(fcurve.range())
+            for fcurve in curves_that_move(data.action, data.action_slot, bones=self.bone is not None)
+            if fcurve.keyframe_points or fcurve.sampled_points
+        ]
         return (min(first for first, _ in ranges), max(last for _, last in ranges)) if ranges else None
 
 

@@ -116,7 +116,9 @@ def drill() -> Mesh:
     def along(y: float, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
         return np.array((0, y, 0.062)), np.array((0, 0, radius)), np.array((radius, 0, 0)), 2.0
 
-    def up(y: float, z: float, width: float, depth: float, power: float = 5.0):
+    def up(
+        y: float, z: float, width: float, depth: float, power: float = 5.0
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
         return np.array((0, y, z)), np.array((width, 0, 0)), np.array((0, depth, 0)), power
 
     body = ((-0.056, 0.015), (-0.05, 0.022), (-0.046, 0.0245), (0.052, 0.0245), (0.06, 0.022), (0.082, 0.0135))

@@ -25,6 +25,6 @@ def power(q: np.ndarray, u: np.ndarray) -> np.ndarray:
 
 def geometric_scales(first: Poses, second: Poses, u: np.ndarray) -> np.ndarray | None:
     """s0^(1 - u) s1^u: growth at an even rate. None where poses have no scales."""
-    if first.scales is None:
+    if first.scales is None or second.scales is None:
         return None
     return np.exp((1.0 - u) * np.log(first.scales) + u * np.log(second.scales))
