@@ -13,7 +13,6 @@ from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Unifo
 from rigid_motion_batch.analysis.metrics import FORMS
 from rigid_motion_batch.analysis.modes import BEST_OF, single_modes
 from rigid_motion_batch.analysis.radii import EVERYWHERE, JOINT, RIGID, Radii, read_radii
-from rigid_motion_batch.axes import AXES
 from rigid_motion_batch.command_line import did_you_mean, folder_path, not_empty, number, parser_of
 from rigid_motion_batch.palette import THEMES
 from rigid_motion_batch.pipeline.bundle import STAGES
@@ -152,9 +151,6 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         "--output",
         type=folder_path,
         help="folder to write to (renders/NAME, by the first recording, with a number where that is another's)",
-    )
-    parser.add_argument(
-        "--axes", type=str.lower, choices=AXES, help="axes of the recordings (opengl for BVH, blender for others)"
     )
     parser.add_argument(
         "--radius",

@@ -20,7 +20,7 @@ from typing import TextIO
 from rigid_motion.motion import MODES, Poses
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.metrics import lines_of_poses
-from rigid_motion_batch.axes import AXES, to_blender
+from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.command_line import Parser, as_called, complain, number, path_line, program_of
 from rigid_motion_batch.files import replacing
 from rigid_motion_batch.progress import Progress, Stage
@@ -160,7 +160,6 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     )
     sending.add_argument("--port", type=_port, default=0, help="its own port, for receive --from (one that is free)")
     _add_bind(sending, "to send from (loopback if all receivers are on this machine)")
-    _add_axes(sending, "of the recording")
     add_reading_options(sending)
 
     receiving = commands.add_parser(
@@ -186,7 +185,6 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         "--truth", metavar="RECORDING", help="the recording that was sent: report how far off it was shown"
     )
     _add_bind(receiving, "to listen at (loopback, or the one that reaches --from)")
-    _add_axes(receiving, "of --truth")
     add_reading_options(receiving)
 
     relaying = commands.add_parser(
@@ -526,10 +524,6 @@ def _check(options: argparse.Namespace) -> None:
 
 def _add_bind(parser: argparse.ArgumentParser, of: str) -> None:
     parser.add_argument("--bind", metavar="ADDRESS", help=f"address {of}")
-
-
-def _add_axes(parser: argparse.ArgumentParser, of: str) -> None:
-    parser.add_argument("--axes", type=str.lower, choices=AXES, help=f"axes {of} (opengl for BVH, blender for others)")
 
 
 def _bounded(what: str, least: float, most: float, above: bool = False) -> Callable[[str], float]:
