@@ -123,7 +123,7 @@ def compare(clips: Sequence[Path], folder: Path, jobs: int, *options: str, alone
     if process.returncode:
         raise RuntimeError(f"compare.py ended with {process.returncode}: {said.decode(errors='replace')[-2000:]}")
     store = Store(output)
-    tasks = [found.index for key in store.latest().values() if (found := store.result(key))]
+    tasks = [result.index for result in store.latest().values()]
     rendering = sum(task["facts"].get("rendering", 0.0) for task in tasks)
     return Run(seconds, own, worker, sum(task["seconds"] for task in tasks), rendering)
 

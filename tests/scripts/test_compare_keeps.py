@@ -206,13 +206,17 @@ def test_a_damaged_result_is_made_again(
     for path in (folder / "out" / OWN / "results").glob(f"*/{part}"):
         damage(path)
     (folder / "out" / "metrics.csv").unlink()
-    assert run("toss.csv", "--output", "out", "--rates", "5,10") == 0
+    again = "toss.csv", "--output", "out", "--rates", "5,10"
+    if damage is garbage and part != ".index.json":  # Seen by those who read it alone.
+        assert run(*again) in (1, 2)
+        assert "damaged" in capsys.readouterr().err
+    assert run(*again) == 0
     assert "Traceback" not in capsys.readouterr().err
     assert (folder / "out" / "metrics.csv").read_bytes().startswith(table)
 
 
 @pytest.mark.parametrize("damage", [garbage, emptied, folder_instead])
-@pytest.mark.parametrize("name", ["comparison.json", "inputs.json", "latest.jsonl"])
+@pytest.mark.parametrize("name", ["comparison.json", "inputs.json"])
 def test_a_damaged_record_lets_the_work_be_done_again(folder: Path, name: str, damage: Callable[[Path], None]) -> None:
     damage(folder / "out" / OWN / name)
     assert run("toss.csv", "--output", "out") == 0

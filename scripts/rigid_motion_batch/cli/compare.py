@@ -12,21 +12,21 @@ import os
 import sys
 import webbrowser
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from itertools import chain, count, groupby
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.needed import KeysNeeded
 from rigid_motion_batch.analysis.results import ChoiceNumbers
-from rigid_motion_batch.cli.compare_options import ALL, SCRIPT, own_recordings, parse
+from rigid_motion_batch.cli.compare_options import ALL, SCRIPT, own_recordings, parse, without
 from rigid_motion_batch.command_line import as_typed, complain, path_line, program_of
 from rigid_motion_batch.pipeline import comparison_steps as steps
 from rigid_motion_batch.pipeline import values
-from rigid_motion_batch.pipeline.bundle import PROGRESS, FarmProgress
+from rigid_motion_batch.pipeline.bundle import PROGRESS, STAGES, FarmProgress
 from rigid_motion_batch.pipeline.comparison import (
     DECIMATED,
     IN_BLENDER,
@@ -58,6 +58,9 @@ from rigid_motion_batch.system_libraries import missing_for_rendering, way_out, 
 
 from . import terminal
 
+if TYPE_CHECKING:
+    from rigid_motion_batch.pipeline.dask import Farm
+
 PROGRAM = program_of(SCRIPT)
 
 TABLES = (METRICS, JOINT_METRICS, DECIMATED, KEYS_NEEDED)
@@ -87,8 +90,12 @@ def main(arguments: list[str]) -> int:
             plan = ComparisonPlan(comparison, store)
             if options.explain:
                 return _explain(plan, store, _share(options))
-            with Progress(quiet=options.quiet) as progress, _executor(options, store, progress) as executor:
-                return _Run(options, plan, executor, progress).run()
+            with (
+                Progress(quiet=options.quiet) as progress,
+                SerialExecutor() if options.jobs == 0 else ProcessExecutor(options.jobs or processors()) as executor,
+                _farm(options, store, progress) as farm,
+            ):
+                return _Run(options, plan, executor, progress, farm, said).run()
     except (SubjectError, FolderInUse, ExecutorError, OutputError, Refused) as error:
         print(*(f"{PROGRAM}: {error}".splitlines()), sep="\n", file=sys.stderr)
     except OSError as error:
@@ -239,16 +246,16 @@ def _suffix(source: str) -> str:
     return next((end for end in IN_BLENDER if lower.endswith(end) or f"{end}:" in lower), "")
 
 
-def _executor(options: argparse.Namespace, store: Store, progress: Progress) -> Executor:
-    """Who does the work. Raises ExecutorError where Dask is wanted, and is not there."""
+def _farm(options: argparse.Namespace, store: Store, progress: Progress) -> AbstractContextManager[Farm | None]:
+    """Who does shares of the work, if not all is done here. Raises ExecutorError where that cannot be."""
     if options.scheduler is None:
-        return SerialExecutor() if options.jobs == 0 else ProcessExecutor(options.jobs or processors())
+        return nullcontext()
     try:
-        from rigid_motion_batch.pipeline.dask import DaskExecutor
+        from rigid_motion_batch.pipeline.dask import Farm
     except ImportError as error:
         way = "python scripts/bootstrap.py dask" if CHECKOUT else "pip install 'rigid-motion[farm]'"
         raise ExecutorError(f"--scheduler: {error}; `{way}` installs it") from None
-    return DaskExecutor(options.scheduler, store.scratch, lambda text: progress.note(f"{PROGRAM}: {text}"))
+    return Farm(options.scheduler, store.output, lambda text: progress.note(f"{PROGRAM}: {text}"))
 
 
 # -- doing it ---------------------------------------------------------------------------------------------------------
@@ -284,15 +291,22 @@ class _Run:
     """A comparison in its opened folder."""
 
     def __init__(
-        self, options: argparse.Namespace, plan: ComparisonPlan, executor: Executor, progress: Progress
+        self,
+        options: argparse.Namespace,
+        plan: ComparisonPlan,
+        executor: Executor,
+        progress: Progress,
+        farm: Farm | None,
+        arguments: list[str],
     ) -> None:
         self.options, self.plan, self.store, self.executor = options, plan, plan.store, executor
-        self.progress = progress
-        self.share = _share(options)
+        self.progress, self.farm, self.arguments = progress, farm, arguments
+        self.share = Share(frozenset({"report"})) if farm else _share(options)
         self.on_farm = os.environ.get(PROGRESS) == "openjd"
         self.notes: list[str] = []
         self.outcome = Outcome()
-        self.page = True
+        self.page = False
+        """Whether there is one of this run."""
 
     def run(self) -> int:
         """Read the recordings, see what there is to do, do it, and say what it came to."""
@@ -301,7 +315,7 @@ class _Run:
             self._do("Reading", self.plan.reading)
             if self.outcome.interrupted or self.outcome.problem or self.options.only:
                 return self._end()
-        notes = self.plan.look_into_anew(lambda tasks: self._do("Reading", tasks))
+        notes = self.plan.look_into()
         warnings = [
             "; ".join(filter(None, (f"{study.name}: {warning.text}", warning.way_out)))
             for study in self.plan.studies
@@ -336,24 +350,43 @@ class _Run:
             self._show_numbers()
         return self._end()
 
-    def _do(self, title: str, tasks: Plan) -> Outcome:
+    def _do(self, title: str, tasks: Plan) -> None:
+        if self.farm:
+            self._share_out(tasks)
+            if self.outcome.interrupted or self.outcome.problem:
+                return
         with self.progress.stage(title, 1.0) as stage:
             shown = FarmProgress() if self.on_farm else _Shown(self.progress, stage, self.options.quiet)
-            outcome = run(
+            self.outcome = run(
                 tasks,
                 self.store,
                 self.executor,
                 progress=shown,
                 share=self.share,
                 blender=self.options.blender or "",
+                before=self.outcome,
             )
-        self.page = getattr(shown, "page", True)
-        before, self.outcome = self.outcome, self.outcome.continued(outcome)
-        self.outcome.failures = before.failures | outcome.failures
-        self.outcome.details = before.details | outcome.details
-        if not self.options.only:
-            self.outcome.note_failures(self.store)
-        return outcome
+        if self.plan.studies and not self.outcome.interrupted:
+            self.page = getattr(shown, "page", True)
+
+    def _share_out(self, tasks: Plan) -> None:
+        """Have the machines of the farm do all stages before the report."""
+        arguments, outcome = without(self.arguments, "--scheduler", "--output", "-o"), self.outcome
+        try:
+            for name in STAGES[:-1]:
+                todo = Survey.of(tasks, self.store, Share(frozenset({name}))).tasks
+                with self.progress.stage(name.capitalize(), 1.0) as stage:
+                    for done, answer in self.farm.run(arguments, name, todo) if todo else ():
+                        stage.reach(done, f"{name}, on {len(self.farm.workers())} workers")
+                        for problem in answer.get("failures", {}).values():
+                            self.progress.note(f"{PROGRAM}: {problem}", "red")
+                        outcome.failures |= answer.get("failures", {})
+                        outcome.counts.update({State(what): n for what, n in answer.get("tasks", {}).items()})
+        except ExecutorError as error:
+            outcome.problem = str(error)
+        except KeyboardInterrupt:
+            outcome.interrupted = True
+        outcome.note_failures(self.store)
 
     def _note(self, text: str, style: str = "") -> None:
         self.notes.append(text)
@@ -372,7 +405,7 @@ class _Run:
         """Name what the stages before the report have not done."""
         tasks = (task for task in chain(self.plan.reading(), self.plan.tasks()) if task.step.stage != "report")
         for task in tasks:
-            if not (task.step.temporary or self.store.result(task.key)):
+            if not self.store.result(task.key):
                 self.outcome.failures[task.name] = "not done: its own stage said why"
                 complain(PROGRAM, f"{task.shown}: {self.outcome.failures[task.name]}")
 

@@ -13,7 +13,6 @@ from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Unifo
 from rigid_motion_batch.analysis.metrics import FORMS
 from rigid_motion_batch.analysis.modes import BEST_OF, single_modes
 from rigid_motion_batch.analysis.radii import EVERYWHERE, JOINT, RIGID, Radii, read_radii
-from rigid_motion_batch.axes import AXES
 from rigid_motion_batch.command_line import did_you_mean, folder_path, not_empty, number, parser_of
 from rigid_motion_batch.palette import THEMES
 from rigid_motion_batch.pipeline.bundle import STAGES
@@ -123,10 +122,10 @@ many clips:
   The work is split into small tasks, done by as many processes as --jobs says. Results are kept: after Ctrl-C, a full
   disk or a crash, the same command continues from there; with other options it does only what these change. A recording
   that cannot be read, or a video that cannot be rendered, is reported, and the others go on. With --scheduler, the
-  processes of all machines that a Dask scheduler knows do the work; docs/farm.md says how.
+  machines of a Dask scheduler do the work; docs/farm.md says how.
 
 Exit code: 0 done, 1 some recordings or videos could not be done, 2 nothing could be done, or a wrong option, 130
-stopped by Ctrl-C, and 143 by SIGTERM; the report then holds what was ready.
+stopped by Ctrl-C, and 143 by SIGTERM.
 """
 
 
@@ -152,9 +151,6 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         "--output",
         type=folder_path,
         help="folder to write to (renders/NAME, by the first recording, with a number where that is another's)",
-    )
-    parser.add_argument(
-        "--axes", type=str.lower, choices=AXES, help="axes of the recordings (opengl for BVH, blender for others)"
     )
     parser.add_argument(
         "--radius",
@@ -260,7 +256,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     video.add_argument(
         "--antialiasing",
         choices=ANTIALIASING,
-        help="for workbench: OFF, FXAA or a number of samples; 8 for a talk (edges smoothed by the compositor)",
+        help="for workbench: OFF, FXAA or a number of samples; 8 for a talk (softened by the compositor)",
     )
     video.add_argument("--samples", type=int, default=16, help="samples for eevee and cycles (%(default)s)")
     options = parser.parse_args(arguments)
@@ -279,6 +275,14 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     if options.against and len(options.inputs) != 1:
         parser.error(f"--against is a motion of one clip, and there are {len(options.inputs)}: name one recording")
     return options
+
+
+def without(arguments: list[str], *options: str) -> list[str]:
+    """Arguments of a comparison but for some options and their values."""
+    parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    for option in options:
+        parser.add_argument(option)
+    return parser.parse_known_args(arguments)[1]
 
 
 def own_recordings() -> list[str]:

@@ -12,7 +12,6 @@ import textwrap
 from collections.abc import Iterator
 from dataclasses import asdict
 
-from rigid_motion_batch.axes import AXES
 from rigid_motion_batch.command_line import INSTALLED, Parser, complain, not_empty, printable
 from rigid_motion_batch.places import CHECKOUT
 from rigid_motion_batch.recordings import TrajectoryError, files_of
@@ -71,7 +70,6 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument(
         "inputs", nargs="+", type=not_empty, metavar="INPUT", help="recordings, bodies of them (FILE:BODY), or folders"
     )
-    parser.add_argument("--axes", type=str.lower, choices=AXES, help="axes of the recordings, where you know them")
     parser.add_argument("--json", action="store_true", help="print everything as JSON, a list with an entry for each")
     add_reading_options(parser)
     options = parser.parse_args(arguments)

@@ -12,6 +12,7 @@ import shlex
 from pathlib import Path
 
 from rigid_motion_batch.cli.compare_options import parse as parse_comparison
+from rigid_motion_batch.cli.compare_options import without
 from rigid_motion_batch.command_line import complain, parser_of, program_of
 from rigid_motion_batch.pipeline.bundle import MOST_PARTS, STAGES, write_bundle
 from rigid_motion_batch.places import output_folder
@@ -47,7 +48,7 @@ def main(arguments: list[str]) -> int:
     stages = [stage for stage in STAGES if options.stage or stage not in FILMING]
     parts = {stage: 1 if stage == "report" else own.parts for stage in stages}
     try:
-        values = write_bundle(own.bundle.absolute(), _without_output(rest), output, parts, output.name)
+        values = write_bundle(own.bundle.absolute(), without(rest, "-o", "--output"), output, parts, output.name)
     except ValueError as error:
         complain(PROGRAM, error)
         return 2
@@ -80,10 +81,3 @@ def _count(text: str) -> int:
     if not (text.isascii() and text.isdecimal() and 1 <= int(text) <= MOST_PARTS):
         raise argparse.ArgumentTypeError(f"{text!r} is not a number of tasks; give 1 to {MOST_PARTS}")
     return int(text)
-
-
-def _without_output(arguments: list[str]) -> list[str]:
-    """The arguments of a comparison but for its output folder, which is a parameter of the job."""
-    parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
-    parser.add_argument("-o", "--output")
-    return parser.parse_known_args(arguments)[1]

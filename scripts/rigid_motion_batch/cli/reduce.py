@@ -22,7 +22,6 @@ from rigid_motion.gltf.sizes import OF_A_BODY, OF_KEY_POSES
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.radii import RIGID, radius_in_metres
-from rigid_motion_batch.axes import AXES
 from rigid_motion_batch.keying.gltf_files import ENDINGS, GltfRun
 from rigid_motion_batch.keying.options import add_file_options, add_target_options, refuse_odd_places
 from rigid_motion_batch.keying.planning import Job, file_and_body, named_file, planned
@@ -174,9 +173,6 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     recordings.add_argument("--blend", action="store_true", help="also write rigid motions as .blend files")
     recordings.add_argument(
         "--fps", type=_fps, metavar="N", help="frames a second of .blend and GLB files (the rate of the recording)"
-    )
-    recordings.add_argument(
-        "--axes", type=str.lower, choices=AXES, help="axes of the recordings (opengl for BVH, blender for others)"
     )
     add_reading_options(parser)
     gltf = parser.add_argument_group("glTF files")

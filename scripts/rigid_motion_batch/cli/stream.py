@@ -17,7 +17,6 @@ from pathlib import Path
 
 from rigid_motion.motion import MODES, rms
 from rigid_motion_batch.analysis.choices import Tolerance
-from rigid_motion_batch.axes import AXES
 from rigid_motion_batch.command_line import Parser, as_called, complain, number, path_line, program_of
 from rigid_motion_batch.progress import Progress, Stage
 from rigid_motion_batch.recordings import TrajectoryError
@@ -102,7 +101,6 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     sending.add_argument("--rate", type=_positive, metavar="HZ", help="send a key at each of so many ticks a second")
     help = f"seconds by which it is shown later ({DELAY}; with --rate one interval)"
     sending.add_argument("--delay", type=_delay, metavar="S", help=help)
-    _add_axes(sending, "of the recordings")
     add_reading_options(sending)
 
     receiving = commands.add_parser(
@@ -120,7 +118,6 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     help = "seconds that are waited longer for what is late (%(default)g)"
     receiving.add_argument("--margin", type=_margin, default=0.0, metavar="S", help=help)
     receiving.add_argument("--truth", metavar="RECORDING", help="what was sent: report how far off it was shown")
-    _add_axes(receiving, "of --truth")
     add_reading_options(receiving)
 
     routing = commands.add_parser(
@@ -352,10 +349,6 @@ def _add_place(parser: argparse.ArgumentParser, what: str) -> None:
     parser.add_argument(
         "--config", type=Path, metavar="FILE", help="configuration of Zenoh: TLS, passwords, access rules"
     )
-
-
-def _add_axes(parser: argparse.ArgumentParser, of: str) -> None:
-    parser.add_argument("--axes", type=str.lower, choices=AXES, help=f"axes {of} (opengl for BVH, blender for others)")
 
 
 def _bounded(what: str, least: float, most: float, above: bool = False) -> Callable[[str], float]:

@@ -19,7 +19,7 @@ from rigid_motion.streams import Body
 from rigid_motion.streams.bodies import RADIUS, Forest
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.metrics import write_poses
-from rigid_motion_batch.axes import AXES, from_blender
+from rigid_motion_batch.axes import from_blender
 from rigid_motion_batch.command_line import number, path_line
 from rigid_motion_batch.files import replacing
 from rigid_motion_batch.recordings import TrajectoryError
@@ -56,7 +56,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-answers", action="store_true", help="a receiver that says nothing, as in a multicast")
     parser.add_argument("--output", "-o", type=Path, metavar="FILE", help="write what was shown, as .bvh or .csv")
     parser.add_argument("--json", action="store_true", help="print numbers as JSON")
-    parser.add_argument("--axes", type=str.lower, choices=AXES, help="axes of the recording")
 
 
 def run(options: argparse.Namespace) -> None:

@@ -31,12 +31,9 @@ def main(arguments: list[str]) -> int:
         return 2
     store = Store(options.output, alone=False)
     failures = _failures(options.output / OWN / "failures.json")
-    for name, key in store.latest().items():
-        result = store.result(key)
-        if name in failures or options.failed:
-            continue
-        state = f"done in {result.index.get('seconds', 0.0):.1f} s" if result else "not done"
-        print(printable(f"{name}: {state}"))
+    for name, result in store.latest().items():
+        if not (name in failures or options.failed):
+            print(printable(f"{name}: done in {result.index.get('seconds', 0.0):.1f} s"))
     for name, failure in failures.items():
         print(printable(f"{name}: failed: {failure['message']}"))
         if options.failed and failure.get("details"):

@@ -15,6 +15,7 @@ import tempfile
 import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -29,7 +30,7 @@ from rigid_motion_batch.pipeline.performing import (
     Made,
     Order,
     SerialExecutor,
-    Told,
+    outcome_of,
 )
 from rigid_motion_batch.progress import Progress, Stage
 from rigid_motion_batch.supervising import blender_program, report, stop_signals, written_of
@@ -223,8 +224,9 @@ class _Session:
         self._scratch = scratch
         self._outcomes: dict[int, Outcome] = {}
         """By the places of the inputs."""
-        self._at_work: dict[str, tuple[int, str]] = {}
-        """The folder of an order to the place of its input, and the key of its result."""
+        self._at_work: dict[int, str] = {}
+        """Places of inputs to the keys of their results."""
+        self._futures: dict[Future[Made | Failed | Lost], int] = {}
 
     @property
     def in_order(self) -> list[Outcome]:
@@ -238,16 +240,16 @@ class _Session:
             while more and len(self._at_work) < self._executor.capacity:
                 place, job = next(waiting, (0, None))
                 if more := job is not None:
-                    self._begin(place, job)
-                    self._show(stage)
+                    self._begin(place, job, stage)
                     stop_if_asked()
-            if self._at_work:
-                self._executor.wait(self._hear, LOOK)
-                self._show(stage)
+            ended, _ = wait(self._futures, LOOK, FIRST_COMPLETED)
+            for future in ended:
+                self._end(self._futures.pop(future), outcome_of(future))
+            self._show(stage)
 
     def take_partly(self, stopped: Stopped) -> None:
         """Count what is complete of inputs that were stopped in this process, or in workers."""
-        for place, _ in self._at_work.values():
+        for place in self._at_work:
             source = self._jobs[place].source
             outcome = stopped.partly or Outcome(source, written=list(map(Path, written_of(source))))
             if outcome.written:
@@ -260,12 +262,12 @@ class _Session:
         return set(self._work.objects or ()).difference(*(one.matched for one in outcomes)) if seen else set()
 
     def _show(self, stage: Stage) -> None:
-        at_work = [self._jobs[place] for place, _ in self._at_work.values()]
+        at_work = [self._jobs[place] for place in self._at_work]
         stage.reach(len(self._outcomes), ", ".join(job.title for job in at_work))
         summary = _summary(self.in_order, len(self._jobs), self._work, interrupted=True)
         report(at=", ".join(job.source for job in at_work), summary=summary)
 
-    def _begin(self, place: int, job: Job) -> None:
+    def _begin(self, place: int, job: Job, stage: Stage) -> None:
         """Have an input done, unless it is done already or cannot be."""
         if job.problem:
             self._note(f"{job.source}: {job.problem}")
@@ -289,14 +291,14 @@ class _Session:
             output=os.fspath(job.folder),
             folder=os.fspath(self._scratch / str(place)),
         )
-        self._at_work[order.folder] = place, key
-        self._executor.submit(order)
+        self._at_work[place] = key
+        self._show(stage)
+        stop_if_asked()
+        self._futures[self._executor.submit(order, lambda share, doing: None)] = place
 
-    def _hear(self, order: Order, message: Told | Made | Failed | Lost) -> None:
-        if isinstance(message, Told):
-            return
-        place, key = self._at_work.pop(order.folder)
-        job = self._jobs[place]
+    def _end(self, place: int, message: Made | Failed | Lost) -> None:
+        """Take what came of an input."""
+        job, key = self._jobs[place], self._at_work.pop(place)
         for note in message.notes:
             self._note(note)
         if isinstance(message, Made):

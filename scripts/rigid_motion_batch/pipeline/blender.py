@@ -50,7 +50,7 @@ def perform_in_blender(order: Order, tell: Callable[[float, str], object] | None
     try:
         with tempfile.TemporaryDirectory() as folder:
             file, answer, log = (Path(folder, name) for name in ("order", "order.answer", "log"))
-            file.write_bytes(pickle.dumps(replace(order, blender="", here=order.here or os.getcwd())))
+            file.write_bytes(pickle.dumps(replace(order, blender="")))
             command = [order.blender, "--background", "--factory-startup", "--python", WORKER, "--", file, *path]
             with (
                 log.open("wb") as errors,

@@ -24,6 +24,9 @@ STAGES = ("read", "measure", "build", "render", "encode", "report")
 
 COMPARE = ("-m", "rigid_motion_batch", "compare")
 
+CHECK = ("-m", "rigid_motion_batch.pipeline.bundle")
+"""What fails, and says so, where the version behind it is not that of the program: see `main`."""
+
 MOST_PARTS = 1024
 """Values of a parameter, in Open Job Description."""
 
@@ -98,6 +101,11 @@ def write_bundle(
     return values
 
 
+def share_of(output: str, stage: str, number: int | str, of: int) -> list[str]:
+    """The options of a comparison that do a share of a stage."""
+    return ["--output", output, "--only", stage, "--part", f"{number}/{of}"]
+
+
 def below_inputs(arguments: Sequence[str]) -> tuple[list[str], Path]:
     """Arguments with the files that they name, FILE, FILE:BODY or --option=FILE, as the job finds them, and where.
 
@@ -143,7 +151,7 @@ def _template(command: Sequence[str], parts: Mapping[str, int], name: str) -> di
             {
                 "name": "Rigid Motion",
                 "variables": {"PYTHONPATH": "{{Param.Program}}", PROGRESS: "openjd"},
-                "script": {"actions": {"onEnter": _action(["-m", __name__, version_here()])}},
+                "script": {"actions": {"onEnter": _action([*CHECK, version_here()])}},
             }
         ],
         "steps": [
@@ -154,7 +162,7 @@ def _template(command: Sequence[str], parts: Mapping[str, int], name: str) -> di
 
 
 def _step(stage: str, before: str | None, parts: int, command: Sequence[str]) -> dict[str, Any]:
-    share = ["--output", "{{Param.Output}}", "--only", stage, "--part", f"{{{{Task.Param.Part}}}}/{parts}"]
+    share = share_of("{{Param.Output}}", stage, "{{Task.Param.Part}}", parts)
     return {
         "name": stage.capitalize(),
         **({"dependencies": [{"dependsOn": before.capitalize()}]} if before else {}),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -34,9 +34,8 @@ from rigid_motion_batch.scenes.timeline import Timeline
 from . import comparison_steps as steps
 from . import values
 from .comparison_steps import ClipOf, Page, Part
-from .running import Outcome, Plan
 from .steps import Input, Step, Task
-from .store import Store
+from .store import OutputError, Store
 
 METRICS, JOINT_METRICS, DECIMATED, KEYS_NEEDED = "metrics.csv", "metrics_joints.csv", "decimated.csv", "keys_needed.csv"
 
@@ -182,25 +181,22 @@ class ComparisonPlan:
         parameters = steps.Read(source, comparison.axes, comparison.reading, blender, comparison.against, called)
         return Task(step, parameters, f"read {source}", inputs=inputs, title=source, weight=0.3)
 
-    def read(self, run: Callable[[Plan], Outcome]) -> tuple[Outcome, list[str]]:
-        """Read the sources by a function that runs a plan, and see what is in them: see `look_into`."""
-        return run(self.reading), self.look_into_anew(run)
-
-    def look_into_anew(self, run: Callable[[Plan], Outcome]) -> list[str]:
-        """The same as `look_into`; what was read before and turns out to be damaged is read again."""
-        try:
-            return self.look_into()
-        except Exception:
-            damaged = [task.key for task in self.reading() if not self.store.result(task.key, thoroughly=True)]
-            if not damaged:
-                raise
-            for key in damaged:
-                self.store.discard(key)
-        run(self.reading)
-        return self.look_into()
-
     def look_into(self) -> list[str]:
-        """See what clips there are in the recordings that were read, and return what the user should know of them."""
+        """See what clips there are in the recordings that were read, and return what the user should know of them.
+
+        Raises
+        ------
+        OutputError
+            Where what was read is damaged.
+        """
+        try:
+            return self._look_into()
+        except Exception:
+            if self.store.discard_damaged(task.key for task in self.reading()):
+                raise OutputError("what was read is damaged; the same command reads it again") from None
+            raise
+
+    def _look_into(self) -> list[str]:
         comparison = self.comparison
         readers = [task.key for task in self._readers]
         folders = {key: result.folder for key in dict.fromkeys(readers) if (result := self.store.result(key))}
@@ -380,16 +376,27 @@ class ComparisonPlan:
         count = Timeline.between(*study.choices[choice], stage.fps, stage.slow_motion).count
         pieces = math.ceil(count / PIECE)
         firsts = [1 + count * number // pieces for number in range(pieces + 1)]
-        after = [building.key]
+        rendering = []
         for first, following in itertools.pairwise(firsts):
             frames, name = following - first, f"{folder} from {first}"
             part = steps.Frames(title, first, following - 1)
-            about = {"title": title, "weight": seconds * frames, "amount": frames, "unit": "frame", "group": name}
-            yield (rendering := Task(steps.render, part, f"render {name}", (building.key,), **about))
-            after.append(rendering.key)
-        about = {"title": title, "weight": seconds * count * 0.06, "group": folder}
-        publish = {steps.FILM: f"{folder}/{steps.FILM}"}
-        yield Task(steps.encode, steps.Frames(title, 1, count), f"encode {folder}", (*after,), publish=publish, **about)
+            about = {"title": title, "weight": seconds * frames, "amount": frames, "unit": "frame", "group": study.name}
+            rendering.append(Task(steps.render, part, f"render {name}", (building.key,), **about))
+        keys = tuple(task.key for task in rendering)
+        encoding = Task(
+            steps.encode,
+            steps.Frames(title, 1, count),
+            f"encode {folder}",
+            after=(building.key, *keys),
+            spends=keys,
+            publish={steps.FILM: f"{folder}/{steps.FILM}"},
+            title=title,
+            weight=seconds * count * 0.06,
+            group=folder,
+        )
+        if not self.store.result(encoding.key):
+            yield from rendering
+        yield encoding
 
     def _subject_file(self) -> tuple[Input]:
         return (self.store.input(place_of_subject(self.comparison.subject)[0]),)

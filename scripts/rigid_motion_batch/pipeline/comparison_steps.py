@@ -265,7 +265,7 @@ class Frames:
     last: int
 
 
-@step(rooms=SCENES, stage="render", temporary=True, blender=True)
+@step(rooms=SCENES, stage="render", blender=True)
 def render(job: Job, parameters: Frames) -> dict[str, float]:
     """Render some frames of a film. Before: its scene."""
     from rigid_motion_batch.scenes.film import render_piece

@@ -1,176 +1,164 @@
-"""Many machines: orders are done by the workers of a Dask scheduler, with the output folder on a disk that all share.
+"""Many machines: the workers of a Dask scheduler do shares of a comparison's stages, as the tasks of a job bundle do.
 
-Every worker is asked first which version of the program it has, and whether it sees the folder; tasks go only to those
-that fit. Each thread of a worker hands its tasks to a process of its own, for Blender is not made for threads, and so
-that a task which nobody wants any more can be ended. Dask gives a task of a worker that died to another one.
+The output folder is on a disk that all share. Every worker is asked first whether it has this version of the program,
+and sees the folder; only those that fit get shares. A share is a process of its own, which Dask's worker waits for.
 """
 
 from __future__ import annotations
 
 import asyncio
+import json
 import logging
 import os
-import queue
+import subprocess
+import sys
 import time
-import uuid
-from collections import deque
-from collections.abc import Callable
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
-from distributed import Client, Future, KilledWorker, Security, get_worker
+from distributed import Client, Future, Security, get_worker
 from distributed.comm import connect
 
-from .executors import ProcessExecutor, Tell
-from .performing import ExecutorError, Failed, Lost, Made, Order, Told, progress_of, write_progress
+from rigid_motion_batch.supervising import end_with_parent
+
+from .bundle import CHECK, COMPARE, share_of
+from .performing import ExecutorError
+from .running import RETRIES
 from .steps import version_here
 
 CONNECTING = 5.0
 """Seconds that a scheduler has to answer."""
 
-LOOK = 1.0
-"""Seconds between two looks at which workers there are, and at whether a task is still wanted."""
+LOOK = 0.5
+"""Seconds between two looks at which workers there are, and at whether a share is done or still wanted."""
 
-PROGRESS = 0.2
-"""Seconds between two looks at how far tasks are."""
-
-ANSWER = 10.0
-"""Seconds for the result of a task that is done."""
+SHARES = 4
+"""Of a stage for each thread of a worker: no worker waits long for the last one."""
 
 UNREACHABLE = (OSError, RuntimeError, TimeoutError, CancelledError)
 """What Dask raises where its scheduler does not answer."""
 
 
-LOADED = version_here()
-"""The version that this process was started with, whatever was done to the files since."""
-
-
-# -- what a worker does -----------------------------------------------------------------------------------------------
-
-_idle: dict[str, deque[ProcessExecutor]] = {}
-"""Session to the processes that wait for its next task."""
-
-
-def identify(folder: str) -> str:
-    """The version of the program here; where a folder of the run is not seen, that."""
-    return LOADED if os.path.isdir(folder) else f"it does not see {folder}; choose one on a disk that all share"
-
-
-def retire(session: str) -> None:
-    """End the processes of a run that is over."""
-    for executor in _idle.pop(session, ()):
-        executor.__exit__()
-
-
-def do(order: Order, session: str) -> Made | Failed | Lost:
-    """Do an order, as a task of Dask's, in a process that is kept for the run.
-
-    Its folder is the beginning of the name of that which is used: where Dask has it done twice, the one does not get
-    in the way of the other.
-    """
+def do(arguments: Sequence[str], here: str) -> dict[str, Any]:
+    """On a worker: what Python prints as JSON with these arguments. It ends with the worker, or as that is told to."""
     worker = get_worker()
     key = worker.get_current_task()
-    ended: list[Made | Failed | Lost] = []
-
-    def hear(_: Order, message: Told | Made | Failed | Lost) -> None:
-        if isinstance(message, Told):
-            write_progress(order, message.share, message.doing)
-        else:
-            ended.append(message)
-
-    idle = _idle.setdefault(session, deque())
-    try:
-        executor = idle.pop()
-    except IndexError:
-        executor = ProcessExecutor(1)
-    try:
-        executor.submit(replace(order, folder=f"{order.folder}-{uuid.uuid4().hex[:8]}"))
-        while not ended:
-            executor.wait(hear, PROGRESS)
+    with subprocess.Popen(
+        [sys.executable, *arguments],
+        cwd=here if os.path.isdir(here) else None,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=end_with_parent if sys.platform == "linux" else None,
+    ) as process:
+        while True:
+            with suppress(subprocess.TimeoutExpired):
+                printed, said = process.communicate(timeout=LOOK)
+                break
             task = worker.state.tasks.get(key)
-            if not ended and (task is None or task.state == "cancelled"):
-                return Lost("it was stopped")
-    finally:
-        if ended:
-            idle.append(executor)
-        else:
-            executor.__exit__()
-    return ended[0]
+            if task is None or task.state == "cancelled":
+                process.kill()
+    try:
+        return json.loads(printed)
+    except ValueError:
+        raise RuntimeError(f"exit code {process.returncode}: {said.strip()[-500:]}") from None
 
 
-# -- what the run does ------------------------------------------------------------------------------------------------
-
-
-class DaskExecutor:
-    """Does orders on the workers of a Dask scheduler.
+class Farm:
+    """The workers of a Dask scheduler, as a context.
 
     Parameters
     ----------
     address : str
         Of the scheduler: tcp://HOST:8786, or tls:// with the certificates in Dask's configuration.
     folder : Path
-        One of this run in the output folder, which all workers must see.
+        The output folder, which all workers must see.
     note : callable
         Takes a line for the user about the workers.
 
     Raises
     ------
     ExecutorError
-        On entering, where no scheduler answers, or all its workers are unfit.
+        On entering, where no scheduler answers, or all its workers are unfit; and later, where it is gone.
     """
 
     def __init__(self, address: str, folder: Path, note: Callable[[str], object]) -> None:
         self._address, self._folder, self._note = address, folder, note
-        self._session = uuid.uuid4().hex
-        self._workers: dict[str, int] = {}
-        """The addresses of those that fit, and how many threads they have."""
-        self._unfit: set[str] = set()
-        self._at_work: dict[Future, tuple[Order, frozenset[str]]] = {}
-        """With the workers that may do it."""
-        self._ended: queue.SimpleQueue[Future] = queue.SimpleQueue()
-        self._looked_at = 0.0
+        self._fit: dict[str, bool] = {}
+        """The workers that were asked, by their addresses."""
         self._alone = False
         """Whether it was said that there is no worker."""
         self._client: Client
 
-    @property
-    def capacity(self) -> int:
-        # A worker goes on with the next task while what it has just made is put in place.
-        return 2 * sum(self._workers.values())
-
-    @property
-    def workers(self) -> list[str]:
-        """The addresses of those that get tasks."""
-        return [*self._workers]
-
-    def submit(self, order: Order) -> None:
-        key = f"{order.step.function.__name__}-{uuid.uuid4().hex[:8]}"
-        asked = replace(order, here=os.getcwd())
-        future = self._client.submit(do, asked, self._session, key=key, workers=self.workers, pure=False)
-        self._at_work[future] = order, frozenset(self._workers)
-        future.add_done_callback(self._ended.put)
-
-    def wait(self, tell: Tell, seconds: float) -> None:
-        self._look()
+    def run(self, arguments: Sequence[str], stage: str, tasks: int) -> Iterator[tuple[float, dict[str, Any]]]:
+        """Have a stage of so many tasks done by the command of these arguments; the share done, and each answer."""
+        parts = max(1, min(tasks, SHARES * sum(self.workers().values())))
+        waiting = deque(range(1, parts + 1))
+        losses: Counter[int] = Counter()
+        at_work: dict[Future, tuple[int, str]] = {}
         try:
-            future = self._ended.get(timeout=min(seconds, PROGRESS))
-        except queue.Empty:
-            for order, _ in [*self._at_work.values()]:
-                if progress := progress_of(order):
-                    tell(order, Told(order, *progress))
-            return
-        if future in self._at_work:
-            order, _ = self._at_work.pop(future)
-            tell(order, self._message(future))
+            while waiting or at_work:
+                workers = self.workers()
+                for future, (number, worker) in [*at_work.items()]:
+                    if worker in workers and not future.done():
+                        continue
+                    del at_work[future]
+                    try:
+                        if worker not in workers:
+                            future.cancel(force=True)
+                            raise RuntimeError("its worker is gone")
+                        answer = future.result(CONNECTING)
+                    except (CancelledError, Exception) as error:
+                        losses[number] += 1
+                        if losses[number] > RETRIES:
+                            name = f"{stage} {number}/{parts}"
+                            said = f"{name}: {_first_line(error)}; given up after {losses[number]} attempts"
+                            yield 1.0 - (len(waiting) + len(at_work)) / parts, {"failures": {name: said}}
+                        else:
+                            waiting.appendleft(number)
+                        continue
+                    yield 1.0 - (len(waiting) + len(at_work)) / parts, answer
+                busy = Counter(worker for _, worker in at_work.values())
+                for worker, threads in workers.items():
+                    for number in [waiting.popleft() for _ in range(min(threads - busy[worker], len(waiting)))]:
+                        share = [*COMPARE, *arguments, *share_of(os.fspath(self._folder), stage, number, parts)]
+                        future = self._client.submit(
+                            do, [*share, "--json", "--jobs", "1"], os.getcwd(), workers=[worker], pure=False
+                        )
+                        at_work[future] = number, worker
+                time.sleep(LOOK)
+        finally:
+            with suppress(*UNREACHABLE):
+                self._client.cancel([*at_work], force=True)
 
-    def stop(self) -> None:
-        futures = [*self._at_work]
-        self._at_work.clear()
-        with suppress(*UNREACHABLE):
-            self._client.cancel(futures, force=True)
+    def workers(self) -> dict[str, int]:
+        """Those that fit, by address, and how many threads each has. Raises ExecutorError where there are none ever."""
+        threads = self._threads()
+        for address in self._fit.keys() - threads.keys():
+            if self._fit.pop(address):
+                self._note(f"worker {address} is gone; others go on with its tasks")
+        if strangers := [*threads.keys() - self._fit.keys()]:
+            answers: dict[str, str | BaseException] = {}
+            with suppress(*UNREACHABLE):
+                ask = _asker([*CHECK, version_here()], os.fspath(self._folder))
+                answers = self._client.run(ask, workers=strangers, on_error="return")
+            for address, said in answers.items():
+                if isinstance(said, OSError):
+                    continue  # It is seen again at the next look, or gone.
+                self._fit[address] = not said
+                if said:
+                    self._note(f"worker {address}: {said}; it is left out")
+        if self._fit and not any(self._fit.values()):
+            raise ExecutorError(f"{self._address}: none of its workers is fit")
+        if not threads and not self._alone:
+            self._note(f"{self._address} has no worker; waiting for one: `dask worker {self._address}`")
+        self._alone = not threads
+        return {address: threads[address] for address, fits in self._fit.items() if fits}
 
     def __enter__(self) -> Self:
         for name in ("distributed", "distributed.client"):
@@ -193,75 +181,23 @@ class DaskExecutor:
                 "address that it prints"
             ) from None
         try:
-            if (said := self._client.run_on_scheduler(_asker(), "")).startswith("No module"):
-                raise ExecutorError(f"{self._address}: the scheduler: {said}")
-            self._look()
-            if self._unfit and not self._workers:
-                raise ExecutorError(f"{self._address}: none of its workers is fit")
+            self.workers()
         except BaseException:
             self.__exit__()
             raise
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.stop()
         with suppress(*UNREACHABLE):
-            self._client.run(retire, self._session, workers=self.workers, on_error="ignore")
             self._client.close(timeout=2.0)
-
-    def _look(self) -> None:
-        """See which workers have come and gone. Raises ExecutorError where the scheduler has."""
-        if time.monotonic() - self._looked_at < LOOK:
-            return
-        self._looked_at = time.monotonic()
-        threads = self._threads()
-        for address in self._workers.keys() - threads.keys():
-            del self._workers[address]
-            self._note(f"worker {address} is gone; others go on with its tasks")
-        self._unfit &= threads.keys()
-        if strangers := threads.keys() - self._workers.keys() - self._unfit:
-            self._welcome({address: threads[address] for address in strangers})
-        for future, (order, workers) in [*self._at_work.items()]:
-            # Of those that could have done it none is left: that is no fault of the task.
-            if self._workers and not workers.intersection(self._workers):
-                del self._at_work[future]
-                self._client.cancel([future], force=True)
-                self.submit(order)
-        if not self._alone and not threads:
-            self._note(f"{self._address} has no worker; waiting for one: `dask worker {self._address}`")
-        self._alone = not threads
 
     def _threads(self) -> dict[str, int]:
         """The workers that the scheduler knows, and how many threads each has."""
         with suppress(*UNREACHABLE):
             if self._client.status == "running":
-                found = self._client.sync(self._client.scheduler.identity, n_workers=-1, callback_timeout=ANSWER)
+                found = self._client.sync(self._client.scheduler.identity, n_workers=-1, callback_timeout=CONNECTING)
                 return {address: worker["nthreads"] for address, worker in found["workers"].items()}
         raise ExecutorError(f"{self._address}: the Dask scheduler is gone")
-
-    def _welcome(self, threads: dict[str, int]) -> None:
-        """Ask workers who have come who they are, and take those that fit."""
-        answers: dict[str, str | BaseException] = {}
-        with suppress(*UNREACHABLE):  # They are seen again at the next look, or gone.
-            answers = self._client.run(_asker(), str(self._folder), workers=[*threads], on_error="return")
-        for address, answer in answers.items():
-            if answer == LOADED:
-                self._workers[address] = threads[address]
-            elif not isinstance(answer, OSError):
-                self._unfit.add(address)
-                said = _first_sentence(answer) if isinstance(answer, BaseException) else answer
-                said = f"it has {said}, and this is {LOADED}" if said.startswith("program") else said
-                self._note(f"worker {address}: {said}; it is left out")
-
-    def _message(self, future: Future) -> Made | Failed | Lost:
-        """What became of an order that Dask has done with."""
-        try:
-            return future.result(timeout=ANSWER)
-        except KilledWorker as error:
-            return Lost(f"{error.allowed_failures + 1} workers died of it, {error.last_worker.address} last")
-        except (CancelledError, Exception) as error:  # Of Dask's, or of a worker's machine; not of the task's.
-            self._threads()  # Where the scheduler is gone, that is what there is to say.
-            return Lost(f"its worker failed: {_first_sentence(error)}")
 
 
 async def _knock(address: str) -> None:
@@ -271,19 +207,18 @@ async def _knock(address: str) -> None:
     comm.abort()
 
 
-def _asker() -> Callable[[str], str]:
-    """`identify`, in a function that is sent whole: a worker that cannot import what it is sent would die of that."""
+def _asker(check: Sequence[str], folder: str) -> Callable[[], str]:
+    """What a worker answers where it does not fit, in a function that is sent whole: it may not have this program."""
 
-    def ask(folder: str) -> str:
-        try:
-            from rigid_motion_batch.pipeline.dask import identify
-        except ImportError as error:
-            return f"{error}; start scheduler and workers with this program on their module path: see docs/farm.md"
-        return identify(folder)
+    def ask() -> str:
+        if not os.path.isdir(folder):
+            return f"it does not see {folder}; choose one on a disk that all share"
+        ended = subprocess.run([sys.executable, *check], capture_output=True, text=True, check=False)
+        lines = (ended.stdout + ended.stderr).strip().splitlines()
+        return lines[-1].removeprefix("openjd_fail: ") if ended.returncode and lines else ""
 
     return ask
 
 
-def _first_sentence(error: BaseException) -> str:
-    lines = str(error).strip().splitlines()
-    return f"{type(error).__name__}: {lines[0].split('. ')[0]}" if lines else type(error).__name__
+def _first_line(error: BaseException) -> str:
+    return (str(error).strip().splitlines() or [type(error).__name__])[0]

@@ -7,7 +7,7 @@ from typing import Any
 
 from .running import EVERYTHING, Plan, Share, look_through
 from .steps import Task
-from .store import OutputError, Store
+from .store import OutputError, Result, Store
 from .values import to_plain
 
 MOST = 3
@@ -23,19 +23,17 @@ def explain(plan: Plan, store: Store, share: Share = EVERYTHING) -> Iterator[tup
         task = found.task
         if found.result and not found.done:
             yield task, _unpublished(task, store)
-        for one in () if found.result else (*found.missing, task):
-            if found.chosen or one is not task:
-                yield one, _reason(one, store, latest.get(one.name), changed)
-            changed[one.key] = one.shown
+        if not found.result:
+            if found.chosen:
+                is_damaged = store.folder_of(task.key).exists()
+                yield task, "its result is damaged" if is_damaged else _reason(task, latest.get(task.name), changed)
+            changed[task.key] = task.shown
 
 
-def _reason(task: Task, store: Store, key: str | None, changed: Mapping[str, str]) -> str:
+def _reason(task: Task, earlier: Result | None, changed: Mapping[str, str]) -> str:
     """Why a task without a result would be done, by what its last result was made of."""
-    earlier = store.result(key) if key else None
-    if key == task.key:
-        return "its result is damaged or gone"
     if earlier is None or not isinstance(made_of := earlier.index.get("made_of"), dict):
-        return "never done" if key is None else "never done of this"
+        return "never done"
     reasons = [
         *_of("program", _differences(made_of.get("versions"), task.step.versions, values=False)),
         *_of("parameters", _differences(made_of.get("parameters"), to_plain(task.parameters))),

@@ -1,7 +1,7 @@
 """Doing one task, wherever that is: from an order to a folder with files, and a message of what came of it.
 
-Nothing here touches a store, so it does not matter where it happens or how it ends: here, in a worker, on another
-machine. Orders and messages are pickled. How far a task is, it writes into a file beside its folder.
+Nothing here touches a store, so it does not matter where it happens or how it ends: here, in a worker, in a Blender.
+Orders and messages are pickled. How far a task is, it writes into a file beside its folder.
 """
 
 from __future__ import annotations
@@ -10,11 +10,12 @@ import errno
 import json
 import os
 import shutil
+import signal
 import stat
 import time
 import traceback
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import CancelledError, Future
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,18 +53,6 @@ class Order:
     blender: str = ""
     """The program that does it, if that is not to be this one."""
 
-    here: str = ""
-    """The folder that relative inputs start from, where that is not the current one."""
-
-
-@dataclass(frozen=True)
-class Told:
-    """How far a task is."""
-
-    order: Order
-    share: float
-    doing: str
-
 
 @dataclass(frozen=True)
 class Made:
@@ -96,45 +85,20 @@ class Lost:
     notes: Sequence[str] = ()
 
 
-Tell = Callable[[Order, Told | Made | Failed | Lost], object]
+Tell = Callable[[float, str], object]
 
 
 class Executor(Protocol):
     """Who does orders. A context; may be used again after `stop`."""
 
     capacity: int
-    """How many orders it takes at a time; 0 where there is nobody to do one yet."""
+    """How many orders it takes at a time."""
 
-    def submit(self, order: Order) -> None: ...
-
-    def wait(self, tell: Tell, seconds: float) -> None:
-        """Pass on what has happened, or wait for it for so long. Raises ExecutorError where nothing can any more."""
+    def submit(self, order: Order, tell: Tell) -> Future[Made | Failed | Lost]:
+        """Begin an order. How far it is, is told here, or written for `progress_of`."""
 
     def stop(self) -> None:
-        """End what is at work, and forget what is waiting, within a second."""
-
-    def __enter__(self) -> Executor: ...
-
-    def __exit__(self, *_: object) -> None: ...
-
-
-class SerialExecutor:
-    """Does one order after the other in this process."""
-
-    capacity = 1
-
-    def __init__(self) -> None:
-        self._waiting: deque[Order] = deque()
-
-    def submit(self, order: Order) -> None:
-        self._waiting.append(order)
-
-    def wait(self, tell: Tell, seconds: float) -> None:
-        order = self._waiting.popleft()
-        tell(order, perform(order, lambda share, doing: tell(order, Told(order, share, doing))))
-
-    def stop(self) -> None:
-        self._waiting.clear()
+        """End what is at work, within a second."""
 
     def __enter__(self) -> Self:
         return self
@@ -143,11 +107,42 @@ class SerialExecutor:
         self.stop()
 
 
+class SerialExecutor(Executor):
+    """Does an order at once, in this process."""
+
+    capacity = 1
+
+    def submit(self, order: Order, tell: Tell) -> Future[Made | Failed | Lost]:
+        future: Future[Made | Failed | Lost] = Future()
+        future.set_result(perform(order, tell))
+        return future
+
+    def stop(self) -> None:
+        pass
+
+
+def outcome_of(future: Future[Made | Failed | Lost]) -> Made | Failed | Lost:
+    """What became of an order."""
+    try:
+        return future.result()
+    except (CancelledError, Exception) as error:  # Of pebble's, or at unpickling; not of the task's.
+        if code := getattr(error, "exitcode", None):
+            return Lost(f"its process died ({_death(code)})")
+        return Lost(f"its process failed: {type(error).__name__}: {error}")
+
+
+def _death(code: int) -> str:
+    if -code in {*signal.Signals}:
+        name = signal.Signals(-code).name
+        return f"{name}, perhaps for want of memory" if name == "SIGKILL" else name
+    return f"exit code {code}"
+
+
 class ExecutorError(Exception):
     """Why nothing can be done by these means, and the way out, in one line."""
 
 
-def perform(order: Order, tell: Callable[[float, str], object] | None = None) -> Made | Failed | Lost:
+def perform(order: Order, tell: Tell | None = None) -> Made | Failed | Lost:
     """Do a task. Its folder is there afterwards if it was made, and only then.
 
     Parameters
@@ -156,8 +151,6 @@ def perform(order: Order, tell: Callable[[float, str], object] | None = None) ->
     tell : callable, optional
         Takes the share that is done and what is being done; written into a file for `progress_of` unless given.
     """
-    if order.here and os.path.isdir(order.here):
-        os.chdir(order.here)
     if order.step.blender and order.blender:
         from .blender import perform_in_blender
 
@@ -205,12 +198,6 @@ def perform(order: Order, tell: Callable[[float, str], object] | None = None) ->
     return done
 
 
-def write_progress(order: Order, share: float, doing: str) -> None:
-    """Say how far an order is to whoever asks `progress_of`."""
-    with suppress(OSError):
-        Path(f"{order.folder}.progress").write_text(json.dumps([share, doing]), encoding="utf-8")
-
-
 def progress_of(order: Order) -> tuple[float, str] | None:
     """How far an order is that is done elsewhere, and what is being done; None where nothing is known."""
     try:
@@ -221,14 +208,15 @@ def progress_of(order: Order) -> tuple[float, str] | None:
 
 
 def _writing(order: Order) -> Callable[[float, str], None]:
-    """What writes how far a task is, not too often."""
+    """What writes how far a task is for `progress_of`, not too often."""
     said_at = 0.0
 
     def tell(share: float, doing: str) -> None:
         nonlocal said_at
         if time.monotonic() - said_at >= INTERVAL:
             said_at = time.monotonic()
-            write_progress(order, share, doing)
+            with suppress(OSError):
+                Path(f"{order.folder}.progress").write_text(json.dumps([share, doing]), encoding="utf-8")
 
     return tell
 

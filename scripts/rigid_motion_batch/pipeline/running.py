@@ -11,14 +11,14 @@ import enum
 import heapq
 import os
 import shutil
-import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from .performing import FULL_OR_FORBIDDEN, Executor, ExecutorError, Failed, Lost, Made, Order, Told, perform
+from .performing import FULL_OR_FORBIDDEN, Executor, Failed, Lost, Made, Order, outcome_of, progress_of
 from .steps import Task
 from .store import OutputError, Result, Store, not_written
 
@@ -27,11 +27,8 @@ Plan = Callable[[], Iterable[Task]]
 RETRIES = 2
 """How often a task is begun anew whose process died."""
 
-PATIENCE = 0.5
-"""Seconds between two looks at the clock while nothing happens."""
-
-AFTER_CTRL_C = 1.0
-"""Seconds for everything that is done after Ctrl-C."""
+LOOK = 0.2
+"""Seconds between two looks at how far tasks are."""
 
 
 class State(enum.Enum):
@@ -80,14 +77,16 @@ class Outcome:
     """Why nothing more could be done, in one line; empty where everything was tried."""
 
     def continued(self, later: Outcome) -> Outcome:
-        """What became of both of two runs of one plan."""
+        """What became of this and a later run, which found done what this one has done."""
         done = self.counts[State.DONE]
         later.counts.update({State.DONE: done, State.UP_TO_DATE: -done})
+        later.failures, later.details = self.failures | later.failures, self.details | later.details
         return later
 
     def note_failures(self, store: Store) -> None:
         """Have the store keep what failed, for whoever asks later."""
-        failures = {name: {"message": said, "details": self.details[name]} for name, said in self.failures.items()}
+        details = self.details
+        failures = {name: {"message": m, "details": details.get(name, "")} for name, m in self.failures.items()}
         with suppress(OSError):
             store.note("failures.json", failures)
 
@@ -125,32 +124,20 @@ EVERYTHING = Share()
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Found:
-    """A task as it is found in a store, and the temporary ones that are for it alone."""
+    """A task as it is found in a store."""
 
     task: Task
     chosen: bool
     result: Result | None
-    temporary: tuple[Task, ...]
-    missing: tuple[Task, ...]
-    """Those of them that are to be done before it."""
-
     done: bool
 
 
 def look_through(plan: Plan, store: Store, share: Share = EVERYTHING) -> Iterator[Found]:
-    """All tasks of a plan but the temporary ones."""
+    """All tasks of a plan."""
     chosen = share.chooser()
-    sleeping: dict[str, tuple[Task, bool]] = {}
     for task in plan():
-        wanted = chosen(task)
-        if task.step.temporary:
-            sleeping[task.key] = task, wanted
-            continue
-        own = [sleeping.pop(key) for key in task.after if key in sleeping]
-        result = store.result(task.key)
-        done = bool(result) and (not wanted or store.is_published(task, result))
-        missing = () if result else tuple(one for one, also in own if also and not store.result(one.key))
-        yield Found(task, wanted, result, tuple(one for one, _ in own), missing, done)
+        wanted, result = chosen(task), store.result(task.key)
+        yield Found(task, wanted, result, bool(result) and (not wanted or store.is_published(task, result)))
 
 
 @dataclass
@@ -183,10 +170,9 @@ class Survey:
                 continue
             if found.chosen:
                 strangers += store.strangers(found.task, found.result)
-            for task in (*found.missing, *([found.task] if found.chosen else [])):
-                survey.weight += task.weight
+                survey.weight += found.task.weight
                 survey.tasks += 1
-                survey.amounts[task.unit] += task.amount
+                survey.amounts[found.task.unit] += found.task.amount
         if strangers and not store.overwrite:
             raise OutputError(not_written([os.fspath(store.output / path) for path in strangers]))
         return survey
@@ -200,6 +186,7 @@ def run(
     progress: Progress | None = None,
     share: Share = EVERYTHING,
     blender: str = "",
+    before: Outcome | None = None,
 ) -> Outcome:
     """Do what is missing of a plan.
 
@@ -214,12 +201,13 @@ def run(
         What is to be done here; of the rest, what is there is used.
     blender : str
         The program for steps that need Blender, if it is not to be this one.
+    before : Outcome, optional
+        What became of an earlier plan of the same work, which this one's goes on from.
 
     Returns
     -------
     Outcome
-        Also after Ctrl-C: then partial tasks have been done with what there is, if that took no longer than a moment,
-        and nothing is at work any more.
+        Also after Ctrl-C: then nothing is at work any more.
 
     Raises
     ------
@@ -227,18 +215,14 @@ def run(
         Before anything is done, where something would be replaced that must not be.
     """
     survey = Survey.of(plan, store, share)
-    if not survey.tasks:
-        return Outcome(Counter({State.UP_TO_DATE: survey.up_to_date}))
-    attempt = _Run(plan, store, executor, progress or Progress(), share, blender, survey)
-    outcome = attempt.run()
-    if not attempt.damaged or outcome.interrupted or outcome.problem:
-        return outcome
-    again = replace(attempt, survey=Survey.of(plan, store, share), mends=False)
-    return outcome.continued(again.run())
-
-
-class _OutOfTime(BaseException):
-    """Raised inside a task that takes too long after Ctrl-C."""
+    if survey.tasks:
+        outcome = _Run(plan, store, executor, progress or Progress(), share, blender, survey).run()
+    else:
+        outcome = Outcome(Counter({State.UP_TO_DATE: survey.up_to_date}))
+    outcome = (before or Outcome()).continued(outcome)
+    if share == EVERYTHING:
+        outcome.note_failures(store)
+    return outcome
 
 
 class _Hopeless(Exception):
@@ -272,25 +256,18 @@ class _Run:
     share: Share
     blender: str
     survey: Survey
-    mends: bool = True
-    """Whether what turns out to be damaged will be made again."""
 
     def __post_init__(self) -> None:
-        self.outcome, self.damaged = Outcome(), False
+        self.outcome = Outcome()
         self.settled: dict[str, str | None] = {}
         """Key of a task to that of its result; None where it has none."""
-        self.open: dict[int, _Open] = {}
-        """By their places in the plan."""
         self.readers: dict[str, list[_Open]] = {}
         """Key of an open task to those that wait for it."""
         self.ready: list[tuple[int, _Open]] = []
-        self.temporary: set[str] = set()
-        self.at_work: dict[str, _Open] = {}
-        """By the folder of the order."""
+        self.at_work: dict[Future[Made | Failed | Lost], tuple[_Open, Order]] = {}
         self.number, self.weight_done = 0, 0.0
         self.amounts_done: Counter[str] = Counter()
         self.shown: Counter[str] = Counter()
-        self.rest = look_through(self.plan, self.store, self.share)
 
     def run(self) -> Outcome:
         self.progress.begin(self.survey.weight)
@@ -299,55 +276,52 @@ class _Run:
             self._work()
             if self.share == EVERYTHING and not outcome.failures:
                 self.store.sweep(key for key in self.settled.values() if key)
-        except (_Hopeless, ExecutorError) as error:
+        except _Hopeless as error:
             outcome.problem = str(error)
-            self._stop()
         except KeyboardInterrupt:
-            self._interrupted()
+            outcome.interrupted = True
         if outcome.problem or outcome.interrupted:
+            self.executor.stop()
             over = sum(outcome.counts[state] for state in (State.DONE, State.FAILED, State.SKIPPED))
             outcome.counts[State.STOPPED] = max(0, self.survey.tasks - over)
-        if self.share == EVERYTHING:
-            outcome.note_failures(self.store)
         return outcome
 
     def _work(self) -> None:
+        rest = look_through(self.plan, self.store, self.share)
+        found: Found | None
         more = True
         while more or self.ready or self.at_work:
             while more and len(self.ready) < self.executor.capacity:
-                found = next(self.rest, None)
-                if more := found is not None:
+                if found := next(rest, None):
                     self._meet(found)
+                more = found is not None
             while self.ready and len(self.at_work) < self.executor.capacity:
                 self._begin(heapq.heappop(self.ready)[1])
-            if self.at_work or not self.executor.capacity:
-                self.executor.wait(self._hear, PATIENCE)
+            ended, _ = wait(self.at_work, LOOK, FIRST_COMPLETED)
+            for future in ended:
+                opened, order = self.at_work.pop(future)
+                self._end(opened, order, outcome_of(future))
+            for opened, order in () if ended else self.at_work.values():
+                if progress := progress_of(order):
+                    self._tell(opened, *progress)
 
     def _meet(self, found: Found) -> None:
         """Take a task from the plan: it is up to date, or ready, or waits for others."""
-        if found.done and found.task.key not in self.readers:
-            for one in found.temporary:
-                self.store.discard(one.key)
-            self.settled[found.task.key] = found.task.key
+        task = found.task
+        if found.done and task.key not in self.readers:
+            self.settled[task.key] = task.key
             if found.chosen:
-                self._count(found.task, State.UP_TO_DATE)
-            return
-        for task in found.missing:
-            self._open(task)
-        if found.chosen:
-            self.temporary.update(one.key for one in found.temporary)
-            self._open(found.task)
-
-    def _open(self, task: Task) -> None:
-        self.number += 1
-        self.open[self.number] = opened = _Open(task, self.number)
-        # A task that is there twice waits for itself.
-        for key in {*task.after, task.key} & self.readers.keys():
-            self.readers[key].append(opened)
-            opened.waits += 1
-        self.readers.setdefault(task.key, [])
-        if not opened.waits:
-            heapq.heappush(self.ready, (opened.number, opened))
+                self._count(task, State.UP_TO_DATE)
+        elif found.chosen:
+            self.number += 1
+            opened = _Open(task, self.number)
+            # A task that is there twice waits for itself.
+            for key in {*task.after, task.key} & self.readers.keys():
+                self.readers[key].append(opened)
+                opened.waits += 1
+            self.readers.setdefault(task.key, [])
+            if not opened.waits:
+                heapq.heappush(self.ready, (opened.number, opened))
 
     def _before(self, task: Task) -> list[str | None]:
         """The keys of the results of the tasks before one, also of earlier plans; None where there is none."""
@@ -367,33 +341,23 @@ class _Run:
             self.store.withdraw(task.publish.values())
             self._close(opened, State.SKIPPED)
         else:
-            order = self._order(task)
-            self.at_work[order.folder], opened.share = opened, 0.0
-            self._show(task.shown)
-            self.executor.submit(order)
+            order = Order(
+                step=task.step,
+                parameters=task.parameters,
+                before=tuple(os.fspath(self.store.folder_of(key)) if key else None for key in before),
+                inputs=task.inputs,
+                wanted={name: os.fspath(self.store.output / path) for name, path in task.publish.items()},
+                output=os.fspath(self.store.output),
+                folder=os.fspath(self.store.new_scratch()),
+                blender=self.blender,
+            )
+            self._tell(opened, 0.0, "")
+            future = self.executor.submit(order, lambda share, doing: self._tell(opened, share, doing))
+            self.at_work[future] = opened, order
 
-    def _order(self, task: Task) -> Order:
-        return Order(
-            step=task.step,
-            parameters=task.parameters,
-            before=tuple(os.fspath(self.store.folder_of(key)) if key else None for key in self._before(task)),
-            inputs=task.inputs,
-            wanted={name: os.fspath(self.store.output / path) for name, path in task.publish.items()},
-            output=os.fspath(self.store.output),
-            folder=os.fspath(self.store.new_scratch()),
-            blender=self.blender,
-        )
-
-    def _hear(self, order: Order, message: Told | Made | Failed | Lost) -> None:
-        opened = self.at_work.get(order.folder)
-        if opened is None:
-            return
+    def _end(self, opened: _Open, order: Order, message: Made | Failed | Lost) -> None:
+        """Take what came of an order."""
         shown = opened.task.shown
-        if isinstance(message, Told):
-            opened.share = message.share
-            self._show(f"{shown}: {message.doing}" if message.doing else shown)
-            return
-        del self.at_work[order.folder]
         for note in message.notes:
             self.progress.note(note)
         if isinstance(message, Made):
@@ -423,36 +387,31 @@ class _Run:
         except OSError as error:
             self._failed(opened, _of_system(error))
         else:
+            for key in task.spends:
+                self.store.discard(key)
             self._close(opened, State.DONE if is_new else State.UP_TO_DATE)
 
     def _failed(self, opened: _Open, failed: Failed) -> None:
         # An error that nobody foresaw does not say by itself what it is about.
         task = opened.task
         said = f"{task.shown}: {failed.message}" if failed.details else failed.message
+        if not failed.hopeless and self.store.discard_damaged(key for key in self._before(task) if key):
+            said = f"{task.shown}: what it reads was damaged; run the same command again"
         self.outcome.failures[task.name], self.outcome.details[task.name] = said, failed.details
+        self._close(opened, State.FAILED, said)
         if failed.hopeless:
-            self._close(opened, State.FAILED, said)
             raise _Hopeless(said)
-        keys = [key for key in self._before(task) if key and self.mends]
-        for key in (key for key in keys if not self.store.result(key, thoroughly=True)):
-            self.store.discard(key)
-            self.damaged = True
-            self.progress.note(f"{task.shown}: what it reads is damaged; it is made again")
         # What is there under its name was made of something else.
         self.store.withdraw(task.publish.values())
-        self._close(opened, State.FAILED, said)
 
     def _close(self, opened: _Open, state: State, problem: str = "") -> None:
         """An open task has come to its end: those after it may begin."""
         task, there = opened.task, state in (State.DONE, State.UP_TO_DATE)
-        self.open.pop(opened.number, None)
         waiting = self.readers.pop(task.key, [])
         self.settled[task.key] = opened.key if there else None
         self.weight_done += task.weight
         self.amounts_done[task.unit] += task.amount
         self._count(task, state, problem)
-        for key in self.temporary.intersection(task.after) if there else ():
-            self.store.discard(key)
         for one in waiting:
             if one.task.key == task.key:
                 self.readers.setdefault(task.key, [])
@@ -464,47 +423,20 @@ class _Run:
         self.outcome.counts[state] += 1
         self.progress.finish(task, state, problem)
 
-    def _show(self, doing: str) -> None:
-        by_now, weight = Counter(self.amounts_done), self.weight_done
-        for one in self.at_work.values():
+    def _tell(self, opened: _Open, share: float, doing: str) -> None:
+        """Tell how far a task is, and with it the whole."""
+        opened.share = share
+        at_work = {opened, *(one for one, _ in self.at_work.values())}
+        weight = self.weight_done + sum(one.share * one.task.weight for one in at_work)
+        by_now = Counter(self.amounts_done)
+        for one in at_work:
             by_now[one.task.unit] += one.share * one.task.amount
-            weight += one.share * one.task.weight
         del by_now[""]
         # What a worker that died had done does not make the count go back.
         self.shown |= Counter({unit: int(number) for unit, number in by_now.items()})
         counts = {unit: (number, self.survey.amounts[unit]) for unit, number in self.shown.items()}
-        self.progress.reach(min(weight, self.survey.weight), doing, counts)
-
-    # -- Ctrl-C -------------------------------------------------------------------------------------------------------
-
-    def _stop(self) -> None:
-        self.executor.stop()
-        for folder in self.at_work:
-            shutil.rmtree(folder, ignore_errors=True)
-        self.at_work.clear()
-
-    def _interrupted(self) -> None:
-        self.outcome.interrupted = True
-        deadline = time.monotonic() + AFTER_CTRL_C
-        with suppress(KeyboardInterrupt, _OutOfTime, _Hopeless, OSError):  # The next run will do the rest.
-            self._stop()
-            rest = (_Open(found.task) for found in self.rest if found.chosen and not found.done)
-            for opened in (*self.open.values(), *rest):
-                if opened.task.step.partial and any(before := self._before(opened.task)):
-                    opened.key = opened.task.key_after(before)
-                    self._do_at_once(opened, deadline)
-
-    def _do_at_once(self, opened: _Open, deadline: float) -> None:
-        """Do a partial task in this process, with what there is."""
-
-        def tell(share: float, doing: str) -> None:
-            if time.monotonic() > deadline:
-                raise _OutOfTime
-
-        tell(0.0, "")
-        made = self.store.result(opened.key) or perform(self._order(opened.task), tell)
-        if isinstance(made, (Made, Result)):
-            self._settle(opened, made)
+        shown = opened.task.shown
+        self.progress.reach(min(weight, self.survey.weight), f"{shown}: {doing}" if doing else shown, counts)
 
 
 def _of_system(error: OSError) -> Failed:

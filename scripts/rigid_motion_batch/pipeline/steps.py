@@ -82,9 +82,6 @@ class Step:
     partial: bool = False
     """Goes on with what there is where some of the tasks before it failed."""
 
-    temporary: bool = False
-    """Its result is for one other task, is made when that needs it, and goes when that is done."""
-
     blender: bool = False
     """Needs bpy: done by the Blender that the user names, if any."""
 
@@ -153,6 +150,9 @@ class Task:
     """The keys of tasks whose results it reads."""
 
     inputs: tuple[Input, ...] = ()
+
+    spends: tuple[str, ...] = ()
+    """The keys of those before it whose results are for it alone, and go when it is done."""
 
     publish: Mapping[str, str] = field(default_factory=dict)
     """Files of the result to where they go in the output folder, with slashes; "FOLDER/" stands for all files below."""

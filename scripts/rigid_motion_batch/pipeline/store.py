@@ -3,9 +3,8 @@
 Below `.rigid-motion/` of the folder:
 
     results/KEY/        what a task made, with an index of its files; there if and only if the task is done
-    scratch/SESSION/    what is being made, by a process that holds SESSION.lock
+    scratch/SESSION/    what is being made, by one process
     published/          what this program has put into the output folder: lines of JSON, a file for each folder
-    latest.jsonl        task to key of its last result, for `--explain`
     inputs.json         digests of inputs, by size, time of change and inode
     lock                held by a run that has the folder for itself
 
@@ -15,7 +14,6 @@ number may write at the same time.
 
 from __future__ import annotations
 
-import errno
 import json
 import os
 import shutil
@@ -31,7 +29,7 @@ from typing import Any, Self
 
 from filelock import FileLock, Timeout
 
-from rigid_motion_batch.files import append_lines, lines_of, write_text, written_beside
+from rigid_motion_batch.files import append_lines, lines_of, write_text
 
 from .steps import OWN, Input, Task, sha256_of
 from .values import to_plain
@@ -43,7 +41,10 @@ UNSETTLED = 2.0
 """Seconds since its last change, by which a file that was hashed may have changed again without a trace in its time."""
 
 KEPT = 7 * 86400.0
-"""Seconds that a result is kept that the last plan did not ask for."""
+"""Seconds that a result is kept that the last plan did not ask for, and what a process was making that was killed."""
+
+ALONE = "run"
+"""The session of a run that has the folder for itself."""
 
 Files = Mapping[str, tuple[int, int, str]]
 """Name to size, time of change in ns and SHA-256."""
@@ -94,7 +95,8 @@ class Store:
         """Of inputs, in the file system, to their paths."""
         self._real = cache(os.path.realpath)
         """Of folders: asking the system for those of all inputs takes long."""
-        self._session: FileLock | None = None
+        self.scratch = self._scratch / (ALONE if alone else uuid.uuid4().hex[:8])
+        """The folder of this process for what is being made."""
         self._number = 0
 
     # -- opening and closing ------------------------------------------------------------------------------------------
@@ -109,12 +111,10 @@ class Store:
                 raise FolderInUse(
                     f"{self.output}: another run is at work in this folder; wait for it, or choose another"
                 ) from None
-        self._clear_dead_sessions()
-        while self._session is None:
-            session = FileLock(self._scratch / f"{uuid.uuid4().hex[:8]}.lock")
-            session.acquire()
-            # Another process may have taken it for a dead one's before it was locked.
-            self._session = session if os.path.exists(session.lock_file) else None
+        for session in self._scratch.glob("*"):
+            with suppress(FileNotFoundError):  # Another process has ended.
+                if session == self.scratch or time.time() - session.stat().st_mtime > KEPT:
+                    shutil.rmtree(session, ignore_errors=True)
         self.scratch.mkdir(parents=True)
         return self
 
@@ -123,24 +123,16 @@ class Store:
         if self._identities:
             with suppress(OSError):
                 self.note("inputs.json", self._cache)
-        lock = self._session.lock_file
-        self._session.release()
-        Path(lock).unlink(missing_ok=True)
         for name in ("results", "scratch", "published"):
             _remove_if_empty(self.own / name)
         if self._lock:
             if not self._results.exists():
-                for name in ("inputs.json", "latest.jsonl", "failures.json", "lock"):
+                for name in ("inputs.json", "failures.json", "lock"):
                     (self.own / name).unlink(missing_ok=True)
             self._lock.release()
         for folder in (self.own, *self._missing):
             if not _remove_if_empty(folder):
                 break
-
-    @property
-    def scratch(self) -> Path:
-        """The folder of this process for what is being made."""
-        return Path(self._session.lock_file).with_suffix("")
 
     def new_scratch(self) -> Path:
         """A path for the result of a task that is begun; nothing is there."""
@@ -155,13 +147,6 @@ class Store:
             write_text(self.own / name, json.dumps(content, indent=1))
         else:
             (self.own / name).unlink(missing_ok=True)
-
-    def _clear_dead_sessions(self) -> None:
-        for path in self._scratch.glob("*.lock"):
-            lock = FileLock(path, blocking=False)
-            with suppress(Timeout, OSError), lock:
-                shutil.rmtree(path.with_suffix(""), ignore_errors=True)
-                path.unlink(missing_ok=True)
 
     # -- inputs -------------------------------------------------------------------------------------------------------
 
@@ -239,7 +224,7 @@ class Store:
             "inputs": {one.path: one.sha256 for one in task.inputs},
             "after": list(task.after),
         }
-        content = {**index, "made_of": {**made_of, "parameters": to_plain(task.parameters)}}
+        content = {**index, "name": task.name, "made_of": {**made_of, "parameters": to_plain(task.parameters)}}
         (made / INDEX).write_text(json.dumps(content), encoding="utf-8")
         target = self._results / key
         try:
@@ -251,7 +236,6 @@ class Store:
                 self.discard(key)
                 self._results.mkdir(exist_ok=True)  # A worker that made nothing may have taken it away.
                 os.rename(made, target)
-        append_lines(self.own / "latest.jsonl", [{"name": task.name, "key": key}])
         return Result(target, content)
 
     def discard(self, key: str) -> None:
@@ -265,6 +249,14 @@ class Store:
         with suppress(OSError):
             away.unlink()
 
+    def discard_damaged(self, keys: Iterable[str]) -> bool:
+        """Delete those of these results that are damaged, and return whether there are any."""
+        kept = (key for key in keys if os.path.lexists(self._results / key))
+        damaged = [key for key in kept if not self.result(key, thoroughly=True)]
+        for key in damaged:
+            self.discard(key)
+        return bool(damaged)
+
     def sweep(self, wanted: Iterable[str]) -> None:
         """Delete results that are not among these, and older than a week."""
         wanted = frozenset(wanted)
@@ -272,9 +264,11 @@ class Store:
             if entry.name not in wanted and time.time() - entry.stat(follow_symlinks=False).st_mtime > KEPT:
                 self.discard(entry.name)
 
-    def latest(self) -> dict[str, str]:
-        """Task to the key of its last result, of all tasks that were ever done."""
-        return {line["name"]: line["key"] for line in lines_of(self.own / "latest.jsonl") if {"name", "key"} <= {*line}}
+    def latest(self) -> dict[str, Result]:
+        """Task to its last result, of all that are kept."""
+        results = sorted(self._results.glob("*"), key=lambda folder: folder.stat().st_mtime)
+        found = (self.result(folder.name) for folder in results)
+        return {result.index["name"]: result for result in found if result}
 
     # -- published files ----------------------------------------------------------------------------------------------
 
@@ -329,10 +323,7 @@ class Store:
                 os.replace(beside, target)
             except OSError as error:
                 beside.unlink(missing_ok=True)
-                if error.errno != errno.EXDEV:
-                    raise OSError(error.errno, error.strerror, os.fspath(target)) from None
-                with written_beside(target) as near:
-                    shutil.copy2(original, near)
+                raise OSError(error.errno, error.strerror, os.fspath(target)) from None
 
     def withdraw(self, paths: Iterable[str]) -> None:
         """Delete files of this program that nobody wants any more, and folders that are empty then."""

@@ -6,14 +6,18 @@ import argparse
 from collections.abc import Callable
 from dataclasses import fields
 
+from rigid_motion_batch.axes import AXES
 from rigid_motion_batch.command_line import number
 
 from .options import TICKS, ReadingOptions
 
 
 def add_reading_options(parser: argparse.ArgumentParser) -> None:
-    """Add a group of options, of which `reading_options` makes one thing."""
+    """Add a group of options: `--axes`, and others of which `reading_options` makes one thing."""
     group = parser.add_argument_group("reading", "For recordings that leave something out; docs/csv.md has examples.")
+    group.add_argument(
+        "--axes", type=str.lower, choices=AXES, help="axes of the recordings (opengl for BVH, blender for others)"
+    )
     group.add_argument(
         "--columns",
         type=_columns,

@@ -6,8 +6,6 @@ its place and moved into it when it is whole.
 
 from __future__ import annotations
 
-import signal
-import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -17,7 +15,6 @@ import bpy
 
 from rigid_motion_batch.files import written_beside
 from rigid_motion_batch.hushing import hushed
-from rigid_motion_batch.supervising import stop_signals
 
 LOSSLESS = "HUFFYUV", "MKV", ".mkv"
 """Codec, container and extension of pieces of a film: exact to the bit, and quicker than PNG or FFV1."""
@@ -47,10 +44,10 @@ def render_film(scene: bpy.types.Scene, path: Path, progress: Callable[[int, int
     OSError
         Where the file cannot be put in its place.
     KeyboardInterrupt
-        After Ctrl-C, once the frame at hand is done; there is no film then.
+        After Ctrl-C in a Blender program, which cancels; the module renders on.
     """
     total = scene.frame_end - scene.frame_start + 1
-    with written_beside(path) as beside, _interruptible(), _counting(progress, total):
+    with written_beside(path) as beside, _counting(progress, total):
         kept, scene.render.filepath = scene.render.filepath, str(beside)
         started = time.perf_counter()
         try:
@@ -173,36 +170,3 @@ def _counting(progress: Callable[[int, int], None] | None, total: int) -> Iterat
         yield
     finally:
         bpy.app.handlers.render_post.remove(count)
-
-
-@contextmanager
-def _interruptible() -> Iterator[None]:
-    """Let Ctrl-C end the rendering after the frame at hand, and raise KeyboardInterrupt then.
-
-    Blender swallows what is raised in its handlers, and renders on. So the scene is put on its last frame, and
-    Blender's own loop skips the rest. The Blender program, unlike the module, has an answer to Ctrl-C of its own, which
-    Python cannot see: it cancels the rendering.
-    """
-    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGINT) is None:
-        yield
-        return
-    interrupted = False
-
-    def interrupt(*_: object) -> None:
-        nonlocal interrupted
-        interrupted = True
-
-    def skip(scene: bpy.types.Scene, *_: object) -> None:
-        if interrupted:
-            scene.frame_current = scene.frame_end
-
-    before = {one: signal.signal(one, interrupt) for one in stop_signals()}
-    bpy.app.handlers.render_post.append(skip)
-    try:
-        yield
-    finally:
-        bpy.app.handlers.render_post.remove(skip)
-        for one, handler in before.items():
-            signal.signal(one, signal.SIG_DFL if handler is None else handler)
-    if interrupted:
-        raise KeyboardInterrupt

@@ -25,6 +25,7 @@ if __name__ == "__main__":
     share, progress = Share(frozenset({options.only}), number, of), FarmProgress()
     with Store(options.output, alone=False) as store, SerialExecutor() as executor:
         plan = ComparisonPlan(wanted(*options.inputs, stage=STAGE, about=ABOUT), store)
-        outcome, _ = plan.read(lambda tasks: run(tasks, store, executor, share=share, progress=progress))
+        outcome = run(plan.reading, store, executor, share=share, progress=progress)
+        plan.look_into()
         later = run(plan.tasks, store, executor, share=share, progress=progress)
     sys.exit(bool(outcome.failures or later.failures))

@@ -59,12 +59,6 @@ def write(job: Job, parameters: Write) -> dict[str, int]:
     return {"characters": len(parameters.text)}
 
 
-@step(stage="write", temporary=True)
-def piece(job: Job, parameters: Write) -> None:
-    """The same, for one other task."""
-    write.function(job, parameters)
-
-
 @step(stage="join")
 def join(job: Job, parameters: Nothing) -> None:
     """Write what is in the results before it that are there."""
@@ -123,7 +117,6 @@ def die(job: Job, parameters: Die) -> None:
     with Path(parameters.marker).open("a") as stream:
         stream.write("x")
     if len(Path(parameters.marker).read_text()) <= parameters.times:
-        print("last words", flush=True)
         os.kill(os.getpid(), signal.SIGKILL)
     (job.folder / FILE).write_text("whole")
 

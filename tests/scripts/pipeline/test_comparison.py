@@ -55,7 +55,7 @@ def compared(
     of_store = {name: options.pop(name) for name in ("alone", "overwrite") if name in options}
     with Store(output, **of_store) as store, executor or SerialExecutor() as opened:
         plan = ComparisonPlan(comparison, store)
-        outcome, notes = plan.read(lambda tasks: run(tasks, store, opened, progress=listener, **options))
+        outcome, notes = run(plan.reading, store, opened, progress=listener, **options), plan.look_into()
         listener.notes += notes
         later = run(plan.tasks, store, opened, progress=listener, **options)
     later.failures = outcome.failures | later.failures
@@ -148,7 +148,8 @@ def test_a_page_may_be_made_before_its_films(output: Path, toss: Path) -> None:
     comparison = wanted(toss, stage=STAGE, about=ABOUT)
     with Store(output) as store, SerialExecutor() as executor:
         plan = ComparisonPlan(comparison, store)
-        plan.read(lambda tasks: run(tasks, store, executor))
+        run(plan.reading, store, executor)
+        plan.look_into()
         assert run(lambda: plan.tasks(films=False), store, executor).failures == {}
     assert not (output / "toss/5/comparison.mp4").exists()
     assert "toss/5/comparison.mp4" in (output / "report.html").read_text()
@@ -256,6 +257,12 @@ def test_a_damaged_part_is_made_again(output: Path, toss: Path, part: str, damag
     for name in ("metrics.csv", "report.html"):
         (output / name).unlink()
     other = replace(comparison, about=replace(ABOUT, command="again"))
+    if damage is garbage:  # Which is seen by those who read it alone.
+        try:
+            said = " ".join(compared(output, other)[0].failures.values())
+        except OutputError as error:
+            said = str(error)
+        assert "damaged" in said
     outcome, _ = compared(output, other)
     assert outcome.failures == {}
     assert (output / "metrics.csv").read_bytes() == metrics
@@ -380,7 +387,8 @@ with Store(Path(sys.argv[2])) as store, SerialExecutor() as executor:
     choices, modes = (Tolerance("2cm"),), ("lerp_slerp", "motor_spline")
     about = Settings(0.1, "x", "y")
     plan = ComparisonPlan(Comparison((sys.argv[1],), choices, modes, count_keys=True, about=about), store)
-    plan.read(lambda tasks: run(tasks, store, executor))
+    run(plan.reading, store, executor)
+    plan.look_into()
     outcome = run(plan.tasks, store, executor)
 sys.exit(str(outcome.failures) if outcome.failures else 0)
 """

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,15 +15,12 @@ from pathlib import Path
 import pytest
 from distributed import Client
 
+from rigid_motion_batch.cli import compare
 from rigid_motion_batch.pipeline import dask
-from rigid_motion_batch.pipeline.dask import DaskExecutor
-from rigid_motion_batch.pipeline.performing import ExecutorError, Order
-from rigid_motion_batch.pipeline.running import run
+from rigid_motion_batch.pipeline.dask import Farm
+from rigid_motion_batch.pipeline.performing import ExecutorError
 from rigid_motion_batch.pipeline.steps import OWN
-from rigid_motion_batch.pipeline.store import Store
-from tests.scripts.pipeline import steps
-from tests.scripts.pipeline.plans import Listener, contents, joining, states, task, writing
-from tests.scripts.pipeline.steps import Die, Fail, Write
+from tests.scripts.comparing import outputs, write_toss
 
 pytestmark = pytest.mark.skipif(
     not Path("/proc/self/task").exists(), reason="kills, and looks for processes where Linux shows them"
@@ -112,94 +109,96 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
 
 
 class Connecting:
-    """An executor on a cluster, with all that it had to say."""
+    """A farm on a cluster, with all that it had to say."""
 
     def __init__(self, folder: Path, address: str) -> None:
         self.notes: list[str] = []
-        self.executor = DaskExecutor(address, folder, self.notes.append)
+        self.farm = Farm(address, folder, self.notes.append)
 
     def wait_for_workers(self, count: int) -> None:
-        def there() -> bool:
-            self.executor.wait(lambda *_: None, 0.1)
-            return len(self.executor.workers) == count
-
-        wait_for(there)
+        wait_for(lambda: len(self.farm.workers()) == count)
 
 
-def at_work(process: int) -> list[str]:
-    """The processes that a worker has started for tasks."""
+def commands_of(process: int) -> list[bytes]:
+    """The command lines of the processes that a worker has started."""
     found = [path.read_text().split() for path in Path(f"/proc/{process}/task").glob("*/children")]
-    return [one for some in found for one in some if b"spawn_main" in Path(f"/proc/{one}/cmdline").read_bytes()]
+    return [Path(f"/proc/{one}/cmdline").read_bytes() for some in found for one in some]
 
 
-def test_tasks_are_done_by_the_workers_and_say_how_they_get_on(cluster: Cluster, tmp_path: Path) -> None:
-    with Store(tmp_path) as store:
-        connecting, listener = Connecting(store.scratch, cluster.address), Listener()
-        slow = [task(name, steps.process_id, Write(name, seconds=0.4)) for name in "abcd"]
-        tasks = [*slow, task("chat", steps.chatter), joining("all", *slow[:2])]
-        with connecting.executor as executor:
-            connecting.wait_for_workers(2)
-            outcome = run(lambda: tasks, store, executor, progress=listener)
-    made = contents(tmp_path)
-    assert states(outcome) == {"done": 6}
-    assert made["all.txt"] == made["a.txt"] + made["b.txt"]
-    assert len({made[f"{name}.txt"] for name in "abcd"}) == 2
-    assert listener.notes == ["it is nearly there"]
-    assert any(doing == "chat: half way" for _, doing, _ in listener.reached)
-    assert not (tmp_path / OWN / "scratch").exists()
+def at_work(cluster: Cluster) -> bool:
+    return any(b"--only" in command for worker in cluster.workers for command in commands_of(worker.pid))
 
 
-def test_a_task_that_fails_or_kills_its_process_is_told_and_the_others_go_on(cluster: Cluster, tmp_path: Path) -> None:
-    dying = task("b", steps.die, Die(str(tmp_path / "marker"), 1))
-    tasks, listener = [task("bad", steps.fail, Fail()), dying, writing("c")], Listener()
-    with Store(tmp_path / "out") as store, Connecting(store.scratch, cluster.address).executor as executor:
-        outcome = run(lambda: tasks, store, executor, progress=listener)
-    assert states(outcome) == {"failed": 1, "done": 2}
-    assert contents(tmp_path / "out") == {"b.txt": "whole", "c.txt": "c"}
-    assert outcome.failures == {"bad": "it cannot be made; make another"}
-    said = "b: its process died (SIGKILL, perhaps for want of memory): last words; trying again"
-    assert listener.notes == [said]
+FILMED = ("--rates", "5", "--modes", "lerp_slerp", "--resolution", "64x36", "--fps", "30")
 
 
-def test_a_run_that_stops_leaves_no_process_at_work(cluster: Cluster, tmp_path: Path) -> None:
-    with Store(tmp_path) as store:
-        connecting = Connecting(store.scratch, cluster.address)
-        with connecting.executor as executor:
-            connecting.wait_for_workers(len(cluster.workers))
-            folder = store.new_scratch()
-            executor.submit(Order(steps.write, Write("a", seconds=600.0), (), (), {}, str(tmp_path), str(folder)))
-            wait_for(lambda: list(folder.parent.glob("*/out.txt")))
-            assert any(at_work(worker.pid) for worker in cluster.workers)
-        wait_for(lambda: not any(at_work(worker.pid) for worker in cluster.workers))
+def options(clips: list[Path], output: Path, cluster: Cluster, *more: str) -> list[str]:
+    return [*map(str, clips), *(more or FILMED), "--output", str(output), "--scheduler", cluster.address]
+
+
+@pytest.fixture
+def clips(tmp_path: Path) -> list[Path]:
+    """Two clips and one that nobody can read."""
+    (tmp_path / "clips").mkdir()
+    bad = tmp_path / "clips" / "bad.csv"
+    bad.write_text("junk\n")
+    return [bad, *(write_toss(tmp_path / "clips" / f"{name}.csv") for name in ("one", "two"))]
+
+
+def test_the_workers_make_what_one_machine_makes_and_say_what_fails(
+    cluster: Cluster, clips: list[Path], tmp_path: Path, capfd: pytest.CaptureFixture
+) -> None:
+    shared, alone = tmp_path / "shared", tmp_path / "alone"
+    assert compare.main([*options(clips, shared, cluster), "--json"]) == 1
+    printed, said = capfd.readouterr()
+    answer = json.loads(printed)
+    assert [*answer["failures"]] == [f"read {clips[0]}"]
+    assert answer["tasks"]["done"] > 10
+    assert "bad.csv:1: no column has a known name" in said
+    assert compare.main([*map(str, clips), *FILMED, "--output", str(alone)]) == 1
+    assert outputs(shared) == outputs(alone)
+    assert not (shared / OWN / "scratch").exists()
+    capfd.readouterr()
+    assert compare.main([*options(clips[1:], shared, cluster), "--json"]) == 0
+    assert json.loads(capfd.readouterr().out)["tasks"].get("failed", 0) == 0
+
+
+def test_ctrl_c_leaves_no_process_at_work(cluster: Cluster, clips: list[Path], tmp_path: Path) -> None:
+    command = options(clips[1:], tmp_path / "out", cluster, "--rates", "5", "--fps", "60")
+    process = subprocess.Popen([sys.executable, "-m", "rigid_motion_batch", "compare", *command], text=True)
+    wait_for(lambda: at_work(cluster))
+    process.send_signal(signal.SIGINT)
+    assert process.wait(30) == 130
+    wait_for(lambda: not at_work(cluster))
 
 
 def test_workers_of_another_version_are_left_out(
     cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(dask, "LOADED", "program 2")
+    monkeypatch.setattr(dask, "version_here", lambda: "program 2")
     connecting = Connecting(tmp_path, cluster.address)
     with pytest.raises(ExecutorError, match="none of its workers is fit"):
-        connecting.executor.__enter__()
-    assert connecting.notes[-1].endswith(", and this is program 2; it is left out")
+        connecting.farm.__enter__()
+    assert connecting.notes[-1].endswith(", and the bundle is of program 2; it is left out")
 
 
 def test_workers_that_do_not_see_the_folder_are_left_out(cluster: Cluster, tmp_path: Path) -> None:
     connecting = Connecting(tmp_path / "none", cluster.address)
     with pytest.raises(ExecutorError, match="none of its workers is fit"):
-        connecting.executor.__enter__()
+        connecting.farm.__enter__()
     assert f"it does not see {tmp_path / 'none'}" in connecting.notes[-1]
 
 
 def test_a_worker_without_this_program_is_left_out_and_lives(cluster: Cluster, tmp_path: Path) -> None:
     connecting = Connecting(tmp_path, cluster.address)
-    with connecting.executor as executor:
+    with connecting.farm as farm:
         stranger = cluster.add_worker(program=tmp_path)
 
         def left_out() -> bool:
-            executor.wait(lambda *_: None, 0.1)
-            return any("No module named 'rigid_motion_batch'; start" in note for note in connecting.notes)
+            found = farm.workers()
+            return any("No module named 'rigid_motion_batch'" in note for note in connecting.notes) and len(found) == 2
 
-        wait_for(lambda: left_out() and len(executor.workers) == 2)
+        wait_for(left_out)
         assert stranger.poll() is None
     stranger.kill()
 
@@ -215,39 +214,32 @@ def test_a_worker_without_this_program_is_left_out_and_lives(cluster: Cluster, t
 def test_a_wrong_address_is_said_to_be_one_within_seconds(tmp_path: Path, address: str, complaint: str) -> None:
     started = time.monotonic()
     with pytest.raises(ExecutorError, match=complaint):
-        Connecting(tmp_path, address).executor.__enter__()
+        Connecting(tmp_path, address).farm.__enter__()
     assert time.monotonic() - started < 10.0
 
 
-def test_workers_may_come_and_die_and_the_scheduler_too_and_nothing_is_lost(tmp_path: Path) -> None:
-    first = [task(f"{n}", steps.process_id, Write(f"{n}", seconds=0.4)) for n in range(8)]
-    first.append(joining("all", *first))
-    later = [*first, *(task(f"later {n}", steps.write, Write(f"{n}", seconds=3.0)) for n in range(4))]
+def test_workers_may_come_and_die_and_the_scheduler_too_and_nothing_is_lost(
+    clips: list[Path], tmp_path: Path, capfd: pytest.CaptureFixture
+) -> None:
     (tmp_path / "dask").mkdir()
     out = tmp_path / "out"
-    with cluster_in(tmp_path / "dask", workers=0) as cluster, Store(out) as store:
-        connecting = Connecting(store.scratch, cluster.address)
-        with connecting.executor as executor:
-            assert connecting.notes == [
-                f"{cluster.address} has no worker; waiting for one: `dask worker {cluster.address}`"
-            ]
-            dying, _ = cluster.add_worker(), cluster.add_worker()
-            connecting.wait_for_workers(2)
-            when_done = threading.Thread(target=wait_for, args=(lambda: (out / "1.txt").exists() and not dying.kill(),))
-            when_done.start()
-            outcome = run(lambda: first, store, executor)
-            when_done.join()
-            assert states(outcome) == {"done": 9}
-            assert [note.split(" ", 2)[2] for note in connecting.notes[1:]] == ["is gone; others go on with its tasks"]
-
-            def are_at_work() -> bool:
-                return bool(list(store.scratch.glob("*/out.txt"))) and not cluster.scheduler.kill()
-
-            when_at_work = threading.Thread(target=wait_for, args=(are_at_work,))
-            when_at_work.start()
-            outcome = run(lambda: later, store, executor)
-            when_at_work.join()
-            assert outcome.problem == f"{cluster.address}: the Dask scheduler is gone"
-    made = contents(out)
-    assert "half" not in "".join(made.values())
-    assert made["all.txt"] == "".join(made[f"{n}.txt"] for n in range(8))
+    with cluster_in(tmp_path / "dask", workers=0) as cluster:
+        asked = options(clips[1:], out, cluster, "--rates", "5", "--resolution", "320x180", "--fps", "60")
+        command = [sys.executable, "-m", "rigid_motion_batch", "compare", *asked]
+        with (tmp_path / "said").open("w") as stream:
+            process = subprocess.Popen(command, stderr=stream)
+        waiting = f"{cluster.address} has no worker; waiting for one"
+        wait_for(lambda: waiting in (tmp_path / "said").read_text())
+        dying, _ = cluster.add_worker(), cluster.add_worker()
+        wait_for(lambda: any(b"--only" in command for command in commands_of(dying.pid)))
+        dying.kill()
+        wait_for(lambda: (out / "report.html").exists() and at_work(cluster))
+        cluster.scheduler.kill()
+        assert process.wait(120) == 2
+        said = (tmp_path / "said").read_text()
+        assert "is gone; others go on with its tasks" in said
+        assert f"{cluster.address}: the Dask scheduler is gone; nothing that is done is lost" in " ".join(said.split())
+    asked = asked[: asked.index("--scheduler")]
+    assert compare.main([*asked]) == 0
+    assert compare.main([*asked[:-1], str(tmp_path / "alone")]) == 0
+    assert outputs(out) == outputs(tmp_path / "alone")

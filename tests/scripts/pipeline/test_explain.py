@@ -74,18 +74,7 @@ def test_a_damaged_result_is_named(output: Path) -> None:
     run_in(output, hidden)
     (path,) = (output / OWN).glob("results/*/out.txt")
     path.unlink()
-    assert explained(output, hidden) == {"a": "its result is damaged or gone"}
-
-
-def test_temporary_tasks_are_named_where_they_would_be_done(output: Path) -> None:
-    piece = Task(steps.piece, Write("1"), "piece")
-    run_in(output, piece, joining("film", piece))
-    assert explained(output, piece, joining("film", piece)) == {}
-    other = Task(steps.piece, Write("2"), "piece")
-    assert [*explained(output, other, joining("film", other))] == ["piece", "film"]
-
-
-# -- versions ---------------------------------------------------------------------------------------------------------
+    assert explained(output, hidden) == {"a": "its result is damaged"}
 
 
 @pytest.fixture

@@ -12,11 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from rigid_motion_batch.pipeline import running
 from rigid_motion_batch.pipeline.executors import ProcessExecutor
 from rigid_motion_batch.pipeline.performing import SerialExecutor
 from rigid_motion_batch.pipeline.running import Outcome, Share, State, run
-from rigid_motion_batch.pipeline.steps import OWN, Task
+from rigid_motion_batch.pipeline.steps import OWN, Step, Task
 from rigid_motion_batch.pipeline.store import Store
 from tests.scripts.pipeline import steps
 from tests.scripts.pipeline.plans import EXECUTORS, Listener, contents, joining, run_in, states, task, writing
@@ -213,7 +212,7 @@ def test_a_plan_is_taken_task_by_task(output: Path) -> None:
     assert max(ahead[40:]) <= 1
 
 
-# -- partial and temporary tasks --------------------------------------------------------------------------------------
+# -- partial tasks, and those that spend what they read ---------------------------------------------------------------
 
 
 def test_a_partial_task_makes_the_best_of_what_there_is(output: Path, tmp_path: Path) -> None:
@@ -239,35 +238,38 @@ def test_a_partial_task_with_nothing_to_go_by_is_skipped(output: Path) -> None:
     assert states(run_in(output, bad, task("report", steps.report, None, bad))) == {"failed": 1, "skipped": 1}
 
 
-def film(log: object, piece: str = "1") -> list[Task]:
-    pieces = [Task(steps.piece, Write(text, str(log)), f"piece {text}") for text in (piece, "2")]
-    return [*pieces, joining("film", *pieces, log=log)]
+def film(output: Path, log: object, piece: str = "1", step: Step = steps.join, **options: object) -> Outcome:
+    """Run a plan of a film whose pieces are wanted where it is missing only."""
+    pieces = [Task(steps.write, Write(text, str(log)), f"piece {text}") for text in (piece, "2")]
+    parameters = Fail() if step is steps.fail else Nothing(str(log))
+    whole = task("film", step, parameters, *pieces, spends=tuple(one.key for one in pieces))
+    with Store(output, **options) as store, SerialExecutor() as executor:
+        return run(lambda: [whole] if store.result(whole.key) else [*pieces, whole], store, executor)
 
 
 def kept(output: Path) -> int:
     return len(os.listdir(output / OWN / "results"))
 
 
-def test_temporary_results_go_when_what_wanted_them_is_done(output: Path, log: Log) -> None:
-    run_in(output, *film(log))
+def test_spent_results_go_when_what_wanted_them_is_done(output: Path, log: Log) -> None:
+    film(output, log)
     assert contents(output) == {"film.txt": "12"}
     assert kept(output) == 1
     log.new()
-    assert states(run_in(output, *film(log))) == {"up to date": 1}
+    assert states(film(output, log)) == {"up to date": 1}
     (output / "film.txt").unlink()
-    run_in(output, *film(log))
+    film(output, log)
     assert log.new() == []
-    run_in(output, *film(log, "3"))
+    film(output, log, "3")
     assert log.new() == ["2", "3", "join"]
     assert contents(output) == {"film.txt": "32"}
 
 
-def test_temporary_results_stay_for_a_task_that_failed(output: Path, log: Log) -> None:
-    pieces = film(log)[:2]
-    run_in(output, *pieces, task("film", steps.fail, Fail(), *pieces))
+def test_results_stay_for_a_task_that_failed(output: Path, log: Log) -> None:
+    film(output, log, step=steps.fail)
     assert log.new() == ["1", "2"]
     assert kept(output) == 2
-    run_in(output, *film(log))
+    film(output, log)
     assert log.new() == ["join"]
     assert kept(output) == 1
 
@@ -278,14 +280,14 @@ def test_temporary_results_stay_for_a_task_that_failed(output: Path, log: Log) -
 @pytest.mark.parametrize("parts", [1, 2, 3])
 def test_the_shares_of_a_plan_make_the_whole(output: Path, log: Log, parts: int) -> None:
     first = [writing(f"{n}", f"{n}", log) for n in range(5)]
-    tasks = [*first, *film(log, "x"), task("all", steps.report, Nothing(str(log)), *first)]
+    tasks = [*first, joining("pair", *first[:2], log=log), task("all", steps.report, Nothing(str(log)), *first)]
     for stage in ("write", "join", "report"):
         for number in range(1, parts + 1):
             outcome = run_in(output, *tasks, alone=False, share=Share(frozenset({stage}), number, parts))
             assert not outcome.failures
     assert contents(output)["all.txt"] == "01234"
-    assert contents(output)["film.txt"] == "x2"
-    assert log.new() == sorted(["0", "1", "2", "3", "4", "2", "x", "join", "join"])
+    assert contents(output)["pair.txt"] == "01"
+    assert log.new() == ["0", "1", "2", "3", "4", "join", "join"]
     assert states(run_in(output, *tasks)) == {"up to date": 7}
 
 
@@ -362,7 +364,7 @@ def interrupt_when(condition: object) -> threading.Thread:
 
 
 @pytest.mark.parametrize("executor", EXECUTORS)
-def test_ctrl_c_leaves_what_is_done_and_a_report_of_it(output: Path, executor: str) -> None:
+def test_ctrl_c_leaves_what_is_done_and_nothing_half_written(output: Path, executor: str) -> None:
     first, slow = writing("a", "1"), task("slow", steps.write, Write("2", seconds=60.0))
     tasks = [first, slow, joining("b", slow), task("report", steps.report, None, first, slow)]
     interrupt_when((output / "a.txt").exists)
@@ -370,18 +372,9 @@ def test_ctrl_c_leaves_what_is_done_and_a_report_of_it(output: Path, executor: s
     outcome = run_in(output, *tasks, executor=EXECUTORS[executor]())
     assert time.monotonic() - started < 5.0
     assert outcome.interrupted
-    assert states(outcome) == {"done": 2, "not begun or stopped": 2}
-    assert contents(output) == {"a.txt": "1", "report.txt": "1"}
-    assert not (output / OWN / "scratch").exists()
-
-
-def test_ctrl_c_does_not_wait_for_a_report_that_takes_long(output: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(running, "AFTER_CTRL_C", -1.0)
-    first, slow = writing("a", "1"), task("slow", steps.write, Write("2", seconds=60.0))
-    interrupt_when((output / "a.txt").exists)
-    outcome = run_in(output, first, slow, task("report", steps.report, None, first, slow))
-    assert outcome.interrupted
+    assert states(outcome) == {"done": 1, "not begun or stopped": 3}
     assert contents(output) == {"a.txt": "1"}
+    assert not (output / OWN / "scratch").exists()
 
 
 # -- progress ---------------------------------------------------------------------------------------------------------
@@ -439,7 +432,7 @@ def test_a_worker_that_dies_is_replaced_and_its_task_done_again(output: Path, tm
     tasks = [writing("a"), dying, joining("c", dying)]
     assert states(run_in(output, *tasks, executor=ProcessExecutor(2), progress=listener)) == {"done": 3}
     assert contents(output)["c.txt"] == "whole"
-    said = "b: its process died (SIGKILL, perhaps for want of memory): last words; trying again"
+    said = "b: its process died (SIGKILL, perhaps for want of memory); trying again"
     assert listener.notes == [said, said]
 
 

@@ -106,7 +106,7 @@ SEEDS: dict[str, tuple[str, ...]] = {
     ".euroc.csv": (
         _EUROC
         + "".join(
-            f"{1403636580838555648 + 5_000_001 * row},{line}"
+            f"{1403636580838555648 + 50_000_001 * row},{line}"
             for row, line in enumerate(
                 _rows((POSITIONS, XYZW[:, 3], XYZW[:, :3], POSITIONS[:, 0])).splitlines(keepends=True)
             )
