@@ -135,19 +135,18 @@ def humanoid_bones(joints: Sequence[str]) -> dict[str, int]:
 
 
 def matched(sources: Sequence[str], targets: Sequence[str]) -> dict[str, str]:
-    """Which target each source moves: that of its name; else the same humanoid bone; else the same but for case,
-    namespace and how sides are written."""
-    pairs = {name: name for name in set(sources) & set(targets)}
+    """Which target each source moves: of the same skeleton that of its name. Otherwise that which is the same humanoid
+    bone; or else of the same name, or the same but for case, namespace and how sides are written."""
+    if set(sources) <= set(targets):
+        return {name: name for name in sources}
     ours, theirs = humanoid_bones(sources), humanoid_bones(targets)
-    for bone in HUMANOID:
-        if bone in ours and bone in theirs:
-            pairs.setdefault(sources[ours[bone]], targets[theirs[bone]])
+    pairs = {sources[ours[bone]]: targets[theirs[bone]] for bone in ours if bone in theirs}
     plain = {_plain(name): name for name in reversed(targets)}
     for name in sources:
-        if (same := plain.get(_plain(name))) is not None:
-            pairs.setdefault(name, same)
-    first = {pairs[name]: name for name in reversed(sources) if name in pairs}
-    return {name: pairs[name] for name in sources if name in pairs and first[pairs[name]] == name}
+        same = name if name in targets else plain.get(_plain(name))
+        if same is not None and name not in pairs and same not in pairs.values():
+            pairs[name] = same
+    return {name: pairs[name] for name in sources if name in pairs}
 
 
 def shortest_turns(first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -212,7 +211,7 @@ class Retargeting:
         arms = [np.where(sliding[parents] | (parents < 0), 0.0, _lengths(rest, parents)) for rest in (source, target)]
         both = (arms[0] > 1e-6) & (arms[1] > 1e-6)
         self.has_places = bool(np.any(_lengths(source, parents) > 1e-6)) or len(pairs) == 1
-        self.scale = float(arms[1][both].sum() / arms[0][both].sum()) if both.any() else 1.0
+        self.scale = float(np.median(arms[1][both] / arms[0][both])) if both.any() else 1.0
         aligned = alignments(bones, target.positions, source.positions) if self.has_places else {}
         turns = target.quaternions.copy()
         for bone, turn in aligned.items():

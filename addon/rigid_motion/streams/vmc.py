@@ -77,6 +77,16 @@ def write(time: float, poses: Mapping[str, Poses]) -> list[bytes]:
     return [write_bundle(messages[first : first + AT_ONCE]) for first in range(0, len(messages), AT_ONCE)]
 
 
+def write_trackers(poses: Mapping[str, Poses]) -> list[bytes]:
+    """The datagrams of the poses () of trackers in the world, by their names."""
+    messages = []
+    for name, pose in poses.items():
+        unity = to_unity(pose)
+        w, *xyz = unity.quaternions.tolist()
+        messages.append(write_message("/VMC/Ext/Tra/Pos", name, *unity.positions.tolist(), *xyz, w))
+    return [write_bundle(messages[first : first + AT_ONCE]) for first in range(0, len(messages), AT_ONCE)]
+
+
 class Performer:
     """A skeleton of any kind as VMC.
 
