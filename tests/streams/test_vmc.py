@@ -180,7 +180,7 @@ def test_a_skeleton_of_another_size_rest_and_naming_does_the_same():
         (("Hips", "LHipJoint", "LeftUpLeg", "LeftLeg", "LowerBack", "Spine", "Spine1", "Neck", "LeftArm"), 8),
         (("pelvis", "spine_01", "spine_02", "clavicle_l", "upperarm_l", "lowerarm_l", "hand_l", "calf_r"), 8),
         (("Bip01 Pelvis", "upper_arm.L", "forearm.L", "hand.L", "f_index.01.L", "thumb.02.R", "shin.L"), 6),
-        (("ORG-hand.L", "torso", "hips", "spine_fk", "spine_fk.001", "upper_arm_fk.L", "upper_arm_ik.L", "DEF-x"), 4),
+        (("ORG-hand.L", "torso", "hips", "spine_fk", "spine_fk.001", "upper_arm_fk.L", "upper_arm_ik.L", "DEF-x"), 3),
         (("J_Bip_C_Hips", "J_Bip_L_UpperArm", "J_Bip_R_LowerLeg"), 0),
     ],
 )

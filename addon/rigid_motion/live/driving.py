@@ -33,6 +33,10 @@ MOVED = 1e-3
 """What has turned by that many radians has followed."""
 
 
+SWITCHES = ("IK_FK", "neck_follow", "head_follow")
+"""Of Rigify's rigs: at 1 limbs do what their bones are turned to, and what hangs on others follows them as a whole."""
+
+
 @dataclass(frozen=True, eq=False)
 class Values:
     """Channels of objects or bones, as poses: location and rotation on top of where each is with nothing keyed."""
@@ -228,10 +232,11 @@ def _new_armature(label: str, body: Body) -> bpy.types.Object | None:
 
 
 def clear(obj: bpy.types.Object, bones: Iterable[str]) -> None:
-    """Have nothing on these bones of a rig, and its arms and legs follow bones: Rigify's switch from IK to FK."""
+    """Have nothing on these bones of a rig, and its switches such that it follows them."""
     for bone in obj.pose.bones:
-        if "IK_FK" in bone:
-            bone["IK_FK"] = 1.0
+        for switch in SWITCHES:
+            if switch in bone:
+                bone[switch] = 1.0
     for name in bones:
         if (bone := obj.pose.bones.get(name)) is not None:
             if bone.rotation_mode == "AXIS_ANGLE":

@@ -65,8 +65,13 @@ class _Heard:
     moment: float = 0.0
 
     take: Take | None = None
-    origin: float = 0.0
-    """The moment that is on the first frame of the recording."""
+    origin: float | None = None
+    """The moment that is on the first frame of the recording; None where the sender has begun since."""
+
+    @property
+    def is_taken(self) -> bool:
+        """Whether what comes is of the joints that are recorded."""
+        return self.take is not None and self.take.driver.body.joints == self.body.joints
 
 
 @dataclass
@@ -119,8 +124,8 @@ class Listening:
                 heard = self._heard_of(stream, body, present, receiver is self._vmc)
                 heard.moment, heard.poses = shown[stream].moment, shown[stream].poses[body.name]
                 self._show(heard)
-                if self._recording and heard.take is None and heard.driver is not None:
-                    self._begin_take(heard, now)
+                if self._recording and heard.driver is not None:
+                    self._follow(heard, now)
             for few in keys:
                 self._record(few)
         self._heard = {which: it for which, it in self._heard.items() if which in present or it.take}
@@ -137,11 +142,8 @@ class Listening:
                 if (label := body.name if number == 1 else f"{body.name} {number}") not in labels
             )
             before = next((other for other, it in self._heard.items() if it.label == label), None)
-            heard = self._heard.pop(before, None) or _Heard(label, body, is_vmc)
-            if heard.take is not None:
-                heard.take, finished = None, heard.take
-                finished.write()
-            self._heard[which] = heard
+            heard = self._heard[which] = self._heard.pop(before, None) or _Heard(label, body, is_vmc)
+            heard.origin = None
         if heard.body is not body:
             heard.body, heard.driver = body, None
         return heard
@@ -184,14 +186,18 @@ class Listening:
         rate = scene.render.fps / scene.render.fps_base
         self._recording = _Recording(time.monotonic(), scene.frame_current_final, rate, mode, tolerance)
         for heard in self._heard.values():
+            heard.origin = None
             if heard.driver is not None and heard.poses is not None:
-                self._begin_take(heard, self._recording.begun)
+                self._follow(heard, self._recording.begun)
 
-    def _begin_take(self, heard: _Heard, now: float) -> None:
+    def _follow(self, heard: _Heard, now: float) -> None:
+        """Record a body from now on, and go on where its sender began again."""
         recording = self._recording
-        heard.origin = heard.moment - (now - recording.begun)
-        heard.take = Take(heard.driver, recording.mode, recording.tolerance if heard.is_vmc else None)
-        self._add_shown(heard)
+        if heard.origin is None:
+            heard.origin = heard.moment - (now - recording.begun)
+        if heard.take is None:
+            heard.take = Take(heard.driver, recording.mode, recording.tolerance if heard.is_vmc else None)
+            self._add_shown(heard)
 
     def _add_shown(self, heard: _Heard) -> None:
         """Have the picture itself among what is recorded: where it begins, and where it ends."""
@@ -204,7 +210,7 @@ class Listening:
     def _record(self, keys: Keys) -> None:
         for name, poses in keys.poses.items():
             heard = self._heard.get((keys.stream, name))
-            if heard is not None and heard.take is not None and poses.shape[1] == len(heard.take.driver.body.joints):
+            if heard is not None and heard.origin is not None and heard.is_taken:
                 self._add(heard, keys.moments, poses)
 
     def finish(self) -> int:
@@ -212,7 +218,7 @@ class Listening:
         count = 0
         for heard in self._heard.values():
             if heard.take is not None:
-                if len(heard.poses) == len(heard.take.driver.body.joints):
+                if heard.is_taken and heard.origin is not None:
                     self._add_shown(heard)
                 count += heard.take.write()
                 heard.take = None

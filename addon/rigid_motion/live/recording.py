@@ -9,7 +9,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from .. import animation
+from ..animation import set_mode, write_channel
 from ..motion import Poses, reduce_skeleton_keys
 from ..motion.eulers import ORDERS, extrinsic_eulers_from_quaternions
 from ..motion.quaternions import align_signs
@@ -100,7 +100,7 @@ class Take:
             if owner is not None:
                 count += _write(obj, owner, prefix, *_of_all(keys), places)
                 moved.append(owner)
-        animation.set_mode(moved, self._mode, refused=[])
+        set_mode(moved, self._mode, refused=[])
         return count
 
 
@@ -130,7 +130,7 @@ def _write(
     else:
         channels["rotation_quaternion"] = poses.quaternions
     for name, values in channels.items():
-        animation.write_channel(obj, prefix + name, frames, values, group=group)
+        write_channel(obj, prefix + name, frames, values, group=group)
     return len(frames)
 
 

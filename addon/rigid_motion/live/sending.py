@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Iterable
 
@@ -14,6 +15,8 @@ from ..motion import Poses
 from ..motion.quaternions import from_matrices
 from ..streams.vmc import Performer, write, write_trackers
 from .sockets import Outlet
+
+log = logging.getLogger(__package__)
 
 RATE = 60
 """Frames a second."""
@@ -28,7 +31,6 @@ class Sending:
         self._performers: dict[str, tuple[int, Performer]] = {}
         """Of each rig, how many bones it had."""
         self._begun = time.monotonic()
-        self.frames = 0
 
     def tick(self, now: float) -> None:
         """Send where everything is."""
@@ -40,13 +42,13 @@ class Sending:
                 continue
             evaluated = obj.evaluated_get(depsgraph)
             if obj.type == "ARMATURE":
-                for datagram in write(now - self._begun, self._performer(obj)(_bones(evaluated))):
+                performer = self._performer(obj)
+                for datagram in write(now - self._begun, performer(_bones(evaluated))) if performer.bones else ():
                     self._outlet.say(datagram)
             else:
                 trackers[name] = _poses(np.array(evaluated.matrix_world))
         for datagram in write_trackers(trackers):
             self._outlet.say(datagram)
-        self.frames += 1
 
     def _performer(self, obj: bpy.types.Object) -> Performer:
         bones = obj.data.bones
@@ -106,7 +108,13 @@ def stop() -> None:
 def _look() -> float | None:
     if _sending is None:
         return None
-    _sending.tick(time.monotonic())
+    try:
+        _sending.tick(time.monotonic())
+    except Exception:
+        # Blender would only drop the timer, and leave the port open.
+        log.exception("What is selected cannot be sent")
+        stop()
+        return None
     return 1.0 / RATE
 
 

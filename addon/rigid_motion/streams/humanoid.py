@@ -126,6 +126,9 @@ def humanoid_bones(joints: Sequence[str]) -> dict[str, int]:
             if bone not in found or rank < found[bone][1]:
                 found[bone] = (number, rank)
     bones = {bone: number for bone, (number, _) in found.items()}
+    if is_rigify:
+        # The lower half of its spine hangs upside down on the middle, and carries the legs.
+        trunk = sorted(trunk, key=lambda number: joints[number])[len(trunk) // 2 :]
     named = {_plain(joints[number])[0]: number for number in trunk}
     if "chest" in named:
         bones |= {bone: named[bone.lower()] for bone in SPINE if bone.lower() in named}
@@ -140,12 +143,15 @@ def matched(sources: Sequence[str], targets: Sequence[str]) -> dict[str, str]:
     if set(sources) <= set(targets):
         return {name: name for name in sources}
     ours, theirs = humanoid_bones(sources), humanoid_bones(targets)
-    pairs = {sources[ours[bone]]: targets[theirs[bone]] for bone in ours if bone in theirs}
+    # Spines of other lengths have their upper ends in common.
+    spines = [[bone for bone in SPINE if bone in bones][::-1] for bones in (ours, theirs)]
+    same = {bone: bone for bone in ours if bone in theirs and bone not in SPINE} | dict(zip(*spines, strict=False))
+    pairs = {sources[ours[bone]]: targets[theirs[other]] for bone, other in same.items()}
     plain = {_plain(name): name for name in reversed(targets)}
     for name in sources:
-        same = name if name in targets else plain.get(_plain(name))
-        if same is not None and name not in pairs and same not in pairs.values():
-            pairs[name] = same
+        target = name if name in targets else plain.get(_plain(name))
+        if target is not None and name not in pairs and target not in pairs.values():
+            pairs[name] = target
     return {name: pairs[name] for name in sources if name in pairs}
 
 
@@ -211,7 +217,12 @@ class Retargeting:
         arms = [np.where(sliding[parents] | (parents < 0), 0.0, _lengths(rest, parents)) for rest in (source, target)]
         both = (arms[0] > 1e-6) & (arms[1] > 1e-6)
         self.has_places = bool(np.any(_lengths(source, parents) > 1e-6)) or len(pairs) == 1
+        legs = [row for bone, row in bones.items() if bone.endswith(("LowerLeg", "Foot")) and both[row]]
         self.scale = float(np.median(arms[1][both] / arms[0][both])) if both.any() else 1.0
+        if legs:
+            # Then feet are on the same ground.
+            self.scale = float(arms[1][legs].sum() / arms[0][legs].sum())
+        hips = [row for bone, row in bones.items() if bone.endswith("UpperLeg")]
         aligned = alignments(bones, target.positions, source.positions) if self.has_places else {}
         turns = target.quaternions.copy()
         for bone, turn in aligned.items():
@@ -223,6 +234,7 @@ class Retargeting:
         for pair in np.flatnonzero(sliding):
             children = np.flatnonzero(parents == pair)
             if len(children):
+                children = [child for child in children if child in hips] or children
                 theirs = (source.positions[children] - source.positions[pair]).mean(axis=0)
                 ours = (target.positions[children] - target.positions[pair]).mean(axis=0)
                 self._beside[pair] = rotate(conjugate(source.quaternions[pair]), self.scale * theirs - ours)
