@@ -28,6 +28,7 @@ STILL = np.tile((1.0, 0.0, 0.0, 0.0), (len(JOINTS), 1))
 REST = Poses(PLACES, STILL)
 BODY = Body("dancer", JOINTS, PARENTS, REST)
 SKELETON = Skeleton(PARENTS)
+TIMES_OF_A_SECOND = np.arange(60) / 60.0
 
 
 def dance(times: np.ndarray) -> Poses:

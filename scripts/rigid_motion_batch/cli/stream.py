@@ -23,6 +23,7 @@ from rigid_motion_batch.analysis.metrics import lines_of_poses
 from rigid_motion_batch.axes import AXES, to_blender
 from rigid_motion_batch.command_line import Parser, as_called, complain, number, path_line, program_of
 from rigid_motion_batch.files import replacing
+from rigid_motion_batch.live import vmc
 from rigid_motion_batch.progress import Progress, Stage
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
@@ -87,6 +88,7 @@ examples:
   python scripts/stream.py send hand.csv --axes unity --to 10.0.0.7:9000 --packing smallest_three
   python scripts/stream.py send hand.csv --to 127.0.0.1:9000 --rate 20 --mode motor_spline_causal
   python scripts/stream.py send hand.csv --port 9001            for receivers that ask for it: receive --from
+  python scripts/stream.py send walk.bvh --to-vmc 127.0.0.1:39539
 
 With --tolerance it sends a key only when the picture would otherwise be off by more than that; with --rate, so many
 keys a second. Poses go over the wire in metres and in Blender's axes. It begins at once, even if nobody listens, and
@@ -132,6 +134,12 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     )
     sending.add_argument(
         "--to", action="append", default=[], metavar="HOST:PORT", help="where to send it; may be given several times"
+    )
+    sending.add_argument(
+        "--to-vmc",
+        metavar="HOST:PORT",
+        help="play it as VMC instead, for a program that shows performers: Blender's "
+        "panel Live, VSeeFace, Warudo, Unity",
     )
     sending.add_argument("--tolerance", metavar="LENGTH", help=f"largest shell error: 5mm, 0.5cm ({TOLERANCE})")
     sending.add_argument("--rate", type=_positive, metavar="HZ", help="send so many keys a second instead")
@@ -251,6 +259,9 @@ def _measure(options: argparse.Namespace) -> int:
 def send(options: argparse.Namespace, stopped: list[int]) -> None:
     """Play a recording. Raises what says why it could not be."""
     clip = read_one(options.recording, options)
+    if options.to_vmc:
+        send_vmc(clip, address_of(options.to_vmc), stopped)
+        return
     receivers = [address_of(text) for text in options.to]
     stream = secrets.randbelow(2**32 - 1) + 1
     try:
@@ -294,6 +305,15 @@ def send(options: argparse.Namespace, stopped: list[int]) -> None:
         )
         if endpoint.unsent:
             _say(f"not taken by the system: {endpoint.unsent}")
+
+
+def send_vmc(clip: Clip, to: Address, stopped: list[int]) -> None:
+    """Play a recording as VMC. Raises what says why it could not be."""
+    try:
+        with Progress() as progress, progress.stage("Playing", float(clip.times[-1] - clip.times[0])) as stage:
+            _say(f"datagrams: {vmc.play(clip, to, stopped, stage.reach)}")
+    except ValueError as error:
+        raise StreamError(str(error)) from None
 
 
 def receive(options: argparse.Namespace, stopped: list[int]) -> None:
@@ -387,7 +407,7 @@ def read_one(recording: str, options: argparse.Namespace) -> Clip:
         raise StreamError(
             f"{recording}: {len(clips)} bodies, and a stream is of one: {names}; name it, as {recording}:NAME"
         )
-    if clips[0].figure is not None:
+    if clips[0].figure is not None and not getattr(options, "to_vmc", None):
         raise StreamError(f"{recording}: a whole body, and a stream is of one joint; name it, as FILE:LeftHand")
     return clips[0]
 
@@ -519,7 +539,7 @@ def _check(options: argparse.Namespace) -> None:
         return
     if options.rate and options.tolerance:
         raise ValueError("--rate and --tolerance exclude one another: keys come evenly, or when they are needed")
-    if not options.to and not options.port:
+    if not options.to and not options.port and not options.to_vmc:
         raise ValueError("nobody would hear it: give --to HOST:PORT, or a --port where others can ask for it")
     options.tolerance = Tolerance(options.tolerance or TOLERANCE)
 
