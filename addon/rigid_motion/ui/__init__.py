@@ -49,6 +49,7 @@ CLASSES = (
     *gltf_export.CLASSES,
     *menus.CLASSES,
     *panels.CLASSES,
+    *live.CLASSES,
 )
 
 

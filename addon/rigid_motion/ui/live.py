@@ -123,6 +123,7 @@ def _match(live: LiveSettings, joints: tuple[str, ...], rig: bpy.types.Object) -
 class RIGID_MOTION_OT_live_listen(bpy.types.Operator):
     bl_idname = "rigid_motion.live_listen"
     bl_label = "Listen"
+    bl_options = {"REGISTER"}  # noqa: RUF012 - Blender reads it
     bl_description = "Show bodies that other programs send to this port: as new objects, or on the rig below"
 
     @classmethod
@@ -154,6 +155,7 @@ class _WhileListening:
 class RIGID_MOTION_OT_live_stop(_WhileListening, bpy.types.Operator):
     bl_idname = "rigid_motion.live_stop"
     bl_label = "Stop Listening"
+    bl_options = {"REGISTER"}  # noqa: RUF012 - Blender reads it
     bl_description = "Close the port. Everything stays as it is shown; a recording that is not finished is given up"
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
@@ -164,6 +166,7 @@ class RIGID_MOTION_OT_live_stop(_WhileListening, bpy.types.Operator):
 class RIGID_MOTION_OT_live_record(_WhileListening, bpy.types.Operator):
     bl_idname = "rigid_motion.live_record"
     bl_label = "Record"
+    bl_options = {"REGISTER"}  # noqa: RUF012 - Blender reads it
     bl_description = "Keep what comes from now on, from the current frame on, as keys"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -211,6 +214,7 @@ class RIGID_MOTION_OT_live_match(_WhileListening, bpy.types.Operator):
 class RIGID_MOTION_OT_live_send(bpy.types.Operator):
     bl_idname = "rigid_motion.live_send"
     bl_label = "Send Selected"
+    bl_options = {"REGISTER"}  # noqa: RUF012 - Blender reads it
     bl_description = (
         "Send the selected rigs as VMC performers and all other selected objects as VMC trackers, as they are seen"
     )
@@ -238,7 +242,8 @@ class RIGID_MOTION_OT_live_send(bpy.types.Operator):
 class RIGID_MOTION_OT_live_stop_sending(bpy.types.Operator):
     bl_idname = "rigid_motion.live_stop_sending"
     bl_label = "Stop Sending"
-    bl_description = "Send no more"
+    bl_options = {"REGISTER"}  # noqa: RUF012 - Blender reads it
+    bl_description = "Send nothing any more, and close the port"
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
@@ -364,8 +369,6 @@ CLASSES = (
 
 
 def register() -> None:
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
     bpy.types.Scene.rigid_motion_live = PointerProperty(type=LiveSettings)
 
 
@@ -373,5 +376,3 @@ def unregister() -> None:
     receiving.stop()
     sending.stop()
     del bpy.types.Scene.rigid_motion_live
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
