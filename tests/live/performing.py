@@ -77,7 +77,9 @@ def new_rig(prefix: str = "", larger: float = 1.0, turned_by: float = 0.3) -> bp
     heads = in_world(REST[:, None])[:, 0].positions * larger
     bones = [obj.data.edit_bones.new(prefix + name) for name in JOINTS]
     for bone, head, parent in zip(bones, heads, PARENTS.tolist(), strict=True):
-        bone.head, bone.tail, bone.roll = head, head + np.array((0.0, 0.05, 0.1)), turned_by
+        children = heads[JOINTS.index(bone.name.removeprefix(prefix)) == PARENTS]
+        tail = children.mean(axis=0) if len(children) else head + np.array((0.0, 0.05, 0.1))
+        bone.head, bone.tail, bone.roll = head, tail, turned_by
         bone.parent = bones[parent] if parent >= 0 else None
     bpy.ops.object.mode_set(mode="OBJECT")
     return obj

@@ -280,6 +280,12 @@ class RIGID_MOTION_PT_live(bpy.types.Panel):
     bl_category = CATEGORY
     bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012 - Blender reads it
 
+    def draw_header(self, _context: bpy.types.Context) -> None:
+        if receiving.listening() is None:
+            self.layout.operator("rigid_motion.live_listen", text="", icon="PLAY", emboss=False)
+        else:
+            self.layout.operator("rigid_motion.live_stop", text="", icon="PAUSE", emboss=False)
+
     def draw(self, context: bpy.types.Context) -> None:
         layout, live, listening = self.layout, context.scene.rigid_motion_live, receiving.listening()
         column = layout.column(align=True)
