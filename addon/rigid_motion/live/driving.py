@@ -118,13 +118,13 @@ class RigDriver(Driver):
         joints = [joint for joint in body.joints if pairs.get(joint, "") in bones]
         self.bones = [pairs[joint] for joint in joints]
         self._skeleton = Skeleton(body.parents)
-        self._placed, self._follows = _space(obj, self.bones)
+        placed, self._follows = _space(obj, self.bones)
+        self._offsets = _beside(placed, self._follows)
+        """Where each bone is with no values, seen from the bone that it follows, or in the armature."""
         _, turn, scale = obj.matrix_basis.decompose()
         self._turn, self._scale = np.array(turn), max(sum(map(abs, scale)) / 3.0, 1e-9)
         numbers = np.array([body.joints.index(joint) for joint in joints], dtype=np.int64)
-        in_world = Poses(
-            self._scale * rotate(self._turn, self._placed.positions), multiply(self._turn, self._placed.quaternions)
-        )
+        in_world = Poses(self._scale * rotate(self._turn, placed.positions), multiply(self._turn, placed.quaternions))
         rest = self._skeleton.in_root_space(body.rest[:, None])[:, 0]
         named = humanoid_bones(body.joints)
         rows = {joint: row for row, joint in enumerate(numbers.tolist())}
@@ -145,7 +145,7 @@ class RigDriver(Driver):
         return rows.get(joint, -1)
 
     def values(self, poses: Poses) -> Values:
-        target = self._retarget(self._skeleton.in_root_space(poses))
+        target = self._retarget(_in_root_space(self._skeleton, poses))
         back = conjugate(self._turn)
         turns = multiply(back, target.quaternions)
         places = rotate(back, target.positions) / self._scale
@@ -164,17 +164,6 @@ class RigDriver(Driver):
         prefixes = [f'pose.bones["{bpy.utils.escape_identifier(name)}"].' for name in self.bones]
         return Values(prefixes, values, self._has_location)
 
-    @property
-    def _offsets(self) -> Poses:
-        """Where each bone is with no values, seen from the bone that it follows, or in the armature."""
-        placed, above = self._placed, self._follows
-        hanging = (above >= 0)[:, None]
-        back = np.where(hanging, conjugate(placed.quaternions[above]), (1.0, 0.0, 0.0, 0.0))
-        return Poses(
-            rotate(back, placed.positions - np.where(hanging, placed.positions[above], 0.0)),
-            multiply(back, placed.quaternions),
-        )
-
     def owners(self, obj: bpy.types.Object) -> Iterable[bpy.types.PoseBone | None]:
         bones = obj.pose.bones if obj.pose else {}
         return map(bones.get, self.bones)
@@ -184,6 +173,34 @@ class RigDriver(Driver):
         slides = np.where(values.has_location[:, None, None], values.poses.positions, 0.0)
         places = offsets.positions + rotate(offsets.quaternions, slides)
         return Poses(places, multiply(offsets.quaternions, values.poses.quaternions)), self._follows, self._scale
+
+
+def _beside(placed: Poses, follows: np.ndarray) -> Poses:
+    """Poses (bones,) seen from those that each follows; as they are where that is none, -1."""
+    hanging = (follows >= 0)[:, None]
+    back = np.where(hanging, conjugate(placed.quaternions[follows]), (1.0, 0.0, 0.0, 0.0))
+    return Poses(
+        rotate(back, placed.positions - np.where(hanging, placed.positions[follows], 0.0)),
+        multiply(back, placed.quaternions),
+    )
+
+
+def _in_root_space(skeleton: Skeleton, poses: Poses) -> Poses:
+    """What `Skeleton.in_root_space` says of poses (joints, n), at a third of the time where n is 1."""
+    turns = poses.quaternions[..., _LEFT] * _LEFT_SIGNS
+    for joints in skeleton.levels[1:]:
+        turns[joints] = turns[skeleton.parents[joints]] @ turns[joints]
+    quaternions = turns[..., 0]
+    hanging = (skeleton.parents >= 0)[:, None, None]
+    positions = np.where(hanging, rotate(quaternions[skeleton.parents], poses.positions), poses.positions)
+    for joints in skeleton.levels[1:]:
+        positions[joints] += positions[skeleton.parents[joints]]
+    return Poses(positions, quaternions)
+
+
+_LEFT = np.array(((0, 1, 2, 3), (1, 0, 3, 2), (2, 3, 0, 1), (3, 2, 1, 0)))
+_LEFT_SIGNS = np.array(((1, -1, -1, -1), (1, 1, -1, 1), (1, 1, 1, -1), (1, -1, 1, 1)))
+"""A quaternion q as a matrix, of these components with these signs: matrix(p) @ matrix(q) is matrix(p q)."""
 
 
 def object_of(label: str, body: Body) -> bpy.types.Object | None:

@@ -116,7 +116,8 @@ class Listening:
             self._port.send(answer, address)
         present = set()
         for receiver in (self._codec, self._vmc):
-            keys = receiver.keys()
+            # Those of the codec take up room until they are asked for.
+            keys = receiver.keys() if self._recording or receiver is self._codec else []
             shown = receiver.show(now)
             bodies = [(stream, body) for stream in shown for body in receiver.bodies(stream)]
             present |= {(stream, body.name) for stream, body in bodies}
@@ -183,6 +184,7 @@ class Listening:
     def record(self, mode: str, tolerance: float) -> None:
         """Keep what comes from now on, from the current frame on."""
         scene = bpy.context.scene
+        self._vmc.keys()
         rate = scene.render.fps / scene.render.fps_base
         self._recording = _Recording(time.monotonic(), scene.frame_current_final, rate, mode, tolerance)
         for heard in self._heard.values():

@@ -5,8 +5,10 @@ Source: "The Open Sound Control 1.0 Specification" (Wright, 2002). Big-endian, e
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Iterable, Iterator
+from functools import lru_cache
 from typing import NamedTuple
 
 BUNDLE = b"#bundle\0"
@@ -20,7 +22,9 @@ MOST_MESSAGES = 2048
 IMMEDIATELY = struct.pack(">Q", 1)
 """The time tag of a bundle that is for now."""
 
-NUMBERS = {"i": ">i", "f": ">f", "h": ">q", "d": ">d", "t": ">Q"}
+NUMBERS = {"i": "i", "f": "f", "h": "q", "d": "d", "t": "Q"}
+"""Types of OSC, as `struct` has them."""
+
 CONSTANTS = {"T": True, "F": False, "N": None}
 
 
@@ -93,12 +97,12 @@ def _message(data: bytes) -> Message:
     if address[:1] != "/" or tags[:1] != ",":
         raise ValueError
     arguments: list[object] = []
-    for tag in tags[1:]:
+    for tag in _parts(tags[1:]):
         if tag in CONSTANTS:
             arguments.append(CONSTANTS[tag])
-        elif tag in NUMBERS:
-            arguments += struct.unpack_from(NUMBERS[tag], data, at)
-            at += struct.calcsize(NUMBERS[tag])
+        elif isinstance(tag, struct.Struct):
+            arguments += tag.unpack_from(data, at)
+            at += tag.size
         elif tag == "s":
             text, at = _string(data, at)
             arguments.append(text)
@@ -111,6 +115,13 @@ def _message(data: bytes) -> Message:
         else:
             raise ValueError
     return Message(address, tuple(arguments))
+
+
+@lru_cache(256)
+def _parts(tags: str) -> list[str | struct.Struct]:
+    """Types one by one, but for numbers, which are read together where they are side by side."""
+    runs = re.findall(f"[{''.join(NUMBERS)}]+|.", tags, re.DOTALL)
+    return [struct.Struct(">" + "".join(map(NUMBERS.get, run))) if run[0] in NUMBERS else run for run in runs]
 
 
 def _string(data: bytes, at: int) -> tuple[str, int]:

@@ -30,6 +30,7 @@ ROOT = "Root"
 """The joint that the hips hang on."""
 
 JOINTS = (ROOT, *HUMANOID)
+NUMBERS = {name: number for number, name in enumerate(JOINTS) if number}
 PARENTS = {ROOT: "", **{bone: above or ROOT for bone, above in HUMANOID.items()}}
 
 MOST_SOURCES = 16
@@ -183,20 +184,22 @@ class _Source:
     def hear(self, message: Message, arrival: float) -> None:
         """Take one message."""
         arguments = message.arguments
-        if message.address == "/VMC/Ext/T" and len(arguments) == 1 and _is_finite(arguments):
-            self._has_time = True
-            self._sample(float(arguments[0]), arrival)
+        if message.address == "/VMC/Ext/Bone/Pos" and arguments and arguments[0] in NUMBERS:
+            self._place(NUMBERS[arguments[0]], arguments[1:], arrival)
         elif message.address == "/VMC/Ext/Root/Pos":
             self._place(0, arguments[1:], arrival)
-        elif message.address == "/VMC/Ext/Bone/Pos" and arguments and arguments[0] in HUMANOID:
-            self._place(JOINTS.index(arguments[0]), arguments[1:], arrival)
+        elif message.address == "/VMC/Ext/T" and len(arguments) == 1 and _is_finite(arguments[0]):
+            self._has_time = True
+            self._sample(float(arguments[0]), arrival)
 
     def _place(self, joint: int, numbers: tuple[object, ...], arrival: float) -> None:
-        if len(numbers) < 7 or not _is_finite(numbers[:7]) or max(map(abs, numbers[:3])) > FURTHEST:
-            return
-        x, y, z, w = numbers[3:7]
-        length = math.sqrt(x * x + y * y + z * z + w * w)
-        if not 0.5 < length < 2.0:
+        try:
+            x, y, z, w = numbers[3:7]
+            length = math.sqrt(x * x + y * y + z * z + w * w)
+            is_sound = 0.5 < length < 2.0 and all(-FURTHEST < number < FURTHEST for number in numbers[:3])
+        except (TypeError, ValueError, OverflowError):
+            is_sound = False
+        if not is_sound:
             return
         if joint in self._said and not self._has_time:
             self._sample(self._begun, self._begun)
@@ -268,5 +271,5 @@ def world(body: Body, poses: Poses) -> Poses:
     return Skeleton(body.parents).in_root_space(poses)
 
 
-def _is_finite(numbers: tuple[object, ...]) -> bool:
-    return all(isinstance(number, float | int) and math.isfinite(number) for number in numbers)
+def _is_finite(number: object) -> bool:
+    return isinstance(number, float | int) and math.isfinite(number)
