@@ -21,7 +21,7 @@ from .humanoid import HUMANOID, alignments, humanoid_bones
 from .osc import Message, read, write_bundle, write_message
 from .paths import Path
 from .playing import SET, Playing
-from .receiver import SILENT, Keys, Shown, Stream
+from .receiver import Keys, Shown, Stream
 
 PORT = 39539
 """That programs which show a performer listen on."""
@@ -36,6 +36,9 @@ PARENTS = {ROOT: "", **{bone: above or ROOT for bone, above in HUMANOID.items()}
 MOST_SOURCES = 16
 MOST_SAMPLES = 512
 """Of a source that wait to be shown, or to be recorded."""
+
+SILENT = 2.0
+"""Seconds after which a performer, who is sent on every frame, has gone."""
 
 FURTHEST = 1e5
 """Metres; what is further away is damage."""

