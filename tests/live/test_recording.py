@@ -49,7 +49,7 @@ def record(sent, clock, frames: list[list[bytes]]) -> None:
 def off_by(rig: bpy.types.Object, delay: float = 0.0) -> float:
     """Metres by which a rig that is played again is off, at any sample and frame in between."""
     world, worst = in_world(dance(TIMES)).positions, 0.0
-    for row in range(BEGINS + 1, len(TIMES) - 20, 3):
+    for row in range(BEGINS + 1 - round(60 * delay), len(TIMES) - 20, 3):
         frame = FIRST + (TIMES[row] - TIMES[BEGINS] + delay) * 30
         bpy.context.scene.frame_set(int(frame), subframe=frame % 1.0)
         worst = max(worst, float(np.linalg.norm(heads_of(rig) - world[:, row], axis=1).max()))
@@ -71,6 +71,13 @@ def test_vmc_is_thinned_within_the_tolerance_and_plays_again(live, sent, clock, 
     assert off_by(rig) < TOLERANCE * (1.5 if mode == "BLENDER" else 1.05)
     assert max(counts(rig)) < 0.5 * (len(TIMES) - BEGINS)
     assert modes_of(transform_of(rig.pose.bones["LeftUpperArm"]), [FIRST, FIRST + 30]) == [mode, mode]
+
+
+def test_what_had_come_and_was_not_shown_when_a_recording_began_is_in_it(live, sent, clock):
+    live.armature, live.mode, live.tolerance = (rig := new_rig()), "lerp_slerp", TOLERANCE
+    receiving.listening()._vmc.delay = 0.3
+    record(sent, clock, frames_of_vmc(TIMES))
+    assert off_by(rig, 0.3) < 1.05 * TOLERANCE
 
 
 def test_reduce_keys_works_on_what_was_recorded(live, sent, clock):

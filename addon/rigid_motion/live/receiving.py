@@ -9,8 +9,9 @@ from __future__ import annotations
 import itertools
 import logging
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
@@ -30,6 +31,9 @@ log = logging.getLogger(__package__)
 
 RATE = 60
 """Looks a second."""
+
+MOST_AHEAD = 64
+"""Messages of a body whose keys wait to be shown."""
 
 Pairs = Callable[[Body, bpy.types.Object], Mapping[str, str]]
 """Which bone of a rig each joint of a body moves."""
@@ -63,6 +67,9 @@ class _Heard:
     poses: Poses | None = None
     """What is shown of it, shape (joints,), and by the sender's clock when that was."""
     moment: float = 0.0
+
+    ahead: deque[tuple[np.ndarray, Poses]] = field(default_factory=lambda: deque(maxlen=MOST_AHEAD))
+    """Moments (k,) and poses (k, joints) of keys that are not shown yet."""
 
     take: Take | None = None
     origin: float | None = None
@@ -116,8 +123,8 @@ class Listening:
             self._port.send(answer, address)
         present = set()
         for receiver in (self._codec, self._vmc):
-            # Those of the codec take up room until they are asked for.
-            keys = receiver.keys() if self._recording or receiver is self._codec else []
+            # Those of the codec take up room until they are asked for; VMC keeps the newest.
+            came = receiver.keys() if self._recording or receiver is self._codec else []
             shown = receiver.show(now)
             bodies = [(stream, body) for stream in shown for body in receiver.bodies(stream)]
             present |= {(stream, body.name) for stream, body in bodies}
@@ -127,8 +134,8 @@ class Listening:
                 self._show(heard)
                 if self._recording and heard.driver is not None:
                     self._follow(heard, now)
-            for few in keys:
-                self._record(few)
+            for keys in came:
+                self._keep(keys)
         self._heard = {which: it for which, it in self._heard.items() if which in present or it.take}
 
     def _heard_of(self, stream: Stream, body: Body, present: set[tuple[Stream, str]], is_vmc: bool) -> _Heard:
@@ -184,7 +191,6 @@ class Listening:
     def record(self, mode: str, tolerance: float) -> None:
         """Keep what comes from now on, from the current frame on."""
         scene = bpy.context.scene
-        self._vmc.keys()
         rate = scene.render.fps / scene.render.fps_base
         self._recording = _Recording(time.monotonic(), scene.frame_current_final, rate, mode, tolerance)
         for heard in self._heard.values():
@@ -209,11 +215,19 @@ class Listening:
         recording = self._recording
         heard.take.add(recording.first_frame + (moments - heard.origin) * recording.frames_a_second, poses)
 
-    def _record(self, keys: Keys) -> None:
+    def _keep(self, keys: Keys) -> None:
+        """Record keys, or have those at hand that are not shown yet: a recording may begin before they are."""
         for name, poses in keys.poses.items():
             heard = self._heard.get((keys.stream, name))
-            if heard is not None and heard.origin is not None and heard.is_taken:
-                self._add(heard, keys.moments, poses)
+            if heard is None:
+                continue
+            heard.ahead.append((keys.moments, poses))
+            if heard.is_taken and heard.origin is not None:
+                for moments, few in heard.ahead:
+                    self._add(heard, moments, few)
+                heard.ahead.clear()
+            while heard.ahead and heard.ahead[0][0][-1] <= heard.moment:
+                heard.ahead.popleft()
 
     def finish(self) -> int:
         """End the recording and make its keys; say how many poses have keys."""
