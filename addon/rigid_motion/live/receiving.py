@@ -10,7 +10,7 @@ import itertools
 import logging
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, field
 
 import bpy
@@ -31,6 +31,9 @@ log = logging.getLogger(__package__)
 
 RATE = 60
 """Looks a second."""
+
+Which = tuple[Stream, str]
+"""A stream, and the name of one of its bodies."""
 
 MOST_AHEAD = 64
 """Messages of a body whose keys wait to be shown."""
@@ -99,7 +102,7 @@ class Listening:
         self._settings, self._pairs = settings, pairs
         self._port = Port(host, port)
         self._codec, self._vmc = Receiver(), VmcReceiver(settings().delay)
-        self._heard: dict[tuple[Stream, str], _Heard] = {}
+        self._heard: dict[Which, _Heard] = {}
         self._recording: _Recording | None = None
 
     @property
@@ -121,26 +124,26 @@ class Listening:
             (self._vmc if is_osc(datagram) else self._codec).take(datagram, now, address)
         for address, answer in self._codec.answers():
             self._port.send(answer, address)
-        present = set()
-        for receiver in (self._codec, self._vmc):
-            # Those of the codec take up room until they are asked for; VMC keeps the newest.
-            came = receiver.keys() if self._recording or receiver is self._codec else []
-            shown = receiver.show(now)
-            bodies = [(stream, body) for stream in shown for body in receiver.bodies(stream)]
-            present |= {(stream, body.name) for stream, body in bodies}
-            for stream, body in bodies:
-                heard = self._heard_of(stream, body, present, receiver is self._vmc)
-                heard.moment, heard.poses = shown[stream].moment, shown[stream].poses[body.name]
-                self._show(heard)
-                if self._recording and heard.driver is not None:
-                    self._follow(heard, now)
-            for keys in came:
-                self._keep(keys)
-        self._heard = {which: it for which, it in self._heard.items() if which in present or it.take}
+        # Those of the codec take up room until they are asked for; VMC keeps the newest.
+        came = self._codec.keys() + (self._vmc.keys() if self._recording else [])
+        shown = {
+            (stream, body.name): (receiver, body, what)
+            for receiver in (self._codec, self._vmc)
+            for stream, what in receiver.show(now).items()
+            for body in receiver.bodies(stream)
+        }
+        for which, (receiver, body, what) in shown.items():
+            heard = self._heard_of(which, body, shown, receiver is self._vmc)
+            heard.moment, heard.poses = what.moment, what.poses[body.name]
+            self._show(heard)
+            if self._recording and heard.driver is not None:
+                self._follow(heard, now)
+        for keys in came:
+            self._keep(keys)
+        self._heard = {which: it for which, it in self._heard.items() if which in shown or it.take}
 
-    def _heard_of(self, stream: Stream, body: Body, present: set[tuple[Stream, str]], is_vmc: bool) -> _Heard:
+    def _heard_of(self, which: Which, body: Body, present: Container[Which], is_vmc: bool) -> _Heard:
         """What is known of a body. It has a label of its own; a sender that begins again goes on with its old one."""
-        which = stream, body.name
         heard = self._heard.get(which)
         if heard is None:
             labels = {it.label for other, it in self._heard.items() if other in present}
