@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from rigid_motion.live import sending
+from rigid_motion.motion import Skeleton
 from rigid_motion.streams import osc
-from rigid_motion.streams.vmc import ROOT, VmcReceiver, world
+from rigid_motion.streams.vmc import ROOT, VmcReceiver
 from tests.live.performing import JOINTS, heads_of, new_rig
 
 
@@ -52,7 +53,7 @@ def test_a_rig_is_a_performer(listener, prefix, turned_by):
         (keys,) = receiver.keys()
         (body,) = receiver.bodies(keys.stream)
         assert body.joints == (ROOT, *(name for name in body.joints[1:] if name in JOINTS))
-        found = dict(zip(body.joints, world(body, shown.poses["VMC"][:, None])[:, 0].positions, strict=True))
+        found = dict(zip(body.joints, Skeleton(body.parents).in_root_space(shown.poses["VMC"]).positions, strict=True))
         for name, head in zip(JOINTS, heads, strict=True):
             assert found[name] == pytest.approx(head, abs=1e-5)
 

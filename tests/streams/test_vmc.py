@@ -11,7 +11,7 @@ from pythonosc.osc_message_builder import OscMessageBuilder
 
 from rigid_motion.motion import Poses, Skeleton, shell_error
 from rigid_motion.motion.quaternions import multiply, rotate
-from rigid_motion.streams import osc
+from rigid_motion.streams import Body, osc
 from rigid_motion.streams.humanoid import HUMANOID, Retargeting, humanoid_bones, matched
 from rigid_motion.streams.vmc import (
     JOINTS,
@@ -21,7 +21,6 @@ from rigid_motion.streams.vmc import (
     VmcReceiver,
     from_unity,
     to_unity,
-    world,
     write,
 )
 from tests.thoroughness import sample
@@ -35,6 +34,11 @@ PLACES = np.array(
         *([0.2, 0.0, 0.15], [0.3, 0.0, 0.0], [0.25, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, -0.4], [0.0, 0.0, -0.4]),
     ]
 )
+
+
+def world(body: Body, poses: Poses) -> Poses:
+    """Poses (joints, ...) of a body in the space of its roots."""
+    return Skeleton(body.parents).in_root_space(poses)
 
 
 def about(axis: int, degrees: float) -> np.ndarray:

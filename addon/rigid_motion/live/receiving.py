@@ -106,10 +106,6 @@ class Listening:
         self._recording: _Recording | None = None
 
     @property
-    def number(self) -> int:
-        return self._port.number
-
-    @property
     def is_recording(self) -> bool:
         return self._recording is not None
 

@@ -14,7 +14,7 @@ from collections.abc import Hashable, Mapping
 
 import numpy as np
 
-from ..motion import Poses, Skeleton
+from ..motion import Poses
 from ..motion.quaternions import conjugate, multiply, rotate
 from .bodies import Body
 from .humanoid import HUMANOID, alignments, humanoid_bones
@@ -267,11 +267,6 @@ class _Source:
         moments, positions, quaternions = (np.array(part) for part in zip(*self._unkept, strict=True))
         self._unkept.clear()
         return Keys(stream, moments, self._poses(positions, quaternions))
-
-
-def world(body: Body, poses: Poses) -> Poses:
-    """Poses (joints, ...) of a body in the space of its roots."""
-    return Skeleton(body.parents).in_root_space(poses)
 
 
 def _is_finite(number: object) -> bool:
