@@ -33,7 +33,9 @@ class Program:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._to = ("127.0.0.1", port)
         self._began, self._sent = time.monotonic(), 0
-        bpy.app.timers.register(self._send, persistent=True)
+        # Blender tells timers apart by identity, and a method is another object each time.
+        self._timer = self._send
+        bpy.app.timers.register(self._timer, persistent=True)
 
     def _send(self) -> float:
         due = int((time.monotonic() - self._began) * RATE)
@@ -44,7 +46,7 @@ class Program:
         return 0.5 / RATE
 
     def close(self) -> None:
-        bpy.app.timers.unregister(self._send)
+        bpy.app.timers.unregister(self._timer)
         self._socket.close()
 
 
