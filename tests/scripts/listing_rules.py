@@ -25,6 +25,9 @@ OF_BLENDER = {
 """Modules that come with Blender, beside Python's own."""
 
 NETWORK = {"asyncio", "ftplib", "http", "imaplib", "requests", "smtplib", "socket", "socketserver", "ssl", "urllib"}
+SOCKETS = "live/sockets.py"
+"""What opens them."""
+
 PROCESSES = {"concurrent", "ctypes", "multiprocessing", "pty", "signal", "subprocess", "_thread"}
 
 STARTING = ("threading.Thread", "threading.Timer", "Thread", "Timer")
@@ -96,8 +99,12 @@ def without(forbidden: set[str], files: Files) -> Iterator[str]:
             yield f"{name}:{line} imports {module}"
 
 
-def no_network(files: Files) -> Iterable[str]:
-    return without(NETWORK, files)
+def network_in_one_module(files: Files) -> Iterable[str]:
+    """Only one module has a way to the network, and it is nothing but UDP; it asks whether Blender may go online."""
+    yield from without(NETWORK, {name: content for name, content in files.items() if name != SOCKETS})
+    yield from without(NETWORK - {"socket"}, files)
+    if SOCKETS in files and b"bpy.app.online_access" not in files[SOCKETS]:
+        yield f"{SOCKETS} does not ask whether Blender may go online"
 
 
 def no_processes_and_no_threads(files: Files) -> Iterator[str]:
@@ -146,6 +153,8 @@ def permissions_are_those_that_are_used(files: Files) -> Iterator[str]:
     for name, line, module in imports(files):
         if module in FILES:
             used.add(("files", f"{name}:{line} imports {module}"))
+        if module in NETWORK:
+            used.add(("network", f"{name}:{line} imports {module}"))
     for name, node, function in called(files):
         if function.rpartition(".")[2] in ("open", "read_text", "write_text", "write_bytes", "mkdir", "abspath"):
             used.add(("files", f"{name}:{node.lineno} calls {function}"))
@@ -287,7 +296,7 @@ def the_manifest_is_as_the_site_wants_it(files: Files) -> Iterator[str]:
 
 
 RULES: tuple[Rule, ...] = (
-    no_network,
+    network_in_one_module,
     no_processes_and_no_threads,
     no_debug_code,
     no_print,

@@ -22,7 +22,7 @@ from rigid_motion.ui.shown import ShownTransform
 from rigid_motion.ui.wording import DESCRIPTIONS, OWN_WORDS, SHORT_LABELS, spoken_of
 
 PACKAGE = Path(rigid_motion.__file__).parent
-FLOORS = ("animation", "ui")
+FLOORS = ("animation", "live", "ui")
 """The packages that have texts. The core names its modes, which are enum items above, and its errors are for Python."""
 
 Message = tuple[str, str]

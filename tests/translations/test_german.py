@@ -29,6 +29,7 @@ UNSEEN = {
     "Whether in-betweens are exact between frames, by a constraint, and not in delta transforms",
     "Rigid Motion Rest",
     # Names in files and in Blender's own interface
+    " Live",
     "Rigid Motion",
     "Object Transforms",
     "Object Mode",
@@ -63,11 +64,14 @@ UNSEEN = {
     "Whether the constraints of bones show nothing, for as long as the rig is in Edit Mode",
     "File Filter",
     "Files that the dialog shows",
+    "The rig that the table is for",
     # For the log, and for those who call the program from Python
     "In-betweens could not be brought up to date",
     "neither an object nor a pose bone: ",
     "Keys are not in memory as expected, and are read by Blender's own functions, which takes longer",
     "The paths could not be drawn",
+    "What came over the network cannot be shown",
+    "What is selected cannot be sent",
     "The transform on the screen cannot be shown",
     "a mode for keyframes can look one key behind and ahead of a segment: see with_neighbours",
     ": rotation by axis and angle cannot be baked; set its rotation mode to Quaternion first",

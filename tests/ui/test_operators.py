@@ -19,7 +19,7 @@ from rigid_motion.animation import (
     set_enabled,
 )
 from rigid_motion.motion import MODES, Poses, interpolate, shell_error
-from rigid_motion.ui import CLASSES, gltf_export, pose_operators
+from rigid_motion.ui import CLASSES, gltf_export, live, pose_operators
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import new_object
 from tests.ui.conftest import FRAMES, keyed, select_keys
@@ -486,8 +486,8 @@ def test_every_operator_and_property_says_what_it_is_for(extension, operator):
     assert operator.bl_idname.startswith("rigid_motion.")
     assert len(operator.bl_description) > 20
     assert not operator.bl_description.endswith(".")
-    # Blender's operator that is called makes the step of undo, if it makes one; an export changes nothing.
-    without_undo = {*pose_operators.CLASSES, *gltf_export.CLASSES}
+    # Blender's operator that is called makes the step of undo, if it makes one; an export and a port change nothing.
+    without_undo = {*pose_operators.CLASSES, *gltf_export.CLASSES, *live.CLASSES}
     assert {"REGISTER", "UNDO"} - operator.bl_options <= ({"UNDO"} if operator in without_undo else set())
     kind = getattr(bpy.ops.rigid_motion, operator.bl_idname.partition(".")[2]).get_rna_type()
     for prop in kind.properties:

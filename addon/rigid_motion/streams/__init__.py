@@ -41,6 +41,12 @@ fitting    what a message has to say
 sender     when it has to be said
 playing    the jitter buffer: which moment is shown when
 receiver   from datagrams to what is shown
+
+and of what the world speaks:
+
+osc        messages and bundles of Open Sound Control
+humanoid   which bone is which, and poses of one skeleton as those of another
+vmc        the Virtual Motion Capture protocol
 """
 
 from .bodies import Body

@@ -13,7 +13,7 @@ breakdown    those that key poses by a slider
 exactness    exact between frames, or not
 preferences  of the extension                           manual       where the documentation is
 turn_operator  whole turns between keys
-gltf_export  glTF files with few keys
+gltf_export  glTF files with few keys                   live         bodies over a network
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from . import (
     exactness,
     gltf_export,
     keymap,
+    live,
     manual,
     menus,
     operators,
@@ -48,6 +49,7 @@ CLASSES = (
     *gltf_export.CLASSES,
     *menus.CLASSES,
     *panels.CLASSES,
+    *live.CLASSES,
 )
 
 
@@ -56,6 +58,7 @@ def register() -> None:
     shown.register()
     for cls in CLASSES:
         bpy.utils.register_class(cls)
+    live.register()
     menus.register()
     keymap.register()
     manual.register()
@@ -66,6 +69,7 @@ def unregister() -> None:
     manual.unregister()
     keymap.unregister()
     menus.unregister()
+    live.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
     shown.unregister()

@@ -23,6 +23,7 @@ REDUCE = f"{ANIMATORS}#reduce-keys"
 RIGS = f"{ANIMATORS}#rigs"
 IN_THE_FILE = f"{ANIMATORS}#what-is-in-the-file"
 LIMITS = f"{ANIMATORS}#limits"
+LIVE = "live.md"
 
 PAGES = (
     ("bpy.ops.rigid_motion.set_mode", MODES),
@@ -34,7 +35,10 @@ PAGES = (
     ("bpy.ops.rigid_motion.mend", IN_THE_FILE),
     ("bpy.ops.rigid_motion.exact", LIMITS),
     ("bpy.ops.rigid_motion.refresh", LIMITS),
+    ("bpy.ops.rigid_motion.live_*", LIVE),
     ("bpy.ops.rigid_motion.*", CHOOSE),
+    ("bpy.types.livesettings.*", LIVE),
+    ("bpy.types.livebone.*", LIVE),
     ("bpy.types.objectmotion.mode", MODES),
     ("bpy.types.objectmotion.own_*", IN_THE_FILE),
     ("bpy.types.objectmotion.*", EDIT),

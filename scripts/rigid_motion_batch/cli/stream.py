@@ -16,6 +16,7 @@ from contextlib import AbstractContextManager, closing, contextmanager, nullcont
 from pathlib import Path
 
 from rigid_motion.motion import MODES, rms
+from rigid_motion.streams import Body, Sender
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.command_line import Parser, as_called, complain, number, path_line, program_of
 from rigid_motion_batch.progress import Progress, Stage
@@ -23,9 +24,21 @@ from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.streaming import vmc
 from rigid_motion_batch.streaming.measuring import straight
 from rigid_motion_batch.streaming.receiving import Handing, Receiving, Tracks, errors
-from rigid_motion_batch.streaming.rooms import EVERYWHERE, HERE, PORT, ROOM, USER, Room, RoomError, is_loopback, opened
+from rigid_motion_batch.streaming.rooms import (
+    EVERYWHERE,
+    HERE,
+    MOTION,
+    PORT,
+    ROOM,
+    USER,
+    Room,
+    RoomError,
+    is_loopback,
+    opened,
+)
 from rigid_motion_batch.streaming.sending import Sending, play, samples_of, sender_of, together
 from rigid_motion_batch.streaming.transports import HEADERS
 from rigid_motion_batch.streaming.written import Motion, write_motions
@@ -40,6 +53,9 @@ ENDINGS = (".csv", ".bvh", ".tum")
 
 LOOK = 0.2
 """Seconds after which a router looks up."""
+
+FRAME = 0.01
+"""Seconds after which what another program performs is looked at."""
 
 SCRIPT = "stream.py"
 PROGRAM = program_of(SCRIPT)
@@ -63,6 +79,8 @@ examples:
   python scripts/stream.py send walk.bvh --room studio
   python scripts/stream.py send log.csv:left log.csv:right --room studio --user ada --tolerance 2mm --delay 0.2
   python scripts/stream.py send hand.csv --axes unity --room studio --at studio.local --rate 20
+  python scripts/stream.py send --from-vmc 39539 --room studio   what another program performs
+  python scripts/stream.py send walk.bvh --to-vmc 127.0.0.1:39539
 
 All recordings begin together, and take as long as they take, even if nobody listens.
 """
@@ -72,6 +90,7 @@ examples:
   python scripts/stream.py receive --room studio --output shown.bvh --truth walk.bvh
   python scripts/stream.py receive --room studio --output shown.csv --mode motor_spline --seconds 20
   python scripts/stream.py receive --room studio --at studio.local --to-blender 127.0.0.1:39539
+  python scripts/stream.py receive --room studio --to-vmc 127.0.0.1:39540
 
 It ends when all who sent have gone, after --seconds, or at Ctrl-C. A .csv file has all bodies, in metres and Blender's
 axes: device,t,x,y,z,qw,qx,qy,qz, where t is the moment of the sender's motion. Of .bvh and .tum there is one for each
@@ -95,8 +114,12 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
     sending = commands.add_parser("send", help="play recordings", epilog=as_called(SEND_EPILOG, SCRIPT), **style)
-    sending.add_argument("recordings", nargs="+", metavar="RECORDING", help="FILE, or FILE:BODY for one of several")
+    sending.add_argument("recordings", nargs="*", metavar="RECORDING", help="FILE, or FILE:BODY for one of several")
+    help = "send what another program sends by VMC to this port of this machine, instead of recordings"
+    sending.add_argument("--from-vmc", type=_port, metavar="PORT", help=help)
     _add_room(sending, "to send")
+    help = "play it to this program by VMC instead: Blender's panel Live, VSeeFace, Warudo, Unity"
+    sending.add_argument("--to-vmc", type=_address, metavar="HOST:PORT", help=help)
     sending.add_argument("--tolerance", default="5mm", metavar="LENGTH", help="largest error: 5mm, 0.5cm (%(default)s)")
     sending.add_argument("--rate", type=_positive, metavar="HZ", help="send a key at each of so many ticks a second")
     help = f"seconds by which it is shown later ({DELAY}; with --rate one interval)"
@@ -112,6 +135,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     receiving.add_argument("--mode", choices=MODES, metavar="MODE", help=help)
     help = "hand everything on to the panel Live of Blender, by UDP"
     receiving.add_argument("--to-blender", type=_address, metavar="HOST:PORT", help=help)
+    help = "show it to another program by VMC: the first body there is, and rigid bodies as trackers"
+    receiving.add_argument("--to-vmc", type=_address, metavar="HOST:PORT", help=help)
     receiving.add_argument("--seconds", type=_positive, metavar="N", help="stop after so many seconds")
     help = "frames a second of the display (%(default)g)"
     receiving.add_argument("--fps", type=_fps, default=72.0, metavar="N", help=help)
@@ -167,7 +192,14 @@ def main(arguments: list[str]) -> int:
 
 def send(options: argparse.Namespace, stopped: list[int]) -> None:
     """Play recordings. Raises what says why they could not be."""
+    if options.from_vmc is not None:
+        send_performer(options, stopped)
+        return
     clips = _read(options.recordings, options)
+    if options.to_vmc:
+        with Progress() as progress, progress.stage("Playing", float(clips[0].times[-1] - clips[0].times[0])) as stage:
+            _say(f"datagrams: {vmc.play(clips[0], options.to_vmc, stopped, stage.reach)}")
+        return
     bodies, moments, poses = together(clips, options.rate)
     delay = options.delay or (1.0 / options.rate if options.rate else DELAY)
     sender = sender_of(bodies, moments, Tolerance(options.tolerance).tolerance(clips[0]), delay, options.rate)
@@ -195,6 +227,33 @@ def send(options: argparse.Namespace, stopped: list[int]) -> None:
         )
 
 
+def send_performer(options: argparse.Namespace, stopped: list[int]) -> None:
+    """Send what another program performs until that is to end. Raises what says why it could not be."""
+    tolerance, delay = Tolerance(options.tolerance).metres(1.0), options.delay or DELAY
+    sending: Sending | None = None
+    sent: Body | None = None
+    with _room(options) as room, vmc.Performers(options.from_vmc) as performers:
+        _say(f"{options.user} listens to port {performers.port} and sends to {options.room}")
+        while not stopped:
+            for body, moments, poses in performers.samples():
+                if sending is None:
+                    sending = Sending(room, options.user, Sender([body], tolerance, delay))
+                elif body is not sent:  # Bones came that were not there before.
+                    sending.sender = Sender([body], tolerance, delay)
+                    sending.say(sending.sender.join())
+                sent = body
+                for sample, moment in enumerate(moments.tolist()):
+                    sending.say(sending.sender.add(moment, poses[:, sample]))
+                ahead = float(moments[-1]) - time.monotonic()
+            for came in room.come(FRAME):
+                if sending:
+                    sending.take(came, time.monotonic() + ahead)
+        if sending is None:
+            raise RoomError(f"nothing came by VMC at port {performers.port}; give the other program this port")
+        room.leave(options.user, MOTION)
+        _say(f"datagrams: {sending.datagrams}", f"bytes: {sending.bytes}")
+
+
 def receive(options: argparse.Namespace, stopped: list[int]) -> None:
     """Show what comes. Raises what says why there is nothing."""
     truth = _read([options.truth], options)[0] if options.truth else None
@@ -206,6 +265,8 @@ def receive(options: argparse.Namespace, stopped: list[int]) -> None:
     ):
         keeps = bool(options.output or truth)
         receiving = Receiving(room, options.user, options.fps, options.margin, handing, keeps)
+        if options.to_vmc:
+            receiving.on_frame.append(vmc.ToVmc(receiving.receiver, options.to_vmc))
         _say(f"{options.user} listens in {options.room}")
         until = time.monotonic() + (options.seconds or float("inf"))
         with _stage(progress, "Receiving", options.seconds) as stage:
@@ -320,6 +381,16 @@ def _check(options: argparse.Namespace) -> None:
     options.reading = reading_options(options)
     if options.command == "send":
         Tolerance(options.tolerance)
+        if bool(options.recordings) == (options.from_vmc is not None):
+            raise ValueError("give recordings, or --from-vmc PORT, and not both")
+        if options.to_vmc and (options.room or len(options.recordings) != 1):
+            raise ValueError("--to-vmc plays one recording to one program, without a room; leave the others out")
+        if not (options.room or options.to_vmc):
+            raise ValueError("give --room NAME, which receivers give as well, or --to-vmc HOST:PORT")
+    elif not options.room:
+        raise ValueError("give --room NAME, as the sender does")
+    if options.to_vmc and not (options.network or is_loopback(options.to_vmc[0])):
+        raise ValueError("--to-vmc sends to another machine; give --network as well, if that is what you want")
     if options.command != "receive":
         return
     if (
@@ -334,7 +405,7 @@ def _check(options: argparse.Namespace) -> None:
 
 
 def _add_room(parser: argparse.ArgumentParser, what: str) -> None:
-    parser.add_argument("--room", type=_named(ROOM, "room"), required=True, metavar="NAME", help=f"where {what}")
+    parser.add_argument("--room", type=_named(ROOM, "room"), metavar="NAME", help=f"where {what}")
     own = re.sub(r"[^\w.-]+", "_", os.environ.get("USER") or os.environ.get("USERNAME") or "user")
     help = "who you are in the room (%(default)s)"
     parser.add_argument("--user", type=_named(USER, "user"), default=own, metavar="NAME", help=help)
@@ -381,6 +452,10 @@ def _address(text: str) -> tuple[str, int]:
     if not (host and port.isascii() and port.isdecimal() and 0 < int(port) <= 65535):
         raise argparse.ArgumentTypeError(f"{text!r} is no address; give one such as {HERE}:39539")
     return host.strip("[]"), int(port)
+
+
+def _port(text: str) -> int:
+    return _address(f"{HERE}:{text}")[1]
 
 
 def _file(text: str) -> Path:

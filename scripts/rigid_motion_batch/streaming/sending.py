@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from rigid_motion.motion import Poses
+from rigid_motion.motion.quaternions import conjugate, multiply
 from rigid_motion.streams import Body, Sender
 from rigid_motion.streams.bodies import RADIUS
 from rigid_motion.streams.wire import DESCRIPTION, kind_of
@@ -49,12 +50,14 @@ def samples_of(clip: Clip) -> tuple[np.ndarray, Poses]:
 
 
 def body_of(clip: Clip, poses: Poses, radius: float = RADIUS) -> Body:
-    """What is streamed of a clip. At rest it is as in its first sample."""
-    rest = poses[:, 0]
+    """What is streamed of a clip. A rigid body is at rest as in its first sample."""
     if clip.figure is None:
-        return Body.rigid(clip.name, rest, radius)
+        return Body.rigid(clip.name, poses[:, 0], radius)
+    parents, turns = clip.figure.parents, to_blender(clip.figure.rest, clip.axes).quaternions
+    turns = np.where((parents >= 0)[:, None], multiply(conjugate(turns[parents]), turns), turns)
     sliding = np.ptp(poses.positions, axis=1).max(axis=1) > SLIDES
-    return Body(clip.name, clip.figure.joints, clip.figure.parents, rest, radius, sliding | (clip.figure.parents < 0))
+    rest = Poses(poses.positions[:, 0], turns)
+    return Body(clip.name, clip.figure.joints, parents, rest, radius, sliding | (parents < 0))
 
 
 def together(clips: Sequence[Clip], rate: float | None = None) -> tuple[list[Body], np.ndarray, Poses]:

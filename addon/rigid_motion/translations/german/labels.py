@@ -80,6 +80,18 @@ LABELS = {
     "Scale X": "X-Skalierung",
     "Scale Y": "Y-Skalierung",
     "Scale Z": "Z-Skalierung",
+    # Live
+    "Live": "Live",
+    "Send": "Senden",
+    "Address": "Adresse",
+    "Port": "Port",
+    "Delay": "Verzögerung",
+    "Rig": "Rig",
+    "Body": "Körper",
+    "Bone": "Knochen",
+    "Bones": "Knochen",
+    "rigid": "starr",
+    "{count} joints": "{count} Gelenke",
 }
 
 OF_OPERATORS = {
@@ -107,6 +119,13 @@ OF_OPERATORS = {
     "Pie Menu": "Kreismenü",
     "Documentation": "Dokumentation",
     "Website": "Website",
+    "Listen": "Zuhören",
+    "Stop Listening": "Zuhören beenden",
+    "Record": "Aufnehmen",
+    "Finish Recording": "Aufnahme beenden",
+    "Match Names": "Namen zuordnen",
+    "Send Selected": "Ausgewählte senden",
+    "Stop Sending": "Senden beenden",
 }
 
 OF_OWN_CONTEXT = {

@@ -72,4 +72,5 @@ NOTES = {
     "slide {distance}": "rutschen {distance}",
     "{after}, recorded {before}": "{after}, aufgenommen {before}",
     "{keys}, {error} off": "{keys}, Fehler {error}",
+    "Nothing comes yet": "Noch kommt nichts",
 }

@@ -275,4 +275,16 @@ REFUSALS = {
     "{name} is a bone, and exact between frames anyway": (
         "{name} ist ein Knochen, und zwischen Einzelbildern ohnehin genau"
     ),
+    # Live
+    "{host} is not on this machine, and Blender is offline: "
+    "turn on Preferences > System > Network > Allow Online Access, or use 127.0.0.1": (
+        "{host} ist nicht auf diesem Rechner, und Blender ist offline: "
+        "Einstellungen > System > Netzwerk > Onlinezugriff erlauben einschalten, oder 127.0.0.1 nehmen"
+    ),
+    "Port {port} of {host} cannot be listened to, maybe another program does: choose another ({why})": (
+        "Port {port} von {host} ist nicht zu haben, vielleicht hat ihn ein anderes Programm: einen anderen wählen "
+        "({why})"
+    ),
+    "{host} is no address that can be sent to ({why})": "{host} ist keine Adresse, an die man senden kann ({why})",
+    "Choose a rig first": "Zuerst ein Rig auswählen",
 }

@@ -42,4 +42,6 @@ REPORTS = {
         "höchstens {error:.2f} mm daneben"
     ),
     "; segments: {modes}": "; Segmente: {modes}",
+    "{count} poses of objects and bones have keys": "{count} Posen von Objekten und Knochen haben Schlüsselbilder",
+    "Nothing came while it was recorded: no keys": "Während der Aufnahme kam nichts: keine Schlüsselbilder",
 }

@@ -423,4 +423,53 @@ TOOLTIPS = {
     ),
     "Export selected objects only": "Nur ausgewählte Objekte exportieren",
     "Enable the add-on glTF 2.0 format first": "Zuerst das Add-on glTF 2.0 format aktivieren",
+    # Live
+    "Bodies from other programs, over a network: shown, recorded as keys, and sent": (
+        "Körper aus anderen Programmen, über ein Netz: gezeigt, als Schlüsselbilder aufgenommen und gesendet"
+    ),
+    "Show bodies that other programs send to this port: as new objects, or on the rig below": (
+        "Körper zeigen, die andere Programme an diesen Port senden: als neue Objekte oder am Rig darunter"
+    ),
+    "Close the port. Everything stays as it is shown; a recording that is not finished is given up": (
+        "Den Port schließen. Alles bleibt, wie es gezeigt wird; eine Aufnahme, die nicht beendet ist, wird verworfen"
+    ),
+    "Keep what comes from now on, from the current frame on, as keys": (
+        "Was von jetzt an kommt, ab dem aktuellen Einzelbild als Schlüsselbilder behalten"
+    ),
+    "Give each body that was recorded an Action with its keys. Reduce Keys then makes them fewer": (
+        "Jedem Körper, der aufgenommen wurde, eine Aktion mit seinen Schlüsselbildern geben. Mit Reduzieren werden sie "
+        "weniger"
+    ),
+    "Fill the table in anew: which bone of the rig each joint moves, as far as names tell": (
+        "Die Tabelle neu ausfüllen: welchen Knochen des Rigs jedes Gelenk bewegt, soweit die Namen es sagen"
+    ),
+    "Send the selected rigs as VMC performers and all other selected objects as VMC trackers, as they are seen": (
+        "Die ausgewählten Rigs als Darsteller und alle anderen ausgewählten Objekte als Tracker von VMC senden, so wie "
+        "man sie sieht"
+    ),
+    "Send nothing any more, and close the port": "Nichts mehr senden und den Port schließen",
+    "Where to listen: 127.0.0.1 for programs on this machine alone, 0.0.0.0 for others, too": (
+        "Wo zugehört wird: 127.0.0.1 nur für Programme auf diesem Rechner, 0.0.0.0 auch für andere"
+    ),
+    "The UDP port that other programs send to": "Der UDP-Port, an den andere Programme senden",
+    "By how much the picture of VMC is behind, so that it goes on evenly where data comes unevenly": (
+        "Um wie viel das Bild von VMC zurückliegt, damit es gleichmäßig weitergeht, wo Daten ungleichmäßig kommen"
+    ),
+    "The armature that a body drives, by the names of its bones. Without, it appears as a new one": (
+        "Das Skelett, das ein Körper bewegt, nach den Namen seiner Knochen. Ohne erscheint er als ein neues"
+    ),
+    "Which of several bodies drives the rig. Without, the first that comes": (
+        "Welcher von mehreren Körpern das Rig bewegt. Ohne der erste, der kommt"
+    ),
+    "The bone that this joint moves; none where it is empty": (
+        "Der Knochen, den dieses Gelenk bewegt; keiner, wenn das Feld leer ist"
+    ),
+    "What fills in between the keys that are recorded": "Was zwischen die Schlüsselbilder der Aufnahme kommt",
+    "How far off any bone may be where a recording of VMC, which comes on every frame, is thinned": (
+        "Wie weit ein Knochen daneben sein darf, wo eine Aufnahme von VMC, das jedes Einzelbild schickt, ausgedünnt "
+        "wird"
+    ),
+    "The machine that VMC is sent to": "Der Rechner, an den VMC gesendet wird",
+    "The UDP port that VMC is sent to": "Der UDP-Port, an den VMC gesendet wird",
+    "Select objects or rigs first": "Zuerst Objekte oder Rigs auswählen",
 }

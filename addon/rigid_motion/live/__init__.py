@@ -1,0 +1,10 @@
+"""Bodies that come over a network, in Blender's viewport: heard, shown, recorded as keys; and sent. No user interface.
+
+sockets    the only module that opens one
+driving    from bodies to objects and bones
+recording  from what came to keys
+receiving  what listens: the timer, and what becomes of what comes
+sending    what goes out
+
+Nothing listens or sends until an operator asks for it. Each module imports only those above it.
+"""

@@ -1,0 +1,310 @@
+"""From bodies to objects and bones: where each joint is, as values of channels, and shown by setting these.
+
+Nothing of Blender's is held from one look to the next, but names: after an undo all else is gone. The axes of streams
+are the world's; an armature is driven in the space of its parent, wherever its own location is, so that it can be moved
+to a place by its location and turned by a parent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from mathutils import Quaternion
+
+from ..motion import Poses, Skeleton
+from ..motion.eulers import ORDERS
+from ..motion.quaternions import conjugate, from_matrices, multiply, rotate
+from ..streams import Body
+from ..streams.humanoid import Retargeting, humanoid_bones
+
+MARK = "rigid_motion_live"
+"""The property of an object that was made for a body: the body's name."""
+
+SIZE = 0.1
+"""Metres of the axes that stand for a rigid body, and of bones that end nowhere."""
+
+TRIED = 0.5
+"""Radians by which a control is turned to see what follows it."""
+
+MOVED = 1e-3
+"""What has turned by that many radians has followed."""
+
+
+SWITCHES = ("IK_FK", "neck_follow", "head_follow")
+"""Of Rigify's rigs: at 1 limbs do what their bones are turned to, and what hangs on others follows them as a whole."""
+
+
+@dataclass(frozen=True, eq=False)
+class Values:
+    """Channels of objects or bones, as poses: location and rotation on top of where each is with nothing keyed."""
+
+    prefixes: list[str]
+    """Of the data paths, "" for an object."""
+
+    poses: Poses
+    """Shape (channels, n)."""
+
+    has_location: np.ndarray
+    """Shape (channels,)."""
+
+
+class Driver:
+    """What shows a body on one object."""
+
+    def __init__(self, obj: bpy.types.Object, body: Body) -> None:
+        self.name, self.body = obj.name, body
+
+    @property
+    def object(self) -> bpy.types.Object | None:
+        """The object, or None where it is gone."""
+        return bpy.data.objects.get((self.name, None))
+
+    def show(self, poses: Poses) -> bool:
+        """Show poses (joints,); False where the object is gone."""
+        obj = self.object
+        if obj is None:
+            return False
+        if obj.is_editable:
+            values = self.values(poses[:, None])
+            rotations, places = values.poses.quaternions[:, 0].tolist(), values.poses.positions[:, 0].tolist()
+            for owner, has_location, place, rotation in zip(
+                self.owners(obj), values.has_location.tolist(), places, rotations, strict=True
+            ):
+                if owner is not None:
+                    _set(owner, place if has_location else None, rotation)
+        return True
+
+    def values(self, poses: Poses) -> Values:
+        """The channels' values of poses (joints, n)."""
+        raise NotImplementedError
+
+    def owners(self, obj: bpy.types.Object) -> Iterable[bpy.types.Object | bpy.types.PoseBone | None]:
+        """Whose channels these are, in their order."""
+        raise NotImplementedError
+
+    def locals(self, values: Values) -> tuple[Poses, np.ndarray, float]:
+        """Poses (channels, n) of these values in the space of what each hangs on, numbers of that (channels,), -1 for
+        the world, and how many metres their unit is."""
+        return values.poses, np.full(len(values.prefixes), -1), 1.0
+
+
+class ObjectDriver(Driver):
+    """A rigid body."""
+
+    def values(self, poses: Poses) -> Values:
+        return Values([""], poses[:1], np.array([True]))
+
+    def owners(self, obj: bpy.types.Object) -> Iterable[bpy.types.Object]:
+        return (obj,)
+
+
+class RigDriver(Driver):
+    """A skeleton on the bones of an armature.
+
+    Parameters
+    ----------
+    obj
+        The armature, with nothing on the bones that are driven.
+    pairs
+        Which bone each joint moves.
+    """
+
+    def __init__(self, obj: bpy.types.Object, body: Body, pairs: Mapping[str, str]) -> None:
+        super().__init__(obj, body)
+        bones = obj.pose.bones
+        joints = [joint for joint in body.joints if pairs.get(joint, "") in bones]
+        self.bones = [pairs[joint] for joint in joints]
+        self._skeleton = Skeleton(body.parents)
+        placed, self._follows = _space(obj, self.bones)
+        self._offsets = _beside(placed, self._follows)
+        """Where each bone is with no values, seen from the bone that it follows, or in the armature."""
+        _, turn, scale = obj.matrix_basis.decompose()
+        self._turn, self._scale = np.array(turn), max(sum(map(abs, scale)) / 3.0, 1e-9)
+        numbers = np.array([body.joints.index(joint) for joint in joints], dtype=np.int64)
+        in_world = Poses(self._scale * rotate(self._turn, placed.positions), multiply(self._turn, placed.quaternions))
+        rest = self._skeleton.in_root_space(body.rest[:, None])[:, 0]
+        named = humanoid_bones(body.joints)
+        rows = {joint: row for row, joint in enumerate(numbers.tolist())}
+        self._retarget = Retargeting(
+            rest,
+            in_world,
+            np.stack((numbers, np.arange(len(numbers))), axis=1),
+            np.array([self._above(joint, rows) for joint in numbers.tolist()], dtype=np.int64),
+            {bone: rows[joint] for bone, joint in named.items() if joint in rows},
+            body.sliding[numbers],
+        )
+        connected = np.array([bones[name].bone.use_connect for name in self.bones], dtype=bool)
+        self._has_location = body.sliding[numbers] & ~connected & self._retarget.has_places
+
+    def _above(self, joint: int, rows: Mapping[int, int]) -> int:
+        while (joint := int(self.body.parents[joint])) >= 0 and joint not in rows:
+            pass
+        return rows.get(joint, -1)
+
+    def values(self, poses: Poses) -> Values:
+        target = self._retarget(_in_root_space(self._skeleton, poses))
+        back = conjugate(self._turn)
+        turns = multiply(back, target.quaternions)
+        places = rotate(back, target.positions) / self._scale
+        hanging, above = self._follows >= 0, self._follows
+        offsets = self._offsets
+        spaces = np.where(
+            hanging[:, None, None], multiply(turns[above], offsets.quaternions[:, None]), offsets.quaternions[:, None]
+        )
+        origins = np.where(
+            hanging[:, None, None],
+            places[above] + rotate(turns[above], offsets.positions[:, None]),
+            offsets.positions[:, None],
+        )
+        spaces = conjugate(spaces)
+        values = Poses(rotate(spaces, places - origins), multiply(spaces, turns))
+        prefixes = [f'pose.bones["{bpy.utils.escape_identifier(name)}"].' for name in self.bones]
+        return Values(prefixes, values, self._has_location)
+
+    def owners(self, obj: bpy.types.Object) -> Iterable[bpy.types.PoseBone | None]:
+        bones = obj.pose.bones if obj.pose else {}
+        return map(bones.get, self.bones)
+
+    def locals(self, values: Values) -> tuple[Poses, np.ndarray, float]:
+        offsets = self._offsets[:, None]
+        slides = np.where(values.has_location[:, None, None], values.poses.positions, 0.0)
+        places = offsets.positions + rotate(offsets.quaternions, slides)
+        return Poses(places, multiply(offsets.quaternions, values.poses.quaternions)), self._follows, self._scale
+
+
+def _beside(placed: Poses, follows: np.ndarray) -> Poses:
+    """Poses (bones,) seen from those that each follows; as they are where that is none, -1."""
+    hanging = (follows >= 0)[:, None]
+    back = np.where(hanging, conjugate(placed.quaternions[follows]), (1.0, 0.0, 0.0, 0.0))
+    return Poses(
+        rotate(back, placed.positions - np.where(hanging, placed.positions[follows], 0.0)),
+        multiply(back, placed.quaternions),
+    )
+
+
+def _in_root_space(skeleton: Skeleton, poses: Poses) -> Poses:
+    """What `Skeleton.in_root_space` says of poses (joints, n), at a third of the time where n is 1."""
+    turns = poses.quaternions[..., _LEFT] * _LEFT_SIGNS
+    for joints in skeleton.levels[1:]:
+        turns[joints] = turns[skeleton.parents[joints]] @ turns[joints]
+    quaternions = turns[..., 0]
+    hanging = (skeleton.parents >= 0)[:, None, None]
+    positions = np.where(hanging, rotate(quaternions[skeleton.parents], poses.positions), poses.positions)
+    for joints in skeleton.levels[1:]:
+        positions[joints] += positions[skeleton.parents[joints]]
+    return Poses(positions, quaternions)
+
+
+_LEFT = np.array(((0, 1, 2, 3), (1, 0, 3, 2), (2, 3, 0, 1), (3, 2, 1, 0)))
+_LEFT_SIGNS = np.array(((1, -1, -1, -1), (1, 1, -1, 1), (1, 1, 1, -1), (1, -1, 1, 1)))
+"""A quaternion q as a matrix, of these components with these signs: matrix(p) @ matrix(q) is matrix(p q)."""
+
+
+def object_of(label: str, body: Body) -> bpy.types.Object | None:
+    """The object that stands for a body, made where it is missing; None for as long as none can be made."""
+    for obj in bpy.context.scene.objects:
+        if obj.get(MARK) == label and (obj.type == "ARMATURE") == (len(body.joints) > 1):
+            return obj
+    if len(body.joints) > 1:
+        return _new_armature(label, body)
+    obj = bpy.data.objects.new(label, None)
+    obj.empty_display_type, obj.empty_display_size = "ARROWS", SIZE
+    return _linked(obj, label)
+
+
+def _linked(obj: bpy.types.Object, label: str) -> bpy.types.Object:
+    obj[MARK] = label
+    obj.rotation_mode = "QUATERNION"
+    bpy.context.scene.collection.objects.link(obj)
+    return obj
+
+
+def _new_armature(label: str, body: Body) -> bpy.types.Object | None:
+    """A bone for each joint, at rest as the joint is. Blender makes bones in Edit Mode alone."""
+    if bpy.context.mode != "OBJECT":
+        return None
+    rest = Skeleton(body.parents).in_root_space(body.rest[:, None])[:, 0]
+    obj = _linked(bpy.data.objects.new(label, bpy.data.armatures.new(label)), label)
+    active = bpy.context.view_layer.objects.active
+    selected = bpy.context.selected_objects
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.mode_set(mode="EDIT")
+    bones = [obj.data.edit_bones.new(name) for name in body.joints]
+    for joint, (bone, place, parent) in enumerate(zip(bones, rest.positions, body.parents.tolist(), strict=True)):
+        children = rest.positions[body.parents == joint]
+        reach = children.mean(axis=0) - place if len(children) else np.zeros(3)
+        if np.linalg.norm(reach) < 1e-4:
+            reach = (place - rest.positions[parent]) * 0.5 if parent >= 0 else np.zeros(3)
+        bone.head, bone.tail = place, place + (reach if np.linalg.norm(reach) > 1e-4 else (0.0, 0.0, SIZE))
+        bone.parent = bones[parent] if parent >= 0 else None
+    bpy.ops.object.mode_set(mode="OBJECT")
+    obj.data.display_type = "STICK"
+    for other in bpy.context.selected_objects:
+        other.select_set(other in selected)
+    bpy.context.view_layer.objects.active = active
+    return obj
+
+
+def clear(obj: bpy.types.Object, bones: Iterable[str]) -> None:
+    """Have nothing on these bones of a rig, and its switches such that it follows them."""
+    for bone in obj.pose.bones:
+        for switch in SWITCHES:
+            if switch in bone:
+                bone[switch] = 1.0
+    for name in bones:
+        if (bone := obj.pose.bones.get(name)) is not None:
+            if bone.rotation_mode == "AXIS_ANGLE":
+                bone.rotation_mode = "QUATERNION"
+            bone.matrix_basis.identity()
+            bone.location, bone.scale = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+            _set(bone, None, (1.0, 0.0, 0.0, 0.0))
+    obj.update_tag()
+    bpy.context.view_layer.update()
+
+
+def _space(obj: bpy.types.Object, bones: list[str]) -> tuple[Poses, np.ndarray]:
+    """Where bones are with nothing on them, in the armature, and which of them each follows, -1 for none."""
+    clear(obj, bones)
+    rows = {name: row for row, name in enumerate(bones)}
+    follows, unsure = np.full(len(bones), -1), []
+    for row, name in enumerate(bones):
+        above = obj.pose.bones[name].parent
+        while above is not None and above.name not in rows and not above.constraints:
+            above = above.parent
+        if above is not None and above.name not in rows:
+            unsure.append(row)
+        elif above is not None:
+            follows[row] = rows[above.name]
+    placed = _placed(obj, bones)
+    for row in rows.values() if unsure else ():
+        # What hangs on a control by way of constraints is found out by turning the control.
+        _set(obj.pose.bones[bones[row]], None, (np.cos(TRIED / 2), np.sin(TRIED / 2), 0.0, 0.0))
+        bpy.context.view_layer.update()
+        turned = _placed(obj, bones).quaternions
+        for other in unsure:
+            cosine = abs(float(placed.quaternions[other] @ turned[other]))
+            if other != row and 2.0 * np.arccos(min(cosine, 1.0)) > MOVED:
+                follows[other] = row
+        _set(obj.pose.bones[bones[row]], None, (1.0, 0.0, 0.0, 0.0))
+    if unsure:
+        bpy.context.view_layer.update()
+    return placed, follows
+
+
+def _placed(obj: bpy.types.Object, bones: list[str]) -> Poses:
+    matrices = np.array([obj.pose.bones[name].matrix for name in bones], dtype=np.float64).reshape(-1, 4, 4)
+    axes = matrices[:, :3, :3] / np.linalg.norm(matrices[:, :3, :3], axis=1, keepdims=True)
+    return Poses(matrices[:, :3, 3], from_matrices(axes))
+
+
+def _set(owner: bpy.types.Object | bpy.types.PoseBone, place: list[float] | None, rotation: Iterable[float]) -> None:
+    """Set what an object or a bone has: its rotation in whatever mode it turns by."""
+    if place is not None:
+        owner.location = place
+    if owner.rotation_mode == "QUATERNION":
+        owner.rotation_quaternion = rotation
+    elif owner.rotation_mode in ORDERS:
+        owner.rotation_euler = Quaternion(rotation).to_euler(owner.rotation_mode, owner.rotation_euler)

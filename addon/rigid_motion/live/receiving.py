@@ -1,0 +1,310 @@
+"""What listens: a port, looked at by a timer, and what becomes of what comes. There is one at most.
+
+It ends where a file is loaded, and where the extension is switched off. An undo takes objects away that were made
+after it, and they are made again; what is deleted stays away until somebody listens anew.
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import time
+from collections import deque
+from collections.abc import Callable, Container, Mapping
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+from bpy.app.handlers import persistent
+
+from ..animation.handlers import append_handlers, remove_handlers
+from ..motion import Poses
+from ..streams import Body, Keys, Receiver
+from ..streams.osc import is_osc
+from ..streams.receiver import Stream
+from ..streams.vmc import VmcReceiver
+from .driving import Driver, ObjectDriver, RigDriver, object_of
+from .recording import Take
+from .sockets import Port
+
+log = logging.getLogger(__package__)
+
+RATE = 60
+"""Looks a second."""
+
+Which = tuple[Stream, str]
+"""A stream, and the name of one of its bodies."""
+
+MOST_AHEAD = 64
+"""Messages of a body whose keys wait to be shown."""
+
+Pairs = Callable[[Body, bpy.types.Object], Mapping[str, str]]
+"""Which bone of a rig each joint of a body moves."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is asked for."""
+
+    delay: float
+    """Seconds, of VMC. The codec's streams have their own."""
+
+    armature: str
+    """The name of a rig that a skeleton drives, "" for none."""
+
+    body: str
+    """The label of that skeleton, "" for the first that comes."""
+
+
+@dataclass(eq=False)
+class _Heard:
+    """A body of a stream."""
+
+    label: str
+    body: Body
+    is_vmc: bool
+    driver: Driver | None = None
+    is_gone: bool = False
+    """Whether somebody deleted its object."""
+
+    poses: Poses | None = None
+    """What is shown of it, shape (joints,), and by the sender's clock when that was."""
+    moment: float = 0.0
+
+    ahead: deque[tuple[np.ndarray, Poses]] = field(default_factory=lambda: deque(maxlen=MOST_AHEAD))
+    """Moments (k,) and poses (k, joints) of keys that are not shown yet."""
+
+    take: Take | None = None
+    origin: float | None = None
+    """The moment that is on the first frame of the recording; None where the sender has begun since."""
+
+    @property
+    def is_taken(self) -> bool:
+        """Whether what comes is of the joints that are recorded."""
+        return self.take is not None and self.take.driver.body.joints == self.body.joints
+
+
+@dataclass
+class _Recording:
+    """What is recorded, and since when."""
+
+    begun: float
+    first_frame: float
+    frames_a_second: float
+    mode: str
+    tolerance: float
+
+
+class Listening:
+    """A port that is listened to. Raises OSError where it is taken, and NotAllowed."""
+
+    def __init__(self, host: str, port: int, settings: Callable[[], Settings], pairs: Pairs) -> None:
+        self._settings, self._pairs = settings, pairs
+        self._port = Port(host, port)
+        self._codec, self._vmc = Receiver(), VmcReceiver(settings().delay)
+        self._heard: dict[Which, _Heard] = {}
+        self._recording: _Recording | None = None
+
+    @property
+    def is_recording(self) -> bool:
+        return self._recording is not None
+
+    @property
+    def joints(self) -> dict[str, tuple[str, ...]]:
+        """The joints of each body that is heard, by its label."""
+        return {heard.label: heard.body.joints for heard in self._heard.values()}
+
+    def tick(self, now: float) -> None:
+        """Take what came, and show what is due."""
+        for datagram, address in self._port.received():
+            (self._vmc if is_osc(datagram) else self._codec).take(datagram, now, address)
+        for address, answer in self._codec.answers():
+            self._port.send(answer, address)
+        # Those of the codec take up room until they are asked for; VMC keeps the newest.
+        came = self._codec.keys() + (self._vmc.keys() if self._recording else [])
+        shown = {
+            (stream, body.name): (receiver, body, what)
+            for receiver in (self._codec, self._vmc)
+            for stream, what in receiver.show(now).items()
+            for body in receiver.bodies(stream)
+        }
+        for which, (receiver, body, what) in shown.items():
+            heard = self._heard_of(which, body, shown, receiver is self._vmc)
+            heard.moment, heard.poses = what.moment, what.poses[body.name]
+            self._show(heard)
+            if self._recording and heard.driver is not None:
+                self._follow(heard, now)
+        for keys in came:
+            self._keep(keys)
+        self._heard = {which: it for which, it in self._heard.items() if which in shown or it.take}
+
+    def _heard_of(self, which: Which, body: Body, present: Container[Which], is_vmc: bool) -> _Heard:
+        """What is known of a body. It has a label of its own; a sender that begins again goes on with its old one."""
+        heard = self._heard.get(which)
+        if heard is None:
+            labels = {it.label for other, it in self._heard.items() if other in present}
+            label = next(
+                label
+                for number in itertools.count(1)
+                if (label := body.name if number == 1 else f"{body.name} {number}") not in labels
+            )
+            before = next((other for other, it in self._heard.items() if it.label == label), None)
+            heard = self._heard[which] = self._heard.pop(before, None) or _Heard(label, body, is_vmc)
+            heard.origin = None
+        if heard.body is not body:
+            heard.body, heard.driver = body, None
+        return heard
+
+    def _show(self, heard: _Heard) -> None:
+        if heard.driver is None and not heard.is_gone:
+            heard.driver = self._driver_of(heard)
+        if heard.driver is not None and not heard.driver.show(heard.poses):
+            heard.driver, heard.is_gone = None, True
+
+    def _driver_of(self, heard: _Heard) -> Driver | None:
+        """What shows a body; None for as long as nothing can."""
+        if len(heard.body.joints) > 1:
+            settings = self._settings()
+            rig = bpy.data.objects.get((settings.armature, None))
+            is_taken = any(it.driver is not None and it.driver.name == settings.armature for it in self._heard.values())
+            if rig is not None and (settings.body or heard.label) == heard.label and not is_taken:
+                return RigDriver(rig, heard.body, self._pairs(heard.body, rig))
+        obj = object_of(heard.label, heard.body)
+        if obj is None:
+            return None
+        is_rigid = len(heard.body.joints) == 1
+        names = {name: name for name in heard.body.joints}
+        return ObjectDriver(obj, heard.body) if is_rigid else RigDriver(obj, heard.body, names)
+
+    def show_again(self) -> None:
+        """Show what is shown on top of what another frame has keyed."""
+        for heard in self._heard.values():
+            if heard.driver is not None and heard.poses is not None:
+                heard.driver.show(heard.poses)
+
+    def look_anew(self, for_all: bool = False) -> None:
+        """Choose anew what shows each body, of those whose object is gone as well where asked to."""
+        for heard in self._heard.values():
+            heard.driver, heard.is_gone = None, heard.is_gone and not for_all
+
+    def record(self, mode: str, tolerance: float) -> None:
+        """Keep what comes from now on, from the current frame on."""
+        scene = bpy.context.scene
+        rate = scene.render.fps / scene.render.fps_base
+        self._recording = _Recording(time.monotonic(), scene.frame_current_final, rate, mode, tolerance)
+        for heard in self._heard.values():
+            heard.origin = None
+            if heard.driver is not None and heard.poses is not None:
+                self._follow(heard, self._recording.begun)
+
+    def _follow(self, heard: _Heard, now: float) -> None:
+        """Record a body from now on, and go on where its sender began again."""
+        recording = self._recording
+        if heard.origin is None:
+            heard.origin = heard.moment - (now - recording.begun)
+        if heard.take is None:
+            heard.take = Take(heard.driver, recording.mode, recording.tolerance if heard.is_vmc else None)
+            self._add_shown(heard)
+
+    def _add_shown(self, heard: _Heard) -> None:
+        """Have the picture itself among what is recorded: where it begins, and where it ends."""
+        self._add(heard, np.array([heard.moment]), heard.poses[None])
+
+    def _add(self, heard: _Heard, moments: np.ndarray, poses: Poses) -> None:
+        recording = self._recording
+        heard.take.add(recording.first_frame + (moments - heard.origin) * recording.frames_a_second, poses)
+
+    def _keep(self, keys: Keys) -> None:
+        """Record keys, or have those at hand that are not shown yet: a recording may begin before they are."""
+        for name, poses in keys.poses.items():
+            heard = self._heard.get((keys.stream, name))
+            if heard is None:
+                continue
+            heard.ahead.append((keys.moments, poses))
+            if heard.is_taken and heard.origin is not None:
+                for moments, few in heard.ahead:
+                    self._add(heard, moments, few)
+                heard.ahead.clear()
+            while heard.ahead and heard.ahead[0][0][-1] <= heard.moment:
+                heard.ahead.popleft()
+
+    def finish(self) -> int:
+        """End the recording and make its keys; say how many poses have keys."""
+        count = 0
+        for heard in self._heard.values():
+            if heard.take is not None:
+                if heard.is_taken and heard.origin is not None:
+                    self._add_shown(heard)
+                count += heard.take.write()
+                heard.take = None
+        self._recording = None
+        return count
+
+    def close(self) -> None:
+        self._port.close()
+
+
+_listening: Listening | None = None
+trouble = ""
+"""Why it ended by itself."""
+
+
+def listening() -> Listening | None:
+    """What listens, if anything does."""
+    return _listening
+
+
+def start(host: str, port: int, settings: Callable[[], Settings], pairs: Pairs) -> Listening:
+    """Listen to a port, and to nothing else any more. Raises OSError where it is taken, and NotAllowed."""
+    global _listening, trouble
+    stop()
+    _listening, trouble = Listening(host, port, settings, pairs), ""
+    append_handlers(HANDLERS)
+    bpy.app.timers.register(_look)
+    return _listening
+
+
+def stop() -> None:
+    """Listen no more. What is recorded and not finished is given up."""
+    global _listening
+    if _listening is not None:
+        _listening.close()
+        _listening = None
+        remove_handlers(HANDLERS)
+        if bpy.app.timers.is_registered(_look):
+            bpy.app.timers.unregister(_look)
+
+
+def _look() -> float | None:
+    global trouble
+    if _listening is None:
+        return None
+    try:
+        _listening.tick(time.monotonic())
+    except Exception as error:
+        # Blender would only drop the timer, and leave the port open.
+        log.exception("What came over the network cannot be shown")
+        stop()
+        trouble = str(error)
+        return None
+    return 1.0 / RATE
+
+
+@persistent
+def _on_load(*_: object) -> None:
+    stop()
+
+
+@persistent
+def _on_undo(*_: object) -> None:
+    if _listening is not None:
+        _listening.look_anew(for_all=True)
+
+
+@persistent
+def _on_frame(*_: object) -> None:
+    if _listening is not None:
+        _listening.show_again()
+
+
+HANDLERS = {"load_pre": _on_load, "undo_post": _on_undo, "redo_post": _on_undo, "frame_change_post": _on_frame}

@@ -1,0 +1,100 @@
+"""The only module that opens a socket: UDP, without waiting. An operator asks for it, nothing else.
+
+On this machine that is always allowed; to reach others, or to be reached by them, Blender has to be allowed online.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import socket
+
+import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
+
+LONGEST = 65535
+MOST_AT_ONCE = 512
+"""Datagrams that one look at a socket takes out of it: a flood does not stop the viewport."""
+
+PENDING = 1 << 20
+"""Bytes that may wait to be looked at."""
+
+Address = tuple[str, int]
+
+
+class NotAllowed(Exception):
+    """What has to be allowed first, with the way out."""
+
+
+def check_access(host: str) -> None:
+    """Raise NotAllowed for an address beyond this machine where Blender is to stay offline."""
+    if not _is_loopback(host) and not bpy.app.online_access:
+        raise NotAllowed(
+            rpt_(
+                "{host} is not on this machine, and Blender is offline: "
+                "turn on Preferences > System > Network > Allow Online Access, or use 127.0.0.1"
+            ).format(host=host)
+        )
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+class Port:
+    """A UDP port. Raises OSError where it is taken, and NotAllowed."""
+
+    def __init__(self, host: str, port: int = 0) -> None:
+        check_access(host)
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        self._socket = socket.socket(family, socket.SOCK_DGRAM)
+        try:
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, PENDING)
+            self._socket.setblocking(False)
+            self._socket.bind((host, port))
+        except OSError:
+            self._socket.close()
+            raise
+
+    @property
+    def number(self) -> int:
+        return self._socket.getsockname()[1]
+
+    def received(self) -> list[tuple[bytes, Address]]:
+        """What came since the last look, and from where."""
+        found = []
+        while len(found) < MOST_AT_ONCE:
+            try:
+                data, (host, port, *_) = self._socket.recvfrom(LONGEST)
+            except BlockingIOError:
+                break
+            except OSError:
+                continue  # what Windows says of somebody who is not there any more
+            found.append((data, (host, port)))
+        return found
+
+    def send(self, data: bytes, to: Address) -> None:
+        """Send a datagram; as if it had been lost where that cannot be."""
+        try:
+            self._socket.sendto(data, to)
+        except OSError:
+            return
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+class Outlet(Port):
+    """A port to send from, to one address."""
+
+    def __init__(self, host: str, port: int) -> None:
+        check_access(host)
+        # Looked up once: a name could take seconds at every datagram.
+        family, *_, self.to = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+        own = ("::" if family == socket.AF_INET6 else "0.0.0.0") if not _is_loopback(host) else self.to[0]
+        super().__init__(own)
+
+    def say(self, data: bytes) -> None:
+        self.send(data, self.to)

@@ -1,0 +1,384 @@
+"""The panel *Live*: bodies that come over a network, on objects and rigs; recorded as keys; and sent."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import bpy
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.app.translations import pgettext_tip as tip_
+from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
+
+from ..animation.properties import MODE_ITEMS
+from ..live import receiving, sending
+from ..live.sockets import NotAllowed
+from ..streams import Body
+from ..streams.humanoid import matched
+from ..streams.vmc import PORT
+from .panels import CATEGORY
+from .rows import draw_text, labelled
+
+HOST = "127.0.0.1"
+
+
+_is_matching = False
+"""Whether it is the program that fills the table."""
+
+
+def _on_bones(_settings: LiveSettings | LiveBone, _context: bpy.types.Context) -> None:
+    if (listening := receiving.listening()) is not None and not _is_matching:
+        listening.look_anew()
+
+
+class LiveBone(bpy.types.PropertyGroup):
+    """A joint of a body, and the bone that it moves. Its name is that of the joint."""
+
+    bone: StringProperty(
+        name="Bone", description="The bone that this joint moves; none where it is empty", update=_on_bones
+    )
+
+
+class LiveSettings(bpy.types.PropertyGroup):
+    host: StringProperty(
+        name="Address",
+        description="Where to listen: 127.0.0.1 for programs on this machine alone, 0.0.0.0 for others, too",
+        default=HOST,
+    )
+    port: IntProperty(
+        name="Port", description="The UDP port that other programs send to", default=PORT, min=1024, max=65535
+    )
+    delay: FloatProperty(
+        name="Delay",
+        description="By how much the picture of VMC is behind, so that it goes on evenly where data comes unevenly",
+        default=0.05,
+        min=0.0,
+        max=2.0,
+        precision=3,
+        subtype="TIME_ABSOLUTE",
+        unit="TIME_ABSOLUTE",
+    )
+    armature: PointerProperty(
+        name="Rig",
+        description="The armature that a body drives, by the names of its bones. Without, it appears as a new one",
+        type=bpy.types.Object,
+        poll=lambda _, obj: obj.type == "ARMATURE",
+        update=_on_bones,
+    )
+    body: StringProperty(
+        name="Body",
+        description="Which of several bodies drives the rig. Without, the first that comes",
+        update=_on_bones,
+    )
+    bones: CollectionProperty(type=LiveBone)
+    bones_of: StringProperty(description="The rig that the table is for", options={"HIDDEN"})
+    active_bone: IntProperty(options={"HIDDEN"})
+    mode: EnumProperty(
+        name="Mode",
+        description="What fills in between the keys that are recorded",
+        items=MODE_ITEMS,
+        default="lerp_slerp",
+    )
+    tolerance: FloatProperty(
+        name="Tolerance",
+        description="How far off any bone may be where a recording of VMC, which comes on every frame, is thinned",
+        default=0.002,
+        min=1e-5,
+        soft_max=0.1,
+        step=0.1,
+        precision=4,
+        subtype="DISTANCE",
+    )
+    to_host: StringProperty(name="Address", description="The machine that VMC is sent to", default=HOST)
+    to_port: IntProperty(
+        name="Port", description="The UDP port that VMC is sent to", default=PORT + 1, min=1, max=65535
+    )
+
+
+def _settings() -> receiving.Settings:
+    live = bpy.context.scene.rigid_motion_live
+    return receiving.Settings(live.delay, live.armature.name if live.armature else "", live.body)
+
+
+def _pairs(body: Body, rig: bpy.types.Object) -> Mapping[str, str]:
+    """What the table says; it is filled in by names where it is for other joints or for another rig."""
+    live = bpy.context.scene.rigid_motion_live
+    if [item.name for item in live.bones] != list(body.joints) or live.bones_of != rig.name:
+        _match(live, body.joints, rig)
+    return {item.name: item.bone for item in live.bones if item.bone}
+
+
+def _match(live: LiveSettings, joints: tuple[str, ...], rig: bpy.types.Object) -> None:
+    global _is_matching
+    found = matched(joints, [bone.name for bone in rig.data.bones])
+    live.bones.clear()
+    live.bones_of = rig.name
+    _is_matching = True
+    for joint in joints:
+        item = live.bones.add()
+        item.name, item.bone = joint, found.get(joint, "")
+    _is_matching = False
+
+
+class RIGID_MOTION_OT_live_listen(bpy.types.Operator):
+    bl_idname = "rigid_motion.live_listen"
+    bl_label = "Listen"
+    bl_options = {"REGISTER"}  # noqa: RUF012 - Blender reads it
+    bl_description = "Show bodies that other programs send to this port: as new objects, or on the rig below"
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        return receiving.listening() is None
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        live = context.scene.rigid_motion_live
+        try:
+            receiving.start(live.host, live.port, _settings, _pairs)
+        except NotAllowed as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        except OSError as error:
+            text = rpt_(
+                "Port {port} of {host} cannot be listened to, maybe another program does: choose another ({why})"
+            )
+            self.report({"ERROR"}, text.format(port=live.port, host=live.host, why=error.strerror or error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class _WhileListening:
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        return receiving.listening() is not None
+
+
+class RIGID_MOTION_OT_live_stop(_WhileListening, bpy.types.Operator):
+    bl_idname = "rigid_motion.live_stop"
+    bl_label = "Stop Listening"
+    bl_options = {"REGISTER"}  # noqa: RUF012 - Blender reads it
+    bl_description = "Close the port. Everything stays as it is shown; a recording that is not finished is given up"
+
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        receiving.stop()
+        return {"FINISHED"}
+
+
+class RIGID_MOTION_OT_live_record(_WhileListening, bpy.types.Operator):
+    bl_idname = "rigid_motion.live_record"
+    bl_label = "Record"
+    bl_options = {"REGISTER"}  # noqa: RUF012 - Blender reads it
+    bl_description = "Keep what comes from now on, from the current frame on, as keys"
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        live = context.scene.rigid_motion_live
+        receiving.listening().record(live.mode, live.tolerance)
+        return {"FINISHED"}
+
+
+class RIGID_MOTION_OT_live_finish(bpy.types.Operator):
+    bl_idname = "rigid_motion.live_finish"
+    bl_label = "Finish Recording"
+    bl_description = "Give each body that was recorded an Action with its keys. Reduce Keys then makes them fewer"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 - Blender reads it
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        listening = receiving.listening()
+        return listening is not None and listening.is_recording
+
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        count = receiving.listening().finish()
+        if not count:
+            self.report({"WARNING"}, rpt_("Nothing came while it was recorded: no keys"))
+            return {"CANCELLED"}
+        self.report({"INFO"}, rpt_("{count} poses of objects and bones have keys").format(count=count))
+        return {"FINISHED"}
+
+
+class RIGID_MOTION_OT_live_match(_WhileListening, bpy.types.Operator):
+    bl_idname = "rigid_motion.live_match"
+    bl_label = "Match Names"
+    bl_description = "Fill the table in anew: which bone of the rig each joint moves, as far as names tell"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 - Blender reads it
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        live = context.scene.rigid_motion_live
+        if live.armature is None:
+            self.report({"ERROR"}, rpt_("Choose a rig first"))
+            return {"CANCELLED"}
+        _match(live, tuple(item.name for item in live.bones), live.armature)
+        receiving.listening().look_anew()
+        return {"FINISHED"}
+
+
+class RIGID_MOTION_OT_live_send(bpy.types.Operator):
+    bl_idname = "rigid_motion.live_send"
+    bl_label = "Send Selected"
+    bl_options = {"REGISTER"}  # noqa: RUF012 - Blender reads it
+    bl_description = (
+        "Send the selected rigs as VMC performers and all other selected objects as VMC trackers, as they are seen"
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not context.selected_objects:
+            cls.poll_message_set(tip_("Select objects or rigs first"))
+        return bool(context.selected_objects) and sending.sending() is None
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        live = context.scene.rigid_motion_live
+        try:
+            sending.start(live.to_host, live.to_port, context.selected_objects)
+        except NotAllowed as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        except OSError as error:
+            text = rpt_("{host} is no address that can be sent to ({why})")
+            self.report({"ERROR"}, text.format(host=live.to_host, why=error.strerror or error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class RIGID_MOTION_OT_live_stop_sending(bpy.types.Operator):
+    bl_idname = "rigid_motion.live_stop_sending"
+    bl_label = "Stop Sending"
+    bl_options = {"REGISTER"}  # noqa: RUF012 - Blender reads it
+    bl_description = "Send nothing any more, and close the port"
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        return sending.sending() is not None
+
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        sending.stop()
+        return {"FINISHED"}
+
+
+class RIGID_MOTION_UL_live_bones(bpy.types.UIList):
+    def draw_item(
+        self,
+        context: bpy.types.Context,
+        layout: bpy.types.UILayout,
+        _data: LiveSettings,
+        item: LiveBone,
+        _icon: int,
+        _active: LiveSettings,
+        _active_property: str,
+    ) -> None:
+        split = layout.split(factor=0.45)
+        split.label(text=item.name, translate=False)
+        rig = context.scene.rigid_motion_live.armature
+        if rig is not None:
+            split.prop_search(item, "bone", rig.data, "bones", text="", icon="BONE_DATA")
+
+
+class RIGID_MOTION_PT_live(bpy.types.Panel):
+    bl_label = "Live"
+    bl_description = "Bodies from other programs, over a network: shown, recorded as keys, and sent"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = CATEGORY
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012 - Blender reads it
+
+    def draw_header(self, _context: bpy.types.Context) -> None:
+        if receiving.listening() is None:
+            self.layout.operator("rigid_motion.live_listen", text="", icon="PLAY", emboss=False)
+        else:
+            self.layout.operator("rigid_motion.live_stop", text="", icon="PAUSE", emboss=False)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, live, listening = self.layout, context.scene.rigid_motion_live, receiving.listening()
+        column = layout.column(align=True)
+        column.enabled = listening is None
+        row = column.row(align=True)
+        row.prop(live, "host", text="")
+        row.prop(live, "port", text="")
+        column.prop(live, "delay")
+        layout.prop(live, "armature")
+        if listening is None:
+            layout.operator("rigid_motion.live_listen", icon="PLAY")
+            if receiving.trouble:
+                draw_text(context, layout, receiving.trouble, "ERROR")
+            return
+        layout.operator("rigid_motion.live_stop", icon="PAUSE")
+        joints = listening.joints
+        if not joints:
+            layout.label(text="Nothing comes yet", icon="INFO")
+        for label, names in joints.items():
+            text = iface_("{count} joints") if len(names) > 1 else iface_("rigid")
+            labelled(layout, label).label(text=text.format(count=len(names)), translate=False)
+        if sum(len(names) > 1 for names in joints.values()) > 1 and live.armature:
+            layout.prop(live, "body")
+        column = layout.column(align=True)
+        column.prop(live, "mode", text="")
+        column.prop(live, "tolerance")
+        if listening.is_recording:
+            layout.operator("rigid_motion.live_finish", icon="SNAP_FACE")
+        else:
+            layout.operator("rigid_motion.live_record", icon="REC")
+
+
+class RIGID_MOTION_PT_live_bones(bpy.types.Panel):
+    bl_label = "Bones"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = CATEGORY
+    bl_parent_id = RIGID_MOTION_PT_live.__name__
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012 - Blender reads it
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        live = context.scene.rigid_motion_live
+        return live.armature is not None and len(live.bones) > 0
+
+    def draw(self, context: bpy.types.Context) -> None:
+        live = context.scene.rigid_motion_live
+        self.layout.template_list("RIGID_MOTION_UL_live_bones", "", live, "bones", live, "active_bone")
+        self.layout.operator("rigid_motion.live_match")
+
+
+class RIGID_MOTION_PT_live_send(bpy.types.Panel):
+    bl_label = "Send"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = CATEGORY
+    bl_parent_id = RIGID_MOTION_PT_live.__name__
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012 - Blender reads it
+
+    def draw(self, context: bpy.types.Context) -> None:
+        live = context.scene.rigid_motion_live
+        row = self.layout.row(align=True)
+        row.enabled = sending.sending() is None
+        row.prop(live, "to_host", text="")
+        row.prop(live, "to_port", text="")
+        if sending.sending() is None:
+            self.layout.operator("rigid_motion.live_send", icon="EXPORT")
+        else:
+            self.layout.operator("rigid_motion.live_stop_sending", icon="PAUSE")
+
+
+CLASSES = (
+    LiveBone,
+    LiveSettings,
+    RIGID_MOTION_OT_live_listen,
+    RIGID_MOTION_OT_live_stop,
+    RIGID_MOTION_OT_live_record,
+    RIGID_MOTION_OT_live_finish,
+    RIGID_MOTION_OT_live_match,
+    RIGID_MOTION_OT_live_send,
+    RIGID_MOTION_OT_live_stop_sending,
+    RIGID_MOTION_UL_live_bones,
+    RIGID_MOTION_PT_live,
+    RIGID_MOTION_PT_live_bones,
+    RIGID_MOTION_PT_live_send,
+)
+
+
+def register() -> None:
+    bpy.types.Scene.rigid_motion_live = PointerProperty(type=LiveSettings)
+
+
+def unregister() -> None:
+    receiving.stop()
+    sending.stop()
+    del bpy.types.Scene.rigid_motion_live

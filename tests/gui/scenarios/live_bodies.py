@@ -1,0 +1,138 @@
+"""A performer that another program sends moves a rig; it is recorded, played again, and reduced."""
+
+from __future__ import annotations
+
+import socket
+import time
+from importlib import import_module
+
+import bpy
+import numpy as np
+
+from rigid_motion import animation
+from tests.gui import places
+from tests.gui.driver import Hand, Steps
+from tests.gui.places import Place
+from tests.gui.scenarios.panel_notes import extension
+from tests.live.performing import JOINTS, dance, frames_of_vmc, heads_of, in_world, new_rig
+
+RATE = 60
+
+ICON = 0.12
+"""Where the panel's header has its button, as a share of the sidebar's width."""
+
+TOLERANCE = 0.002
+WITHIN = 0.005
+"""Metres: the live picture goes straight from sample to sample, of which a busy machine leaves some out."""
+
+
+class Program:
+    """Another program, that sends a performer in real time."""
+
+    def __init__(self, port: int) -> None:
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._to = ("127.0.0.1", port)
+        self._began, self._sent = time.monotonic(), 0
+        # Blender tells timers apart by identity, and a method is another object each time.
+        self._timer = self._send
+        bpy.app.timers.register(self._timer, persistent=True)
+
+    def _send(self) -> float:
+        due = int((time.monotonic() - self._began) * RATE)
+        for datagrams in frames_of_vmc(np.arange(self._sent, due) / RATE):
+            for datagram in datagrams:
+                self._socket.sendto(datagram, self._to)
+        self._sent = due
+        return 0.5 / RATE
+
+    def close(self) -> None:
+        bpy.app.timers.unregister(self._timer)
+        self._socket.close()
+
+
+def rig() -> bpy.types.Object:
+    """The rig, asked for anew each time: undo replaces it."""
+    return bpy.data.objects["Rig"]
+
+
+def off_by(moment: float) -> float:
+    """Metres by which the rig is not where the performer was."""
+    world = in_world(dance(np.array([moment]))).positions[:, 0]
+    return float(np.linalg.norm(heads_of(rig()) - world, axis=1).max())
+
+
+def keys() -> int:
+    """How many keys all bones have."""
+    return sum(len(animation.key_frames(rig().pose.bones[name])) for name in JOINTS)
+
+
+def button(hand: Hand, view: bpy.types.Area, what: str) -> Steps[Place]:
+    """Where the button of an operator is in the header of a panel of the sidebar."""
+    part = places.region(view, "UI")
+    for y in range(part.y + part.height, part.y, -10):
+        place = part.x + int(ICON * part.width), y
+        yield from hand.hover(place)
+        if hand._under_the_mouse(view, part) == f"bpy.ops.{what}":
+            return place
+    raise LookupError(f"{what} has no button in the sidebar")
+
+
+def scenario(hand: Hand) -> Steps[None]:
+    receiving = import_module(f"{extension().module}.live.receiving")
+    view = hand.area("VIEW_3D")
+    bpy.data.batch_remove(bpy.data.objects)
+    new_rig()
+    rig().select_set(True)
+    rig().show_in_front = True
+    live = bpy.context.scene.rigid_motion_live
+    live.armature, live.tolerance = rig(), TOLERANCE
+    space = view.spaces.active.region_3d
+    space.view_location, space.view_distance = (0.0, 0.0, 0.9), 4.0
+    bpy.ops.ed.undo_push(message="Rig")
+    yield from hand.open_sidebar(view, "Animation")
+    assert receiving.listening() is None, "nothing listens until it is asked to"
+
+    header = x, y = yield from button(hand, view, "rigid_motion.live_listen")
+    yield from hand.click((x + 60, y))  # the header, to unfold the panel
+    yield from hand.click(header)
+    program = Program(live.port)
+    yield from hand.wait_until(lambda: receiving.listening() and receiving.listening().joints, "the performer is heard")
+    worst = 0.0
+    for _ in range(20):
+        yield 0.05
+        (heard,) = receiving.listening()._heard.values()
+        worst = max(worst, off_by(heard.moment))
+    assert worst < WITHIN, f"{1000 * worst} mm off while live"
+    yield from hand.picture("live")
+
+    bpy.ops.rigid_motion.live_record()
+    yield 2.0
+    yield from hand.picture("recording")
+    (heard,) = receiving.listening()._heard.values()
+    origin = heard.origin
+    bpy.ops.rigid_motion.live_finish("EXEC_DEFAULT", True)
+    yield from hand.wait_until(lambda: rig().animation_data and rig().animation_data.action, "there are keys")
+    yield from hand.click(header)
+    yield from hand.wait_until(lambda: receiving.listening() is None, "the button of the header closes the port")
+    program.close()
+
+    first, last = (int(frame) for frame in rig().animation_data.action.frame_range)
+    fps = bpy.context.scene.render.fps
+
+    def replayed() -> float:
+        errors = []
+        for frame in range(first + 1, last):
+            bpy.context.scene.frame_set(frame)
+            errors.append(off_by(origin + (frame - first) / fps))
+        return max(errors)
+
+    played = replayed()
+    print(f"live {1000 * worst:.2f} mm, played again {1000 * played:.2f} mm, {keys()} keys, {last - first} frames")
+    assert played < WITHIN, f"{1000 * played} mm off when played again"
+    recorded = keys()
+    bpy.context.scene.frame_set((first + last) // 2)
+    yield from hand.picture("played-again")
+    bpy.ops.rigid_motion.reduce_keys("EXEC_DEFAULT", True, tolerance=0.01)
+    assert keys() < recorded, "Reduce Keys works on what was recorded"
+    print(f"reduced: {1000 * replayed():.2f} mm, {keys()} keys")
+    yield from hand.picture("reduced")

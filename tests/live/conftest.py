@@ -1,0 +1,42 @@
+"""The extension switched on, a port that is listened to, and somebody who sends to it."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterator
+
+import bpy
+import pytest
+
+import rigid_motion
+from tests.live.performing import Sent
+
+
+@pytest.fixture
+def extension(empty_file) -> Iterator[bpy.types.Context]:
+    """The extension as it is when Blender has switched it on."""
+    rigid_motion.register()
+    try:
+        yield empty_file
+    finally:
+        rigid_motion.unregister()
+
+
+@pytest.fixture
+def port(extension) -> int:
+    """A port that nobody has, in the settings of the scene."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as tried:
+        tried.bind(("127.0.0.1", 0))
+        number = tried.getsockname()[1]
+    extension.scene.rigid_motion_live.port = number
+    extension.scene.rigid_motion_live.delay = 0.0
+    return number
+
+
+@pytest.fixture
+def sent(port) -> Iterator[Sent]:
+    """What another program sends to a port that Blender listens to."""
+    assert bpy.ops.rigid_motion.live_listen() == {"FINISHED"}
+    sending = Sent(port)
+    yield sending
+    sending.close()

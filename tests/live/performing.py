@@ -1,0 +1,91 @@
+"""A performer for tests: a skeleton that dances, what it sends, and a rig that it can drive."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Iterable
+
+import bpy
+import numpy as np
+
+from rigid_motion.live import receiving
+from rigid_motion.motion import Poses, Skeleton
+from rigid_motion.streams import Body
+from rigid_motion.streams.paths import turned
+from rigid_motion.streams.vmc import Performer, write
+
+JOINTS = ("Hips", "Spine", "Neck", "Head", "LeftUpperArm", "LeftLowerArm", "LeftHand", "LeftUpperLeg", "LeftLowerLeg")
+JOINTS += ("LeftFoot",)
+PARENTS = np.array([-1, 0, 1, 2, 1, 4, 5, 0, 7, 8])
+PLACES = np.array(
+    [
+        *([0.0, 0.0, 0.9], [0.0, 0.0, 0.2], [0.0, 0.0, 0.3], [0.0, 0.0, 0.1], [0.2, 0.0, 0.2]),
+        *([0.3, 0.0, 0.0], [0.25, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, -0.4], [0.0, 0.0, -0.4]),
+    ]
+)
+STILL = np.tile((1.0, 0.0, 0.0, 0.0), (len(JOINTS), 1))
+REST = Poses(PLACES, STILL)
+BODY = Body("dancer", JOINTS, PARENTS, REST)
+SKELETON = Skeleton(PARENTS)
+TIMES_OF_A_SECOND = np.arange(60) / 60.0
+
+
+def dance(times: np.ndarray) -> Poses:
+    """Poses (joints, n) in their parents' space at moments (n,)."""
+    phases = np.random.default_rng(2).uniform(0.0, 6.0, (len(JOINTS), 1, 3))
+    angles = 0.5 * np.sin(2.0 * times[:, None] + phases)
+    positions = np.repeat(PLACES[:, None], len(times), axis=1)
+    positions[0] += 0.3 * np.sin(times[:, None] * (1.0, 1.4, 0.5))
+    return Poses(positions, np.array(turned(np.repeat(STILL[:, None], len(times), axis=1), angles)))
+
+
+def in_world(poses: Poses) -> Poses:
+    return SKELETON.in_root_space(poses)
+
+
+def frames_of_vmc(times: np.ndarray) -> list[list[bytes]]:
+    """The datagrams of each moment."""
+    performer, world = Performer(JOINTS, in_world(REST[:, None])[:, 0]), in_world(dance(times))
+    return [write(moment, performer(world[:, row])) for row, moment in enumerate(times.tolist())]
+
+
+class Sent:
+    """A socket that another program sends from, and the clock of the one that listens."""
+
+    def __init__(self, port: int) -> None:
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._to = ("127.0.0.1", port)
+
+    def send(self, datagrams: Iterable[bytes], now: float) -> None:
+        """Send datagrams, and have Blender look at its port as if it was so late."""
+        for datagram in datagrams:
+            self._socket.sendto(datagram, self._to)
+        time.sleep(0.001)
+        receiving.listening().tick(now)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+def new_rig(prefix: str = "", larger: float = 1.0, turned_by: float = 0.3) -> bpy.types.Object:
+    """An armature of the dancer, as large and with other names, its bones rolled anyhow."""
+    obj = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
+    bpy.context.scene.collection.objects.link(obj)
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.mode_set(mode="EDIT")
+    heads = in_world(REST[:, None])[:, 0].positions * larger
+    bones = [obj.data.edit_bones.new(prefix + name) for name in JOINTS]
+    for bone, head, parent in zip(bones, heads, PARENTS.tolist(), strict=True):
+        children = heads[JOINTS.index(bone.name.removeprefix(prefix)) == PARENTS]
+        tail = children.mean(axis=0) if len(children) else head + np.array((0.0, 0.05, 0.1))
+        bone.head, bone.tail, bone.roll = head, tail, turned_by
+        bone.parent = bones[parent] if parent >= 0 else None
+    bpy.ops.object.mode_set(mode="OBJECT")
+    return obj
+
+
+def heads_of(rig: bpy.types.Object) -> np.ndarray:
+    """Where the bones of a rig are in the world, shape (joints, 3)."""
+    bpy.context.view_layer.update()
+    return np.array([rig.matrix_world @ bone.head for bone in rig.pose.bones])

@@ -1,0 +1,245 @@
+"""Bodies that come over a network, on objects and rigs."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion.live import driving, receiving
+from rigid_motion.motion import Poses
+from rigid_motion.streams import Body, Sender
+from tests.live.performing import (
+    BODY,
+    JOINTS,
+    REST,
+    SKELETON,
+    Sent,
+    dance,
+    frames_of_vmc,
+    heads_of,
+    in_world,
+    new_rig,
+)
+from tests.rigs.human import human
+
+TIMES = np.arange(90) / 60.0
+SINGLE = 2e-6
+"""What single precision leaves of metres."""
+
+
+@pytest.fixture
+def live(extension):
+    return extension.scene.rigid_motion_live
+
+
+@pytest.mark.parametrize(("prefix", "larger", "turned_by"), [("", 1.0, 0.0), ("mixamorig:", 1.0, 0.7), ("", 1.3, 0.2)])
+def test_a_performer_moves_the_bones_of_a_rig_of_any_size_rest_and_naming(live, sent, prefix, larger, turned_by):
+    live.armature = rig = new_rig(prefix, larger, turned_by)
+    world = in_world(dance(TIMES)).positions
+    for row, datagrams in enumerate(frames_of_vmc(TIMES)[:30]):
+        sent.send(datagrams, 50.0 + TIMES[row])
+        if row:
+            assert heads_of(rig) == pytest.approx(larger * world[:, row], abs=larger * SINGLE)
+    assert [item.bone for item in live.bones] == ["", *(prefix + item.name for item in list(live.bones)[1:])]
+
+
+@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XYZ", "ZYX"])
+def test_bones_turn_in_whatever_way_they_do(live, sent, rotation_mode):
+    live.armature = rig = new_rig()
+    for bone in rig.pose.bones:
+        bone.rotation_mode = rotation_mode
+    for row, datagrams in enumerate(frames_of_vmc(TIMES)[:10]):
+        sent.send(datagrams, 50.0 + TIMES[row])
+    assert heads_of(rig) == pytest.approx(in_world(dance(TIMES)).positions[:, 9], abs=SINGLE)
+
+
+def test_a_rig_is_where_its_object_and_its_parent_put_it(live, sent):
+    live.armature = rig = new_rig()
+    rig.parent = stage = bpy.data.objects.new("Stage", None)
+    bpy.context.scene.collection.objects.link(stage)
+    stage.rotation_euler.z, stage.location.x, rig.location.y = np.pi / 2, 5.0, 1.0
+    # As importers leave them: in other axes and units.
+    rig.rotation_euler.x, rig.scale = 0.4, (0.5, 0.5, 0.5)
+    rig.data.transform(
+        rig.matrix_basis.inverted() @ bpy.data.objects["Rig"].matrix_basis.__class__.Translation((0, 1, 0))
+    )
+    for row, datagrams in enumerate(frames_of_vmc(TIMES)[:10]):
+        sent.send(datagrams, 50.0 + TIMES[row])
+    x, y, z = in_world(dance(TIMES)).positions[:, 9].T
+    assert heads_of(rig) == pytest.approx(np.stack((5.0 - (y + 1.0), x, z), axis=1), abs=4 * SINGLE)
+
+
+def test_without_a_rig_a_body_is_an_armature_with_its_rest(live, sent):
+    for row, datagrams in enumerate(frames_of_vmc(TIMES)[:10]):
+        sent.send(datagrams, 50.0 + TIMES[row])
+    (rig,) = bpy.context.scene.objects
+    assert rig.type == "ARMATURE"
+    assert {bone.name for bone in rig.data.bones} == {"Root", *JOINTS}
+    heads = dict(zip(rig.pose.bones.keys(), heads_of(rig), strict=True))
+    world = in_world(dance(TIMES)).positions[:, 9]
+    for joint, name in enumerate(JOINTS):
+        assert heads[name] == pytest.approx(world[joint], abs=SINGLE)
+
+
+def test_rigid_bodies_of_the_codec_are_objects_and_a_skeleton_moves_the_rig(live, sent):
+    live.armature = rig = new_rig()
+    ball = Body.rigid("ball")
+    sender = Sender([ball, BODY], 0.005, 0.1, rate=60.0)
+    times = np.arange(120) / 60.0
+    poses = dance(times)
+    for row, moment in enumerate(times.tolist()):
+        where = Poses([[moment, 0.0, 0.0]], [[1.0, 0.0, 0.0, 0.0]])
+        datagrams = sender.add(moment, {"ball": where, "dancer": poses[:, row]})
+        sent.send((sender.describe() if row == 0 else []) + datagrams, 50.0 + moment)
+    shown = 119 / 60 - 0.1
+    assert bpy.data.objects["ball"].location.x == pytest.approx(shown, abs=0.005)
+    expected = in_world(dance(np.array([shown]))).positions[:, 0]
+    assert np.linalg.norm(heads_of(rig) - expected, axis=1).max() < 0.006
+
+
+def test_a_rig_of_rigify_follows_by_its_controls(live, sent):
+    live.armature = rig = human()
+    for row, datagrams in enumerate(frames_of_vmc(TIMES)[:8]):
+        sent.send(datagrams, 50.0 + TIMES[row])
+    bpy.context.view_layer.update()
+    assert {item.name: item.bone for item in live.bones}["LeftUpperArm"] == "upper_arm_fk.L"
+    world = in_world(dance(TIMES))
+    for joint, control in (("LeftHand", "DEF-forearm.L.001"), ("LeftFoot", "DEF-shin.L.001")):
+        # Deforming bones point where the performer's do.
+        row = JOINTS.index(joint)
+        points = world.positions[row, 7] - world.positions[row - 1, 7]
+        bone = rig.pose.bones[control]
+        found = np.array(bone.tail - bone.head)
+        assert found / np.linalg.norm(found) == pytest.approx(points / np.linalg.norm(points), abs=0.02)
+
+
+def test_a_corrected_table_is_what_moves(live, sent):
+    live.armature = rig = new_rig()
+    frames = frames_of_vmc(TIMES)
+    for row in range(5):
+        sent.send(frames[row], 50.0 + TIMES[row])
+    live.bones[list(live.bones.keys()).index("LeftUpperArm")].bone = ""
+    rig.pose.bones["LeftUpperArm"].rotation_quaternion = (0.0, 1.0, 0.0, 0.0)
+    for row in range(5, 10):
+        sent.send(frames[row], 50.0 + TIMES[row])
+    assert rig.pose.bones["LeftUpperArm"].rotation_quaternion[1] == pytest.approx(1.0)
+    assert bpy.ops.rigid_motion.live_match() == {"FINISHED"}
+    sent.send(frames[10], 50.0 + TIMES[10])
+    assert heads_of(rig) == pytest.approx(in_world(dance(TIMES)).positions[:, 10], abs=SINGLE)
+
+
+def test_two_bodies_of_one_name_are_two(live, sent, port):
+    other = Sent(port)
+    for row, datagrams in enumerate(frames_of_vmc(TIMES)[:5]):
+        sent.send(datagrams, 50.0 + TIMES[row])
+        other.send(datagrams, 50.0 + TIMES[row])
+    other.close()
+    assert sorted(receiving.listening().joints) == ["VMC", "VMC 2"]
+    assert sorted(obj.name for obj in bpy.context.scene.objects) == ["VMC", "VMC 2"]
+
+
+def test_what_vanishes_stays_where_it_was_and_comes_back_as_the_same(live, sent, port):
+    frames = frames_of_vmc(TIMES)
+    for row in range(5):
+        sent.send(frames[row], 50.0 + TIMES[row])
+    sent.send([], 70.0)
+    assert receiving.listening().joints == {}
+    assert len(bpy.context.scene.objects) == 1
+    other = Sent(port)
+    for row in range(5):
+        other.send(frames[row], 80.0 + TIMES[row])
+    other.close()
+    assert [obj.name for obj in bpy.context.scene.objects] == ["VMC"]
+
+
+def test_what_is_deleted_stays_away_until_an_undo(live, sent):
+    frames = frames_of_vmc(TIMES)
+    for row in range(5):
+        sent.send(frames[row], 50.0 + TIMES[row])
+    bpy.data.objects.remove(bpy.data.objects["VMC"])
+    for row in range(5, 8):
+        sent.send(frames[row], 50.0 + TIMES[row])
+    assert len(bpy.context.scene.objects) == 0
+    receiving.HANDLERS["undo_post"]()
+    sent.send(frames[8], 50.0 + TIMES[8])
+    assert len(bpy.context.scene.objects) == 1
+
+
+def test_a_frame_with_keys_does_not_take_the_picture_back(live, sent):
+    live.armature = rig = new_rig()
+    bone = rig.pose.bones["LeftUpperArm"]
+    bone.keyframe_insert("rotation_quaternion", frame=1)
+    for row, datagrams in enumerate(frames_of_vmc(TIMES)[:8]):
+        sent.send(datagrams, 50.0 + TIMES[row])
+    bpy.context.scene.frame_set(2)
+    assert heads_of(rig) == pytest.approx(in_world(dance(TIMES)).positions[:, 7], abs=SINGLE)
+
+
+def test_linked_rigs_are_left_alone(live, sent, tmp_path):
+    new_rig()
+    bpy.data.libraries.write(str(tmp_path / "rig.blend"), {bpy.data.objects["Rig"]})
+    bpy.data.objects.remove(bpy.data.objects["Rig"])
+    with bpy.data.libraries.load(str(tmp_path / "rig.blend"), link=True) as (_, wanted):
+        wanted.objects = ["Rig"]
+    bpy.context.scene.collection.objects.link(wanted.objects[0])
+    live.armature = wanted.objects[0]
+    for row, datagrams in enumerate(frames_of_vmc(TIMES)[:5]):
+        sent.send(datagrams, 50.0 + TIMES[row])
+    assert receiving.trouble == ""
+
+
+def test_a_port_that_is_taken_is_named(live, port, sent):
+    receiving.stop()
+    taken = receiving.Port("127.0.0.1", port)
+    with pytest.raises(RuntimeError, match=f"Port {port} of 127.0.0.1 cannot be listened to"):
+        bpy.ops.rigid_motion.live_listen()
+    taken.close()
+    assert receiving.listening() is None
+
+
+def test_a_new_file_and_switching_off_close_the_port(live, port, sent):
+    bpy.ops.wm.read_homefile(use_empty=True)
+    assert receiving.listening() is None
+    receiving.Port("127.0.0.1", port).close()
+
+
+def test_an_error_closes_the_port_and_says_so(live, sent, monkeypatch, caplog):
+    monkeypatch.setattr(receiving.Listening, "tick", lambda *_: 1 / 0)
+    assert receiving._look() is None
+    assert receiving.listening() is None
+    assert receiving.trouble == "division by zero"
+
+
+def test_any_datagram_does_no_harm(live, sent):
+    rng = np.random.default_rng(6)
+    live.armature = new_rig()
+    sender = Sender([BODY], rate=60.0)
+    genuine = [datagram for frame in frames_of_vmc(TIMES[:5]) for datagram in frame]
+    genuine += sender.describe() + [one for row in range(60) for one in sender.add(row / 60, dance(TIMES)[:, row])]
+    for turn in range(60):
+        wrong = []
+        for _ in range(20):
+            data = bytearray(genuine[rng.integers(len(genuine))] if rng.random() < 0.9 else rng.bytes(40))
+            for _ in range(int(rng.integers(4))):
+                data[rng.integers(len(data))] ^= 1 << int(rng.integers(8))
+            wrong.append(bytes(data))
+        sent.send(wrong, 50.0 + turn / 60)
+
+
+def test_at_rest_nothing_of_a_rig_is_turned(live, sent):
+    live.armature = rig = new_rig("", 1.2, 0.5)
+    still = dance(np.zeros(1))
+    assert still.shape == (len(JOINTS), 1)
+    sender = Sender([BODY], 0.001, 0.1, rate=60.0)
+    for row in range(30):
+        sent.send((sender.describe() if row == 0 else []) + sender.add(row / 60, REST), 50.0 + row / 60)
+    for bone in rig.pose.bones:
+        assert np.array(bone.matrix_basis) == pytest.approx(np.eye(4), abs=1e-4)
+
+
+def test_the_quick_way_into_root_space_is_the_way(extension):
+    quick = driving._in_root_space(SKELETON, dance(TIMES[:7]))
+    slow = SKELETON.in_root_space(dance(TIMES[:7]))
+    assert quick.positions == pytest.approx(slow.positions)
+    assert np.abs(np.einsum("...i,...i", quick.quaternions, slow.quaternions)) == pytest.approx(1.0)

@@ -1,0 +1,162 @@
+"""What comes, as keys: at the moments that were sent by the codec, thinned from what VMC sends on every frame."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+import rigid_motion.live.receiving as receiving
+from rigid_motion.animation import channelbag_of, modes_of
+from rigid_motion.animation.transforms import transform_of
+from rigid_motion.motion import Poses
+from rigid_motion.streams import Body, Sender
+from tests.live.performing import BODY, dance, frames_of_vmc, heads_of, in_world, new_rig
+
+TIMES = np.arange(240) / 60.0
+FIRST, BEGINS = 10, 30
+"""The frame that a recording begins on, and the sample that is shown then."""
+
+TOLERANCE = 0.002
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """The time that Blender believes it is."""
+    now = [50.0]
+    monkeypatch.setattr(receiving.time, "monotonic", lambda: now[0])
+    return now
+
+
+@pytest.fixture
+def live(extension):
+    extension.scene.render.fps = 30
+    extension.scene.frame_set(FIRST)
+    return extension.scene.rigid_motion_live
+
+
+def record(sent, clock, frames: list[list[bytes]]) -> None:
+    """Send all of it, and record from one sample on."""
+    for row, datagrams in enumerate(frames):
+        clock[0] = 50.0 + TIMES[row]
+        sent.send(datagrams, clock[0])
+        if row == BEGINS:
+            assert bpy.ops.rigid_motion.live_record() == {"FINISHED"}
+    assert bpy.ops.rigid_motion.live_finish() == {"FINISHED"}
+    receiving.stop()
+
+
+def off_by(rig: bpy.types.Object, delay: float = 0.0) -> float:
+    """Metres by which a rig that is played again is off, at any sample and frame in between."""
+    world, worst = in_world(dance(TIMES)).positions, 0.0
+    for row in range(BEGINS + 1 - round(60 * delay), len(TIMES) - 20, 3):
+        frame = FIRST + (TIMES[row] - TIMES[BEGINS] + delay) * 30
+        bpy.context.scene.frame_set(int(frame), subframe=frame % 1.0)
+        worst = max(worst, float(np.linalg.norm(heads_of(rig) - world[:, row], axis=1).max()))
+    return worst
+
+
+def counts(obj: bpy.types.Object) -> list[int]:
+    """Keys of each rotation."""
+    return [len(one.keyframe_points) for one in channelbag_of(obj).fcurves if one.data_path.endswith("_quaternion")]
+
+
+@pytest.mark.parametrize("mode", ["BLENDER", "lerp_slerp", "motor_spline"])
+def test_vmc_is_thinned_within_the_tolerance_and_plays_again(live, sent, clock, mode):
+    live.armature, live.mode, live.tolerance = (rig := new_rig()), mode, TOLERANCE
+    record(sent, clock, frames_of_vmc(TIMES))
+    assert rig.animation_data.action.name == "Rig Live"
+    assert rig.animation_data.action.frame_range[0] == FIRST
+    # Blender's own in-betweens of quaternions are not the shortest way.
+    assert off_by(rig) < TOLERANCE * (1.5 if mode == "BLENDER" else 1.05)
+    assert max(counts(rig)) < 0.5 * (len(TIMES) - BEGINS)
+    assert modes_of(transform_of(rig.pose.bones["LeftUpperArm"]), [FIRST, FIRST + 30]) == [mode, mode]
+
+
+def test_what_had_come_and_was_not_shown_when_a_recording_began_is_in_it(live, sent, clock):
+    live.armature, live.mode, live.tolerance = (rig := new_rig()), "lerp_slerp", TOLERANCE
+    receiving.listening()._vmc.delay = 0.3
+    record(sent, clock, frames_of_vmc(TIMES))
+    assert off_by(rig, 0.3) < 1.05 * TOLERANCE
+
+
+def test_reduce_keys_works_on_what_was_recorded(live, sent, clock):
+    live.armature, live.mode, live.tolerance = (rig := new_rig()), "lerp_slerp", TOLERANCE
+    record(sent, clock, frames_of_vmc(TIMES))
+    before = sum(counts(rig))
+    rig.select_set(True)
+    assert bpy.ops.rigid_motion.reduce_keys(tolerance=0.02, mode="lerp_slerp") == {"FINISHED"}
+    assert sum(counts(rig)) < 0.7 * before
+    assert off_by(rig) < 0.02 + TOLERANCE
+
+
+def test_what_comes_by_the_codec_has_keys_at_the_moments_that_were_sent(live, sent, clock):
+    live.armature, live.mode = (rig := new_rig()), "lerp_slerp"
+    sender, poses, ball = Sender([BODY, Body.rigid("ball")], 0.005, 0.1, rate=60.0), dance(TIMES), []
+    frames = []
+    for row, moment in enumerate(TIMES.tolist()):
+        ball.append(Poses([[np.sin(moment), 0.0, 1.0]], [[1.0, 0.0, 0.0, 0.0]]))
+        frames.append(sender.add(moment, {"dancer": poses[:, row], "ball": ball[-1]}))
+    frames[0] = sender.describe() + frames[0]
+    record(sent, clock, frames)
+    assert off_by(rig, 0.1) < 0.006
+    (fcurve, *_) = channelbag_of(bpy.data.objects["ball"]).fcurves
+    keys = np.array([key.co[0] for key in fcurve.keyframe_points])
+    moments = TIMES[BEGINS] - 0.1 + (keys - FIRST) / 30
+    # Moments of knots lie on a grid of the sender's; the first and last are those of the recording itself.
+    assert np.ptp(np.round(moments[1:-1] * 60) - moments[1:-1] * 60) < 1e-2
+    assert 5 < len(keys) < 0.6 * len(TIMES)
+    assert counts(rig)[0] == len(keys)
+
+
+def test_an_action_that_was_there_is_kept(live, sent, clock):
+    live.armature = rig = new_rig()
+    rig.pose.bones["Head"].keyframe_insert("rotation_quaternion", frame=1)
+    before = rig.animation_data.action
+    record(sent, clock, frames_of_vmc(TIMES)[:80])
+    assert rig.animation_data.action != before
+    assert before.use_fake_user
+
+
+def test_what_never_moves_has_a_single_key(live, sent, clock):
+    live.armature = rig = new_rig()
+    frames = [frames_of_vmc(TIMES[:1] * 0)[0][:-1] + frame[-1:] for frame in frames_of_vmc(TIMES)[:60]]
+    record(sent, clock, frames)
+    assert min(counts(rig)) == 1
+
+
+def test_nothing_recorded_is_said(live, sent, clock):
+    assert bpy.ops.rigid_motion.live_record() == {"FINISHED"}
+    assert bpy.ops.rigid_motion.live_finish() == {"CANCELLED"}
+    assert not bpy.ops.rigid_motion.live_finish.poll()
+
+
+def test_what_is_deleted_while_it_is_recorded_has_no_keys_and_no_error(live, sent, clock):
+    live.armature = rig = new_rig()
+    for row, datagrams in enumerate(frames_of_vmc(TIMES)[:40]):
+        sent.send(datagrams, clock[0] + TIMES[row])
+        if row == 5:
+            bpy.ops.rigid_motion.live_record()
+        if row == 20:
+            bpy.data.objects.remove(rig)
+    assert bpy.ops.rigid_motion.live_finish() == {"CANCELLED"}
+
+
+def test_a_sender_that_begins_again_is_recorded_on(live, sent, clock):
+    live.armature = rig = new_rig()
+    first, again = Sender([BODY], rate=60.0), Sender([BODY], rate=60.0)
+    poses = dance(TIMES)
+    for row, moment in enumerate(TIMES.tolist()):
+        sender, own = (first, moment) if row < 120 else (again, moment - TIMES[120] + 900.0)
+        clock[0] = 50.0 + moment
+        begins = sender.describe() if row in (0, 120) else []
+        sent.send(begins + sender.add(own, poses[:, row]), clock[0])
+        if row == BEGINS:
+            bpy.ops.rigid_motion.live_record()
+    assert bpy.ops.rigid_motion.live_finish() == {"FINISHED"}
+    receiving.stop()
+    world = in_world(poses).positions
+    for row in (60, 100, 180, 210):
+        frame = FIRST + (TIMES[row] - TIMES[BEGINS] + 0.1) * 30
+        bpy.context.scene.frame_set(int(frame), subframe=frame % 1.0)
+        assert np.linalg.norm(heads_of(rig) - world[:, row], axis=1).max() < 0.03

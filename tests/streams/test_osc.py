@@ -1,0 +1,75 @@
+"""OSC as python-osc has it, which is somebody else's."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pythonosc.osc_bundle import OscBundle
+from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
+from pythonosc.osc_message import OscMessage
+from pythonosc.osc_message_builder import OscMessageBuilder
+
+from rigid_motion.streams import osc
+
+TYPES = ((), ("name",), ("", "abc", "abcd"), (1, -7), (0.5, -1e20), ("Hips", 0.25, 3, "ü"))
+
+
+def theirs(address: str, *arguments: object) -> OscMessage:
+    builder = OscMessageBuilder(address)
+    for argument in arguments:
+        builder.add_arg(argument)
+    return builder.build()
+
+
+@pytest.mark.parametrize("arguments", TYPES)
+def test_messages_are_the_bytes_of_the_other_implementation(arguments):
+    written = osc.write_message("/VMC/Ext/Test", *arguments)
+    assert written == theirs("/VMC/Ext/Test", *arguments).dgram
+    assert OscMessage(written).params == pytest.approx(list(arguments))
+    (read,) = osc.read(written)
+    assert read.address == "/VMC/Ext/Test"
+    assert list(read.arguments) == pytest.approx(list(arguments))
+
+
+def test_all_types_of_the_other_implementation_are_read():
+    builder = OscMessageBuilder("/all")
+    for kind, value in [("T", True), ("F", False), ("N", None), ("h", 2**40), ("d", 1 / 3), ("b", b"12345"), ("i", 4)]:
+        builder.add_arg(value, kind)
+    (read,) = osc.read(builder.build().dgram)
+    assert read.arguments == (True, False, None, 2**40, 1 / 3, b"12345", 4)
+
+
+def test_bundles_are_read_in_bundles():
+    inner, outer = OscBundleBuilder(IMMEDIATELY), OscBundleBuilder(IMMEDIATELY)
+    inner.add_content(theirs("/a", 1))
+    inner.add_content(theirs("/b", 2.0))
+    outer.add_content(inner.build())
+    outer.add_content(theirs("/c", "three"))
+    assert [message.address for message in osc.read(outer.build().dgram)] == ["/a", "/b", "/c"]
+    written = osc.write_bundle([osc.write_message("/a", 1), osc.write_message("/b", 2.0)])
+    assert [message.address for message in OscBundle(written)] == ["/a", "/b"]
+
+
+def test_what_is_said_of_time_in_the_documentation():
+    # /VMC/Ext/T (float){time}
+    data = bytes.fromhex("2f564d432f4578742f5400002c6600003dcccccd")
+    (message,) = osc.read(data)
+    assert message == ("/VMC/Ext/T", (pytest.approx(0.1),))
+    assert osc.write_message("/VMC/Ext/T", 0.1) == data
+
+
+def test_bundles_that_hold_themselves_end():
+    data = osc.write_message("/deep", 1)
+    for _ in range(50):
+        data = osc.write_bundle([data])
+    assert osc.read(data) == []
+
+
+def test_any_bytes_are_read_without_an_error():
+    rng = np.random.default_rng(3)
+    genuine = osc.write_bundle([osc.write_message("/VMC/Ext/Bone/Pos", "Hips", *([0.5] * 7))] * 3)
+    for _ in range(3000):
+        data = bytearray(genuine if rng.random() < 0.8 else b"/" + rng.bytes(int(rng.integers(200))))
+        for _ in range(int(rng.integers(1, 6))):
+            data[rng.integers(len(data))] ^= 1 << int(rng.integers(8))
+        assert len(osc.read(bytes(data[: int(rng.integers(1, len(data) + 1))]))) <= osc.MOST_MESSAGES

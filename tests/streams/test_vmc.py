@@ -1,0 +1,211 @@
+"""VMC in and out: what its documentation says, and back what was sent."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from pythonosc.osc_bundle import OscBundle
+from pythonosc.osc_message_builder import OscMessageBuilder
+
+from rigid_motion.motion import Poses, Skeleton, shell_error
+from rigid_motion.motion.quaternions import multiply, rotate
+from rigid_motion.streams import Body, osc
+from rigid_motion.streams.humanoid import HUMANOID, Retargeting, humanoid_bones, matched
+from rigid_motion.streams.vmc import (
+    JOINTS,
+    MOST_SOURCES,
+    ROOT,
+    Performer,
+    VmcReceiver,
+    from_unity,
+    to_unity,
+    write,
+)
+from tests.thoroughness import sample
+
+NAMES = ("Hips", "Spine", "Chest", "Neck", "Head", "LeftUpperArm", "LeftLowerArm", "LeftHand", "LeftUpperLeg")
+NAMES += ("LeftLowerLeg", "LeftFoot")
+PARENTS = np.array([-1, 0, 1, 2, 3, 2, 5, 6, 0, 8, 9])
+PLACES = np.array(
+    [
+        *([0.0, 0.0, 0.9], [0.0, 0.0, 0.1], [0.0, 0.0, 0.2], [0.0, 0.0, 0.2], [0.0, 0.0, 0.1]),
+        *([0.2, 0.0, 0.15], [0.3, 0.0, 0.0], [0.25, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, -0.4], [0.0, 0.0, -0.4]),
+    ]
+)
+
+
+def world(body: Body, poses: Poses) -> Poses:
+    """Poses (joints, ...) of a body in the space of its roots."""
+    return Skeleton(body.parents).in_root_space(poses)
+
+
+def about(axis: int, degrees: float) -> np.ndarray:
+    quaternion = np.zeros(4)
+    quaternion[0], quaternion[1 + axis] = math.cos(math.radians(degrees) / 2), math.sin(math.radians(degrees) / 2)
+    return quaternion
+
+
+def random_turns(count: int, seed: int = 1) -> np.ndarray:
+    turns = np.random.default_rng(seed).normal(size=(count, 4))
+    return turns / np.linalg.norm(turns, axis=1, keepdims=True)
+
+
+def frame(seed: int) -> dict[str, Poses]:
+    """A pose of all bones, in their parents' space."""
+    turns = random_turns(len(NAMES), seed)
+    return {name: Poses(PLACES[row], turns[row]) for row, name in enumerate(NAMES)}
+
+
+def heard(datagrams: list[bytes], arrival: float = 0.0, receiver: VmcReceiver | None = None) -> VmcReceiver:
+    receiver = receiver or VmcReceiver()
+    for datagram in datagrams:
+        receiver.take(datagram, arrival)
+    return receiver
+
+
+def test_unity_is_left_handed_with_y_up_and_performers_look_along_minus_y_in_blender():
+    unity = Poses([[0, 0, 1], [0, 1, 0], [1, 0, 0]], [[1, 0, 0, 0]] * 3)
+    assert from_unity(unity).positions.tolist() == [[0, -1, 0], [0, 0, 1], [-1, 0, 0]]
+    # Left-handed: a positive turn about y takes z to x, which is a performer's right.
+    turned = from_unity(Poses([[0.0, 0.0, 0.0]], [[math.cos(0.5), 0.0, math.sin(0.5), 0.0]])).quaternions[0]
+    looks = rotate(turned, np.array([0.0, -1.0, 0.0]))
+    assert looks == pytest.approx([-math.sin(1.0), -math.cos(1.0), 0.0])
+    there = Poses(np.random.default_rng(1).normal(size=(9, 3)), random_turns(9))
+    assert to_unity(from_unity(there)).positions == pytest.approx(there.positions)
+    assert to_unity(from_unity(there)).quaternions == pytest.approx(there.quaternions)
+
+
+def test_a_frame_is_what_the_documentation_says_it_is():
+    """/VMC/Ext/Bone/Pos (string){name} (float){p.x} {p.y} {p.z} {q.x} {q.y} {q.z} {q.w}, read by python-osc."""
+    datagrams = write(
+        1.5, {ROOT: Poses([0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]), "Hips": Poses([-1.0, -3.0, 2.0], about(2, 90))}
+    )
+    (bundle,) = (list(OscBundle(datagram)) for datagram in datagrams)
+    said = [(message.address, message.params) for message in bundle]
+    assert [address for address, _ in said] == ["/VMC/Ext/Root/Pos", "/VMC/Ext/Bone/Pos", "/VMC/Ext/OK", "/VMC/Ext/T"]
+    assert said[0][1] == ["root", 0, 0, 0, 0, 0, 0, 1]
+    assert said[1][1][0] == "Hips"
+    # A turn to the left about the upright is one against Unity's.
+    assert said[1][1][1:] == pytest.approx([1, 2, 3, 0, -math.sqrt(0.5), 0, math.sqrt(0.5)])
+    assert said[3][1] == [1.5]
+    assert max(map(len, write(0.0, {name: frame(1)["Hips"] for name in JOINTS}))) < 1400
+
+
+def test_what_another_program_sends_in_single_messages_is_shown():
+    def message(address: str, *arguments: object) -> bytes:
+        builder = OscMessageBuilder(address)
+        for argument in arguments:
+            builder.add_arg(argument)
+        return builder.build().dgram
+
+    receiver = VmcReceiver(delay=0.0)
+    for second in range(3):
+        datagrams = [
+            message("/VMC/Ext/OK", 1, 3, 0, 1),
+            message("/VMC/Ext/Root/Pos", "root", *[0.0] * 6, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0),
+            message("/VMC/Ext/Bone/Pos", "Hips", 0.0, 1.0, 0.1 * second, 0.0, 0.0, 0.0, 1.0),
+            message("/VMC/Ext/Bone/Pos", "Tail", 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0),
+            message("/VMC/Ext/Blend/Val", "Joy", 1.0),
+            message("/VMC/Ext/Blend/Apply"),
+            message("/VMC/Ext/T", 100.0 + 0.1 * second),
+        ]
+        heard(datagrams, 0.1 * second, receiver)
+    ((stream, shown),) = receiver.show(0.15).items()
+    assert receiver.bodies(stream)[0].joints == (ROOT, "Hips")
+    assert shown.moment == pytest.approx(100.15)
+    assert shown.poses["VMC"].positions[1] == pytest.approx([0.0, -0.15, 1.0], abs=1e-5)
+
+
+def test_without_times_a_bone_that_comes_again_begins_a_frame():
+    receiver = VmcReceiver(delay=0.0)
+    for row in range(4):
+        hips = ("Hips", 0.0, 1.0, float(row), 0.0, 0.0, 0.0, 1.0)
+        heard([osc.write_message("/VMC/Ext/Bone/Pos", *hips)], 0.1 * row, receiver)
+    (keys,) = receiver.keys()
+    assert keys.moments == pytest.approx([0.0, 0.1, 0.2])
+    assert keys.poses["VMC"].positions[:, 1, 1] == pytest.approx([0.0, -1.0, -2.0])
+
+
+def test_what_is_written_is_what_is_shown():
+    receiver = VmcReceiver(delay=0.05)
+    for row in range(20):
+        heard(write(row / 60, frame(row)), 5.0 + row / 60, receiver)
+    (keys,) = receiver.keys()
+    assert keys.moments == pytest.approx(np.arange(20) / 60, abs=1e-6)
+    body = receiver.bodies(keys.stream)[0]
+    for joint, name in enumerate(body.joints[1:], 1):
+        frames = [frame(row)[name] for row in range(20)]
+        sent = Poses([one.positions for one in frames], [one.quaternions for one in frames])
+        assert shell_error(sent, keys.poses["VMC"][:, joint], 0.1).max() < 1e-6
+    shown = receiver.show(5.0 + 19 / 60)[keys.stream]
+    assert shown.moment == pytest.approx(19 / 60 - 0.05, abs=1e-6)
+    assert receiver.show(30.0) == {}
+
+
+def skeleton(rest_turns: np.ndarray, arms_down: float, larger: float, prefix: str) -> tuple[list[str], Poses]:
+    """A skeleton at rest in root space, its bones turned anyhow, its arms held down by degrees."""
+    local = np.tile((1.0, 0.0, 0.0, 0.0), (len(NAMES), 1))
+    local[NAMES.index("LeftUpperArm")] = about(1, arms_down)
+    held = Skeleton(PARENTS).in_root_space(Poses(PLACES[:, None] * larger, local[:, None]))[:, 0]
+    return [prefix + name for name in NAMES], Poses(held.positions, multiply(held.quaternions, rest_turns))
+
+
+def test_a_skeleton_of_another_size_rest_and_naming_does_the_same():
+    joints, rest = skeleton(random_turns(len(NAMES), 5), 50.0, 1.25, "mixamorig:")
+    performer = Performer(tuple(joints), rest)
+    assert list(performer.bones) == [name for name in HUMANOID if name in NAMES]
+    # At rest its arms hang down; in a T-pose nothing is turned at all.
+    sent = performer(rest)
+    assert sent["LeftUpperArm"].quaternions == pytest.approx(about(1, 50), abs=1e-9)
+    assert sent["LeftHand"].quaternions == pytest.approx([1, 0, 0, 0], abs=1e-9)
+    receiver = heard(write(0.0, sent))
+    receiver.show(0.0)
+    (keys,) = receiver.keys()
+    body = receiver.bodies(keys.stream)[0]
+    pairs = matched(body.joints, joints)
+    assert pairs == {name: f"mixamorig:{name}" for name in body.joints if name in NAMES}
+    rows = np.array([(body.joints.index(one), joints.index(other)) for one, other in pairs.items()])
+    above = rows[:, 0].tolist()
+    parents = np.array([above.index(body.parents[row]) if body.parents[row] in above else -1 for row in above])
+    sliding = np.array([name == "Hips" for name in pairs])
+    bones = {name: row for row, name in enumerate(pairs)}
+    retarget = Retargeting(world(body, body.rest[:, None])[:, 0], rest, rows, parents, bones, sliding)
+    back = retarget(world(body, keys.poses["VMC"][0][:, None])[:, 0])
+    assert retarget.scale == pytest.approx(1.0)
+    assert np.abs(np.einsum("ij,ij->i", back.quaternions, rest.quaternions[rows[:, 1]])) == pytest.approx(1.0)
+    assert back.positions[0] == pytest.approx(rest.positions[0], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("joints", "bones"),
+    [
+        (("Hips", "LHipJoint", "LeftUpLeg", "LeftLeg", "LowerBack", "Spine", "Spine1", "Neck", "LeftArm"), 8),
+        (("pelvis", "spine_01", "spine_02", "clavicle_l", "upperarm_l", "lowerarm_l", "hand_l", "calf_r"), 8),
+        (("Bip01 Pelvis", "upper_arm.L", "forearm.L", "hand.L", "f_index.01.L", "thumb.02.R", "shin.L"), 6),
+        (("ORG-hand.L", "torso", "hips", "spine_fk", "spine_fk.001", "upper_arm_fk.L", "upper_arm_ik.L", "DEF-x"), 3),
+        (("J_Bip_C_Hips", "J_Bip_L_UpperArm", "J_Bip_R_LowerLeg"), 0),
+    ],
+)
+def test_bones_are_found_by_their_usual_names(joints, bones):
+    assert len(humanoid_bones(joints)) == bones
+
+
+def test_any_datagram_does_no_harm():
+    rng = np.random.default_rng(4)
+    genuine = [datagram for row in range(5) for datagram in write(row / 60, frame(row))]
+    receiver = VmcReceiver()
+    for row in range(len(sample(range(8000)))):
+        data = bytearray(genuine[rng.integers(len(genuine))])
+        for _ in range(int(rng.integers(0, 5))):
+            data[rng.integers(len(data))] ^= 1 << int(rng.integers(8))
+        receiver.take(bytes(data), row / 600, int(rng.integers(30)))
+        if row % 100 == 0:
+            shown = receiver.show(row / 600)
+            assert len(shown) <= MOST_SOURCES
+            for stream, what in shown.items():
+                assert np.isfinite(what.poses["VMC"].positions).all()
+                assert np.linalg.norm(what.poses["VMC"].quaternions, axis=1) == pytest.approx(1.0)
+                assert len(receiver.bodies(stream)[0].joints) == len(what.poses["VMC"])
+            receiver.keys()
