@@ -17,6 +17,7 @@ from rigid_motion_batch.cli import stream
 from rigid_motion_batch.places import CHECKOUT
 from rigid_motion_batch.streaming.vmc import Performers, ToVmc, play
 from tests.live.performing import BODY, JOINTS, TIMES_OF_A_SECOND, dance, frames_of_vmc, in_world
+from tests.scripts.streaming.test_rooms import HERE, PATIENCE, free_port, running
 
 BVH = """HIERARCHY
 ROOT Hips
@@ -48,6 +49,13 @@ Frames: 20
 Frame Time: 0.0333333
 """
 """A leg in centimetres that swings, 1.6 m."""
+
+
+def free_udp_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as tried:
+        tried.bind((HERE, 0))
+        return tried.getsockname()[1]
+
 
 HAND = "t,x,y,z,qw,qx,qy,qz\n" + "".join(f"{0.05 * row:g},{0.1 * row:g},0,1,1,0,0,0\n" for row in range(5))
 
@@ -115,7 +123,7 @@ def test_a_body_without_hips_is_refused(walk, listener, capsys):
 
 def test_playing_ends_when_it_is_stopped(walk, listener):
     options = stream.parse(["send", str(walk), "--to-vmc", "127.0.0.1:1"])
-    clip = stream.read_one(str(walk), options)
+    (clip,) = stream._read(options.recordings, options)
     began = time.monotonic()
     assert play(clip, listener.getsockname(), [15]) == 0
     assert time.monotonic() - began < 0.3
@@ -157,3 +165,45 @@ def test_what_a_receiver_shows_goes_to_another_program(listener):
         performer.take(datagram, 0.001 * row)
     (keys,) = performer.keys()
     assert keys.poses["VMC"].positions[-1, 1] == pytest.approx(in_world(poses).positions[0, -7], abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["send", "a.csv", "--from-vmc", "39539", "--room", "studio"], "and not both"),
+        (["send", "--room", "studio"], "give recordings, or --from-vmc"),
+        (["send", "a.csv", "--to-vmc", "127.0.0.1:1", "--room", "studio"], "without a room"),
+        (["send", "a.csv"], "give --room NAME"),
+        (["receive"], "give --room NAME"),
+        (["receive", "--room", "studio", "--to-vmc", "192.0.2.1:39540"], "give --network as well"),
+        (["send", "a.csv", "--to-vmc", "192.0.2.1:39540"], "give --network as well"),
+    ],
+)
+def test_what_does_not_go_together_is_said(arguments, said, capsys):
+    with pytest.raises(SystemExit) as ended:
+        stream.parse(arguments)
+    assert ended.value.code == 2
+    assert said in capsys.readouterr().err
+
+
+def test_a_performer_goes_through_a_room_to_another_program(listener):
+    room, vmc = ("--room", "studio", "--at", f"{HERE}:{free_port()}"), free_udp_port()
+    to = f"127.0.0.1:{listener.getsockname()[1]}"
+    with (
+        running("send", "--from-vmc", vmc, *room, "--user", "ada"),
+        running("receive", *room, "--user", "bob", "--to-vmc", to),
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as program,
+    ):
+        performer, ends = VmcReceiver(0.0), time.monotonic() + PATIENCE
+        frames = frames_of_vmc(np.arange(int(60 * PATIENCE)) / 60.0)
+        for datagrams in frames:
+            for datagram in datagrams:
+                program.sendto(datagram, ("127.0.0.1", vmc))
+            time.sleep(1.0 / 60.0)
+            for datagram in received(listener):
+                performer.take(datagram, time.monotonic())
+            recorded = performer.keys()
+            came = sum(len(keys.moments) for keys in recorded)
+            if came or time.monotonic() > ends:
+                break
+    assert came, "nothing came through the room"
