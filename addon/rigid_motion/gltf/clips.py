@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from ..motion import SeparateKeys
+from ..motion.skeleton_stretches import Run
 from .errors import NOWHERE, PARTS, World
 from .feet import Feet
 from .nodes import Nodes, by_target, steadied
@@ -63,6 +64,9 @@ class Options:
 
     vertices: bool = False
     """Whether the largest displacement of any vertex of a skin is measured."""
+
+    run: Run = map
+    """What has stretches of long clips searched, called as `map` is, with functions of modules."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +186,7 @@ class ClipReduction:
         """A search for the keys of nodes, but for those whose steps are kept."""
         moved = [target for target, track in self.settled.items() if len(track.times) > 1]
         steps = [node for node, path in moved if path in (TRANSLATION, ROTATION)]
-        return Search(self.world, self.settled | self.dense, np.isin(self.world.moving, steps))
+        return Search(self.world, self.settled | self.dense, np.isin(self.world.moving, steps), self.options.run)
 
     @cached_property
     def storing(self) -> tuple[frozenset[tuple[int, str]], float]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..motion import Poses, SeparateKeys, Skeleton, reduce_skeleton_keys
 from ..motion.quaternions import align_signs, from_matrices
-from ..motion.skeleton_stretches import LongRecording, keys_in_stretches
+from ..motion.skeleton_stretches import LongRecording, Run, keys_in_stretches
 from .accessors import EVERY
 from .errors import World
 from .tracks import ROTATION, TRANSLATION, Tracks
@@ -30,10 +30,12 @@ class Search:
         The tracks that are to have fewer keys, which may be less noisy than the truth.
     fixed : array of bool, shape (n,)
         Nodes whose keys are not asked for.
+    run : callable
+        What has stretches searched.
     """
 
-    def __init__(self, world: World, tracks: Tracks, fixed: np.ndarray) -> None:
-        self.world, self.tracks, self.fixed = world, tracks, fixed
+    def __init__(self, world: World, tracks: Tracks, fixed: np.ndarray, run: Run) -> None:
+        self.world, self.tracks, self.fixed, self.run = world, tracks, fixed, run
 
     def keys(self, tolerance: float) -> tuple[SeparateKeys, ...]:
         """The samples that are keys of each node."""
@@ -43,7 +45,7 @@ class Search:
         weights = np.broadcast_to(1.0, (len(world.moving), len(world.times)))
         skeleton, free = Skeleton(world.parents), ~self.fixed
         recording = LongRecording(world.times, skeleton, MODE, world.radii, weights, free, self._poses)
-        return keys_in_stretches(recording, tolerance, True, world.stretches, map)
+        return keys_in_stretches(recording, tolerance, True, world.stretches, self.run)
 
     def key_poses(self, tolerance: float) -> np.ndarray:
         """The samples that are keys of all nodes, those where stretches meet among them."""

@@ -229,7 +229,7 @@ class Reduce(Work):
         return not job.problem and (job.is_recording or not _is_gltf(job.file))
 
     def do(self, job: Job, record: Record, note: Note) -> Outcome:
-        gltf = GltfRun(self.wishes, record, note, dry_run=self.dry_run)
+        gltf = GltfRun(self.wishes, record, note, dry_run=self.dry_run, processes=self.processes)
         if not self.needs_blender(job):
             return gltf.do(job)
         from rigid_motion_batch.keying.exporting import export_file

@@ -14,6 +14,7 @@ from .output_files import FileProblem, Unreadable, refuse_read_only
 from .planning import Job, place_of
 from .records import Record
 from .sessions import Note, Outcome, stop_if_asked, tell_failure
+from .side_by_side import side_by_side
 from .wishes import Wishes, doubt, fewer, off
 
 ENDINGS = (".glb", ".gltf")
@@ -25,8 +26,8 @@ MILLIMETRES = 1e3
 class GltfRun:
     """Doing a glTF file."""
 
-    def __init__(self, wishes: Wishes, record: Record, note: Note, *, dry_run: bool) -> None:
-        self.wishes, self.dry_run = wishes, dry_run
+    def __init__(self, wishes: Wishes, record: Record, note: Note, *, dry_run: bool, processes: int = 1) -> None:
+        self.wishes, self.dry_run, self.processes = wishes, dry_run, processes
         self._record, self._note = record, note
         self._would = "would be " if dry_run else ""
 
@@ -59,7 +60,11 @@ class GltfRun:
                 self._note(f"{job.source}: no animations; left alone")
                 return
             tolerance = None if wishes.tolerance is None else wishes.tolerance.metres(per_unit)
-            report = reduced(document, Options(tolerance, wishes.radius, wishes.shared, wishes.count, wishes.vertices))
+            with side_by_side(self.processes) as run:
+                report = reduced(
+                    document,
+                    Options(tolerance, wishes.radius, wishes.shared, wishes.count, wishes.vertices, run),
+                )
         except GltfError as error:
             raise Unreadable(str(error)) from None
         stop_if_asked()

@@ -79,6 +79,8 @@ class Work(ABC):
     """Whether files that were not made of an input may be replaced."""
 
     dry_run: bool
+    processes: int = field(default=1, kw_only=True)
+    """For one input, where it has parts."""
 
     @abstractmethod
     def needs_blender(self, job: Job) -> bool: ...
@@ -94,7 +96,7 @@ class Work(ABC):
             import bpy
 
             blender = bpy.app.version_string
-        options = replace(self, overwrite=False, dry_run=False)
+        options = replace(self, overwrite=False, dry_run=False, processes=1)
         body = job.source.removeprefix(os.fspath(job.file))
         return steps.Task(keyed, (options, body, job.output.name, blender), job.title, inputs=_inputs(job))
 
@@ -179,6 +181,8 @@ def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = 
     except ExecutorError as error:
         complain(program, error)
         return 2
+    if workers is None and len(jobs) == 1 and not blender_program():
+        work = replace(work, processes=os.cpu_count() or 1)
     with (
         Progress() as progress,
         executor,
