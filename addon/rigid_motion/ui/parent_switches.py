@@ -33,7 +33,9 @@ from ..animation.live.follower import show_seen_in_channels
 from ..animation.queries.polls import with_in_betweens
 from ..animation.transforms import transform_of
 
-BUTTON = re.compile(r"^ *props = .+\('pose\.rigify_switch_parent_(?!bake_).+\n(?: *props\.\w+ = .+\n){5}", re.MULTILINE)
+BUTTON = re.compile(
+    r"^\s*props\s=\s.+\('pose\.rigify_switch_parent_(?!bake_).+\n(?:\s*props\.\w+\s=\s.+\n){5}", re.MULTILINE
+)
 
 NO_SWITCH = n_("No selected bone has both a parent that Rigify can switch and in-betweens of a mode")
 

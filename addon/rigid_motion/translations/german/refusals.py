@@ -275,4 +275,7 @@ REFUSALS = {
     "{name} is a bone, and exact between frames anyway": (
         "{name} ist ein Knochen, und zwischen Einzelbildern ohnehin genau"
     ),
+    "{name} has no operator of Rigify's: run its script {script} in the Text Editor first": (
+        "{name} hat keinen Befehl von Rigify: zuerst das Skript {script} im Texteditor ausführen"
+    ),
 }
