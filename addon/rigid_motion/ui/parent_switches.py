@@ -109,7 +109,7 @@ class RIGID_MOTION_OT_switch_parent(bpy.types.Operator):
     )
     bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
 
-    parent: EnumProperty(name="Parent", items=_parents)
+    parent: EnumProperty(name="New Parent", items=_parents)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -119,6 +119,9 @@ class RIGID_MOTION_OT_switch_parent(bpy.types.Operator):
         return False
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        if self.properties.is_property_set("parent"):
+            return self.execute(context)
+
         def draw(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
             menu.layout.operator_enum(self.bl_idname, "parent")
 

@@ -53,6 +53,7 @@ LABELS = {
     "Number": "Anzahl",
     "Hold Feet": "Füße halten",
     "Factor": "Faktor",
+    "New Parent": "Neues Elternteil",
     "On": "An",
     "Off": "Aus",
     "LMB, Enter: Confirm | Esc, RMB: Cancel | E: Overshoot ({overshoot}) | Ctrl: Steps of 10 % | "
