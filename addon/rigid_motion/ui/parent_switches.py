@@ -109,7 +109,7 @@ class RIGID_MOTION_OT_switch_parent(bpy.types.Operator):
     )
     bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
 
-    parent: EnumProperty(name="New Parent", items=_parents)
+    parent: EnumProperty(name="New Parent", items=_parents, options={"SKIP_SAVE"})
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

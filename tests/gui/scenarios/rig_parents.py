@@ -19,7 +19,8 @@ PARENTS = ["None", "Root", "Torso", "Hips", "Chest", "Head"]
 STAYS = 1e-5
 """Metres, and parts of a rotation matrix."""
 
-SWITCH = "rigid_motion.switch_parent"
+BESIDE = {"Animation": ("rigid_motion.bake", 25), "Item": ("rigify_transfer_use_all_keys", 62)}
+"""What the button is above of in each tab, and how far in pixels: which operator it calls, Blender does not tell."""
 
 
 def rig() -> bpy.types.Object:
@@ -107,8 +108,9 @@ def in_the_sidebar(hand: Hand, view: bpy.types.Area, tab: str, frame: int, to: s
     yield from hand.open_sidebar(view, tab)
     if tab == "Item":
         yield from hand.picture("item")
-    x, y = yield from hand.find_button(view, "UI", "rigid_motion.bake")
-    yield from hand.click((x, y + 25))
+    beside, above = BESIDE[tab]
+    x, y = yield from hand.find_button(view, "UI", beside)
+    yield from hand.click((x, y + above))
     name = f"{tab.lower()}-{'auto' if auto_key else 'by-hand'}"
     yield from hand.picture(f"{name}-menu")
     yield from hand.choose_row(PARENTS.index(to))
@@ -131,15 +133,19 @@ def in_the_sidebar(hand: Hand, view: bpy.types.Area, tab: str, frame: int, to: s
 
 
 def by_search(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """F3, and an entry of what pops up."""
+    """F3, which has the entries of the menu in Pose; and the menu as a shortcut opens it."""
     before = yield from go(16)
     yield from hand.hover(places.centre(places.region(view)))
-    yield from hand.search("Switch Parent on Screen")
-    yield 0.5
-    yield from hand.picture("search")
-    yield from hand.choose_row(PARENTS.index("Chest"))
+    yield from hand.search("Switch Parent on Screen Chest")
     yield from hand.wait_until(lambda: parent() == "Chest", "the hand hangs on the chest")
     assert_stays(before, "switched by F3")
+    with bpy.context.temp_override(window=hand.window, area=view, region=places.region(view)):
+        bpy.ops.rigid_motion.switch_parent("INVOKE_DEFAULT")
+    yield 0.3
+    yield from hand.picture("shortcut")
+    yield from hand.choose_row(PARENTS.index("Hips"))
+    yield from hand.wait_until(lambda: parent() == "Hips", "the hand hangs on the hips")
+    assert_stays(before, "switched by a shortcut")
 
 
 def apply_and_switch(hand: Hand, view: bpy.types.Area) -> Steps[None]:
