@@ -232,6 +232,14 @@ def test_without_rigify_s_operator_the_hand_stays_as_it_is_and_one_line_says_wha
     assert np.abs(seen(rig) - before).max() < 1e-6
 
 
+def test_a_script_that_names_no_parent_does_nothing(rig):
+    choose(rig, HAND)
+    go(11)
+    before = seen(rig)
+    assert bpy.ops.rigid_motion.switch_parent("EXEC_DEFAULT", True) == {"CANCELLED"}
+    assert np.abs(seen(rig) - before).max() < 1e-6
+
+
 BUTTON = """
                 props = group2.operator('pose.rigify_switch_parent_abc', text="Bob's", icon='DOWNARROW_HLT')
                 props.bone = 'hand'

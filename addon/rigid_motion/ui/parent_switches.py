@@ -96,7 +96,9 @@ def _parents(_operator: object, context: bpy.types.Context | None) -> list[tuple
         present = context.active_object.pose.bones[switch.prop_bone][switch.prop_id]
         for number, name in enumerate(switch.parents):
             icon = "CHECKMARK" if number == present else "BLANK1"
-            _items.append((json.dumps((*switch[2:5], number)), name, "", icon, len(_items)))
+            _items.append(
+                (json.dumps((switch.bone, switch.prop_bone, switch.prop_id, number)), name, "", icon, len(_items))
+            )
     return _items
 
 
@@ -129,20 +131,25 @@ class RIGID_MOTION_OT_switch_parent(bpy.types.Operator):
         return {"INTERFACE"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
+        if not self.parent:
+            return {"CANCELLED"}
         rig, (*names, number) = context.active_object, json.loads(self.parent)
-        switch = next(one for one in switches_of(context) if [*one[2:5]] == names)
+        switch = next(one for one in switches_of(context) if [one.bone, one.prop_bone, one.prop_id] == names)
         operator = bpy.types.Operator.bl_rna_get_subclass_py(f"POSE_OT_{switch.operator}")
         if operator is None:
             text = rpt_("{name} has no operator of Rigify's: run its script {script} in the Text Editor first")
             self.report({"ERROR"}, text.format(name=rig.name, script=rig["rig_ui"].name))
             return {"CANCELLED"}
-        settings = {**switch._asdict(), "report": self.report}
+        settings = switch._asdict()
         del settings["label"], settings["operator"]
-        # Until it has read the names of the parents, as when it is invoked, it takes none of them.
-        operator.init_invoke(SimpleNamespace(**settings), context)
-        del settings["report"]
+        # Before it has read the names of the parents, as where it is invoked, it takes none of them.
+        operator.init_invoke(SimpleNamespace(**settings, report=self.report), context)
         show_seen_in_channels([transform_of(rig.pose.bones[switch.bone])])
-        return getattr(bpy.ops.pose, switch.operator)("EXEC_DEFAULT", selected=str(number), **settings)
+        try:
+            return getattr(bpy.ops.pose, switch.operator)("EXEC_DEFAULT", selected=str(number), **settings)
+        except RuntimeError as error:
+            self.report({"ERROR"}, str(error).strip())
+            return {"FINISHED"}
 
 
 def draw_parent_switch(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
