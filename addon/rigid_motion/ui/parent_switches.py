@@ -111,7 +111,9 @@ class RIGID_MOTION_OT_switch_parent(bpy.types.Operator):
     )
     bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
 
-    parent: EnumProperty(name="New Parent", items=_parents, options={"SKIP_SAVE"})
+    parent: EnumProperty(
+        name="New Parent", description="What the control is to hang on", items=_parents, options={"SKIP_SAVE"}
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

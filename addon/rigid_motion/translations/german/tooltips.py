@@ -374,6 +374,7 @@ TOOLTIPS = {
         "Das Elternteil eines Steuerknochens von Rigify wechseln, der bleibt, wo er zu sehen ist. "
         "Rigifys eigener Befehl nimmt Blenders Zwischenbild"
     ),
+    "What the control is to hang on": "Woran der Steuerknochen hängen soll",
     "No selected bone has both a parent that Rigify can switch and in-betweens of a mode": (
         "Kein ausgewählter Knochen hat ein Elternteil, das Rigify wechseln kann, und Zwischenbilder eines Modus"
     ),
