@@ -118,18 +118,18 @@ def test_a_switch_that_is_keyed_later_is_kept_as_it_was_seen(rig, extension):
     assert np.abs(seen(rig) - before).max() < STAYS
 
 
-def test_rigify_s_own_operator_moves_the_hand(rig, auto_key):
+def test_rigify_s_own_operator_moves_the_hand(rig):
     """If this fails, ours is not needed any more."""
     choose(rig, HAND)
     go(11)
     (one,) = switches_of(bpy.context)
-    bpy.ops.rigid_motion.switch_parent("EXEC_DEFAULT", True, parent=_choice(one, "Root"))
+    switch("Root")  # Rigify's has the names of the parents from then on
     go(12)
     go(11)
     before = seen(rig)
     settings = dict(zip(one._fields[2:], one[2:], strict=True))
     getattr(bpy.ops.pose, one.operator)("EXEC_DEFAULT", True, selected=str(PARENTS["Head"]), **settings)
-    assert (np.abs(seen(rig) - before).max() > 0.05) != auto_key
+    assert np.abs(seen(rig) - before).max() > 0.05
 
 
 def test_what_was_moved_by_hand_stays_there(rig, auto_key):
@@ -141,7 +141,7 @@ def test_what_was_moved_by_hand_stays_there(rig, auto_key):
     assert np.abs(seen(rig) - before).max() < STAYS
 
 
-def test_on_a_key_and_with_blender_s_in_betweens_beside_it_a_control_stays(rig, auto_key):
+def test_on_a_key_the_hand_stays_too(rig, auto_key):
     choose(rig, HAND, TORSO)
     go(KEYS[1])
     before = seen(rig)
@@ -163,12 +163,11 @@ def test_of_a_pole_the_place_stays(rig, auto_key):
 def test_the_torso_stays_with_all_that_hangs_on_it(rig, auto_key):
     choose(rig, TORSO)
     go(11)
-    key_at = rig.pose.bones["root"]
-    key_at.location.x = 0.5
-    before = seen(rig, "head"), seen(rig, TORSO)
+    rig.pose.bones["root"].location.x = 0.5
+    torso, head = seen(rig, TORSO), seen(rig, "head")
     switch("None", TORSO)
-    assert np.abs(seen(rig, TORSO) - before[1]).max() < STAYS
-    assert np.abs(seen(rig, "head") - before[0]).max() < STAYS
+    assert np.abs(seen(rig, TORSO) - torso).max() < STAYS
+    assert np.abs(seen(rig, "head") - head).max() < STAYS
 
 
 def test_a_switch_is_one_step_back_and_forth(rig, auto_key):
@@ -193,10 +192,9 @@ def test_a_switch_is_one_step_back_and_forth(rig, auto_key):
 
 def test_the_visual_transform_applied_after_switches_leaves_the_hand_where_it_is(rig, auto_key):
     choose(rig, HAND)
-    for frame in (16, 6):
+    for frame, parent in ((16, "Head"), (6, "Torso")):
         go(frame)
-        before = seen(rig)
-        switch("Head" if frame == 16 else "Torso")
+        switch(parent)
         go(frame + 2)
         before = seen(rig)
         bpy.ops.pose.visual_transform_apply("EXEC_DEFAULT", True)

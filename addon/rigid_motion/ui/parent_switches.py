@@ -34,7 +34,8 @@ from ..animation.queries.polls import with_in_betweens
 from ..animation.transforms import transform_of
 
 BUTTON = re.compile(
-    r"^\s*props\s=\s.+\('pose\.rigify_switch_parent_(?!bake_).+\n(?:\s*props\.\w+\s=\s.+\n){5}", re.MULTILINE
+    r"^[\x20\t]*props\x20=\x20.+\('pose\.rigify_switch_parent_(?!bake_).+\n(?:[\x20\t]*props\.\w+\x20=\x20.+\n){5}",
+    re.MULTILINE,
 )
 
 NO_SWITCH = n_("No selected bone has both a parent that Rigify can switch and in-betweens of a mode")
