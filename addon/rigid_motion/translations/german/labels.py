@@ -105,7 +105,7 @@ OF_OPERATORS = {
     "Refresh In-Betweens": "Zwischenbilder aktualisieren",
     "Copy Pose on Screen": "Sichtbare Pose kopieren",
     "Create Pose Asset on Screen": "Posen-Asset der sichtbaren Pose erstellen",
-    "Switch Parent on Screen": "Elternteil wechseln (sichtbare Pose)",
+    "Switch Parent on Screen": "Elternteil sichtbar wechseln",
     "Pie Menu": "Kreismenü",
     "Documentation": "Dokumentation",
     "Website": "Website",
