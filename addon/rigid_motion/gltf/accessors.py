@@ -6,7 +6,7 @@ the specification has it (glTF 2.0, sections 3.6 and 3.11): -1 to 1, or 0 to 1.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -37,7 +37,7 @@ class Rows:
     """How many rows there are, each of as many elements as make it."""
 
     shape: tuple[int, ...]
-    order: list[int] | slice = EVERY
+    order: list[int] | slice = field(default_factory=lambda: EVERY)
     """Of the columns."""
 
     def __len__(self) -> int:

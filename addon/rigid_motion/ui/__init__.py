@@ -3,7 +3,7 @@
 targets      the transforms and keys an editor means    operators    what can be done to them
 on_targets   what these operators have in common        reducing     fewer keys, and all of them again
 keymap       shortcuts
-pose_operators  Blender's operators, with the pose that is seen
+pose_operators  Blender's operators, with the pose that is seen; parent_switches has Rigify's
 menus        entries in Blender's menus, and the pies   panels       the sidebar
 rows         its lines, aligned                         notes        what the panel notes on a target
 shown        the transform seen on the screen           overlay      paths in the viewport
@@ -31,6 +31,7 @@ from . import (
     operators,
     overlay,
     panels,
+    parent_switches,
     pose_operators,
     preferences,
     reducing,
@@ -45,6 +46,7 @@ CLASSES = (
     *breakdown.CLASSES,
     *exactness.CLASSES,
     *pose_operators.CLASSES,
+    *parent_switches.CLASSES,
     *reducing.CLASSES,
     *gltf_export.CLASSES,
     *menus.CLASSES,

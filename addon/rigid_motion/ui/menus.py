@@ -13,6 +13,7 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ..animation.transforms import OWN_WORDS
 from .gltf_export import RIGID_MOTION_OT_export_gltf
+from .parent_switches import draw_parent_switch
 from .pose_operators import RIGID_MOTION_OT_copy_pose, RIGID_MOTION_OT_create_pose_asset
 from .targets import CURRENT, SELECTED, WHOLE, active_target, is_posing, modes_meant
 from .wording import LABELS, SHORT_LABELS
@@ -186,10 +187,11 @@ def _draw_in_betweens(self: bpy.types.Menu, _context: bpy.types.Context) -> None
     _draw_breakdowns(self.layout)
 
 
-def _draw_copy(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+def _draw_copy(self: bpy.types.Menu, context: bpy.types.Context) -> None:
     self.layout.separator()
     self.layout.operator(RIGID_MOTION_OT_copy_pose.bl_idname, icon="COPYDOWN")
     self.layout.operator(RIGID_MOTION_OT_create_pose_asset.bl_idname)
+    draw_parent_switch(self.layout, context)
 
 
 def _draw_copy_and_view(self: bpy.types.Menu, context: bpy.types.Context) -> None:

@@ -17,6 +17,7 @@ from ..animation.queries.segments import SegmentFacts, parts_with_in_betweens
 from ..animation.transforms import ORIGINALS, OWN_WORDS, Refused, Transform
 from . import exactness, overlay
 from .notes import facts_and_notes
+from .parent_switches import RIGID_MOTION_OT_switch_parent, draw_parent_switch
 from .rows import draw_text, labelled
 from .targets import (
     CURRENT,
@@ -72,6 +73,7 @@ class _Main:
             layout.operator("rigid_motion.refresh")
         if any(trouble in notes for trouble in TROUBLES.values()):
             layout.operator("rigid_motion.mend")
+        draw_parent_switch(layout, context)
         row = layout.row(align=True)
         row.operator("rigid_motion.bake", text="Bake...")
         row.operator("rigid_motion.unbake")
@@ -102,6 +104,22 @@ class _Shown:
                 # A scale without in-betweens is that of the Item tab.
                 if name != SCALE or name in parts:
                     column.prop(context.window_manager.rigid_motion_shown, prop)
+
+
+class RIGID_MOTION_PT_parent_switch(bpy.types.Panel):
+    """Where Rigify's own panel is, whose *Switch Parent* takes Blender's in-between."""
+
+    bl_label = "Rigid Motion"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Item"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return RIGID_MOTION_OT_switch_parent.poll(context)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        draw_parent_switch(self.layout, context)
 
 
 class _Path:
@@ -198,4 +216,4 @@ def _panels() -> Iterator[type[bpy.types.Panel]]:
         yield _in_space(_Path, space, main)
 
 
-CLASSES = tuple(_panels())
+CLASSES = (*_panels(), RIGID_MOTION_PT_parent_switch)

@@ -199,3 +199,20 @@ def test_undo_brings_back_a_whole_pose_as_it_was_seen(rig, live_file):
     assert np.abs(placed(rig) - copied).max() < 2e-5
     insert_keys(rig)
     assert np.abs(placed(rig) - copied).max() < 2e-5
+
+
+@pytest.mark.parametrize("then", ["looked at", "keyed", "another frame"])
+def test_undo_brings_back_the_in_between_that_was_seen_before_a_whole_pose(rig, live_file, then):
+    bpy.ops.ed.undo_push(message="Begin")
+    seen = placed(rig)
+    as_an_animator(bpy.ops.pose.visual_transform_apply)
+    with bpy.context.temp_override(mode="OBJECT"):
+        assert bpy.ops.ed.undo() == {"FINISHED"}
+    rig = bpy.data.objects["Rig"]
+    if then == "another frame":
+        live_file.scene.frame_set(BETWEEN + 1)
+        live_file.scene.frame_set(BETWEEN)
+    assert np.abs(placed(rig) - seen).max() < 1e-6
+    if then == "keyed":
+        insert_keys(rig)
+        assert np.abs(placed(rig) - seen).max() < 2e-5

@@ -278,6 +278,7 @@ class Follower:
         if depsgraph.id_type_updated("OBJECT") or depsgraph.id_type_updated("SCENE"):
             self.refresh_objects(depsgraph, seen)
         self.left.forget_assignments()
+        self.inserted.forget_undo()
 
     def before_frame(self, scene: bpy.types.Scene, *_: object) -> None:
         self.channels.put_back()
@@ -295,6 +296,7 @@ class Follower:
         self.waiting = []
         self.inserted.forget_poses()
         self.left.forget_assignments()
+        self.inserted.forget_undo()
         self.frame = scene.frame_current_final
         if is_baking():
             with self.turn() as is_first:
@@ -309,6 +311,7 @@ class Follower:
         for obj in filter(uses_modes, bpy.data.objects):
             for place in filled_places_of(obj) if obj.is_editable else ():
                 for transform in place.users:
+                    self.inserted.notice_undo(transform)
                     if self.inserted.is_whole_again(transform, self.frame):
                         writer_of(place).hide(place, transform)
 

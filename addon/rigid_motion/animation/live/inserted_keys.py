@@ -127,6 +127,8 @@ class InsertedKeys:
         self._posed: dict[tuple[int, str], _Posed] = {}
         self._whole: OrderedDict[tuple[tuple[int, str], bytes], _Posed] = OrderedDict()
         """The whole poses that undo and redo can bring back, by the transform and the components."""
+        self._undone: dict[tuple[int, str], bytes] = {}
+        """The components that undo or redo has given transforms, which have not been evaluated since."""
         self._new: defaultdict[SlotTransform, list[_NewKey]] = defaultdict(list)
         """The keys that were inserted in each place, as each of its users may have them, while edits are looked at."""
         self._insertions: list[Insertion] = []
@@ -179,6 +181,14 @@ class InsertedKeys:
             if len(self._whole) > MOST_WHOLE:
                 self._whole.popitem(last=False)
 
+    def notice_undo(self, transform: Transform) -> None:
+        """Undo or redo gave a transform its properties: nobody has set them, though others were evaluated."""
+        self._undone[_identity(transform)] = transform.components().tobytes()
+
+    def forget_undo(self) -> None:
+        """All has been evaluated since."""
+        self._undone.clear()
+
     def is_whole_again(self, transform: Transform, frame: float) -> bool:
         """Whether undo or redo brought a whole pose back that was put on a transform on this frame."""
         posed = self._whole.get((_identity(transform), transform.components().tobytes()))
@@ -223,7 +233,7 @@ class InsertedKeys:
             evaluated is not None and tuple(getattr(carrier, prop)) != tuple(getattr(evaluated, prop))
             for prop in ("location", transform.rotation, "scale")
         )
-        if not changed:
+        if not changed or self._undone.get(_identity(transform)) == transform.components().tobytes():
             return False
         is_whole = self._is_shown_whole(transform) or operators.are_any(transform.stored_by)
         if not is_whole and not transform.matrix_lacks_difference and operators.is_script:

@@ -47,6 +47,7 @@ class BoneTransform(Transform):
         "POSE_OT_visual_transform_apply",
         "POSE_OT_transforms_clear",
         "POSE_OT_rigify_",
+        "RIGID_MOTION_OT_switch_parent",
     )
     matrix_lacks_difference = False
 

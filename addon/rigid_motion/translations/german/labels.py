@@ -53,6 +53,7 @@ LABELS = {
     "Number": "Anzahl",
     "Hold Feet": "Füße halten",
     "Factor": "Faktor",
+    "New Parent": "Neues Elternteil",
     "On": "An",
     "Off": "Aus",
     "LMB, Enter: Confirm | Esc, RMB: Cancel | E: Overshoot ({overshoot}) | Ctrl: Steps of 10 % | "
@@ -116,6 +117,7 @@ OF_OPERATORS = {
     "Refresh In-Betweens": "Zwischenbilder aktualisieren",
     "Copy Pose on Screen": "Sichtbare Pose kopieren",
     "Create Pose Asset on Screen": "Posen-Asset der sichtbaren Pose erstellen",
+    "Switch Parent on Screen": "Elternteil sichtbar wechseln",
     "Pie Menu": "Kreismenü",
     "Documentation": "Dokumentation",
     "Website": "Website",

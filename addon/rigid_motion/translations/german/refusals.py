@@ -287,4 +287,7 @@ REFUSALS = {
     ),
     "{host} is no address that can be sent to ({why})": "{host} ist keine Adresse, an die man senden kann ({why})",
     "Choose a rig first": "Zuerst ein Rig auswählen",
+    "{name} has no operator of Rigify's: run its script {script} in the Text Editor first": (
+        "{name} hat keinen Befehl von Rigify: zuerst das Skript {script} im Texteditor ausführen"
+    ),
 }

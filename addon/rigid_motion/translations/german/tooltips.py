@@ -369,6 +369,15 @@ TOOLTIPS = {
     "No selected bone is on an in-between: Blender's own operator does the same": (
         "Kein ausgewählter Knochen ist auf einem Zwischenbild: Blenders eigener Befehl tut dasselbe"
     ),
+    "Switch the parent of a control of Rigify, which stays where you see it. "
+    "Rigify's own operator takes Blender's in-between": (
+        "Das Elternteil eines Steuerknochens von Rigify wechseln, der bleibt, wo er zu sehen ist. "
+        "Rigifys eigener Befehl nimmt Blenders Zwischenbild"
+    ),
+    "What the control is to hang on": "Woran der Steuerknochen hängen soll",
+    "No selected bone has both a parent that Rigify can switch and in-betweens of a mode": (
+        "Kein ausgewählter Knochen hat ein Elternteil, das Rigify wechseln kann, und Zwischenbilder eines Modus"
+    ),
     "None of these objects is baked": "Keines dieser Objekte ist gebacken",
     "None of these bones is baked": "Keiner dieser Knochen ist gebacken",
     "None of these objects and bones is baked": "Keines dieser Objekte und keiner dieser Knochen ist gebacken",

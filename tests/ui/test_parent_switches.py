@@ -1,0 +1,284 @@
+"""Rigify's human: parents switched between two keys. What is held stays where it is seen."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Euler
+
+from rigid_motion.animation import key_frames, set_mode
+from rigid_motion.ui.parent_switches import Switch, switches_in, switches_of
+from tests.animation.bones.rigs import select_only
+from tests.animation.oracle import rotation_path
+
+HAND, TORSO, POLE = "hand_ik.L", "torso", "upper_arm_ik_target.L"
+PARENTS = {"None": 0, "Root": 1, "Torso": 2, "Hips": 3, "Chest": 4, "Head": 5}
+KEYS = 1, 21
+STAYS = 1e-5
+"""Meters, and parts of axes."""
+
+
+@pytest.fixture
+def rig(human, extension) -> Iterator[bpy.types.Object]:
+    """The human in Pose Mode with its own operators, a screw on the left hand, on its pole and on the torso."""
+    script = human["rig_ui"].as_module()
+    select_only(human)
+    bpy.ops.object.mode_set(mode="POSE")
+    key(human, HAND, (0.3, -0.2, 0.4), (0.9, 0.7, 1.2))
+    key(human, POLE, (0.1, 0.2, -0.2), (0.4, 0.2, 0.0))
+    key(human, TORSO, (0.2, 0.3, 0.1), (0.2, 0.5, 1.4))
+    yield human
+    script.unregister()
+
+
+def key(rig: bpy.types.Object, name: str, location: tuple, angles: tuple) -> None:
+    bone = rig.pose.bones[name]
+    bone.rotation_mode = "QUATERNION"
+    for frame, part in zip(KEYS, (0.0, 1.0), strict=True):
+        bone.location = np.multiply(location, part)
+        bone.rotation_quaternion = Euler(np.multiply(angles, part)).to_quaternion()
+        for path in ("location", "rotation_quaternion", "scale"):
+            bone.keyframe_insert(path, frame=frame)
+    set_mode(bone, "dq_sclerp")
+    choose(rig, name)
+
+
+def choose(rig: bpy.types.Object, *names: str) -> None:
+    for bone in rig.pose.bones:
+        (bone if bpy.app.version >= (5, 0) else bone.bone).select = bone.name in names
+    rig.data.bones.active = rig.data.bones[names[0]]
+
+
+def seen(rig: bpy.types.Object, name: str = HAND) -> np.ndarray:
+    bpy.context.view_layer.update()
+    return np.array(rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones[name].matrix)
+
+
+def go(frame: int) -> None:
+    bpy.context.scene.frame_set(frame)
+
+
+def switch(parent: str, bone: str = HAND) -> set[str]:
+    """As the menu does."""
+    one = next(one for one in switches_of(bpy.context) if one.bone == bone)
+    return bpy.ops.rigid_motion.switch_parent("EXEC_DEFAULT", True, parent=_choice(one, parent))
+
+
+def _choice(one: Switch, parent: str) -> str:
+    return json.dumps((one.bone, one.prop_bone, one.prop_id, one.parents.index(parent)))
+
+
+def is_keyed(rig: bpy.types.Object, frame: int) -> bool:
+    return frame in key_frames(rig.pose.bones[HAND])
+
+
+@pytest.fixture(params=[False, True], ids=["Auto Key off", "Auto Key on"])
+def auto_key(request, extension) -> bool:
+    extension.scene.tool_settings.use_keyframe_insert_auto = request.param
+    return request.param
+
+
+@pytest.fixture(params=[False, True], ids=["the switch without keys", "the switch keyed"])
+def keyed_switch(request, rig) -> None:
+    """What the parent is goes by keys or not: where it does, Auto Key sets more."""
+    if request.param:
+        path = 'pose.bones["upper_arm_parent.L"]["IK_parent"]'
+        assert rig.keyframe_insert(path, frame=KEYS[0])
+
+
+def test_between_keys_the_hand_stays_when_parents_are_switched(rig, auto_key, keyed_switch):
+    choose(rig, HAND)
+    for frame in (6, 11, 16):
+        go(frame)
+        for parent in ("Torso", "Head", "None"):
+            before = seen(rig)
+            assert switch(parent) == {"FINISHED"}
+            assert rig.pose.bones["upper_arm_parent.L"]["IK_parent"] == PARENTS[parent]
+            assert np.abs(seen(rig) - before).max() < STAYS
+            assert is_keyed(rig, frame) == auto_key
+            if auto_key:
+                go(frame + 1)
+                go(frame)
+                assert np.abs(seen(rig) - before).max() < STAYS
+
+
+def test_a_switch_that_is_keyed_later_is_kept_as_it_was_seen(rig, extension):
+    choose(rig, HAND)
+    go(11)
+    before = seen(rig)
+    switch("Chest")
+    for path in ("location", rotation_path(rig.pose.bones[HAND]), "scale"):
+        rig.pose.bones[HAND].keyframe_insert(path)
+    go(12)
+    go(11)
+    assert np.abs(seen(rig) - before).max() < STAYS
+
+
+def test_rigify_s_own_operator_moves_the_hand(rig):
+    """If this fails, ours is not needed any more."""
+    choose(rig, HAND)
+    go(11)
+    (one,) = switches_of(bpy.context)
+    switch("Root")  # Rigify's has the names of the parents from then on
+    go(12)
+    go(11)
+    before = seen(rig)
+    settings = dict(zip(one._fields[2:], one[2:], strict=True))
+    getattr(bpy.ops.pose, one.operator)("EXEC_DEFAULT", True, selected=str(PARENTS["Head"]), **settings)
+    assert np.abs(seen(rig) - before).max() > 0.05
+
+
+def test_what_was_moved_by_hand_stays_there(rig, auto_key):
+    choose(rig, HAND)
+    go(11)
+    bpy.ops.transform.translate("EXEC_DEFAULT", True, value=(0.1, 0.2, 0.0))
+    before = seen(rig)
+    switch("Head")
+    assert np.abs(seen(rig) - before).max() < STAYS
+
+
+def test_on_a_key_the_hand_stays_too(rig, auto_key):
+    choose(rig, HAND, TORSO)
+    go(KEYS[1])
+    before = seen(rig)
+    switch("Head")
+    assert np.abs(seen(rig) - before).max() < STAYS
+
+
+def test_of_a_pole_the_place_stays(rig, auto_key):
+    rig.pose.bones["upper_arm_parent.L"]["pole_vector"] = True  # it is hidden otherwise
+    bpy.context.view_layer.update()
+    choose(rig, POLE)
+    go(11)
+    before = seen(rig, POLE)
+    for parent in ("Torso", "None", "hand_ik.L"):
+        switch(parent, POLE)
+        assert np.abs(seen(rig, POLE) - before)[:3, 3].max() < STAYS
+
+
+def test_the_torso_stays_with_all_that_hangs_on_it(rig, auto_key):
+    choose(rig, TORSO)
+    go(11)
+    rig.pose.bones["root"].location.x = 0.5
+    torso, head = seen(rig, TORSO), seen(rig, "head")
+    switch("None", TORSO)
+    assert np.abs(seen(rig, TORSO) - torso).max() < STAYS
+    assert np.abs(seen(rig, "head") - head).max() < STAYS
+
+
+def test_a_switch_is_one_step_back_and_forth(rig, auto_key):
+    choose(rig, HAND)
+    go(11)
+    bpy.ops.ed.undo_push(message="Begin")
+    before = seen(rig)
+    switch("Head")
+    with bpy.context.temp_override(mode="OBJECT"):
+        bpy.ops.ed.undo()
+    rig = bpy.data.objects["rig"]
+    assert rig.pose.bones["upper_arm_parent.L"]["IK_parent"] == PARENTS["Root"]
+    assert np.abs(seen(rig) - before).max() < STAYS
+    assert not is_keyed(rig, 11)
+    with bpy.context.temp_override(mode="OBJECT"):
+        bpy.ops.ed.redo()
+    rig = bpy.data.objects["rig"]
+    assert rig.pose.bones["upper_arm_parent.L"]["IK_parent"] == PARENTS["Head"]
+    assert np.abs(seen(rig) - before).max() < STAYS
+    assert is_keyed(rig, 11) == auto_key
+
+
+def test_the_visual_transform_applied_after_switches_leaves_the_hand_where_it_is(rig, auto_key):
+    choose(rig, HAND)
+    for frame, parent in ((16, "Head"), (6, "Torso")):
+        go(frame)
+        switch(parent)
+        go(frame + 2)
+        before = seen(rig)
+        bpy.ops.pose.visual_transform_apply("EXEC_DEFAULT", True)
+        assert np.abs(seen(rig) - before).max() < STAYS
+
+
+def test_switches_are_offered_of_selected_bones_with_a_mode(rig):
+    offered = bpy.ops.rigid_motion.switch_parent.poll
+    for names in ((HAND,), ("upper_arm_parent.L", "head"), (TORSO,)):
+        choose(rig, *names)
+        assert offered()
+    choose(rig, "hand_ik.R")
+    assert not offered()
+    choose(rig, HAND)
+    set_mode(rig.pose.bones[HAND], "BLENDER")
+    assert not offered()
+    choose(rig, TORSO)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert not offered()
+
+
+def test_without_rigify_s_operator_the_hand_stays_as_it_is_and_one_line_says_what_to_do(rig, extension):
+    choose(rig, HAND)
+    go(11)
+    (one,) = switches_of(extension)
+    before = seen(rig)
+    operator = bpy.types.Operator.bl_rna_get_subclass_py(f"POSE_OT_{one.operator}")
+    bpy.utils.unregister_class(operator)
+    with pytest.raises(RuntimeError, match=r"run its script rig_ui\.py in the Text Editor") as refusal:
+        switch("Head")
+    bpy.utils.register_class(operator)
+    assert str(refusal.value).strip().count("\n") == 0
+    assert np.abs(seen(rig) - before).max() < 1e-6
+
+
+def test_a_script_that_names_no_parent_does_nothing(rig):
+    choose(rig, HAND)
+    go(11)
+    before = seen(rig)
+    assert bpy.ops.rigid_motion.switch_parent("EXEC_DEFAULT", True) == {"CANCELLED"}
+    assert np.abs(seen(rig) - before).max() < 1e-6
+
+
+BUTTON = """
+                props = group2.operator('pose.rigify_switch_parent_abc', text="Bob's", icon='DOWNARROW_HLT')
+                props.bone = 'hand'
+                props.prop_bone = 'arm'
+                props.prop_id = 'IK_parent'
+                props.parent_names = '["None", "Root"]'
+                props.locks = (False, True, False)
+                group2.prop(pose_bones['arm'], '["IK_parent"]', text='')
+"""
+
+
+def test_buttons_are_read_from_the_script_of_a_rig():
+    (one,) = switches_in(BUTTON)
+    assert one.label == "Bob's"
+    assert one.operator == "rigify_switch_parent_abc"
+    assert one.parents == ["None", "Root"]
+    assert one[2:5] == ("hand", "arm", "IK_parent")
+    assert one.locks == (False, True, False)
+    assert len(switches_in(BUTTON * 3)) == 3
+    assert not switches_in(BUTTON.replace("parent_abc", "parent_bake_abc"))
+
+
+@pytest.mark.parametrize(
+    ("written", "instead"),
+    [
+        ("'hand'", "name()"),
+        ("'hand'", "7"),
+        ("'hand'", "'hand"),
+        ("props.bone", "props.bones"),
+        ('["None", "Root"]', "None, Root"),
+        ('["None", "Root"]', "[1, 2]"),
+        ('\'["None", "Root"]\'', "3"),
+        ("(False, True, False)", "None"),
+        ("(False, True, False)", "(False,)"),
+        ("(False, True, False)", "(" * 5000),
+        ("(False, True, False)", "-" * 50000 + "1"),
+        ('text="Bob\'s", ', ""),
+        ("'pose.rigify_switch_parent_abc'", "'pose.rigify_switch_parent_abc' + name"),
+        ("                props.locks = (False, True, False)\n", ""),
+    ],
+)
+def test_what_is_written_otherwise_is_passed_over(written, instead):
+    assert written in BUTTON
+    assert switches_in(BUTTON.replace(written, instead)) == ()
