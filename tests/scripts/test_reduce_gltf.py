@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from rigid_motion_batch.cli import reduce
+from rigid_motion_batch.keying import gltf_files
 from tests.gltf.making import Making, walk
 from tests.gltf.oracle import File, off
 from tests.scripts.reducing import listed
@@ -19,6 +20,7 @@ WITHOUT_BLENDER = """
 import sys
 sys.modules["bpy"] = None
 from rigid_motion_batch.cli import reduce
+from rigid_motion_batch.keying import gltf_files
 sys.exit(reduce.main(sys.argv[1:]))
 """
 
@@ -129,3 +131,18 @@ def test_a_rig_with_its_mode_comes_with_blend(tmp_path):
     source = walk().write(tmp_path / "walk.glb")
     assert run(source, "--blend", "--mode", "dq_sclerp") == 0
     assert listed(tmp_path) == ["walk-keys.blend", "walk.glb"]
+
+
+def test_a_file_that_vanishes_while_it_is_read_is_said(tmp_path, monkeypatch, capsys):
+    source = walk().write(tmp_path / "walk.glb")
+    before = gltf_files.reduced
+
+    def vanishing(*arguments: object) -> object:
+        source.unlink()
+        return before(*arguments)
+
+    monkeypatch.setattr(gltf_files, "reduced", vanishing)
+    assert run(source, "--tolerance", "2mm") == 1
+    said = capsys.readouterr().err
+    assert "walk.glb: this file changed while it was read; run the same command again" in said
+    assert "Traceback" not in said

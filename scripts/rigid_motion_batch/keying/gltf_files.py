@@ -67,6 +67,8 @@ class GltfRun:
                 )
         except GltfError as error:
             raise Unreadable(str(error)) from None
+        except OSError as error:  # It is read while it is worked on.
+            raise _unreadable(error) from None
         stop_if_asked()
         length = wishes.tolerance or Tolerance(f"{MILLIMETRES * report.tolerance:.6f}mm")
         by_number = wishes.count is not None
@@ -112,7 +114,11 @@ def _read(path: Path) -> Document:
     try:
         return read_document(path)
     except OSError as error:
-        raise Unreadable(f"this cannot be read ({error.strerror}): see to its path, and who may read it") from None
+        raise _unreadable(error) from None
+
+
+def _unreadable(error: OSError) -> Unreadable:
+    return Unreadable(f"this cannot be read ({error.strerror}): see to its path, and who may read it")
 
 
 def _holds(path: Path, content: bytes) -> bool:
