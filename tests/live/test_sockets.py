@@ -51,7 +51,8 @@ def test_beyond_it_blender_has_to_be_allowed_online(host, extension, monkeypatch
     assert sending.sending() is None
 
 
-def test_a_flood_is_taken_in_portions():
+def test_a_flood_is_taken_in_portions(monkeypatch):
+    monkeypatch.setattr(sockets, "MOST_AT_ONCE", 500)
     port = sockets.Port("127.0.0.1")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         for _ in range(sockets.MOST_AT_ONCE + 20):

@@ -148,6 +148,16 @@ def test_a_long_way_with_jitter_loss_and_duplicates(loss: float, within: float, 
 
 
 @pytest.mark.parametrize("answers", [True, False])
+def test_where_datagrams_are_lost_no_joint_leaps_back_to_the_motion(answers: bool) -> None:
+    own = body()
+    samples = dance(own, 4.0, speed=3.0)
+    usual = run(own, *samples, answers=answers).steps.max()
+    for number in (10, 14, 18):
+        lost = lambda now, count: count in (number, number + 1)  # noqa: B023, E731
+        assert run(own, *samples, lost=lost, answers=answers).steps.max() < 3.0 * usual
+
+
+@pytest.mark.parametrize("answers", [True, False])
 @pytest.mark.parametrize("loss", [0.0, 0.01])
 def test_an_outage_of_2_s_heals_within_half_a_second(loss: float, answers: bool) -> None:
     own, rng = body(), np.random.default_rng(4)

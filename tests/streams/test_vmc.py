@@ -118,6 +118,46 @@ def test_what_another_program_sends_in_single_messages_is_shown():
     assert shown.poses["VMC"].positions[1] == pytest.approx([0.0, -0.15, 1.0], abs=1e-5)
 
 
+OK_1 = b"/VMC/Ext/OK\0,i\0\0\0\0\0\1"
+OK_3 = b"/VMC/Ext/OK\0,iii\0\0\0\0\0\0\0\1\0\0\0\3\0\0\0\0"
+OK_4 = b"/VMC/Ext/OK\0,iiii\0\0\0\0\0\0\1\0\0\0\3\0\0\0\0\0\0\0\1"
+TIME = b"/VMC/Ext/T\0\0,f\0\0\x41\x20\0\0"
+"""At 10 s."""
+
+POSE_7 = b"\x3f\x80\0\0\x40\0\0\0\x40\x40\0\0" + b"\0\0\0\0\x3f\x35\x04\xf3\0\0\0\0\x3f\x35\x04\xf3"
+"""At (1, 2, 3), a quarter turn about Unity's y."""
+
+ROOT_7 = b"/VMC/Ext/Root/Pos\0\0\0,sfffffff\0\0\0root\0\0\0\0" + POSE_7
+ROOT_13 = b"/VMC/Ext/Root/Pos\0\0\0,sfffffffffffff\0root\0\0\0\0" + POSE_7 + 3 * b"\x3f\x80\0\0" + 12 * b"\0"
+HIPS = b"/VMC/Ext/Bone/Pos\0\0\0,sfffffff\0\0\0Hips\0\0\0\0" + POSE_7
+JOY = b"/VMC/Ext/Blend/Val\0\0,sf\0Joy\0\x3f\x80\0\0"
+
+
+def bundled(*messages: bytes) -> bytes:
+    """A bundle to be done at once, as in the specification of OSC 1.0."""
+    return b"#bundle\0" + b"\0\0\0\0\0\0\0\1" + b"".join(len(each).to_bytes(4, "big") + each for each in messages)
+
+
+@pytest.mark.parametrize("available", [OK_1, OK_3, OK_4], ids=["2.0", "2.5", "2.7"])
+@pytest.mark.parametrize("root", [ROOT_7, ROOT_13], ids=["2.0", "2.1"])
+@pytest.mark.parametrize("pack", ["one by one", "a frame in a bundle", "a bundle for each"])
+def test_bytes_written_after_the_documentation_are_shown(available, root, pack):
+    """Every form of https://protocol.vmc.info/marionette-spec, in any packing that OSC allows."""
+    messages = [available, root, HIPS, JOY, TIME]
+    datagrams = {
+        "one by one": messages,
+        "a frame in a bundle": [bundled(*messages)],
+        "a bundle for each": [bundled(each) for each in messages],
+    }[pack]
+    receiver = heard(datagrams, 1.0, VmcReceiver(delay=0.0))
+    ((stream, shown),) = receiver.show(1.0).items()
+    assert shown.moment == pytest.approx(10.0)
+    assert receiver.bodies(stream)[0].joints == (ROOT, "Hips")
+    for joint in range(2):
+        assert shown.poses["VMC"].positions[joint] == pytest.approx([-1.0, -3.0, 2.0])
+        assert shown.poses["VMC"].quaternions[joint] == pytest.approx(about(2, -90), abs=1e-7)
+
+
 def test_without_times_a_bone_that_comes_again_begins_a_frame():
     receiver = VmcReceiver(delay=0.0)
     for row in range(4):

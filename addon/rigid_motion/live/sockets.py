@@ -12,11 +12,11 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 LONGEST = 65535
-MOST_AT_ONCE = 512
+MOST_AT_ONCE = 2048
 """Datagrams that one look at a socket takes out of it: a flood does not stop the viewport."""
 
-PENDING = 1 << 20
-"""Bytes that may wait to be looked at."""
+PENDING, LEAST_PENDING = 1 << 23, 1 << 16
+"""Bytes that may wait to be looked at, where a viewport is slow: as many as the system allows."""
 
 Address = tuple[str, int]
 
@@ -51,12 +51,23 @@ class Port:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         try:
-            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, PENDING)
+            self._allow_pending()
             self._socket.setblocking(False)
             self._socket.bind((host, port))
         except OSError:
             self._socket.close()
             raise
+
+    def _allow_pending(self) -> None:
+        """Linux takes what is allowed of what is asked for, others refuse it."""
+        size = PENDING
+        while size >= LEAST_PENDING:
+            try:
+                self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, size)
+            except OSError:
+                size //= 2
+            else:
+                break
 
     @property
     def number(self) -> int:

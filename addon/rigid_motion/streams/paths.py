@@ -82,13 +82,18 @@ class Path:
         vectors = share * turns_between(first, self.quaternions[after]) + beyond * self.spins
         return Poses(positions.swapaxes(0, 1), turned(first, vectors).swapaxes(0, 1))
 
-    def followed(self, other: Path) -> Path:
-        """This path until the start of another, and from there straight to the knots of that."""
+    def followed(self, other: Path, lost: int = 0) -> Path:
+        """This path until the start of another, and from there straight to the knots of that.
+
+        Where as many windows between them are lost, the motion went on as it was going until the first of these, and
+        what it did then is not known: it goes straight from there.
+        """
         start = other.moments[0]
-        here = self.at(other.moments[:1])
+        start = max(start - lost * (other.moments[-1] - start), min(start, self.moments[-1]))
+        here = self.at(np.array([start]))
         kept = int(np.searchsorted(self.moments, start))
         return Path(
-            np.concatenate((self.moments[:kept], other.moments)),
+            np.concatenate((self.moments[:kept], [start], other.moments[1:])),
             np.concatenate((self.positions[:kept], here.positions.swapaxes(0, 1), other.positions[1:])),
             np.concatenate((self.quaternions[:kept], here.quaternions.swapaxes(0, 1), other.quaternions[1:])),
             other.velocities,

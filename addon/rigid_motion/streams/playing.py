@@ -22,7 +22,7 @@ LOOK_BACK = 3.0
 MOST_TRANSITS = 512
 
 FEW, SHORT, SOONER = 4, 0.3, 0.05
-"""So many datagrams in a row, over so many seconds, that all came sooner by so much than the longest took..."""
+"""Datagrams at so many times in a row, over so many seconds, that all came so much sooner than the longest..."""
 
 QUICK = 0.1
 """... and sooner than all but this part of those before: the network is quicker now, and does not only vary."""
@@ -49,7 +49,7 @@ class Playing:
         """The transit that is waited for."""
         self._transits: deque[tuple[float, float]] = deque(maxlen=MOST_TRANSITS)
         self._moment: float | None = None
-        self._last = -np.inf
+        self._last = self._heard = -np.inf
         self._unsure = False
         """Whether our clock leapt, and nothing came since."""
 
@@ -64,14 +64,16 @@ class Playing:
             known.popleft()
         # As they were sent: those of a quick way overtake.
         by_sent = sorted((when - took, when, took) for when, took in known)
-        begun = min(by_sent[-FEW:][0][0], by_sent[-1][0] - SHORT)
+        # What somebody who seldom looks takes out of a socket came at one time.
+        last_left = {when: left for left, when, _ in by_sent}
+        begun = min(sorted(last_left.values())[-FEW:][0], by_sent[-1][0] - SHORT)
         recent = [took for left, _, took in by_sent if left >= begun]
         older = sorted(took for left, _, took in by_sent if left < begun)
-        if older and len(recent) >= FEW and max(recent) < min(older[int(QUICK * len(older))], older[-1] - SOONER):
+        if older and len(last_left) >= FEW and max(recent) < min(older[int(QUICK * len(older))], older[-1] - SOONER):
             known.clear()
             known.extend(sorted((when, took) for left, when, took in by_sent if left >= begun))
         self.longest = max(took for _, took in known)
-        self._unsure = False
+        self._heard, self._unsure = arrival, False
 
     def moment(self, now: float) -> float | None:
         """The moment to be shown now; None before anything came."""
@@ -81,7 +83,7 @@ class Playing:
         passed, self._last = now - self._last, now
         if self._moment is None:
             self._moment, passed = wanted, 0.0
-        if abs(passed) > SET:
+        if abs(passed) > SET and not 0.0 <= now - self._heard <= SET:
             self._unsure = True
         if self._unsure or passed <= 0.0:
             return self._moment
@@ -89,7 +91,8 @@ class Playing:
         if abs(gap) > SET:
             self._moment = wanted
         else:
-            self._moment += passed + min(max(gap / SETTLING, -1.0), HURRY) * passed
+            # Somebody who seldom looks is not to overshoot.
+            self._moment += passed + min(max(gap / max(SETTLING, passed), -1.0), HURRY) * passed
         return self._moment
 
 

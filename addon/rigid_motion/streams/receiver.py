@@ -10,6 +10,7 @@ import secrets
 from collections import OrderedDict, deque
 from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -278,37 +279,38 @@ class _Playback:
         self._states[motion.sequence] = State(path, read[1], end)
         if len(self._states) > MOST_STATES:
             self._states.pop(min(self._states))
-        newer = motion.sequence > self._newest
+        newer, lost = motion.sequence > self._newest, motion.sequence - self._newest - 1
         if newer:
             self._newest, self._ticks, self._came, self._needs = motion.sequence, float(end), arrival, 0
         self.heard = max(self.heard, arrival) if newer else self.heard
         if not motion.late or self._playing.longest is None:
             self._playing.heard(end / TICKS, arrival)
-        self._put(motion.sequence, path, newer, arrival)
+        self._put(motion.sequence, path, lost, arrival)
         return True
 
-    def _put(self, sequence: int, path: Path, newer: bool, now: float) -> None:
-        """Let a window take part in what is shown."""
+    def _put(self, sequence: int, path: Path, lost: int, now: float) -> None:
+        """Let a window take part in what is shown; before it so many are lost, or it came late where that is < 0."""
+        before = self._path
         self._windows[sequence] = path
         for old in sorted(self._windows)[:-MOST_WINDOWS]:
             del self._windows[old]
-        if self._path is None:
+        if before is None:
             # How the motion got to the first knot is not known.
             self._path, self._begins = path, float(path.moments[1])
-        elif newer:
-            self._path = self._path.followed(path)
+        elif lost >= 0:
+            self._path = before.followed(path, lost)
             if path.moments[0] < self._begins:
                 self._begins = float(path.moments[1])
             first = -min(max(MOST_JOINT_KNOTS // len(self.forest), MOST_KNOTS), len(self._path.moments))
             shown = path.moments[0] if self._moment is None else self._moment
             self._path = self._path.since(max(min(self._kept, shown) - 1e-6, self._path.moments[first]))
         else:
-            before = self._path
-            first, *others = (self._windows[number] for number in sorted(self._windows))
-            self._path = before if before.moments[0] < first.moments[0] else first
-            for other in [first, *others] if self._path is before else others:
-                self._path = self._path.followed(other)
-        if self._moment is not None and path.moments[0] < self._moment:
+            numbers = sorted(self._windows)
+            first = self._windows[numbers[0]]
+            self._path = before.followed(first) if before.moments[0] < first.moments[0] else first
+            for last, number in pairwise(numbers):
+                self._path = self._path.followed(self._windows[number], number - last - 1)
+        if self._moment is not None and (lost or path.moments[0] < self._moment):
             self._fading.changed(_only(self._path.at(np.array([self._moment]))), now)
 
     def due(self, moment: float) -> float:
