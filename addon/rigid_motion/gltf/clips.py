@@ -25,7 +25,7 @@ from .thinning import shared_times
 from .tracks import ROTATION, TRANSLATION, Clip, Track, Tracks
 from .vertices import largest_displacement
 
-OF_INTEGERS = 0.25
+OF_INTEGERS = 0.85
 """The share of the tolerance that rotations may take that are stored as 16-bit integers."""
 
 MORE_SLIDE = 0.001 / 1.7
