@@ -12,7 +12,7 @@ import pytest
 
 from rigid_motion_batch.cli.commands import COMMANDS
 from rigid_motion_batch.command_line import path_line
-from tests.scripts.reducing import write_csv
+from tests.scripts.reducing import listed, write_csv
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -71,7 +71,7 @@ def test_closed_streams_keep_nothing_from_being_done(tmp_path, closed):
     write_csv(tmp_path / "hand.csv")
     done = shell(f"reduce hand.csv --blend {closed}", tmp_path)
     assert done.returncode == 0, done.stderr
-    assert sorted(os.listdir(tmp_path)) == ["hand-keys.blend", "hand-keys.csv", "hand.csv"]
+    assert listed(tmp_path) == ["hand-keys.blend", "hand-keys.csv", "hand.csv"]
     assert done.stdout == ("" if ">&-" in closed.replace("2>&-", "") else "hand-keys.csv\nhand-keys.blend\n")
 
 

@@ -270,7 +270,7 @@ def _planned(options: argparse.Namespace) -> list[Job]:
         name, suffix = name_of(*file_and_body(source)), GLB_SUFFIX if options.glb else SUFFIX
         made = named.with_suffix("") if named else folder / f"{name}{suffix}"
         kind = named.suffix.lower() if named else ""
-        possible = (".glb",) if options.glb else tuple({kind or ".csv", ".blend"})
+        possible = (".glb",) if options.glb else tuple(dict.fromkeys((kind or ".csv", ".blend")))
         return Job(source, folder, made, possible, kind, is_recording=True)
 
     return planned(options.inputs, None if named else options.output, IN_FOLDERS, _is_result, job_of)

@@ -379,6 +379,8 @@ def _check(options: argparse.Namespace) -> None:
     if options.command == "router":
         return
     options.reading = reading_options(options)
+    if options.command == "measure":
+        return
     if options.command == "send":
         Tolerance(options.tolerance)
         if bool(options.recordings) == (options.from_vmc is not None):

@@ -164,7 +164,7 @@ def _settled(jobs: list[Job]) -> Iterator[Job]:
             if (place := place_of(path)) in sources:
                 problem = f"this would be written over {path}, which is to be read too: leave one of them out"
                 job = replace(job, problem=problem)
-            elif place in taken:
+            elif place in taken and not job.problem:
                 job = replace(job, problem=f"{taken[place]} is written to {path} too: use another --output for it")
             taken.setdefault(place, job.source)
         yield job
