@@ -295,9 +295,13 @@ def _space(obj: bpy.types.Object, bones: list[str]) -> tuple[Poses, np.ndarray]:
 
 
 def _placed(obj: bpy.types.Object, bones: list[str]) -> Poses:
-    matrices = np.array([obj.pose.bones[name].matrix for name in bones], dtype=np.float64).reshape(-1, 4, 4)
-    axes = matrices[:, :3, :3] / np.linalg.norm(matrices[:, :3, :3], axis=1, keepdims=True)
-    return Poses(matrices[:, :3, 3], from_matrices(axes))
+    return unscaled(np.array([obj.pose.bones[name].matrix for name in bones], dtype=np.float64).reshape(-1, 4, 4))
+
+
+def unscaled(matrices: np.ndarray) -> Poses:
+    """Matrices (..., 4, 4) as poses, without their scale."""
+    axes = matrices[..., :3, :3] / np.linalg.norm(matrices[..., :3, :3], axis=-2, keepdims=True)
+    return Poses(matrices[..., :3, 3], from_matrices(axes))
 
 
 def _set(owner: bpy.types.Object | bpy.types.PoseBone, place: list[float] | None, rotation: Iterable[float]) -> None:

@@ -12,8 +12,8 @@ from bpy.app.handlers import persistent
 
 from ..animation.handlers import append_handlers, remove_handlers
 from ..motion import Poses
-from ..motion.quaternions import from_matrices
 from ..streams.vmc import Performer, write, write_trackers
+from .driving import unscaled
 from .sockets import Outlet
 
 log = logging.getLogger(__package__)
@@ -46,7 +46,7 @@ class Sending:
                 for datagram in write(now - self._begun, performer(_bones(evaluated))) if performer.bones else ():
                     self._outlet.say(datagram)
             else:
-                trackers[name] = _poses(np.array(evaluated.matrix_world))
+                trackers[name] = unscaled(np.array(evaluated.matrix_world))
         for datagram in write_trackers(trackers):
             self._outlet.say(datagram)
 
@@ -55,7 +55,7 @@ class Sending:
         count, performer = self._performers.get(obj.name, (0, None))
         if count != len(bones):
             matrices = np.array([bone.matrix_local for bone in bones])
-            rest = _poses(np.array(obj.matrix_basis.to_quaternion().to_matrix().to_4x4()) @ matrices)
+            rest = unscaled(np.array(obj.matrix_basis.to_quaternion().to_matrix().to_4x4()) @ matrices)
             performer = Performer(tuple(bone.name for bone in bones), rest)
             self._performers[obj.name] = len(bones), performer
         return performer
@@ -67,13 +67,7 @@ class Sending:
 def _bones(obj: bpy.types.Object) -> Poses:
     """Where the bones of a rig are in the world, in the order of its armature."""
     matrices = np.array([obj.pose.bones[bone.name].matrix for bone in obj.data.bones])
-    return _poses(np.array(obj.matrix_world) @ matrices)
-
-
-def _poses(matrices: np.ndarray) -> Poses:
-    """Matrices (..., 4, 4) without their scale."""
-    axes = matrices[..., :3, :3] / np.linalg.norm(matrices[..., :3, :3], axis=-2, keepdims=True)
-    return Poses(matrices[..., :3, 3], from_matrices(axes))
+    return unscaled(np.array(obj.matrix_world) @ matrices)
 
 
 _sending: Sending | None = None

@@ -37,9 +37,9 @@ from rigid_motion_batch.pipeline.comparison import (
     ComparisonPlan,
 )
 from rigid_motion_batch.pipeline.comparison_steps import PAGE
-from rigid_motion_batch.pipeline.executors import ProcessExecutor, processors
+from rigid_motion_batch.pipeline.executors import ProcessExecutor
 from rigid_motion_batch.pipeline.explain import explain
-from rigid_motion_batch.pipeline.performing import Executor, ExecutorError, SerialExecutor
+from rigid_motion_batch.pipeline.performing import Executor, ExecutorError, SerialExecutor, processors
 from rigid_motion_batch.pipeline.running import Outcome, Plan, Share, State, Survey, run
 from rigid_motion_batch.pipeline.running import Progress as Listener
 from rigid_motion_batch.pipeline.steps import OWN, Task

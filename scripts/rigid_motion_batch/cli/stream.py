@@ -391,8 +391,11 @@ def _check(options: argparse.Namespace) -> None:
             raise ValueError("give --room NAME, which receivers give as well, or --to-vmc HOST:PORT")
     elif not options.room:
         raise ValueError("give --room NAME, as the sender does")
-    if options.to_vmc and not (options.network or is_loopback(options.to_vmc[0])):
-        raise ValueError("--to-vmc sends to another machine; give --network as well, if that is what you want")
+    for name in ("to_vmc", "to_blender"):
+        to = getattr(options, name, None)
+        if to and not (options.network or is_loopback(to[0])):
+            option = f"--{name.replace('_', '-')}"
+            raise ValueError(f"{option} sends to another machine; give --network as well, if that is what you want")
     if options.command != "receive":
         return
     if (
@@ -402,8 +405,6 @@ def _check(options: argparse.Namespace) -> None:
         and options.output.resolve() == Path(options.truth).resolve()
     ):
         raise ValueError(f"--output {options.output} is the recording of --truth; choose another file")
-    if options.to_blender and not (options.network or is_loopback(options.to_blender[0])):
-        raise ValueError("--to-blender sends to another machine; give --network as well, if that is what you want")
 
 
 def _add_room(parser: argparse.ArgumentParser, what: str) -> None:

@@ -95,9 +95,7 @@ class Record:
 
     def _is_own(self, path: Path) -> bool:
         """Whether a file is there as it was made of this input."""
-        name = _from(self.folder, path)
-        digests = {line.get("sha256") for line in self._lines if line.get("file") == name}
-        return bool(digests) and _digest(path) in digests
+        return _is_among(path, _from(self.folder, path), self._lines)
 
     @property
     def _lines(self) -> list[dict[str, Any]]:
@@ -106,7 +104,12 @@ class Record:
 
 def is_made(path: Path) -> bool:
     """Whether a file is as this program has written it, by the record of its folder."""
-    digests = {line.get("sha256") for line in _lines_of(path.parent / OWN / NAME) if line.get("file") == path.name}
+    return _is_among(path, path.name, _lines_of(path.parent / OWN / NAME))
+
+
+def _is_among(path: Path, name: str, lines: Iterable[Mapping[str, Any]]) -> bool:
+    """Whether a file is as lines of a record say under its name."""
+    digests = {line.get("sha256") for line in lines if line.get("file") == name}
     return bool(digests) and _digest(path) in digests
 
 

@@ -31,6 +31,7 @@ from rigid_motion_batch.pipeline.performing import (
     Order,
     SerialExecutor,
     outcome_of,
+    processors,
 )
 from rigid_motion_batch.progress import Progress, Stage
 from rigid_motion_batch.supervising import blender_program, report, stop_signals, written_of
@@ -182,7 +183,7 @@ def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = 
         complain(program, error)
         return 2
     if workers is None and len(jobs) == 1 and not blender_program():
-        work = replace(work, processes=os.cpu_count() or 1)
+        work = replace(work, processes=processors())
     with (
         Progress() as progress,
         executor,
@@ -339,7 +340,7 @@ def _executor(workers: int | None, count: int) -> Executor:
     try:
         if blender_program():
             raise ImportError("Blender itself starts no workers")
-        from rigid_motion_batch.pipeline.executors import ProcessExecutor, processors
+        from rigid_motion_batch.pipeline.executors import ProcessExecutor
     except ImportError as error:
         if workers is None:
             return SerialExecutor()

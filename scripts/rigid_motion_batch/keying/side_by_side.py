@@ -10,9 +10,8 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from typing import Any
 
+from rigid_motion.motion.skeleton_stretches import Run
 from rigid_motion_batch.supervising import end_with_parent
-
-Run = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 
 
 @contextmanager

@@ -61,11 +61,6 @@ class ProcessExecutor(Executor):
         return self._pools[-1]
 
 
-def processors() -> int:
-    """How many this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def _begin(command: str) -> None:
     """Begin a worker: it ends with its parent, and nobody sees what libraries print in it."""
     end_with_parent()

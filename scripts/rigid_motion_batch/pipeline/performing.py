@@ -121,6 +121,11 @@ class SerialExecutor(Executor):
         pass
 
 
+def processors() -> int:
+    """How many this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def outcome_of(future: Future[Made | Failed | Lost]) -> Made | Failed | Lost:
     """What became of an order."""
     try:
