@@ -170,7 +170,8 @@ def off(before: File, after: File, clip: int, radius: float) -> float:
     largest = 0.0
     for node in range(len(truth)):
         axes = truth[node, :, :3, :3]
-        biggest = axes[np.argmax(np.linalg.norm(axes, axis=(1, 2)))]
+        sizes = np.linalg.norm(axes, axis=(1, 2))
+        biggest = axes[np.argmax(sizes >= (1.0 - 1e-9) * sizes.max())]
         points = np.column_stack((ball @ np.linalg.pinv(biggest).T, np.ones(len(ball))))
         moved = (found[node] - truth[node]) @ points.T
         largest = max(largest, float(np.linalg.norm(moved[:, :3], axis=1).max()))

@@ -29,6 +29,9 @@ AT_ONCE = 2**15
 EXACTLY = 64
 """Poses whose displacement is worked out at once, those with the largest bounds first."""
 
+AS_LARGE = 1.0 - 1e-9
+"""What is larger than this share of something else is no smaller but for rounding."""
+
 NOWHERE = np.empty(0, dtype=np.int64)
 
 
@@ -138,8 +141,11 @@ class World:
 
     @cached_property
     def _extremes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of each node: its axes where they are largest (n, 3, 3), their lengths at most (n, 3), and how far it gets
-        from its parent (n,).
+        """Of each node: its axes where they are first largest (n, 3, 3), their lengths at most (n, 3), and how far it
+        gets from its parent (n,).
+
+        Axes that are as large again, but for rounding, are not taken: under a parent whose scale is uneven, nodes that
+        turn keep their size and change the shape of what was a ball.
         """
         count = len(self.moving)
         axes, sizes = np.zeros((count, 3, 3)), np.full(count, -1.0)
@@ -148,8 +154,8 @@ class World:
         for block in self.seen(self.truth):
             (maps,) = block.maps
             squares = np.einsum("nmij,nmij->nm", maps.axes, maps.axes)
-            largest = np.argmax(squares, axis=1)
-            larger = squares[every, largest] > sizes
+            largest = np.argmax(squares >= AS_LARGE * squares.max(axis=1, keepdims=True), axis=1)
+            larger = AS_LARGE * squares[every, largest] > sizes
             sizes[larger], axes[larger] = squares[every, largest][larger], maps.axes[every, largest][larger]
             lengths = np.maximum(lengths, np.linalg.norm(maps.axes, axis=-2).max(axis=1))
             from_parents = maps.origins[hangs] - maps.origins[self.parents[hangs]]

@@ -41,7 +41,9 @@ def moments(world: World, clip: Clip, tolerance: float) -> np.ndarray:
         for track in smooth:
             values = track.at(times)
             if track.path == ROTATION:
-                halved |= np.abs(np.einsum("ij,ij->i", values[1:], values[:-1])) < np.cos(WIDE / 2)
+                cosines = np.einsum("ij,ij->i", values[1:], values[:-1])
+                # A spline that passes near 0 comes out on the other side: nearly a whole turn in no time.
+                halved |= (cosines if track.interpolation == CUBICSPLINE else np.abs(cosines)) < np.cos(WIDE / 2)
             if track.interpolation == CUBICSPLINE:
                 reach = 1.0 if track.path not in (ROTATION, SCALE) else 2.0 * reaches[world.places[track.node]]
                 halved |= _bows(track, times, values) * reach > BOW * tolerance
