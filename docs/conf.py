@@ -26,6 +26,7 @@ extensions = [
     "numpydoc",
     "sphinx_copybutton",
     "extensions.commands",
+    "extensions.excerpts",
     "extensions.mathml",
     "extensions.mode_pages",
     "extensions.names",

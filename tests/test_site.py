@@ -167,6 +167,18 @@ def test_the_search_knows_sclerp(site):
     assert "sclerp" in {**known["terms"], **known["titleterms"]}
 
 
+def test_the_search_has_the_text_of_every_page_for_its_excerpts(site):
+    script = (site / "_static" / "texts.js").read_text(encoding="utf-8")
+    texts = json.loads(script.removeprefix("const PAGE_TEXTS = ").rstrip(";\n"))
+    assert set(texts) == {f"{path.relative_to(site).with_suffix('')}.html" for path in site.rglob("*.html")} - {
+        "genindex.html",
+        "search.html",
+        "py-modindex.html",
+    }
+    assert all('role="main"' in text for text in texts.values())
+    assert "along a screw, at" in texts["glossary.html"]
+
+
 @pytest.mark.usefixtures("site")
 def test_what_sphinx_warns_of_is_an_error_and_the_site_before_stays(tmp_path, monkeypatch, capfd):
     def with_a_broken_link(folder):

@@ -25,7 +25,16 @@ document.addEventListener("DOMContentLoaded", () => {
   still.addEventListener("change", () => films.forEach(settle));
 });
 
-// Results of a search show the lines around what was found, which browsers do not let pages read from a folder.
-if (location.protocol === "file:" && typeof DOCUMENTATION_OPTIONS !== "undefined") {
-  DOCUMENTATION_OPTIONS.SHOW_SEARCH_SUMMARY = false;
+// Results of a search show the lines around what was found. From a folder browsers let no page read another, so the
+// search page has the texts of all pages in a script (extensions/excerpts.py).
+if (location.protocol === "file:" && document.currentScript && /search\.html$/.test(location.pathname)) {
+  const script = document.createElement("script");
+  script.src = new URL("texts.js", document.currentScript.src);
+  const loaded = new Promise((resolve) => { script.onload = resolve; });
+  document.head.append(script);
+  const folder = new URL(".", location.href).href;
+  window.fetch = (url) => loaded.then(() => {
+    const page = decodeURI(new URL(url, location.href).href.slice(folder.length));
+    return { text: () => PAGE_TEXTS[page] ?? "" };
+  });
 }
