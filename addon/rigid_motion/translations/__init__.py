@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import re
-from pathlib import Path
+from importlib.resources import files
 
 import bpy
 from bpy.app.translations import contexts
@@ -28,7 +28,8 @@ Texts = dict[tuple[str, str], str]
 
 def languages() -> dict[str, Texts]:
     """Return the texts of all languages, by locale."""
-    return {path.stem: read(path.read_text("utf-8")) for path in sorted(Path(__file__).parent.glob("*.po"))}
+    catalogs = (file for file in files(__package__).iterdir() if file.name.endswith(".po"))
+    return {file.name.removesuffix(".po"): read(file.read_text("utf-8")) for file in catalogs}
 
 
 def read(po: str) -> Texts:
