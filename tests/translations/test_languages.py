@@ -1,15 +1,17 @@
-"""German: every text that a user sees has a translation, every translation is of such a text, and they fit."""
+"""Languages: every text that a user sees has a translation, every translation is of such a text, and they fit."""
 
 from __future__ import annotations
 
 import ast
+import re
 import string
+from pathlib import Path
 
 import blf
 import pytest
+from babel.messages.pofile import read_po
 
-from rigid_motion.translations import LANGUAGES
-from rigid_motion.translations.german import BY_CONTEXT, LABELS, NOTES, REFUSALS, REPORTS, TOOLTIPS
+from rigid_motion import translations
 from rigid_motion.ui.wording import LABELS as ENGLISH_MODES
 from tests.translations.shown_texts import (
     MARKS,
@@ -21,7 +23,8 @@ from tests.translations.shown_texts import (
     texts_of,
 )
 
-GERMAN = LANGUAGES["de_DE"]
+LANGUAGES = translations.languages()
+GERMAN = LANGUAGES["de"]
 
 UNSEEN = {
     "How many samples a frame the in-betweens have",
@@ -87,12 +90,14 @@ def shown(extension) -> set[tuple[str, str]]:
     return messages()
 
 
-def test_every_text_has_a_translation(shown):
-    assert shown - GERMAN.keys() == set()
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_every_text_has_a_translation(shown, language):
+    assert shown - LANGUAGES[language].keys() == set()
 
 
-def test_every_translation_is_of_a_text_that_is_shown(shown):
-    assert GERMAN.keys() - shown == set()
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_every_translation_is_of_a_text_that_is_shown(shown, language):
+    assert LANGUAGES[language].keys() - shown == set()
 
 
 def test_a_text_that_is_new_would_be_missed(shown):
@@ -144,28 +149,71 @@ def beginning(text: str) -> str:
     return text[: len(text) - len(text.lstrip(" .:;,"))]
 
 
-@pytest.mark.parametrize(("english", "german"), sorted((text, german) for (_, text), german in GERMAN.items()))
-def test_a_translation_fits_its_text(english, german):
-    assert german.strip()
-    assert fields(german) == fields(english)
-    assert ending(german) == ending(english)
-    assert beginning(german) == beginning(english)
-    assert german.count("„") == german.count("“")
-    assert "  " not in german
+@pytest.mark.parametrize(
+    ("english", "translation"),
+    sorted((text, translation) for texts in LANGUAGES.values() for (_, text), translation in texts.items()),
+)
+def test_a_translation_fits_its_text(english, translation):
+    assert translation.strip()
+    assert fields(translation) == fields(english)
+    assert ending(translation) == ending(english)
+    assert beginning(translation) == beginning(english)
+    assert translation.count("„") == translation.count("“")
+    assert "  " not in translation
 
 
 @pytest.mark.parametrize(
-    ("english", "german"),
+    ("english", "translation"),
     [("{count} keys", "{keys} Schlüsselbilder"), ("{frame:g}", "{frame}"), ("Bake...", "Backen"), (", keys", "Keys")],
 )
-def test_a_translation_that_does_not_fit_is_found(english, german):
+def test_a_translation_that_does_not_fit_is_found(english, translation):
     with pytest.raises(AssertionError):
-        test_a_translation_fits_its_text(english, german)
+        test_a_translation_fits_its_text(english, translation)
 
 
-def test_no_text_is_translated_twice():
-    assert sum(len(texts) for texts in BY_CONTEXT.values()) == len(GERMAN)
-    assert sum(map(len, (LABELS, NOTES, REFUSALS, REPORTS, TOOLTIPS))) == len(BY_CONTEXT["*"])
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_files_are_read_as_other_programs_read_them(language):
+    """Babel refuses what is no gettext file."""
+    file = Path(translations.__file__).with_name(f"{language}.po")
+    text = file.read_text(encoding="utf-8")
+    catalog = read_po(text.splitlines(keepends=True), abort_invalid=True)
+    assert {(entry.context or "*", entry.id): entry.string for entry in catalog if entry.id} == LANGUAGES[language]
+    # A text that is translated twice is one entry in both.
+    assert len(re.findall("^msgid ", text, re.MULTILINE)) == 1 + len(LANGUAGES[language])
+
+
+def test_lines_escapes_and_contexts_are_read_and_what_is_not_translated_is_left_out():
+    po = r"""
+msgid ""
+msgstr "Language: de\n"
+
+# Said by \"hand\"
+#: panels.py:7
+#, python-brace-format
+msgctxt "Operator"
+msgid ""
+"The \"long\" text\n"
+"goes on"
+msgstr "Der „lange“ Text\n"
+"geht \\ weiter"
+
+msgid "Not yet"
+msgstr ""
+
+#, fuzzy
+#| msgid "Guess"
+msgid "Guessed"
+msgstr "Geraten"
+msgid "Bake"
+msgstr "Backen"
+
+#~ msgid "Gone"
+#~ msgstr "Weg"
+"""
+    assert translations.read(po) == {
+        ("Operator", 'The "long" text\ngoes on'): "Der „lange“ Text\ngeht \\ weiter",
+        ("*", "Bake"): "Backen",
+    }
 
 
 def test_what_the_texts_call_things_is_what_they_are_called():
