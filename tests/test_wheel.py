@@ -116,13 +116,6 @@ def test_the_mathematics_needs_numpy_alone(installed: Path) -> None:
     assert (done.returncode, done.stdout.strip()) == (0, "[]"), done.stderr
 
 
-@pytest.mark.parametrize("arguments", [(), ("--help",)])
-def test_help_lists_the_commands(arguments: tuple[str, ...], installed: Path) -> None:
-    done = run(installed / "rigid-motion", *arguments)
-    assert done.returncode == 0
-    assert all(f"\n  {name} " in done.stdout for name in COMMANDS)
-
-
 def test_a_command_that_there_is_not_is_said(installed: Path) -> None:
     done = run(installed / "rigid-motion", "compair")
     assert done.returncode == 2

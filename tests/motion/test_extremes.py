@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigid_motion.motion import MODES, Poses, interpolate, measure, reduce_keys
+from rigid_motion.motion import MODES, Poses, interpolate, reduce_keys
 
 
 @pytest.mark.parametrize("value", [1e308, -1e308, np.nan, np.inf, -np.inf])
@@ -26,14 +26,6 @@ def test_what_is_no_measurement_is_refused_with_its_place(field: str, value: flo
 def test_keys_that_no_clock_tells_apart_are_refused(step: float) -> None:
     with pytest.raises(ValueError, match="key 1 is not later than the key before it"):
         interpolate([0.0, step], Poses(np.zeros((2, 3)), np.eye(4)[[0, 0]]), [0.0])
-
-
-def test_errors_of_what_is_not_finite_are_not_finite() -> None:
-    truth = Poses(np.zeros((3, 3)), np.eye(4)[[0, 0, 0]])
-    lost = Poses([[0, 0, 0], [np.inf, 0, 0], [np.nan, 0, 0]], np.eye(4)[[0, 0, 0]])
-    errors = measure(np.arange(3.0), lost, truth)
-    assert np.isfinite(errors.shell).tolist() == [True, False, False]
-    assert np.isfinite(errors.position).tolist() == [True, False, False]
 
 
 def test_all_of_the_range_of_single_precision_can_be_filled_in() -> None:

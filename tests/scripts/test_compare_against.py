@@ -242,19 +242,6 @@ def test_a_film_has_a_lane_of_it(toss, mine, tmp_path):
         assert (there.inv() * turns[0]).magnitude() < 1e-5
 
 
-def test_a_film_of_a_body_has_a_lane_of_it(tmp_path):
-    times = np.arange(31) / 30.0
-    walk = write_body(tmp_path / "walk.bvh", times, ("LeftHand", "Head"))
-    mine = write_body(tmp_path / "mine.bvh", times[::5], ("LeftHand", "Head"))
-    how = ("--rates", "5", "--modes", "lerp_slerp", "--output", tmp_path / "output")
-    assert run(walk, "--against", mine, *how, *SMALL) == 0
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "output" / "walk" / "5" / "comparison.blend"))
-    rig = bpy.data.objects["mine"]
-    # Its keys are not known: it has one on every frame.
-    assert len({key.co[0] for curve in rig.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
-                for key in curve.keyframe_points}) == bpy.context.scene.frame_end  # fmt: skip
-
-
 # -- refusals ---------------------------------------------------------------------------------------------------------
 
 

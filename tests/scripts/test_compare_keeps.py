@@ -8,7 +8,6 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -75,16 +74,6 @@ def test_an_input_that_lies_where_an_output_goes_is_refused(
     assert [*files(tmp_path)] == [place]
 
 
-def test_an_input_that_lies_where_the_keys_of_its_clip_go_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "keys").mkdir()
-    write_toss(tmp_path / "keys" / "5" / "keys.csv")
-    assert "this input lies where" in refused(capsys, "keys/5/keys.csv", "--output", ".")
-    assert files(tmp_path).keys() == {os.path.join("keys", "5", "keys.csv")}
-
-
 @pytest.mark.skipif(os.name == "nt", reason="links need permission on Windows")
 def test_an_input_that_leads_to_an_output_is_refused(folder: Path, capsys: pytest.CaptureFixture) -> None:
     (folder / "linked.csv").symlink_to(folder / "out" / "metrics.csv")
@@ -94,12 +83,6 @@ def test_an_input_that_leads_to_an_output_is_refused(folder: Path, capsys: pytes
 def test_an_output_of_an_earlier_run_is_no_input_of_the_next(folder: Path, capsys: pytest.CaptureFixture) -> None:
     said = refused(capsys, "toss.csv", "out/toss/5/lerp_slerp.csv", "--output", "out")
     assert "out/toss/5/lerp_slerp.csv: this input was written by a run into this folder" in said.replace(os.sep, "/")
-
-
-def test_an_input_where_the_program_keeps_its_own_files_is_refused(folder: Path, capsys: pytest.CaptureFixture) -> None:
-    write_toss(folder / "out" / OWN / "mine.csv")
-    said = refused(capsys, f"out/{OWN}/mine.csv", "--output", "out", "--overwrite")
-    assert "where the program works" in said
 
 
 # -- files of strangers -----------------------------------------------------------------------------------------------
@@ -127,13 +110,6 @@ def test_without_its_own_folders_it_knows_no_file_for_its_own(folder: Path, caps
     said = refused(capsys, "toss.csv", "--output", "out")
     assert "lerp_slerp.csv" in said
     assert "were not written by this program" in said
-
-
-def test_a_folder_where_a_file_goes_is_never_replaced(folder: Path, capsys: pytest.CaptureFixture) -> None:
-    (folder / "out" / "report.html").unlink()
-    (folder / "out" / "report.html").mkdir()
-    (folder / "out" / "report.html" / "mine.txt").write_text("mine")
-    assert "a folder where a file goes" in refused(capsys, "toss.csv", "--output", "out", "--overwrite")
 
 
 def test_a_file_where_a_folder_goes_is_never_replaced(folder: Path, capsys: pytest.CaptureFixture) -> None:
@@ -173,53 +149,7 @@ def test_the_same_recordings_and_more_of_them_go_on(folder: Path, arguments: tup
     assert run(*arguments, "--output", "out") == 0
 
 
-def test_a_recording_that_was_edited_is_the_same_comparison(folder: Path) -> None:
-    write_toss(folder / "toss.csv", samples=80)
-    assert run("toss.csv", "--output", "out") == 0
-
-
 # -- damage -----------------------------------------------------------------------------------------------------------
-
-
-def garbage(path: Path) -> None:
-    """Other bytes, of which size and time say nothing."""
-    status = path.stat()
-    path.write_bytes(b"[" * status.st_size)
-    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
-
-
-def emptied(path: Path) -> None:
-    path.write_bytes(b"")
-
-
-def folder_instead(path: Path) -> None:
-    path.unlink()
-    (path / "inner").mkdir(parents=True)
-
-
-@pytest.mark.parametrize("damage", [garbage, emptied, folder_instead])
-@pytest.mark.parametrize("part", ["facts.json", "0.json", "0.npz", "result.json", "result.npz", ".index.json"])
-def test_a_damaged_result_is_made_again(
-    folder: Path, part: str, damage: Callable[[Path], None], capsys: pytest.CaptureFixture
-) -> None:
-    table = (folder / "out" / "metrics.csv").read_bytes()
-    for path in (folder / "out" / OWN / "results").glob(f"*/{part}"):
-        damage(path)
-    (folder / "out" / "metrics.csv").unlink()
-    again = "toss.csv", "--output", "out", "--rates", "5,10"
-    if damage is garbage and part != ".index.json":  # Seen by those who read it alone.
-        assert run(*again) in (1, 2)
-        assert "damaged" in capsys.readouterr().err
-    assert run(*again) == 0
-    assert "Traceback" not in capsys.readouterr().err
-    assert (folder / "out" / "metrics.csv").read_bytes().startswith(table)
-
-
-@pytest.mark.parametrize("damage", [garbage, emptied, folder_instead])
-@pytest.mark.parametrize("name", ["comparison.json", "inputs.json"])
-def test_a_damaged_record_lets_the_work_be_done_again(folder: Path, name: str, damage: Callable[[Path], None]) -> None:
-    damage(folder / "out" / OWN / name)
-    assert run("toss.csv", "--output", "out") == 0
 
 
 # -- what would be done -----------------------------------------------------------------------------------------------
@@ -268,25 +198,6 @@ def test_after_an_edit_of_the_page_the_page_alone_is_made_again(folder: Path, tm
     ]
     steps_with_report = {name for name, one in vars(steps).items() if "report" in getattr(one, "rooms", ())}
     assert steps_with_report == {"page", "overview"}
-
-
-def test_of_a_stage_that_stage_alone_is_explained(folder: Path, capsys: pytest.CaptureFixture) -> None:
-    for stage, names in (("measure", {"measure toss/5"}), ("read", {"nothing to do"})):
-        assert run("toss.csv", "--output", "out", "--explain", "--radius", "0.2", "--only", stage) == 0
-        assert {line.partition(":")[0] for line in capsys.readouterr().out.splitlines()} == names
-    assert run("hand.csv", "--output", "new", "--explain", "--only", "read") == 0
-    assert capsys.readouterr().out == "read hand.csv: never done\n"
-
-
-def test_of_recordings_that_were_never_read_it_is_explained_that_they_will_be(
-    folder: Path, capsys: pytest.CaptureFixture
-) -> None:
-    write_toss(folder / "hand.csv", samples=70)
-    assert run("hand.csv", "--output", "new", "--explain") == 0
-    said = capsys.readouterr().out.splitlines()
-    assert said[0] == "read hand.csv: never done"
-    assert "when they have been read" in said[-1]
-    assert not (folder / "new").exists()
 
 
 # -- where it goes ----------------------------------------------------------------------------------------------------

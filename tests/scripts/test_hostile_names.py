@@ -168,35 +168,6 @@ def test_a_comparison_stays_in_its_folder_and_names_do_not_change_its_report(
         assert link.startswith(("#", "data:")) or (output / unquote(link)).is_file(), link
 
 
-def test_bones_of_any_name_stay_in_the_folder_and_do_not_change_the_report(tmp_path: Path) -> None:
-    from tests.scripts.recordings.blends import bpy, key, rig
-
-    # Blender's own names are text of at most 63 bytes, without NUL.
-    names = [name for name in NAMES if 0 < len(name.encode(errors="replace")) <= 63 and not set(name) & set("\0\udcff")]
-
-    def in_a_rig(folder: Path, bones: Sequence[str]) -> list[str]:
-        bpy.ops.wm.read_factory_settings(use_empty=True)
-        arm = rig("../Rig", dict.fromkeys(bones, ((0, 0, 0), (0, 1, 0), None)))
-        for frame in (1, 9, 17):
-            key(arm, frame, location=(frame, 0, 0))
-        path = folder / "shot.blend"
-        bpy.ops.wm.save_as_mainfile(filepath=str(path))
-        bpy.ops.wm.read_factory_settings(use_empty=True)
-        return [f"{path}:../Rig/{name}" for name in bones]
-
-    compared(tmp_path / "plain", in_a_rig, [f"body {number}" for number in range(len(names))])
-    output = compared(tmp_path / "hostile", in_a_rig, names)
-    assert {path.name for path in tmp_path.iterdir()} == {"plain", "hostile"}
-    folders = {path.name for path in output.iterdir() if path.is_dir() and not path.name.startswith(".")}
-    assert folders == set(folder_names(f"shot-../Rig/{name}" for name in names))
-    assert len(folders) == len(names)
-    whole, as_plain = (
-        Structure((tmp_path / kind / "output" / "report.html").read_text(encoding="utf-8"))
-        for kind in ("hostile", "plain")
-    )
-    assert (whole.tags, whole.code) == (as_plain.tags, as_plain.code)
-
-
 def test_joints_of_any_name_are_in_the_tables_and_do_not_change_the_report(tmp_path: Path) -> None:
     # A blank or a bracket ends a name in BVH, and there it has to be there.
     names = [name for name in NAMES if name and not re.search(r"[\s\0\x1c-\x1f{}\udcff]", name)]

@@ -113,13 +113,6 @@ def test_a_log_gets_a_plain_line_every_ten_seconds_at_most() -> None:
     assert "\x1b" not in log.getvalue()
 
 
-def test_what_is_soon_done_leaves_no_line_in_a_log() -> None:
-    log = io.StringIO()
-    with Progress(log) as progress, progress.stage("Rendering", 2) as stage:
-        stage.advance()
-    assert log.getvalue() == ""
-
-
 def test_blenders_own_python_has_no_rich_and_shows_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "rich.console", None)
     clock, terminal = Clock(), Terminal()
@@ -197,13 +190,6 @@ def test_where_nothing_is_to_be_shown_notes_are() -> None:
         stage.advance()
         progress.note("reach.csv: dropped 1 row")
     assert log.getvalue() == "reach.csv: dropped 1 row\n"
-
-
-def test_work_of_no_steps_is_done_at_once() -> None:
-    log = io.StringIO()
-    with Progress(log) as progress, progress.stage("Nothing", 0) as stage:
-        assert stage.fraction == 1.0
-    assert log.getvalue() == ""
 
 
 def test_a_program_without_a_standard_error_shows_nothing_and_works(monkeypatch: pytest.MonkeyPatch) -> None:

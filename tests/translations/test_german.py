@@ -5,21 +5,11 @@ from __future__ import annotations
 import ast
 import string
 
-import blf
 import pytest
 
 from rigid_motion.translations import LANGUAGES
 from rigid_motion.translations.german import BY_CONTEXT, LABELS, NOTES, REFUSALS, REPORTS, TOOLTIPS
-from rigid_motion.ui.wording import LABELS as ENGLISH_MODES
-from tests.translations.shown_texts import (
-    MARKS,
-    marked_or_drawn,
-    messages,
-    parsed,
-    sentences,
-    sources,
-    texts_of,
-)
+from tests.translations.shown_texts import MARKS, marked_or_drawn, messages, parsed, sentences, sources, texts_of
 
 GERMAN = LANGUAGES["de_DE"]
 
@@ -113,11 +103,6 @@ def test_no_literal_goes_around_the_translation(shown):
     assert missed == []
 
 
-def test_a_literal_in_an_f_string_goes_around_it():
-    ((_, text),) = sentences(ast.parse('self.report({"INFO"}, f"{count} keys baked")'))
-    assert text == " keys baked"
-
-
 @pytest.mark.parametrize("unseen", sorted(UNSEEN))
 def test_what_is_called_unseen_is_in_the_code(unseen):
     assert any(unseen == text for path in sources() for _, text in sentences(parsed(path)))
@@ -175,14 +160,3 @@ def test_what_the_texts_call_things_is_what_they_are_called():
     for german in GERMAN.values():
         for quoted in (part.partition("“")[0] for part in german.split("„")[1:]):
             assert quoted in names | of_blender, quoted
-
-
-def test_names_of_modes_fit_where_the_english_ones_do():
-    """The panel has just the room for the longest of those."""
-
-    def width(text: str) -> float:
-        return blf.dimensions(0, text)[0]
-
-    blf.size(0, 11.0)
-    room = 1.01 * max(map(width, ENGLISH_MODES.values()))
-    assert {german for mode in ENGLISH_MODES.values() if width(german := GERMAN["*", mode]) > room} == set()

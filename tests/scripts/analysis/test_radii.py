@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigid_motion_batch.analysis.radii import EVERYWHERE, JOINT, MOST_BYTES, RIGID, Radii, read_radii
+from rigid_motion_batch.analysis.radii import JOINT, MOST_BYTES, Radii, read_radii
 from rigid_motion_batch.rows import line_of
 
 
@@ -25,11 +25,6 @@ def table(tmp_path: Path) -> Callable[[str | bytes], str]:
         return str(path)
 
     return _table
-
-
-def test_joints_are_smaller_than_what_a_hand_holds_unless_something_else_is_said() -> None:
-    assert (EVERYWHERE.rigid, EVERYWHERE.joint) == (RIGID, JOINT) == (0.1, 0.03)
-    assert EVERYWHERE.of(["a", "b"]).tolist() == [0.03, 0.03]
 
 
 @pytest.mark.parametrize("text", ["0.05", " 0.05 ", "5e-2"])
@@ -105,14 +100,6 @@ def test_what_is_wrong_is_told_with_the_file_and_the_line(
     assert str(caught.value) == f"{path}:{line}: {problem}"
 
 
-@pytest.mark.parametrize("content", [b"\xff\xfej\0o\0", b"joint,radius_m\nH\xe4nd,0.1\n"])
-def test_what_is_no_text_is_told_with_the_file(table: Callable[[bytes], str], content: bytes) -> None:
-    path = table(content)
-    with pytest.raises(ValueError, match="this is no CSV in UTF-8") as caught:
-        read_radii(path)
-    assert str(caught.value).startswith(f"{path}: ")
-
-
 def test_a_table_that_is_too_large_or_has_an_endless_cell_is_refused(table: Callable[[str], str]) -> None:
     with pytest.raises(ValueError, match="bytes are no table of radii"):
         read_radii(table("joint,radius_m\n" + "x" * MOST_BYTES))
@@ -126,13 +113,6 @@ def test_a_table_that_is_too_large_or_has_an_endless_cell_is_refused(table: Call
 def test_what_is_neither_a_number_nor_a_table_is_told(text: str) -> None:
     with pytest.raises(ValueError, match=r"is neither a length above 0, such as 3cm or 0\.03, nor a table"):
         read_radii(text)
-
-
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes with a name here")
-def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "pipe.csv")
-    with pytest.raises(ValueError, match="nor a table of radii"):
-        read_radii(str(tmp_path / "pipe.csv"))
 
 
 def test_a_name_from_a_table_of_ours_is_the_joint_that_was_meant(tmp_path: Path) -> None:

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import Poses
-from rigid_motion_batch.recordings import ReadingOptions, Trajectory, TrajectoryError, read_clips
+from rigid_motion_batch.recordings import ReadingOptions, Trajectory, TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import make_clip
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.figures import Figure
-from tests.recordings import RECORDINGS
 
 JOINTS = {
     "Hips": (-1, (0, 1.0, 0)),
@@ -194,19 +193,6 @@ def test_who_is_fast_all_the_time_does_not_jump(scale: float) -> None:
     assert clip_of(fast).warnings == ()
 
 
-@pytest.mark.recordings
-@pytest.mark.parametrize(
-    "path",
-    sorted([*RECORDINGS.glob("*.[!m]*"), *RECORDINGS.with_name("rigs").glob("*.[!m]*")]),
-    ids=lambda path: path.name,
-)
-def test_of_other_peoples_motions_one_begins_with_a_t_pose_and_none_is_broken(path) -> None:
-    ((clip,), notes) = read_clips([str(path)])
-    assert clip.calibration == (path.name == "cmu_01_01.bvh")
-    assert len(clip.warnings) == clip.calibration
-    assert any("without its first frame" in note for note in notes) == bool(clip.calibration)
-
-
 # -- the part that is taken -------------------------------------------------------------------------------------------
 
 
@@ -223,13 +209,6 @@ def test_start_and_end_count_from_the_first_sample(begin: float, options: dict, 
     )
     assert len(clip.times) == count
     assert clip.times[0] - begin == pytest.approx(options.get("start", 0.0), abs=1e-5)
-
-
-def test_a_wild_time_in_front_does_not_move_the_start() -> None:
-    one = hand()
-    times = one.times.copy()
-    times[0] = -1e9
-    assert clip_of(replace(one, times=times), start=1.0).times[0] == pytest.approx(1.0, abs=0.02)
 
 
 @pytest.mark.parametrize(

@@ -24,10 +24,6 @@ def clip() -> Clip:
     return replace(clip, figure=replace(clip.figure, skin=skin))
 
 
-def test_a_sound_figure_stays_what_it_is(clip: Clip) -> None:
-    assert repaired(clip.figure) == (clip.figure, ())
-
-
 @pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, 1e38])
 def test_a_joint_that_is_nowhere_at_rest_has_no_bone_and_is_told(clip: Clip, number: float) -> None:
     figure = clip.figure
@@ -47,27 +43,6 @@ def test_a_joint_that_is_nowhere_at_rest_has_no_bone_and_is_told(clip: Clip, num
     made = make_clip(trajectory, "walk.fbx", "walk", "blender")
     assert made.repairs == done
     assert np.isfinite(made.figure.tails).all()
-
-
-@pytest.mark.parametrize(
-    ("size", "unit"),
-    [
-        (1.7, "metres"),
-        (0.3, "metres"),
-        (4.9, "metres"),
-        (175.9, "centimetres"),
-        (110.0, "centimetres"),
-        (67.0, "inches"),
-        (24.9, "units of CMU's motion capture, 1/0.45 inch"),
-        (1700.0, "millimetres"),
-        (5.8, "feet"),
-        (0.0, "metres"),
-    ],
-)
-def test_a_body_is_taken_to_be_in_the_unit_that_makes_it_a_grown_up(size: float, unit: str) -> None:
-    name, length = unit_of(size)
-    assert name == unit
-    assert length == dict(UNITS)[unit]
 
 
 @given(power=st.floats(-6.0, 9.0))

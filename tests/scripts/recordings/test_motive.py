@@ -87,25 +87,6 @@ def test_euler_angles_are_turns_about_the_turned_axes(write, order: str) -> None
     np.testing.assert_allclose(drill.poses.quaternions, expected, atol=1e-15)
 
 
-def test_rotations_without_a_w_are_euler_angles_where_the_settings_say_nothing(write) -> None:
-    text = "\n".join(
-        [
-            "Format Version,1.22,Take Name,Test,,,,",
-            ",,,,,,,",
-            "," + ",Rigid Body" * 6,
-            "," + ",Drill" * 6,
-            "," + ",B1" * 6,
-            "," + ",Rotation" * 3 + ",Position" * 3,
-            "Frame,Time (Seconds),X,Y,Z,X,Y,Z",
-            "0,0.0,90,0,0,1,2,3",
-            "1,0.1,0,90,0,1,2,3",
-        ]
-    )
-    (drill,) = read_trajectories(write("take.csv", text)).trajectories
-    half = np.sqrt(0.5)
-    np.testing.assert_allclose(drill.poses.quaternions, [[half, half, 0, 0], [half, 0, half, 0]], atol=1e-15)
-
-
 @pytest.mark.parametrize(
     ("text", "line", "problem"),
     [
@@ -131,10 +112,3 @@ def test_a_wrong_file_is_told_with_its_line(write, refusal, text: str, line: int
     told_line, message = refusal(write("take.csv", text))
     assert message.startswith(problem)
     assert told_line == line
-
-
-def test_two_bodies_of_one_name_are_told_apart(write) -> None:
-    text = export().replace('"Head, left"', "Drill")
-    recording = read_trajectories(write("take.csv", text))
-    assert [trajectory.name for trajectory in recording.trajectories] == ["Drill"]
-    assert recording.others == ("Drill.001",)

@@ -69,20 +69,8 @@ def test_columns_are_found_by_their_names(write, text: str) -> None:
     assert_holds_the_rows(write("take.csv", text))
 
 
-@pytest.mark.parametrize("name", ["take.CSV", "take.tsv", "take.txt"])
-def test_other_extensions_of_the_same_content(write, name: str) -> None:
-    assert_holds_the_rows(write(name, f"{HEADER}\n{ROWS}".replace(",", "\t")))
-
-
 def test_the_text_may_be_utf16_as_spreadsheets_write_it(write) -> None:
     assert_holds_the_rows(write("take.csv", f"{HEADER}\n{ROWS}".replace(",", "\t").encode("utf-16")))
-
-
-def test_the_body_has_the_name_of_the_file(write) -> None:
-    recording = read_trajectories(write("drill v2.csv", f"{HEADER}\n{ROWS}"))
-    assert [trajectory.name for trajectory in recording.trajectories] == ["drill v2"]
-    assert recording.others == ()
-    assert recording.note == ""
 
 
 def test_what_is_broken_in_the_recording_is_kept_for_the_repair(write) -> None:
@@ -99,12 +87,6 @@ def test_a_scale_is_read_where_there_is_one(write, name: str) -> None:
     rows = ROWS.replace("0.9\n", "0.9,1\n").replace("0.4\n", "0.4,2.5\n")
     (trajectory,) = read_trajectories(write("take.csv", f"{HEADER},{name}\n{rows}")).trajectories
     np.testing.assert_array_equal(trajectory.poses.scales, [1.0, 2.5])
-
-
-def test_a_scale_that_is_always_1_is_none(write) -> None:
-    rows = ROWS.replace("\n", ",1.0\n")
-    (trajectory,) = read_trajectories(write("take.csv", f"{HEADER},s\n{rows}")).trajectories
-    assert trajectory.poses.scales is None
 
 
 @pytest.mark.parametrize(
@@ -143,14 +125,6 @@ def test_a_wrong_file_is_told_with_its_line(write, refusal, text: str | bytes, l
     assert message.startswith(problem)
     assert told_line == line
     assert len(message) < 200
-
-
-def test_a_missing_column_is_answered_with_the_columns_that_are_needed(write, refusal) -> None:
-    _, message = refusal(write("take.csv", f"{HEADER.removesuffix(',qw')}\n{ROWS}"))
-    assert message == (
-        "no column named qw (found t, x, y, z, qx, qy, qz); known are t, time, timestamp_ms; x, px, pos_x, position.x; "
-        "qw, rot_w, rotation.w; or --columns qw=NAME"
-    )
 
 
 METADATA = ["Recorder v1.2", "Date: 2026-11-22", "Rate,90", 'Operator,"Ann, Bob"', "", "# calibrated", "gain;1;2;3"]

@@ -22,7 +22,7 @@ from rigid_motion_batch.pipeline.comparison import DECIMATED
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.figures import Figure
 from rigid_motion_batch.scenes import decimated_bodies
-from rigid_motion_batch.scenes.decimated_bodies import Decimations, Left
+from rigid_motion_batch.scenes.decimated_bodies import Left
 from rigid_motion_batch.scenes.decimating import DecimatedBody, beside_decimate, frames_of
 from tests.balls import largest_displacements
 
@@ -144,15 +144,6 @@ def test_decimate_is_held_to_our_largest_error_and_all_is_counted(monkeypatch, s
         assert found.keys < max(one.keys for one in tried)
 
 
-def test_only_channels_that_vary_are_counted() -> None:
-    clip = leg(samples=12)
-    body = DecimatedBody(made_of(clip), RADIUS)
-    values = decimated_bodies.values_of(body.rig.obj, body.frames)
-    vary = [curve for curve, own in values.items() if np.ptp(own) > 1e-4]
-    assert 0 < len(vary) < len(values)
-    assert body.left() == Left(DECIMATE, 12, 12 * len(vary), 6 * 12 * len(vary), body.errors().max())
-
-
 def test_a_body_that_stays_and_an_error_beyond_single_precision_have_no_row_of_decimate() -> None:
     clip = leg(samples=10)
     still = replace(clip, poses=Poses(clip.poses.positions[:, [0] * 10], clip.poses.quaternions[:, [0] * 10]))
@@ -171,46 +162,6 @@ def test_samples_are_on_whole_frames_where_they_are_even() -> None:
     np.testing.assert_allclose(frames_of(uneven), 1.0 + (uneven - uneven[0]) * 29.97, rtol=1e-6)
     with pytest.raises(RuntimeError, match=r"too close for Blender's frames, at 101 s"):
         frames_of(np.array((100.0, 101.0, 101.0 + 1e-9, 102.0, 103.0)))
-
-
-def test_uneven_samples_are_decimated_as_well() -> None:
-    clip = leg(samples=30)
-    kept = np.delete(np.arange(30), (4, 5, 11, 20))
-    made = made_of(replace(clip, times=clip.times[kept], poses=clip.poses[:, kept]))
-    body = DecimatedBody(made, RADIUS)
-    assert body.errors().max() < 1e-6
-    found = body.within(0.02)
-    assert 0.0 < found.largest <= 0.02
-    assert found.frames <= len(kept)
-
-
-def test_what_was_tried_for_one_error_is_known_for_the_next(monkeypatch) -> None:
-    obj = bpy.data.objects.new("carrier", None)
-    obj.animation_data_create().action = recorded = bpy.data.actions.new("recorded")
-    margins = []
-
-    def decimate(_obj: object, *, mode: str, remove_error_margin: float) -> None:
-        assert mode == "ERROR"
-        margins.append(remove_error_margin)
-
-    def seen() -> Left:
-        """Keys are the fewer, and errors the larger, the larger the margin is."""
-        assert obj.animation_data.action != recorded
-        return Left(DECIMATE, 1, int(100.0 / margins[-1] ** 0.5), 1, 3.0 * margins[-1] ** 1.3)
-
-    monkeypatch.setattr(decimated_bodies, "decimate", decimate)
-    decimations = Decimations(obj, seen)
-    first = decimations.within(0.01)
-    assert 0.98 * 0.01 <= first.largest <= 0.01
-    count = len(margins)
-    assert count <= 6
-    assert decimations.within(1.001 * first.largest) == first
-    assert len(margins) == count
-    assert decimations.within(1e-12) is None
-    assert decimations.within(1e9).largest > 50.0
-    assert len(margins) <= 4 * decimated_bodies.TRIALS
-    assert obj.animation_data.action == recorded
-    assert not [action for action in bpy.data.actions if action.name.startswith("recorded.")]
 
 
 # -- in a comparison --------------------------------------------------------------------------------------------------

@@ -13,7 +13,6 @@ from rigid_motion.animation import channelbag_of, read_poses
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
 from rigid_motion.motion.quaternions import angle_between, conjugate, multiply, rotate
 from rigid_motion_batch.analysis.choices import Tolerance
-from rigid_motion_batch.analysis.metrics import measure_reconstruction
 from rigid_motion_batch.analysis.reconstructions import reconstruct as choose
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.clips import Clip
@@ -73,8 +72,7 @@ def test_every_mode_is_played_on_every_frame_as_it_was_computed(axes):
     times = timeline.times_of(timeline.frames)
     centre = np.array(scene["recording_centre_m"])
     found_of = poses_on(
-        timeline.frames,
-        [name for mode in KEYFRAME_MODES for name in (f"Lane {mode}", mode, f"{mode} recording")],
+        timeline.frames, [name for mode in KEYFRAME_MODES for name in (f"Lane {mode}", mode, f"{mode} recording")]
     )
     for mode in KEYFRAME_MODES:
         turn = np.array(bpy.data.objects[f"Lane {mode}"].matrix_world.to_quaternion())
@@ -94,15 +92,6 @@ def test_every_mode_is_played_on_every_frame_as_it_was_computed(axes):
                 multiply(conjugate(turn), found.quaternions),
             )
             assert_same_poses(at_home, wanted)
-
-
-def test_the_keys_of_a_mode_are_ordinary_keys_for_every_frame():
-    scene = build_stage(reconstruct(swinging_clip(seconds=1.0), "5", TWO), SETTINGS)
-    for mode in TWO:
-        fcurves = channelbag_of(bpy.data.objects[mode]).fcurves
-        assert {curve.data_path for curve in fcurves} == {"location", "rotation_quaternion"}
-        assert {len(curve.keyframe_points) for curve in fcurves} == {scene.frame_end}
-        assert bpy.data.objects[mode].animation_data.action.name == mode
 
 
 def test_an_object_that_grows_grows_on_the_stage():
@@ -192,31 +181,6 @@ def test_the_number_shows_the_error_of_the_frame_and_the_graph_has_passed_so_far
         assert any(len(points) != len(drawn[0]) for points in drawn)
 
 
-def test_at_few_frames_the_graph_keeps_the_peaks_between_them_and_says_the_largest():
-    clip = swinging_clip(seconds=1.0)
-    jolted = clip.poses.positions.copy()
-    jolted[len(jolted) // 2 + 3] += (0.0, 0.0, 0.15)  # Between two frames.
-    made = reconstruct(dataclasses.replace(clip, poses=Poses(jolted, clip.poses.quaternions)), "5", TWO)
-    build_stage(made, dataclasses.replace(SETTINGS, fps=5))
-    largest = {mode: 1e3 * made.errors[mode].shell.max() for mode in TWO}
-    tallest = {mode: vertices_of(bpy.data.objects[f"{mode} graph"].data)[:, 1].max() for mode in TWO}
-    for mode, row in zip(TWO, measure_reconstruction(made), strict=True):
-        assert largest[mode] > 100.0
-        assert tallest[mode] / max(tallest.values()) == pytest.approx(largest[mode] / max(largest.values()), rel=1e-5)
-        assert bpy.data.curves[f"{mode} max"].body == f"max {1e3 * row.max_shell_m:.1f}"
-    assert f"(graphs up to {max(largest.values()):.1f})" in bpy.data.curves["Legend"].body
-
-
-def test_the_number_ends_where_it_ended():
-    scene = build_stage(reconstruct(swinging_clip(seconds=1.0), "5", TWO), SETTINGS)
-    clock = bpy.data.objects["Time"]
-    ends = []
-    for frame in (2, 6, 11):
-        scene.frame_set(frame)
-        ends.append(evaluated_points(clock)[:, 0].max())
-    assert np.ptp(ends) < 0.006 * bpy.data.objects["Frame"].scale.x
-
-
 def test_the_trail_ends_at_the_object_and_follows_it_for_a_while():
     reconstruction = reconstruct(swinging_clip(seconds=2.0), "5", TWO)
     scene = build_stage(reconstruction, SETTINGS)
@@ -254,32 +218,6 @@ def test_the_file_needs_no_script_to_play():
     for block in bpy.data.user_map():
         data = getattr(block, "animation_data", None)
         assert data is None or not data.drivers, block
-
-
-def test_the_outliner_tells_what_is_what():
-    scene = build_stage(reconstruct(swinging_clip("arm", seconds=0.6), "7.5", TWO), SETTINGS)
-    assert scene.name == "arm 7.5"
-    assert {child.name for child in scene.collection.children} == {"Lane lerp_slerp", "Lane dq_sclerp", "Captions"}
-    assert {"dq_sclerp", "dq_sclerp recording"} <= set(bpy.data.collections["Lane dq_sclerp"].objects.keys())
-
-
-def test_a_clip_shorter_than_a_frame_is_one_frame():
-    scene = build_stage(reconstruct(swinging_clip(seconds=0.05), "30", TWO), SETTINGS)
-    assert (scene.frame_start, scene.frame_end) == (1, 1)
-    assert len(evaluated_points(bpy.data.objects["Time"]))
-
-
-@pytest.mark.parametrize("engine", ["workbench", "eevee", "cycles"])
-def test_every_engine_can_be_chosen(engine):
-    reconstruction = reconstruct(swinging_clip(seconds=0.6), "5", ("dq_sclerp",))
-    scene = build_stage(reconstruction, dataclasses.replace(SETTINGS, engine=engine))
-    assert engine in scene.render.engine.lower()
-
-
-def test_an_object_that_would_be_lost_on_its_path_is_shown_larger_and_says_so():
-    build_stage(reconstruct(changed(swinging_clip(seconds=1.0), 100.0), "5", TWO), SETTINGS)
-    assert "object shown" in bpy.data.curves["Legend"].body
-    assert np.ptp(vertices_of(bpy.data.objects["dq_sclerp"].data), axis=0).max() > 0.5
 
 
 @pytest.mark.parametrize(
