@@ -117,27 +117,6 @@ def test_a_motion_that_lasts_as_long_is_compared_from_end_to_end(toss, tmp_path,
     assert int(row["samples"]) > 80
 
 
-def test_options_say_of_it_what_they_say_of_the_recording(toss, mine, tmp_path):
-    """In centimetres with y up and other names, both have the numbers that they have in metres."""
-
-    def write(path: Path) -> Path:
-        columns = table(path)
-        renamed = {"when": columns["t"], **{f"p{name}": 100.0 * columns[name] for name in "xyz"}}
-        renamed |= {name: columns[name] for name in POSE[3:]}
-        lines = [
-            ",".join(map(repr, row)) for row in zip(*(column.tolist() for column in renamed.values()), strict=True)
-        ]
-        (tmp_path / path.name).write_text("\n".join([",".join(renamed), *lines, ""]))
-        return tmp_path / path.name
-
-    how = ("--scale", "0.01", "--axes", "unity", "--columns", "t=when,x=px,y=py,z=pz")
-    assert run(toss, "--against", mine, *FAST, "--output", tmp_path / "metres") == 0
-    assert run(write(toss), "--against", write(mine), *FAST, *how, "--output", tmp_path / "units") == 0
-    for one, other in zip(*(rows_of(tmp_path / name / "metrics.csv") for name in ("metres", "units")), strict=True):
-        assert one["mode"] == other["mode"]
-        assert float(one["rms_shell_m"]) == pytest.approx(float(other["rms_shell_m"]), rel=1e-9)
-
-
 @pytest.mark.parametrize(
     ("stem", "called"),
     [

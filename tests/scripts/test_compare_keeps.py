@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from rigid_motion_batch import places
 from rigid_motion_batch.cli import compare
-from rigid_motion_batch.pipeline import comparison_steps as steps
 from rigid_motion_batch.pipeline.steps import OWN
-from tests.scripts.comparing import ROOT, write_toss
+from tests.scripts.comparing import write_toss
 
 OPTIONS = ("--no-video", "--rates", "5", "--modes", "lerp_slerp", "--jobs", "0")
 
@@ -166,38 +162,6 @@ def test_what_would_be_done_is_explained_and_nothing_is_done(folder: Path, capsy
     capsys.readouterr()
     assert run("toss.csv", "--output", "out", "--explain") == 0
     assert capsys.readouterr().out.splitlines() == ["nothing to do"]
-
-
-def test_after_an_edit_of_the_page_the_page_alone_is_made_again(folder: Path, tmp_path: Path) -> None:
-    """A colour of the page, a chart: nothing is measured anew, and nothing that films are made of may use them."""
-    for name in ("addon", "scripts/rigid_motion_batch", "assets", "blender_manifest.toml"):
-        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        copy(ROOT / name, tmp_path / name)
-    shutil.copy(ROOT / "scripts" / "compare.py", tmp_path / "scripts")
-    command = [sys.executable, tmp_path / "scripts" / "compare.py", folder / "toss.csv", "--no-video", "--rates", "10"]
-    command += ["--jobs", "0", "--output", tmp_path / "output"]
-
-    def explained() -> list[str]:
-        return subprocess.run([*command, "--explain"], check=True, capture_output=True, text=True).stdout.splitlines()
-
-    subprocess.run(command, check=True, capture_output=True)
-    assert explained() == ["nothing to do"]
-    room = tmp_path / "scripts" / "rigid_motion_batch"
-    style, charts = room / "report" / "templates" / "page.css", room / "report" / "charts.py"
-    style.write_text(style.read_text(encoding="utf-8").replace("#0a58b8", "#b8580a"), encoding="utf-8")
-    charts.write_text(charts.read_text(encoding="utf-8") + "\n# A chart.\n", encoding="utf-8")
-    assert explained() == ["report.html: program changed (report)"]
-    found = subprocess.run([*command, "--json"], check=True, capture_output=True, text=True).stdout
-    assert json.loads(found)["tasks"] == {"done": 1, "up to date": 4}
-    assert "#b8580a" in (tmp_path / "output" / "report.html").read_text(encoding="utf-8")
-    metrics = room / "analysis" / "metrics.py"
-    metrics.write_text(metrics.read_text(encoding="utf-8") + "\n# A number.\n", encoding="utf-8")
-    assert [line.partition(":")[0] for line in explained()] == [
-        *("measure toss/10", "model toss/10", "metrics.csv", "report.html")
-    ]
-    steps_with_report = {name for name, one in vars(steps).items() if "report" in getattr(one, "rooms", ())}
-    assert steps_with_report == {"page", "overview"}
 
 
 # -- where it goes ----------------------------------------------------------------------------------------------------

@@ -143,15 +143,9 @@ def test_a_file_without_animation_is_told(tmp_path, capsys):
     ("options", "line"),
     [
         (["shot.blend", "--mode", "dq_sclerp"], "GLB knows lines and even turns alone: leave it out"),
-        (
-            ["shot.blend", "--in-place"],
-            "--in-place is for .blend files, and --glb writes others: leave one of them out",
-        ),
+        (["shot.blend", "--in-place"], "--in-place is for .blend files, and --glb writes others: leave one of them ou"),
         (["walk.bvh", "--blend"], "--blend is for .blend files, and --glb writes others: leave one of them out"),
-        (
-            ["shot.blend", "--objects", "A"],
-            "--objects is for .blend files, and --glb writes others: leave one of them out",
-        ),
+        (["shot.blend", "--objects", "A"], "--objects is for .blend files, and --glb writes others: leave one of them"),
         (["walk.fbx", "--start", "1"], "with --glb Blender imports walk.fbx whole"),
         (["walk.gltf"], "walk.gltf is reduced to a .gltf file: do it without --glb"),
     ],

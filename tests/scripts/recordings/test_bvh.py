@@ -219,11 +219,7 @@ def test_the_poses_are_those_of_blenders_importer(write, seed: int) -> None:
         (ARM.replace("Frames: 2", "Frames: 1").replace("1 5 0  90 0 0  -90 0 0\n", ""), None, "'arm' has 1 samples"),
         ("HIERARCHY\nROOT A\n{\nOFFSET 0 0 0\n}\nMOTION\nFrames: 1\nFrame Time: 1\n0\n", 6, "no joint has CHANNELS"),
         ("HIERARCHY\n" + "ROOT A {" + "JOINT B {" * 50_000, 2, "more than 500 joints hang on one another; export a"),
-        (
-            "HIERARCHY\n" + "ROOT A {" + "JOINT B {}" * 50_000,
-            2,
-            "more than 3000 joints; export fewer, such as one body",
-        ),
+        ("HIERARCHY\n" + "ROOT A {" + "JOINT B {}" * 50_000, 2, "more than 3000 joints; export fewer, such as one bod"),
         ("HIERARCHY\n" + "ROOT A {" + "JOINT B {" * 400, 2, "the file ends where MOTION is expected"),
         (b"\x00\x01HIERARCHY", 1, "this is not text but binary data"),
     ],

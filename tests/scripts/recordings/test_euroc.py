@@ -28,11 +28,7 @@ def test_not_a_nanosecond_is_lost(write, header: str) -> None:
     ("text", "line", "problem"),
     [
         (f"{HEADER}\n", None, "'data' has 0 samples"),
-        (
-            "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m]\n1,2,3,4\n",
-            1,
-            "no column named x, y, z, qx, qy, qz, qw",
-        ),
+        ("#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m]\n1,2,3,4\n", 1, "no column named x, y, z, qx, qy, qz"),
         (f"{HEADER}\n{ROWS}1,0,0,0,up,0,0,0,0,0,0\n", 5, "qw is 'up', not a number"),
     ],
 )

@@ -23,7 +23,7 @@ from rigid_motion_batch.recordings.fbx_records import FIRST
 from rigid_motion_batch.scenes.armature import Rest
 from rigid_motion_batch.scenes.physique import figure_size
 from tests.blank import blank
-from tests.scripts.recordings.blends import empty, key, on_frames, rig
+from tests.scripts.recordings.blends import empty, on_frames, rig
 from tests.scripts.recordings.glbs import soldier
 from tests.scripts.recordings.skeletons import (
     BONES,
@@ -163,16 +163,6 @@ def test_a_body_is_as_large_as_its_joints_wherever_an_importer_has_its_bones_end
     assert rest.joints.positions[:, 2].min() < 0.3, "the ground is below its feet, and not below the ends of bones"
     far = replace(rest, tails=rest.joints.positions + np.array([0.0, 0.0, 40.0]))
     assert figure_size(far) == figure_size(rest)
-
-
-@pytest.mark.parametrize(("between", "rate"), [(1, 24.0), (10, 60.0)])
-def test_a_gltf_without_a_rate_is_sampled_60_times_a_second(scene, tmp_path: Path, between: int, rate: float) -> None:
-    obj = rig("Body", BONES)
-    for frame in range(0, 41, between):
-        key(obj.pose.bones["Upper"], frame, rotation_euler=(0.1 * frame, 0, 0))
-    bpy.context.scene.render.fps, bpy.context.scene.frame_start, bpy.context.scene.frame_end = 24, 0, 40
-    path = export(tmp_path / "walk.glb", export_force_sampling=False)
-    assert 1.0 / np.diff(on_frames(whole(path)).times).mean() == pytest.approx(rate)
 
 
 @pytest.mark.parametrize("ending", [".fbx", ".glb"])

@@ -53,10 +53,7 @@ def test_turns_about_fixed_axes_are_turns_about_moved_ones_in_the_opposite_order
     [
         (["--columns", "when"], "'when' names no columns; write t=timestamp_ms,x=pos_x,..."),
         (["--columns", "t="], "'t=' names no columns"),
-        (
-            ["--columns", "q=a"],
-            "a column cannot mean 'q'; known are t, x, y, z, qw, qx, qy, qz, rx, ry, rz, scale, dev",
-        ),
+        (["--columns", "q=a"], "a column cannot mean 'q'; known are t, x, y, z, qw, qx, qy, qz, rx, ry, rz, scale, de"),
         (["--columns", "t=a,t=b"], "two columns for t; name one"),
         (["--time-unit", "min"], "invalid choice: 'min'"),
         (["--scale", "0"], "a unit cannot be 0.0 metres long; give a number such as 0.01 for centimetres"),

@@ -67,10 +67,7 @@ def test_hands_are_not_doubted() -> None:
     [
         (hand(rate=4.0), "only 4 samples a second, fewer than any motion needs"),
         (hand(rate=90e3), "9e+04 samples a second, more than any device has"),
-        (
-            replace(hand(), metres_per_unit=100.0),
-            "a twentieth of its speeds are above 179 m/s, and it goes 41.1 m far, as no hand does; if its",
-        ),
+        (replace(hand(), metres_per_unit=100.0), "a twentieth of its speeds are above 179 m/s, and it goes 41.1 m far"),
         (replace(hand(), metres_per_unit=1000.0), "a twentieth of its speeds are above 1.79e+03 m/s"),
     ],
 )
@@ -121,16 +118,8 @@ def csv_of(times: list[str]) -> str:
 @pytest.mark.parametrize(
     ("unit", "ticks", "told"),
     [
-        (
-            "ms",
-            1_000,
-            "t goes in steps of 11: as seconds that is one sample in 11 s; these look like milliseconds (90.9",
-        ),
-        (
-            "us",
-            10**6,
-            "t goes in steps of 1.1e+04: as seconds that is one sample in 1.1e+04 s; these look like microse",
-        ),
+        ("ms", 1_000, "t goes in steps of 11: as seconds that is one sample in 11 s; these look like milliseconds (90"),
+        ("us", 10**6, "t goes in steps of 1.1e+04: as seconds that is one sample in 1.1e+04 s; these look like micros"),
         ("ns", 10**9, "t goes in steps of 1.1e+07: as seconds that is one sample in 1.1e+07 s; these look like nanose"),
     ],
 )

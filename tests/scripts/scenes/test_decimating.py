@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import replace
-from pathlib import Path
 
 import bpy
 import numpy as np
@@ -17,8 +15,6 @@ from rigid_motion_batch.analysis.body_decimated import DECIMATE, OWN, SHARED
 from rigid_motion_batch.analysis.body_metrics import measure_modes
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.axes import AXES
-from rigid_motion_batch.cli import compare
-from rigid_motion_batch.pipeline.comparison import DECIMATED
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.figures import Figure
 from rigid_motion_batch.scenes import decimated_bodies
@@ -29,8 +25,6 @@ from tests.balls import largest_displacements
 RADIUS = np.array((0.03, 0.05, 0.02, 0.03))
 
 MODES = ("lerp_slerp", "motor_spline")
-
-COLUMNS = "clip,mode,how,rate_hz,frames_with_keys,keys,numbers,max_shell_m,decimation,tolerance_m"
 
 JOINTS = ("Hip", "Knee", "Foot", 'A "bone" of\\any name')
 
@@ -165,65 +159,3 @@ def test_samples_are_on_whole_frames_where_they_are_even() -> None:
 
 
 # -- in a comparison --------------------------------------------------------------------------------------------------
-
-
-HOSTILE = """HIERARCHY
-ROOT <b>Hip&"
-{
-  OFFSET 0 0 0
-  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
-  JOINT </table><script>alert(1)</script>
-  {
-    OFFSET 0 -50 0
-    CHANNELS 3 Zrotation Xrotation Yrotation
-    End Site
-    {
-      OFFSET 0 -50 0
-    }
-  }
-}
-MOTION
-Frames: 30
-Frame Time: 0.0333333
-"""
-
-
-def test_a_run_has_the_table_in_its_report_and_goes_on_without_it(tmp_path: Path, monkeypatch, capfd) -> None:
-    source, output = tmp_path / "<i>leg&.bvh", tmp_path / "output"
-    rows = [f"{n} {90 + n % 5} 0 {40 * np.sin(n / 5):.3f} {n} 0 {50 * np.cos(n / 4):.3f} 0 0" for n in range(30)]
-    source.write_text(HOSTILE + "\n".join(rows) + "\n", encoding="utf-8")
-    adaptive = ["--tolerance", "1cm", "--rates", "5", "--modes", "lerp_slerp,motor_spline"]
-    command = ["--jobs", "0", str(source), *adaptive, "--no-video", "--output", str(output)]
-    assert compare.main(command) == 0
-    page = (output / "report.html").read_text(encoding="utf-8")
-    assert "Decimate" in page
-    assert "<script>alert" not in page
-    assert "<i>leg" not in page
-    with (output / DECIMATED).open(encoding="utf-8", newline="") as stream:
-        table = list(csv.DictReader(stream))
-    assert ",".join(table[0]) == COLUMNS
-    assert [(line["mode"], line["how"]) for line in table] == [(mode, how) for mode in MODES for how in (OWN, DECIMATE)]
-    with (output / "metrics.csv").open(encoding="utf-8", newline="") as stream:
-        metrics = {line["mode"]: line for line in csv.DictReader(stream) if line["decimation"] == "adaptive"}
-    for own, theirs in zip(table[::2], table[1::2], strict=True):
-        measured = metrics[own["mode"]]
-        assert [own[name] for name in ("keys", "max_shell_m", "clip")] == [
-            measured[name] for name in ("keys", "max_shell_m", "clip")
-        ]
-        assert own["frames_with_keys"] == measured["key_frames"]
-        assert float(theirs["max_shell_m"]) <= float(own["max_shell_m"]) <= 0.01
-        assert float(own["tolerance_m"]) == 0.01
-
-    def without_window(*_: object, **__: object) -> None:
-        raise RuntimeError("Error: no\nwindow")
-
-    monkeypatch.setattr(decimated_bodies, "decimate", without_window)
-    capfd.readouterr()
-    again = tmp_path / "again"
-    assert compare.main([*command[:-1], str(again)]) == 1
-    said = capfd.readouterr().err
-    assert "within 1 cm: not compared with Blender's Decimate: Error: no window" in said
-    assert "Traceback" not in said
-    assert "not compared" in said
-    assert (again / "report.html").is_file()
-    assert not (again / DECIMATED).exists() or (again / DECIMATED).read_text(encoding="utf-8") == f"{COLUMNS}\n"

@@ -181,37 +181,6 @@ def test_the_number_shows_the_error_of_the_frame_and_the_graph_has_passed_so_far
         assert any(len(points) != len(drawn[0]) for points in drawn)
 
 
-def test_the_trail_ends_at_the_object_and_follows_it_for_a_while():
-    reconstruction = reconstruct(swinging_clip(seconds=2.0), "5", TWO)
-    scene = build_stage(reconstruction, SETTINGS)
-    frame = scene.frame_end
-    for mode in TWO:
-        trail = bpy.data.objects[f"{mode} trail"]
-        path = vertices_of(trail.data)
-        scene.frame_set(frame)
-        world = np.array(bpy.data.objects[f"Lane {mode}"].matrix_world)
-        path = path @ world[:3, :3].T + world[:3, 3]
-        drawn = evaluated_points(trail)
-        reach = 0.02 * bpy.data.objects["Frame"].scale.x
-        gaps = np.linalg.norm(drawn[None] - path[:, None], axis=-1).min(axis=1)
-        assert gaps[-1] < reach
-        assert gaps[0] > reach
-        scene.frame_set(1)
-        assert len(evaluated_points(trail)) < len(drawn) / 4
-
-
-def test_keys_are_marked_where_the_modes_meet_the_recording():
-    reconstruction = reconstruct(swinging_clip(seconds=1.0), "5", TWO)
-    scene = build_stage(reconstruction, SETTINGS)
-    keys = bpy.data.objects["dq_sclerp keys"]
-    assert len(keys.data.vertices) == len(reconstruction.keys["dq_sclerp"])
-    scene.frame_set(scene.frame_end)
-    radius = 0.02 * bpy.data.objects["Frame"].scale.x
-    world = np.array(keys.matrix_world)
-    last = vertices_of(keys.data)[-1] @ world[:3, :3].T + world[:3, 3]
-    assert np.linalg.norm(evaluated_points(keys) - last, axis=1).min() < radius
-
-
 def test_the_file_needs_no_script_to_play():
     build_stage(reconstruct(swinging_clip(seconds=0.6), "5"), SETTINGS)
     assert not bpy.data.texts
