@@ -95,14 +95,11 @@ def test_a_step_is_two_samples_and_is_told(tmp_path: Path) -> None:
     body = Body(parents, offsets, tracks)
     found = read(body.write(tmp_path / "step.glb"))
     assert len(found.times) == 32
-    times = body.moments[(body.moments < 0.4 - 0.03 / 30) | (body.moments >= 0.4)]
+    times = body.moments[(body.moments < 0.4 - 0.03 / 30) | (body.moments > 0.4)]
     assert off(found, body, times) < WITHIN
     (warning,) = found.warnings
     assert "it jumps" in warning.text
     assert "first at 0.3992 s" in warning.text
-
-
-# -- which moments ----------------------------------------------------------------------------------------------------
 
 
 # -- .blend -----------------------------------------------------------------------------------------------------------
