@@ -95,9 +95,7 @@ def test_the_main_job_runs_on_the_motions_that_come_along(installed: Path, tmp_p
     assert {row.split(",")[0] for row in rows[1:]} == clips
 
 
-def test_the_zip_for_blender_is_the_same_as_from_the_checkout(
-    installed: Path, tmp_path: Path, extension_zip: Path
-) -> None:
+def test_the_zip_for_blender_is_the_same_as_from_the_checkout(installed, tmp_path, extension_zip):
     done = run(installed / "rigid-motion", "build", "--output", tmp_path)
     assert done.returncode == 0, done.stderr
     assert Path(done.stdout.strip()).read_bytes() == extension_zip.read_bytes()

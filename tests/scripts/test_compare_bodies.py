@@ -189,9 +189,7 @@ def lines_about(said: str, path: Path) -> list[str]:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals end no processes there")
 @pytest.mark.parametrize("jobs", sample([2, 1]))
-def test_a_body_that_ends_a_worker_is_told_and_the_others_go_on(
-    deadly: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], jobs: int
-) -> None:
+def test_a_body_that_ends_a_worker_is_told_and_the_others_go_on(deadly, tmp_path, capfd, jobs):
     walk, stroll, output = write_body(tmp_path), write_body(tmp_path, "stroll"), tmp_path / "output"
     assert run(walk, deadly, stroll, *QUICK, "--rates", "5", "--output", output, jobs=jobs) == 1
     lines = [line for line in lines_about(capfd.readouterr().err, deadly) if "its process died (SIGSEGV)" in line]
@@ -205,9 +203,7 @@ def test_a_body_that_ends_a_worker_is_told_and_the_others_go_on(
 
 
 @pytest.mark.parametrize("jobs", [0, 1])
-def test_a_damaged_body_is_told_in_one_line_and_the_others_go_on(
-    fbx: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], jobs: int
-) -> None:
+def test_a_damaged_body_is_told_in_one_line_and_the_others_go_on(fbx, tmp_path, capfd, jobs):
     content, walk, output = fbx.read_bytes(), write_body(tmp_path), tmp_path / "output"
     cut, torn = tmp_path / "cut.fbx", tmp_path / "torn.bvh"
     cut.write_bytes(content[: len(content) // 2])

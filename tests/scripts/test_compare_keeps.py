@@ -61,9 +61,7 @@ def refused(capsys: pytest.CaptureFixture, *arguments: object) -> str:
 
 @pytest.mark.parametrize("place", ["metrics.csv"])
 @pytest.mark.parametrize("force", [(), ("--overwrite",)])
-def test_an_input_that_lies_where_an_output_goes_is_refused(
-    tmp_path: Path, place: str, force: tuple[str, ...], capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_input_that_lies_where_an_output_goes_is_refused(tmp_path, place, force, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_toss(tmp_path / place)
     assert f"{place}: this input lies where" in refused(capsys, place, "--output", ".", *force)
@@ -117,9 +115,7 @@ def test_a_file_where_a_folder_goes_is_never_replaced(folder: Path, capsys: pyte
 # -- another comparison -----------------------------------------------------------------------------------------------
 
 
-def test_another_comparison_in_the_folder_is_named_with_the_ways_out(
-    folder: Path, capsys: pytest.CaptureFixture
-) -> None:
+def test_another_comparison_in_the_folder_is_named_with_the_ways_out(folder, capsys):
     write_toss(folder / "hand.csv", samples=70)
     said = refused(capsys, "hand.csv", "--output", "out")
     assert "out holds another comparison, of toss.csv; choose another folder, such as --output " in said

@@ -142,9 +142,7 @@ def compared(folder: Path, write: Callable[[Path, Sequence[str]], list[str]], na
         ),
     ],
 )
-def test_a_comparison_stays_in_its_folder_and_names_do_not_change_its_report(
-    tmp_path: Path, write: Callable[[Path, Sequence[str]], list[str]], names: tuple[str, ...]
-) -> None:
+def test_a_comparison_stays_in_its_folder_and_names_do_not_change_its_report(tmp_path, write, names):
     plain = compared(tmp_path / "plain", write, [f"body {number}" for number in range(len(names))])
     output = compared(tmp_path / "hostile", write, names)
     assert {path.name for path in tmp_path.iterdir()} == {"plain", "hostile"}

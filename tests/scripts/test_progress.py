@@ -148,9 +148,7 @@ def test_a_console_that_cannot_show_every_letter_gets_ascii() -> None:
 
 
 @pytest.mark.parametrize(("variable", "coloured"), [({}, True), ({"NO_COLOR": "1"}, False), ({"TERM": "dumb"}, False)])
-def test_colour_is_for_terminals_that_did_not_say_no(
-    variable: dict[str, str], coloured: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_colour_is_for_terminals_that_did_not_say_no(variable, coloured, monkeypatch):
     monkeypatch.delenv("NO_COLOR")
     for name, value in variable.items():
         monkeypatch.setenv(name, value)

@@ -161,9 +161,7 @@ def test_tables_are_joined_under_one_header_whatever_joints_are_called(tmp_path:
 
 @pytest.mark.parametrize("joints", [JOINTS, HOSTILE], ids=["plain", "hostile"])
 @pytest.mark.parametrize("choice", CHOICES, ids=str)
-def test_keys_are_tables_of_poses_in_parents_space_and_read_back_exactly(
-    tmp_path: Path, choice: Choice, joints: tuple[str, ...]
-) -> None:
+def test_keys_are_tables_of_poses_in_parents_space_and_read_back_exactly(tmp_path, choice, joints):
     made = measured(choice, joints=joints).made
     write_key_tables(tmp_path, made)
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(body_table_names(choice, MODES))

@@ -47,9 +47,7 @@ def test_a_tolerance_with_a_unit_is_the_same_length_in_recordings_of_any_unit() 
 
 
 @pytest.mark.parametrize(("seconds", "rate", "count"), [(3.0, "10", 31), (1.0, "7.5", 8), (3.0, "500", 271)])
-def test_a_budget_is_as_many_keys_as_a_sender_at_that_rate_has_and_better_ones(
-    seconds: float, rate: str, count: int
-) -> None:
+def test_a_budget_is_as_many_keys_as_a_sender_at_that_rate_has_and_better_ones(seconds, rate, count):
     clip = swinging_clip(seconds=seconds)
     keys = Budget(rate).keys(clip, "lerp_slerp", 0.1)
     evenly = Uniform(rate).keys(clip, "lerp_slerp", 0.1)

@@ -62,9 +62,7 @@ NAMES = st.text(
         lambda named: len({name.strip() for name in named}) == len(named)
     )
 )
-def test_joints_of_any_name_have_their_radius(
-    tmp_path_factory: pytest.TempPathFactory, named: dict[str, float]
-) -> None:
+def test_joints_of_any_name_have_their_radius(tmp_path_factory, named):
     path = tmp_path_factory.getbasetemp() / f"radii-{os.getpid()}.csv"
     lines = [line_of(("joint", "radius_m")), *map(line_of, named.items())]
     path.write_text("".join(lines), encoding="utf-8", newline="")
@@ -91,9 +89,7 @@ def test_joints_of_any_name_have_their_radius(
         ("a\x1b[2J\n", 1, "the columns joint and radius_m are needed, and it has a\\x1b[2j"),
     ],
 )
-def test_what_is_wrong_is_told_with_the_file_and_the_line(
-    table: Callable[[str], str], content: str, line: int, problem: str
-) -> None:
+def test_what_is_wrong_is_told_with_the_file_and_the_line(table, content, line, problem):
     path = table(content)
     with pytest.raises(ValueError, match=re.escape(problem)) as caught:
         read_radii(path)

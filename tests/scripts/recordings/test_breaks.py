@@ -186,6 +186,12 @@ def test_a_joint_that_jumps_is_said() -> None:
     assert (there.end_s, back.start_s) == (dance.times[300], dance.times[300])
 
 
+def test_jumps_in_more_than_one_sample_of_a_hundred_are_no_faults_of_some() -> None:
+    one = hand()
+    one.poses.positions[30::60] += (0.0, 0.8, 0.0)
+    assert not [warning for warning in clip_of(one).warnings if "jump" in warning.text]
+
+
 @pytest.mark.parametrize("scale", [1.0, 100.0])
 def test_who_is_fast_all_the_time_does_not_jump(scale: float) -> None:
     one = hand()

@@ -231,9 +231,7 @@ def test_a_column_that_is_named_for_devices_and_is_none_is_refused(write, refusa
         ("t,x [furlong],y,z,qx,qy,qz,qw", {}, "'furlong' is no unit of length that is known; say how many metres it "),
     ],
 )
-def test_a_refusal_says_what_was_found_what_is_known_and_what_helps(
-    write, refusal, header: str, options: dict, told: str
-) -> None:
+def test_a_refusal_says_what_was_found_what_is_known_and_what_helps(write, refusal, header, options, told):
     row = ",".join("0" for _ in header.split(","))
     line, message = refusal(write("take.csv", f"{header}\n{row}\n"), **options)
     assert message.startswith(told)
@@ -245,7 +243,9 @@ def test_a_refusal_says_what_was_found_what_is_known_and_what_helps(
 
 
 def test_angles_that_are_no_radians_are_refused(write, refusal) -> None:
-    source = write("take.csv", "t,x,y,z,rx,ry,rz\n0,0,0,0,359,0,0\n.1,0,0,0,1,0,0\n")
+    rows = "0,0,0,0,359,0,0\n.1,0,0,0,1,0,0\n"
+    source = write("take.csv", f"t,x,y,z,rx,ry,rz\n{rows}")
+    read_one(write("said.csv", f"t,x,y,z,rx_rad,ry_rad,rz_rad\n{rows}"), euler="XYZ")
     assert refusal(source, euler="XYZ")[1].startswith("angles go up to 359, which are no radians; say so: --degrees;")
 
 
@@ -318,9 +318,7 @@ def loggers(draw: st.DrawFn) -> tuple[str, ReadingOptions, str, int]:
 
 @settings(max_examples=tried(100))
 @given(loggers())
-def test_any_spelling_any_unit_any_order_and_any_layout_is_the_motion(
-    tmp_path_factory: pytest.TempPathFactory, logger: tuple[str, ReadingOptions, str, int]
-) -> None:
+def test_any_spelling_any_unit_any_order_and_any_layout_is_the_motion(tmp_path_factory, logger):
     text, options, unit, start = logger
     path = Path(tmp_path_factory.getbasetemp()) / "logger.csv"
     path.write_text(text, encoding="utf-8")

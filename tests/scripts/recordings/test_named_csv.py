@@ -173,9 +173,7 @@ samples = st.lists(st.tuples(*[numbers] * 9), min_size=2, max_size=FEWEST - 1).m
 
 @settings(max_examples=tried(60))
 @given(samples, st.permutations(range(9)), st.sampled_from([",", ";", "\t"]))
-def test_what_is_written_in_full_precision_comes_back_exactly(
-    tmp_path_factory: pytest.TempPathFactory, table: np.ndarray, order: list[int], separator: str
-) -> None:
+def test_what_is_written_in_full_precision_comes_back_exactly(tmp_path_factory, table, order, separator):
     path = tmp_path_factory.getbasetemp() / "round_trip.csv"
     names = ["t", "x", "y", "z", "qw", "qx", "qy", "qz", "scale"]
     lines = [[names[column] for column in order], *[[repr(float(row[column])) for column in order] for row in table]]

@@ -67,9 +67,7 @@ def test_turns_about_fixed_axes_are_turns_about_moved_ones_in_the_opposite_order
         (["--euler", "xYz"], "'xYz' is no order of Euler angles"),
     ],
 )
-def test_what_cannot_be_meant_is_refused_at_once(
-    capsys: pytest.CaptureFixture[str], arguments: list[str], told: str
-) -> None:
+def test_what_cannot_be_meant_is_refused_at_once(capsys, arguments, told):
     with pytest.raises(SystemExit):
         parsed(*arguments)
     assert told in capsys.readouterr().err

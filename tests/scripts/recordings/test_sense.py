@@ -123,9 +123,7 @@ def csv_of(times: list[str]) -> str:
         ("ns", 10**9, "t goes in steps of 1.1e+07: as seconds that is one sample in 1.1e+07 s; these look like nanose"),
     ],
 )
-def test_times_that_are_no_seconds_are_refused_with_their_unit(
-    write, refusal, name: str, start: int, unit: str, ticks: int, told: str
-) -> None:
+def test_times_that_are_no_seconds_are_refused_with_their_unit(write, refusal, name, start, unit, ticks, told):
     text = csv_of([str(start * ticks + row * 11 * ticks // 1000) for row in range(9)])
     source = write(name, text if name.endswith(".csv") else "# " + text.replace(",", " "))
     line, message = refusal(source)

@@ -143,9 +143,7 @@ def box(page: Browser, selector: str) -> dict[str, float]:
 @pytest.mark.parametrize("name", ["two", "body", "adaptive", "large"])
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
 @pytest.mark.parametrize("width", [1440, 390])
-def test_every_page_draws_its_view_and_chart_and_fits(
-    page: Browser, folder: Path, name: str, dark: bool, width: int
-) -> None:
+def test_every_page_draws_its_view_and_chart_and_fits(page, folder, name, dark, width):
     opened(page, folder / f"{name}.html", width=width, height=900, dark=dark)
     assert colours_in_view(page) > 20
     curves = page.run("[...document.querySelectorAll('#plot .line')].map((one) => one.getAttribute('d').length)")

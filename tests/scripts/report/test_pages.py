@@ -166,9 +166,7 @@ def test_films_are_beside_the_page_and_looked_for_from_where_it_will_be(tmp_path
     assert "The film could not be made." in all_text(page)
 
 
-def test_data_that_would_make_the_page_too_large_are_files_beside_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_data_that_would_make_the_page_too_large_are_files_beside_it(tmp_path, monkeypatch):
     monkeypatch.setattr(pages, "IN_THE_PAGE", 150_000)
     clips = [result_of(swinging_clip(name, seed=seed)) for seed, name in enumerate(("a", "b", "c"))]
     path = tmp_path / "report.html"
