@@ -24,47 +24,19 @@ from tests.scripts.recordings.seeds import SEEDS
 FORMULAS = "=+-@\t\r"
 """What spreadsheets take for the beginning of a formula."""
 
+PLAIN_NAMES = r"""
+.. . ../../../../escaped ..\..\escaped /etc/escaped C:\escaped \\host\escaped a/../b <script>alert(1)</script>
+</script><b> ]]> ${title} $style {}{0}%s%n javascript:alert(1) %2e%2e%2f &lt; =1+1 +1 -2+3 @SUM(1) --no-video
+-rf con NUL.txt com1 lpt9.tar.gz aux. report.html metrics.csv .parts _ Hand hand HAND hand. hand_ hand-2
+"""
+
 NAMES = (
-    *(
-        "..",
-        ".",
-        "../../../../escaped",
-        "..\\..\\escaped",
-        "/etc/escaped",
-        "C:\\escaped",
-        "\\\\host\\escaped",
-        "a/../b",
-    ),
-    *("<script>alert(1)</script>", "<img src=x onerror=alert(1)>", "\"><svg onload='x'>", "</script><b>", "]]>"),
-    *(
-        "<!-- clips -->",
-        "<!-- films -->",
-        "${title}",
-        "$style",
-        "{}{0}%s%n",
-        "javascript:alert(1)",
-        "%2e%2e%2f",
-        "&lt;",
-    ),
-    *("=1+1", "+1", "-2+3", "@SUM(1)", "=cmd|' /C calc'!A0", "--no-video", "-rf", "`touch escaped`", "$(rm -r .)"),
-    *("con", "NUL.txt", "com1", "COM\u00b9", "lpt9.tar.gz", "aux.", "report.html", "metrics.csv", ".parts"),
-    *(
-        "\x1b[2J\x07",
-        "a\nb",
-        "a\r\n\r\nb",
-        "a\0b",
-        "\u202egpj.exe",
-        "\u200b",
-        "\ufeff",
-        "\udcff",
-        " ",
-        "",
-        "_",
-        "end. ",
-    ),
-    *("\U0001f600", "\U0001f468\u200d\U0001f469", "x" * 300, "\u00fc" * 300, "\U00020000" * 300, "\u0301" * 300),
-    *("Hand", "hand", "HAND", "hand.", "hand_", "hand-2", "\ub208", unicodedata.normalize("NFD", "\ub208")),
-    *("x" * 200, "\u00fc" * 110, "\U00020000" * 60),
+    *PLAIN_NAMES.split(),
+    *("<img src=x onerror=alert(1)>", "\"><svg onload='x'>", "<!-- clips -->", "<!-- films -->", "=cmd|' /C calc'!A0"),
+    *("`touch escaped`", "$(rm -r .)", "COM\u00b9", "\x1b[2J\x07", "a\nb", "a\r\n\r\nb", "a\0b", "\u202egpj.exe"),
+    *("\u200b", "\ufeff", "\udcff", " ", "", "end. ", "\U0001f600", "\U0001f468\u200d\U0001f469"),
+    *("x" * 300, "\u00fc" * 300, "\U00020000" * 300, "\u0301" * 300, "x" * 200, "\u00fc" * 110, "\U00020000" * 60),
+    *("\ub208", unicodedata.normalize("NFD", "\ub208")),
 )
 
 FILE_NAMES = tuple(

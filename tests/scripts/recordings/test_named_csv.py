@@ -22,51 +22,35 @@ def assert_holds_the_rows(source: str) -> None:
     np.testing.assert_array_equal(trajectory.poses.quaternions, [[0.9, 0.1, 0.2, 0.3], [0.4, 0.4, 0.5, 0.6]])
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        f"{HEADER}\n{ROWS}",
-        f"{HEADER}\r\n{ROWS}".replace("\n", "\r\n").replace("\r\r", "\r"),
-        f"{HEADER}\n{ROWS}".replace("\n", "\r"),
-        f"{HEADER}\n{ROWS}".rstrip(),
-        f"\ufeff{HEADER}\n{ROWS}",
-        f"# made by hand\n\n{HEADER}\n# and\n\n{ROWS}\n\n",
-        f"# {HEADER}\n{ROWS}",
-        f"{HEADER.upper()}\n{ROWS}",
-        f"{HEADER}\n{ROWS}".replace(",", ";"),
-        f"{HEADER}\n{ROWS}".replace(",", "\t"),
-        f"{HEADER}\n{ROWS}".replace(",", " "),
-        f"{HEADER}\n{ROWS}".replace(",", ";").replace(".", ","),
-        f"{HEADER}\n{ROWS}".replace(",", " , "),
-        f"{HEADER},\n{ROWS}".replace("\n0", ",\n0").replace("0.4\n", "0.4,\n"),
-        "Time [s],X [m],Y [m],Z [m],qx,qy,qz,qw\n" + ROWS,
-        '"t","x","y","z","qx","qy","qz","qw"\n"0.0","1","2","3","0.1","0.2","0.3","0.9"\n0.1,4,5,6,0.4,0.5,0.6,0.4\n',
-        "qw,button,z,y,x,t,qz,qy,qx\n0.9,A,3,2,1,0.0,0.3,0.2,0.1\n0.4,B,6,5,4,0.1,0.6,0.5,0.4\n",
-        "t,x,y,z,qw,qx,qy,qz\n0.0,1,2,3,0.9,0.1,0.2,0.3\n0.1,4,5,6,0.4,0.4,0.5,0.6\n",
-    ],
-    ids=[
-        "plain",
-        "Windows line ends",
-        "old line ends",
-        "no end of line at the end",
-        "byte order mark",
-        "comments and blank lines",
-        "header in a comment",
-        "capital names",
-        "semicolons",
-        "tabs",
-        "blanks",
-        "decimal commas",
-        "blanks around the commas",
-        "commas at the line ends",
-        "units in the names",
-        "quotes",
-        "another order and more columns",
-        "as the program writes it",
-    ],
-)
-def test_columns_are_found_by_their_names(write, text: str) -> None:
-    assert_holds_the_rows(write("take.csv", text))
+SPELLINGS = {
+    "plain": f"{HEADER}\n{ROWS}",
+    "Windows line ends": f"{HEADER}\r\n{ROWS}".replace("\n", "\r\n").replace("\r\r", "\r"),
+    "old line ends": f"{HEADER}\n{ROWS}".replace("\n", "\r"),
+    "no end of line at the end": f"{HEADER}\n{ROWS}".rstrip(),
+    "byte order mark": f"\ufeff{HEADER}\n{ROWS}",
+    "comments and blank lines": f"# made by hand\n\n{HEADER}\n# and\n\n{ROWS}\n\n",
+    "header in a comment": f"# {HEADER}\n{ROWS}",
+    "capital names": f"{HEADER.upper()}\n{ROWS}",
+    "semicolons": f"{HEADER}\n{ROWS}".replace(",", ";"),
+    "tabs": f"{HEADER}\n{ROWS}".replace(",", "\t"),
+    "blanks": f"{HEADER}\n{ROWS}".replace(",", " "),
+    "decimal commas": f"{HEADER}\n{ROWS}".replace(",", ";").replace(".", ","),
+    "blanks around the commas": f"{HEADER}\n{ROWS}".replace(",", " , "),
+    "commas at the line ends": f"{HEADER},\n{ROWS}".replace("\n0", ",\n0").replace("0.4\n", "0.4,\n"),
+    "units in the names": "Time [s],X [m],Y [m],Z [m],qx,qy,qz,qw\n" + ROWS,
+    "quotes": (
+        '"t","x","y","z","qx","qy","qz","qw"\n"0.0","1","2","3","0.1","0.2","0.3","0.9"\n0.1,4,5,6,0.4,0.5,0.6,0.4\n'
+    ),
+    "another order and more columns": (
+        "qw,button,z,y,x,t,qz,qy,qx\n0.9,A,3,2,1,0.0,0.3,0.2,0.1\n0.4,B,6,5,4,0.1,0.6,0.5,0.4\n"
+    ),
+    "as the program writes it": "t,x,y,z,qw,qx,qy,qz\n0.0,1,2,3,0.9,0.1,0.2,0.3\n0.1,4,5,6,0.4,0.4,0.5,0.6\n",
+}
+
+
+@pytest.mark.parametrize("spelling", SPELLINGS)
+def test_columns_are_found_by_their_names(write, spelling: str) -> None:
+    assert_holds_the_rows(write("take.csv", SPELLINGS[spelling]))
 
 
 def test_the_text_may_be_utf16_as_spreadsheets_write_it(write) -> None:

@@ -222,27 +222,6 @@ def test_adaptive_keys_are_marked_in_the_lane_of_the_mode_they_are_of_and_counte
         assert caption == f"{(len(keys) - 1) / 1.0:.1f} keys/s"
 
 
-@pytest.mark.parametrize("modes", [TWO, tuple(KEYFRAME_MODES)], ids=["two", "all"])
-@pytest.mark.parametrize("clip", [1.0, (0.0, 0.0, 3.0)], ids=["as recorded", "up and down"])
-@pytest.mark.parametrize("distinct", [False, True], ids=["each", "distinct"])
-def test_what_a_caption_says_stands_apart(modes, clip, distinct):
-    settings = dataclasses.replace(SETTINGS, distinct=distinct)
-    build_stage(choose(changed(swinging_clip(seconds=1.0), clip), Tolerance("5mm"), modes, 0.1), settings)
-    for mode in [obj.name.removesuffix(" names") for obj in bpy.data.objects if obj.name.endswith(" names")]:
-        low, high = {}, {}
-        for part in ("title", "names", "error", "graph", "max"):
-            obj = bpy.data.objects[f"{mode} {part}"]
-            inside = obj.parent.matrix_world.inverted()
-            found = (
-                evaluated_points(obj) if obj.type == "MESH" else [obj.matrix_world @ Vector(c) for c in obj.bound_box]
-            )
-            corners = np.array([inside @ Vector(corner) for corner in found])
-            low[part], high[part] = corners.min(axis=0), corners.max(axis=0)
-        for upper, lower in (("title", "names"), ("names", "graph"), ("names", "error"), ("error", "max")):
-            assert low[upper][1] > high[lower][1]
-        assert high["graph"][0] < min(low["error"][0], low["max"][0])
-
-
 def test_modes_that_are_one_motion_share_a_lane_that_names_them_all():
     made = reconstruct(swinging_clip(seconds=1.0), "5")
     scene = build_stage(made, dataclasses.replace(SETTINGS, distinct=True))
@@ -271,10 +250,3 @@ def test_a_deviation_of_millimetres_is_drawn_larger_and_the_picture_says_how_muc
         places = [layout.swept_points(some, middle[None]) for some in poses]
         places[2] -= layout.AWAY * truth.delta_location.length
         assert np.allclose(places[1] - places[2], 20.0 * (places[0] - places[2]), atol=1e-5)
-
-
-@pytest.mark.parametrize("theme", ["dark", "light"])
-def test_letters_stand_out_from_their_cards(theme):
-    build_stage(reconstruct(swinging_clip(seconds=0.6), "5", TWO), dataclasses.replace(SETTINGS, theme=theme))
-    card, ink = (np.array(bpy.data.materials[name].diffuse_color)[:3].mean() for name in ("Card", "Ink"))
-    assert (ink > card) == (theme == "dark")
