@@ -14,6 +14,7 @@ import pytest
 
 from rigid_motion_batch.cli.commands import COMMANDS
 from rigid_motion_batch.places import CHECKOUT, manifest
+from tests.thoroughness import sample
 
 BESIDES = (
     *("bpy", "filelock", "jinja2", "markdown-it-py", "markupsafe", "mdurl", "numpy", "pebble", "pygments", "rich"),
@@ -101,7 +102,7 @@ def test_the_zip_for_blender_is_the_same_as_from_the_checkout(installed, tmp_pat
     assert Path(done.stdout.strip()).read_bytes() == extension_zip.read_bytes()
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", sample(list(COMMANDS)))
 def test_help_shows_every_command_as_it_is_typed(command: str, installed: Path) -> None:
     done = run(installed / "rigid-motion", command, "--help")
     assert done.returncode == 0, done.stderr
