@@ -212,16 +212,6 @@ def test_what_cannot_be_baked_is_named_with_the_way_out_and_the_others_go_on(sho
     assert not any("Plain" in line or "Still" in line for line in lines)
 
 
-def test_a_dry_run_says_the_same_and_writes_nothing(shot, tmp_path, capsys):
-    assert run(shot, "--output", tmp_path / "farm", "--dry-run") == 1
-    said = capsys.readouterr()
-    assert "Tool: would be baked, frames 1 to 40" in said.err
-    assert "Crane: not baked" in said.err
-    assert f"would be written to {tmp_path / 'farm' / 'shot-baked.blend'}" in said.err
-    assert said.out == ""
-    assert not (tmp_path / "farm").exists()
-
-
 def test_a_file_without_modes_is_left_alone(tmp_path, capsys):
     new_file()
     key(new_object("Plain"))

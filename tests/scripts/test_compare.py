@@ -250,31 +250,6 @@ def test_what_is_repaired_is_said(short_clip, tmp_path, capsys):
     assert "length zero" in (tmp_path / "out" / "report.html").read_text()
 
 
-def test_what_a_recording_does_not_say_may_be_said_and_what_is_hard_to_believe_is(short_clip, tmp_path, capsys):
-    rows = [line.split(",") for line in short_clip.read_text().splitlines()]
-    place = [rows[0].index(name) for name in "xyz"]
-    rows[1:] = [
-        [f"{100.0 * float(cell):.9f}" if column in place else cell for column, cell in enumerate(row)]
-        for row in rows[1:]
-    ]
-    rows[0][rows[0].index("t")] = "when"
-    log = tmp_path / "log.csv"
-    log.write_text("\n".join(",".join(row) for row in rows))
-    errors = []
-    for path, said in (
-        (short_clip, []),
-        (log, ["--columns", "t=when", "--scale", "0.01"]),
-        (log, ["--columns", "t=when"]),
-    ):
-        output = tmp_path / str(len(errors))
-        assert run(path, *said, "--no-video", "--output", output, "--rates", "5", "--modes", "dq_sclerp") == 0
-        errors.append(float(rows_of(output / "metrics.csv")[0]["rms_position_m"]))
-    assert errors[1] == pytest.approx(errors[0], rel=1e-6)
-    assert errors[2] == pytest.approx(100.0 * errors[0], rel=1e-6)
-    assert capsys.readouterr().err.count("log: a twentieth of its speeds are above") == 1
-    assert "a twentieth of its speeds are above" in (tmp_path / "2" / "report.html").read_text()
-
-
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [

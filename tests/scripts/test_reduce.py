@@ -215,16 +215,6 @@ def test_nothing_is_written_over_unless_asked(tmp_path, capsys):
     assert all(path.read_bytes() != b"mine" for path in there)
 
 
-def test_in_place_keeps_the_file_from_before(tmp_path):
-    path = object_file(tmp_path / "shot.blend")
-    before = path.read_bytes()
-    assert run(path, "--in-place") == 0
-    assert listed(tmp_path) == ["shot.blend", "shot.blend1"]
-    assert (tmp_path / "shot.blend1").read_bytes() == before
-    open_again(path)
-    assert count_keys(bpy.data.objects["Tool"]) < len(FRAMES)
-
-
 def test_what_cannot_be_read_is_named_and_the_others_are_done(tmp_path, capsys):
     good = tmp_path / "hand.csv"
     write_csv(good)

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rigid_motion.motion.quaternions import angle_between
-from rigid_motion_batch.recordings import ReadingOptions, TrajectoryError, read_trajectories
+from rigid_motion_batch.recordings import ReadingOptions, read_trajectories
 from tests.scripts.recordings import seeds
 
 ARM = f"""{seeds.ARM}Frames: 2
@@ -228,15 +228,3 @@ def test_a_wrong_file_is_told_with_its_line(write, refusal, text: str | bytes, l
     told_line, message = refusal(write("arm.bvh", text))
     assert message.startswith(problem)
     assert told_line == line
-
-
-def test_joints_have_their_names_in_any_case_and_an_exact_one_goes_first(write) -> None:
-    path = write("arm.bvh", ARM)
-    recording = read_trajectories(f"{path}:eLBOW")
-    assert (recording.trajectories[0].name, recording.body) == ("Elbow", "Elbow")
-    both = write("both.bvh", ARM.replace("Elbow", "shoulder"))
-    assert read_trajectories(f"{both}:shoulder").trajectories[0].name == "shoulder"
-    with pytest.raises(
-        TrajectoryError, match="no body named 'SHOULDER', and 2 that differ from it in their case alone; "
-    ):
-        read_trajectories(f"{both}:SHOULDER")

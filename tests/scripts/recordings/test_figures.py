@@ -6,13 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from rigid_motion_batch.recordings import Trajectory
 from rigid_motion_batch.recordings.clip_reading import make_clip
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.recordings.figures import IN_METRES, TYPICAL, UNITS, Skin, repaired, size_of, unit_of
+from rigid_motion_batch.recordings.figures import Skin, repaired, size_of
 from tests.scripts.clips.bodies import JOINTS, swinging_body
 
 
@@ -43,16 +41,6 @@ def test_a_joint_that_is_nowhere_at_rest_has_no_bone_and_is_told(clip: Clip, num
     made = make_clip(trajectory, "walk.fbx", "walk", "blender")
     assert made.repairs == done
     assert np.isfinite(made.figure.tails).all()
-
-
-@given(power=st.floats(-6.0, 9.0))
-def test_a_body_of_any_size_has_a_unit_and_is_as_near_to_a_person_as_units_allow(power: float) -> None:
-    size = 10.0**power
-    _, length = unit_of(size)
-    metres = size * length
-    assert IN_METRES[0] <= metres <= IN_METRES[1] or all(
-        abs(np.log(metres / TYPICAL)) <= abs(np.log(size * other / TYPICAL)) + 1e-12 for _, other in UNITS
-    )
 
 
 def test_the_size_of_a_body_is_that_from_where_it_branches() -> None:

@@ -134,15 +134,6 @@ def test_single_joints_are_where_they_are_in_the_whole(exported, ending: str) ->
         np.testing.assert_allclose(alike, 1.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
-def test_a_body_in_centimetres_is_taken_for_one(scene, tmp_path: Path, ending: str) -> None:
-    body(size=(100, 100, 100))
-    recording = read_trajectories(str(export(tmp_path / f"walk{ending}")))
-    assert recording.trajectories[0].metres_per_unit == 0.01
-    assert "taken for centimetres" in recording.note
-    assert recording.trajectories[0].warnings == ()
-
-
 @pytest.mark.parametrize("ending", [".glb", ".blend"])
 def test_a_body_is_as_large_as_its_joints_wherever_an_importer_has_its_bones_end(scene, tmp_path: Path, ending) -> None:
     path = soldier().write(tmp_path / "soldier.glb")
