@@ -75,6 +75,12 @@ def test_spelling_and_spacing_do_not_matter(write, text: str) -> None:
     np.testing.assert_allclose(elbow.poses.positions, [[2, 0, 0], [1, 7, 0]], atol=1e-15)
 
 
+@pytest.mark.parametrize(("name", "read"), [("Shoulder", "Shoulder.001"), ("Left Elbow : top", "Left_Elbow_:_top")])
+def test_names_of_joints_are_those_that_blender_makes_of_them(write, name: str, read: str) -> None:
+    (body,) = read_trajectories(write("arm.bvh", ARM.replace("Elbow", name))).trajectories
+    assert body.figure.joints == ("Shoulder", read)
+
+
 def test_position_channels_take_the_place_of_the_offset(write) -> None:
     text = ARM.replace("CHANNELS 3", "CHANNELS 6 Zposition Yposition Xposition").replace("-90 0 0", "3 2 1 -90 0 0")
     text = text.replace("0 0 0  0 0 0  0 0 0", "0 0 0  0 0 0  3 2 1  0 0 0")

@@ -68,11 +68,14 @@ def test_positions_stay_in_the_unit_of_the_export_which_is_told(write, unit: str
     assert drill.metres_per_unit == metres
 
 
-@pytest.mark.parametrize("order", ["XYZ", "ZYX", "YZX"])
+@pytest.mark.parametrize("order", ["XYZ", "ZYX", "YZX", ""], ids=str)
 def test_euler_angles_are_turns_about_the_turned_axes(write, order: str) -> None:
+    """Those about X, Y and Z where the settings say nothing, and there is no W."""
+    kind = f"Rotation Type,{order}," if order else ""
+    order = order or "XYZ"
     text = "\n".join(
         [
-            SETTINGS.replace("Quaternion", order),
+            SETTINGS.replace("Rotation Type,Quaternion,", kind),
             ",Type" + ",Rigid Body" * 6,
             ",Name" + ",Drill" * 6,
             ",ID" + ",B1" * 6,
