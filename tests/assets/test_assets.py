@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike
-from scipy.signal import find_peaks, savgol_filter
-from scipy.spatial.transform import Rotation
 
 from assets import make_assets
 from research.making.drill import drill
 from research.making.motions import (
-    BACK,
-    CENTRE_OF_MASS,
-    GRAVITY,
     MOTIONS,
     PITCH,
     SITE,
-    THERE,
     TIP,
-    Throw,
 )
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import angle_between, rotate
@@ -94,40 +86,11 @@ def test_a_clip_moves_at_the_speeds_of_hands(name):
     assert 150.0 < rates.max() < 800.0
 
 
-def test_the_reach_is_five_strokes_each_with_one_peak_of_speed():
-    times, poses = recorded("reach")
-    even = np.arange(0.0, times[-1], 1.0 / 90.0)
-    smooth = savgol_filter(
-        np.stack([np.interp(even, times, axis) for axis in poses.positions.T], axis=1), 21, 3, axis=0
-    )
-    speeds = np.linalg.norm(np.gradient(smooth, even, axis=0), axis=1)
-    peaks, _ = find_peaks(speeds, prominence=0.15)
-    assert len(peaks) == 5
-    valleys = [speeds[a:b].min() for a, b in pairwise(peaks)]
-    assert max(valleys) < 0.2
-
-
 def test_the_pivot_keeps_its_tip_in_place_while_the_handle_moves():
     _, poses = recorded("pivot")
     tip = place_of(TIP, poses)
     assert np.linalg.norm(tip - SITE, axis=1).max() < 3e-3
     assert np.ptp(poses.positions, axis=0).max() > 0.15
-
-
-@pytest.mark.parametrize("way", [THERE, BACK], ids=["there", "back"])
-def test_the_thrown_tool_falls_freely_and_turns_evenly(way: Throw):
-    times, poses = recorded("throw")
-    _, release, catch, _ = way.moments
-    flying = (times > release) & (times < catch)
-    fit = np.polynomial.polynomial.polyfit(times[flying] - release, place_of(CENTRE_OF_MASS, poses)[flying], 2)
-    np.testing.assert_allclose(2.0 * fit[2], GRAVITY, atol=0.15)
-
-    turned = Rotation.from_quat(poses.quaternions[flying][:, [1, 2, 3, 0]])
-    rates = (turned[1:] * turned[:-1].inv()).as_rotvec() / np.diff(times[flying])[:, None]
-    even = np.radians(way.angles[2] - way.angles[1]) / (catch - release) * way.axis
-    np.testing.assert_allclose(rates.mean(axis=0), even, atol=0.05)
-    assert np.linalg.norm(rates - even, axis=1).max() < 0.15 * np.linalg.norm(even)
-    assert 1.0 <= np.linalg.norm(even) * (catch - release) / (2.0 * np.pi) <= 2.0
 
 
 def test_the_screw_advances_by_its_pitch_with_every_turn():
@@ -154,13 +117,6 @@ def test_the_bit_of_the_drill_ends_where_the_clips_have_the_tip():
     foremost = drill().vertices
     foremost = foremost[foremost[:, 1] > foremost[:, 1].max() - 1e-6]
     np.testing.assert_allclose(foremost.mean(axis=0), 1e3 * TIP, atol=1e-9)
-
-
-def assert_closed(faces: list[tuple[int, ...]]) -> None:
-    """Each edge is run along once in each direction."""
-    edges = [edge for face in faces for edge in zip(face, (*face[1:], face[0]), strict=True)]
-    assert len(set(edges)) == len(edges)
-    assert {(b, a) for a, b in edges} == set(edges)
 
 
 # ---- models ----------------------------------------------------------------------------------------------------------
@@ -216,30 +172,6 @@ def test_the_script_makes_the_kept_model_again(models, name):
         np.array([corner.vector[:] for corner in m.data.corner_normals]) for m in (kept, made)
     )
     np.testing.assert_allclose(kept_normals, made_normals, atol=1e-3)
-
-
-@each_model
-def test_a_model_is_of_closed_shells_that_look_outward(models, name):
-    kept, _ = models[name]
-    assert not kept.data.validate()
-    faces, vertices = faces_of(kept), vertices_of(kept)
-    assert_closed(faces)
-    group = np.arange(len(vertices))
-    while True:
-        lowest = group.copy()
-        for face in faces:
-            lowest[list(face)] = lowest[list(face)].min()
-        if (lowest == group).all():
-            break
-        group = lowest
-    for shell in np.unique(group):
-        inside = sum(
-            np.linalg.det(vertices[[face[0], a, b]])
-            for face in faces
-            if group[face[0]] == shell
-            for a, b in pairwise(face[1:])
-        )
-        assert inside > 0.0
 
 
 @pytest.mark.parametrize(("name", "length"), [("Drill", 0.22), ("Controller", 0.15)])

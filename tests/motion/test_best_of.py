@@ -87,19 +87,6 @@ def test_a_screw_gets_the_screw_and_a_straight_flight_the_straight_line():
     assert best_modes(times, poses, keys, modes, RADIUS) == ("dq_sclerp",) * 5 + ("lerp_slerp",) * 5
 
 
-def test_a_bend_gets_the_spline_and_a_hit_does_not():
-    """A body that goes round evenly, stops dead and goes back straight."""
-    times = np.linspace(0.0, 8.0, 321)
-    angle = np.minimum(times, 4.0)
-    back = np.maximum(times - 4.0, 0.0)
-    positions = np.stack((np.sin(angle) - back, np.cos(angle), 0.0 * angle), axis=1)
-    poses = Poses(positions, np.tile((1.0, 0.0, 0.0, 0.0), (321, 1)))
-    chosen = best_modes(times, poses, np.arange(0, 321, 20), ("lerp_slerp", "motor_spline"), RADIUS)
-    assert chosen[1:7] == ("motor_spline",) * 6
-    # In the segment after the hit the spline still bends; after that nothing tells them apart, and no key changes.
-    assert chosen[8:] == ("lerp_slerp",) * 8
-
-
 def test_modes_that_are_one_motion_are_not_told_apart_by_rounding():
     times, poses = wandering(400, 3)
     keys = decimate(times, 8.0)

@@ -119,14 +119,6 @@ def test_a_budget_is_of_rotations_and_locations(count, joints, seed, more):
             reduce_skeleton_keys(times, poses, parents, "lerp_slerp", budget=least - 1, separate=True)
 
 
-@pytest.mark.parametrize("wanted", [{"tolerance": 1e-4}, {"budget": 20}])
-def test_few_samples_are_their_own_keys(wanted):
-    times, poses, parents = wandering_body(40, 5, 2, resting=0.0)
-    for samples in (np.arange(0), np.arange(1), np.array((0, 39))):
-        keys = reduce_skeleton_keys(times[samples], poses[:, samples], parents, "lerp_slerp", separate=True, **wanted)
-        assert [samples.tolist() for own in keys for samples in own] == [list(range(len(samples)))] * 10
-
-
 TIMES, BODY, PARENTS = wandering_body(20, 3, 1, resting=0.0, scaled=True)
 
 

@@ -160,17 +160,6 @@ def test_how_the_whole_body_stands_does_not_matter(seed, mode, shared):
     assert list(map(len, here)) == list(map(len, there))
 
 
-@TWO_WAYS
-def test_signs_of_quaternions_do_not_matter(shared):
-    times, poses, parents = wandering_body(80, 6, 4)
-    signs = np.random.default_rng(1).choice((-1.0, 1.0), (6, 80, 1))
-    here, there = (
-        reduce_skeleton_keys(times, Poses(poses.positions, some), parents, tolerance=0.02, shared=shared)
-        for some in (poses.quaternions, poses.quaternions * signs)
-    )
-    assert [own.tolist() for own in here] == [own.tolist() for own in there]
-
-
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("count", [1, 2, 3, 500])
 def test_a_body_at_rest_has_one_key_each_or_two_key_poses(count, mode):

@@ -81,18 +81,6 @@ def test_its_numbers_are_those_of_straight_lines_and_slerp_between_its_samples(t
         assert (row["keys"], row["keys_per_s"], row["bytes_per_s"]) == ("", "", "")
 
 
-def test_the_modes_are_compared_as_on_the_stretch_that_both_have(toss, mine, compared, tmp_path):
-    recording, own = table(toss), table(mine)
-    common = (recording["t"] >= own["t"][0]) & (recording["t"] <= own["t"][-1])
-    cut = write_poses(tmp_path / "toss.csv", {name: column[common] for name, column in recording.items()})
-    assert run(cut, *FAST, "--output", tmp_path / "cut", "--tolerance", "1cm", "--modes", "all,best_of") == 0
-    alone = rows_of(tmp_path / "cut" / "metrics.csv")
-    assert [row for row in rows_of(compared / "metrics.csv") if row["mode"] != "mine"] == alone
-    assert sorted(path.name for path in (compared / "toss" / "10").iterdir()) == sorted(
-        ["mine.csv", *(path.name for path in (tmp_path / "cut" / "toss" / "10").iterdir())]
-    )
-
-
 def test_it_is_in_the_line_of_the_clip_the_table_the_verdict_and_the_page(toss, mine, tmp_path, capsys):
     assert run(toss, "--against", mine, *FAST, "--output", tmp_path, "--json") == 0
     said = json.loads(capsys.readouterr().out)

@@ -77,17 +77,6 @@ def test_no_bar_is_left_where_the_work_has_ended(error: type[Exception] | None) 
     assert written.rindex("\x1b[?25h") > written.rindex("\x1b[?25l")
 
 
-def test_work_that_many_do_is_counted_as_a_whole_and_may_be_lost_again() -> None:
-    with Progress(io.StringIO()) as progress, progress.stage("Rendering", 4) as stage:
-        stage.reach(2.5, "two at once")
-        assert stage.fraction == pytest.approx(0.625)
-        stage.reach(2.0)
-        assert stage.fraction == pytest.approx(0.5)
-        assert stage.doing == "two at once"
-        stage.reach(9.0)
-        assert stage.fraction == 1.0
-
-
 def test_the_time_that_is_left_is_reckoned_from_the_stage_and_not_from_what_came_before() -> None:
     clock, log = Clock(), io.StringIO()
     with Progress(log, clock=clock) as progress:

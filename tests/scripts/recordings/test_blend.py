@@ -63,20 +63,6 @@ def test_the_animated_objects_are_told_and_still_ones_are_not(saved) -> None:
     np.testing.assert_array_equal(lamp.poses.positions, np.zeros((30, 3)))
 
 
-def test_nla_strips_move_an_object_too(saved) -> None:
-    obj = empty("Strip")
-    key(obj, 1, location=(0, 0, 0))
-    key(obj, 11, location=(5, 0, 0))
-    data = obj.animation_data
-    strip = data.nla_tracks.new().strips.new("Push", 21, data.action)
-    if strip.action_slot is None:
-        strip.action_slot = data.action.slots[0]
-    data.action = None
-    (trajectory,) = read_trajectories(saved()).trajectories
-    np.testing.assert_allclose(trajectory.times[[0, -1]] * FPS, [21, 31])
-    np.testing.assert_allclose(trajectory.poses.positions[[0, -1], 0], [0, 5], atol=1e-6)
-
-
 def test_scale_and_unit_are_told(saved, scene: bpy.types.Scene) -> None:
     scene.unit_settings.scale_length = 0.01
     obj = empty("Balloon")

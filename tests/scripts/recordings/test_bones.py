@@ -112,14 +112,6 @@ def test_constraints_drivers_and_parents_of_a_hidden_rig_are_evaluated(saved, sc
     )
 
 
-@pytest.mark.parametrize(("scale", "said"), [(1.0, ""), (0.01, "Rig/Hand is 0.01 times its own size all along, ")])
-def test_a_bone_of_a_rig_in_another_unit_says_so(saved, scale: float, said: str) -> None:
-    waving().scale = (scale,) * 3
-    note = read_trajectories(saved() + ":Rig/Hand").note
-    assert note.startswith(said)
-    assert ("its own size" in note) == bool(said)
-
-
 @pytest.mark.parametrize("how", ["linked", "overridden", "overridden and animated anew"])
 def test_rigs_of_libraries_can_be_read(saved, how: str) -> None:
     arm = waving()

@@ -156,16 +156,6 @@ def test_a_warning_is_above_the_verdict_and_leads_to_its_moment(tmp_path: Path) 
     )
 
 
-def test_films_are_beside_the_page_and_looked_for_from_where_it_will_be(tmp_path: Path) -> None:
-    film = tmp_path / "swing" / "10" / "comparison.mp4"
-    films = {("swing", "10"): film, ("swing", "20"): None}
-    path = tmp_path / "elsewhere" / "report.html"
-    write_report(path, [result_of(swinging_clip())], SETTINGS, films, folder=tmp_path)
-    page = Page(path)
-    assert page.attributes("video", "src") == ["swing/10/comparison.mp4"]
-    assert "The film could not be made." in all_text(page)
-
-
 def test_data_that_would_make_the_page_too_large_are_files_beside_it(tmp_path, monkeypatch):
     monkeypatch.setattr(pages, "IN_THE_PAGE", 150_000)
     clips = [result_of(swinging_clip(name, seed=seed)) for seed, name in enumerate(("a", "b", "c"))]
