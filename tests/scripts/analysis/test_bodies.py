@@ -64,6 +64,14 @@ def test_a_joint_that_stays_as_it_is_has_one_key_and_the_others_are_key_poses() 
     assert np.flatnonzero(~moving(made.clip)).tolist() == [GLOVE]
 
 
+@pytest.mark.parametrize("metres_per_unit", [0.001, 0.01, 1.0])
+def test_how_little_a_joint_may_move_to_stay_does_not_depend_on_the_unit(metres_per_unit: float) -> None:
+    clip = replace(still_body(), metres_per_unit=metres_per_unit)
+    for micrometres, moves in ((0.9, False), (1.1, True)):
+        clip.poses.positions[2, 5, 1] = clip.poses.positions[2, 4, 1] + 1e-6 * micrometres / metres_per_unit
+        assert moving(clip).tolist() == [moves and joint == 2 for joint in range(len(JOINTS))]
+
+
 @pytest.mark.parametrize("choice", [Uniform("5"), Budget("5"), Tolerance("1cm")], ids=str)
 @pytest.mark.parametrize("shared", [False, True])
 def test_a_body_of_which_nothing_moves_is_everywhere_as_it_was(choice: Choice, shared: bool) -> None:
