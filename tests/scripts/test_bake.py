@@ -17,7 +17,7 @@ from rigid_motion import animation
 from rigid_motion.animation import is_baked, set_mode
 from rigid_motion_batch.keying import jobs
 from tests.animation.farm import played_on_a_farm
-from tests.animation.oracle import curves_of, shown_worlds, snapshot
+from tests.animation.oracle import curves_of, expected_worlds, shown_worlds, snapshot
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object
 from tests.scripts.baking import (
     LAST,
@@ -413,3 +413,36 @@ def test_an_installed_extension_steps_aside_and_is_there_again_afterwards(extens
     shutil.copy(baked_name(path), tmp_path / "alone.blend")
     open_again(tmp_path / "alone.blend")
     assert len(frames_of_keys(bpy.data.objects["Tool"])) == 40
+
+
+def test_keys_count_as_they_are_where_live_update_was_off(tmp_path):
+    def edit(obj: bpy.types.Object) -> None:
+        animation.set_enabled(False)
+        key(obj, seed=5)
+
+    try:
+        path = one_object_file(tmp_path / "shot.blend", edit)
+    finally:
+        animation.set_enabled(True)
+    with extension():
+        open_again(path)
+        wanted = expected_worlds(bpy.data.objects["Tool"], PLAYED[:43])
+    assert run(path) == 0
+    open_again(baked_name(path))
+    assert_same(shown_worlds([bpy.data.objects["Tool"]], PLAYED[:43]), [wanted])
+
+
+@pytest.mark.parametrize(("options", "wanted"), [((), "LINEAR"), (("--hold",), "CONSTANT")])
+def test_poses_are_held_where_that_is_asked_for(tmp_path, options, wanted):
+    path = one_object_file(tmp_path / "shot.blend")
+    assert run(path, "--step", "2", *options) == 0
+    open_again(baked_name(path))
+    curves = curves_of(bpy.data.objects["Tool"])
+    assert {key.interpolation for curve in curves.values() for key in curve.keyframe_points[:-1]} == {wanted}
+
+
+@pytest.mark.parametrize("compress", [False, True])
+def test_a_compressed_file_stays_compressed_and_another_not(tmp_path, compress):
+    path = one_object_file(tmp_path / "shot.blend", compress=compress)
+    assert run(path) == 0
+    assert (baked_name(path).read_bytes()[:7] == b"BLENDER") is not compress

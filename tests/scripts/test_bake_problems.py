@@ -286,3 +286,21 @@ def test_ctrl_c_while_blender_is_loaded_ends_it_at_once(tmp_path):
 
 
 # What it says of itself
+
+
+def test_a_file_where_a_folder_should_be_is_named(tmp_path, capsys):
+    path = one_object_file(tmp_path / "shot.blend")
+    (tmp_path / "file").touch()
+    assert run(path, "--output", tmp_path / "file" / "folder") == 1
+    said = capsys.readouterr().err.splitlines()
+    assert any(line.startswith(f"{path}: {tmp_path / 'file'} is a file, and ") for line in said)
+    assert said[-1] == "0 objects baked; 1 file: 0 written, 1 failed."
+    assert listed(tmp_path) == ["file", "shot.blend"]
+
+
+def test_a_folder_of_the_name_of_the_output_is_left_alone(tmp_path, capsys):
+    path = one_object_file(tmp_path / "shot.blend")
+    baked_name(path).mkdir()
+    assert run(path, "--overwrite") == 1
+    assert f"{path}: {baked_name(path)} is a folder: rename it" in capsys.readouterr().err
+    assert baked_name(path).is_dir()

@@ -185,3 +185,14 @@ def test_a_program_without_a_standard_error_shows_nothing_and_works(monkeypatch:
         stage.advance()
         progress.note("unheard")
         assert stage.fraction == 0.5
+
+
+def test_work_that_many_do_is_counted_as_a_whole_and_may_be_lost_again() -> None:
+    with Progress(io.StringIO()) as progress, progress.stage("Rendering", 4) as stage:
+        stage.reach(2.5, "two at once")
+        assert stage.fraction == pytest.approx(0.625)
+        stage.reach(2.0)
+        assert stage.fraction == pytest.approx(0.5)
+        assert stage.doing == "two at once"
+        stage.reach(9.0)
+        assert stage.fraction == 1.0

@@ -338,6 +338,8 @@ def test_a_stop_between_bodies_tells_of_the_files_that_are_complete(tmp_path, ca
         ([], "INPUT"),
         (["a.blend", "--tolerance", "5 apples"], "is no tolerance; give a length such as 5mm"),
         (["a.blend", "--tolerance", "0mm"], "is no tolerance"),
+        (["a.blend", "--keys", "1"], "--keys"),
+        (["a.blend", "--keys", "5", "--tolerance", "5mm"], "--keys"),
         (["a.blend", "--radius", "0"], "is not a length above 0, such as 3cm or 0.03"),
         (["a.glb", "b.glb", "--output", "c.glb"], "--output c.glb is a file, and there may be several results"),
         (["a.csv", "--output", "b.glb"], "add --glb, and a.csv becomes a GLB file"),
@@ -368,3 +370,9 @@ def test_as_a_program_it_ends_by_itself_and_prints_the_path_alone(tmp_path):
         cwd=tmp_path,
     )
     assert (done.returncode, done.stdout) == (0, "shot-reduced.blend\n"), done.stderr
+
+
+def test_key_poses_are_few_where_no_tolerance_is_given(tmp_path, capsys):
+    path = rig_file(tmp_path / "shot.blend")
+    assert run(path, "--shared") == 0
+    assert "(12 mm allowed)" in capsys.readouterr().err

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from rigid_motion_batch.cli import reduce
@@ -288,3 +289,23 @@ def test_after_a_kill_the_same_command_goes_on(tmp_path, jobs):
     assert ".glb: already reduced: out" in done.stderr
     visible = [name for name in listed(tmp_path / "out") if not name.startswith(".")]
     assert visible == [f"{name}-reduced.glb" for name in ("a", "b", "slow", "z")]
+
+
+def test_a_gltf_is_done_again_where_one_of_its_files_has_changed(tmp_path, capsys):
+    made = walk()
+    made.json["images"] = [{"uri": "skin.png"}]
+    (tmp_path / "skin.png").write_bytes(b"some")
+    for name in ("a", "b"):
+        made.write(tmp_path / f"{name}.gltf")
+    out = tmp_path / "out"
+    assert run(tmp_path, "--output", out) == 0, "both have the same image"
+    assert listed(out) == ["a-reduced.bin", "a-reduced.gltf", "b-reduced.bin", "b-reduced.gltf", "skin.png"]
+    values = np.frombuffer((tmp_path / "a 0.bin").read_bytes(), dtype="<f4").copy()
+    values[-5:] *= 0.5
+    (tmp_path / "a 0.bin").write_bytes(values.tobytes())
+    capsys.readouterr()
+    assert run(tmp_path, "--output", out) == 0
+    assert last_line(capsys).endswith("2 files: 1 written, 1 already reduced.")
+    (out / "b-reduced.bin").unlink()
+    assert run(tmp_path, "--output", out) == 0
+    assert (out / "b-reduced.bin").is_file()

@@ -178,3 +178,11 @@ def test_what_is_far_away_is_refused_where_blender_could_not_hold_it(tmp_path, c
     assert run(path) == 0
     assert run(path, "--blend", "--overwrite") == 1
     assert f"{path}: this is up to 1e+06 m from its origin" in capsys.readouterr().err
+
+
+def test_a_tolerance_larger_than_the_motion_is_refused_with_the_way_out(tmp_path, capsys):
+    path = tmp_path / "hand.csv"
+    write_csv(path)
+    assert run(path, "--tolerance", "50") == 2
+    assert "as in 50mm" in capsys.readouterr().err
+    assert not (tmp_path / "hand-keys.csv").exists()

@@ -234,3 +234,10 @@ def test_lengths_in_unreals_axes_are_said_to_be_centimetres_unless_the_user_says
     assert [*map(str, said)] == ["its lengths are read as metres, and Unreal has centimetres; add --scale 0.01"]
     assert make_clip(hand(), "hand.csv", "hand", "unreal", ReadingOptions(scale=1.0)).warnings == ()
     assert make_clip(hand(), "hand.csv", "hand", "unity").warnings == ()
+
+
+def test_a_wild_time_in_front_does_not_move_the_start() -> None:
+    one = hand()
+    times = one.times.copy()
+    times[0] = -1e9
+    assert clip_of(replace(one, times=times), start=1.0).times[0] == pytest.approx(1.0, abs=0.02)

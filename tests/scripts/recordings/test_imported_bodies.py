@@ -23,7 +23,7 @@ from rigid_motion_batch.recordings.fbx_records import FIRST
 from rigid_motion_batch.scenes.armature import Rest
 from rigid_motion_batch.scenes.physique import figure_size
 from tests.blank import blank
-from tests.scripts.recordings.blends import empty, on_frames, rig
+from tests.scripts.recordings.blends import empty, key, on_frames, rig
 from tests.scripts.recordings.glbs import soldier
 from tests.scripts.recordings.skeletons import (
     BONES,
@@ -356,3 +356,16 @@ def test_images_materials_and_extras_of_a_gltf_never_reach_blender(exported, tmp
     files = sorted(os.listdir(tmp_path))
     np.testing.assert_allclose(places(whole(path)), seen, atol=SINGLE)
     assert sorted(os.listdir(tmp_path)) == files
+
+
+def test_the_larger_armature_is_taken_and_the_other_told(scene, tmp_path: Path) -> None:
+    body()
+    small = rig("Bird", {"Wing": ((0, 0, 0), (0, 1, 0), None)})
+    for frame in FRAMES:
+        key(small.pose.bones["Wing"], frame, location=(0, frame, 0))
+    path = export(tmp_path / "walk.fbx")
+    recording = read_trajectories(str(path))
+    assert recording.trajectories[0].figure.joints == tuple(BONES)
+    assert recording.note == "took Body of 2 armatures; others: Bird"
+    assert whole(f"{path}:Bird").figure.joints == ("Wing",)
+    assert read_trajectories(f"{path}:Bird/Wing").trajectories[0].poses.shape == (len(FRAMES),)

@@ -170,3 +170,9 @@ def test_what_is_written_in_full_precision_comes_back_exactly(tmp_path_factory, 
         np.testing.assert_array_equal(table[:, 8], 1.0)
     else:
         np.testing.assert_array_equal(trajectory.poses.scales, table[:, 8])
+
+
+def test_a_scale_that_is_always_1_is_none(write) -> None:
+    rows = ROWS.replace("\n", ",1.0\n")
+    (trajectory,) = read_trajectories(write("take.csv", f"{HEADER},s\n{rows}")).trajectories
+    assert trajectory.poses.scales is None

@@ -245,3 +245,10 @@ def test_bodies_stay_within_their_cards(walked, modes):
                 points = np.array([in_picture(scene, figure.matrix_world @ v.co) for v in figure.data.vertices])
                 assert (points >= corners.min(axis=0)).all()
                 assert (points <= corners.max(axis=0)).all()
+
+
+def test_a_body_that_stands_still_has_a_film():
+    made = made_of(dancing_clip(still=range(len(JOINTS))))
+    scene = build_body_stage(made, SETTINGS, RADII)
+    scene.frame_set(5)
+    assert not instances_of("lerp_slerp worst joint")

@@ -250,3 +250,22 @@ def test_a_deviation_of_millimetres_is_drawn_larger_and_the_picture_says_how_muc
         places = [layout.swept_points(some, middle[None]) for some in poses]
         places[2] -= layout.AWAY * truth.delta_location.length
         assert np.allclose(places[1] - places[2], 20.0 * (places[0] - places[2]), atol=1e-5)
+
+
+def test_a_clip_shorter_than_a_frame_is_one_frame():
+    scene = build_stage(reconstruct(swinging_clip(seconds=0.05), "30", TWO), SETTINGS)
+    assert (scene.frame_start, scene.frame_end) == (1, 1)
+    assert len(evaluated_points(bpy.data.objects["Time"]))
+
+
+@pytest.mark.parametrize("engine", ["workbench", "eevee", "cycles"])
+def test_every_engine_can_be_chosen(engine):
+    reconstruction = reconstruct(swinging_clip(seconds=0.6), "5", ("dq_sclerp",))
+    scene = build_stage(reconstruction, dataclasses.replace(SETTINGS, engine=engine))
+    assert engine in scene.render.engine.lower()
+
+
+def test_an_object_that_would_be_lost_on_its_path_is_shown_larger_and_says_so():
+    build_stage(reconstruct(changed(swinging_clip(seconds=1.0), 100.0), "5", TWO), SETTINGS)
+    assert "object shown" in bpy.data.curves["Legend"].body
+    assert np.ptp(vertices_of(bpy.data.objects["dq_sclerp"].data), axis=0).max() > 0.5
