@@ -56,19 +56,6 @@ def test_every_quote_ends_and_none_begins_a_line_of_a_paragraph(path: Path):
         assert not re.match(r"\s*(?:[-*] )?<!-- (?:quote \S+|end) -->.", line), line
 
 
-@pytest.mark.parametrize(
-    ("saved", "words"),
-    [
-        ([4.4, 6.6], "4 to 7 % fewer"),
-        ([-26.7, -3.0], "3 to 27 % more"),
-        ([-2.6, 7.0, 1.0], "between 3 % more and 7 % fewer"),
-        ([5.0, 5.2], "5 % fewer"),
-    ],
-)
-def test_what_is_not_saved_is_more(saved: list[float], words: str):
-    assert quote_figures.fewer(saved) == words
-
-
 def test_a_quote_of_nothing_known_is_refused():
     with pytest.raises(LookupError, match=r"page\.md: .*'keys-lost'"):
         quote_figures.filled("<!-- quote keys-lost -->1<!-- end -->", quote_figures.Sources(), "page.md")
@@ -138,13 +125,6 @@ TIMES = np.array((1.0, 20.0, 1.0, 0.5)), np.array((20.0, 1.0, 1.0, 0.7))
 def test_the_rule_in_bold_is_that_of_the_program():
     np.testing.assert_array_equal(measure_recordings.RULES[quote_figures.OWN_RULE](*TIMES), curves._shares(*TIMES))
     assert set(measure_recordings.RULES) == set(quote_figures.RULES)
-
-
-def test_other_rules_are_others():
-    own = curves._shares(*TIMES)
-    for name, rule in measure_recordings.RULES.items():
-        if name != quote_figures.OWN_RULE:
-            assert np.abs(rule(*TIMES) - own).max() > 0.01, name
 
 
 def test_half_of_what_the_parabola_adds_is_the_stream_spline_of_the_program():

@@ -104,17 +104,6 @@ def test_a_lid_stays_in_its_hinge_by_the_screw_and_leaves_it_by_blenders_own(mak
     assert keys_of("Screw lid") == keys_of("Blender lid") == len(lid.KEYS)
 
 
-def test_a_lid_opens_in_camera_view_with_the_lid_selected_that_has_the_mode(make: Callable, tmp_path: Path) -> None:
-    make("lid")
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "examples" / "lid" / "lid.blend"), load_ui=True)
-    spaces = [space for screen in bpy.data.screens for area in screen.areas for space in area.spaces]
-    views = [space for space in spaces if space.type == "VIEW_3D"]
-    assert views
-    assert {space.region_3d.view_perspective for space in views} == {"CAMERA"}
-    assert [obj.name for obj in bpy.context.scene.objects if obj.select_get()] == ["Screw lid"]
-    assert bpy.context.view_layer.objects.active.name == "Screw lid"
-
-
 def test_a_sword_stays_in_the_hand_and_the_screw_keeps_the_arm_long(make: Callable, tmp_path: Path) -> None:
     printed = make("sword")
     assert all(line in printed for line in claims("sword"))

@@ -46,11 +46,6 @@ def test_the_glossary_lists_all_of_its_entries_in_order():
         assert entries == sorted(entries), name
 
 
-def test_every_entry_of_the_glossary_says_something():
-    entries = re.split(r"^### ", GLOSSARY.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
-    assert [entry for entry in entries if len(entry.partition("\n")[2].split()) < 10] == []
-
-
 @pytest.mark.parametrize("name", ["README.md", "docs/animators.md", "docs/comparing.md", "docs/streaming.md"])
 def test_pages_lead_to_the_glossary(name: str):
     assert "glossary.md#" in (ROOT / name).read_text(encoding="utf-8")

@@ -140,27 +140,6 @@ def test_every_command_says_its_options(command, site, pages):
     assert f"{module}-help" in page.anchors
 
 
-def test_films_play_by_themselves_without_a_sound(pages):
-    films = [film for page in pages.values() for film in page.films]
-    assert len(films) > len(motion.MODES)
-    for film in films:
-        assert {"autoplay", "loop", "muted", "playsinline"} <= set(film), film["src"]
-        assert film["aria-label"], film["src"]
-
-
-def test_a_picture_that_links_to_a_film_is_that_film(site, pages):
-    home = pages[site / "index.html"]
-    assert [film["src"] for film in home.films] == ["_images/rigs.mp4"]
-    assert home.loaded.count("_images/rigs-lever.png") == 1, "as the poster, and not as a picture besides"
-
-
-def test_formulas_are_set_by_the_browser_and_all_of_them_could_be(site, pages):
-    assert pages[site / "conventions.html"].formulas > len(motion.MODES)
-    for page in pages.values():
-        assert "<merror" not in page.text
-        assert not re.search(r"\\(frac|sqrt|exp|begin)\b", re.sub(r"<(script|pre).*?</\1>", "", page.text, flags=re.S))
-
-
 def test_the_search_knows_sclerp(site):
     index = (site / "searchindex.js").read_text(encoding="utf-8")
     known = json.loads(index.removeprefix("Search.setIndex(").rstrip(");"))

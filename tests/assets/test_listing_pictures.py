@@ -65,8 +65,3 @@ def test_notes_in_a_picture_are_found():
     note = struct.pack(">I4s", 4, b"tEXt") + b"a\0b!" + b"sum!"
     picture = (LISTING / "icon.png").read_bytes()
     assert without_notes(picture[:33] + note + picture[33:]) == picture
-
-
-@pytest.mark.parametrize(("name", "most"), [("icon.png", 60_000), ("featured.png", 1_500_000)])
-def test_a_page_with_them_loads_soon(name, most):
-    assert (LISTING / name).stat().st_size < most

@@ -82,12 +82,7 @@ def largest_displacements(a: np.ndarray, b: np.ndarray, radii: np.ndarray) -> np
 
 
 def body_errors(
-    times: np.ndarray,
-    poses: Poses,
-    parents: np.ndarray,
-    keys: tuple[np.ndarray, ...],
-    mode: str,
-    radii: np.ndarray,
+    times: np.ndarray, poses: Poses, parents: np.ndarray, keys: tuple[np.ndarray, ...], mode: str, radii: np.ndarray
 ) -> np.ndarray:
     """How far off a body is between keys of its joints, shape (joints, n)."""
     shown = [interpolate(times[own], poses[joint][own], times, mode) for joint, own in enumerate(keys)]

@@ -11,7 +11,6 @@ import warnings
 import kingdon
 import numpy as np
 import pytest
-from mathutils import Quaternion, Vector
 from pytransform3d.trajectories import dual_quaternions_from_pqs, dual_quaternions_sclerp, pqs_from_dual_quaternions
 from scipy.linalg import expm, logm
 from scipy.spatial.transform import Rotation, Slerp
@@ -178,36 +177,9 @@ def test_rotation_of_lerp_slerp_is_scipys_slerp(corner, way):
         assert (expected.inv() * actual).magnitude() < (1e-7 if near_half_turn else 1e-12)
 
 
-@ways
-@pytest.mark.parametrize("corner", [name for name in CORNERS if name != "near 180 degrees"])
-def test_lerp_slerp_is_what_mathutils_does(corner, way):
-    # In single precision, so that near 180 degrees mathutils may take the other way round.
-    first, second = corners()[corner]
-    poses = evaluate("lerp_slerp", way, first, second, shares())
-    for row in range(0, PAIRS, 20):
-        u = float(shares()[row])
-        position = Vector(first.positions[row]).lerp(Vector(second.positions[row]), u)
-        quaternion = Quaternion(first.quaternions[row]).slerp(Quaternion(second.quaternions[row]), u).normalized()
-        assert np.abs(poses.positions[row] - position).max() < 1e-6 * size_of(first, second)
-        assert abs(abs(np.dot(poses.quaternions[row], quaternion)) - 1.0) < 1e-6
-
-
 @pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])
 @in_each_corner
 @pytest.mark.parametrize("mode", MODES)
 def test_fast_form_is_the_reference(mode, corner, scaled):
     first, second = corners(scaled)[corner]
     assert_same(evaluate(mode, "fast", first, second, shares()), evaluate(mode, "reference", first, second, shares()))
-
-
-def test_golden_value():
-    keys = Poses([[0, 0, 0], [1, 0, 0]], [[1, 0, 0, 0], [np.sqrt(0.5), 0, 0, np.sqrt(0.5)]])
-    for mode, position, degrees in (
-        ("dq_sclerp", (0.22940195, -0.15328148, 0), 22.5),
-        ("pga_lerp", (0.2191532, -0.14894151, 0), 21.59816),
-    ):
-        quarter = interpolate([0, 1], keys, [0.25], mode)
-        assert quarter.positions[0] == pytest.approx(position, abs=5e-9)
-        assert np.degrees(2 * np.arctan2(quarter.quaternions[0, 3], quarter.quaternions[0, 0])) == pytest.approx(
-            degrees, abs=5e-6
-        )

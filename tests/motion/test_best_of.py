@@ -87,19 +87,6 @@ def test_a_screw_gets_the_screw_and_a_straight_flight_the_straight_line():
     assert best_modes(times, poses, keys, modes, RADIUS) == ("dq_sclerp",) * 5 + ("lerp_slerp",) * 5
 
 
-def test_a_bend_gets_the_spline_and_a_hit_does_not():
-    """A body that goes round evenly, stops dead and goes back straight."""
-    times = np.linspace(0.0, 8.0, 321)
-    angle = np.minimum(times, 4.0)
-    back = np.maximum(times - 4.0, 0.0)
-    positions = np.stack((np.sin(angle) - back, np.cos(angle), 0.0 * angle), axis=1)
-    poses = Poses(positions, np.tile((1.0, 0.0, 0.0, 0.0), (321, 1)))
-    chosen = best_modes(times, poses, np.arange(0, 321, 20), ("lerp_slerp", "motor_spline"), RADIUS)
-    assert chosen[1:7] == ("motor_spline",) * 6
-    # In the segment after the hit the spline still bends; after that nothing tells them apart, and no key changes.
-    assert chosen[8:] == ("lerp_slerp",) * 8
-
-
 def test_modes_that_are_one_motion_are_not_told_apart_by_rounding():
     times, poses = wandering(400, 3)
     keys = decimate(times, 8.0)
@@ -108,28 +95,6 @@ def test_modes_that_are_one_motion_are_not_told_apart_by_rounding():
     for order in (one, one[::-1]):
         assert set(best_modes(times, poses, keys, order, RADIUS)) == {order[0]}
         assert set(best_modes(times, screws, keys, ("lerp_slerp", *order, "motor_spline"), RADIUS)) == {order[0]}
-
-
-def test_a_body_at_rest_changes_no_mode():
-    poses = Poses(np.ones((100, 3)), np.tile((0.5, 0.5, 0.5, 0.5), (100, 1)))
-    assert set(best_modes(np.arange(100.0), poses, np.arange(0, 100, 11))) == {"lerp_slerp"}
-
-
-@pytest.mark.parametrize(
-    ("errors", "chosen"),
-    [
-        ([[1, 1, 1, 1], [1, 1, 1, 1]], [0, 0, 0, 0]),
-        ([[1, 1, 2, 1], [2, 1, 1, 1]], [0, 0, 1, 1]),
-        ([[1, 2, 1, 2], [2, 1, 2, 1]], [0, 1, 0, 1]),
-        ([[1, 2, 2, 2], [1, 1, 2, 1], [1, 1, 1, 2]], [2, 2, 2, 1]),
-        ([[0, 0, 0, 0], [1e-7, 0, 0, 0]], [0, 0, 0, 0]),
-    ],
-)
-def test_of_equally_good_modes_the_one_that_changes_least_is_taken(errors, chosen):
-    """Four segments of two samples each; the keys are on the recording."""
-    shown = np.zeros((len(errors), 9))
-    shown[:, 1::2] = errors
-    assert least_errors(shown, np.arange(0, 9, 2)).tolist() == chosen
 
 
 @settings(max_examples=tried(100))
@@ -162,16 +127,6 @@ def test_samples_outside_of_the_keys_do_not_count():
     keys = np.arange(40, 260, 20)
     inner = slice(40, 241)
     assert best_modes(times, poses, keys) == best_modes(times[inner], poses[inner], keys - 40)
-
-
-def test_what_makes_no_sense_is_refused():
-    times, poses = wandering(30, 1)
-    with pytest.raises(ValueError, match="no mode to choose from"):
-        best_modes(times, poses, np.array([0, 29]), ())
-    with pytest.raises(ValueError, match="no mode 'bezier'"):
-        best_modes(times, poses, np.array([0, 29]), ("bezier",))
-    with pytest.raises(ValueError, match="2 modes do not fit 2 keys"):
-        interpolate_by_segments(times[:2], poses[:2], times, ("dq_sclerp", "dq_sclerp"))
 
 
 @pytest.mark.parametrize(("tolerance", "mode"), [(0.01, "motor_spline"), (0.01, "lerp_slerp"), (0.01, "dq_sclerp")])

@@ -39,12 +39,6 @@ def test_one_sample_is_its_own_key():
     assert decimate(np.array([7.0]), 5.0).tolist() == [0]
 
 
-@pytest.mark.parametrize("rate", [0.0, -5.0, np.nan, np.inf])
-def test_a_rate_that_is_no_rate_is_refused(rate):
-    with pytest.raises(ValueError, match="rate"):
-        decimate(np.arange(5.0), rate)
-
-
 @given(st.lists(st.floats(0.001, 0.5), min_size=1, max_size=200), st.floats(0.5, 60.0))
 def test_keys_rise_start_at_the_first_sample_and_are_never_more_than_the_ticks(intervals, rate):
     times = 100.0 + np.cumsum(intervals)

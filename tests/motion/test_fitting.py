@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from rigid_motion.motion import MODES, Poses, fit_keys, interpolate, reduce_keys, rms, shell_error
+from rigid_motion.motion import MODES, Poses, fit_keys, interpolate, rms
 from rigid_motion.motion.quaternions import angle_between, normalise
 from tests.motion.test_reduction import wandering
 from tests.thoroughness import tried
@@ -78,16 +78,6 @@ def test_of_a_noisy_recording_they_are_nearer_the_truth(mode):
         assert measured(fitted) < 0.7 * measured(noisy[keys])
 
 
-def test_a_reduced_recording_gains_by_it():
-    times, poses = wandering(900, 2)
-    keys = reduce_keys(times, poses, tolerance=0.004, rms=True)
-    before, after = (
-        rms(shell_error(interpolate(times[keys], at, times, "motor_spline"), poses))
-        for at in (poses[keys], fit_keys(times, poses, keys))
-    )
-    assert after < 0.95 * before
-
-
 def test_scales_stay_as_they_are():
     times, poses = wandering(100, 4)
     growing = Poses(poses.positions, poses.quaternions, np.linspace(1.0, 3.0, 100))
@@ -103,30 +93,3 @@ def test_a_body_at_rest_stays_at_rest():
     poses = Poses(np.ones((20, 3)), np.tile((1.0, 0.0, 0.0, 0.0), (20, 1)))
     fitted = fit_keys(times, poses, np.array((0, 7, 19)))
     np.testing.assert_allclose(fitted.positions, 1.0, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        ({"mode": "no_mode"}, "no mode 'no_mode'"),
-        ({"radius": 0.0}, "radius of 0.0"),
-        ({"radius": float("nan")}, "radius of nan"),
-        ({"radius": float("inf")}, "radius of inf"),
-        ({"keys": []}, "0 keys are too few"),
-        ({"keys": [3]}, "1 keys are too few"),
-        ({"keys": [0.0, 19.0]}, "keys are floats"),
-        ({"keys": [0, 20]}, "from 0 to 19"),
-        ({"keys": [-1, 19]}, "from 0 to 19"),
-        ({"keys": [0, 7, 7, 19]}, "not rising"),
-    ],
-)
-def test_what_cannot_be_fitted_is_refused(options, said):
-    with pytest.raises(ValueError, match=said):
-        fit_keys(*wandering(20, 0), **{"keys": [0, 19], **options})
-
-
-def test_a_recording_with_a_bad_sample_is_not_fitted():
-    times, poses = wandering(20, 0)
-    poses.positions[7] = np.nan
-    with pytest.raises(ValueError, match="sample 7 is not finite"):
-        fit_keys(times, poses, np.array((0, 19)))

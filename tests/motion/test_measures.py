@@ -76,25 +76,12 @@ def test_how_the_bodys_axes_lie_does_not_matter(growing):
     assert shell_error(*turned) == pytest.approx(shell_error(poses, truth), rel=1e-9, abs=1e-15)
 
 
-def test_the_three_points_along_the_axes_miss_more_than_half_of_it():
-    poses, truth = pairs(20000, 6, growing=False)
-    share = displacements(poses, truth, 0.1 * np.eye(3)).max(axis=1) / shell_error(poses, truth)
-    assert share.max() <= 1.0 + 1e-12
-    assert 0.40 < share.min() < 0.42
-
-
 @pytest.mark.parametrize("growing", [False, True])
 def test_a_radius_for_each_pose(growing):
     poses, truth = pairs(50, 7, growing)
     radii = np.random.default_rng(8).uniform(0.0, 2.0, 50)
     each = [shell_error(poses[[i]], truth[[i]], radius)[0] for i, radius in enumerate(radii)]
     assert shell_error(poses, truth, radii) == pytest.approx(each, rel=1e-14)
-
-
-def test_what_does_not_grow_is_off_as_without_scales():
-    poses, truth = pairs(500, 9, growing=False)
-    scaled = [Poses(some.positions, some.quaternions, np.full(500, 1.7)) for some in (poses, truth)]
-    assert shell_error(*scaled, radius=0.1) == pytest.approx(shell_error(poses, truth, radius=0.17), rel=1e-12)
 
 
 def test_the_sign_of_a_quaternion_is_no_error():

@@ -23,16 +23,6 @@ def test_the_numbers_that_files_store_never_change():
     }
 
 
-def test_no_two_modes_have_the_same_number_and_none_has_that_of_blenders_own():
-    numbers = [mode.number for mode in MODES.values()]
-    assert len(set(numbers)) == len(numbers)
-    assert 0 not in numbers
-
-
-def test_a_mode_is_found_by_its_name():
-    assert [mode_named(name) for name in MODES] == list(MODES.values())
-
-
 @pytest.mark.parametrize(
     "use",
     [mode_named, lambda mode: interpolate([0.0, 1.0], KEYS, [0.5], mode), lambda mode: prepare([0.0, 1.0], KEYS, mode)],

@@ -4,53 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
 from hypothesis import strategies as st
 
 from rigid_motion.motion import MODES, Poses, in_betweens, prepare
-from rigid_motion.motion.piecewise import blocks, combine, is_dense, multiply_matrices
 from tests.motion.cases import random_quaternions
 
-
-@given(st.lists(st.sampled_from((0, 1, 7, 8, 130, 400)), min_size=1, max_size=8), st.integers(1, 5), st.integers(1, 4))
-def test_products_are_what_each_sample_gives(counts, rows, functions):
-    random = np.random.default_rng(len(counts))
-    counts = np.array(counts)
-    coefficients = random.normal(size=(rows, functions, len(counts)))
-    values = random.normal(size=(functions, counts.sum()))
-    expected = np.einsum("kbn,bn->kn", coefficients.repeat(counts, axis=2), values)
-    found = np.full((2, rows, counts.sum()), np.nan)
-    combine(coefficients, values, counts, found[0])
-    multiply_matrices(np.ascontiguousarray(coefficients.transpose(2, 0, 1)), values, counts, found[1])
-    np.testing.assert_allclose(found, np.stack((expected, expected)), rtol=0, atol=1e-12)
-
-
 few = st.lists(st.sampled_from((0, 1, 3, 5)), max_size=4)
-
-
-@given(few, few.filter(any), st.integers(2, 6), few)
-def test_counts_that_come_round_again_and_again_make_the_same_products(head, pattern, rounds, tail):
-    counts = np.array(head + rounds * pattern + tail)
-    random = np.random.default_rng(counts)
-    matrices, functions = random.normal(size=(len(counts), 3, 2)), random.normal(size=(2, counts.sum()))
-    found = np.full((3, counts.sum()), np.nan)
-    multiply_matrices(matrices, functions, counts, found)
-    expected = np.einsum("nkb,bn->kn", matrices.repeat(counts, axis=0), functions)
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
-
-
-def test_long_runs_are_dense_and_single_samples_are_not():
-    assert is_dense(np.full(10, 200))
-    assert not is_dense(np.ones(1000, dtype=int))
-
-
-@pytest.mark.parametrize("size", [1, 10, 1000])
-def test_blocks_cover_everything_once(size):
-    bounds = np.array((0, 0, 5, 5, 40, 41, 41))
-    pieces, samples = zip(*blocks(bounds, size), strict=True)
-    assert [some.start for some in pieces] == [0, *(some.stop for some in pieces[:-1])]
-    assert [some.start for some in samples] == [0, *(some.stop for some in samples[:-1])]
-    assert (pieces[-1].stop, samples[-1].stop) == (6, 41)
 
 
 @pytest.mark.parametrize("mode", MODES)

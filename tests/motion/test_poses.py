@@ -137,8 +137,7 @@ def test_half_turns_have_a_quaternion_too(axis):
 
 
 @pytest.mark.parametrize(
-    ("diagonal", "fault"),
-    [((1, 1, -1), "mirrors"), ((1, 1, 1.01), "unevenly"), ((0, 0, 0), "no scale")],
+    ("diagonal", "fault"), [((1, 1, -1), "mirrors"), ((1, 1, 1.01), "unevenly"), ((0, 0, 0), "no scale")]
 )
 def test_a_matrix_that_is_no_pose_is_named(diagonal, fault):
     matrices = np.tile(np.eye(4), (4, 1, 1))

@@ -5,26 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigid_motion.motion import Poses, interpolate, series
+from rigid_motion.motion import Poses, interpolate
 from rigid_motion.motion.quaternions import align_signs
 from tests.motion.cases import random_quaternions
-
-
-def test_a_series_is_the_polynomial_through_its_nodes():
-    random = np.random.default_rng(4)
-    polynomials = random.normal(size=(3, series.TERMS))
-    s = np.linspace(-1.0, 1.0, 101)
-    values, expected = (polynomials @ np.vander(at, series.TERMS, increasing=True).T for at in (series.moments(1), s))
-    np.testing.assert_allclose(series.fit(values)[0] @ series.powers(s), expected, rtol=0, atol=1e-12)
-
-
-def test_pieces_lie_side_by_side():
-    values = np.sin(series.moments(4))
-    coefficients = series.fit(values[None])
-    assert coefficients.shape == (4, 1, series.TERMS)
-    s = np.linspace(-1.0, 1.0, 101)
-    for piece, row in enumerate(coefficients[:, 0]):
-        np.testing.assert_allclose(row @ series.powers(s), np.sin((s + 2 * piece - 3) / 4), rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])

@@ -82,27 +82,6 @@ def test_every_joint_stays_within_the_tolerance_with_no_more_numbers(count, join
     assert errors.max() <= tolerance * (1.0 + 1e-9) + rounding
 
 
-@pytest.mark.parametrize("tolerance", [0.003, 0.02])
-def test_channels_apart_need_three_quarters_of_the_numbers_where_all_joints_turn_and_move(tolerance):
-    """0.75 of them in the mean of 24 bodies."""
-    shares = []
-    for seed in range(6):
-        times, poses, parents = wandering_body(100, 8, seed)
-        options = {"mode": "lerp_slerp", "tolerance": tolerance}
-        keys = reduce_skeleton_keys(times, poses, parents, separate=True, **options)
-        shares.append(numbers_in(keys) / (7 * sum(map(len, reduce_skeleton_keys(times, poses, parents, **options)))))
-    assert np.mean(shares) < 0.8
-
-
-def test_what_only_turns_has_one_location():
-    times, poses, parents = wandering_body(90, 6, 3, resting=0.0)
-    poses = Poses(poses.positions[:, :1].repeat(90, axis=1), poses.quaternions)
-    keys = reduce_skeleton_keys(times, poses, parents, "lerp_slerp", tolerance=0.01, separate=True)
-    whole = reduce_skeleton_keys(times, poses, parents, "lerp_slerp", tolerance=0.01)
-    assert [own.location.tolist() for own in keys] == [[0]] * 6
-    assert sum(len(own.rotation) for own in keys) <= sum(map(len, whole))
-
-
 def test_a_channel_that_trembles_below_the_tolerance_rests_at_one_sample():
     times, poses, parents = wandering_body(90, 4, 5, resting=0.0)
     trembling = poses.positions[:, :1] + np.random.default_rng(5).uniform(-1e-5, 1e-5, poses.positions.shape)
@@ -138,28 +117,6 @@ def test_a_budget_is_of_rotations_and_locations(count, joints, seed, more):
     if least > 2:
         with pytest.raises(ValueError, match=f"a budget of {least - 1} keys is too small for {changing} rotations and"):
             reduce_skeleton_keys(times, poses, parents, "lerp_slerp", budget=least - 1, separate=True)
-
-
-def test_a_larger_budget_buys_a_smaller_error():
-    times, poses, parents = wandering_body(40, 3, 1)
-    errors = [
-        channel_errors(
-            *(times, poses, parents),
-            reduce_skeleton_keys(times, poses, parents, "lerp_slerp", budget=budget, separate=True),
-            np.full(3, 0.03),
-        ).max()
-        for budget in (12, 28, 60, 140)
-    ]
-    assert errors == sorted(errors, reverse=True)
-    assert errors[-1] < 0.2 * errors[0]
-
-
-@pytest.mark.parametrize("wanted", [{"tolerance": 1e-4}, {"budget": 20}])
-def test_few_samples_are_their_own_keys(wanted):
-    times, poses, parents = wandering_body(40, 5, 2, resting=0.0)
-    for samples in (np.arange(0), np.arange(1), np.array((0, 39))):
-        keys = reduce_skeleton_keys(times[samples], poses[:, samples], parents, "lerp_slerp", separate=True, **wanted)
-        assert [samples.tolist() for own in keys for samples in own] == [list(range(len(samples)))] * 10
 
 
 TIMES, BODY, PARENTS = wandering_body(20, 3, 1, resting=0.0, scaled=True)

@@ -11,10 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_motion.motion import MODES, Poses, reduce_skeleton_keys
-from rigid_motion_batch.recordings import read_trajectories
 from tests.motion.bodies import body_errors, in_root_space, wandering_body
-from tests.motion.test_skeleton_channels import channel_errors, numbers_in
-from tests.motion.test_skeleton_reduction import BODIES
+from tests.motion.test_skeleton_channels import channel_errors
 from tests.thoroughness import tried
 
 
@@ -64,34 +62,6 @@ def test_every_joint_stays_within_the_tolerance_everywhere(count, joints, seed, 
 
 
 @TWO_WAYS
-def test_stretches_cost_few_keys(separate):
-    """0.6 and, of channels, 0.9 % more, with five stretches, in the mean of six bodies."""
-    more = []
-    for seed in range(3):
-        times, poses, parents = wandering_body(600, 6, seed)
-        options = {"mode": "lerp_slerp", "tolerance": 0.005, "separate": separate}
-        whole, parts = (
-            reduce_skeleton_keys(times, poses, parents, stretch=stretch, **options) for stretch in (None, 120)
-        )
-        counted = numbers_in if separate else lambda keys: sum(map(len, keys))
-        more.append(counted(parts) / counted(whole))
-    assert np.mean(more) < 1.03
-
-
-@pytest.mark.recordings
-@TWO_WAYS
-def test_a_real_body_in_stretches_has_few_more_keys(separate):
-    (body,) = read_trajectories(str(BODIES["cmu_01_01"])).trajectories
-    options = {"mode": "lerp_slerp", "tolerance": 0.1, "radius": 0.5, "separate": separate}
-    whole, parts = (
-        reduce_skeleton_keys(body.times, body.poses, body.figure.parents, stretch=stretch, **options)
-        for stretch in (None, 1000)
-    )
-    counted = numbers_in if separate else lambda keys: sum(map(len, keys))
-    assert counted(parts) < 1.03 * counted(whole)
-
-
-@TWO_WAYS
 def test_what_trembles_below_the_tolerance_rests_from_beginning_to_end(separate):
     times, poses, parents = wandering_body(200, 5, 3, resting=0.0)
     trembling = poses.positions[:, :1] + np.random.default_rng(5).uniform(-1e-5, 1e-5, poses.positions.shape)
@@ -133,20 +103,3 @@ def test_what_is_not_longer_than_a_stretch_is_searched_as_without(separate):
     options = {"mode": "lerp_slerp", "tolerance": 0.002, "separate": separate}
     here, there = (reduce_skeleton_keys(*body, **options, stretch=stretch) for stretch in (None, 59))
     assert as_lists(here) == as_lists(there)
-
-
-@pytest.mark.parametrize(
-    ("options", "error", "message"),
-    [
-        ({"mode": "motor_spline"}, ValueError, "motor_spline is smooth, .* take one of lerp_slerp, dq_sclerp"),
-        ({"shared": True}, ValueError, "leave out shared and budget"),
-        ({"tolerance": None, "budget": 50}, ValueError, "leave out shared and budget"),
-        ({"stretch": 1}, ValueError, "a stretch of 1 samples is too short: give 2 or more"),
-        ({"stretch": 2.5}, TypeError, "stretch is 2.5: give a whole number"),
-    ],
-)
-def test_what_stretches_cannot_do_is_refused(options, error, message):
-    times, poses, parents = wandering_body(20, 3, 1)
-    given = {"times": times, "poses": poses, "parents": parents, "mode": "lerp_slerp", "tolerance": 0.1, "stretch": 5}
-    with pytest.raises(error, match=message):
-        reduce_skeleton_keys(**{**given, **options})

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.interpolate import CubicHermiteSpline
 from scipy.linalg import expm, logm
 
 from rigid_motion.motion import MODES, Poses, in_betweens, interpolate, twists
-from rigid_motion.motion.quaternions import angle_between, multiply, normalise, rotate
+from rigid_motion.motion.quaternions import angle_between, multiply, rotate
 from tests.motion.cases import assert_same, random_quaternions
 from tests.motion.test_properties import assert_close, motions, placed, reseated
 from tests.motion.test_twists import pose_matrix
@@ -51,13 +50,6 @@ def test_the_twist_goes_on_through_every_key(mode, seed, scaled):
     for moment in times[1:-1]:
         before, behind = (twist_at(times, keys, moment, side, mode) for side in (-1, 1))
         assert np.abs(before - behind).max() < 1e-6 * np.abs(before).max()
-
-
-@every_spline
-def test_a_screw_has_a_corner_where_the_spline_has_none(mode):
-    times, keys = motion()
-    before, behind = (twist_at(times, keys, times[4], side, "dq_sclerp") for side in (-1, 1))
-    assert np.abs(before - behind).max() > 0.1 * np.abs(before).max()
 
 
 @every_spline
@@ -132,8 +124,7 @@ def test_turns_of_almost_half_a_turn_stay_sound(mode, short):
     turned = random_quaternions(random, 7)
     for place in range(1, 7):
         half = 0.5 * (np.pi - short)
-        step = pose_matrix(np.append(np.cos(half), np.sin(half) * axes[place]), np.zeros(3))
-        turned[place] = quaternion_of(pose_matrix(turned[place - 1], np.zeros(3)) @ step)
+        turned[place] = multiply(turned[place - 1], np.append(np.cos(half), np.sin(half) * axes[place]))
     keys = Poses(random.normal(size=(7, 3)), turned)
     moments = np.linspace(times[0], times[-1], 4001)
     path = interpolate(times, keys, moments, mode)
@@ -142,21 +133,6 @@ def test_turns_of_almost_half_a_turn_stay_sound(mode, short):
     assert steps.max() < 4.0 * np.pi / np.diff(times).min()
     assert np.abs(np.linalg.norm(path.quaternions, axis=1) - 1.0).max() < 1e-12
     assert_close(interpolate(times, keys, times, mode), keys, 1e-9)
-
-
-def quaternion_of(matrix: np.ndarray) -> np.ndarray:
-    """Of a rotation matrix, by its eigenvector: sound for every angle."""
-    m = matrix
-    k = np.array(
-        (
-            (m[0, 0] + m[1, 1] + m[2, 2], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]),
-            (m[2, 1] - m[1, 2], m[0, 0] - m[1, 1] - m[2, 2], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0]),
-            (m[0, 2] - m[2, 0], m[0, 1] + m[1, 0], m[1, 1] - m[0, 0] - m[2, 2], m[1, 2] + m[2, 1]),
-            (m[1, 0] - m[0, 1], m[0, 2] + m[2, 0], m[1, 2] + m[2, 1], m[2, 2] - m[0, 0] - m[1, 1]),
-        )
-    )
-    values, vectors = np.linalg.eigh(k)
-    return normalise(vectors[:, np.argmax(values)])
 
 
 def slow_spline(times: np.ndarray, keys: Poses, moments: np.ndarray, mode: str) -> np.ndarray:
@@ -201,28 +177,6 @@ def test_the_motor_spline_is_that_of_matrix_exponentials(seed, mode):
     expected = slow_spline(times, keys, moments, mode)
     for pose, matrix in zip(zip(path.quaternions, path.positions, strict=True), expected, strict=True):
         np.testing.assert_allclose(pose_matrix(*pose), matrix, rtol=0, atol=1e-8)
-
-
-def test_without_turning_it_is_the_cubic_through_the_keys():
-    times, keys = motion(8)
-    keys = Poses(keys.positions, np.tile((1.0, 0.0, 0.0, 0.0), (8, 1)))
-    ways, h = np.diff(keys.positions, axis=0), np.diff(times)
-    inner = []
-    for (way, duration), (next_way, next_duration) in itertools.pairwise(zip(ways, h, strict=True)):
-        # With even times as with uneven ones up to the golden ratio, the parabola's slope.
-        if max(duration, next_duration) ** 2 < duration * next_duration + min(duration, next_duration) ** 2:
-            weights = next_duration / duration, duration / next_duration
-            inner.append((weights[0] * way + weights[1] * next_way) / (duration + next_duration))
-        elif duration < next_duration:
-            inner.append((way + (1.0 - duration / next_duration) * next_way) / next_duration)
-        else:
-            inner.append((next_way + (1.0 - next_duration / duration) * way) / duration)
-    slopes = np.array([ways[0] / h[0], *inner, ways[-1] / h[-1]])
-    moments = np.linspace(times[0], times[-1], 300)
-    path = interpolate(times, keys, moments, "motor_spline")
-    np.testing.assert_allclose(
-        path.positions, CubicHermiteSpline(times, keys.positions, slopes)(moments), rtol=0, atol=1e-12
-    )
 
 
 @every_spline
@@ -285,30 +239,6 @@ def lengths(path: Poses) -> np.ndarray:
     return np.linalg.norm(np.diff(path.positions, axis=1), axis=-1).sum(axis=-1)
 
 
-@pytest.mark.parametrize("degrees", [0.0, 20.0], ids=["straight", "turning"])
-@pytest.mark.parametrize("times", [(1.0, 2.0, 25.0), (0.0, 0.01, 1.0), (0.0, 23.0, 24.0)])
-def test_a_short_segment_does_not_throw_the_body_through_the_long_one(times, degrees):
-    times, angles = np.array(times), np.radians([0.0, degrees, 2.0 * degrees])
-    turned = np.stack((np.cos(0.5 * angles), 0 * angles, 0 * angles, np.sin(0.5 * angles)), axis=1)
-    keys = Poses(0.2 * np.arange(3.0)[:, None] * (1.0, 0.0, 0.0), turned)
-    path = filled(times, keys, "motor_spline")
-    assert turnings(path).sum() == pytest.approx(np.radians(2.0 * degrees), abs=1e-6)
-    x = path.positions[..., 0].ravel()
-    assert x.min() > -1e-12
-    assert x.max() < 0.4 + 1e-12
-
-
-@pytest.mark.parametrize("times", [(1.0, 2.0, 25.0), (0.0, 0.01, 1.0), (0.0, 0.3, 0.5, 0.6, 9.0)])
-def test_a_key_that_comes_late_does_not_throw_a_stream_off(times):
-    """It has gone on by no more than the way before it, and 4/27 of twice that."""
-    keys = Poses(
-        0.2 * np.arange(float(len(times)))[:, None] * (1.0, 0.0, 0.0), np.tile((1.0, 0, 0, 0), (len(times), 1))
-    )
-    path, screw = (filled(np.array(times), keys, mode) for mode in (CAUSAL, "dq_sclerp"))
-    away = np.linalg.norm(path.positions - screw.positions, axis=-1)
-    assert away[-1].max() < 0.2 * 2.0 * 1.31 * 4 / 27
-
-
 @given(wild_times(), st.integers(0, 2**16), st.floats(0.0, 4.0))
 def test_whatever_the_keys_a_stream_stays_in_their_neighbourhood(times, seed, spread):
     """It leaves a key by at most 1.31 of the twist before and half of that before it, for twice the time before."""
@@ -323,25 +253,6 @@ def test_whatever_the_keys_a_stream_stays_in_their_neighbourhood(times, seed, sp
         one, two = (np.concatenate((np.zeros(shift), amounts))[:count] for shift in (1, 2))
         bound = (4 / 27) * (1.31 * amounts + 0.5 * one + 2.0 * (1.31 * one + 0.5 * two))
         assert np.all(away.max(axis=1) <= bound + 1e-6 * amounts.max())
-
-
-@given(wild_times(), st.integers(0, 2**16), st.floats(1e-3, 3.1), st.floats(0.0, 1.0))
-def test_even_steps_along_a_screw_stay_on_it_at_any_times(times, seed, angle, advance):
-    """There and no way back: it turns and goes just as far as the screw."""
-    random, count = np.random.default_rng(seed), len(times) - 1
-    axes, advances = (np.tile(random.normal(size=(3, 1)), count) for _ in range(2))
-    keys = steps(random, np.full(count, angle), axes, advance * advances)
-    path, screw = (filled(times, keys, mode) for mode in ("motor_spline", "dq_sclerp"))
-    np.testing.assert_allclose(turnings(path), angle, rtol=1e-6)
-    np.testing.assert_allclose(lengths(path), lengths(screw), rtol=1e-3, atol=1e-9)
-
-
-@given(wild_times(), st.integers(0, 2**16), st.floats(1e-3, 3.1))
-def test_turns_of_one_size_about_any_axes_add_up_to_little_more(times, seed, angle):
-    """Rounding corners takes up to 4 % more at even times, and up to 8 % at the worst that a search found."""
-    random, count = np.random.default_rng(seed), len(times) - 1
-    keys = steps(random, np.full(count, angle), random.normal(size=(3, count)), random.normal(size=(3, count)))
-    assert turnings(filled(times, keys, "motor_spline")).sum() <= 1.1 * count * angle
 
 
 @given(wild_times(), st.integers(0, 2**16), st.floats(0.0, 4.0))
@@ -361,49 +272,3 @@ def test_whatever_the_keys_no_point_of_the_body_leaves_their_neighbourhood(times
             assert np.all(away.max(axis=1) <= (4 / 27) * around + 0.155 * amounts + 1e-6 * amounts.max())
         around = np.convolve(np.concatenate(((0.0,), angles, (0.0,))), (1.0, 0.0, 1.0), mode="valid")
         assert np.all(turnings(path) <= 1.37 * angles + (8 / 27) * around + 1e-6)
-
-
-@every_spline
-@given(wild_times(), st.integers(0, 2**16))
-def test_the_origin_of_the_body_does_not_matter_at_wild_times_either(mode, times, seed):
-    random, count = np.random.default_rng(seed), len(times) - 1
-    keys = steps(random, random.uniform(0.0, 3.0, count), *random.normal(size=(2, 3, count)))
-    world, body = (Poses(random.normal(size=3), random_quaternions(random)) for _ in range(2))
-    path = filled(times, placed(world, reseated(keys, body)), mode)
-    expected = filled(times, keys, mode)
-    flat = Poses(expected.positions.reshape(-1, 3), expected.quaternions.reshape(-1, 4))
-    assert_close(
-        Poses(path.positions.reshape(-1, 3), path.quaternions.reshape(-1, 4)), placed(world, reseated(flat, body)), 1e-7
-    )
-
-
-@given(wild_times(least=4), st.integers(0, 2**16))
-def test_the_twist_goes_on_through_keys_at_wild_times(times, seed):
-    """Measured in the time of the segment on either side, and told in that of the shorter one."""
-    random, count = np.random.default_rng(seed), len(times) - 1
-    keys = steps(random, random.uniform(0.1, 3.0, count), *random.normal(size=(2, 3, count)))
-    step = 1e-5
-    leave, arrive = (
-        in_betweens(times, keys, [3] * count, np.tile(at, count), "motor_spline")
-        for at in (step * np.arange(3.0), 1.0 - step * np.arange(3.0))
-    )
-
-    def rates(some: Poses, sign: float) -> np.ndarray:
-        here = Poses(some.positions[0::3], some.quaternions[0::3])
-        near, far = (
-            twists.between(here.positions, here.quaternions, some.positions[k::3], some.quaternions[k::3])
-            for k in (1, 2)
-        )
-        return sign * (2.0 * near - 0.5 * far) / step / np.diff(times)
-
-    before, behind = rates(arrive, -1.0)[:, :-1], rates(leave, 1.0)[:, 1:]
-    shorter = np.minimum(np.diff(times)[:-1], np.diff(times)[1:])
-    assert np.abs((before - behind) * shorter).max() < 1e-4
-
-
-@given(wild_times(), st.integers(0, 2**16))
-def test_backwards_it_is_the_same_motion_at_wild_times(times, seed):
-    random, count = np.random.default_rng(seed), len(times) - 1
-    keys = steps(random, random.uniform(0.0, 3.0, count), *random.normal(size=(2, 3, count)))
-    there, back = filled(times, keys, "motor_spline"), filled(-times[::-1], keys[::-1], "motor_spline")
-    np.testing.assert_allclose(back.positions[::-1, ::-1], there.positions, rtol=0, atol=1e-7)

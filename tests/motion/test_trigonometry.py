@@ -66,19 +66,6 @@ def test_half_a_turn_is_no_pole(turns):
     assert np.all(sine != 0.0)
 
 
-@pytest.mark.parametrize(
-    ("current", "is_vector"),
-    [("AVX512_SKX", True), ("X86_V4", True), ("baseline(X86_V2)", False), ("baseline(NEON NEON_FP16)", False)],
-)
-def test_the_tangent_is_taken_where_numpy_has_vector_code_for_it(monkeypatch, current, is_vector):
-    def told(func_name, signature):
-        assert (func_name, signature) == ("^tan$", "float64")
-        return {"tan": {"dd": {"current": current, "available": f"{current} baseline(X86_V2)"}}}
-
-    monkeypatch.setattr(np.lib, "introspect", SimpleNamespace(opt_func_info=told), raising=False)
-    assert trigonometry._has_vector_tangent() is is_vector
-
-
 def test_without_a_word_from_numpy_the_polynomial_is_taken(monkeypatch):
     monkeypatch.setattr(np.lib, "introspect", SimpleNamespace(opt_func_info=lambda **_: {}), raising=False)
     assert not trigonometry._has_vector_tangent()

@@ -7,7 +7,6 @@ import pytest
 from scipy.linalg import expm, logm
 
 from rigid_motion.motion import twists
-from rigid_motion.motion.quaternions import align_signs
 from tests.motion.cases import random_quaternions
 
 ANGLES = [0.0, 1e-12, 1e-6, 1e-3, 0.02999, 0.03001, 0.5, 2.0, 3.1, np.pi - 1e-9]
@@ -47,15 +46,6 @@ def test_exponentials_are_those_of_matrices(angle):
         np.testing.assert_allclose(pose_matrix(quaternion, translation), expm(matrix_of(twist)), rtol=0, atol=1e-13)
 
 
-def test_small_and_large_twists_together_are_what_they_are_alone():
-    together = np.concatenate([some_twists(angle, 3) for angle in ANGLES], axis=1)
-    quaternions, translations = twists.exponential(together)
-    for place, angle in enumerate(ANGLES):
-        own, alone = slice(3 * place, 3 * place + 3), twists.exponential(some_twists(angle, 3))
-        np.testing.assert_allclose(quaternions[:, own], alone[0], rtol=0, atol=1e-15)
-        np.testing.assert_allclose(translations[:, own], alone[1], rtol=0, atol=1e-14)
-
-
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("angle", ANGLES)
 def test_a_logarithm_leads_back(angle, sign):
@@ -74,13 +64,3 @@ def test_logarithms_are_those_of_matrices():
     for twist, quaternion, translation in zip(found.T, quaternions, translations, strict=True):
         matrix = logm(pose_matrix(quaternion, translation)).real
         np.testing.assert_allclose(matrix_of(twist), matrix, rtol=0, atol=1e-8)
-
-
-def test_the_twist_between_poses_leads_from_one_to_the_other():
-    random = np.random.default_rng(5)
-    quaternions = align_signs(random_quaternions(random, 40, 2))
-    positions = random.normal(size=(40, 2, 3))
-    found = twists.between(positions[:, 0], quaternions[:, 0], positions[:, 1], quaternions[:, 1])
-    for row in range(40):
-        first, second = (pose_matrix(quaternions[row, end], positions[row, end]) for end in range(2))
-        np.testing.assert_allclose(first @ expm(matrix_of(found[:, row])), second, rtol=0, atol=1e-12)

@@ -68,14 +68,6 @@ def test_a_yaw_to_the_right_in_unreal_is_one_to_the_right_in_blender() -> None:
     np.testing.assert_allclose(Rotation.from_quat(turn[[1, 2, 3, 0]]).apply((0, 1, 0)), (1, 0, 0), atol=1e-15)
 
 
-@pytest.mark.parametrize("axes", AXES)
-def test_what_was_recorded_stays_as_it_was(poses: Poses, axes: str) -> None:
-    before = poses.positions.copy(), poses.quaternions.copy()
-    to_blender(poses, axes)
-    np.testing.assert_array_equal(poses.positions, before[0])
-    np.testing.assert_array_equal(poses.quaternions, before[1])
-
-
 def test_unknown_axes_are_answered_with_the_known_ones(poses: Poses) -> None:
     with pytest.raises(ValueError, match="'maya'; known are blender, opengl, unity, ros, unreal"):
         to_blender(poses, "maya")

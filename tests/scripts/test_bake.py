@@ -15,11 +15,10 @@ import pytest
 
 from rigid_motion import animation
 from rigid_motion.animation import is_baked, set_mode
-from rigid_motion_batch.cli import bake
 from rigid_motion_batch.keying import jobs
 from tests.animation.farm import played_on_a_farm
 from tests.animation.oracle import curves_of, expected_worlds, shown_worlds, snapshot
-from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own_deltas
+from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object
 from tests.scripts.baking import (
     LAST,
     baked_name,
@@ -167,60 +166,6 @@ def test_un_baking_gives_back_exactly_the_keys_and_the_motion(shot, baked, tmp_p
     assert_same(found[1][2], found[0][2])
 
 
-def test_the_delta_transforms_of_an_object_itself_come_back_too(baked, shot, tmp_path):
-    assert run(baked, "--unbake", "--output", tmp_path) == 0
-    owns = []
-    for path in (shot, tmp_path / "shot-baked-unbaked.blend"):
-        with extension():
-            open_again(path)
-            obj = bpy.data.objects["Own"]
-            set_mode(obj, "BLENDER")
-            owns.append(own_deltas(obj))
-    assert owns[0] == owns[1]
-
-
-def test_keys_count_as_they_are_where_live_update_was_off(tmp_path):
-    def edit(obj: bpy.types.Object) -> None:
-        animation.set_enabled(False)
-        key(obj, seed=5)
-
-    try:
-        path = one_object_file(tmp_path / "shot.blend", edit)
-    finally:
-        animation.set_enabled(True)
-    with extension():
-        open_again(path)
-        wanted = expected_worlds(bpy.data.objects["Tool"], PLAYED[:43])
-    assert run(path) == 0
-    open_again(baked_name(path))
-    assert_same(shown_worlds([bpy.data.objects["Tool"]], PLAYED[:43]), [wanted])
-
-
-def test_a_library_override_is_baked_and_given_back(tmp_path):
-    with extension():
-        new_file()
-        give_own_deltas(key(new_object("Prop")))
-        library = save(tmp_path / "library.blend")
-        new_file()
-        with bpy.data.libraries.load(str(library), link=True, relative=False) as (there, here):
-            here.objects = there.objects
-        bpy.context.scene.collection.objects.link(here.objects[0])
-        obj = here.objects[0].override_create(remap_local_usages=True)
-        obj.animation_data.action = obj.animation_data.action.copy()
-        set_mode(obj, "dq_sclerp")
-        bpy.context.scene.frame_set(17)
-        (wanted,), keys = shown_worlds([obj], PLAYED[:43]), snapshot(obj)
-        path = save(tmp_path / "shot.blend")
-    assert run(path, "--output", tmp_path / "farm") == 0
-    assert run(tmp_path / "farm" / "shot-baked.blend", "--unbake") == 0
-    for name in ("shot-baked", "shot-baked-unbaked"):
-        with extension():
-            open_again(tmp_path / "farm" / f"{name}.blend")
-            obj = next(obj for obj in bpy.data.objects if obj.override_library)
-            assert_same(shown_worlds([obj], PLAYED[:43]), [wanted])
-    assert snapshot(obj) == keys
-
-
 @pytest.mark.parametrize(
     ("options", "wanted"),
     [
@@ -234,15 +179,6 @@ def test_steps_and_ranges(tmp_path, options, wanted):
     assert run(path, *options) == 0
     open_again(baked_name(path))
     assert frames_of_keys(bpy.data.objects["Tool"]) == wanted
-
-
-@pytest.mark.parametrize(("options", "wanted"), [((), "LINEAR"), (("--hold",), "CONSTANT")])
-def test_poses_are_held_where_that_is_asked_for(tmp_path, options, wanted):
-    path = one_object_file(tmp_path / "shot.blend")
-    assert run(path, "--step", "2", *options) == 0
-    open_again(baked_name(path))
-    curves = curves_of(bpy.data.objects["Tool"])
-    assert {key.interpolation for curve in curves.values() for key in curve.keyframe_points[:-1]} == {wanted}
 
 
 def test_objects_can_be_chosen_by_names_and_patterns(shot, tmp_path, capsys):
@@ -274,16 +210,6 @@ def test_what_cannot_be_baked_is_named_with_the_way_out_and_the_others_go_on(sho
     assert lines[-1] == f"{len(BAKED)} objects baked, {len(REFUSED)} not; 1 file: 1 written."
     assert said.out == f"{tmp_path / 'shot-baked.blend'}\n"
     assert not any("Plain" in line or "Still" in line for line in lines)
-
-
-def test_a_dry_run_says_the_same_and_writes_nothing(shot, tmp_path, capsys):
-    assert run(shot, "--output", tmp_path / "farm", "--dry-run") == 1
-    said = capsys.readouterr()
-    assert "Tool: would be baked, frames 1 to 40" in said.err
-    assert "Crane: not baked" in said.err
-    assert f"would be written to {tmp_path / 'farm' / 'shot-baked.blend'}" in said.err
-    assert said.out == ""
-    assert not (tmp_path / "farm").exists()
 
 
 def test_a_file_without_modes_is_left_alone(tmp_path, capsys):
@@ -382,13 +308,6 @@ def test_textures_and_libraries_are_found_from_another_folder(tmp_path):
     assert not bpy.data.objects["Prop"].is_missing
 
 
-@pytest.mark.parametrize("compress", [False, True])
-def test_a_compressed_file_stays_compressed_and_another_not(tmp_path, compress):
-    path = one_object_file(tmp_path / "shot.blend", compress=compress)
-    assert run(path) == 0
-    assert (baked_name(path).read_bytes()[:7] == b"BLENDER") is not compress
-
-
 def test_no_python_of_a_file_is_run_and_all_of_it_stays(tmp_path):
     trace = tmp_path / "trace"
 
@@ -441,26 +360,6 @@ def test_a_wrong_option_ends_with_code_2_and_a_way_out(arguments, complaint, cap
     assert complaint in capsys.readouterr().err
 
 
-def test_a_file_that_is_named_twice_is_done_once():
-    options = bake.parse(["a.blend", "b.blend", "x/../a.blend"])
-    assert [job.source for job in options.todo] == ["a.blend", "b.blend"]
-
-
-def test_what_would_be_written_over_another_is_named(tmp_path, capsys):
-    for name in ("a/shot", "b/shot", "b/shot-baked"):
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        one_object_file(tmp_path / f"{name}.blend")
-    assert run(tmp_path / "a" / "shot.blend", tmp_path / "b" / "shot.blend", "--output", tmp_path / "x") == 1
-    assert (
-        f"{tmp_path / 'a' / 'shot.blend'} is written to {tmp_path / 'x' / 'shot-baked.blend'} too"
-        in capsys.readouterr().err
-    )
-    before = (tmp_path / "b" / "shot-baked.blend").read_bytes()
-    assert run(tmp_path / "b" / "shot.blend", tmp_path / "b" / "shot-baked.blend") == 1
-    assert "which is to be read too: leave one of them out" in capsys.readouterr().err
-    assert (tmp_path / "b" / "shot-baked.blend").read_bytes() == before
-
-
 def test_a_folder_is_baked_and_what_was_baked_is_no_input(tmp_path, capsys):
     (tmp_path / "a").mkdir()
     for name in ("shot", "a/shot"):
@@ -473,18 +372,6 @@ def test_a_folder_is_baked_and_what_was_baked_is_no_input(tmp_path, capsys):
         assert said.err.splitlines()[-1].endswith(f"2 files: {written}.")
     assert run(tmp_path / "out", "--unbake") == 0
     assert listed(tmp_path / "out" / "a") == ["shot-baked-unbaked.blend", "shot-baked.blend"]
-
-
-def test_as_a_program_it_ends_by_itself_and_prints_the_path_alone(tmp_path):
-    path = one_object_file(tmp_path / "shot.blend")
-    done = subprocess.run(
-        [sys.executable, ROOT / "scripts" / "bake.py", path.name],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        cwd=tmp_path,
-    )
-    assert (done.returncode, done.stdout) == (0, "shot-baked.blend\n"), done.stderr
 
 
 BESIDE_AN_INSTALLED_EXTENSION = """
@@ -526,3 +413,36 @@ def test_an_installed_extension_steps_aside_and_is_there_again_afterwards(extens
     shutil.copy(baked_name(path), tmp_path / "alone.blend")
     open_again(tmp_path / "alone.blend")
     assert len(frames_of_keys(bpy.data.objects["Tool"])) == 40
+
+
+def test_keys_count_as_they_are_where_live_update_was_off(tmp_path):
+    def edit(obj: bpy.types.Object) -> None:
+        animation.set_enabled(False)
+        key(obj, seed=5)
+
+    try:
+        path = one_object_file(tmp_path / "shot.blend", edit)
+    finally:
+        animation.set_enabled(True)
+    with extension():
+        open_again(path)
+        wanted = expected_worlds(bpy.data.objects["Tool"], PLAYED[:43])
+    assert run(path) == 0
+    open_again(baked_name(path))
+    assert_same(shown_worlds([bpy.data.objects["Tool"]], PLAYED[:43]), [wanted])
+
+
+@pytest.mark.parametrize(("options", "wanted"), [((), "LINEAR"), (("--hold",), "CONSTANT")])
+def test_poses_are_held_where_that_is_asked_for(tmp_path, options, wanted):
+    path = one_object_file(tmp_path / "shot.blend")
+    assert run(path, "--step", "2", *options) == 0
+    open_again(baked_name(path))
+    curves = curves_of(bpy.data.objects["Tool"])
+    assert {key.interpolation for curve in curves.values() for key in curve.keyframe_points[:-1]} == {wanted}
+
+
+@pytest.mark.parametrize("compress", [False, True])
+def test_a_compressed_file_stays_compressed_and_another_not(tmp_path, compress):
+    path = one_object_file(tmp_path / "shot.blend", compress=compress)
+    assert run(path) == 0
+    assert (baked_name(path).read_bytes()[:7] == b"BLENDER") is not compress

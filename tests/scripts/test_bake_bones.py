@@ -167,19 +167,6 @@ def test_bones_are_told_of_rig_by_rig_with_their_modes(tmp_path, capsys):
     assert lines[-1] == "1 object and 5 bones to be baked; 1 file: 1 to be written."
 
 
-def test_few_bones_are_named(tmp_path, capsys):
-    path = rig_file(tmp_path / "shot.blend")
-    assert run(path, "--objects", "Rig/Arm,Rig/Hand,Rig/Index", "--first", "30") == 0
-    assert run(baked_name(path), "--objects", "Rig/Hand", "--unbake") == 0
-    lines = capsys.readouterr().err.splitlines()
-    assert (
-        f"{path}: Rig: 3 bones baked, frames 11 to 40; Screw (Dual Quaternion), Smooth Screw (PGA): Arm; "
-        "Screw (Dual Quaternion): Hand, Index"
-    ) in lines
-    assert f"{baked_name(path)}: Rig/Hand: un-baked, Screw (Dual Quaternion)" in lines
-    assert lines[-1] == "1 bone un-baked; 1 file: 1 written."
-
-
 def test_what_cannot_be_baked_of_a_rig_is_named_by_bone_and_the_others_go_on(tmp_path, capsys):
     def edit(rig: bpy.types.Object) -> None:
         rig.pose.bones["Index"].rotation_mode = "AXIS_ANGLE"
@@ -198,24 +185,6 @@ def test_what_cannot_be_baked_of_a_rig_is_named_by_bone_and_the_others_go_on(tmp
     assert "set its rotation mode to Quaternion first" in refused["Index"]
     assert f"{path}: Rig: 2 bones baked, " in "\n".join(lines)
     assert lines[-1] == "2 bones baked, 2 not; 1 file: 1 written."
-
-
-def test_bones_whose_keys_are_elsewhere_are_told_from_those_whose_names_begin_alike(tmp_path, capsys):
-    with extension():
-        new_file()
-        rig = new_rig(names=("Arm", "Arm.L", "Arm has"))
-        set_mode(list(rig.pose.bones), "dq_sclerp")
-        for (path, _), curve in curves_of(rig).items():
-            for point in curve.keyframe_points if "Arm.L" in path or "has" in path else ():
-                point.co_ui.x += 100.0
-        path = save(tmp_path / "shot.blend")
-    assert run(path, "--last", "50") == 1
-    lines = capsys.readouterr().err.splitlines()
-    assert [line.partition(": ")[2].partition(":")[0] for line in lines if "none of them is in that range" in line] == [
-        "Rig/Arm.L",
-        "Rig/Arm has",
-    ]
-    assert f"{path}: Rig/Arm: baked, frames 1 to 40, Screw (Dual Quaternion)" in lines
 
 
 def test_the_bones_of_a_library_override_are_baked_and_given_back(tmp_path):
@@ -250,51 +219,3 @@ def shown_bones(rig: bpy.types.Object) -> np.ndarray:
         bpy.context.scene.frame_set(int(frame))
         found.append([np.array(bone.matrix) for bone in rig.pose.bones])
     return np.array(found)
-
-
-def test_a_linked_rig_is_named_once_and_says_how_many_bones_it_has(tmp_path, capsys):
-    library = rig_file(tmp_path / "library.blend")
-    with extension():
-        new_file()
-        with bpy.data.libraries.load(str(library), link=True, relative=False) as (_, here):
-            here.objects = ["Rig"]
-        bpy.context.scene.collection.objects.link(here.objects[0])
-        path = save(tmp_path / "shot.blend")
-    assert run(path) == 1
-    lines = [line for line in capsys.readouterr().err.splitlines() if "not baked" in line]
-    assert [line.partition(": not baked: it is linked from ")[0] for line in lines] == [
-        f"{path}: Rig: 4 bones",
-        f"{path}: Rig",
-    ]
-
-
-@pytest.mark.parametrize(
-    ("asked", "counts"), [("Rig", True), ("Rig/Hand", True), ("*/Hand", True), ("Rug/Hand", False), ("Other", False)]
-)
-def test_a_missing_rig_counts_where_bones_of_it_are_asked_for(tmp_path, capsys, asked, counts):
-    library = rig_file(tmp_path / "library.blend")
-    with extension():
-        new_file()
-        with bpy.data.libraries.load(str(library), link=True, relative=False) as (_, here):
-            here.objects = ["Rig"]
-        bpy.context.scene.collection.objects.link(here.objects[0])
-        path = save(tmp_path / "shot.blend")
-    library.unlink()
-    capsys.readouterr()
-    assert run(path, "--objects", asked) == 1
-    said = capsys.readouterr().err
-    assert (f"{path}: Rig: not baked: it is missing from {library}" in said) is counts
-    assert (f"--objects {asked}: no object or bone" in said) is not counts
-
-
-def test_all_bones_of_a_rig_are_baked_in_one_go(tmp_path, monkeypatch):
-    path = rig_file(tmp_path / "shot.blend")
-    calls, real = [], animation.bake
-
-    def counted(targets: list, **options: object) -> tuple[float, float]:
-        calls.append([target.name for target in targets])
-        return real(targets, **options)
-
-    monkeypatch.setattr(animation, "bake", counted)
-    assert run(path) == 0
-    assert calls == [["Rig/Root", "Rig/Arm", "Rig/Hand", "Rig/Index"], ["Rig"]]

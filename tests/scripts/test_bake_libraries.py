@@ -119,33 +119,6 @@ def test_a_missing_library_that_holds_meshes_only_is_named_and_does_no_harm(tmp_
     assert "2 objects baked; 1 file: 1 written." in said
 
 
-def test_a_library_that_lost_what_is_wanted_of_it_is_told_from_one_that_is_gone(tmp_path, capsys):
-    library = make_library(tmp_path / "library.blend")
-    shot = shot_with(tmp_path / "shot.blend", link_object, library)
-    open_again(library)
-    bpy.data.objects["Prop"].name = "Property"
-    bpy.ops.wm.save_mainfile()
-    assert run(shot) == 1
-    assert f"{shot}: library {library} cannot be read, or lacks something (Object Prop): " in capsys.readouterr().err
-
-
-def test_a_library_of_a_library_that_is_missing_is_named_where_it_should_be(tmp_path, capsys):
-    (tmp_path / "sets" / "deep").mkdir(parents=True)
-    deep = make_library(tmp_path / "sets" / "deep" / "library.blend")
-    middle = shot_with(tmp_path / "sets" / "middle.blend", link_action, deep)
-    with extension():
-        open_again(middle)
-        bpy.data.objects.remove(bpy.data.objects["Tool"])
-        bpy.ops.wm.save_mainfile()
-    shot = shot_with(tmp_path / "shot.blend", link_object, middle)
-    deep.unlink()
-    capsys.readouterr()
-    assert run(shot) == 1
-    said = capsys.readouterr().err
-    assert f"{shot}: library {deep} was not found (Action PropAction)" in said
-    assert f"{shot}: Local: not baked: its Action PropAction is missing from {deep}" in said
-
-
 @pytest.mark.parametrize("link", [link_object, link_action, link_collection])
 def test_a_library_that_is_back_is_found_by_what_was_baked_without_it(tmp_path, link):
     library = make_library(tmp_path / "library.blend")
@@ -160,53 +133,6 @@ def test_a_library_that_is_back_is_found_by_what_was_baked_without_it(tmp_path, 
         assert Path(bpy.path.abspath(found.filepath)).resolve() == library
         assert found.users_id
         assert not any(block.is_missing for block in found.users_id)
-
-
-def test_objects_that_were_not_asked_for_may_be_missing(tmp_path, capsys):
-    library = make_library(tmp_path / "library.blend")
-    object_shot = shot_with(tmp_path / "one.blend", link_object, library)
-    collection_shot = shot_with(tmp_path / "two.blend", link_collection, library)
-    library.unlink()
-    capsys.readouterr()
-    assert run(object_shot, collection_shot, "--objects", "Tool") == 0
-    assert capsys.readouterr().err.count(" was not found") == 2
-
-
-def test_un_baking_says_what_is_missing_too(tmp_path, capsys):
-    library = make_library(tmp_path / "library.blend")
-    shot = shot_with(tmp_path / "shot.blend", link_object, library)
-    library.unlink()
-    capsys.readouterr()
-    assert run(shot, "--unbake") == 1
-    assert f"{shot}: Prop: not un-baked: it is missing from {library}" in capsys.readouterr().err
-
-
-def test_a_live_object_that_is_linked_for_its_override_alone_is_no_failure(tmp_path, capsys):
-    shot = shot_with(tmp_path / "shot.blend", link_and_override, make_library(tmp_path / "library.blend"))
-    capsys.readouterr()
-    assert run(shot) == 0
-    assert "2 objects baked; 1 file: 1 written." in capsys.readouterr().err
-
-
-def test_a_live_object_that_is_shown_beside_its_override_is_one(tmp_path, capsys):
-    def link(library: Path) -> None:
-        bpy.context.scene.collection.objects.link(link_and_override(library).override_library.reference)
-
-    shot = shot_with(tmp_path / "shot.blend", link, make_library(tmp_path / "library.blend"))
-    capsys.readouterr()
-    assert run(shot) == 1
-    assert "Prop: not baked: it is linked from //library.blend: use --in-place on that file" in capsys.readouterr().err
-
-
-def test_an_action_that_is_linked_is_refused_with_the_way_out(tmp_path, capsys):
-    def link(library: Path) -> None:
-        link_action(library)
-        bpy.data.objects["Local"].rigid_motion.mode = "dq_sclerp"
-
-    shot = shot_with(tmp_path / "shot.blend", link, make_library(tmp_path / "library.blend"))
-    capsys.readouterr()
-    assert run(shot) == 1
-    assert "Local: not baked: PropAction is linked from another file: make it local first" in capsys.readouterr().err
 
 
 def test_spaces_and_umlauts_in_paths_and_names_are_kept(tmp_path, capsys):

@@ -11,10 +11,8 @@ import tomllib
 import zipfile
 from pathlib import Path
 
-import pytest
-
 from rigid_motion_batch.cli import build_extension
-from rigid_motion_batch.places import EXTENSION, LICENSE, MANIFEST
+from rigid_motion_batch.places import EXTENSION, LICENSE
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -105,12 +103,6 @@ def test_the_command_prints_the_path_and_leaves_nothing_else(tmp_path):
     assert [Path(done.stdout.strip())] == list((tmp_path / "new").iterdir())
 
 
-def test_help_has_examples():
-    done = run(ROOT / "scripts" / "build_extension.py", "--help")
-    assert done.returncode == 0
-    assert "--output ~/Desktop" in done.stdout
-
-
 def test_what_blender_refuses_is_reported_in_its_words_and_the_old_zip_stays(tmp_path, monkeypatch, capsys):
     package, manifest = tmp_path / "package", tmp_path / "blender_manifest.toml"
     package.mkdir()
@@ -124,30 +116,6 @@ def test_what_blender_refuses_is_reported_in_its_words_and_the_old_zip_stays(tmp
     assert build_extension.main(["--output", str(old.parent)]) == 2
     assert 'missing "tagline"' in capsys.readouterr().err
     assert {path.name: path.read_text() for path in old.parent.iterdir()} == {old.name: "old"}
-
-
-def test_a_tag_that_blender_does_not_know_is_refused(tmp_path, monkeypatch, capsys):
-    manifest = tmp_path / MANIFEST.name
-    manifest.write_text(MANIFEST.read_text(encoding="utf-8").replace('"Rigging"', '"Interpolation"'), encoding="utf-8")
-    monkeypatch.setattr(build_extension, "BESIDE", (manifest, LICENSE))
-    assert build_extension.main(["--output", str(tmp_path / "dist")]) == 2
-    assert "Interpolation" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("missing", ["LICENSE", "rigid_motion"])
-def test_a_missing_part_is_named(missing, tmp_path, monkeypatch, capsys):
-    if missing == "LICENSE":
-        monkeypatch.setattr(build_extension, "BESIDE", (MANIFEST, tmp_path / missing))
-    else:
-        monkeypatch.setattr(build_extension, "EXTENSION", tmp_path / missing)
-    assert build_extension.main(["--output", str(tmp_path / "dist")]) == 2
-    assert str(tmp_path / missing) in capsys.readouterr().err
-
-
-def test_a_folder_that_cannot_be_made_is_named(tmp_path, capsys):
-    (tmp_path / "file").touch()
-    assert build_extension.main(["--output", str(tmp_path / "file" / "dist")]) == 2
-    assert str(tmp_path / "file") in capsys.readouterr().err
 
 
 def test_it_installs_enables_disables_and_uninstalls_without_a_word_of_complaint(extension_zip, tmp_path):

@@ -81,18 +81,6 @@ def test_its_numbers_are_those_of_straight_lines_and_slerp_between_its_samples(t
         assert (row["keys"], row["keys_per_s"], row["bytes_per_s"]) == ("", "", "")
 
 
-def test_the_modes_are_compared_as_on_the_stretch_that_both_have(toss, mine, compared, tmp_path):
-    recording, own = table(toss), table(mine)
-    common = (recording["t"] >= own["t"][0]) & (recording["t"] <= own["t"][-1])
-    cut = write_poses(tmp_path / "toss.csv", {name: column[common] for name, column in recording.items()})
-    assert run(cut, *FAST, "--output", tmp_path / "cut", "--tolerance", "1cm", "--modes", "all,best_of") == 0
-    alone = rows_of(tmp_path / "cut" / "metrics.csv")
-    assert [row for row in rows_of(compared / "metrics.csv") if row["mode"] != "mine"] == alone
-    assert sorted(path.name for path in (compared / "toss" / "10").iterdir()) == sorted(
-        ["mine.csv", *(path.name for path in (tmp_path / "cut" / "toss" / "10").iterdir())]
-    )
-
-
 def test_it_is_in_the_line_of_the_clip_the_table_the_verdict_and_the_page(toss, mine, tmp_path, capsys):
     assert run(toss, "--against", mine, *FAST, "--output", tmp_path, "--json") == 0
     said = json.loads(capsys.readouterr().out)
@@ -115,27 +103,6 @@ def test_a_motion_that_lasts_as_long_is_compared_from_end_to_end(toss, tmp_path,
     assert "compared from" not in capsys.readouterr().err
     (row,) = (row for row in rows_of(tmp_path / "output" / "metrics.csv") if row["mode"] == "same")
     assert int(row["samples"]) > 80
-
-
-def test_options_say_of_it_what_they_say_of_the_recording(toss, mine, tmp_path):
-    """In centimetres with y up and other names, both have the numbers that they have in metres."""
-
-    def write(path: Path) -> Path:
-        columns = table(path)
-        renamed = {"when": columns["t"], **{f"p{name}": 100.0 * columns[name] for name in "xyz"}}
-        renamed |= {name: columns[name] for name in POSE[3:]}
-        lines = [
-            ",".join(map(repr, row)) for row in zip(*(column.tolist() for column in renamed.values()), strict=True)
-        ]
-        (tmp_path / path.name).write_text("\n".join([",".join(renamed), *lines, ""]))
-        return tmp_path / path.name
-
-    how = ("--scale", "0.01", "--axes", "unity", "--columns", "t=when,x=px,y=py,z=pz")
-    assert run(toss, "--against", mine, *FAST, "--output", tmp_path / "metres") == 0
-    assert run(write(toss), "--against", write(mine), *FAST, *how, "--output", tmp_path / "units") == 0
-    for one, other in zip(*(rows_of(tmp_path / name / "metrics.csv") for name in ("metres", "units")), strict=True):
-        assert one["mode"] == other["mode"]
-        assert float(one["rms_shell_m"]) == pytest.approx(float(other["rms_shell_m"]), rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -240,19 +207,6 @@ def test_a_film_has_a_lane_of_it(toss, mine, tmp_path):
         assert np.abs(np.array(actor.location) - (positions[0] - centre)).max() < 1e-5
         there = Rotation.from_quat(np.array(actor.rotation_quaternion), scalar_first=True)
         assert (there.inv() * turns[0]).magnitude() < 1e-5
-
-
-def test_a_film_of_a_body_has_a_lane_of_it(tmp_path):
-    times = np.arange(31) / 30.0
-    walk = write_body(tmp_path / "walk.bvh", times, ("LeftHand", "Head"))
-    mine = write_body(tmp_path / "mine.bvh", times[::5], ("LeftHand", "Head"))
-    how = ("--rates", "5", "--modes", "lerp_slerp", "--output", tmp_path / "output")
-    assert run(walk, "--against", mine, *how, *SMALL) == 0
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "output" / "walk" / "5" / "comparison.blend"))
-    rig = bpy.data.objects["mine"]
-    # Its keys are not known: it has one on every frame.
-    assert len({key.co[0] for curve in rig.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
-                for key in curve.keyframe_points}) == bpy.context.scene.frame_end  # fmt: skip
 
 
 # -- refusals ---------------------------------------------------------------------------------------------------------

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import os
 import subprocess
 import sys
@@ -123,23 +122,6 @@ def test_keys_are_in_a_table_for_all_modes_or_one_for_each_and_shared_by_the_joi
             np.testing.assert_allclose(np.diff(moments["Hips"]), 0.1, atol=1e-4)
 
 
-def test_the_keys_needed_are_told_of_bodies_too(written: tuple[Path, Path]) -> None:
-    _, output = written
-    rows = [row for row in rows_of(output / "keys_needed.csv") if row["clip"] == "walk"]
-    assert {row["mode"] for row in rows} == set(MODES)
-    assert {row["decimation"] for row in rows} == {"uniform", "adaptive"}
-    for row in rows:
-        if row["keys"]:
-            assert float(row["rms_shell_m"]) <= float(row["wanted_rms_shell_m"]) * (1.0 + 1e-9)
-
-
-def test_the_report_shows_the_body_and_names_its_joints(written: tuple[Path, Path]) -> None:
-    walk, output = written
-    page = (output / "report.html").read_text(encoding="utf-8")
-    for joint in joints_in(walk):
-        assert joint in page
-
-
 def test_a_radius_of_its_own_changes_the_errors_of_that_joint_alone(written: tuple[Path, Path], tmp_path: Path) -> None:
     walk, output = written
     assert run(walk, *QUICK, "--rates", "5", "--output", tmp_path) == 0
@@ -153,17 +135,6 @@ def test_a_radius_of_its_own_changes_the_errors_of_that_joint_alone(written: tup
             assert float(row["rms_shell_m"]) >= float(other["rms_shell_m"]) * (1.0 - 1e-9)
 
 
-def test_a_second_run_has_nothing_to_do(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    walk = write_body(tmp_path)
-    asked = (walk, *QUICK, "--rates", "5", "--output", tmp_path / "output")
-    assert run(*asked) == 0
-    before = (tmp_path / "output" / "metrics_joints.csv").read_bytes()
-    capsys.readouterr()
-    assert run(*asked, "--json") == 0
-    assert json.loads(capsys.readouterr().out)["tasks"] == {"up to date": 6}
-    assert (tmp_path / "output" / "metrics_joints.csv").read_bytes() == before
-
-
 def test_the_joints_of_an_earlier_run_do_not_pass_for_those_of_this(tmp_path: Path) -> None:
     walk, toss, output = write_body(tmp_path), write_toss(tmp_path / "toss.csv"), tmp_path / "output"
     asked = (toss, *QUICK, "--rates", "5", "--output", output)
@@ -173,24 +144,6 @@ def test_the_joints_of_an_earlier_run_do_not_pass_for_those_of_this(tmp_path: Pa
     assert not (output / "metrics_joints.csv").exists()
     assert run(walk, *asked) == 0
     assert (output / "metrics_joints.csv").read_bytes() == table
-
-
-@pytest.mark.parametrize(
-    ("content", "complaint"),
-    [
-        ("joint,radius_m\nHips,0.1\nHips,0.2\n", ":3: the joint 'Hips' comes a second time; leave one"),
-        ("joint,radius_m\nHips,wide\n", ":2: 'wide' is no number of metres above 0"),
-    ],
-)
-def test_a_wrong_table_of_radii_ends_with_code_2_and_its_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], content: str, complaint: str
-) -> None:
-    table = tmp_path / "radii.csv"
-    table.write_text(content, encoding="utf-8")
-    with pytest.raises(SystemExit) as ended:
-        run(write_body(tmp_path), *QUICK, "--radius", table, "--output", tmp_path / "output")
-    assert ended.value.code == 2
-    assert f"{table}{complaint}" in capsys.readouterr().err
 
 
 # -- bodies that cannot be read ---------------------------------------------------------------------------------------
@@ -236,9 +189,7 @@ def lines_about(said: str, path: Path) -> list[str]:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals end no processes there")
 @pytest.mark.parametrize("jobs", sample([2, 1]))
-def test_a_body_that_ends_a_worker_is_told_and_the_others_go_on(
-    deadly: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], jobs: int
-) -> None:
+def test_a_body_that_ends_a_worker_is_told_and_the_others_go_on(deadly, tmp_path, capfd, jobs):
     walk, stroll, output = write_body(tmp_path), write_body(tmp_path, "stroll"), tmp_path / "output"
     assert run(walk, deadly, stroll, *QUICK, "--rates", "5", "--output", output, jobs=jobs) == 1
     lines = [line for line in lines_about(capfd.readouterr().err, deadly) if "its process died (SIGSEGV)" in line]
@@ -251,25 +202,8 @@ def test_a_body_that_ends_a_worker_is_told_and_the_others_go_on(
     assert (output / "report.html").is_file()
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="signals end no processes there")
-def test_a_body_that_ends_the_only_process_loses_what_is_not_done_and_the_command_without_it_goes_on(
-    deadly: Path, tmp_path: Path
-) -> None:
-    walk, output = write_body(tmp_path), tmp_path / "output"
-    command, options = [sys.executable, str(ROOT / "scripts" / "compare.py"), str(walk)], [*QUICK, "--rates", "5"]
-    options += ["--jobs", "0", "--output", str(output)]
-    done = subprocess.run([*command, str(deadly), *options], capture_output=True, text=True, timeout=300)
-    assert done.returncode == 1, done.stderr
-    assert "the process died (SIGSEGV)" in done.stderr
-    done = subprocess.run([*command, *options], capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stderr
-    assert {row["clip"] for row in rows_of(output / "metrics.csv")} == {"walk"}
-
-
 @pytest.mark.parametrize("jobs", [0, 1])
-def test_a_damaged_body_is_told_in_one_line_and_the_others_go_on(
-    fbx: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], jobs: int
-) -> None:
+def test_a_damaged_body_is_told_in_one_line_and_the_others_go_on(fbx, tmp_path, capfd, jobs):
     content, walk, output = fbx.read_bytes(), write_body(tmp_path), tmp_path / "output"
     cut, torn = tmp_path / "cut.fbx", tmp_path / "torn.bvh"
     cut.write_bytes(content[: len(content) // 2])

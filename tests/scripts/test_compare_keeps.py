@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import shutil
-import subprocess
-import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from rigid_motion_batch import places
 from rigid_motion_batch.cli import compare
-from rigid_motion_batch.pipeline import comparison_steps as steps
 from rigid_motion_batch.pipeline.steps import OWN
-from tests.scripts.comparing import ROOT, write_toss
+from tests.scripts.comparing import write_toss
 
 OPTIONS = ("--no-video", "--rates", "5", "--modes", "lerp_slerp", "--jobs", "0")
 
@@ -66,23 +61,11 @@ def refused(capsys: pytest.CaptureFixture, *arguments: object) -> str:
 
 @pytest.mark.parametrize("place", ["metrics.csv"])
 @pytest.mark.parametrize("force", [(), ("--overwrite",)])
-def test_an_input_that_lies_where_an_output_goes_is_refused(
-    tmp_path: Path, place: str, force: tuple[str, ...], capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_input_that_lies_where_an_output_goes_is_refused(tmp_path, place, force, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_toss(tmp_path / place)
     assert f"{place}: this input lies where" in refused(capsys, place, "--output", ".", *force)
     assert [*files(tmp_path)] == [place]
-
-
-def test_an_input_that_lies_where_the_keys_of_its_clip_go_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "keys").mkdir()
-    write_toss(tmp_path / "keys" / "5" / "keys.csv")
-    assert "this input lies where" in refused(capsys, "keys/5/keys.csv", "--output", ".")
-    assert files(tmp_path).keys() == {os.path.join("keys", "5", "keys.csv")}
 
 
 @pytest.mark.skipif(os.name == "nt", reason="links need permission on Windows")
@@ -94,12 +77,6 @@ def test_an_input_that_leads_to_an_output_is_refused(folder: Path, capsys: pytes
 def test_an_output_of_an_earlier_run_is_no_input_of_the_next(folder: Path, capsys: pytest.CaptureFixture) -> None:
     said = refused(capsys, "toss.csv", "out/toss/5/lerp_slerp.csv", "--output", "out")
     assert "out/toss/5/lerp_slerp.csv: this input was written by a run into this folder" in said.replace(os.sep, "/")
-
-
-def test_an_input_where_the_program_keeps_its_own_files_is_refused(folder: Path, capsys: pytest.CaptureFixture) -> None:
-    write_toss(folder / "out" / OWN / "mine.csv")
-    said = refused(capsys, f"out/{OWN}/mine.csv", "--output", "out", "--overwrite")
-    assert "where the program works" in said
 
 
 # -- files of strangers -----------------------------------------------------------------------------------------------
@@ -129,13 +106,6 @@ def test_without_its_own_folders_it_knows_no_file_for_its_own(folder: Path, caps
     assert "were not written by this program" in said
 
 
-def test_a_folder_where_a_file_goes_is_never_replaced(folder: Path, capsys: pytest.CaptureFixture) -> None:
-    (folder / "out" / "report.html").unlink()
-    (folder / "out" / "report.html").mkdir()
-    (folder / "out" / "report.html" / "mine.txt").write_text("mine")
-    assert "a folder where a file goes" in refused(capsys, "toss.csv", "--output", "out", "--overwrite")
-
-
 def test_a_file_where_a_folder_goes_is_never_replaced(folder: Path, capsys: pytest.CaptureFixture) -> None:
     shutil.rmtree(folder / "out" / "toss")
     (folder / "out" / "toss").write_text("mine")
@@ -145,9 +115,7 @@ def test_a_file_where_a_folder_goes_is_never_replaced(folder: Path, capsys: pyte
 # -- another comparison -----------------------------------------------------------------------------------------------
 
 
-def test_another_comparison_in_the_folder_is_named_with_the_ways_out(
-    folder: Path, capsys: pytest.CaptureFixture
-) -> None:
+def test_another_comparison_in_the_folder_is_named_with_the_ways_out(folder, capsys):
     write_toss(folder / "hand.csv", samples=70)
     said = refused(capsys, "hand.csv", "--output", "out")
     assert "out holds another comparison, of toss.csv; choose another folder, such as --output " in said
@@ -173,53 +141,7 @@ def test_the_same_recordings_and_more_of_them_go_on(folder: Path, arguments: tup
     assert run(*arguments, "--output", "out") == 0
 
 
-def test_a_recording_that_was_edited_is_the_same_comparison(folder: Path) -> None:
-    write_toss(folder / "toss.csv", samples=80)
-    assert run("toss.csv", "--output", "out") == 0
-
-
 # -- damage -----------------------------------------------------------------------------------------------------------
-
-
-def garbage(path: Path) -> None:
-    """Other bytes, of which size and time say nothing."""
-    status = path.stat()
-    path.write_bytes(b"[" * status.st_size)
-    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
-
-
-def emptied(path: Path) -> None:
-    path.write_bytes(b"")
-
-
-def folder_instead(path: Path) -> None:
-    path.unlink()
-    (path / "inner").mkdir(parents=True)
-
-
-@pytest.mark.parametrize("damage", [garbage, emptied, folder_instead])
-@pytest.mark.parametrize("part", ["facts.json", "0.json", "0.npz", "result.json", "result.npz", ".index.json"])
-def test_a_damaged_result_is_made_again(
-    folder: Path, part: str, damage: Callable[[Path], None], capsys: pytest.CaptureFixture
-) -> None:
-    table = (folder / "out" / "metrics.csv").read_bytes()
-    for path in (folder / "out" / OWN / "results").glob(f"*/{part}"):
-        damage(path)
-    (folder / "out" / "metrics.csv").unlink()
-    again = "toss.csv", "--output", "out", "--rates", "5,10"
-    if damage is garbage and part != ".index.json":  # Seen by those who read it alone.
-        assert run(*again) in (1, 2)
-        assert "damaged" in capsys.readouterr().err
-    assert run(*again) == 0
-    assert "Traceback" not in capsys.readouterr().err
-    assert (folder / "out" / "metrics.csv").read_bytes().startswith(table)
-
-
-@pytest.mark.parametrize("damage", [garbage, emptied, folder_instead])
-@pytest.mark.parametrize("name", ["comparison.json", "inputs.json"])
-def test_a_damaged_record_lets_the_work_be_done_again(folder: Path, name: str, damage: Callable[[Path], None]) -> None:
-    damage(folder / "out" / OWN / name)
-    assert run("toss.csv", "--output", "out") == 0
 
 
 # -- what would be done -----------------------------------------------------------------------------------------------
@@ -236,57 +158,6 @@ def test_what_would_be_done_is_explained_and_nothing_is_done(folder: Path, capsy
     capsys.readouterr()
     assert run("toss.csv", "--output", "out", "--explain") == 0
     assert capsys.readouterr().out.splitlines() == ["nothing to do"]
-
-
-def test_after_an_edit_of_the_page_the_page_alone_is_made_again(folder: Path, tmp_path: Path) -> None:
-    """A colour of the page, a chart: nothing is measured anew, and nothing that films are made of may use them."""
-    for name in ("addon", "scripts/rigid_motion_batch", "assets", "blender_manifest.toml"):
-        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        copy(ROOT / name, tmp_path / name)
-    shutil.copy(ROOT / "scripts" / "compare.py", tmp_path / "scripts")
-    command = [sys.executable, tmp_path / "scripts" / "compare.py", folder / "toss.csv", "--no-video", "--rates", "10"]
-    command += ["--jobs", "0", "--output", tmp_path / "output"]
-
-    def explained() -> list[str]:
-        return subprocess.run([*command, "--explain"], check=True, capture_output=True, text=True).stdout.splitlines()
-
-    subprocess.run(command, check=True, capture_output=True)
-    assert explained() == ["nothing to do"]
-    room = tmp_path / "scripts" / "rigid_motion_batch"
-    style, charts = room / "report" / "templates" / "page.css", room / "report" / "charts.py"
-    style.write_text(style.read_text(encoding="utf-8").replace("#0a58b8", "#b8580a"), encoding="utf-8")
-    charts.write_text(charts.read_text(encoding="utf-8") + "\n# A chart.\n", encoding="utf-8")
-    assert explained() == ["report.html: program changed (report)"]
-    found = subprocess.run([*command, "--json"], check=True, capture_output=True, text=True).stdout
-    assert json.loads(found)["tasks"] == {"done": 1, "up to date": 4}
-    assert "#b8580a" in (tmp_path / "output" / "report.html").read_text(encoding="utf-8")
-    metrics = room / "analysis" / "metrics.py"
-    metrics.write_text(metrics.read_text(encoding="utf-8") + "\n# A number.\n", encoding="utf-8")
-    assert [line.partition(":")[0] for line in explained()] == [
-        *("measure toss/10", "model toss/10", "metrics.csv", "report.html")
-    ]
-    steps_with_report = {name for name, one in vars(steps).items() if "report" in getattr(one, "rooms", ())}
-    assert steps_with_report == {"page", "overview"}
-
-
-def test_of_a_stage_that_stage_alone_is_explained(folder: Path, capsys: pytest.CaptureFixture) -> None:
-    for stage, names in (("measure", {"measure toss/5"}), ("read", {"nothing to do"})):
-        assert run("toss.csv", "--output", "out", "--explain", "--radius", "0.2", "--only", stage) == 0
-        assert {line.partition(":")[0] for line in capsys.readouterr().out.splitlines()} == names
-    assert run("hand.csv", "--output", "new", "--explain", "--only", "read") == 0
-    assert capsys.readouterr().out == "read hand.csv: never done\n"
-
-
-def test_of_recordings_that_were_never_read_it_is_explained_that_they_will_be(
-    folder: Path, capsys: pytest.CaptureFixture
-) -> None:
-    write_toss(folder / "hand.csv", samples=70)
-    assert run("hand.csv", "--output", "new", "--explain") == 0
-    said = capsys.readouterr().out.splitlines()
-    assert said[0] == "read hand.csv: never done"
-    assert "when they have been read" in said[-1]
-    assert not (folder / "new").exists()
 
 
 # -- where it goes ----------------------------------------------------------------------------------------------------

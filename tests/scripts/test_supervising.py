@@ -143,16 +143,6 @@ def test_no_child_outlives_a_command_that_is_killed(tmp_path):
     assert not any(map(alive, processes))
 
 
-def test_what_is_ignored_goes_on_being_ignored(tmp_path):
-    write_csv(tmp_path / "hand.csv", seconds=20.0)
-    ignore = {"preexec_fn": lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN)}
-    run = start(tmp_path, "reduce.py", "hand.csv", where="no such file", **ignore)
-    time.sleep(0.3)
-    run.process.send_signal(signal.SIGHUP)
-    printed, said, _ = run.end()
-    assert (run.process.returncode, printed) == (0, "hand-keys.csv\n"), said
-
-
 def test_ctrl_c_within_an_importer_is_no_fault_of_the_file(tmp_path):
     def importer() -> None:
         # As bpy.ops puts it.

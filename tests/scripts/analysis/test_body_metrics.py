@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import csv
 import re
-from dataclasses import astuple, fields, replace
+from dataclasses import astuple
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rigid_motion_batch.analysis import bodies
 from rigid_motion_batch.analysis.bodies import Ground, measure_body, reconstruct_body
 from rigid_motion_batch.analysis.body_metrics import (
     MeasuredBody,
@@ -22,7 +21,7 @@ from rigid_motion_batch.analysis.body_metrics import (
     write_key_tables,
 )
 from rigid_motion_batch.analysis.choices import Choice, Tolerance, Uniform
-from rigid_motion_batch.analysis.metrics import body_table_names, write_metrics
+from rigid_motion_batch.analysis.metrics import body_table_names
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.rows import meant
 from tests.scripts.clips.bodies import JOINTS, swinging_body
@@ -110,28 +109,6 @@ def test_a_joint_that_stays_as_it_is_sends_nothing() -> None:
     assert row.key_frames == 11
 
 
-def test_blocks_of_samples_make_no_difference_to_any_row(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = measured()
-    monkeypatch.setattr(bodies, "BLOCK", 5)
-    pieces = measured()
-    assert pieces.groups == whole.groups
-    for one, other in zip((*whole.rows, *whole.joints), (*pieces.rows, *pieces.joints), strict=True):
-        for field in fields(one):
-            expected, found = getattr(one, field.name), getattr(other, field.name)
-            assert found == (pytest.approx(expected, abs=1e-12) if isinstance(expected, float) else expected)
-    for mode, errors in whole.errors.items():
-        np.testing.assert_allclose(pieces.errors[mode].shell, errors.shell, atol=1e-12)
-        np.testing.assert_allclose(pieces.errors[mode].largest, errors.largest, atol=1e-9)
-
-
-def test_modes_that_are_one_motion_are_shown_once_and_have_a_row_each() -> None:
-    found = measured()
-    assert ("dq_sclerp", "cga_slerp") in found.groups
-    assert set(found.errors) == {group[0] for group in found.groups}
-    rows = {row.mode: row for row in found.rows}
-    assert replace(rows["cga_slerp"], mode="dq_sclerp").rms_shell_m == pytest.approx(rows["dq_sclerp"].rms_shell_m)
-
-
 @pytest.mark.parametrize("seconds", [0.4, 2.0, 15.0])
 def test_what_is_shown_has_the_largest_errors_and_where_the_joints_are_then(seconds: float) -> None:
     clip = swinging_body(seconds=seconds)
@@ -172,15 +149,6 @@ def test_the_columns_are_those_promised_and_read_back_exactly(tmp_path: Path) ->
             assert type(value)(cell) == value
 
 
-@pytest.mark.parametrize("name", HOSTILE)
-def test_the_worst_joint_may_be_called_anything(tmp_path: Path, name: str) -> None:
-    (row, *_) = measured().rows
-    write_metrics(tmp_path / "metrics.csv", [replace(row, worst_joint=name), row])
-    header, first, second = cells_of(tmp_path / "metrics.csv")
-    assert first[header.index("worst_joint")] == name
-    assert len(first) == len(second) == len(header)
-
-
 def test_tables_are_joined_under_one_header_whatever_joints_are_called(tmp_path: Path) -> None:
     found = measured(joints=HOSTILE)
     parts = [tmp_path / f"{number}.csv" for number in range(3)]
@@ -193,9 +161,7 @@ def test_tables_are_joined_under_one_header_whatever_joints_are_called(tmp_path:
 
 @pytest.mark.parametrize("joints", [JOINTS, HOSTILE], ids=["plain", "hostile"])
 @pytest.mark.parametrize("choice", CHOICES, ids=str)
-def test_keys_are_tables_of_poses_in_parents_space_and_read_back_exactly(
-    tmp_path: Path, choice: Choice, joints: tuple[str, ...]
-) -> None:
+def test_keys_are_tables_of_poses_in_parents_space_and_read_back_exactly(tmp_path, choice, joints):
     made = measured(choice, joints=joints).made
     write_key_tables(tmp_path, made)
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(body_table_names(choice, MODES))

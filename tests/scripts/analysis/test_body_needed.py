@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from rigid_motion.motion import Poses
-from rigid_motion_batch.analysis.body_needed import NEAR, OfBody
+from rigid_motion_batch.analysis.body_needed import OfBody
 from rigid_motion_batch.analysis.metrics import NOTHING
 from rigid_motion_batch.analysis.needed import RATES, KeysNeeded, evenly_spaced, keys_needed
-from rigid_motion_batch.pipeline import values
 from tests.motion.bodies import body_errors
-from tests.scripts.clips.bodies import JOINTS, PARENTS, still_body, swinging_body
+from tests.scripts.clips.bodies import JOINTS, PARENTS, swinging_body
 
 MODES = ("lerp_slerp", "dq_sclerp", "cga_slerp", "motor_spline")
 
@@ -70,33 +67,3 @@ def test_evenly_one_key_fewer_is_not_as_good(found: KeysNeeded) -> None:
                 stretch = WAYS.between(0, last)
                 fewer = evenly_spaced(stretch.clip, int(keys) - 2)
                 assert stretch.error(fewer, mode) > found.targets[place]
-
-
-def test_the_search_for_keys_of_the_motion_ends_near_the_fewest() -> None:
-    target = WAYS.error(evenly_spaced(WAYS.clip, 8), "lerp_slerp")
-    ((keys, error),) = WAYS.by_motion("lerp_slerp", target, 9)
-    assert error <= target
-    assert len(keys) <= 9
-    assert WAYS.error(keys, "lerp_slerp") == error
-    fewer, worse = WAYS._best_of(len(keys) - max(1, int(NEAR * len(keys))), "lerp_slerp")
-    assert len(fewer) < len(keys)
-    assert worse > target
-
-
-def test_where_nothing_less_will_do_every_sample_is_a_key() -> None:
-    ((keys, error),) = WAYS.by_motion("lerp_slerp", 0.0, 4)
-    assert len(keys) == len(WAYS.clip.times)
-    assert error == pytest.approx(0.0, abs=1e-12)
-
-
-def test_a_body_of_which_nothing_moves_needs_nothing() -> None:
-    nothing = keys_needed(OfBody(still_body(), RADII), MODES)
-    assert np.isnan(nothing.keys).all()
-
-
-def test_what_was_found_is_read_back_as_it_was(found: KeysNeeded, tmp_path: Path) -> None:
-    values.write(tmp_path / "needed", found)
-    again = values.read(KeysNeeded, tmp_path / "needed")
-    assert again.groups == found.groups
-    for name in ("keys", "reached", "targets", "durations", "reference_keys", "uniform_errors"):
-        np.testing.assert_array_equal(getattr(again, name), getattr(found, name))

@@ -46,15 +46,8 @@ def test_a_tolerance_with_a_unit_is_the_same_length_in_recordings_of_any_unit() 
     assert Tolerance("5").tolerance(in_millimetres) == pytest.approx(0.005)
 
 
-def test_a_larger_shell_takes_more_keys() -> None:
-    clip = swinging_clip()
-    assert len(Tolerance("5mm").keys(clip, "dq_sclerp", 0.5)) > len(Tolerance("5mm").keys(clip, "dq_sclerp", 0.05))
-
-
 @pytest.mark.parametrize(("seconds", "rate", "count"), [(3.0, "10", 31), (1.0, "7.5", 8), (3.0, "500", 271)])
-def test_a_budget_is_as_many_keys_as_a_sender_at_that_rate_has_and_better_ones(
-    seconds: float, rate: str, count: int
-) -> None:
+def test_a_budget_is_as_many_keys_as_a_sender_at_that_rate_has_and_better_ones(seconds, rate, count):
     clip = swinging_clip(seconds=seconds)
     keys = Budget(rate).keys(clip, "lerp_slerp", 0.1)
     evenly = Uniform(rate).keys(clip, "lerp_slerp", 0.1)
@@ -78,27 +71,6 @@ def test_a_reconstruction_keeps_the_keys_of_each_mode_apart_but_those_of_one_mot
     assert len(made.keys["motor_spline"]) < len(made.keys["dq_sclerp"])
     for mode, keys in made.keys.items():
         assert made.errors[mode].shell.max() == pytest.approx(shell_errors(clip, keys, mode).max(), rel=1e-9)
-
-
-@pytest.mark.parametrize("samples", [2, 3, 4, 5, 7, 8, 12])
-def test_recordings_of_a_few_samples_have_adaptive_keys_too(samples: int) -> None:
-    clip = swinging_clip()
-    few = replace(clip, times=clip.times[::20][:samples], poses=clip.poses[::20][:samples])
-    made = reconstruct(few, Tolerance("1mm"), KEYFRAME_MODES, 0.1)
-    assert max(errors.shell.max() for errors in made.errors.values()) <= 1e-3
-
-
-@pytest.mark.parametrize(
-    ("choice", "name", "phrase"),
-    [
-        (Uniform("7.5"), "7.5", "at 7.5 keys/s"),
-        (Budget("10"), "budget-10", "at 10 keys/s on average"),
-        (Tolerance("5mm"), "tolerance-5mm", "within 5 mm"),
-        (Tolerance("0.25"), "tolerance-0.25", "within 0.25 units of the recording"),
-    ],
-)
-def test_a_choice_says_what_it_is(choice: Choice, name: str, phrase: str) -> None:
-    assert (choice.name, choice.phrase) == (name, phrase)
 
 
 @pytest.mark.parametrize("written", ["0mm", "-5mm", "5in", "5 m m", "1e-3", "nan", "", "mm", "5MM", "../x", "5mm\n"])
@@ -132,6 +104,11 @@ def test_the_best_of_each_segment_has_the_keys_of_the_best_mode_and_keeps_to_wha
         assert made.errors[BEST_OF].shell.max() <= choice.tolerance(clip) * (1.0 + 1e-9)
 
 
+def test_no_tolerance_is_too_large_for_a_clip_that_stands_still() -> None:
+    clip = swinging_clip()
+    Tolerance("5").require_within(replace(clip, poses=clip.poses[:1][np.zeros(len(clip.times), int)]), 0.1)
+
+
 @pytest.mark.parametrize(
     ("written", "said"),
     [
@@ -142,10 +119,3 @@ def test_the_best_of_each_segment_has_the_keys_of_the_best_mode_and_keeps_to_wha
 def test_a_tolerance_larger_than_the_motion_is_refused_with_the_way_out(written: str, said: str) -> None:
     with pytest.raises(ValueError, match=said):
         Tolerance(written).require_within(swinging_clip(), 0.1)
-
-
-def test_a_tolerance_within_the_motion_or_of_a_clip_that_stands_still_is_none_too_many() -> None:
-    clip = swinging_clip()
-    Tolerance("5mm").require_within(clip, 0.1)
-    still = clip.poses[:1][np.zeros(len(clip.times), int)]
-    Tolerance("5").require_within(replace(clip, poses=still), 0.1)

@@ -10,7 +10,6 @@ import pytest
 from rigid_motion.motion import KEYFRAME_MODES, Poses, decimate, reduce_keys
 from rigid_motion_batch.analysis.needed import (
     RATES,
-    TABLE_RATES,
     KeysNeeded,
     OfRigidBody,
     evenly_spaced,
@@ -41,11 +40,6 @@ def swing() -> Clip:
 @pytest.fixture(scope="module")
 def found(swing: Clip) -> KeysNeeded:
     return keys_needed(OfRigidBody(swing, 0.1), KEYFRAME_MODES)
-
-
-def test_the_rates_are_those_of_the_papers_table_and_some_below() -> None:
-    assert TABLE_RATES == ("30", "20", "15", "12")
-    assert RATES[:4] == TABLE_RATES
 
 
 def test_the_error_to_reach_is_that_of_the_reference_at_its_rate(swing: Clip, found: KeysNeeded) -> None:
@@ -92,12 +86,6 @@ def test_the_reference_needs_its_own_keys_and_shares_are_counted_from_them(found
     assert (found.shares[3, 1] < found.shares[0, 1]).all()
 
 
-def test_without_the_reference_among_the_modes_it_is_still_what_is_reached(swing: Clip, found: KeysNeeded) -> None:
-    alone = keys_needed(OfRigidBody(swing, 0.1), ["dq_sclerp"])
-    assert np.array_equal(alone.targets, found.targets)
-    assert np.array_equal(alone.keys[0], found.keys[1])
-
-
 def test_fitted_keys_reach_it_and_are_fewer(swing: Clip, found: KeysNeeded) -> None:
     shaken = np.random.default_rng(3).normal(size=swing.poses.positions.shape)
     clip = replace(swing, poses=Poses(swing.poses.positions + 1e-3 * shaken, swing.poses.quaternions))
@@ -108,13 +96,6 @@ def test_fitted_keys_reach_it_and_are_fewer(swing: Clip, found: KeysNeeded) -> N
     assert with_fitted.keys[:, 2].sum() < 0.97 * with_fitted.keys[:, 1].sum()
     assert overall([with_fitted, with_fitted]).shares == pytest.approx(with_fitted.shares)
     assert found.keys.shape[1] == 2
-
-
-def test_the_unit_of_a_recording_makes_no_difference(swing: Clip, found: KeysNeeded) -> None:
-    poses = Poses(swing.poses.positions * 1e2, swing.poses.quaternions)
-    other = keys_needed(OfRigidBody(replace(swing, poses=poses, metres_per_unit=1e-2), 0.1), KEYFRAME_MODES)
-    np.testing.assert_allclose(other.targets, found.targets, rtol=1e-9)
-    assert np.array_equal(other.keys, found.keys)
 
 
 def test_where_the_reference_has_all_samples_or_no_two_there_is_nothing_to_reach() -> None:
@@ -175,13 +156,6 @@ def test_over_all_clips_those_count_that_reached_the_error_and_it_is_known_how_m
     assert together.asked.tolist() == [2, 2]
     assert together.clips[:, 1, 0].tolist() == [2, 1]
     assert together.shares[:, 1, 0] == pytest.approx([np.sqrt(0.5 * 0.25), 0.6])
-
-
-def test_modes_that_part_on_one_clip_are_apart_over_all() -> None:
-    same = clip_of("a", [[100, 50]], groups=(("lerp_slerp", "dq_sclerp"),))
-    together = overall([same, clip_of("b", [[100, 50], [80, 40]])])
-    assert together.groups == (("lerp_slerp",), ("dq_sclerp",))
-    assert together.shares[:, 1, 0] == pytest.approx([0.5, np.sqrt(0.5 * 0.4)])
 
 
 def test_the_table_as_a_file_has_a_row_for_every_mode_and_reads_back_exactly(tmp_path: Path, found: KeysNeeded) -> None:

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigid_motion_batch.analysis.radii import EVERYWHERE, JOINT, MOST_BYTES, RIGID, Radii, read_radii
+from rigid_motion_batch.analysis.radii import JOINT, MOST_BYTES, Radii, read_radii
 from rigid_motion_batch.rows import line_of
 
 
@@ -25,11 +25,6 @@ def table(tmp_path: Path) -> Callable[[str | bytes], str]:
         return str(path)
 
     return _table
-
-
-def test_joints_are_smaller_than_what_a_hand_holds_unless_something_else_is_said() -> None:
-    assert (EVERYWHERE.rigid, EVERYWHERE.joint) == (RIGID, JOINT) == (0.1, 0.03)
-    assert EVERYWHERE.of(["a", "b"]).tolist() == [0.03, 0.03]
 
 
 @pytest.mark.parametrize("text", ["0.05", " 0.05 ", "5e-2"])
@@ -67,9 +62,7 @@ NAMES = st.text(
         lambda named: len({name.strip() for name in named}) == len(named)
     )
 )
-def test_joints_of_any_name_have_their_radius(
-    tmp_path_factory: pytest.TempPathFactory, named: dict[str, float]
-) -> None:
+def test_joints_of_any_name_have_their_radius(tmp_path_factory, named):
     path = tmp_path_factory.getbasetemp() / f"radii-{os.getpid()}.csv"
     lines = [line_of(("joint", "radius_m")), *map(line_of, named.items())]
     path.write_text("".join(lines), encoding="utf-8", newline="")
@@ -96,21 +89,11 @@ def test_joints_of_any_name_have_their_radius(
         ("a\x1b[2J\n", 1, "the columns joint and radius_m are needed, and it has a\\x1b[2j"),
     ],
 )
-def test_what_is_wrong_is_told_with_the_file_and_the_line(
-    table: Callable[[str], str], content: str, line: int, problem: str
-) -> None:
+def test_what_is_wrong_is_told_with_the_file_and_the_line(table, content, line, problem):
     path = table(content)
     with pytest.raises(ValueError, match=re.escape(problem)) as caught:
         read_radii(path)
     assert str(caught.value) == f"{path}:{line}: {problem}"
-
-
-@pytest.mark.parametrize("content", [b"\xff\xfej\0o\0", b"joint,radius_m\nH\xe4nd,0.1\n"])
-def test_what_is_no_text_is_told_with_the_file(table: Callable[[bytes], str], content: bytes) -> None:
-    path = table(content)
-    with pytest.raises(ValueError, match="this is no CSV in UTF-8") as caught:
-        read_radii(path)
-    assert str(caught.value).startswith(f"{path}: ")
 
 
 def test_a_table_that_is_too_large_or_has_an_endless_cell_is_refused(table: Callable[[str], str]) -> None:
@@ -126,13 +109,6 @@ def test_a_table_that_is_too_large_or_has_an_endless_cell_is_refused(table: Call
 def test_what_is_neither_a_number_nor_a_table_is_told(text: str) -> None:
     with pytest.raises(ValueError, match=r"is neither a length above 0, such as 3cm or 0\.03, nor a table"):
         read_radii(text)
-
-
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes with a name here")
-def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "pipe.csv")
-    with pytest.raises(ValueError, match="nor a table of radii"):
-        read_radii(str(tmp_path / "pipe.csv"))
 
 
 def test_a_name_from_a_table_of_ours_is_the_joint_that_was_meant(tmp_path: Path) -> None:

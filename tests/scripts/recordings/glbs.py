@@ -1,18 +1,16 @@
-"""GLB files of a chain of joints, written here, and where the glTF specification puts these joints: by matrices."""
+"""GLB files of a chain of joints, and where the glTF specification puts these joints."""
 
 from __future__ import annotations
 
-import json
-import struct
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-KINDS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3"}
-
-REST = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
+from tests.gltf.making import Making
+from tests.gltf.oracle import File
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,30 +23,6 @@ class Track:
     values: np.ndarray
     interpolation: str = "LINEAR"
 
-    def at(self, time: float) -> np.ndarray:
-        """By the glTF specification, appendix C."""
-        times, values, last = self.times, self.values, len(self.times) - 1
-        cubic = self.interpolation == "CUBICSPLINE"
-        points = values[1::3] if cubic else values
-        time = np.clip(time, times[0], times[-1])
-        key = min(int(np.searchsorted(times, time, side="right")) - 1, last - 1)
-        length = times[key + 1] - times[key]
-        s = (time - times[key]) / length
-        if self.interpolation == "STEP":
-            return points[last if time >= times[-1] else key]
-        if cubic:
-            out, into = length * values[3 * key + 2], length * values[3 * key + 3]
-            made = (2 * s**3 - 3 * s**2 + 1) * points[key] + (s**3 - 2 * s**2 + s) * out
-            made += (3 * s**2 - 2 * s**3) * points[key + 1] + (s**3 - s**2) * into
-            return made / np.linalg.norm(made) if self.path == "rotation" else made
-        a, b = points[key], points[key + 1]
-        if self.path != "rotation":
-            return (1 - s) * a + s * b
-        angle = np.arccos(np.clip(abs(a @ b), 0.0, 1.0))
-        if angle < 1e-9:
-            return a
-        return (np.sin((1 - s) * angle) * a + np.copysign(np.sin(s * angle), a @ b) * b) / np.sin(angle)
-
 
 @dataclass(frozen=True, eq=False)
 class Body:
@@ -58,7 +32,6 @@ class Body:
     offsets: np.ndarray
     tracks: Sequence[Track]
     size: float = 1.0
-    settings: Mapping[str, object] = field(default_factory=dict)
 
     @property
     def moments(self) -> np.ndarray:
@@ -68,80 +41,22 @@ class Body:
 
     def places(self, times: np.ndarray) -> np.ndarray:
         """Where the joints are, shape (joints, times, 3), in Blender's axes."""
-        found = np.empty((len(self.parents), len(times), 3))
-        for number, time in enumerate(times):
-            worlds: list[np.ndarray] = []
-            for joint, parent in enumerate(self.parents):
-                pose = REST | {"translation": self.offsets[joint]}
-                pose |= {track.path: track.at(time) for track in self.tracks if track.joint == joint}
-                above = np.diag([self.size] * 3 + [1.0]) if parent < 0 else worlds[parent]
-                worlds.append(above @ matrix(**pose))
-                x, y, z = worlds[-1][:3, 3]
-                found[joint, number] = x, -z, y
-        return found
+        with tempfile.TemporaryDirectory() as folder:
+            worlds = File(self.write(Path(folder) / "body.glb")).worlds(0, times)
+        x, y, z = np.moveaxis(worlds[: len(self.parents), :, :3, 3], -1, 0)
+        return np.stack((x, -z, y), axis=-1)
 
     def write(self, path: Path) -> Path:
         """Write it as a GLB."""
-        data, views, accessors = bytearray(), [], []
-
-        def add(numbers: np.ndarray, kind: str) -> int:
-            numbers = np.asarray(numbers, dtype="<f4")
-            views.append({"buffer": 0, "byteOffset": len(data), "byteLength": numbers.nbytes})
-            data.extend(numbers.tobytes())
-            bounds = {"min": [float(numbers.min())], "max": [float(numbers.max())]} if kind == "SCALAR" else {}
-            count = len(numbers)
-            accessors.append(
-                {"bufferView": len(views) - 1, "componentType": 5126, "count": count, "type": kind} | bounds
-            )
-            return len(accessors) - 1
-
-        samplers = [
-            {
-                "input": add(track.times, "SCALAR"),
-                "output": add(track.values, KINDS[track.path]),
-                "interpolation": track.interpolation,
-            }
-            for track in self.tracks
-        ]
-        channels = [
-            {"sampler": number, "target": {"node": track.joint, "path": track.path}}
-            for number, track in enumerate(self.tracks)
-        ]
-        count = len(self.parents)
+        made, count = Making(), len(self.parents)
         nodes = [{"name": f"Joint{joint}", "translation": list(self.offsets[joint])} for joint in range(count)]
         nodes.append({"name": "Armature", "scale": [self.size] * 3})
         for joint, parent in enumerate(self.parents):
             nodes[parent if parent >= 0 else count].setdefault("children", []).append(joint)
-        document = {
-            "asset": {"version": "2.0"},
-            "scene": 0,
-            "scenes": [{"nodes": [count]}],
-            "nodes": nodes,
-            "skins": [{"joints": list(range(count))}],
-            "animations": [{"name": "Take", "samplers": samplers, "channels": channels}],
-            "accessors": accessors,
-            "bufferViews": views,
-            "buffers": [{"byteLength": len(data)}],
-        } | self.settings
-        text = json.dumps(document).encode()
-        text += b" " * (-len(text) % 4)
-        length = 12 + 8 + len(text) + 8 + len(data)
-        head = struct.pack("<4sII", b"glTF", 2, length) + struct.pack("<I4s", len(text), b"JSON")
-        path.write_bytes(head + text + struct.pack("<I4s", len(data), b"BIN\0") + data)
-        return path
-
-
-def matrix(translation: np.ndarray, rotation: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    x, y, z, w = rotation
-    made = np.eye(4)
-    made[:3, :3] = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    made[:3, :3] *= scale
-    made[:3, 3] = translation
-    return made
+        made.json |= {"nodes": nodes, "scenes": [{"nodes": [count]}], "skins": [{"joints": list(range(count))}]}
+        for track in self.tracks:
+            made.channel(track.joint, track.path, made.times(track.times), track.values, track.interpolation)
+        return made.write(path)
 
 
 def turning(times: np.ndarray, angles: np.ndarray, axis: Sequence[float] = (0.0, 0.0, 1.0)) -> np.ndarray:

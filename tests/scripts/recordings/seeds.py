@@ -113,11 +113,7 @@ SEEDS: dict[str, tuple[str, ...]] = {
         ),
     ),
     ".motive.csv": (_motive(XYZW, "Quaternion"), _motive(DEGREES, "YXZ")),
-    ".json": (
-        json.dumps(_aframe(), indent=1),
-        json.dumps(_aframe()["left"]),
-        json.dumps(_aframe_of_2017(), indent=1),
-    ),
+    ".json": (json.dumps(_aframe(), indent=1), json.dumps(_aframe()["left"]), json.dumps(_aframe_of_2017(), indent=1)),
     ".bvh": (
         f"{ARM}Frames: {COUNT}\nFrame Time: 0.02\n" + _rows((POSITIONS, DEGREES, DEGREES[::-1]), " "),
         f"{ARM}Frames: {COUNT}\nFrame Time: 0.02\n".replace("Elbow", "Shoulder").replace("\n", "\r\n")

@@ -55,13 +55,6 @@ def test_a_controller_that_was_off_is_left_out(write) -> None:
     assert [trajectory.name for trajectory in recording.trajectories] == ["camera"]
 
 
-def test_null_is_a_number_that_was_not_recorded(write) -> None:
-    content = device()
-    content["poses"][1]["position"]["y"] = None
-    (trajectory,) = read_trajectories(write("hand.json", json.dumps(content))).trajectories
-    np.testing.assert_array_equal(np.isnan(trajectory.poses.positions[:, 1]), [False, True, False])
-
-
 def broken(**changes: object) -> str:
     content = device()
     content["poses"][2].update(changes)

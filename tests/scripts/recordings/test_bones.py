@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -114,48 +112,6 @@ def test_constraints_drivers_and_parents_of_a_hidden_rig_are_evaluated(saved, sc
     )
 
 
-@pytest.mark.parametrize(("scale", "said"), [(1.0, ""), (0.01, "Rig/Hand is 0.01 times its own size all along, ")])
-def test_a_bone_of_a_rig_in_another_unit_says_so(saved, scale: float, said: str) -> None:
-    waving().scale = (scale,) * 3
-    note = read_trajectories(saved() + ":Rig/Hand").note
-    assert note.startswith(said)
-    assert ("its own size" in note) == bool(said)
-
-
-def test_a_bone_that_grows_is_not_taken_for_one_in_another_unit(saved) -> None:
-    arm = waving()
-    for frame in (1, 9):
-        key(arm.pose.bones["Hand"], frame, scale=(frame,) * 3)
-    linear(arm)
-    recording = read_trajectories(saved() + ":Rig/Hand")
-    np.testing.assert_allclose(recording.trajectories[0].poses.scales[[0, -1]], [1, 9], rtol=1e-6)
-    assert "its own size" not in recording.note
-
-
-def test_nla_strips_move_bones_too(saved) -> None:
-    arm = rig("Rig", ARM)
-    for frame in (1, 11):
-        key(arm.pose.bones["Upper"], frame, location=(frame, 0, 0))
-    linear(arm)
-    data = arm.animation_data
-    strip = data.nla_tracks.new().strips.new("Wave", 21, data.action)
-    if strip.action_slot is None:
-        strip.action_slot = data.action.slots[0]
-    data.action = None
-    trajectory = read(saved() + ":Rig/Lower")
-    np.testing.assert_allclose(trajectory.times * FPS, np.arange(21, 32))
-    assert_are(trajectory, [matrix((frame, 1, 0)) for frame in range(1, 12)])
-
-
-def test_a_curve_without_keys_does_not_lengthen_the_motion(saved) -> None:
-    arm = waving()
-    for fcurve in fcurves(arm):
-        for point in fcurve.keyframe_points:
-            point.co.x += 100
-    fcurves(arm).new('pose.bones["Upper"].location', index=0).modifiers.new("GENERATOR")
-    np.testing.assert_allclose(read(saved() + ":Rig/Hand").times[[0, -1]] * FPS, [101, 109])
-
-
 @pytest.mark.parametrize("how", ["linked", "overridden", "overridden and animated anew"])
 def test_rigs_of_libraries_can_be_read(saved, how: str) -> None:
     arm = waving()
@@ -208,16 +164,6 @@ def test_bones_and_rigs_may_be_called_anything(saved, name: str) -> None:
     assert read(path).figure.joints == ("Hand", name)
 
 
-def test_an_objects_name_goes_before_a_bones_and_a_longer_one_before_a_shorter(saved) -> None:
-    bone = ((0, 0, 0), (0, 1, 0), None)
-    rig("A", {"B": bone, "B/C": bone, "D/E": bone})
-    rig("A/B", {"C": bone}).location = (1, 0, 0)
-    empty("A/D", location=(2, 0, 0))
-    path = saved()
-    for name, x in (("A/B", 1), ("A/B/C", 1), ("A/D", 2), ("A/D/E", 0)):
-        np.testing.assert_allclose(read(f"{path}:{name}").poses.positions[:, 0], x, err_msg=name)
-
-
 def test_a_missing_bone_is_answered_with_those_nearest_to_it(saved, refusal) -> None:
     names = ("Root", "Hand.L", "Hand.R", "Foot.L", "Foot.R", "Head")
     rig("Rig", dict.fromkeys(names, ((0, 0, 0), (0, 1, 0), None)))
@@ -228,32 +174,10 @@ def test_a_missing_bone_is_answered_with_those_nearest_to_it(saved, refusal) -> 
     assert refusal(f"{path}:Rig/")[1].endswith("the nearest by name: Root, Hand.L, Hand.R, Foot.L, Foot.R")
 
 
-def test_a_bone_of_what_has_none_is_refused(saved, refusal) -> None:
-    empty("Lamp")
-    rig("Bare", {})
-    path = saved()
-    assert refusal(f"{path}:Lamp/Hand")[1] == (
-        f"'Lamp' has no bones, for it is no armature (its type is Empty); name the object alone with {path}:Lamp"
-    )
-    assert refusal(f"{path}:Bare/Hand")[1] == "'Bare' has no bone 'Hand'; it has none at all"
-    assert refusal(f"{path}:Gone/Hand")[1] == "no body named 'Gone/Hand'; it holds Bare, Lamp"
-
-
 def test_a_bone_without_its_rig_is_answered_with_both(saved, refusal) -> None:
     waving()
     path = saved()
     assert refusal(f"{path}:Hand")[1] == f"no body named 'Hand', only a bone of Rig; name it with {path}:Rig/Hand"
-
-
-def test_a_rig_of_a_library_that_is_gone_is_told(saved, refusal) -> None:
-    waving()
-    library = saved("rig.blend")
-    with bpy.data.libraries.load(library, link=True) as (there, here):
-        here.objects = there.objects
-    bpy.context.scene.collection.objects.link(here.objects[0])
-    path = saved("shot.blend")
-    Path(library).unlink()
-    assert refusal(f"{path}:Rig/Hand")[1].startswith("'Rig' is missing from ")
 
 
 def places(trajectory: Trajectory) -> np.ndarray:
@@ -317,19 +241,6 @@ def test_bones_that_are_mirrored_flattened_or_scaled_to_nothing_still_have_poses
     np.testing.assert_allclose(np.linalg.norm(body.poses.quaternions, axis=-1), 1.0, atol=1e-12)
 
 
-def test_what_hidden_rigs_follow_moves_them(saved, scene) -> None:
-    goal = empty("Goal")
-    for frame in (1, 30):
-        key(goal, frame, location=(0, frame, 1))
-    arm = rig("Rig", ARM | HAND)
-    arm.hide_viewport = True
-    arm.pose.bones["Upper"].constraints.new("COPY_LOCATION").target = goal
-    linear(goal)
-    body = read(saved() + ":Rig")
-    assert len(body.times) == 30, "the scene's frames, for want of keys of its own"
-    np.testing.assert_allclose(places(body)[0], [[0, frame, 1] for frame in range(1, 31)], atol=1e-5)
-
-
 def test_a_rig_whose_bones_are_still_is_an_object(saved) -> None:
     arm = rig("Rig", ARM)
     key(arm, 1, location=(0, 0, 0))
@@ -337,45 +248,6 @@ def test_a_rig_whose_bones_are_still_is_an_object(saved) -> None:
     path = saved()
     for source in (path, f"{path}:Rig", f"{path}:*"):
         assert read(source).figure is None
-
-
-def test_an_armature_that_moves_has_nothing_to_say_nor_has_a_bone(saved) -> None:
-    arm = waving()
-    key(arm, 1, location=(0, 0, 0))
-    key(arm, 5, location=(0, 1, 0))
-    linear(arm)
-    path = saved()
-    for source in (path, f"{path}:Rig", f"{path}:Rig/Upper"):
-        assert read_trajectories(source).note == ""
-
-
-def test_of_all_objects_none_may_move_where_only_bones_do(saved, refusal) -> None:
-    waving()
-    empty("Lamp")
-    path = saved()
-    assert refusal(f"{path}:*")[1] == (
-        f"no moving body in this file; name one with {path}:NAME: Rig/Lower, Rig/Hand, Lamp, Rig"
-    )
-
-
-def test_of_many_bones_a_few_are_named_and_the_others_counted(saved, refusal) -> None:
-    arm = rig("Rig", dict.fromkeys([f"Tail {number}" for number in range(9)], ((0, 0, 0), (0, 1, 0), None)))
-    for pose_bone in arm.pose.bones:
-        key(pose_bone, 1, location=(0, 0, 0))
-    path = saved()
-    few = "Rig/Tail 0, Rig/Tail 1, Rig/Tail 2, Rig/Tail 3, Rig/Tail 4"
-    assert refusal(f"{path}:*")[1] == f"no moving body in this file; name one with {path}:NAME: {few}, Rig and 4 more"
-    assert refusal(f"{path}:Gone")[1] == f"no body named 'Gone'; it holds Rig, {few} and 4 more"
-
-
-def test_what_is_open_stays_as_it_is_and_can_be_read_itself(saved) -> None:
-    waving()
-    path = saved()
-    bpy.ops.wm.open_mainfile(filepath=path)
-    before = [(obj.name, len(obj.constraints)) for obj in bpy.data.objects], bpy.context.scene.frame_current
-    assert len(read(f"{path}:Rig/Hand").times) == 9
-    after = [(obj.name, len(obj.constraints)) for obj in bpy.data.objects], bpy.context.scene.frame_current
-    assert after == before
 
 
 @pytest.mark.parametrize("wanted", ["rig/hand.l", "RIG/Hand.L"])

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rigid_motion.motion.quaternions import angle_between
-from rigid_motion_batch.recordings import ReadingOptions, TrajectoryError, read_trajectories
+from rigid_motion_batch.recordings import ReadingOptions, read_trajectories
 from tests.scripts.recordings import seeds
 
 ARM = f"""{seeds.ARM}Frames: 2
@@ -47,12 +47,6 @@ def test_a_body_rests_where_no_joint_is_turned_and_its_bones_end_at_their_childr
     assert np.linalg.norm(body.figure.tails[1]) > 0.0  # Its end site.
 
 
-def test_a_single_joint_is_no_body(write) -> None:
-    text = "HIERARCHY\nROOT A\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\n}\nMOTION\nFrames: 2\n"
-    (single,) = read_trajectories(write("one.bvh", f"{text}Frame Time: 0.1\n0 0 0\n1 0 0\n")).trajectories
-    assert (single.name, single.figure, single.poses.shape) == ("A", None, (2,))
-
-
 @pytest.mark.parametrize("order", ["".join(order) for order in permutations("XYZ")])
 def test_angles_are_applied_in_the_order_of_the_channels(write, order: str) -> None:
     channels = " ".join(f"{axis}rotation" for axis in order)
@@ -81,14 +75,10 @@ def test_spelling_and_spacing_do_not_matter(write, text: str) -> None:
     np.testing.assert_allclose(elbow.poses.positions, [[2, 0, 0], [1, 7, 0]], atol=1e-15)
 
 
-def test_joints_of_one_name_are_numbered_as_blender_does(write) -> None:
-    recording = read_trajectories(write("arm.bvh", ARM.replace("Elbow", "Shoulder")))
-    assert recording.trajectories[0].figure.joints == ("Shoulder", "Shoulder.001")
-
-
-def test_a_name_of_several_words_is_joined_as_blender_does(write) -> None:
-    recording = read_trajectories(write("arm.bvh", ARM.replace("Elbow", "Left Elbow : upper")))
-    assert recording.trajectories[0].figure.joints == ("Shoulder", "Left_Elbow_:_upper")
+@pytest.mark.parametrize(("name", "read"), [("Shoulder", "Shoulder.001"), ("Left Elbow : top", "Left_Elbow_:_top")])
+def test_names_of_joints_are_those_that_blender_makes_of_them(write, name: str, read: str) -> None:
+    (body,) = read_trajectories(write("arm.bvh", ARM.replace("Elbow", name))).trajectories
+    assert body.figure.joints == ("Shoulder", read)
 
 
 def test_position_channels_take_the_place_of_the_offset(write) -> None:
@@ -150,26 +140,6 @@ def test_a_file_that_is_cut_off_in_a_row_loses_that_row_with_a_warning(write, ke
     cut, short = body.warnings
     assert str(cut) == "arm.bvh:21: the file is cut off in this row, which is left out"
     assert str(short).startswith("arm.bvh:17: Frames: says 60 and 2 whole rows follow")
-
-
-def test_the_last_row_needs_no_end_of_line(write) -> None:
-    (body,) = read_trajectories(write("arm.bvh", ARM.rstrip())).trajectories
-    assert (len(body.times), body.warnings) == (2, ())
-
-
-@pytest.mark.parametrize("number", ["nan", "inf", "1e308"])
-def test_numbers_that_are_broken_are_kept_for_the_repair(write, number: str) -> None:
-    text = ARM.replace("1 5 0  90 0 0", f"{number} -{number} 0  90 {number} 0")
-    shoulder, elbow = read_trajectories(write("arm.bvh", text) + ":*").trajectories
-    for trajectory in (shoulder, elbow):
-        assert np.isfinite(trajectory.poses.positions[0]).all()
-        assert not (np.abs(trajectory.poses.positions[1]) < 1e300).all()
-
-
-def test_a_frame_time_beyond_all_measure_is_kept_for_the_repair_too(write) -> None:
-    text = ARM.replace("Time: 0.04", "Time: 1e308").replace("Frames: 2", "Frames: 3") + "0 0 0  0 0 0  0 0 0\n"
-    (shoulder,) = read_trajectories(write("arm.bvh", text)).trajectories
-    np.testing.assert_array_equal(shoulder.times, [0.0, 1e308, np.inf])
 
 
 def skeleton(random: np.random.Generator, frames: int) -> str:
@@ -255,11 +225,7 @@ def test_the_poses_are_those_of_blenders_importer(write, seed: int) -> None:
         (ARM.replace("Frames: 2", "Frames: 1").replace("1 5 0  90 0 0  -90 0 0\n", ""), None, "'arm' has 1 samples"),
         ("HIERARCHY\nROOT A\n{\nOFFSET 0 0 0\n}\nMOTION\nFrames: 1\nFrame Time: 1\n0\n", 6, "no joint has CHANNELS"),
         ("HIERARCHY\n" + "ROOT A {" + "JOINT B {" * 50_000, 2, "more than 500 joints hang on one another; export a"),
-        (
-            "HIERARCHY\n" + "ROOT A {" + "JOINT B {}" * 50_000,
-            2,
-            "more than 3000 joints; export fewer, such as one body",
-        ),
+        ("HIERARCHY\n" + "ROOT A {" + "JOINT B {}" * 50_000, 2, "more than 3000 joints; export fewer, such as one bod"),
         ("HIERARCHY\n" + "ROOT A {" + "JOINT B {" * 400, 2, "the file ends where MOTION is expected"),
         (b"\x00\x01HIERARCHY", 1, "this is not text but binary data"),
     ],
@@ -268,15 +234,3 @@ def test_a_wrong_file_is_told_with_its_line(write, refusal, text: str | bytes, l
     told_line, message = refusal(write("arm.bvh", text))
     assert message.startswith(problem)
     assert told_line == line
-
-
-def test_joints_have_their_names_in_any_case_and_an_exact_one_goes_first(write) -> None:
-    path = write("arm.bvh", ARM)
-    recording = read_trajectories(f"{path}:eLBOW")
-    assert (recording.trajectories[0].name, recording.body) == ("Elbow", "Elbow")
-    both = write("both.bvh", ARM.replace("Elbow", "shoulder"))
-    assert read_trajectories(f"{both}:shoulder").trajectories[0].name == "shoulder"
-    with pytest.raises(
-        TrajectoryError, match="no body named 'SHOULDER', and 2 that differ from it in their case alone; "
-    ):
-        read_trajectories(f"{both}:SHOULDER")

@@ -32,9 +32,7 @@ def test_times_are_known_with_their_unit(unit: str) -> None:
     ids=["positions", "quaternions", "Euler angles"],
 )
 @pytest.mark.parametrize("prefix", ["", "left_", "Left Hand.", "tracker 1 ", "L_"])
-def test_positions_and_rotations_are_known_with_their_body(
-    templates: str, kinds: set[str], axes: str, prefix: str
-) -> None:
+def test_positions_and_rotations_are_known_with_their_body(templates, kinds, axes, prefix):
     for template in logs.spellings(templates):
         for axis in axes:
             name = f"{prefix}{logs.spelled(template, axis)}"

@@ -7,39 +7,24 @@ from __future__ import annotations
 
 import os
 import re
-import time
 from dataclasses import astuple
 from pathlib import Path
-from random import Random
 
 import numpy as np
 import pytest
 
 from rigid_motion.motion import KEYFRAME_MODES
-from rigid_motion_batch.analysis.choices import Choice, Tolerance, Uniform
+from rigid_motion_batch.analysis.choices import Choice, Uniform
 from rigid_motion_batch.analysis.radii import Radii
 from rigid_motion_batch.analysis.results import clip_result, compare_clip
-from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import read_source
 from rigid_motion_batch.recordings.clips import Clip
-from tests.recordings import RECORDINGS
-from tests.scripts.recordings.mutations import mutated
-from tests.scripts.recordings.test_fuzz import PATIENCE, assert_is_one_line
 from tests.thoroughness import THOROUGH
 
 ALL = 20_000
 
 CASES = int(os.environ.get("RIGID_MOTION_FUZZ", ALL if THOROUGH else ALL // 50))
 FIRST = int(os.environ.get("RIGID_MOTION_FUZZ_FROM", "0"))
-
-PARTS = 4
-"""For as many processors."""
-
-MEASURED = 3
-"""Of so many that can be read one is measured and shown, and of so many of these one gets keys by its motion."""
-
-LONGEST = 200
-"""Samples of what is measured: a line that is there 300 times over is no short recording any more."""
 
 
 def hierarchy(name: str, depth: int, channels: str, children: int = 1) -> str:
@@ -69,11 +54,7 @@ def seed(
     return text.replace("\n", end_of_line)
 
 
-SEEDS = (
-    seed("ZXY", 12),
-    seed("XYZ", 30, moved=True),
-    seed("YXZ", 8, roots=2, end_of_line="\r\n"),
-)
+SEEDS = (seed("ZXY", 12), seed("XYZ", 30, moved=True), seed("YXZ", 8, roots=2, end_of_line="\r\n"))
 
 
 def assert_can_be_shown(clip: Clip, choice: Choice, mode: str) -> None:
@@ -91,33 +72,6 @@ def assert_can_be_shown(clip: Clip, choice: Choice, mode: str) -> None:
         assert np.isfinite(motion.errors).all()
 
 
-def fuzz(folder: Path, seeds: tuple[bytes, ...], numbers: range) -> int:
-    """Read damaged files, and return how many could be read nevertheless."""
-    path, readable = folder / "walk.bvh", 0
-    for number in numbers:
-        chance = Random(f"body {number}")
-        path.write_bytes(mutated(chance.choice(seeds), chance))
-        started = time.perf_counter()
-        try:
-            try:
-                clips, note = read_source(str(path), None)
-            except TrajectoryError as error:
-                assert_is_one_line(str(error), str(path))
-                continue
-            assert note.isprintable()
-            readable += 1
-            (clip,) = clips
-            if readable % MEASURED == 0 and clip.figure is not None and len(clip.times) <= LONGEST:
-                by_motion = readable % MEASURED**2 == 0
-                mode = list(KEYFRAME_MODES)[readable // MEASURED % len(KEYFRAME_MODES)]
-                assert_can_be_shown(clip, Tolerance("1cm") if by_motion else Uniform("5"), mode)
-        except Exception as error:
-            error.add_note(f"case {number}: {path}")
-            raise
-        assert time.perf_counter() - started < PATIENCE, f"case {number}: {path}"
-    return readable
-
-
 @pytest.mark.parametrize("text", SEEDS)
 def test_what_is_damaged_here_is_sound_before(tmp_path: Path, text: str) -> None:
     path = tmp_path / "walk.bvh"
@@ -126,19 +80,3 @@ def test_what_is_damaged_here_is_sound_before(tmp_path: Path, text: str) -> None
     assert (note, clip.repairs) == ("", ())
     for mode in KEYFRAME_MODES:
         assert_can_be_shown(clip, Uniform("5"), mode)
-
-
-@pytest.mark.parametrize("part", range(PARTS))
-def test_a_damaged_body_is_refused_in_one_line_or_can_be_measured_and_shown(tmp_path: Path, part: int) -> None:
-    numbers = range(FIRST + part, FIRST + CASES, PARTS)
-    readable = fuzz(tmp_path, tuple(text.encode() for text in SEEDS), numbers)
-    assert 0 < readable < len(numbers) or len(numbers) < 50, "damage that is always or never noticed tells little"
-
-
-@pytest.mark.recordings
-def test_other_peoples_bodies_are_damaged_as_well(tmp_path: Path) -> None:
-    """The beginning of one, with as many frames as it says: damage is to be the only thing that is wrong."""
-    head, _, motion = (RECORDINGS / "beat_saber_body.bvh").read_text(encoding="utf-8").partition("MOTION\n")
-    _, frame_time, *rows = motion.splitlines()
-    text = "\n".join([f"{head}MOTION", "Frames: 20", frame_time, *rows[:20], ""])
-    assert 0 < fuzz(tmp_path, (text.encode(),), range(FIRST, FIRST + CASES // 20)) < CASES // 20

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigid_motion_batch.recordings import ReadingOptions, read_trajectories
+from rigid_motion_batch.recordings import read_trajectories
 
 POSE = "1,2,3,0,0,0,1"
 
@@ -46,13 +46,6 @@ def times_of(source: str) -> np.ndarray:
 )
 def test_dates_and_clock_times_are_seconds_from_the_first(write, times: list[str]) -> None:
     np.testing.assert_array_equal(times_of(write("log.csv", log(times))), [0.0, 0.25])
-
-
-@pytest.mark.parametrize(
-    "name", ["timestamp_ms", "t [hh:mm:ss]", "Date/Time (UTC)", "datetime", "timestamp (ISO 8601)"]
-)
-def test_a_unit_in_the_name_of_dates_is_no_matter(write, name: str) -> None:
-    np.testing.assert_array_equal(times_of(write("log.csv", log(["10:00:00", "10:00:00.25"], name))), [0.0, 0.25])
 
 
 def test_a_fraction_may_have_a_decimal_comma_where_commas_do_not_separate(write) -> None:
@@ -107,11 +100,6 @@ def test_one_wild_date_costs_its_row_and_no_more(write, wild: str) -> None:
     assert abs(times[0]) > 1e9
 
 
-def test_dates_without_fractions_are_said_to_be_slow_and_no_unit_is_asked_for(write) -> None:
-    (trajectory,) = read_trajectories(write("log.csv", log(["10:00:00", "10:00:01", "10:00:02"]))).trajectories
-    assert [*map(str, trajectory.warnings)] == ["only 1 samples a second, fewer than any motion needs"]
-
-
 @pytest.mark.parametrize(
     ("second", "problem"),
     [
@@ -149,18 +137,3 @@ def test_a_unit_of_time_is_nothing_to_dates(write, refusal) -> None:
         "--time-unit ms is for times that are numbers, and these have a clock time with an offset from UTC; "
         "leave it out"
     )
-
-
-def test_a_row_that_ends_before_its_date_is_refused(write, refusal) -> None:
-    row = POSE + ",10:00:00\n"
-    line, message = refusal(write("log.csv", f"x,y,z,qx,qy,qz,qw,t\n{row}{row}{POSE}\n"))
-    assert (line, message) == (4, "7 columns where 8 are needed; correct or delete the line")
-
-
-def test_devices_by_turns_keep_their_dates(write) -> None:
-    rows = "".join(f"{side},23:59:59.{digit},{POSE}\n" for digit in (5, 6, 7) for side in ("left", "right"))
-    recording = read_trajectories(
-        f"{write('log.csv', f'device,t,x,y,z,qx,qy,qz,qw{chr(10)}{rows}')}:*", ReadingOptions()
-    )
-    for trajectory in recording.trajectories:
-        np.testing.assert_allclose(trajectory.times, [0.0, 0.1, 0.2], atol=1e-15)

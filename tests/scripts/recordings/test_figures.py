@@ -6,13 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from rigid_motion_batch.recordings import Trajectory
 from rigid_motion_batch.recordings.clip_reading import make_clip
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.recordings.figures import IN_METRES, TYPICAL, UNITS, Skin, repaired, size_of, unit_of
+from rigid_motion_batch.recordings.figures import Skin, repaired, size_of
 from tests.scripts.clips.bodies import JOINTS, swinging_body
 
 
@@ -22,10 +20,6 @@ def clip() -> Clip:
     clip = swinging_body()
     skin = Skin(np.eye(3), np.array([[0, 1, 2]]), np.zeros((3, 4), dtype=int), np.eye(4)[[0, 0, 0]])
     return replace(clip, figure=replace(clip.figure, skin=skin))
-
-
-def test_a_sound_figure_stays_what_it_is(clip: Clip) -> None:
-    assert repaired(clip.figure) == (clip.figure, ())
 
 
 @pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, 1e38])
@@ -47,37 +41,6 @@ def test_a_joint_that_is_nowhere_at_rest_has_no_bone_and_is_told(clip: Clip, num
     made = make_clip(trajectory, "walk.fbx", "walk", "blender")
     assert made.repairs == done
     assert np.isfinite(made.figure.tails).all()
-
-
-@pytest.mark.parametrize(
-    ("size", "unit"),
-    [
-        (1.7, "metres"),
-        (0.3, "metres"),
-        (4.9, "metres"),
-        (175.9, "centimetres"),
-        (110.0, "centimetres"),
-        (67.0, "inches"),
-        (24.9, "units of CMU's motion capture, 1/0.45 inch"),
-        (1700.0, "millimetres"),
-        (5.8, "feet"),
-        (0.0, "metres"),
-    ],
-)
-def test_a_body_is_taken_to_be_in_the_unit_that_makes_it_a_grown_up(size: float, unit: str) -> None:
-    name, length = unit_of(size)
-    assert name == unit
-    assert length == dict(UNITS)[unit]
-
-
-@given(power=st.floats(-6.0, 9.0))
-def test_a_body_of_any_size_has_a_unit_and_is_as_near_to_a_person_as_units_allow(power: float) -> None:
-    size = 10.0**power
-    _, length = unit_of(size)
-    metres = size * length
-    assert IN_METRES[0] <= metres <= IN_METRES[1] or all(
-        abs(np.log(metres / TYPICAL)) <= abs(np.log(size * other / TYPICAL)) + 1e-12 for _, other in UNITS
-    )
 
 
 def test_the_size_of_a_body_is_that_from_where_it_branches() -> None:

@@ -14,7 +14,6 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from itertools import islice
 from pathlib import Path
 from random import Random
 
@@ -28,7 +27,6 @@ from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.recordings import TrajectoryError, read_trajectories
 from rigid_motion_batch.recordings.clip_reading import make_clip
 from rigid_motion_batch.recordings.clips import Clip
-from tests.recordings import RECORDINGS
 from tests.scripts.recordings.mutations import in_place, mutated
 from tests.scripts.recordings.seeds import SEEDS
 from tests.thoroughness import tried
@@ -129,26 +127,6 @@ def test_what_is_damaged_here_is_sound_before(tmp_path: Path, ending: str) -> No
         path = tmp_path / f"take{ending}"
         path.write_text(seed, encoding="utf-8", newline="")
         assert read_and_fill_in(f"{path}:*", number) or read_and_fill_in(str(path), number)
-
-
-@pytest.mark.parametrize("ending", SEEDS)
-@pytest.mark.parametrize("other", [".csv", ".tum", ".json", ".bvh", ".txt"])
-def test_the_extension_of_another_format_is_no_harm(tmp_path: Path, ending: str, other: str) -> None:
-    for number, seed in enumerate(SEEDS[ending]):
-        path = tmp_path / f"take{other}"
-        path.write_text(seed, encoding="utf-8", newline="")
-        read_and_fill_in(str(path), number)
-
-
-@pytest.mark.recordings
-@pytest.mark.parametrize("ending", [".csv", ".tum", ".bvh"])
-def test_other_peoples_recordings_are_damaged_as_well(tmp_path: Path, ending: str) -> None:
-    """Their beginnings, so that it takes moments."""
-    beginnings = []
-    for recording in sorted(RECORDINGS.glob(f"*{ending}")):
-        with recording.open("rb") as file:
-            beginnings.append(b"".join(islice(file, 300)))
-    fuzz(tmp_path, ending, tuple(beginnings), min(CASES, 60))
 
 
 # -- .blend -----------------------------------------------------------------------------------------------------------

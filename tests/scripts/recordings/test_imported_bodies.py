@@ -7,7 +7,6 @@ import json
 import os
 import struct
 import time
-import warnings
 import zlib
 from dataclasses import replace
 from pathlib import Path
@@ -15,17 +14,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigid_motion.motion import Poses, interpolate
+from rigid_motion.motion import Poses
 from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.quaternions import rotate
 from rigid_motion_batch.hushing import hushed
-from rigid_motion_batch.recordings import Trajectory, TrajectoryError, gltf, importing, read_trajectories, rigs
+from rigid_motion_batch.recordings import Trajectory, gltf, importing, read_trajectories, rigs
 from rigid_motion_batch.recordings.fbx_records import FIRST
-from rigid_motion_batch.recordings.sampling import CLOSEST
 from rigid_motion_batch.scenes.armature import Rest
 from rigid_motion_batch.scenes.physique import figure_size
 from tests.blank import blank
-from tests.recordings import RECORDINGS
 from tests.scripts.recordings.blends import empty, key, on_frames, rig
 from tests.scripts.recordings.glbs import soldier
 from tests.scripts.recordings.skeletons import (
@@ -137,21 +134,6 @@ def test_single_joints_are_where_they_are_in_the_whole(exported, ending: str) ->
         np.testing.assert_allclose(alike, 1.0, atol=1e-12)
 
 
-def test_too_many_vertices_are_no_skin(exported, monkeypatch: pytest.MonkeyPatch) -> None:
-    path, _ = exported(".fbx")
-    monkeypatch.setattr("rigid_motion_batch.recordings.skins.MOST_VERTICES", 3)
-    assert whole(path).figure.skin is None
-
-
-@pytest.mark.parametrize("ending", ENDINGS)
-def test_a_body_in_centimetres_is_taken_for_one(scene, tmp_path: Path, ending: str) -> None:
-    body(size=(100, 100, 100))
-    recording = read_trajectories(str(export(tmp_path / f"walk{ending}")))
-    assert recording.trajectories[0].metres_per_unit == 0.01
-    assert "taken for centimetres" in recording.note
-    assert recording.trajectories[0].warnings == ()
-
-
 @pytest.mark.parametrize("ending", [".glb", ".blend"])
 def test_a_body_is_as_large_as_its_joints_wherever_an_importer_has_its_bones_end(scene, tmp_path: Path, ending) -> None:
     path = soldier().write(tmp_path / "soldier.glb")
@@ -172,45 +154,6 @@ def test_a_body_is_as_large_as_its_joints_wherever_an_importer_has_its_bones_end
     assert rest.joints.positions[:, 2].min() < 0.3, "the ground is below its feet, and not below the ends of bones"
     far = replace(rest, tails=rest.joints.positions + np.array([0.0, 0.0, 40.0]))
     assert figure_size(far) == figure_size(rest)
-
-
-def test_keys_that_come_closer_than_the_frames_of_an_fbx_count(exported, monkeypatch: pytest.MonkeyPatch) -> None:
-    path, seen = exported(".fbx", fps=60)
-    monkeypatch.setattr(importing, "_rate_of_keys", lambda *_: None)
-    assert len(whole(path).times) == len(FRAMES)
-    monkeypatch.undo()
-    content = path.read_bytes()
-    # The enumeration of rates: 3 is 60, 6 is 30.
-    place = content.index(b"TimeMode")
-    place = content.index(b"I", place + len(b"TimeModeS\4\0\0\0enum")) + 1
-    assert struct.unpack_from("<i", content, place) == (3,)
-    path.write_bytes(content[:place] + struct.pack("<i", 6) + content[place + 4 :])
-    walk = whole(path)
-    np.testing.assert_allclose(walk.times, np.arange(len(FRAMES)) / 60.0)
-    np.testing.assert_allclose(places(walk), seen, atol=SINGLE)
-
-
-@pytest.mark.parametrize(("between", "rate"), [(1, 24.0), (10, 60.0)])
-def test_a_gltf_without_a_rate_is_sampled_60_times_a_second(scene, tmp_path: Path, between: int, rate: float) -> None:
-    obj = rig("Body", BONES)
-    for frame in range(0, 41, between):
-        key(obj.pose.bones["Upper"], frame, rotation_euler=(0.1 * frame, 0, 0))
-    bpy.context.scene.render.fps, bpy.context.scene.frame_start, bpy.context.scene.frame_end = 24, 0, 40
-    path = export(tmp_path / "walk.glb", export_force_sampling=False)
-    assert 1.0 / np.diff(on_frames(whole(path)).times).mean() == pytest.approx(rate)
-
-
-def test_the_larger_armature_is_taken_and_the_other_told(scene, tmp_path: Path) -> None:
-    body()
-    small = rig("Bird", {"Wing": ((0, 0, 0), (0, 1, 0), None)})
-    for frame in FRAMES:
-        key(small.pose.bones["Wing"], frame, location=(0, frame, 0))
-    path = export(tmp_path / "walk.fbx")
-    recording = read_trajectories(str(path))
-    assert recording.trajectories[0].figure.joints == tuple(BONES)
-    assert recording.note == "took Body of 2 armatures; others: Bird"
-    assert whole(f"{path}:Bird").figure.joints == ("Wing",)
-    assert read_trajectories(f"{path}:Bird/Wing").trajectories[0].poses.shape == (len(FRAMES),)
 
 
 @pytest.mark.parametrize("ending", [".fbx", ".glb"])
@@ -248,112 +191,7 @@ def test_one_of_several_takes_is_taken_and_the_others_told(scene, tmp_path: Path
 # -- other people's ---------------------------------------------------------------------------------------------------
 
 
-def matrices_of_curves(obj: bpy.types.Object, frame: float) -> dict[str, np.ndarray]:
-    """Where the bones of an armature are by its F-curves and rests alone, as 4x4 matrices in double precision."""
-    data = obj.animation_data
-    curves = {
-        (fcurve.data_path, fcurve.array_index): fcurve.evaluate(frame)
-        for fcurve in anim_utils.action_get_channelbag_for_slot(data.action, data.action_slot).fcurves
-    }
-
-    def basis(owner: object, prefix: str) -> np.ndarray:
-        def channel(name: str) -> np.ndarray:
-            return np.array([curves.get((prefix + name, i), value) for i, value in enumerate(getattr(owner, name))])
-
-        if owner.rotation_mode == "QUATERNION":
-            w, x, y, z = (turn := channel("rotation_quaternion")) / np.linalg.norm(turn)
-        else:
-            assert owner.rotation_mode == "XYZ"
-            halves = channel("rotation_euler") / 2.0
-            (a, b, c), (d, e, f) = np.cos(halves), np.sin(halves)
-            w, x = a * b * c + d * e * f, d * b * c - a * e * f
-            y, z = a * e * c + d * b * f, a * b * f - d * e * c
-        made = np.eye(4)
-        made[:3, :3] = [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-        made[:3, :3] *= channel("scale")
-        made[:3, 3] = channel("location")
-        return made
-
-    there = basis(obj, "")
-    found: dict[str, np.ndarray] = {}
-    for bone in obj.data.bones:
-        own = basis(obj.pose.bones[bone.name], f'pose.bones["{bone.name}"].')
-        rest = np.array(bone.matrix_local)
-        if bone.parent:
-            rest = found[bone.parent.name] @ np.linalg.inv(np.array(bone.parent.matrix_local)) @ rest
-        found[bone.name] = rest @ own
-    return {name: there @ matrix for name, matrix in found.items()}
-
-
-@pytest.mark.recordings
-@pytest.mark.parametrize(("name", "count"), [("pab_run", 21), ("pab_walk", 41)])
-def test_other_peoples_bodies_are_where_their_curves_put_them(scene, name: str, count: int) -> None:
-    path = RECORDINGS.parent / "rigs" / f"{name}.fbx"
-    walk = on_frames(whole(path))
-    assert walk.poses.shape == (66, count)
-    np.testing.assert_allclose(walk.times, np.arange(count) / 30.0)
-    with hushed(), warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        bpy.ops.import_scene.fbx(filepath=str(path))
-    (obj,) = (one for one in bpy.data.objects if one.type == "ARMATURE")
-    frames = [matrices_of_curves(obj, 1.0 + frame) for frame in range(count)]
-    expected = np.array([[matrices[joint][:3, 3] for matrices in frames] for joint in walk.figure.joints])
-    size = np.ptp(expected[:, 0], axis=0).max()
-    # Blender evaluates in single precision through chains of 20 bones: 1e-7 of the size each.
-    assert np.abs(places(walk, walk.figure.joints) - expected).max() < 1e-5 * size
-    assert 1.0 < size < 2.0
-
-
-@pytest.mark.recordings
-def test_keys_between_the_frames_of_other_peoples_bodies_are_read_too(scene) -> None:
-    path = RECORDINGS.parent / "rigs" / "pab_run.fbx"
-    run = whole(path)
-    assert run.rate == 30.0
-    with hushed(), warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        bpy.ops.import_scene.fbx(filepath=str(path))
-    (obj,) = (one for one in bpy.data.objects if one.type == "ARMATURE")
-    data = obj.animation_data
-    curves = anim_utils.action_get_channelbag_for_slot(data.action, data.action_slot).fcurves
-    keys = np.unique([point.co.x for fcurve in curves for point in fcurve.keyframe_points])
-    assert np.abs(run.times * 30.0 + 1.0 - keys[:, None]).min(axis=1).max() < CLOSEST
-    between = (keys[:-1, None] + np.diff(keys)[:, None] * np.arange(8) / 8).ravel()
-    expected = [matrices_of_curves(obj, frame) for frame in between.tolist()]
-    seen = np.array([[matrices[joint][:3, 3] for matrices in expected] for joint in run.figure.joints])
-    local = [interpolate(run.times, own, (between - 1.0) / 30.0, "lerp_slerp") for own in run.poses]
-    poses = Poses(*(np.stack([getattr(own, part) for own in local]) for part in ("positions", "quaternions")))
-    found = run.figure.skeleton.in_root_space(poses).positions
-    assert np.linalg.norm(found - seen, axis=-1).max() < 1e-3
-
-
 # -- what is open stays -----------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("ending", ENDINGS)
-def test_what_is_open_stays_as_it_is(exported, ending: str) -> None:
-    path, seen = exported(ending)
-    opened = body()
-    opened.location = (7, 7, 7)
-    bpy.context.view_layer.objects.active = opened
-    bpy.ops.object.mode_set(mode="POSE")
-    bpy.context.scene.frame_set(7)
-
-    def state() -> list:
-        blocks = sorted((type(block).__name__, block.name_full) for block in bpy.data.user_map())
-        return [blocks, bpy.context.scene.name, bpy.context.scene.frame_current, bpy.context.mode]
-
-    before = state()
-    np.testing.assert_allclose(places(whole(path)), seen, atol=SINGLE)
-    assert whole(f"{path}:Body").name == "Body", "though what is open has one of that name"
-    assert state() == before
-    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
-    with pytest.raises(TrajectoryError):
-        read_trajectories(str(path))
-    assert state() == before
 
 
 def test_images_of_an_fbx_are_not_looked_for(scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -392,14 +230,6 @@ def test_a_file_without_a_moving_skeleton_is_told(scene, tmp_path: Path, refusal
         skinned(rig("Body", BONES))
         path = export(tmp_path / f"still{ending}")
         assert refusal(str(path))[1].startswith("no skeleton that moves in this file; export the armature together ")
-
-
-@pytest.mark.parametrize("ending", ENDINGS)
-def test_a_missing_joint_is_answered_with_those_there_are(exported, refusal, ending: str) -> None:
-    path, _ = exported(ending)
-    message = refusal(f"{path}:Foot")[1]
-    assert message.startswith("no body named 'Foot'; it holds Root, ")
-    assert all(name in message for name in BONES)
 
 
 @pytest.mark.parametrize("content", [b"", b"junk", b"; FBX 7.3.0 project file\n", b"glTF", b"{}", b"[" * 9999, b"\xff"])
@@ -526,3 +356,16 @@ def test_images_materials_and_extras_of_a_gltf_never_reach_blender(exported, tmp
     files = sorted(os.listdir(tmp_path))
     np.testing.assert_allclose(places(whole(path)), seen, atol=SINGLE)
     assert sorted(os.listdir(tmp_path)) == files
+
+
+def test_the_larger_armature_is_taken_and_the_other_told(scene, tmp_path: Path) -> None:
+    body()
+    small = rig("Bird", {"Wing": ((0, 0, 0), (0, 1, 0), None)})
+    for frame in FRAMES:
+        key(small.pose.bones["Wing"], frame, location=(0, frame, 0))
+    path = export(tmp_path / "walk.fbx")
+    recording = read_trajectories(str(path))
+    assert recording.trajectories[0].figure.joints == tuple(BONES)
+    assert recording.note == "took Body of 2 armatures; others: Bird"
+    assert whole(f"{path}:Bird").figure.joints == ("Wing",)
+    assert read_trajectories(f"{path}:Bird/Wing").trajectories[0].poses.shape == (len(FRAMES),)

@@ -4,19 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rigid_motion_batch.cli.inspect import main
-from rigid_motion_batch.recordings import ReadingOptions, TrajectoryError
+from rigid_motion_batch.recordings import ReadingOptions
 from rigid_motion_batch.recordings.inspecting import inspect
-from tests.scripts.recordings.seeds import ARM, COUNT, SEEDS
-
-SCRIPTS = Path(__file__).resolve().parents[3] / "scripts"
 
 
 def log(rows: int = 300, rate: float = 90.0, scale: float = 1.0, up: int = 1, header: str = "t,x,y,z") -> str:
@@ -62,18 +56,6 @@ def test_the_unit_comes_with_where_it_is_from(write, header, scale, options, met
     assert found.contents[0].size.extent == pytest.approx((0.4, 0.6, 0.6), abs=2e-3)
 
 
-def test_a_body_whose_unit_is_guessed_says_so(write) -> None:
-    found = inspect(
-        write(
-            "arm.bvh",
-            ARM.replace("2.0 0.0 0.0", "170 0 0") + "Frames: 2\nFrame Time: .1\n" + "0 " * 8 + "0\n" + "0 " * 8 + "0\n",
-        )
-    )
-    assert found.contents[0].unit.known_from == "guessed from the size of the body"
-    assert found.contents[0].joints[0] == "Shoulder"
-    assert "taken for" in found.note
-
-
 @pytest.mark.parametrize(("up", "matching"), [(1, ("opengl", "unity")), (2, ())])
 def test_the_axis_that_is_up_speaks_for_other_axes(write, up: int, matching: tuple[str, ...]) -> None:
     found = inspect(write("hand.csv", log(up=up)))
@@ -82,11 +64,6 @@ def test_the_axis_that_is_up_speaks_for_other_axes(write, up: int, matching: tup
     given = inspect(write("hand.csv", log(up=up)), axes="unity").axes
     assert (given.name, given.known_from) == ("unity", "as --axes says")
     assert given.others == (() if up == 1 else ("blender", "ros", "unreal"))
-
-
-def test_where_nothing_is_above_a_floor_no_axis_is_up(write) -> None:
-    text = "t,x,y,z,qx,qy,qz,qw\n" + "".join(f"{0.01 * row},0,0,0,0,0,0,1\n" for row in range(30))
-    assert inspect(write("still.csv", text)).contents[0].up == ""
 
 
 def test_all_devices_of_a_log_are_described_and_those_without_poses_named(write) -> None:
@@ -107,31 +84,6 @@ def test_what_looks_wrong_comes_with_the_way_out(write) -> None:
     (hand,) = inspect(write("gap.csv", text)).contents
     assert "no samples from" in hand.warnings[0].text
     assert hand.timing.gaps == 1
-
-
-def test_what_cannot_be_read_is_refused(write) -> None:
-    with pytest.raises(TrajectoryError, match="positions only"):
-        inspect(write("marker.csv", "t,x,y,z\n0,1,2,3\n1,2,3,4\n"))
-
-
-@pytest.mark.parametrize("kind", SEEDS)
-def test_every_text_format_is_described_without_blender(tmp_path: Path, kind: str) -> None:
-    paths = []
-    for number, text in enumerate(SEEDS[kind]):
-        (tmp_path / f"take{number}{kind}").write_text(text)
-        paths.append(str(tmp_path / f"take{number}{kind}"))
-    program = "import sys; sys.modules['bpy'] = None\nfrom rigid_motion_batch.cli.commands import main\n"
-    command = [sys.executable, "-c", f"{program}sys.exit(main(['inspect', *sys.argv[1:], '--json']))", *paths]
-    if kind == ".csv":
-        command += ["--euler", "YXZ"]
-    done = subprocess.run(command, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(SCRIPTS)})
-    found = json.loads(done.stdout)
-    assert len(found) == len(paths), done.stderr
-    if kind != ".csv":
-        assert done.returncode == 0, done.stderr
-    for one in found:
-        if "error" not in one:
-            assert all(body["timing"]["recorded"] == COUNT for body in one["contents"])
 
 
 def test_the_command_says_it_in_words(write, capsys) -> None:

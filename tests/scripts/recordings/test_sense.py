@@ -12,7 +12,6 @@ from rigid_motion.motion import Poses
 from rigid_motion_batch.recordings import ReadingOptions, Trajectory, TrajectoryError, read_trajectories
 from rigid_motion_batch.recordings.sense import doubts, require_one_body
 from rigid_motion_batch.recordings.times import typical_interval
-from tests.recordings import RECORDINGS
 
 COUNT = 90
 
@@ -59,13 +58,6 @@ def test_one_device_is_not_refused(scale: float, rate: float, rounded_to: float)
     require_one_body(replace(one, poses=Poses(positions, one.poses.quaternions)), "log.csv", "", 1)
 
 
-def test_a_device_at_rest_that_trembles_between_two_numbers_is_not_refused() -> None:
-    one = hand()
-    positions = np.zeros((COUNT, 3))
-    positions[::2, 0] = 1e-3
-    require_one_body(replace(one, poses=Poses(positions, one.poses.quaternions)), "log.csv", "", 1)
-
-
 def test_hands_are_not_doubted() -> None:
     assert doubts(hand()) == ()
 
@@ -75,10 +67,7 @@ def test_hands_are_not_doubted() -> None:
     [
         (hand(rate=4.0), "only 4 samples a second, fewer than any motion needs"),
         (hand(rate=90e3), "9e+04 samples a second, more than any device has"),
-        (
-            replace(hand(), metres_per_unit=100.0),
-            "a twentieth of its speeds are above 179 m/s, and it goes 41.1 m far, as no hand does; if its",
-        ),
+        (replace(hand(), metres_per_unit=100.0), "a twentieth of its speeds are above 179 m/s, and it goes 41.1 m far"),
         (replace(hand(), metres_per_unit=1000.0), "a twentieth of its speeds are above 1.79e+03 m/s"),
     ],
 )
@@ -96,17 +85,6 @@ def test_what_stays_far_from_its_origin_may_be_in_another_unit(shift: float, sca
     found = doubts(replace(one, poses=Poses(calm, one.poses.quaternions)))
     assert len(found) == said
     assert all("--scale 0.01, if inches, --scale 0.0254" in one.way_out for one in found)
-
-
-def test_the_unit_of_time_is_a_way_out_only_where_a_format_takes_one() -> None:
-    slow = hand(rate=2.0)
-    assert doubts(slow, time_unit=True)[0].way_out == "if its times are no seconds, --time-unit ms, us or ns"
-    assert doubts(slow)[0].way_out == ""
-
-
-def test_times_that_count_up_by_one_may_be_frames() -> None:
-    way_out = doubts(hand(rate=1.0), time_unit=True)[0].way_out
-    assert way_out.startswith("if it counts frames, --frame-rate 90, or how many there were a second; if its times are")
 
 
 def test_recordings_one_behind_the_other_are_said() -> None:
@@ -140,22 +118,12 @@ def csv_of(times: list[str]) -> str:
 @pytest.mark.parametrize(
     ("unit", "ticks", "told"),
     [
-        (
-            "ms",
-            1_000,
-            "t goes in steps of 11: as seconds that is one sample in 11 s; these look like milliseconds (90.9",
-        ),
-        (
-            "us",
-            10**6,
-            "t goes in steps of 1.1e+04: as seconds that is one sample in 1.1e+04 s; these look like microse",
-        ),
+        ("ms", 1_000, "t goes in steps of 11: as seconds that is one sample in 11 s; these look like milliseconds (90"),
+        ("us", 10**6, "t goes in steps of 1.1e+04: as seconds that is one sample in 1.1e+04 s; these look like micros"),
         ("ns", 10**9, "t goes in steps of 1.1e+07: as seconds that is one sample in 1.1e+07 s; these look like nanose"),
     ],
 )
-def test_times_that_are_no_seconds_are_refused_with_their_unit(
-    write, refusal, name: str, start: int, unit: str, ticks: int, told: str
-) -> None:
+def test_times_that_are_no_seconds_are_refused_with_their_unit(write, refusal, name, start, unit, ticks, told):
     text = csv_of([str(start * ticks + row * 11 * ticks // 1000) for row in range(9)])
     source = write(name, text if name.endswith(".csv") else "# " + text.replace(",", " "))
     line, message = refusal(source)
@@ -166,11 +134,6 @@ def test_times_that_are_no_seconds_are_refused_with_their_unit(
     np.testing.assert_array_equal(trajectory.times - trajectory.times[0], [row * 11 / 1000 for row in range(9)])
     (trajectory,) = read_trajectories(source, ReadingOptions(time_unit="s")).trajectories
     assert typical_interval(trajectory.times) == pytest.approx(11 * ticks / 1000, rel=0.05)
-
-
-def test_steps_that_fit_no_unit_are_refused_as_well(write, refusal) -> None:
-    _, message = refusal(write("take.csv", csv_of(["0", "1e15", "2e15", "3e15"])))
-    assert message.endswith("; say what it counts: --time-unit s, ms, us, ns")
 
 
 def test_a_sample_a_second_is_read_and_said(write) -> None:
@@ -184,16 +147,6 @@ def test_of_nanoseconds_since_1970_none_is_lost_in_a_csv(write) -> None:
     np.testing.assert_array_equal(trajectory.times, np.arange(4) * 5_000_001 / 1e9)
 
 
-@pytest.mark.parametrize("wild", ["1e30", "0", "", "99999999999999999999"])
-def test_a_wild_time_stamp_first_costs_the_others_no_more_than_a_float_does(write, wild: str) -> None:
-    text = csv_of([wild, *(str(1_700_000_000_000_000_000 + 11_000_000 * row) for row in range(9))])
-    (trajectory,) = read_trajectories(write("take.csv", text.replace("t,", "t_ns,", 1))).trajectories
-    steps = np.diff(trajectory.times[1:])
-    np.testing.assert_allclose(steps, 0.011, atol=np.spacing(1.7e18) * 1e-9 if wild != "0" else 1e-15)
-
-
-@pytest.mark.recordings
-@pytest.mark.parametrize("path", sorted(RECORDINGS.glob("*.[ctb][suv][vmh]")), ids=lambda path: path.name)
-def test_other_peoples_recordings_make_sense(path) -> None:
-    for trajectory in read_trajectories(f"{path}:*").trajectories:
-        assert trajectory.warnings == ()
+def test_times_that_count_up_by_one_may_be_frames() -> None:
+    way_out = doubts(hand(rate=1.0), time_unit=True)[0].way_out
+    assert way_out.startswith("if it counts frames, --frame-rate 90, or how many there were a second; if its times are")

@@ -11,7 +11,7 @@ import pytest
 
 from rigid_motion_batch.recordings import TrajectoryError, read_trajectories
 from rigid_motion_batch.recordings.reading import FORMATS, files_of, split_source
-from rigid_motion_batch.recordings.recordings import listed, unique
+from rigid_motion_batch.recordings.recordings import unique
 
 CSV = "t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,0,0,0,0,0,0,1\n"
 BVH = """HIERARCHY
@@ -118,11 +118,6 @@ def test_a_body_with_colons_in_its_name_is_found(write) -> None:
     np.testing.assert_array_equal(spine.poses.positions, [[0, 1, 0]] * 2)
 
 
-def test_a_missing_body_is_answered_with_those_there_are(write, refusal) -> None:
-    _, message = refusal(write("walk.bvh", BVH) + ":Hand")
-    assert message == "no body named 'Hand'; it holds mixamorig:Hips, mixamorig:Spine"
-
-
 HANDS = {"left": -1.0, "right": 1.0}
 
 
@@ -131,11 +126,6 @@ def test_the_note_tells_how_to_get_the_others(write) -> None:
     path = write("log.csv", f"t,device,x,y,z,qx,qy,qz,qw\n{rows}")
     note = f"{path} holds 2 bodies; took left; others: right; name one with {path}:NAME, all with {path}:*"
     assert read_trajectories(path).note == note
-
-
-@pytest.mark.parametrize("body", ["mixamorig:Hips", "*"])
-def test_who_names_a_body_needs_no_note(write, body: str) -> None:
-    assert read_trajectories(f"{write('walk.bvh', BVH)}:{body}").note == ""
 
 
 def test_a_name_from_a_file_cannot_reach_the_terminal(write) -> None:
@@ -154,14 +144,6 @@ def test_a_file_that_may_not_be_read_is_told(write, refusal, monkeypatch: pytest
 
 def test_names_that_occur_twice_are_numbered_around_those_there_are() -> None:
     assert unique(["Hand", "Hand", "Hand.001", "Hand"]) == ["Hand", "Hand.002", "Hand.001", "Hand.003"]
-
-
-def test_a_hundred_thousand_equal_names_are_numbered_without_trying_every_number_for_each() -> None:
-    assert unique(["Hand"] * 100_000)[-1] == "Hand.99999"
-
-
-def test_a_list_too_long_to_read_is_cut() -> None:
-    assert listed([str(number) for number in range(100)], limit=3) == "0, 1, 2 and 97 more"
 
 
 def test_text_formats_need_no_blender(write) -> None:

@@ -51,9 +51,7 @@ def test_a_wrong_file_is_told_with_its_line(write, refusal, text: str, line: int
 
 @settings(max_examples=tried(60))
 @given(st.lists(st.tuples(*[st.floats(allow_nan=False)] * 8), min_size=2, max_size=FEWEST - 1).map(np.array))
-def test_what_is_written_in_full_precision_comes_back_exactly(
-    tmp_path_factory: pytest.TempPathFactory, table: np.ndarray
-) -> None:
+def test_what_is_written_in_full_precision_comes_back_exactly(tmp_path_factory, table):
     path = tmp_path_factory.getbasetemp() / "round_trip.tum"
     path.write_text("\n".join(" ".join(repr(float(number)) for number in row) for row in table))
     (trajectory,) = read_trajectories(str(path), ReadingOptions(time_unit="s")).trajectories

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from rigid_motion_batch.recordings import ReadingOptions, read_trajectories
-from rigid_motion_batch.recordings.vector_cells import expanded, flattened
 
 ROWS = np.random.default_rng(8).normal(size=(20, 7)).round(3)
 """Positions and quaternions, not of length 1."""
@@ -57,13 +56,6 @@ def test_unreal_names_its_components(write) -> None:
     assert trajectory.poses.quaternions.tolist() == [[1, 0, 0, 0]] * 3
 
 
-def test_times_in_quotes_may_have_a_decimal_comma(write) -> None:
-    rows = "".join(f'"{row},5","(0,1, 0,2, 0,3)","(0,0, 0,0, 0,0, 1,0)"\n' for row in range(3))
-    (trajectory,) = read_trajectories(write("log.csv", "Time,Position,Rotation\n" + rows)).trajectories
-    assert trajectory.times.tolist() == [0.5, 1.5, 2.5]
-    assert trajectory.poses.positions.tolist() == [[0.1, 0.2, 0.3]] * 3
-
-
 def test_several_bodies_and_other_cells_stay_apart(write) -> None:
     header = "Time,Left Position,Left Rotation,Note,Right Position,Right Rotation"
     row = '(1.0, 2.0, 3.0),(0, 0, 0, 1),"a, b",(4.0, 5.0, 6.0),(0, 0, 1, 0)'
@@ -85,12 +77,3 @@ def test_a_cell_that_lacks_a_number_is_told_with_its_line(write, refusal) -> Non
     source = write("log.csv", f"Time,Position,Rotation\n0,{row}\n.1,(0, 0),(0, 0, 0, 1)\n")
     line, _ = refusal(source)
     assert line == 3
-
-
-@pytest.mark.parametrize("text", ['"a, b, c"', "(1, 2)", "()", "(1, 2, 3, 4, 5)", "1,2,3", '"0,1"'])
-def test_what_is_no_vector_has_no_names_of_its_own(text: str) -> None:
-    assert expanded(["t", "a", "b", "c", "d", "e"], f"0,{text}", ",") is None
-
-
-def test_what_is_no_vector_beside_one_keeps_to_its_cell() -> None:
-    assert flattened('0,(1, 2, 3),"a, b",(4, 5),', ",") == "0,1,2,3,a  b,(4  5),"

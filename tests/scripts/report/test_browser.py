@@ -143,9 +143,7 @@ def box(page: Browser, selector: str) -> dict[str, float]:
 @pytest.mark.parametrize("name", ["two", "body", "adaptive", "large"])
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
 @pytest.mark.parametrize("width", [1440, 390])
-def test_every_page_draws_its_view_and_chart_and_fits(
-    page: Browser, folder: Path, name: str, dark: bool, width: int
-) -> None:
+def test_every_page_draws_its_view_and_chart_and_fits(page, folder, name, dark, width):
     opened(page, folder / f"{name}.html", width=width, height=900, dark=dark)
     assert colours_in_view(page) > 20
     curves = page.run("[...document.querySelectorAll('#plot .line')].map((one) => one.getAttribute('d').length)")
@@ -187,33 +185,6 @@ def test_dragging_in_the_chart_is_scrubbing(page: Browser, folder: Path) -> None
     page.mouse(("released", places[2], y))
 
 
-def test_a_click_near_a_peak_goes_to_it(page: Browser, folder: Path) -> None:
-    opened(page, folder / "two.html", "#a,10,0.5")
-    plot = box(page, "#plot")
-    x, y = page.run("[...document.querySelectorAll('#plot circle')].map((one) => [+one.getAttribute('cx'), "
-                    "+one.getAttribute('cy')]).sort((a, b) => a[1] - b[1])[0]")  # fmt: skip
-    page.mouse(("pressed", plot["x"] + x + 3, plot["y"] + y + 30), ("released", plot["x"] + x + 3, plot["y"] + y + 30))
-    shows(page, f"{LIVE} === {WORST}")
-
-
-def test_the_wheel_scrolls_the_page_until_the_view_has_the_focus(page: Browser, folder: Path) -> None:
-    opened(page, folder / "two.html")
-    view = box(page, "#view")
-    at = {"x": view["x"] + 50, "y": view["y"] + 50}
-    page.call("Input.dispatchMouseEvent", type="mouseWheel", deltaX=0, deltaY=200, **at)
-    shows(page, "scrollY > 0")
-    page.run("scrollTo(0, 0)")
-    shows(page, "scrollY", 0)
-    page.mouse(
-        ("pressed", at["x"], at["y"]), ("moved", at["x"] + 60, at["y"] + 5), ("released", at["x"] + 60, at["y"] + 5)
-    )
-    page.settle()
-    page.run("window.before = document.getElementById('view').toDataURL(), 0")
-    page.call("Input.dispatchMouseEvent", type="mouseWheel", deltaX=0, deltaY=200, **at)
-    shows(page, "document.getElementById('view').toDataURL() !== window.before")
-    assert page.run("scrollY") == 0
-
-
 def test_a_chip_hides_its_mode_everywhere(page: Browser, folder: Path) -> None:
     opened(page, folder / "two.html")
     modes = page.run(count(LINES))
@@ -248,13 +219,6 @@ def test_a_warning_leads_to_its_moment(page: Browser, folder: Path) -> None:
     shows(page, count("#plot .doubt"), 1)
 
 
-def test_keys_that_differ_have_a_row_of_ticks_for_each_mode(page: Browser, folder: Path) -> None:
-    opened(page, folder / "two.html", "#a,10,1")
-    assert page.run(count(TICKS)) == 1
-    opened(page, folder / "adaptive.html")
-    assert page.run(count(TICKS)) == page.run(count(LINES)) > 1
-
-
 def test_the_keyboard_moves_in_time(page: Browser, folder: Path) -> None:
     opened(page, folder / "two.html", "#a,10,1.005")
     page.press("ArrowRight", shift=True)
@@ -275,16 +239,6 @@ def test_names_are_nothing_but_text(page: Browser, folder: Path) -> None:
         texts = page.run(f"[...document.querySelectorAll({place!r})].map((one) => one.textContent)")
         assert any(HOSTILE in text for text in texts), place
     assert page.run("typeof window.broken") == "undefined"
-
-
-def test_the_table_shows_the_clip_and_the_measure_that_are_chosen(page: Browser, folder: Path) -> None:
-    opened(page, folder / "two.html")
-    page.run("""for (const [id, value] of [["scope", "1"], ["column", "2"]]) {
-        const one = document.getElementById(id); one.value = value;
-        one.dispatchEvent(new Event("change", { bubbles: true })); }""")
-    shown = page.run("[...document.querySelectorAll('#numbers .grid')].filter((one) => one.offsetParent)"
-                     ".map((one) => one.caption.textContent)")  # fmt: skip
-    assert [text.partition(".")[0] for text in shown] == ["Shell error, largest, mm: b & <b>"]
 
 
 def test_without_a_script_the_numbers_are_there(page: Browser, folder: Path) -> None:

@@ -14,7 +14,7 @@ from rigid_motion.motion.quaternions import rotate
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.results import ClipResult
 from rigid_motion_batch.report import data
-from rigid_motion_batch.report.data import Block, clip_data, json_in_page, mesh_data
+from rigid_motion_batch.report.data import Block, clip_data, json_in_page
 from rigid_motion_batch.report.mesh import MOST_TRIANGLES, Mesh, drill
 from tests.scripts.clips.bodies import swinging_body
 from tests.scripts.clips.recordings import swinging_clip
@@ -101,21 +101,6 @@ def test_a_magnified_body_is_so_many_times_as_far_off() -> None:
     assert turned == pytest.approx(4.0 * motion.errors[2, sample], rel=1e-2)
 
 
-def test_a_body_that_grows_is_as_large_as_it_is() -> None:
-    clip = result_of(swinging_clip(), TEN)
-    (result,) = clip.choices
-    motion = result.motions[0]
-    sizes = 1.0 + 0.1 * np.arange(len(clip.times)) / len(clip.times)
-    own = 1.3 * sizes[result.first : result.first + len(motion.poses)]
-    growing = replace(motion, poses=Poses(motion.poses.positions, motion.poses.quaternions, own))
-    truth = Poses(clip.truth.positions, clip.truth.quaternions, sizes)
-    clip = replace(clip, truth=truth, choices=(replace(result, motions=(growing,)),))
-    moment = float(clip.times[result.first + 50] - clip.times[0])
-    assert read(clip, f"poseAt(recording, choice, {moment!r}, choice.motions[0], 1).scale") == pytest.approx(
-        own[50], rel=1e-3
-    )
-
-
 def test_the_joints_of_a_whole_body_are_where_its_mode_puts_them() -> None:
     clip = result_of(swinging_body(), TEN)
     (result,) = clip.choices
@@ -153,15 +138,6 @@ def test_hours_far_from_the_origin_are_as_exact_as_they_need_to_be() -> None:
     np.testing.assert_allclose(np.transpose(found["places"]), clip.truth.positions - middle_of(clip), atol=2e-5)
 
 
-@pytest.mark.parametrize("size", [1e30, 1e-30])
-def test_places_of_any_size_are_read_as_they_are(size: float) -> None:
-    swing = swinging_clip()
-    clip = result_of(replace(swing, poses=Poses(size * swing.poses.positions, swing.poses.quaternions)), TEN)
-    found = read(clip, "recording.places")
-    assert np.isfinite(found).all()
-    assert np.ptp(found) == pytest.approx(np.ptp(clip.truth.positions, axis=0).max(), abs=1e-5, rel=1e-3)
-
-
 def test_deviations_are_magnified_until_they_can_be_seen() -> None:
     clip = result_of(swinging_clip(), (*TEN, Uniform("30")))
     coarse, fine = clip_data(clip, str, drill())["choices"]
@@ -197,27 +173,6 @@ def test_the_address_of_a_moment_leads_back_to_it(name: str) -> None:
 @pytest.mark.parametrize("hash", ["", "#", "#numbers", "#%E0%A4%A", "#a,b,c"])
 def test_any_other_address_has_no_moment(hash: str) -> None:
     assert "t" not in value_of(f"fromAddress({json.dumps(hash)})", "data", "mathematics")
-
-
-def test_the_drill_is_closed_and_its_faces_look_outwards() -> None:
-    mesh = drill()
-    a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
-    volume = np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0
-    assert 1e-4 < volume < 1e-3
-    corners = mesh.corners()
-    assert corners.shape == (7, 3 * len(mesh.triangles))
-    faces = np.repeat(np.cross(b - a, c - a), 3, axis=0)
-    there = np.linalg.norm(faces, axis=1) > 1e-12
-    assert (np.einsum("ij,ij->i", faces, corners[3:6].T)[there] > 0.0).all()
-
-
-def test_a_cube_has_twelve_edges_and_flat_sides() -> None:
-    vertices = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
-    quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
-    mesh = Mesh(vertices, np.array([part for a, b, c, d in quads for part in ((a, b, c), (a, c, d))]))
-    assert mesh.edges().shape == (6, 12)
-    assert set(np.abs(mesh.corners()[3:6]).ravel().round(12)) == {0.0, 1.0}
-    assert mesh_data(mesh)["middle"] == [0.5, 0.5, 0.5]
 
 
 @pytest.mark.parametrize("count", [0, MOST_TRIANGLES + 1])

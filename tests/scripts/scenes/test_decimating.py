@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import replace
-from pathlib import Path
 
 import bpy
 import numpy as np
@@ -17,20 +15,16 @@ from rigid_motion_batch.analysis.body_decimated import DECIMATE, OWN, SHARED
 from rigid_motion_batch.analysis.body_metrics import measure_modes
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.axes import AXES
-from rigid_motion_batch.cli import compare
-from rigid_motion_batch.pipeline.comparison import DECIMATED
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.figures import Figure
 from rigid_motion_batch.scenes import decimated_bodies
-from rigid_motion_batch.scenes.decimated_bodies import Decimations, Left
+from rigid_motion_batch.scenes.decimated_bodies import Left
 from rigid_motion_batch.scenes.decimating import DecimatedBody, beside_decimate, frames_of
 from tests.balls import largest_displacements
 
 RADIUS = np.array((0.03, 0.05, 0.02, 0.03))
 
 MODES = ("lerp_slerp", "motor_spline")
-
-COLUMNS = "clip,mode,how,rate_hz,frames_with_keys,keys,numbers,max_shell_m,decimation,tolerance_m"
 
 JOINTS = ("Hip", "Knee", "Foot", 'A "bone" of\\any name')
 
@@ -144,15 +138,6 @@ def test_decimate_is_held_to_our_largest_error_and_all_is_counted(monkeypatch, s
         assert found.keys < max(one.keys for one in tried)
 
 
-def test_only_channels_that_vary_are_counted() -> None:
-    clip = leg(samples=12)
-    body = DecimatedBody(made_of(clip), RADIUS)
-    values = decimated_bodies.values_of(body.rig.obj, body.frames)
-    vary = [curve for curve, own in values.items() if np.ptp(own) > 1e-4]
-    assert 0 < len(vary) < len(values)
-    assert body.left() == Left(DECIMATE, 12, 12 * len(vary), 6 * 12 * len(vary), body.errors().max())
-
-
 def test_a_body_that_stays_and_an_error_beyond_single_precision_have_no_row_of_decimate() -> None:
     clip = leg(samples=10)
     still = replace(clip, poses=Poses(clip.poses.positions[:, [0] * 10], clip.poses.quaternions[:, [0] * 10]))
@@ -173,106 +158,4 @@ def test_samples_are_on_whole_frames_where_they_are_even() -> None:
         frames_of(np.array((100.0, 101.0, 101.0 + 1e-9, 102.0, 103.0)))
 
 
-def test_uneven_samples_are_decimated_as_well() -> None:
-    clip = leg(samples=30)
-    kept = np.delete(np.arange(30), (4, 5, 11, 20))
-    made = made_of(replace(clip, times=clip.times[kept], poses=clip.poses[:, kept]))
-    body = DecimatedBody(made, RADIUS)
-    assert body.errors().max() < 1e-6
-    found = body.within(0.02)
-    assert 0.0 < found.largest <= 0.02
-    assert found.frames <= len(kept)
-
-
-def test_what_was_tried_for_one_error_is_known_for_the_next(monkeypatch) -> None:
-    obj = bpy.data.objects.new("carrier", None)
-    obj.animation_data_create().action = recorded = bpy.data.actions.new("recorded")
-    margins = []
-
-    def decimate(_obj: object, *, mode: str, remove_error_margin: float) -> None:
-        assert mode == "ERROR"
-        margins.append(remove_error_margin)
-
-    def seen() -> Left:
-        """Keys are the fewer, and errors the larger, the larger the margin is."""
-        assert obj.animation_data.action != recorded
-        return Left(DECIMATE, 1, int(100.0 / margins[-1] ** 0.5), 1, 3.0 * margins[-1] ** 1.3)
-
-    monkeypatch.setattr(decimated_bodies, "decimate", decimate)
-    decimations = Decimations(obj, seen)
-    first = decimations.within(0.01)
-    assert 0.98 * 0.01 <= first.largest <= 0.01
-    count = len(margins)
-    assert count <= 6
-    assert decimations.within(1.001 * first.largest) == first
-    assert len(margins) == count
-    assert decimations.within(1e-12) is None
-    assert decimations.within(1e9).largest > 50.0
-    assert len(margins) <= 4 * decimated_bodies.TRIALS
-    assert obj.animation_data.action == recorded
-    assert not [action for action in bpy.data.actions if action.name.startswith("recorded.")]
-
-
 # -- in a comparison --------------------------------------------------------------------------------------------------
-
-
-HOSTILE = """HIERARCHY
-ROOT <b>Hip&"
-{
-  OFFSET 0 0 0
-  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
-  JOINT </table><script>alert(1)</script>
-  {
-    OFFSET 0 -50 0
-    CHANNELS 3 Zrotation Xrotation Yrotation
-    End Site
-    {
-      OFFSET 0 -50 0
-    }
-  }
-}
-MOTION
-Frames: 30
-Frame Time: 0.0333333
-"""
-
-
-def test_a_run_has_the_table_in_its_report_and_goes_on_without_it(tmp_path: Path, monkeypatch, capfd) -> None:
-    source, output = tmp_path / "<i>leg&.bvh", tmp_path / "output"
-    rows = [f"{n} {90 + n % 5} 0 {40 * np.sin(n / 5):.3f} {n} 0 {50 * np.cos(n / 4):.3f} 0 0" for n in range(30)]
-    source.write_text(HOSTILE + "\n".join(rows) + "\n", encoding="utf-8")
-    adaptive = ["--tolerance", "1cm", "--rates", "5", "--modes", "lerp_slerp,motor_spline"]
-    command = ["--jobs", "0", str(source), *adaptive, "--no-video", "--output", str(output)]
-    assert compare.main(command) == 0
-    page = (output / "report.html").read_text(encoding="utf-8")
-    assert "Decimate" in page
-    assert "<script>alert" not in page
-    assert "<i>leg" not in page
-    with (output / DECIMATED).open(encoding="utf-8", newline="") as stream:
-        table = list(csv.DictReader(stream))
-    assert ",".join(table[0]) == COLUMNS
-    assert [(line["mode"], line["how"]) for line in table] == [(mode, how) for mode in MODES for how in (OWN, DECIMATE)]
-    with (output / "metrics.csv").open(encoding="utf-8", newline="") as stream:
-        metrics = {line["mode"]: line for line in csv.DictReader(stream) if line["decimation"] == "adaptive"}
-    for own, theirs in zip(table[::2], table[1::2], strict=True):
-        measured = metrics[own["mode"]]
-        assert [own[name] for name in ("keys", "max_shell_m", "clip")] == [
-            measured[name] for name in ("keys", "max_shell_m", "clip")
-        ]
-        assert own["frames_with_keys"] == measured["key_frames"]
-        assert float(theirs["max_shell_m"]) <= float(own["max_shell_m"]) <= 0.01
-        assert float(own["tolerance_m"]) == 0.01
-
-    def without_window(*_: object, **__: object) -> None:
-        raise RuntimeError("Error: no\nwindow")
-
-    monkeypatch.setattr(decimated_bodies, "decimate", without_window)
-    capfd.readouterr()
-    again = tmp_path / "again"
-    assert compare.main([*command[:-1], str(again)]) == 1
-    said = capfd.readouterr().err
-    assert "within 1 cm: not compared with Blender's Decimate: Error: no window" in said
-    assert "Traceback" not in said
-    assert "not compared" in said
-    assert (again / "report.html").is_file()
-    assert not (again / DECIMATED).exists() or (again / DECIMATED).read_text(encoding="utf-8") == f"{COLUMNS}\n"

@@ -48,18 +48,3 @@ def test_what_is_drawn_is_as_large_as_the_object_at_most():
 )
 def test_the_factor_is_a_round_number(deviation, factor):
     assert magnification(deviation, 0.1) == factor
-
-
-def test_what_is_seen_anyway_is_drawn_as_it_is():
-    truth = some_poses()
-    shown = beside(truth, 0.1, 0.1)
-    assert magnified(shown, truth, 1.0, MIDDLE) is shown
-
-
-def test_a_large_turn_is_not_wound_up():
-    truth = some_poses()
-    drawn = magnified(beside(truth, 0.0, 1.0), truth, 100.0, MIDDLE)
-    cosines = np.abs(np.einsum("nk,nk->n", drawn.quaternions, truth.quaternions))
-    assert cosines.max() <= 1.0 + 1e-12
-    assert np.allclose(np.linalg.norm(drawn.quaternions, axis=-1), 1.0)
-    assert np.all(cosines < 1e-6 + np.cos(np.pi / 2.0) + 1e-6)

@@ -29,14 +29,6 @@ def test_what_has_room_where_it_is_is_not_followed():
     assert np.array_equal(framing.focus, np.zeros((400, 3)))
 
 
-def test_the_focus_is_smooth_and_keeps_to_the_way():
-    random = np.random.default_rng(3)
-    way = np.linspace((0.0, 0.0, 0.0), (30.0, 0.0, 0.0), 300)
-    framing = Framing.of(Solid(moving(way + 0.01 * random.normal(size=way.shape)), CUBE), smoothing=12.0)
-    assert np.abs(framing.focus - way)[40:-40].max() < 0.01
-    assert np.abs(np.diff(framing.focus, 2, axis=0)).max() < 0.004
-
-
 @pytest.mark.parametrize("count", [1, 2, 5])
 def test_the_shortest_of_films_has_a_frame(count):
     way = moving(np.linspace((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), count))
@@ -56,19 +48,6 @@ def test_a_walk_is_followed_without_a_nod():
     assert framing.follows
     assert np.ptp(framing.focus[:, 2]) == pytest.approx(0.0, abs=1e-12)
     assert np.ptp(framing.focus[:, 0]) > 11.0
-
-
-def test_a_body_that_climbs_is_followed_upwards():
-    framing = Framing.of(Jointed(walking(climbs=5.0)), smoothing=4.0)
-    assert np.ptp(framing.focus[:, 2]) > 4.5
-
-
-def test_quick_turns_are_followed_more_closely_rather_than_shown_small():
-    angles = np.linspace(0.0, 60.0, 600)
-    swings = moving(np.stack((0.6 * np.sin(angles), 0.0 * angles, 0.02 * angles), axis=-1))
-    framing = Framing.of(Solid(swings, CUBE), smoothing=14.4)
-    assert framing.follows
-    assert framing.extent(Solid(swings, CUBE)).size.max() < 0.3
 
 
 def test_what_gets_far_from_the_recording_is_cut_and_does_not_make_it_small():

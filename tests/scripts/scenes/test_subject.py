@@ -68,17 +68,6 @@ def test_nothing_else_of_the_users_file_stays(user_file):
     assert not bpy.data.texts
 
 
-def test_what_is_shown_can_be_opened_elsewhere(user_file, tmp_path):
-    mesh = load_subject(f"{user_file}:Cube")
-    (tmp_path / "paint.png").unlink()
-    assert bpy.data.images["paint.png"].packed_file
-    assert mesh.materials[0].library_weak_reference is None
-
-
-def test_an_object_without_our_material_is_tinted_in_its_first_slot(user_file):
-    assert tinted_slots(load_subject(f"{user_file}:Cube")) == [0]
-
-
 @pytest.mark.parametrize(
     ("wanted", "said"),
     [
