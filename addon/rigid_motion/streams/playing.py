@@ -36,11 +36,11 @@ SETTLING = 0.15
 HURRY = 0.6
 """By which part faster than time the moment goes on at most."""
 
-FADE = 0.07
-"""Seconds in which a third of a difference to what should be shown is left."""
+FADE = 0.04
+"""Seconds: as critically damped springs of this time constant, differences to what should be shown fade."""
 
 FORWARD = 0.8
-"""Part of the motion that a difference may take away from it: what was shown too far ahead waits, and never goes back."""
+"""Part of the motion that a difference may take away: what was shown too far ahead waits, and never goes back."""
 
 RESTS = 0.05
 """Metres or radians a second: a motion that is slower is at rest, and differences along it fade as all others."""
@@ -113,32 +113,47 @@ class Fading:
         self._path: Poses | None = None
         """What the path has where that was shown."""
         self._last = 0.0
-        self._slides = self._turns = np.zeros((1, 3))
-        """Differences of places and, as rotation vectors, of turns, shape (joints, 3)."""
+        self._slides, self._turns = _Differences(), _Differences()
 
     def changed(self, poses: Poses) -> None:
         """Go on from what was shown last, where a new path has poses (joints,)."""
         if self._shown is not None:
             self._path = poses
-            self._slides = self._shown.positions - poses.positions
-            self._turns = turns_between(poses.quaternions, self._shown.quaternions)
+            self._slides.left = self._shown.positions - poses.positions
+            self._turns.left = turns_between(poses.quaternions, self._shown.quaternions)
 
     def show(self, poses: Poses, now: float) -> Poses:
         """Poses (joints,) of the path, with what is left of differences."""
         passed, self._last = max(now - self._last, 0.0), now
-        if self._slides.any() or self._turns.any():
-            self._slides = _faded(self._slides, poses.positions - self._path.positions, passed)
-            self._turns = _faded(self._turns, turns_between(self._path.quaternions, poses.quaternions), passed)
-        shown = Poses(poses.positions + self._slides, normalise(turned(poses.quaternions, self._turns)))
+        if self._shown is not None and passed > 0.0:
+            self._slides.fade(poses.positions - self._path.positions, passed)
+            self._turns.fade(turns_between(self._path.quaternions, poses.quaternions), passed)
+        shown = Poses(poses.positions + self._slides.left, normalise(turned(poses.quaternions, self._turns.left)))
         self._path, self._shown = poses, shown
         return shown
 
 
-def _faded(left: np.ndarray, step: np.ndarray, passed: float) -> np.ndarray:
-    """What is left of differences (joints, 3), where the motion goes on by steps (joints, 3)."""
-    change = np.expm1(-passed / FADE) * left
-    length = np.linalg.norm(step, axis=1, keepdims=True)
-    along = step / np.maximum(length, SMALLEST)
-    back = np.minimum(np.sum(change * along, axis=1, keepdims=True) + FORWARD * length, 0.0)
-    left = left + change - np.where(length > RESTS * passed, back, 0.0) * along
-    return np.where(np.abs(left).max() < NOTHING, 0.0, left)
+class _Differences:
+    """Of places or, as rotation vectors, of turns."""
+
+    def __init__(self) -> None:
+        self.left = np.zeros((1, 3))
+        """Shape (joints, 3)."""
+        self._rate = np.zeros((1, 3))
+        """By which they change, a second."""
+
+    def fade(self, step: np.ndarray, passed: float) -> None:
+        """Let so many seconds pass, in which the path goes on by steps (joints, 3)."""
+        if not self.left.any():
+            return
+        before, decay = self.left, np.exp(-passed / FADE)
+        pull = self._rate + before / FADE
+        left = (before + pull * passed) * decay
+        length = np.linalg.norm(step, axis=1, keepdims=True)
+        along = step / np.maximum(length, SMALLEST)
+        back = np.minimum(np.sum((left - before) * along, axis=1, keepdims=True) + FORWARD * length, 0.0)
+        held = np.where(length > RESTS * passed, back, 0.0) * along
+        self._rate = pull * decay - left / FADE - held / passed
+        self.left = left - held
+        if np.abs(self.left).max() < NOTHING:
+            self.left, self._rate = np.zeros_like(left), np.zeros_like(left)

@@ -94,7 +94,7 @@ FAR_APART, MOST_PARTS = 0.013, 8
 """Seconds between samples beyond which it is looked at what is shown between them, and into how many parts at most."""
 
 LOSSY, CALM = 2, 5.0
-"""Of the 32 messages before the newest: where so many are missing, each is sent twice until none was for some seconds."""
+"""Messages of the last 32: where so many are missing, each is sent twice until none is for some seconds."""
 
 MOST_RECEIVERS = 256
 """Receivers that are waited for."""
