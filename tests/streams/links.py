@@ -61,6 +61,8 @@ class Outcome:
     """The largest of any joint, metres."""
     steps: np.ndarray | None = None
     """How far any joint went from one picture to the next, metres, shape (n - 1,)."""
+    turned_back: np.ndarray | None = None
+    """How far any joint went against its step before, where the motion itself did not, metres, shape (n - 2,)."""
 
     def between(self, first: float, last: float) -> np.ndarray:
         """The errors of what was drawn from one time to another."""
@@ -152,4 +154,8 @@ def compare(outcome: Outcome, own: Body, truth: Path, drawn: list) -> None:
     there = forest.skeleton.in_root_space(shown)
     true = forest.skeleton.in_root_space(truth.at(outcome.moments))
     outcome.errors = shell_error(there, true, forest.radii[:, None]).max(axis=0)
-    outcome.steps = np.linalg.norm(np.diff(there.positions, axis=1), axis=-1).max(axis=0)
+    went, goes = np.diff(there.positions, axis=1), np.diff(true.positions, axis=1)
+    outcome.steps = np.linalg.norm(went, axis=-1).max(axis=0)
+    before = went[:, :-1] / np.maximum(np.linalg.norm(went[:, :-1], axis=-1, keepdims=True), 1e-9)
+    back, is_true = -np.sum(went[:, 1:] * before, axis=-1), np.sum(went[:, 1:] * goes[:, 1:], axis=-1) > 0.0
+    outcome.turned_back = np.where(is_true, 0.0, back).max(axis=0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import Poses
-from rigid_motion.streams.playing import Playing
+from rigid_motion.streams.playing import FORWARD, Fading, Playing
 from rigid_motion.streams.vmc import VmcReceiver, write
 
 DELAY, RATE = 0.1, 60.0
@@ -27,6 +27,29 @@ def test_the_picture_goes_on_however_seldom_somebody_looks(looks: float) -> None
     # All that is shown is there, and it is no older than it has to be.
     assert behind.min() >= DELAY
     assert behind.max() <= DELAY + looks + 2.0 / RATE
+
+
+@pytest.mark.parametrize("fps", [30.0, 72.0, 240.0])
+@pytest.mark.parametrize("speed", [0.3, 1.0, 4.0])
+def test_what_was_shown_too_far_ahead_waits_and_does_not_go_back(speed: float, fps: float) -> None:
+    """A hand that goes 10 cm too far, turned by half a radian too much, and then hears where it should have been."""
+    fading, places, turns = Fading(), [], []
+    for now in np.arange(-0.2, 1.0 + 1.0 / speed, 1.0 / fps).tolist():
+        there, half = speed * now, 0.5 * speed * now
+        if now >= 0.0 and not places:
+            fading.changed(Poses([[there - 1.0 / fps * speed, 0.0, 0.0]], [[np.cos(half), np.sin(half), 0.0, 0.0]]))
+        ahead = 0.0 if now >= 0.0 else 0.1
+        half += 0.25 if ahead else 0.0
+        pose = fading.show(Poses([[there + ahead, 0.0, 0.0]], [[np.cos(half), np.sin(half), 0.0, 0.0]]), now)
+        if now >= 0.0:
+            places.append(pose.positions[0, 0] - there)
+            turns.append(2.0 * np.arctan2(*pose.quaternions[0, 1::-1]) - 2.0 * half)
+    step = speed / fps
+    assert np.diff(places).min() >= -step
+    assert np.diff(np.unwrap(turns)).min() >= -step - 1e-9
+    # To wait takes as long as the motion takes to get there.
+    for off, ahead, most in ((places, 0.1, 0.005), (np.unwrap(turns), 0.5, 0.02)):
+        assert np.abs(off[round((0.4 + ahead / FORWARD / speed) * fps) :]).max() < most
 
 
 @pytest.mark.parametrize("looks", [0.35, 1.0, 1.3])

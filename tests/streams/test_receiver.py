@@ -8,6 +8,7 @@ import pytest
 from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.receiver import MOST_JOINT_KNOTS
 from rigid_motion.streams.wire import LATE, MOTION, kind_of
+from tests.thoroughness import tried
 
 from .links import body, dance, run
 
@@ -147,6 +148,17 @@ def test_a_long_way_with_jitter_loss_and_duplicates(loss: float, within: float, 
     assert np.diff(outcome.moments).min() > 0.0
 
 
+@pytest.mark.parametrize("seed", range(tried(8)))
+@pytest.mark.parametrize("loss", [0.05, 0.2])
+def test_where_datagrams_are_lost_no_hand_goes_back_against_its_motion(loss: float, seed: int) -> None:
+    own, rng = Body.rigid("hand"), np.random.default_rng(seed)
+    lost = lambda now, count: rng.random() < loss  # noqa: E731
+    samples = dance(own, 12.0, speed=4.0, seed=seed)
+    outcome = run(own, *samples, lost=lost, latency=0.21, jitter=0.08, seed=seed)
+    # Half a centimetre in one picture is a jump; corrections of what was never sent are gentler.
+    assert outcome.turned_back[outcome.now[2:] > 2.0].max() < 0.005
+
+
 @pytest.mark.parametrize("answers", [True, False])
 def test_where_datagrams_are_lost_no_joint_leaps_back_to_the_motion(answers: bool) -> None:
     own = body()
@@ -173,10 +185,10 @@ def test_an_outage_of_2_s_heals_within_half_a_second(loss: float, answers: bool)
 
 def test_where_much_is_lost_everything_is_sent_twice() -> None:
     own, rng = body(3), np.random.default_rng(3)
-    outcome = run(own, *dance(own, 8.0), lost=lambda now, count: now < 4.0 and rng.random() < 0.2)
+    outcome = run(own, *dance(own, 16.0), lost=lambda now, count: now < 4.0 and rng.random() < 0.2)
     sent = {True: [], False: []}
     for now, datagram in outcome.datagrams:
-        if 1.0 < now < 4.0 or now > 7.5:
+        if 1.0 < now < 4.0 or now > 13.0:
             sent[now < 4.0].append(datagram)
     assert len(sent[True]) > 1.5 * len(set(sent[True]))
     assert len(sent[False]) == len(set(sent[False]))

@@ -60,6 +60,16 @@ def test_a_fast_hand_is_within_the_tolerance_between_samples(rate: float) -> Non
     assert outcome.errors.max() <= 0.005 * SLACK
 
 
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("answers", [True, False])
+def test_uneven_samples_are_shown_within_the_tolerance_between_them(seed: int, answers: bool) -> None:
+    """Knots lie on a grid, beside the samples; one just behind the start of a window is seen by no sample."""
+    own, times, poses = swing(90.0)
+    times = times + np.random.default_rng(seed).uniform(0.0, 0.001, len(times))
+    outcome = run(own, times, poses, fps=1000.0, answers=answers)
+    assert outcome.errors.max() <= 0.005 * SLACK
+
+
 def test_a_sample_that_is_overdue_is_not_waited_for() -> None:
     own = body()
     times, poses = dance(own, 4.0, 90.0)

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..motion import Poses
 from ..motion.quaternions import normalise
-from .paths import turned, turns_between
+from .paths import SMALLEST, turned, turns_between
 
 LOOK_BACK = 3.0
 """Seconds of which the longest transit counts."""
@@ -36,8 +36,17 @@ SETTLING = 0.15
 HURRY = 0.6
 """By which part faster than time the moment goes on at most."""
 
-FADE = 0.15
-"""Seconds in which a difference fades."""
+FADE = 0.04
+"""Seconds: as critically damped springs of this time constant, differences to what should be shown fade."""
+
+FORWARD = 0.8
+"""Part of the motion that a difference may take away: what was shown too far ahead waits, and never goes back."""
+
+RESTS = 0.05
+"""Metres or radians a second: a motion that is slower is at rest, and differences along it fade as all others."""
+
+NOTHING = 1e-5
+"""Metres or radians: differences that are smaller are over."""
 
 
 class Playing:
@@ -97,27 +106,54 @@ class Playing:
 
 
 class Fading:
-    """What is shown of a path that changes under it: the difference fades."""
+    """What is shown of a path that changes under it: the difference fades, but does not turn the motion back."""
 
     def __init__(self) -> None:
         self._shown: Poses | None = None
-        self._began = 0.0
-        self._slides: np.ndarray | None = None
-        self._turns: np.ndarray | None = None
+        self._path: Poses | None = None
+        """What the path has where that was shown."""
+        self._last = 0.0
+        self._slides, self._turns = _Differences(), _Differences()
 
-    def changed(self, poses: Poses, now: float) -> None:
-        """Go on from what was shown last, where a new path would show poses (joints,)."""
+    def changed(self, poses: Poses) -> None:
+        """Go on from what was shown last, where a new path has poses (joints,)."""
         if self._shown is not None:
-            self._slides = self._shown.positions - poses.positions
-            self._turns = turns_between(poses.quaternions, self._shown.quaternions)
-            self._began = now
+            self._path = poses
+            self._slides.left = self._shown.positions - poses.positions
+            self._turns.left = turns_between(poses.quaternions, self._shown.quaternions)
 
     def show(self, poses: Poses, now: float) -> Poses:
         """Poses (joints,) of the path, with what is left of differences."""
-        if self._slides is not None:
-            left = max(1.0 - max(now - self._began, 0.0) / FADE, 0.0) ** 2
-            poses = Poses(poses.positions + left * self._slides, turned(poses.quaternions, left * self._turns))
-            if left == 0.0:
-                self._slides = self._turns = None
-        self._shown = Poses(poses.positions, normalise(poses.quaternions))
-        return self._shown
+        passed, self._last = max(now - self._last, 0.0), now
+        if self._shown is not None and passed > 0.0:
+            self._slides.fade(poses.positions - self._path.positions, passed)
+            self._turns.fade(turns_between(self._path.quaternions, poses.quaternions), passed)
+        shown = Poses(poses.positions + self._slides.left, normalise(turned(poses.quaternions, self._turns.left)))
+        self._path, self._shown = poses, shown
+        return shown
+
+
+class _Differences:
+    """Of places or, as rotation vectors, of turns."""
+
+    def __init__(self) -> None:
+        self.left = np.zeros((1, 3))
+        """Shape (joints, 3)."""
+        self._rate = np.zeros((1, 3))
+        """By which they change, a second."""
+
+    def fade(self, step: np.ndarray, passed: float) -> None:
+        """Let so many seconds pass, in which the path goes on by steps (joints, 3)."""
+        if not self.left.any():
+            return
+        before, decay = self.left, np.exp(-passed / FADE)
+        pull = self._rate + before / FADE
+        left = (before + pull * passed) * decay
+        length = np.linalg.norm(step, axis=1, keepdims=True)
+        along = step / np.maximum(length, SMALLEST)
+        back = np.minimum(np.sum((left - before) * along, axis=1, keepdims=True) + FORWARD * length, 0.0)
+        held = np.where(length > RESTS * passed, back, 0.0) * along
+        self._rate = pull * decay - left / FADE - held / passed
+        self.left = left - held
+        if np.abs(self.left).max() < NOTHING:
+            self.left, self._rate = np.zeros_like(left), np.zeros_like(left)

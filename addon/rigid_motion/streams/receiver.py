@@ -285,10 +285,10 @@ class _Playback:
         self.heard = max(self.heard, arrival) if newer else self.heard
         if not motion.late or self._playing.longest is None:
             self._playing.heard(end / TICKS, arrival)
-        self._put(motion.sequence, path, lost, arrival)
+        self._put(motion.sequence, path, lost)
         return True
 
-    def _put(self, sequence: int, path: Path, lost: int, now: float) -> None:
+    def _put(self, sequence: int, path: Path, lost: int) -> None:
         """Let a window take part in what is shown; before it so many are lost, or it came late where that is < 0."""
         before = self._path
         self._windows[sequence] = path
@@ -311,7 +311,7 @@ class _Playback:
             for last, number in pairwise(numbers):
                 self._path = self._path.followed(self._windows[number], number - last - 1)
         if self._moment is not None and (lost or path.moments[0] < self._moment):
-            self._fading.changed(_only(self._path.at(np.array([self._moment]))), now)
+            self._fading.changed(_only(self._path.at(np.array([self._moment]))))
 
     def due(self, moment: float) -> float:
         """When a moment is to be shown."""

@@ -63,6 +63,9 @@ GRID = 3
 ROUNDING = 1e-3
 """Ticks by which a sample may be before the one that it is at."""
 
+SAME = 1e-9
+"""Seconds that make no difference between a knot and a sample."""
+
 LAST = 0xFFFF
 """The largest sequence number: behind it the sender begins again, with another identity."""
 
@@ -90,8 +93,8 @@ OLDEST = 2.0
 FAR_APART, MOST_PARTS = 0.013, 8
 """Seconds between samples beyond which it is looked at what is shown between them, and into how many parts at most."""
 
-LOSSY = 2
-"""Of the 32 messages before the newest: where so many are missing, each is sent twice until none is."""
+LOSSY, CALM = 2, 5.0
+"""Messages of the last 32: where so many are missing, each is sent twice until none is for some seconds."""
 
 MOST_RECEIVERS = 256
 """Receivers that are waited for."""
@@ -179,6 +182,9 @@ class Sender:
         self._wanted = False
         """Whether somebody cannot read what is sent."""
         self._lossy = False
+        """Whether so much is lost that all is sent twice."""
+        self._missed = -math.inf
+        """When somebody said so last."""
 
     def add(self, time: float, poses: Poses | Mapping[str, Poses]) -> list[bytes]:
         """Take a sample, and return what is to be sent now.
@@ -245,7 +251,8 @@ class Sender:
             heard = self._times[-1]
         self._receivers[receiver] = _Receiver(entry, heard)
         missing = entry.before.bit_length() - entry.before.bit_count()
-        self._lossy = missing >= LOSSY or (self._lossy and missing > 0)
+        self._missed = heard if missing >= LOSSY or (self._lossy and missing) else self._missed
+        self._lossy = heard - self._missed < CALM
         self._wanted |= bool(entry.needs & NEEDS_REFRESH) and heard - self._refreshed > PATIENCE
         return self.describe() if entry.needs & NEEDS_DESCRIPTION else []
 
@@ -340,18 +347,21 @@ class Sender:
         start = (end + late - self._terms.delay) / TICKS
         times = np.array(self._times)
         inside = times[(times > start) & (times < end / TICKS)]
-        moments = closely(np.unique(np.concatenate(([start], inside, [end / TICKS]))))[1:]
+        looked = np.concatenate(([start], inside, [end / TICKS]))
         samples = self._samples()
         ends = self._forest.skeleton.in_root_space(samples.at(np.array([start, end / TICKS])))
-        if shell_error(ends[:, 0], ends[:, 1], self._forest.radii).max() < STILL * self._scale.tolerance:
-            # A body that does not move is to come to rest, and not to be put right again and again.
-            moments = np.append(moments, end / TICKS + BEYOND)
+        is_still = shell_error(ends[:, 0], ends[:, 1], self._forest.radii).max() < STILL * self._scale.tolerance
         exact = (end - inside * TICKS) / self._terms.grid
         # A jump between two cells takes both of them, everything else the nearest.
         for cells in (np.rint(exact), np.concatenate((np.floor(exact), np.ceil(exact)))):
             cells = np.unique(cells.astype(int))
             cells = cells[(cells > 0) & (cells * self._terms.grid < self._terms.delay - late)]
             grid = (end - cells[::-1] * self._terms.grid) / TICKS
+            between = grid[np.abs(grid[:, None] - looked).min(axis=1) > SAME]
+            moments = closely(np.unique(np.concatenate((looked, between))))[1:]
+            if is_still:
+                # It is to come to rest, and not to be put right again and again.
+                moments = np.append(moments, end / TICKS + BEYOND)
             fitted = self._fitting.fitted(Task(self._path, state, kind, start, samples, end / TICKS, moments, grid))
             if fitted.error <= self._scale.tolerance:
                 break
