@@ -11,14 +11,12 @@ from collections.abc import Callable
 
 from .in_blender import of_live, of_reduction, of_sub_frames
 from .on_top import with_summary
-from .paper import of_paper
 from .speed import of_batch, of_speed
 
 __all__ = [
     "SUMMARIES",
     "of_batch",
     "of_live",
-    "of_paper",
     "of_reduction",
     "of_speed",
     "of_sub_frames",
@@ -29,7 +27,6 @@ SUMMARIES: dict[str, Callable[[str], list[str]]] = {
     "benchmark.md": of_speed,
     "benchmark_batch.md": of_batch,
     "benchmark_live.md": of_live,
-    "paper.md": of_paper,
     "reduction.md": of_reduction,
     "subframes.md": of_sub_frames,
 }

@@ -31,7 +31,7 @@ def test_every_page_has_the_figures_of_the_studies(path: Path):
 @pytest.mark.parametrize("path", pages(), ids=lambda path: path.name)
 def test_every_quote_ends_and_none_begins_a_line_of_a_paragraph(path: Path):
     page = path.read_text(encoding="utf-8")
-    assert page.count("<!--= ") == len(QUOTE.findall(page))
+    assert page.count("<!--= ") == page.count("<!-- end -->") == len(QUOTE.findall(page))
     for line in page.splitlines():
         # Markdown takes such a line for HTML, and leaves what follows on it as it is.
         assert not re.match(r"\s*(?:[-*] )?<!-- ?(?:= .+?|end) -->.", line), line

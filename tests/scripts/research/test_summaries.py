@@ -8,7 +8,7 @@ import pytest
 
 from research import markdown_tables, publishing
 from research.live_benchmark.turns import beyond
-from research.summaries import of_batch, of_live, of_paper, of_reduction, of_speed, of_sub_frames
+from research.summaries import of_batch, of_live, of_reduction, of_speed, of_sub_frames
 
 RACE = """### A path
 
@@ -52,7 +52,7 @@ def test_a_page_in_parts_is_summed_up_by_its_parts():
     )
 
 
-@pytest.mark.parametrize("summary", [of_batch, of_live, of_paper, of_reduction, of_speed, of_sub_frames])
+@pytest.mark.parametrize("summary", [of_batch, of_live, of_reduction, of_speed, of_sub_frames])
 def test_a_page_without_tables_has_no_summary(summary):
     assert summary("# A page\n\nNothing was measured.\n") == []
 
@@ -63,20 +63,6 @@ def test_what_is_published_has_its_summary_below_the_title(tmp_path: Path, capsy
     assert page.startswith("# Title\n\n<!-- summary -->\n\n- Computing in-betweens")
     assert page.index("<!-- end of summary -->") < page.index("About it.")
     assert page in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("cell", "saved"), [("28.1 (6%)", 6.0), ("30.9 (3% more)", -3.0), ("9.7 (20%; 7 of 8 clips)", 20.0)]
-)
-def test_what_the_papers_page_saves_is_read_from_its_cells(cell: str, saved: float):
-    head = "| | 30/s | 20/s | 15/s | 12/s |\n|---|---:|---:|---:|---:|\n"
-    rows = [("*the paper*", "*20 (33%)*"), ("`dq_sclerp`", cell), ("`motor_spline`", "9 (70%)")]
-    rows.append(("`motor_spline`, keys where needed", "-"))
-    table = head + "\n".join(f"| {name} | " + " | ".join([one] * 4) + " |" for name, one in rows)
-    text = said(of_paper(f"# P\n\n**RMS shell error, recordings**\n\n{table}\n"))
-    percent = f"{abs(saved):.0f}"
-    assert f"here it is {percent}, {percent}, {percent} and {percent} % {'less' if saved > 0.0 else 'more'}" in text
-    assert "reach the paper's figures in 0 of 4 rows, the narrowest short by 33 points" in text
 
 
 def test_tables_are_read_as_they_were_written():
