@@ -25,12 +25,5 @@ __all__ = [
     "with_summary",
 ]
 
-SUMMARIES: dict[str, Callable[[str], list[str]]] = {
-    "benchmark.md": of_speed,
-    "benchmark_batch.md": of_batch,
-    "benchmark_live.md": of_live,
-    "paper.md": of_paper,
-    "reduction.md": of_reduction,
-    "subframes.md": of_sub_frames,
-}
+SUMMARIES: dict[str, Callable[[str], list[str]]] = {"paper.md": of_paper}
 """By the page in docs/ that it is on top of."""
