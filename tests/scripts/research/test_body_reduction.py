@@ -159,7 +159,6 @@ def test_the_study_writes_what_the_page_reads(tmp_path, monkeypatch):
     recording = reduction.read(reduction.ASSETS / "reach.csv", 15.0)
     monkeypatch.setattr(reduction, "files", lambda _folder: ["reach.csv"])
     monkeypatch.setattr(reduction, "read", lambda _path, _rate: recording)
-    monkeypatch.setattr(reduction, "TRIALS", 8)
     monkeypatch.setattr(body_reduction, "OZZ_BODY", "leg")
     monkeypatch.setattr(body_reduction, "TRIALS", 4)
     assert reduction.main(["--bodies", str(path), "--root", str(tmp_path)]) == 0
