@@ -1,8 +1,10 @@
-"""Bodies as Blender imports them: an armature, and what its F-curves show on every frame."""
+"""Whole bodies as Blender imports them: what the F-curves of an armature show, and what is left of it by few keys."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import bpy
@@ -11,14 +13,15 @@ import numpy as np
 from rigid_motion import animation
 from rigid_motion.animation.actions.channels import replace_keys
 from rigid_motion.animation.transforms.bones import prefix_of
-from rigid_motion.motion import Poses
+from rigid_motion.motion import Poses, Skeleton, interpolate, shell_error
 from rigid_motion.motion.eulers import quaternions_from_extrinsic_eulers
 from rigid_motion.motion.poses import placed
 from rigid_motion.motion.quaternions import align_signs, normalise
 from rigid_motion_batch.hushing import hushed
 from rigid_motion_batch.scenes.decimated_bodies import Curve, key_frames_of, values_of, varying
 
-from .bodies import Body
+RADIUS = 0.03
+"""Of the ball at every joint, in metres."""
 
 IMPORTERS = {".bvh", ".fbx"}
 
@@ -26,6 +29,78 @@ MOST_FRAMES = 1200
 """Longer recordings are cut off."""
 
 CHANNELS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3}
+
+
+Keys = Sequence[np.ndarray]
+"""The samples that are keys, for each joint."""
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A body with a pose on every frame."""
+
+    name: str
+    rate: float
+    """Frames a second."""
+
+    joints: tuple[str, ...]
+    parents: np.ndarray
+    """Shape (joints,), -1 for roots."""
+
+    poses: Poses
+    """Shape (joints, n), each in its parent's space; z is up in that of roots. In metres."""
+
+    moving: np.ndarray
+    """How many channels of each joint's location ever change, shape (joints,)."""
+
+    turning: np.ndarray
+    """How many of its rotation."""
+
+    enlarged: float = 1.0
+    """How many times larger than in the file."""
+
+    @property
+    def frames(self) -> int:
+        return self.poses.shape[1]
+
+    @property
+    def times(self) -> np.ndarray:
+        return np.arange(self.frames) / self.rate
+
+    @cached_property
+    def skeleton(self) -> Skeleton:
+        return Skeleton(self.parents)
+
+    @cached_property
+    def truth(self) -> Poses:
+        """Where the joints are, shape (joints, n)."""
+        return self.skeleton.in_root_space(self.poses)
+
+    @property
+    def extent(self) -> float:
+        """The largest extent of the joints in the first frame, along any of the three axes."""
+        return float(np.ptp(self.truth.positions[:, 0], axis=0).max())
+
+    def of_size(self, extent: float) -> Body:
+        """The same body, larger or smaller."""
+        factor = extent / self.extent
+        poses = Poses(factor * self.poses.positions, self.poses.quaternions)
+        return replace(self, poses=poses, enlarged=factor * self.enlarged)
+
+    def shown(self, keys: Keys, mode: str) -> Poses:
+        """Where the joints are by their keys, shape (joints, n)."""
+        shown = self.poses.copy()
+        for joint, own in enumerate(keys):
+            shown[joint] = interpolate(self.times[own], self.poses[joint][own], self.times, mode)
+        return self.skeleton.in_root_space(shown)
+
+    def shown_by_key_poses(self, keys: np.ndarray, mode: str) -> Poses:
+        """The same where all joints have keys at the same samples."""
+        return self.skeleton.in_root_space(interpolate(self.times[keys], self.poses[:, keys], self.times, mode))
+
+    def errors(self, shown: Poses, radius: float = RADIUS) -> np.ndarray:
+        """The largest displacement of any point in the balls, shape (joints, n)."""
+        return shell_error(shown, self.truth, radius)
 
 
 class UnusableRigError(ValueError):
@@ -163,7 +238,7 @@ def rig_of(name: str, obj: bpy.types.Object, most_frames: int = MOST_FRAMES) -> 
     return Rig(name, obj, frames)
 
 
-def files(paths: list[Path]) -> list[Path]:
+def body_files(paths: list[Path]) -> list[Path]:
     """The bodies among files and in folders."""
     found = [inside for path in paths for inside in (sorted(path.iterdir()) if path.is_dir() else [path])]
     return [path for path in found if path.suffix.lower() in IMPORTERS]

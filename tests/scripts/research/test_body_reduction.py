@@ -9,17 +9,13 @@ import bpy
 import numpy as np
 import pytest
 
-from research import reduction
-from research.whole_bodies import against_decimate, against_greedy, against_published, feet, rigs, timing
-from research.whole_bodies import section as page
-from research.whole_bodies.bodies import Body, repeated
-from research.whole_bodies.optimum import optimum, optimum_of_four
-from rigid_motion.motion import Poses, reduce_skeleton_keys
+from research import body_reduction, reduction
+from research.bodies import Body, UnusableRigError, import_rig
+from research.body_reduction import TOLERANCE
+from tests.scripts.research.keeping import written
 
 # Blender's BVH importer leaves closing the file to Python.
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-
-TOLERANCE = 0.01
 
 BVH = """HIERARCHY
 ROOT Hip
@@ -59,11 +55,11 @@ def made_up(folder: Path, frames: int = 24) -> Path:
 
 @pytest.fixture
 def body(tmp_path) -> Body:
-    return rigs.import_rig(made_up(tmp_path)).body().of_size(1.7)
+    return import_rig(made_up(tmp_path)).body().of_size(1.7)
 
 
 def test_a_body_is_where_blender_shows_it(tmp_path):
-    rig = rigs.import_rig(made_up(tmp_path))
+    rig = import_rig(made_up(tmp_path))
     body = rig.body()
     for sample in (0, 17):
         bpy.context.scene.frame_set(int(rig.frames[sample]))
@@ -81,7 +77,7 @@ def test_a_body_is_scaled_and_its_channels_are_counted(body):
 
 
 def test_a_long_recording_is_cut_off(tmp_path):
-    rig = rigs.import_rig(made_up(tmp_path), most_frames=10)
+    rig = import_rig(made_up(tmp_path), most_frames=10)
     assert rig.body().frames == 10
     assert max(max(keys) for keys in rig.keys().values()) == 10.0
 
@@ -91,15 +87,12 @@ def test_a_file_without_an_armature_is_refused(tmp_path):
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.context.collection.objects.link(bpy.data.objects.new("empty", None))
     bpy.ops.export_scene.fbx(filepath=str(path))
-    with pytest.raises(rigs.UnusableRigError, match=r"none\.fbx: it has no armature"):
-        rigs.import_rig(path)
+    with pytest.raises(UnusableRigError, match=r"none\.fbx: it has no armature"):
+        import_rig(path)
 
 
-@pytest.mark.parametrize(
-    ("mode", "programme"),
-    [("lerp_slerp", optimum), ("dq_sclerp", optimum), ("motor_spline", optimum_of_four)],
-)
-def test_the_optimum_is_the_fewest_of_all_choices(body, mode, programme):
+@pytest.mark.parametrize("mode", ["lerp_slerp", "dq_sclerp"])
+def test_the_optimum_is_the_fewest_of_all_choices(body, mode):
     few = Body(body.name, body.rate, body.joints, body.parents, body.poses[:, 4:15], body.moving, body.turning)
     tolerance = 0.03
 
@@ -111,29 +104,27 @@ def test_the_optimum_is_the_fewest_of_all_choices(body, mode, programme):
                     return len(keys)
         return few.frames
 
-    best = programme(few, mode, tolerance)
+    best = body_reduction.optimum(few, mode, tolerance)
     assert best == fewest()
-    assert best <= len(against_greedy.greedy(few, mode, tolerance))
+    assert best <= len(body_reduction.greedy(few, mode, tolerance))
 
 
-def test_each_optimum_is_of_modes_that_depend_on_as_many_keys(body):
+def test_an_optimum_is_of_modes_that_depend_on_two_keys(body):
     with pytest.raises(ValueError, match="depends on others"):
-        optimum(body, "motor_spline", TOLERANCE)
-    with pytest.raises(ValueError, match="does not depend on four"):
-        optimum_of_four(body, "lerp_slerp", TOLERANCE)
+        body_reduction.optimum(body, "motor_spline")
 
 
 def test_greedy_keys_keep_to_the_tolerance_and_none_can_go(body):
-    keys = against_greedy.greedy(body, "lerp_slerp", TOLERANCE)
+    keys = body_reduction.greedy(body, "lerp_slerp")
     assert body.errors(body.shown_by_key_poses(keys, "lerp_slerp")).max() <= TOLERANCE
     for key in keys[1:-1]:
         assert body.errors(body.shown_by_key_poses(keys[keys != key], "lerp_slerp")).max() > TOLERANCE
 
 
 def test_decimate_is_as_good_and_leaves_the_rig_as_it_was(tmp_path):
-    rig = rigs.import_rig(made_up(tmp_path))
+    rig = import_rig(made_up(tmp_path))
     body = rig.body().of_size(1.7)
-    own, shared, decimated, imported = against_decimate.measure(rig, body, "motor_spline", TOLERANCE)
+    own, shared, decimated, imported = body_reduction.beside_decimate(rig, body)
     varying = int((body.moving + body.turning).sum())
     assert max(own.largest, shared.largest, decimated.largest) <= TOLERANCE * (1.0 + 1e-6)
     assert imported.largest < 1e-5
@@ -145,52 +136,34 @@ def test_decimate_is_as_good_and_leaves_the_rig_as_it_was(tmp_path):
 
 
 def test_tracks_are_counted_apart(body):
-    keys = reduce_skeleton_keys(body.times, body.poses, body.parents, tolerance=TOLERANCE)
+    keys = body_reduction.reduced(body)
     hip, knee, _ = (len(own) for own in keys)
     # The hip moves and turns, the knee turns; the foot does neither, and is not at its identity.
-    varying, everything = against_published.track_keys(body, keys)
+    varying, constant = body_reduction.track_keys(body, keys)
     assert varying == 2 * hip + knee
-    assert 0 < everything - varying <= 3
+    assert 0 < constant <= 3
 
 
 def test_a_foot_that_stands_is_found_and_its_slide_measured(body):
-    standing = feet.contacts(body)
-    assert [contact.joint for contact in standing] == [2]
-    assert standing[0].start == 0
-    assert standing[0].end <= body.frames / 3 + 1
-    assert feet.slide(body.truth.positions, standing).largest < 0.01
+    ((joint, start, end),) = standing = body_reduction.contacts(body)
+    assert (joint, start) == (2, 0)
+    assert end <= body.frames / 3 + 1
+    assert body_reduction.slide(body.truth.positions, standing)["largest_mm"] < 10.0
     slipped = body.truth.positions.copy()
     slipped[2, 3, 0] += 0.1
-    assert feet.slide(slipped, standing).largest == pytest.approx(0.1, abs=0.01)
+    assert body_reduction.slide(slipped, standing)["largest_mm"] == pytest.approx(100.0, abs=10.0)
 
 
-def test_a_cycle_goes_on(body):
-    on = repeated(body, 60)
-    assert on.frames == 60
-    steps = np.linalg.norm(np.diff(on.truth.positions[0], axis=0), axis=1)
-    assert steps.max() < 1.5 * np.linalg.norm(np.diff(body.truth.positions[0], axis=0), axis=1).max()
-    assert np.allclose(on.poses.positions[:, : body.frames - 1], body.poses.positions[:, :-1])
-
-
-def test_the_page_has_a_section_of_bodies(tmp_path, monkeypatch):
+def test_the_study_writes_what_the_page_reads(tmp_path, monkeypatch):
     path = made_up(tmp_path)
-    clip = Poses(np.linspace(0.0, 1.0, 20)[:, None] ** 2 * (1.0, 0.0, 0.0), np.tile((1.0, 0.0, 0.0, 0.0), (20, 1)))
-    monkeypatch.setattr(reduction, "files", lambda _folder: [])
-    monkeypatch.setattr(reduction, "report", lambda *_: [])
-    monkeypatch.setattr(page, "CYCLE", "leg")
-    monkeypatch.setattr(page, "CYCLE_FRAMES", 12)
-    monkeypatch.setattr(page, "LONG", "leg")
-    monkeypatch.setattr(against_greedy, "SHORT", 0)
-    monkeypatch.setattr(against_decimate, "TRIALS", 4)
-    monkeypatch.setattr(timing, "RUNS", 1)
-    monkeypatch.setattr(against_published, "OZZ_BODY", "leg")
-    lines = list(page.section([path], [("clip", 30.0, clip)]))
-    assert "## Whole bodies" in lines
-    assert not [line for line in lines if len(line) > 120 and not line.startswith("|")]
-    assert str(tmp_path) not in "\n".join(lines)
-    assert len([line for line in lines if line.startswith("### ")]) == 6
-    output = tmp_path / "reduction.md"
-    monkeypatch.setattr(reduction, "section", lambda bodies, _recordings: [f"{len(bodies)} bodies"])
-    assert reduction.main(["--bodies", str(tmp_path), "--output", str(output)]) == 0
-    assert "--bodies ...`" in output.read_text(encoding="utf-8")
-    assert "1 bodies" in output.read_text(encoding="utf-8")
+    recording = reduction.read(reduction.ASSETS / "reach.csv", 15.0)
+    monkeypatch.setattr(reduction, "files", lambda _folder: ["reach.csv"])
+    monkeypatch.setattr(reduction, "read", lambda _path, _rate: recording)
+    monkeypatch.setattr(body_reduction, "OZZ_BODY", "leg")
+    monkeypatch.setattr(body_reduction, "TRIALS", 4)
+    assert reduction.main(["--bodies", str(path), "--root", str(tmp_path)]) == 0
+    found = written(tmp_path, "reduction")
+    assert str(tmp_path) not in str(found)
+    assert [row["how"] for row in found["feet"][1:4:2]] == ["each joint its own", "key poses"]
+    own, decimate = found["decimate"][0], found["decimate"][2]
+    assert found["decimate_means"][own["how"]]["numbers"] == pytest.approx(decimate["numbers"] / own["numbers"], 1e-5)
