@@ -15,7 +15,7 @@ import numpy as np
 DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
-from research.markup import Markup, element
+from docs.drawing import bars, drawing, element, polyline, poses_of
 from rigid_motion.motion import MODES, Poses, interpolate
 from rigid_motion_batch.files import write_text
 from rigid_motion_batch.palette import THEMES, colour_of, colour_on
@@ -60,29 +60,17 @@ def main() -> None:
     """Write a picture for each mode."""
     for mode in MODES:
         style = STYLE.replace("LIGHT", colour_on(THEMES["light"], mode)).replace("DARK", colour_of(mode))
-        picture = element(
-            "svg",
-            element("title", f"{MODES[mode].label}: path and speed"),
-            element("style", Markup(style)),
-            path_of(mode),
-            speed_of(mode),
-            xmlns="http://www.w3.org/2000/svg",
-            viewBox=f"0 0 {WIDTH} {HEIGHT}",
-            width=WIDTH,
-            height=HEIGHT,
-            role="img",
-        )
-        write_text(DOCS / "modes" / f"{mode}.svg", picture + "\n")
+        parts = *path_of(mode), *speed_of(mode)
+        picture = drawing(f"{MODES[mode].label}: path and speed", style, WIDTH, HEIGHT, *parts)
+        write_text(DOCS / "modes" / f"{mode}.svg", picture)
 
 
 def keys() -> Poses:
     """The three of `POINTS`, `DEGREES` and `SIZES`, in a plane."""
-    half = 0.5 * np.radians(DEGREES)
-    turned = np.stack((np.cos(half), 0.0 * half, 0.0 * half, np.sin(half)), axis=1)
-    return Poses(np.column_stack((POINTS, np.zeros(len(POINTS)))), turned, SIZES)
+    return poses_of(POINTS, DEGREES, SIZES)
 
 
-def path_of(mode: str) -> list[Markup]:
+def path_of(mode: str) -> list[str]:
     """The way of the body's middle, and the body at even times, thick on the keys."""
     way = interpolate(TIMES, keys(), moments(FINE), mode)
     bodies = interpolate(TIMES, keys(), moments(STEPS), mode)
@@ -90,15 +78,15 @@ def path_of(mode: str) -> list[Markup]:
         element("circle", cx=x, cy=y, r=2.5, class_="dot") for x, y in _on_paper(bodies.positions).round(1).tolist()
     ]
     return [
-        element("path", d=bars(bodies), class_="mode body"),
+        element("path", d=strokes(bodies), class_="mode body"),
         element("path", d=polyline(_on_paper(way.positions)), class_="mode path"),
         *dots,
-        element("path", d=bars(keys()), class_="key"),
+        element("path", d=strokes(keys()), class_="key"),
         element("text", "path; a bar is the body, at even times", x=20, y=28, class_="words"),
     ]
 
 
-def speed_of(mode: str) -> list[Markup]:
+def speed_of(mode: str) -> list[str]:
     """How fast the body's middle is, over time."""
     times = moments(FINE)
     positions = interpolate(TIMES, keys(), times, mode).positions
@@ -122,21 +110,13 @@ def moments(count: int) -> np.ndarray:
     return np.linspace(TIMES[0], TIMES[-1], count * (len(TIMES) - 1) + 1)
 
 
-def bars(poses: Poses) -> str:
-    """The body, along its own y axis, as an SVG path."""
-    angles = 2.0 * np.arctan2(poses.quaternions[:, 3], poses.quaternions[:, 0])
-    along = HALF * np.stack((-np.sin(angles), np.cos(angles)), axis=1) * poses.scales[:, None]
-    ends = [_on_paper(poses.positions[:, :2] + sign * along) for sign in (-1.0, 1.0)]
-    return "".join(f"M{a:.1f} {b:.1f}L{c:.1f} {d:.1f}" for (a, b), (c, d) in zip(*ends, strict=True))
-
-
-def polyline(points: np.ndarray) -> str:
-    """A line through points (n, 2) in pixels."""
-    return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
+def strokes(poses: Poses) -> str:
+    """The bodies as an SVG path."""
+    return "".join(map(polyline, _on_paper(bars(poses, HALF))))
 
 
 def _on_paper(points: np.ndarray) -> np.ndarray:
-    return np.stack((LEFT + SCALE * points[:, 0], BASE - SCALE * points[:, 1]), axis=1)
+    return np.stack((LEFT + SCALE * points[..., 0], BASE - SCALE * points[..., 1]), axis=-1)
 
 
 if __name__ == "__main__":

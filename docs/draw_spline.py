@@ -14,7 +14,7 @@ import numpy as np
 DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
-from research.markup import Markup, element
+from docs.drawing import bars, drawing, element, polyline, poses_of
 from rigid_motion.motion import Poses, curves, interpolate
 from rigid_motion_batch.files import write_text
 
@@ -45,9 +45,7 @@ text{font:14px system-ui,"Segoe UI",Roboto,"Liberation Sans",sans-serif}
 
 def keys() -> Poses:
     """An arch, walked at a steady pace but for the step from the second key to the third, which takes one frame."""
-    half = 0.5 * np.radians(DEGREES)
-    turned = np.stack((np.cos(half), 0.0 * half, 0.0 * half, np.sin(half)), axis=1)
-    return Poses(np.column_stack((POINTS, np.zeros(len(POINTS)))), turned)
+    return poses_of(POINTS, DEGREES)
 
 
 def parabola(before: np.ndarray, after: np.ndarray) -> np.ndarray:
@@ -59,51 +57,40 @@ def main() -> None:
     """Write docs/spline.svg."""
     with mock.patch.object(curves, "_shares", parabola):
         before = motion("before")
-    parts = [before, motion("after"), [_key(frame, pose) for frame, pose in zip(FRAMES, _bars(keys()), strict=True)]]
-    picture = element(
-        "svg",
-        element("title", "The same keys with the parabola's twists, which loop out, and with bounded ones"),
-        element("style", Markup(STYLE)),
+    marks = [_key(frame, bar) for frame, bar in zip(FRAMES, _on_paper(bars(keys(), HALF)), strict=True)]
+    picture = drawing(
+        "The same keys with the parabola's twists, which loop out, and with bounded ones",
+        STYLE,
+        WIDTH,
+        HEIGHT,
         element("rect", width=WIDTH, height=HEIGHT, class_="paper"),
-        parts,
+        before,
+        motion("after"),
+        *marks,
         element("text", "before: the twists of the parabola through three keys", x=20, y=28, class_="before-words"),
         element("text", "now: the short segment counts no more than short / long", x=20, y=50, class_="after-words"),
         element("text", "keys at frames 1, 13, 14, 26 and 38; a bar a frame", x=20, y=HEIGHT - 16, class_="ink"),
-        xmlns="http://www.w3.org/2000/svg",
-        viewBox=f"0 0 {WIDTH} {HEIGHT}",
-        width=WIDTH,
-        height=HEIGHT,
-        role="img",
     )
-    write_text(DOCS / "spline.svg", picture + "\n")
+    write_text(DOCS / "spline.svg", picture)
 
 
-def motion(name: str) -> list[Markup]:
+def motion(name: str) -> str:
     """The path of the body's middle, and the body on every frame."""
     fine = interpolate(FRAMES, keys(), np.linspace(FRAMES[0], FRAMES[-1], 600), "motor_spline")
     frames = interpolate(FRAMES, keys(), np.arange(FRAMES[0], FRAMES[-1] + 1.0), "motor_spline")
-    bars = "".join(f"M{a[0]:.1f} {a[1]:.1f}L{b[0]:.1f} {b[1]:.1f}" for a, b in _bars(frames))
-    path = "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in _on_paper(fine.positions))
-    return [element("path", d=bars, class_=f"{name} body"), element("path", d=path, class_=f"{name} path")]
+    bodies = "".join(map(polyline, _on_paper(bars(frames, HALF))))
+    path = polyline(_on_paper(fine.positions))
+    return element("path", d=bodies, class_=f"{name} body") + element("path", d=path, class_=f"{name} path")
 
 
-def _key(frame: float, bar: np.ndarray) -> list[Markup]:
-    (x0, y0), (x1, y1) = bar.round(1).tolist()
-    return [
-        element("path", d=f"M{x0} {y0}L{x1} {y1}", class_="key"),
-        element("text", f"{frame:.0f}", x=x0, y=y0 + 18, class_="ink halo", text_anchor="middle"),
-    ]
-
-
-def _bars(poses: Poses) -> np.ndarray:
-    """Both ends of the bar, along the body's y axis, shape (n, 2, 2)."""
-    angles = 2.0 * np.arctan2(poses.quaternions[:, 3], poses.quaternions[:, 0])
-    along = HALF * np.stack((-np.sin(angles), np.cos(angles)), axis=1)
-    return np.stack([_on_paper(poses.positions[:, :2] + sign * along) for sign in (-1.0, 1.0)], axis=1)
+def _key(frame: float, bar: np.ndarray) -> str:
+    x0, y0 = bar[0].round(1).tolist()
+    words = element("text", f"{frame:.0f}", x=x0, y=y0 + 18, class_="ink halo", text_anchor="middle")
+    return element("path", d=polyline(bar), class_="key") + words
 
 
 def _on_paper(points: np.ndarray) -> np.ndarray:
-    return np.stack((LEFT + SCALE * points[:, 0], BASE - SCALE * points[:, 1]), axis=1)
+    return np.stack((LEFT + SCALE * points[..., 0], BASE - SCALE * points[..., 1]), axis=-1)
 
 
 if __name__ == "__main__":

@@ -1,24 +1,18 @@
 """Poses a second of every mode, beside the libraries that offer the same motion, in one run on this machine.
 
     python scripts/research benchmark
-    python scripts/research benchmark --rounds 30 --output docs/benchmark.md
+    python scripts/research benchmark --rounds 30
 
-Each way of computing starts from the keys (positions and quaternions) and ends with positions and quaternions. All ways
-take turns, round by round, so that a machine that slows down slows all of them. The number is that of a way's fastest
-round; compare the ratios. "In the algebra" is the mode written out in NumPy as in the paper, computed anew for every
-in-between (this program's own reference); "closed form" is the best formula known to this program without a table of
-segments. Key reduction is timed on made-up recordings of growing length, beside the greedy insertion that one would
-write first; `python scripts/research reduction` times real recordings and whole bodies. It needs the packages of the
-extra `benchmark`; pypose (its SE(3) B-spline) is measured where it is installed.
+All ways of computing take turns, round by round, and the fastest round counts. It needs the packages of the extra
+`benchmark`; pypose (its SE(3) B-spline) is measured where it is installed.
 """
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytransform3d
@@ -37,12 +31,12 @@ try:
 except ImportError:
     pypose = None
 
-from research.publishing import opening, publish
-from research.summaries import of_speed
+from research.publishing import publish, say, study_parser
 from rigid_motion.motion import MODES, Poses, interpolate, reduce_keys, shell_error, twists
 from rigid_motion.motion.quaternions import align_signs, multiply
 from rigid_motion.motion.trigonometry import VECTOR_TANGENT
-from rigid_motion_batch.command_line import parser_of
+
+OURS = "Rigid Motion"
 
 ENOUGH = 4.0
 """Seconds after which one way of computing a case has been measured well enough."""
@@ -80,12 +74,13 @@ def cases(count: int) -> Iterator[Case]:
         poses = Poses(random.normal(size=(objects, keys, 3)), align_signs(quaternions))
         return Case(title, np.arange(float(keys)), poses, times)
 
-    yield case("a path, 1000 in-betweens to a segment", 1, count // 1000 + 1, np.arange(count) / 1000.0)
+    yield case("A path, 1000 in-betweens to a segment", 1, count // 1000 + 1, np.arange(count) / 1000.0)
     yield case(
-        "a recording, 9 samples to a segment, uneven", 1, count // 9 + 1, np.sort(random.uniform(0, count // 9, count))
+        "A recording, 9 samples to a segment, uneven", 1, count // 9 + 1, np.sort(random.uniform(0, count // 9, count))
     )
-    yield case("2000 objects, 10 segments, 24 frames each", 2000, 11, np.arange(240) / 24.0)
-    yield case("independent pairs", count, 2, random.uniform(size=(count, 1)))
+    objects = count // 50
+    yield case(f"{objects} objects, 10 segments, 24 frames each", objects, 11, np.arange(240) / 24.0)
+    yield case("Independent pairs", count, 2, random.uniform(size=(count, 1)))
 
 
 def numpy_closed_form(case: Case, mode: str) -> Callable[[], object]:
@@ -199,7 +194,7 @@ def ways(case: Case) -> dict[tuple[str, str], Callable[[], object]]:
     """(mode, who computes it) to what computes it."""
     result: dict[tuple[str, str], Callable[[], object]] = {}
     for mode in MODES:
-        result[mode, "Rigid Motion"] = lambda mode=mode: interpolate(case.key_times, case.keys, case.times, mode)
+        result[mode, OURS] = lambda mode=mode: interpolate(case.key_times, case.keys, case.times, mode)
         if not MODES[mode].is_smooth:
             result[mode, "NumPy, in the algebra"] = numpy_algebra(case, mode)
     for mode in ("lerp_slerp", "dq_sclerp", "pga_lerp"):
@@ -231,36 +226,18 @@ def race(contestants: dict[tuple[str, str], Callable[[], object]], rounds: int) 
     return seconds
 
 
-def report(case: Case, seconds: dict[tuple[str, str], list[float]]) -> Iterator[str]:
-    """The case as lines of Markdown: million poses a second, and this program's multiple of each peer."""
+def rates(case: Case, seconds: dict[tuple[str, str], list[float]]) -> list[dict[str, Any]]:
+    """Million poses a second, and this program's multiple of each peer."""
     fastest = {name: min(times) for name, times in seconds.items()}
-    yield f"## {case.title[0].upper()}{case.title[1:]}"
-    yield ""
-    yield f"{case.in_betweens} in-betweens from {case.keys.shape[0] * case.keys.shape[1]} keys."
-    yield ""
-    yield "| mode | computed by | million poses/s | Rigid Motion is faster by |"
-    yield "|---|---|---:|---:|"
-    for (mode, who), best in fastest.items():
-        ratio = "" if who == "Rigid Motion" else f"{best / fastest[mode, 'Rigid Motion']:.1f} times"
-        yield f"| `{mode}` | {who} | {case.in_betweens / best / 1e6:.2f} | {ratio} |"
-    blend = fastest["pga_lerp", "Rigid Motion"]
-    beside = [f"{changed(blend / fastest[mode, 'Rigid Motion'])} than `{mode}`" for mode in ("lerp_slerp", "dq_sclerp")]
-    yield ""
-    yield f"`pga_lerp` takes {' and '.join(beside)}, all in their fast form."
-    yield ""
-
-
-def changed(ratio: float) -> str:
-    """How much less or more time it is, in words."""
-    share = f"{abs(1.0 - ratio):.0%}"
-    return "as much time a pose" if share == "0%" else f"{share} {'less' if ratio < 1.0 else 'more'} time a pose"
-
-
-def sines() -> str:
-    """Where sines come from in this run, for the figures depend on it."""
-    if VECTOR_TANGENT:
-        return "NumPy's tangent has vector code on this processor, and sines are made of it."
-    return "NumPy's tangent has no vector code on this processor, and sines come from a polynomial."
+    return [
+        {
+            "mode": mode,
+            "by": who,
+            "millions": case.in_betweens / best / 1e6,
+            "faster_by": None if who == OURS else best / fastest[mode, OURS],
+        }
+        for (mode, who), best in fastest.items()
+    ]
 
 
 def recording(count: int) -> tuple[np.ndarray, Poses]:
@@ -290,52 +267,36 @@ def greedy(times: np.ndarray, poses: Poses, tolerance: float) -> np.ndarray:
         keys = np.union1d(keys, [keys[i] + int(np.argmax(errors[keys[i] : ends[i + 1]])) for i in over])
 
 
-def reductions(counts: tuple[int, ...], tolerance: float = 0.005) -> Iterator[str]:
-    """Key reduction as lines of Markdown, beside greedy insertion."""
-    yield "## Key reduction"
-    yield ""
-    yield (
-        f"A made-up hand at 90 samples a second, `motor_spline` within {tolerance * 1e3:g} mm at a radius of 0.1 m; "
-        "seconds, the faster of two runs, and keys."
-    )
-    yield ""
-    yield "| samples | `reduce_keys`, s | µs a sample | keys | greedy insertion, s | keys |"
-    yield "|---:|---:|---:|---:|---:|---:|"
-    for count in counts:
-        times, poses = recording(count)
-        seconds, found = {}, {}
-        for name, choose in (("ours", reduce_keys), ("greedy", greedy)):
-            options = {"tolerance": tolerance}
-            for _ in range(2):
-                start = time.perf_counter()
-                found[name] = len(choose(times, poses, **options))
-                seconds[name] = min(seconds.get(name, np.inf), time.perf_counter() - start)
-        yield (
-            f"| {count} | {seconds['ours']:.2f} | {seconds['ours'] / count * 1e6:.0f} | {found['ours']} "
-            f"| {seconds['greedy']:.2f} | {found['greedy']} |"
-        )
-    yield ""
+def reduction(count: int, tolerance: float = 0.005) -> dict[str, float]:
+    """Key reduction of so many samples, beside greedy insertion: the faster of two runs."""
+    times, poses = recording(count)
+    seconds: dict[str, list[float]] = {"": [], "greedy_": []}
+    found: dict[str, float] = {"samples": count}
+    for _ in range(2):
+        for name, choose in (("", reduce_keys), ("greedy_", greedy)):
+            start = time.perf_counter()
+            keys = choose(times, poses, tolerance=tolerance)
+            seconds[name].append(time.perf_counter() - start)
+            found |= {f"{name}seconds": min(seconds[name]), f"{name}key_count": len(keys)}
+    return found
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run all cases; print, and write where asked."""
-    parser = parser_of("benchmark.py", __doc__)
+    """Run all cases, and write the figures."""
+    parser = study_parser("benchmark", __doc__)
     parser.add_argument("--count", type=int, default=100_000, help="in-betweens in a case (%(default)s)")
     parser.add_argument("--rounds", type=int, default=50, help="rounds of all against all (%(default)s)")
-    parser.add_argument("--output", type=Path, help="a Markdown file to write the tables to")
     options = parser.parse_args(arguments)
-    lines = opening(
-        "Benchmark",
-        f"python scripts/research benchmark --rounds {options.rounds}",
-        __doc__,
-        SciPy=scipy.__version__,
-        pytransform3d=pytransform3d.__version__,
-    )
-    lines += [sines(), ""]
+    found = []
     for case in cases(options.count):
-        print(f"{case.title} ...", file=sys.stderr, flush=True)
-        lines += report(case, race(ways(case), options.rounds))
-    print("key reduction ...", file=sys.stderr, flush=True)
-    lines += reductions((900, 1000, 10_000, options.count))
-    publish(lines, options.output, of_speed)
-    return 0
+        say(case.title)
+        about = {"title": case.title, "in_betweens": case.in_betweens, "key_count": int(np.prod(case.keys.shape))}
+        found.append({**about, "rates": rates(case, race(ways(case), options.rounds))})
+    say("key reduction")
+    figures = {
+        "vector_tangent": bool(VECTOR_TANGENT),
+        "cases": found,
+        "reductions": [reduction(count) for count in (900, 1000, options.count // 10, options.count)],
+    }
+    versions = {"SciPy": scipy.__version__, "pytransform3d": pytransform3d.__version__}
+    return publish("benchmark", figures, options, "--rounds", options.rounds, **versions)

@@ -2,19 +2,16 @@
 
     python scripts/research benchmark_batch
     python scripts/research benchmark_batch --clips 40 --films 4 --rounds 1
-    python scripts/research benchmark_batch --output docs/benchmark_batch.md
 
-Clips are pieces of the recordings in `assets/`, each moved to another place, so that no two are alike. `compare.py`
-processes all of them with one worker and with two in turn, each time into a new folder; the numbers are those of the
-fastest round. Where Blender renders on the processor, a single worker uses several processors, so one worker is also
-measured on a single processor (on Linux). The folders are made where `TMPDIR` says, and deleted only at the end: for
-minutes after many files were deleted, ext4 takes several times as long to make new ones. Memory is the most that a
-process used (on Linux; elsewhere it is left out): the program itself over the number of clips, and its largest worker
-over the length of one clip. Compare the ratios; the times depend on the machine.
+Clips are pieces of the recordings in `assets/`. The numbers are those of the fastest round. The folders are made where
+`TMPDIR` says, and deleted only at the end: for minutes after many files were deleted, ext4 takes several times as long
+to make new ones.
 """
 
 from __future__ import annotations
 
+import contextlib
+import json
 import os
 import subprocess
 import sys
@@ -23,13 +20,13 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from research.publishing import more_or_less, opening, publish
-from research.summaries import of_batch
-from rigid_motion_batch.command_line import parser_of
-from rigid_motion_batch.pipeline.store import Store
+from research.publishing import publish, say, study_parser
+from rigid_motion_batch.pipeline.steps import OWN
+from rigid_motion_batch.pipeline.store import INDEX
 from rigid_motion_batch.places import ASSETS, PACKAGE
 
 SECONDS = 2.0
@@ -37,9 +34,6 @@ SECONDS = 2.0
 
 RATE = 90.0
 """Samples a second of the clip whose length grows."""
-
-SAMPLE = 8 * 8
-"""Bytes of a sample as it is read: time, position and quaternion."""
 
 FEW = 20
 """Clips to compare the memory with."""
@@ -60,11 +54,8 @@ class Run:
     worker: int
     """The most memory of any process that it started."""
 
-    work: float
-    """Seconds of all tasks together."""
-
     rendering: float
-    """Seconds of those in which Blender rendered."""
+    """What Blender's renderer takes of the seconds of all tasks together."""
 
 
 def pieces(count: int) -> Iterator[str]:
@@ -94,38 +85,37 @@ def wandering(samples: int) -> str:
 def compare(clips: Sequence[Path], folder: Path, jobs: int, *options: str, alone: bool = False) -> Run:
     """Run `compare.py` on some clips, on a single processor if it is to be alone, into a new folder in that one."""
     output = Path(tempfile.mkdtemp(dir=folder))
-    command = [
-        sys.executable,
-        "-m",
-        "rigid_motion_batch",
-        "compare",
-        *clips,
-        "--output",
-        output,
-        "--jobs",
-        str(jobs),
-        *options,
-    ]
-    started = time.perf_counter()
-    own = worker = 0
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, cwd=PACKAGE.parent) as process:
+    command = [sys.executable, "-m", "rigid_motion_batch", "compare", *clips, "--output", output, "--jobs", str(jobs)]
+    started, own, worker = time.perf_counter(), 0, 0
+    tasks: dict[str, dict[str, Any]] = {}
+    with (
+        tempfile.TemporaryFile() as said,
+        subprocess.Popen([*command, *options], stdout=subprocess.DEVNULL, stderr=said, cwd=PACKAGE.parent) as process,
+    ):
         if alone:
             os.sched_setaffinity(process.pid, {min(os.sched_getaffinity(0))})
-        os.set_blocking(process.stderr.fileno(), False)
-        said = b""
         while process.poll() is None:
             own = max(own, peak_memory_of(process.pid))
             worker = max([worker, *map(peak_memory_of, children_of(process.pid))])
-            said += process.stderr.read() or b""
+            note_tasks(output, tasks)
             time.sleep(POLL)
         seconds = time.perf_counter() - started
-        said += process.stderr.read() or b""
-    if process.returncode:
-        raise RuntimeError(f"compare.py ended with {process.returncode}: {said.decode(errors='replace')[-2000:]}")
-    store = Store(output)
-    tasks = [result.index for result in store.latest().values()]
-    rendering = sum(task["facts"].get("rendering", 0.0) for task in tasks)
-    return Run(seconds, own, worker, sum(task["seconds"] for task in tasks), rendering)
+        if process.returncode:
+            said.seek(0)
+            raise RuntimeError(
+                f"compare ended with {process.returncode}: {said.read().decode(errors='replace')[-2000:]}"
+            )
+    note_tasks(output, tasks)
+    rendering = sum(task["facts"].get("rendering", 0.0) for task in tasks.values())
+    return Run(seconds, own, worker, rendering / sum(task["seconds"] for task in tasks.values()))
+
+
+def note_tasks(output: Path, tasks: dict[str, dict[str, Any]]) -> None:
+    """Add the tasks that are done, while their results are there: those of pieces of a film go when it is whole."""
+    for path in output.glob(f"{OWN}/results/*/{INDEX}"):
+        if path.parent.name not in tasks:
+            with contextlib.suppress(OSError, ValueError):
+                tasks[path.parent.name] = json.loads(path.read_text(encoding="utf-8"))
 
 
 def peak_memory_of(process: int) -> int:
@@ -145,90 +135,69 @@ def children_of(pid: int) -> list[int]:
         return []
 
 
-def workers(title: str, clips: Sequence[Path], folder: Path, rounds: int, *options: str) -> Iterator[str]:
-    """One worker beside two, as lines of Markdown."""
+def workers(clips: Sequence[Path], folder: Path, rounds: int, *options: str) -> list[dict[str, Any]]:
+    """One worker beside two, and beside one that has a single processor."""
     runs: dict[tuple[int, bool], list[Run]] = {(1, False): [], (2, False): []}
     if hasattr(os, "sched_setaffinity"):
         runs[1, True] = []
     for _ in range(rounds):
-        for (jobs, alone), some in runs.items():
-            say(f"{title}, {jobs} at work{' on one processor' if alone else ''} ...")
-            some.append(compare(clips, folder, jobs, *options, alone=alone))
-    best = {way: min(some, key=lambda run: run.seconds) for way, some in runs.items()}
-    yield f"## {title}"
-    yield ""
-    yield f"`compare.py CLIP... {' '.join(options)} --jobs N`"
-    yield ""
-    yield "| workers | seconds | clips a minute | as fast as one | at work, of the time of all | outside the renderer |"
-    yield "|---:|---:|---:|---:|---:|---:|"
-    for (jobs, alone), run in best.items():
-        outside = f"{1.0 - run.rendering / run.work:.1%}" if run.rendering else ""
-        yield (
-            f"| {jobs}{' on one processor' if alone else ''} | {run.seconds:.1f} "
-            f"| {60.0 * len(clips) / run.seconds:.0f} | {best[1, False].seconds / run.seconds:.2f} times "
-            f"| {run.work / run.seconds / jobs:.0%} | {outside} |"
-        )
-    yield ""
+        for (jobs, alone), made in runs.items():
+            say(f"{len(clips)} clips, {jobs} at work{' on one processor' if alone else ''}")
+            made.append(compare(clips, folder, jobs, *options, alone=alone))
+    best = {way: min(made, key=lambda run: run.seconds) for way, made in runs.items()}
+    return [
+        {
+            "workers": jobs,
+            "one_processor": alone,
+            "seconds": run.seconds,
+            "clips_a_minute": 60.0 * len(clips) / run.seconds,
+            "speedup": best[1, False].seconds / run.seconds,
+            "rendering": run.rendering or None,
+        }
+        for (jobs, alone), run in best.items()
+    ]
 
 
-def memory(folder: Path, clips: Sequence[Path], minutes: Sequence[int]) -> Iterator[str]:
-    """What the program and its workers take, as lines of Markdown."""
+def memory(folder: Path, clips: Sequence[Path], minutes: Sequence[int]) -> dict[str, list[dict[str, float]]]:
+    """What the program takes over the number of clips, and its workers over the length of one."""
     options = ("--no-video", "--rates", "10")
-    yield "## Memory"
-    yield ""
-    yield "| clips | of the program, MB | beside |"
-    yield "|---:|---:|---:|"
-    base = 0
+    programs, long = [], []
     for count in (FEW, len(clips)):
-        say(f"memory over {count} clips ...")
-        run = compare(clips[:count], folder, 2, *options)
-        base = base or run.own
-        yield f"| {count} | {run.own / 1e6:.0f} | {more_or_less(run.own / base) if base else ''} |"
-    yield ""
-    yield "| one clip of | samples | a worker at most, MB | more than for a clip of no length, a sample | seconds |"
-    yield "|---:|---:|---:|---:|---:|"
-    path = folder / "long.csv"
-    rest = 0
+        say(f"memory over {count} clips")
+        programs.append({"clips": count, "mb": compare(clips[:count], folder, 2, *options).own / 1e6})
+    path, rest = folder / "long.csv", 0
     for length in (0, *minutes):
         samples = int(length * 60 * RATE) or 10
-        say(f"memory over {length} minutes ...")
+        say(f"memory over {length} minutes")
         path.write_text(wandering(samples), encoding="utf-8")
         run = compare([path], folder, 1, *options)
-        if not length:
-            rest = run.worker
-            continue
-        more = (run.worker - rest) / samples
-        times = f"{more:.0f} bytes, {more / SAMPLE:.0f} times what it takes itself"
-        yield f"| {length} min | {samples} | {run.worker / 1e6:.0f} | {times} | {run.seconds:.1f} |"
-    yield ""
-
-
-def say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
+        rest = rest or run.worker
+        if length:
+            figures = {"mb": run.worker / 1e6, "bytes_a_sample": (run.worker - rest) / samples, "seconds": run.seconds}
+            long.append({"minutes": length, "samples": samples, **figures})
+    return {"programs": programs, "workers": long}
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run everything; print, and write where asked."""
-    parser = parser_of("benchmark_batch.py", __doc__)
+    """Run everything, and write the figures."""
+    parser = study_parser("benchmark_batch", __doc__)
     parser.add_argument("--clips", type=int, default=200, help="without video (%(default)s)")
     parser.add_argument("--films", type=int, default=12, help="clips with video (%(default)s)")
-    parser.add_argument("--minutes", default="6,30,60", metavar="N,...", help="lengths of the long clip (%(default)s)")
+    parser.add_argument("--minutes", default="6,60", metavar="N,...", help="lengths of the long clip (%(default)s)")
     parser.add_argument("--rounds", type=int, default=3, help="of one worker and two in turns (%(default)s)")
-    parser.add_argument("--output", type=Path, help="a Markdown file to write the tables to")
     options = parser.parse_args(arguments)
-    given = f"--clips {options.clips} --films {options.films} --minutes {options.minutes} --rounds {options.rounds}"
-    command = f"python scripts/research benchmark_batch {given}"
-    lines = opening("Benchmark of many clips", command, __doc__, processors=os.cpu_count())
     with tempfile.TemporaryDirectory() as made:
         folder = Path(made)
         clips = [folder / f"clip_{number:04}.csv" for number in range(max(options.clips, options.films))]
         for path, text in zip(clips, pieces(len(clips)), strict=True):
             path.write_text(text, encoding="utf-8")
         small = ("--rates", "10", "--modes", "lerp_slerp,dq_sclerp,motor_spline", "--resolution", "640x360")
-        lines += workers(
-            f"{options.clips} clips, numbers only", clips[: options.clips], folder, options.rounds, "--no-video"
-        )
-        lines += workers(f"{options.films} clips with video", clips[: options.films], folder, options.rounds, *small)
-        lines += memory(folder, clips[: options.clips], [int(part) for part in options.minutes.split(",")])
-    publish(lines, options.output, of_batch)
-    return 0
+        figures = {
+            "clips": options.clips,
+            "films": options.films,
+            "numbers": workers(clips[: options.clips], folder, options.rounds, "--no-video"),
+            "videos": workers(clips[: options.films], folder, options.rounds, *small),
+            **memory(folder, clips[: options.clips], [int(part) for part in options.minutes.split(",")]),
+        }
+    given = f"--clips {options.clips} --films {options.films} --minutes {options.minutes} --rounds {options.rounds}"
+    return publish("benchmark_batch", figures, options, given, processors=os.cpu_count())

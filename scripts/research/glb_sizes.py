@@ -1,15 +1,10 @@
 """Animations of GLB files made smaller: reduce, gltf-transform and gltfpack side by side.
 
     python scripts/research glb_sizes walk.fbx run.bvh --tools FOLDER
-    python scripts/research glb_sizes walk.fbx --tools FOLDER --output docs/benchmark_glb.md
 
 `--tools` is the folder with the programs `gltfpack` and `gltf-transform`, as `npm install gltfpack
-@gltf-transform/cli` puts them into `node_modules/.bin`; each that is missing is left out.
-
-Each body is scaled to 1.7 m and exported by Blender's own exporter, a key on every frame. All files
-are read by this page's own few lines, which share nothing with the program, and played by 4 x 4 matrices at eighths of
-the gaps between the keys of both files. The error is the largest displacement of any joint's head, or of a point 3 cm
-from it along its axes, in the world. *Animation* counts the bytes of all keys: times and values.
+@gltf-transform/cli` puts them into `node_modules/.bin`; each that is missing is left out. The reader and the player
+here share nothing with the program; they need SciPy.
 """
 
 from __future__ import annotations
@@ -18,19 +13,19 @@ import json
 import shutil
 import struct
 import subprocess
-import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
 
-from research.publishing import opening
+from research.publishing import publish, say, study_parser
 from rigid_motion.gltf import Options, reduce_file
-from rigid_motion_batch.command_line import parser_of
-from rigid_motion_batch.files import write_text
+from rigid_motion_batch.analysis.metrics import geometric_mean
 
 HEIGHT = 1.7
 RADIUS = 0.03
@@ -66,20 +61,6 @@ class File:
     """Of the accessors of all clips."""
 
     file_bytes: int
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What a tool made of a clip."""
-
-    tool: str
-    animation_bytes: int
-    file_bytes: int
-    error: float
-    """Largest, in metres."""
-
-    within: tuple[float, float]
-    """Share of all joints and times that are within 0.1 and 1 mm."""
 
 
 def read(path: Path) -> File:
@@ -133,35 +114,6 @@ def read(path: Path) -> File:
     return File(names, parents, rest, longest, sum(map(size, accessors)), len(data))
 
 
-def slerp(times: np.ndarray, keys: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Return unit quaternions (x, y, z, w) at moments, by the shorter way between keys."""
-    after = np.clip(np.searchsorted(times, at, side="right"), 1, max(len(times) - 1, 1))
-    if len(times) == 1:
-        return np.repeat(keys, len(at), axis=0)
-    one, other = keys[after - 1], keys[after]
-    share = np.clip((at - times[after - 1]) / (times[after] - times[after - 1]), 0.0, 1.0)[:, None]
-    cosine = (one * other).sum(axis=1, keepdims=True)
-    other, cosine = np.where(cosine < 0.0, -other, other), np.minimum(np.abs(cosine), 1.0)
-    angle = np.arccos(cosine)
-    sine = np.where(angle > 1e-6, np.sin(angle), 1.0)
-    near = angle <= 1e-6
-    found = np.where(near, 1.0 - share, np.sin((1.0 - share) * angle) / sine) * one
-    found += np.where(near, share, np.sin(share * angle) / sine) * other
-    return found / np.linalg.norm(found, axis=1, keepdims=True)
-
-
-def matrices(location: np.ndarray, rotation: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Return matrices of shape (n, 4, 4)."""
-    x, y, z, w = rotation.T
-    found = np.zeros((len(x), 4, 4))
-    found[:, :3, 0] = np.stack((1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)), axis=1)
-    found[:, :3, 1] = np.stack((2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)), axis=1)
-    found[:, :3, 2] = np.stack((2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)), axis=1)
-    found[:, :3, :3] *= scale[:, None, :]
-    found[:, :3, 3], found[:, 3, 3] = location, 1.0
-    return found
-
-
 def points(file: File, at: np.ndarray) -> dict[str, np.ndarray]:
     """Return where each node's head and points beside it are in the world: name to shape (moments, 7, 3)."""
     channels = {(track.node, track.path): track for track in file.tracks}
@@ -169,17 +121,19 @@ def points(file: File, at: np.ndarray) -> dict[str, np.ndarray]:
 
     def values(node: int, path: str) -> np.ndarray:
         track = channels.get((node, path))
-        if track is None:
-            return np.repeat(file.rest[node][path][None], len(at), axis=0)
+        if track is None or len(track.times) == 1:
+            return np.repeat(file.rest[node][path][None] if track is None else track.values, len(at), axis=0)
         if track.steps:
             return track.values[np.clip(np.searchsorted(track.times, at, side="right") - 1, 0, None)]
         if path == "rotation":
-            return slerp(track.times, track.values, at)
+            return Slerp(track.times, Rotation.from_quat(track.values))(at.clip(*track.times[[0, -1]])).as_quat()
         return np.stack([np.interp(at, track.times, column) for column in track.values.T], axis=1)
 
     def world(node: int) -> np.ndarray:
         if node not in worlds:
-            own = matrices(*(values(node, path) for path in ("translation", "rotation", "scale")))
+            own = np.tile(np.eye(4), (len(at), 1, 1))
+            own[:, :3, :3] = Rotation.from_quat(values(node, "rotation")).as_matrix() * values(node, "scale")[:, None]
+            own[:, :3, 3] = values(node, "translation")
             worlds[node] = own if file.parents[node] < 0 else world(file.parents[node]) @ own
         return worlds[node]
 
@@ -193,14 +147,21 @@ def points(file: File, at: np.ndarray) -> dict[str, np.ndarray]:
     return found
 
 
-def beside(original: File, smaller: File, tool: str) -> Outcome:
-    """Return what a tool made of a clip, with its errors."""
+def beside(original: File, smaller: File, tool: str) -> dict[str, Any]:
+    """Return what a tool made of a clip, with its errors at eighths of the gaps between the keys of both files."""
     times = np.unique(np.concatenate([track.times for file in (original, smaller) for track in file.tracks]))
     eighths = np.unique((times[:-1, None] + np.diff(times)[:, None] * np.arange(8) / 8.0).ravel())
     one, other = points(original, eighths), points(smaller, eighths)
     errors = np.array([np.linalg.norm(one[name] - other[name], axis=2).max(axis=1) for name in one if name in other])
-    shares = tuple(float((errors <= limit).mean()) for limit in (1e-4, 1e-3))
-    return Outcome(tool, smaller.animation_bytes, smaller.file_bytes, float(errors.max()), shares)
+    return {
+        "tool": tool,
+        "animation_bytes": smaller.animation_bytes,
+        "share": smaller.animation_bytes / original.animation_bytes,
+        "file_bytes": smaller.file_bytes,
+        "error_mm": 1e3 * errors.max(),
+        "within_tenth": (errors <= 1e-4).mean(),
+        "within_one": (errors <= 1e-3).mean(),
+    }
 
 
 def export(path: Path, output: Path) -> None:
@@ -247,47 +208,34 @@ def tools_in(folder: Path | None) -> dict[str, Callable[[Path, Path], None]]:
     return ours | {name: run for name, run in others.items() if run}
 
 
-def measure(path: Path, tools: dict[str, Callable[[Path, Path], None]], folder: Path) -> Iterator[Outcome]:
-    """Yield what the exporter and each tool make of a body."""
+def measure(path: Path, tools: dict[str, Callable[[Path, Path], None]], folder: Path) -> list[dict[str, Any]]:
+    """Return what the exporter and each tool make of a body."""
     exported = folder / f"{path.stem}.glb"
     export(path, exported)
     original = read(exported)
-    yield beside(original, original, "exported by Blender")
+    found = [beside(original, original, "exported by Blender")]
     for number, (name, run) in enumerate(tools.items()):
         output = folder / f"{path.stem}-{number}.glb"
         run(exported, output)
-        yield beside(original, read(output), name)
+        found.append(beside(original, read(output), name))
+    return found
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, print, and write where asked."""
-    parser = parser_of("glb_sizes.py", __doc__)
+    """Measure, and write the figures."""
+    parser = study_parser("glb_sizes", __doc__)
     parser.add_argument("bodies", type=Path, nargs="+", metavar="PATH", help="FBX and BVH files")
     parser.add_argument("--tools", type=Path, metavar="FOLDER", help="where gltfpack and gltf-transform are")
-    parser.add_argument("--output", type=Path, help="a Markdown file to write the tables to")
     options = parser.parse_args(arguments)
-    tools = tools_in(options.tools)
-    command = f"python scripts/research glb_sizes ...{' --tools ...' if options.tools else ''}"
-    lines = opening("Animations of GLB files, made smaller", command, __doc__, Blender=bpy.app.version_string)
-    shares: dict[str, list[float]] = {}
-    titles = ("clip", "tool", "animation, bytes", "of the export", "file, bytes", "largest error, mm")
-    lines += [f"| {' | '.join((*titles, 'under 0.1 mm', 'under 1 mm'))} |"]
-    lines += ["|---|---|---:|---:|---:|---:|---:|---:|"]
+    tools, clips = tools_in(options.tools), []
     with tempfile.TemporaryDirectory() as folder:
         for path in options.bodies:
-            print(f"{path.name} ...", file=sys.stderr, flush=True)
-            outcomes = list(measure(path, tools, Path(folder)))
-            for number, one in enumerate(outcomes):
-                share = one.animation_bytes / outcomes[0].animation_bytes
-                shares.setdefault(one.tool, []).append(share)
-                lines.append(
-                    f"| {'' if number else path.stem} | {one.tool} | {one.animation_bytes} | {share:.3f} "
-                    f"| {one.file_bytes} | {1e3 * one.error:.2f} | {one.within[0]:.2%} | {one.within[1]:.2%} |"
-                )
-    lines += ["", "| tool | animation of the export, geometric mean |", "|---|---:|"]
-    lines += [f"| {tool} | {np.exp(np.log(found).mean()):.3f} |" for tool, found in shares.items()]
-    page = "\n".join(lines) + "\n"
-    print(page)
-    if options.output:
-        write_text(options.output, page)
-    return 0
+            say(path.name)
+            clips.append({"name": path.stem, "tools": measure(path, tools, Path(folder))})
+    shares = {one["tool"]: [] for one in clips[0]["tools"]}
+    for clip in clips:
+        for one in clip["tools"]:
+            shares[one["tool"]].append(one["share"])
+    figures = {"clips": clips, "means": {tool: geometric_mean(np.array(found)) for tool, found in shares.items()}}
+    given = f"...{' --tools ...' if options.tools else ''}"
+    return publish("benchmark_glb", figures, options, given, Blender=bpy.app.version_string)

@@ -2,54 +2,33 @@
 
     python scripts/research reduction
     python scripts/research reduction --recordings FOLDER --bodies FOLDER_OR_FILES
-    python scripts/research reduction --output docs/reduction.md
 
 Each recording is an object with a key of location and rotation on every frame, as Blender's users import it. *Reduce
-Keys to Poses* leaves the fewest keys that keep every point within `--radius` of the object's origin within
-`--tolerance`. Blender's Decimate thins each channel by itself, with free handles between its keys, and gets the largest
-error margin with which it is no worse, found by trials. Each cell has what *Reduce Keys to Poses* leaves, and then what
-Decimate does: frames with a key in any channel, which is how many poses an animator has to look after; keys in a
-channel; numbers to be stored, 6 for a key with free handles, and for a pose its frame and a value in each channel; and
-the largest error. The last column has Decimate's error where it may have keys on no more frames than the other. All
-errors are those of what Blender shows, on every frame.
+Keys to Poses* leaves the fewest keys within the tolerance; Decimate gets the largest error margin with which it is no
+worse, found by trials. All errors are those of what Blender shows, on every frame.
 """
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
 
-from research.publishing import opening, publish
-from research.summaries import of_reduction
-from research.whole_bodies import rigs
-from research.whole_bodies.section import section
+from research import body_reduction
+from research.bodies import body_files
+from research.publishing import publish, say, study_parser
 from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate, repair, shell_error
-from rigid_motion_batch.command_line import parser_of
+from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings import TrajectoryError, read_trajectories
 from rigid_motion_batch.recordings.reading import FORMATS
 from rigid_motion_batch.scenes.decimated_bodies import decimate
 
-ROTATION_MODES = {"QUATERNION": "quaternions", "XYZ": "Euler angles"}
-"""What they are called on the page."""
-
-COLUMNS = (
-    "recording",
-    "frames",
-    "frames with keys",
-    "keys in a channel",
-    "numbers",
-    "largest error, mm",
-    "Decimate's on as few frames, mm",
-)
-
-MULTIPLES = "*Decimate's, in multiples of the other's*"
+ROTATION_MODES = ("QUATERNION", "XYZ")
 
 TRIALS = 14
 """Error margins tried until Decimate is as good as the reduced poses."""
@@ -157,41 +136,32 @@ def measure(
     return reduced, as_good, as_few
 
 
-def report(recordings: Iterable[Recording], rotation_mode: str, tolerance: float, radius: float) -> Iterator[str]:
-    """The figures of an object that turns in this way, as lines of Markdown."""
-    yield f"## Turned by {ROTATION_MODES[rotation_mode]}"
-    yield ""
-    yield f"| {' | '.join(COLUMNS)} |"
-    yield "|---|" + "---:|" * (len(COLUMNS) - 1)
-    outcomes = []
-    for recording in recordings:
-        print(f"{recording.name}, {rotation_mode} ...", file=sys.stderr, flush=True)
-        outcomes.append(measure(recording, rotation_mode, tolerance, radius))
-        yield row(recording, *outcomes[-1])
-    yield means(outcomes)
-    yield ""
+def figures_of(one: Outcome | None) -> dict[str, float] | None:
+    """An outcome as figures; None where there is none."""
+    if one is None:
+        return None
+    return {"frames": one.frames, "key_count": one.keys, "numbers": one.numbers, "error_mm": 1e3 * one.largest}
 
 
-def row(recording: Recording, reduced: Outcome, as_good: Outcome | None, as_few: Outcome | None) -> str:
-    """The figures of a recording, empty where there are none."""
-    cells = (
-        [f"{reduced.frames} / {as_good.frames}", f"{reduced.keys:.0f} / {as_good.keys:.0f}"] if as_good else ["", ""]
-    )
-    cells += [f"{reduced.numbers} / {as_good.numbers}"] if as_good else [""]
-    cells += [f"{1e3 * reduced.largest:.2f} / {1e3 * as_good.largest:.2f}"] if as_good else [""]
-    cells += [f"{1e3 * as_few.largest:.2f}"] if as_few else [""]
-    return f"| {recording.name} | {len(recording.frames)} | {' | '.join(cells)} |"
+def row(recording: Recording, reduced: Outcome, as_good: Outcome | None, as_few: Outcome | None) -> dict[str, Any]:
+    """The figures of a recording."""
+    return {
+        "name": recording.name,
+        "frames": len(recording.frames),
+        "reduced": figures_of(reduced),
+        "decimate": figures_of(as_good),
+        "few_mm": as_few and 1e3 * as_few.largest,
+    }
 
 
-def means(outcomes: list[tuple[Outcome, Outcome | None, Outcome | None]]) -> str:
+def means(rows: list[dict[str, Any]]) -> dict[str, float]:
     """What Decimate has in multiples of reduced poses: geometric means over the recordings."""
-
-    def mean(name: str, which: int) -> str:
-        ratios = [getattr(one[which], name) / getattr(one[0], name) for one in outcomes if one[which]]
-        return f"{np.exp(np.log(ratios).mean()):.2f}" if ratios else ""
-
-    cells = [mean(name, 1) for name in ("frames", "keys", "numbers", "largest")]
-    return f"| {MULTIPLES} | | {' | '.join((*cells, mean('largest', 2)))} |"
+    both = [(row["reduced"], row["decimate"]) for row in rows if row["decimate"]]
+    found = {
+        name: geometric_mean(np.array([theirs[name] / ours[name] for ours, theirs in both])) for name in both[0][0]
+    }
+    few = [row["few_mm"] / row["reduced"]["error_mm"] for row in rows if row["few_mm"]]
+    return {**found, "few_mm": geometric_mean(np.array(few))}
 
 
 def files(folder: Path | None) -> list[Path]:
@@ -202,32 +172,37 @@ def files(folder: Path | None) -> list[Path]:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, print, and write where asked."""
-    parser = parser_of("reduction.py", __doc__)
+    """Measure, and write the figures."""
+    parser = study_parser("reduction", __doc__)
     parser.add_argument("--recordings", type=Path, metavar="FOLDER", help="more recordings, axes and unit as they are")
     parser.add_argument("--bodies", type=Path, nargs="+", default=[], metavar="PATH", help="BVH, FBX, folders of them")
     parser.add_argument("--tolerance", type=float, default=0.005, help="in metres (%(default)s)")
     parser.add_argument("--radius", type=float, default=0.1, help="of the shell, in metres (%(default)s)")
     parser.add_argument("--fps", type=float, default=60.0, help="frames a second (%(default)g)")
-    parser.add_argument("--output", type=Path, help="a Markdown file to write the tables to")
     options = parser.parse_args(arguments)
     try:
         recordings = [read(path, options.fps) for path in files(options.recordings)]
-        bodies = rigs.files(options.bodies)
+        bodies = body_files(options.bodies)
     except (TrajectoryError, OSError) as error:
         parser.error(str(error))
-    command = (
-        f"python scripts/research reduction --tolerance {options.tolerance:g} --radius {options.radius:g} "
-        f"--fps {options.fps:g}{' --recordings ...' if options.recordings else ''}{' --bodies ...' if bodies else ''}"
-    )
-    lines = opening("Few keys instead of many", command, __doc__, Blender=bpy.app.version_string)
+    rows: dict[str, list[dict[str, Any]]] = {}
     animation.register()
     try:
-        for rotation_mode in ROTATION_MODES:
-            lines += report(recordings, rotation_mode, options.tolerance, options.radius)
-        if bodies:
-            lines += section(bodies, [(one.name, options.fps, one.poses) for one in recordings])
+        for rotation in ROTATION_MODES:
+            rows[rotation] = []
+            for recording in recordings:
+                say(f"{recording.name}, {rotation}")
+                rows[rotation].append(row(recording, *measure(recording, rotation, options.tolerance, options.radius)))
+        singles = [(one.name, options.fps, one.poses) for one in recordings]
+        found = {
+            "tolerance_mm": 1e3 * options.tolerance,
+            "radius": options.radius,
+            "recordings": rows,
+            "means": {rotation: means(of_one) for rotation, of_one in rows.items()},
+            **body_reduction.figures(bodies, singles),
+        }
     finally:
         animation.unregister()
-    publish(lines, options.output, of_reduction)
-    return 0
+    given = f"--tolerance {options.tolerance:g} --radius {options.radius:g} --fps {options.fps:g}"
+    more = [f"--{name} ..." for name in ("recordings", "bodies") if getattr(options, name)]
+    return publish("reduction", found, options, given, *more, Blender=bpy.app.version_string)

@@ -2,29 +2,20 @@
 
     python scripts/research subframes
     python scripts/research subframes --radius 1
-    python scripts/research subframes --output docs/subframes.md
 
-On whole frames in-betweens are exact, but motion blur and slow motion look between frames. Objects go from key to key
-about axes and in directions drawn at random. All segments have the same angle and distance, and the easing that Blender
-gives new keys. At sub-frames, the pose that Blender shows is compared with the pose that the mode has there. Lengths
-are the largest displacement in the world of any point within a distance (`--radius`) of the origin; degrees are the
-angle between the two poses. *Live* and *baked every frame* are measured at quarter frames, *baked every 0.25* half-way
-between its keys, where it is worst. *Exact* is live with *Exact Between Frames*, as bones always are, at every 32nd
-part of a frame. Numbers are the largest of all, or the RMS where a column says so.
+Objects go from key to key about axes and in directions drawn at random. At sub-frames, the pose that Blender shows is
+compared with the pose that the mode has there: millimetres are the largest displacement of any point of the shell.
 """
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
 
-from research.publishing import opening, publish
-from research.summaries import of_sub_frames
+from research.publishing import publish, say, study_parser
 from rigid_motion import animation
 from rigid_motion.animation.compute.differences import in_betweens
 from rigid_motion.animation.queries.keyed import source_of
@@ -32,7 +23,6 @@ from rigid_motion.motion import KEYFRAME_MODES, Poses, shell_error
 from rigid_motion.motion.eulers import extrinsic_eulers_from_quaternions
 from rigid_motion.motion.measures import rms
 from rigid_motion.motion.quaternions import align_signs, angle_between, multiply
-from rigid_motion_batch.command_line import parser_of
 
 SEGMENTS = 24
 
@@ -60,12 +50,6 @@ class Motion:
     @property
     def key_frames(self) -> np.ndarray:
         return 1.0 + self.frames * np.arange(SEGMENTS + 1)
-
-    def describe(self) -> str:
-        return (
-            f"{self.name}: {self.turn:g} degrees and {self.distance:g} m in {self.frames} frames, "
-            f"{self.turn / self.frames:.2g} degrees and {100 * self.distance / self.frames:.2g} cm a frame"
-        )
 
 
 MOTIONS = (
@@ -144,40 +128,38 @@ def measure(motion: Motion, mode: str, rotation_mode: str, radius: float) -> lis
     return [live, exact, finely, deviation(obj, quarters, at_quarters, radius)]
 
 
-def table(motion: Motion, radius: float) -> Iterator[str]:
-    """The measurements of one motion as lines of Markdown."""
-    yield f"## {motion.describe()}"
-    yield ""
-    yield (
-        "| mode | turned by | live, mm | RMS, mm | degrees | baked every 0.25, mm | degrees | baked every frame, mm "
-        "| exact, mm |"
-    )
-    yield "|---|---|---:|---:|---:|---:|---:|---:|---:|"
+def figures_of(motion: Motion, radius: float) -> dict[str, Any]:
+    """The figures of one motion, for every mode and rotation mode."""
+    rows = []
     for mode in KEYFRAME_MODES:
         for rotation_mode in ROTATION_MODES:
             live, exact, finely, whole = measure(motion, mode, rotation_mode, radius)
-            yield (
-                f"| `{mode}` | {rotation_mode} | {1e3 * live.largest:.3g} | {1e3 * live.rms:.2g} "
-                f"| {np.degrees(live.rotation):.2g} | {1e3 * finely.largest:.2g} | {np.degrees(finely.rotation):.2g} "
-                f"| {1e3 * whole.largest:.2g} | {1e3 * exact.largest:.2g} |"
-            )
-    yield ""
+            figures = {
+                "live_mm": 1e3 * live.largest,
+                "live_rms_mm": 1e3 * live.rms,
+                "live_degrees": np.degrees(live.rotation),
+                "quarter_mm": 1e3 * finely.largest,
+                "quarter_degrees": np.degrees(finely.rotation),
+                "whole_mm": 1e3 * whole.largest,
+                "exact_mm": 1e3 * exact.largest,
+            }
+            rows.append({"mode": mode, "rotation": rotation_mode, **figures})
+    about = {"name": motion.name, "degrees": motion.turn, "metres": motion.distance, "frames": motion.frames}
+    return {**about, "rows": rows}
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, print, and write where asked."""
-    parser = parser_of("subframes.py", __doc__)
+    """Measure, and write the figures."""
+    parser = study_parser("subframes", __doc__)
     parser.add_argument("--radius", type=float, default=0.1, help="of the shell, in metres (%(default)s)")
-    parser.add_argument("--output", type=Path, help="a Markdown file to write the tables to")
     options = parser.parse_args(arguments)
-    command = f"python scripts/research subframes --radius {options.radius:g}"
-    lines = opening("Between whole frames", command, __doc__, Blender=bpy.app.version_string)
+    found = []
     animation.register()
     try:
         for motion in MOTIONS:
-            print(f"{motion.name} ...", file=sys.stderr, flush=True)
-            lines += table(motion, options.radius)
+            say(motion.name)
+            found.append(figures_of(motion, options.radius))
     finally:
         animation.unregister()
-    publish(lines, options.output, of_sub_frames)
-    return 0
+    figures = {"radius": options.radius, "motions": found}
+    return publish("subframes", figures, options, f"--radius {options.radius:g}", Blender=bpy.app.version_string)

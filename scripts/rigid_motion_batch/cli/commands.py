@@ -29,7 +29,7 @@ class Command:
 
 
 RESEARCH = {
-    "paper": "reproduce_paper",
+    "paper": "paper.study",
     "benchmark": "benchmark",
     "benchmark_batch": "benchmark_batch",
     "benchmark_live": "benchmark_live",
@@ -39,6 +39,7 @@ RESEARCH = {
     "glb_sizes": "glb_sizes",
     "stream_tables": "making.stream_tables",
     "check_release": "check_release",
+    "pages": "pages",
 }
 """What `python scripts/research NAME` runs of a checkout: the module of the package `research`."""
 

@@ -1,38 +1,40 @@
-"""What the benchmark's page says follows from what was measured."""
+"""The benchmark's cases are what they say, and its figures what the page reads."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from research.benchmark import cases, changed, report
-from rigid_motion.motion import MODES
-
-
-@pytest.mark.parametrize(
-    ("ratio", "words"),
-    [(0.8, "20% less time a pose"), (1.25, "25% more time a pose"), (1.001, "as much time a pose")],
-)
-def test_time_is_less_or_more_as_it_was_measured(ratio, words):
-    assert changed(ratio) == words
-
-
-def test_the_page_compares_the_blend_with_both_rotations_by_sine():
-    case = next(cases(2000))
-    seconds = {(mode, "Rigid Motion"): [0.002, 0.003] for mode in MODES}
-    seconds["lerp_slerp", "Rigid Motion"] = [0.004, 0.001]
-    seconds["dq_sclerp", "Rigid Motion"] = [0.004]
-    seconds["dq_sclerp", "pytransform3d"] = [0.4, 0.3]
-    page = list(report(case, seconds))
-    assert "| `dq_sclerp` | pytransform3d | 0.01 | 75.0 times |" in page
-    assert (
-        "`pga_lerp` takes 100% more time a pose than `lerp_slerp` and 50% less time a pose than `dq_sclerp`, "
-        "all in their fast form."
-    ) in page
+from research import benchmark
+from tests.scripts.research.keeping import written
 
 
 def test_every_case_has_as_many_in_betweens_as_it_says():
-    for case in cases(2000):
+    for case in benchmark.cases(2000):
         first, shares = case.pairs()
         assert len(first) == len(shares) == case.in_betweens
         assert np.all((shares >= 0.0) & (shares <= 1.0))
+
+
+def test_rates_are_those_of_the_fastest_round():
+    case = next(benchmark.cases(2000))
+    ours, peer = benchmark.rates(
+        case, {("dq_sclerp", benchmark.OURS): [0.004, 0.005], ("dq_sclerp", "SciPy"): [0.4, 0.3]}
+    )
+    assert ours["millions"] == pytest.approx(case.in_betweens / 0.004 / 1e6)
+    assert (ours["faster_by"], peer["faster_by"]) == (None, pytest.approx(75.0))
+
+
+def test_the_study_writes_what_the_page_reads(tmp_path, monkeypatch):
+    monkeypatch.setattr(benchmark, "reduction", lambda count: {**REDUCED, "samples": count})
+    assert benchmark.main(["--count", "1000", "--rounds", "1", "--root", str(tmp_path)]) == 0
+    found = written(tmp_path, "benchmark")
+    assert [row["samples"] for row in found["reductions"]] == [900, 1000, 100, 1000]
+    assert found["cases"][0]["in_betweens"] == 1000
+
+
+REDUCED = benchmark.reduction(90)
+
+
+def test_greedy_keys_keep_to_the_tolerance():
+    assert 2 <= REDUCED["key_count"] <= REDUCED["greedy_key_count"] <= 90

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 
 import numpy as np
 import pytest
 
 from research import benchmark_batch
+from rigid_motion_batch.pipeline.steps import OWN
+from rigid_motion_batch.pipeline.store import INDEX
 from rigid_motion_batch.recordings import read_trajectories
+from tests.scripts.research.keeping import written
 
 
 def test_its_clips_are_recordings_of_which_none_is_like_another(tmp_path):
@@ -42,14 +46,26 @@ def test_it_sees_what_a_process_has_taken_at_most():
     assert benchmark_batch.children_of(2**22 + 1) == []
 
 
-def test_two_workers_are_told_beside_one(tmp_path, monkeypatch):
-    took = {(1, False): 20.0, (2, False): 10.5, (1, True): 21.0}
+def test_two_workers_are_measured_beside_one(tmp_path, monkeypatch):
+    took = {(1, False): 20.0, (2, False): 10.0, (1, True): 21.0}
 
-    def compare(clips, folder, jobs, *options, alone):
-        return benchmark_batch.Run(took[jobs, alone], 10**8, 2 * 10**8, 0.9 * took[jobs, alone] * jobs, 15.0)
+    def compare(clips, folder, jobs, *options, alone=False):
+        return benchmark_batch.Run(took[jobs, alone], 10**8, 2 * 10**8, 0.75 if "--rates" in options else 0.0)
 
     monkeypatch.setattr(benchmark_batch, "compare", compare)
-    page = "\n".join(benchmark_batch.workers("two", [tmp_path] * 7, tmp_path, 2, "--no-video"))
-    assert "| 1 | 20.0 | 21 | 1.00 times | 90% | 16.7% |" in page
-    assert ("| 1 on one processor | 21.0 | 20 | 0.95 times | 90% |" in page) == hasattr(os, "sched_setaffinity")
-    assert "| 2 | 10.5 | 40 | 1.90 times | 90% | 20.6% |" in page
+    assert benchmark_batch.main(["--clips", "4", "--films", "2", "--minutes", "1", "--root", str(tmp_path)]) == 0
+    found = written(tmp_path, "benchmark_batch")
+    assert [row["clips_a_minute"] for row in found["numbers"][:2]] == [12.0, 24.0]
+    assert [row["speedup"] for row in found["videos"][:2]] == [1.0, 2.0]
+    assert [row["rendering"] for row in found["numbers"] + found["videos"]][1::3] == [None, 0.75]
+
+
+def test_tasks_are_noted_before_their_results_go(tmp_path):
+    folder = tmp_path / OWN / "results" / "a"
+    folder.mkdir(parents=True)
+    (folder / INDEX).write_text('{"seconds": 2.0, "facts": {"rendering": 1.5}}', encoding="utf-8")
+    tasks = {}
+    benchmark_batch.note_tasks(tmp_path, tasks)
+    shutil.rmtree(folder)
+    benchmark_batch.note_tasks(tmp_path, tasks)
+    assert tasks == {"a": {"seconds": 2.0, "facts": {"rendering": 1.5}}}

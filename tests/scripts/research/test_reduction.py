@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import bpy
 import numpy as np
 import pytest
 
 from research import reduction
-from research.markdown_tables import numbers, tables
 from rigid_motion import animation
 from rigid_motion.motion import shell_error
 from rigid_motion_batch.recordings import TrajectoryError
@@ -67,39 +65,19 @@ def test_of_a_skeleton_the_root_is_read(tmp_path):
     assert shell_error(whole.poses, root.poses, RADIUS).max() < 1e-9
 
 
-def test_the_page_names_what_was_measured(live, clip, monkeypatch, tmp_path):
-    monkeypatch.setattr(reduction, "files", lambda _folder: [reduction.ASSETS / "reach.csv"])
-    monkeypatch.setattr(reduction, "read", lambda _path, _rate: clip)
-    monkeypatch.setattr(reduction, "ROTATION_MODES", {"XYZ": "Euler angles"})
-    animation.unregister()
-    try:
-        assert reduction.main(["--output", str(tmp_path / "reduction.md")]) == 0
-    finally:
-        animation.register()
-    page = (tmp_path / "reduction.md").read_text(encoding="utf-8")
-    assert bpy.app.version_string in page
-    (table,) = tables(page)
-    assert table.section == "Turned by Euler angles"
-    one, multiples = table.row("reach", "60"), table.rows[-1]
-    ours, theirs = numbers(one[2])
-    assert float(multiples[2]) == pytest.approx(theirs / ours, abs=0.005)
-    assert f"keys on {multiples[2]} times as many frames (with Euler angles)" in " ".join(page.split())
-
-
-def test_means_are_geometric():
+def test_means_are_geometric(clip):
     def outcome(frames, largest):
         return reduction.Outcome(10.0, frames, 80, largest)
 
-    outcomes = [
-        (outcome(10, 1.0), outcome(frames, 1.0), outcome(10, ratio)) for frames, ratio in ((20, 2.0), (80, 8.0))
+    rows = [
+        reduction.row(clip, outcome(10, 1.0), outcome(frames, 1.0), outcome(10, ratio))
+        for frames, ratio in ((20, 2.0), (80, 8.0))
     ]
-    assert reduction.means(outcomes) == f"| {reduction.MULTIPLES} | | 4.00 | 1.00 | 1.00 | 1.00 | 4.00 |"
-
-
-def test_what_decimate_cannot_do_leaves_its_cells_empty(clip):
-    reduced = reduction.Outcome(2.0, 2, 14, 0.004)
-    assert reduction.row(clip, reduced, None, None) == "| reach | 60 |  |  |  |  |  |"
-    assert reduction.means([(reduced, None, None)]).endswith(" | |  |  |  |  |  |")
+    rows.append(reduction.row(clip, outcome(10, 1.0), None, None))
+    assert (rows[-1]["decimate"], rows[-1]["few_mm"]) == (None, None)
+    assert reduction.means(rows) == pytest.approx(
+        {"frames": 4.0, "key_count": 1.0, "numbers": 1.0, "error_mm": 1.0, "few_mm": 4.0}
+    )
 
 
 def test_a_recording_of_too_few_poses_is_refused(tmp_path):

@@ -11,6 +11,7 @@ from rigid_motion import animation
 from rigid_motion.animation.compute.differences import in_betweens
 from rigid_motion.animation.queries.keyed import source_of
 from rigid_motion.motion import KEYFRAME_MODES
+from tests.scripts.research.keeping import written
 
 BRISK = Motion("Brisk", turn=90.0, distance=1.0, frames=24)
 
@@ -59,12 +60,11 @@ def test_baking_every_quarter_of_a_frame_leaves_a_tenth_of_the_error(live_file, 
     assert whole.largest > 0.5 * found.largest, "baking whole frames does not help"
 
 
-def test_the_page_has_a_row_for_every_mode_and_motion(empty_file, tmp_path, monkeypatch):
+def test_the_study_writes_what_the_page_reads(empty_file, tmp_path, monkeypatch):
     monkeypatch.setattr(subframes, "SEGMENTS", 2)
-    page = tmp_path / "subframes.md"
-    assert subframes.main(["--output", str(page)]) == 0
-    text = page.read_text(encoding="utf-8")
-    assert text.startswith("# Between whole frames")
-    assert [text.count(f"| `{mode}` |") for mode in KEYFRAME_MODES] == [2 * len(subframes.MOTIONS)] * len(
-        KEYFRAME_MODES
-    )
+    monkeypatch.setattr(subframes, "MOTIONS", subframes.MOTIONS[:1])
+    assert subframes.main(["--root", str(tmp_path)]) == 0
+    (motion,) = written(tmp_path, "subframes")["motions"]
+    assert [(row["mode"], row["rotation"]) for row in motion["rows"]] == [
+        (mode, rotation) for mode in KEYFRAME_MODES for rotation in subframes.ROTATION_MODES
+    ]

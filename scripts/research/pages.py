@@ -1,0 +1,150 @@
+"""Fill in the pages in docs/ with what the studies found: docs/figures/NAME.json is `NAME` in them.
+
+    python scripts/research pages
+    python scripts/research pages --check
+
+A page of figures is rendered (Jinja2) from the template of its name in docs/templates/. Other pages quote a few
+figures: what is between `<!--= EXPRESSION -->` and `<!-- end -->` is the expression's value. Tables that such a page
+quotes are macros of docs/templates/quotes.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+import re
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+
+from rigid_motion_batch.files import write_text
+from rigid_motion_batch.report.numbers import digits, listed, percent
+
+ROOT = Path(__file__).resolve().parents[2]
+FIGURES, TEMPLATES = "docs/figures", "docs/templates"
+QUOTE = re.compile(r"(<!--= (.+?) -->)(.*?)(<!-- end -->)", re.DOTALL)
+
+
+# -- figures -----------------------------------------------------------------------------------------------------------
+
+
+def write_figures(name: str, figures: dict[str, Any], command: str, root: Path = ROOT, **versions: object) -> Path:
+    """Write what a study found to docs/figures/NAME.json, and return its path.
+
+    Parameters
+    ----------
+    name : str
+    figures : dict
+        Numbers, texts, and lists and dictionaries of them. Numbers get six significant digits; NaN becomes null.
+    command : str
+        What made them.
+    root : Path
+        The checkout.
+    **versions
+        Of what they depend on beside Python and NumPy.
+    """
+    used = {**versions, "Python": platform.python_version(), "NumPy": np.__version__}
+    on = ", ".join([*(f"{one} {version}" for one, version in used.items()), platform.system()])
+    document = {"made_by": f"`{command}`: {on} {platform.machine()}", **plain(figures)}
+    path = root / FIGURES / f"{name}.json"
+    write_text(path, json.dumps(document, indent=1, allow_nan=False) + "\n")
+    return path
+
+
+def plain(value: Any) -> Any:
+    """Return a value as JSON has it."""
+    if isinstance(value, dict):
+        return {str(key): plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [plain(one) for one in value]
+    if isinstance(value, float | np.floating):
+        return float(f"{value:.6g}") if np.isfinite(value) else None
+    return value.item() if isinstance(value, np.generic) else value
+
+
+# -- how figures are written -------------------------------------------------------------------------------------------
+
+
+def spread(values: Iterable[float], decimals: int = 0, factor: float = 1.0) -> str:
+    """Return the least and the largest, times a factor: "4 to 7"; one number where they are written alike."""
+    values = [factor * value for value in values]
+    low, high = f"{min(values):.{decimals}f}", f"{max(values):.{decimals}f}"
+    return low if low == high else f"{low} to {high}"
+
+
+def rest(shares: Iterable[float | None]) -> list[float | None]:
+    """Return what shares leave of 1."""
+    return [None if share is None else 1.0 - share for share in shares]
+
+
+def less(share: float, word: str = "less", decimals: int = 0) -> str:
+    """Return a share that is saved: "3 % less"; below zero it is how much more: "3 % more"."""
+    percents = round(100.0 * share, decimals)
+    return f"{abs(percents):.{decimals}f}\N{NO-BREAK SPACE}% {'more' if percents < 0.0 else word}".rstrip()
+
+
+def each(values: Iterable[float], form: str = "{:.2f}", factor: float = 1.0) -> list[str]:
+    """Return numbers as texts of this form, times a factor; a dash where there is none."""
+    return ["\N{EN DASH}" if value is None else form.format(factor * value) for value in values]
+
+
+def table(rows: Iterable[Sequence[object]], *head: str) -> str:
+    """Return a Markdown table, its first column to the left and the others to the right."""
+    lines = [head, ["---", *["---:"] * (len(head) - 1)], *rows]
+    return "\n".join("| " + " | ".join(map(str, cells)) + " |" for cells in lines)
+
+
+# -- pages -------------------------------------------------------------------------------------------------------------
+
+
+def environment(root: Path = ROOT) -> jinja2.Environment:
+    """Return what templates are rendered in, with all figures."""
+    found = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(root / TEMPLATES),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    found.filters |= {one.__name__: one for one in (digits, each, less, listed, percent, rest, spread, table)}
+    found.globals |= {
+        path.stem: json.loads(path.read_text(encoding="utf-8")) for path in (root / FIGURES).glob("*.json")
+    }
+    if (root / TEMPLATES / "quotes.md").exists():
+        found.globals["quotes"] = found.get_template("quotes.md").module
+    return found
+
+
+def pages(root: Path = ROOT) -> list[Path]:
+    """Return the pages that are filled in, or may quote."""
+    named = {path.name for path in (root / TEMPLATES).glob("*.md")} - {"quotes.md"}
+    return sorted({root / "README.md", *(root / "docs").glob("*.md"), *(root / "docs" / name for name in named)})
+
+
+def filled(path: Path, templates: jinja2.Environment) -> str:
+    """Return a page with its figures."""
+    if path.parent.name == "docs" and path.name in templates.list_templates():
+        return templates.get_template(path.name).render()
+    page = path.read_text(encoding="utf-8")
+    return QUOTE.sub(
+        lambda found: f"{found[1]}{templates.from_string(f'{{{{ {found[2]} }}}}').render()}{found[4]}", page
+    )
+
+
+def main(arguments: list[str]) -> int:
+    """Fill in all pages; with --check, print those that would change, and return 1 if any."""
+    parser = argparse.ArgumentParser("research pages", description=__doc__.partition("\n")[0])
+    parser.add_argument("--check", action="store_true", help="change nothing, and print the pages that would change")
+    check, templates, changed = parser.parse_args(arguments).check, environment(), []
+    for path in pages():
+        page = filled(path, templates)
+        if not path.exists() or page != path.read_text(encoding="utf-8"):
+            changed.append(path.name)
+            if not check:
+                write_text(path, page)
+    print("\n".join(changed) or "All pages have the figures of their studies.")
+    return int(check and bool(changed))

@@ -1,0 +1,92 @@
+"""Pages have the figures of their studies."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import jinja2
+import numpy as np
+import pytest
+
+from research.pages import QUOTE, ROOT, each, environment, filled, less, pages, spread, table, write_figures
+
+TEMPLATES = environment()
+
+
+@pytest.fixture
+def checkout(tmp_path: Path) -> Path:
+    """A checkout without pages."""
+    for folder in ("docs/figures", "docs/templates"):
+        (tmp_path / folder).mkdir(parents=True)
+    return tmp_path
+
+
+@pytest.mark.parametrize("path", pages(), ids=lambda path: path.name)
+def test_every_page_has_the_figures_of_the_studies(path: Path):
+    assert path.read_text(encoding="utf-8") == filled(path, TEMPLATES), "run python scripts/research pages"
+
+
+@pytest.mark.parametrize("path", pages(), ids=lambda path: path.name)
+def test_every_quote_ends_and_none_begins_a_line_of_a_paragraph(path: Path):
+    page = path.read_text(encoding="utf-8")
+    assert page.count("<!--= ") == page.count("<!-- end -->") == len(QUOTE.findall(page))
+    for line in page.splitlines():
+        # Markdown takes such a line for HTML, and leaves what follows on it as it is.
+        assert not re.match(r"\s*(?:[-*] )?<!-- ?(?:= .+?|end) -->.", line), line
+
+
+@pytest.mark.parametrize("path", pages(), ids=lambda path: path.name)
+def test_no_page_says_a_negative_percentage(path: Path):
+    assert not re.findall(r"[^\w.\N{EN DASH}][-\N{MINUS SIGN}]\d+(?:\.\d+)? ?%", path.read_text(encoding="utf-8"))
+
+
+def test_every_template_and_every_file_of_figures_is_used():
+    used = "".join(path.read_text(encoding="utf-8") for path in [*pages(), *(ROOT / "docs/templates").glob("*.md")])
+    for path in (ROOT / "docs/figures").glob("*.json"):
+        assert re.search(rf"\b{path.stem}\b[.[]", used), path.name
+
+
+def test_figures_are_plain_numbers_of_six_digits(checkout: Path):
+    path = write_figures("found", {"a": np.float64(2 / 3), "b": np.arange(2), "c": (float("nan"),)}, "x", checkout)
+    found = json.loads(path.read_text(encoding="utf-8"))
+    assert found.pop("made_by").startswith("`x`: Python ")
+    assert found == {"a": 0.666667, "b": [0, 1], "c": [None]}
+
+
+def test_a_page_is_its_template_with_figures(checkout: Path):
+    write_figures("found", {"error": 0.01234, "saved": {"a": 0.031, "b": -0.2}}, "x", checkout)
+    (checkout / "docs/templates/page.md").write_text(
+        "{% for name, share in found.saved.items() %}\n{{ name }}: {{ share | less }}\n{% endfor %}\n", encoding="utf-8"
+    )
+    (checkout / "docs/templates/quotes.md").write_text(
+        "{% macro rows() %}{{ [['e', found.error]] | table('', 'm') }}{% endmacro %}", encoding="utf-8"
+    )
+    (checkout / "README.md").write_text(
+        "It is <!--= found.error | digits(2) -->9<!-- end -->, <!--= quotes.rows() --><!-- end -->", encoding="utf-8"
+    )
+    templates = environment(checkout)
+    assert (
+        filled(checkout / "docs/page.md", templates) == "a: 3\N{NO-BREAK SPACE}% less\nb: 20\N{NO-BREAK SPACE}% more\n"
+    )
+    assert filled(checkout / "README.md", templates) == (
+        "It is <!--= found.error | digits(2) -->0.012<!-- end -->, "
+        "<!--= quotes.rows() -->|  | m |\n| --- | ---: |\n| e | 0.01234 |<!-- end -->"
+    )
+
+
+def test_what_no_study_found_is_refused(checkout: Path):
+    write_figures("found", {}, "x", checkout)
+    (checkout / "README.md").write_text("<!--= found.nothing -->1<!-- end -->", encoding="utf-8")
+    with pytest.raises(jinja2.UndefinedError, match="nothing"):
+        filled(checkout / "README.md", environment(checkout))
+
+
+def test_how_figures_are_written():
+    assert spread([4.4, 6.6]) == "4 to 7"
+    assert spread([5.0, 5.2]) == "5"
+    assert less(0.031, "fewer") == "3\N{NO-BREAK SPACE}% fewer"
+    assert less(-0.031, decimals=1) == "3.1\N{NO-BREAK SPACE}% more"
+    assert each([1.234, None]) == ["1.23", "\N{EN DASH}"]
+    assert table([["a", 1]], "x", "y") == "| x | y |\n| --- | ---: |\n| a | 1 |"
