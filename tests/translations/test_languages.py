@@ -11,7 +11,6 @@ import pytest
 from babel.messages.pofile import read_po
 
 from rigid_motion import translations
-from rigid_motion.ui.wording import LABELS as ENGLISH_MODES
 from tests.translations.shown_texts import MARKS, marked_or_drawn, messages, parsed, sentences, sources, texts_of
 
 LANGUAGES = translations.languages()
