@@ -1,7 +1,7 @@
 """Measure the recordings of other people that these pages speak of: docs/figures/recordings.json.
 
     python docs/measure_recordings.py --recordings FOLDER
-    python docs/quote_figures.py
+    python scripts/research pages
 
 It takes five minutes; the second command puts the figures into the pages. Of the folder those count that the table of
 the paper's page counts in all its rows: single bodies that move, with two samples to each of 30 updates a second.
@@ -16,7 +16,7 @@ import json
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from itertools import pairwise
@@ -28,14 +28,19 @@ import numpy as np
 DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("addon", "scripts")]
 
-from research.paper.motions import RECORDINGS, read_motion, recordings_in, sampling_rate
+from research.paper.motions import read_motion, recordings_in
+from research.paper.study import read_all
 from research.paper.table import RADIUS, SAMPLES_AN_UPDATE
-from rigid_motion.motion import curves, decimate
+from rigid_motion.motion import KEYFRAME_MODES, curves, decimate
 from rigid_motion.motion.segments import Curves, Segments
-from rigid_motion_batch.analysis.metrics import geometric_mean
+from rigid_motion_batch.analysis.choices import Uniform
+from rigid_motion_batch.analysis.metrics import geometric_mean, measure_reconstruction
 from rigid_motion_batch.analysis.modes import BEST_OF, REFERENCE
 from rigid_motion_batch.analysis.needed import TABLE_RATES, KeysNeeded, OfRigidBody, keys_needed, overall
+from rigid_motion_batch.analysis.reconstructions import reconstruct
 from rigid_motion_batch.files import write_text
+from rigid_motion_batch.places import ASSETS
+from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 
 OUTPUT = DOCS / "figures" / "recordings.json"
@@ -113,17 +118,36 @@ def main(arguments: list[str] | None = None) -> int:
         "rules": {name: _by_rule(clips, name) for name in RULES},
         "best_of": {name: _best_of(paths, modes) for name, modes in CHOICES.items()},
         "best_of_adaptive": _best_of_adaptive(paths),
+        "assets": _assets(),
     }
     options.output.parent.mkdir(parents=True, exist_ok=True)
     write_text(options.output, json.dumps(_rounded(figures), indent=1) + "\n")
     return 0
 
 
-def _counting(paths: Iterable[Path]) -> Iterator[tuple[Path, Clip]]:
-    for path in paths:
-        _, clip = read_motion(str(path), path.stem, RECORDINGS)
-        if clip is not None and sampling_rate(clip) >= SAMPLES_AN_UPDATE * float(TABLE_RATES[0]):
+def _counting(paths: Sequence[Path]) -> Iterator[tuple[Path, Clip]]:
+    for path, clip in read_all(paths, lambda path: (path, read_motion(path)))[0]:
+        if clip.samples_a_second >= SAMPLES_AN_UPDATE * float(TABLE_RATES[0]):
             yield path, clip
+
+
+def _assets() -> dict[str, object]:
+    """The errors of smooth.png in mm, and how much closer `best_of` is on `throw` than the best single mode."""
+    gains = {}
+    for rate in ("5", "10"):
+        errors = _asset_errors("throw", rate, (*KEYFRAME_MODES, BEST_OF))
+        best = errors.pop(BEST_OF)
+        gains[rate] = 1.0 - best / min(errors.values())
+    smooth = _asset_errors("reach", "8", ("lerp_slerp", "dq_sclerp", "motor_spline"))
+    return {"smooth_mm": [1e3 * error for error in smooth.values()], "throw_gains": gains}
+
+
+def _asset_errors(asset: str, rate: str, modes: Sequence[str]) -> dict[str, float]:
+    """By mode, the RMS shell error of an asset that is kept at so many keys a second, in metres."""
+    (clip,), _ = read_clips([str(ASSETS / f"{asset}.csv")], "blender")
+    return {
+        row.mode: row.rms_shell_m for row in measure_reconstruction(reconstruct(clip, Uniform(rate), modes, RADIUS))
+    }
 
 
 # -- errors of evenly spaced keys --------------------------------------------------------------------------------------
@@ -299,6 +323,8 @@ def _rows(path: Path) -> list[dict[str, str]]:
 def _rounded(value: object) -> object:
     if isinstance(value, dict):
         return {key: _rounded(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [_rounded(one) for one in value]
     return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
 
 

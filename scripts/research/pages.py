@@ -69,16 +69,29 @@ def plain(value: Any) -> Any:
 # -- how figures are written -------------------------------------------------------------------------------------------
 
 
-def spread(values: Iterable[float], decimals: int = 0) -> str:
-    """Return the least and the largest: "4 to 7"; one number where they are written alike."""
-    values = list(values)
+def spread(values: Iterable[float], decimals: int = 0, factor: float = 1.0) -> str:
+    """Return the least and the largest, times a factor: "4 to 7"; one number where they are written alike."""
+    values = [factor * value for value in values]
     low, high = f"{min(values):.{decimals}f}", f"{max(values):.{decimals}f}"
     return low if low == high else f"{low} to {high}"
 
 
+def rest(shares: Iterable[float | None]) -> list[float | None]:
+    """Return what shares leave of 1."""
+    return [None if share is None else 1.0 - share for share in shares]
+
+
 def less(share: float, word: str = "less", decimals: int = 0) -> str:
     """Return a share that is saved: "3 % less"; below zero it is how much more: "3 % more"."""
-    return f"{abs(100.0 * share):.{decimals}f}\N{NO-BREAK SPACE}% {'more' if share < 0.0 else word}"
+    percents = round(100.0 * share, decimals)
+    return f"{abs(percents):.{decimals}f}\N{NO-BREAK SPACE}% {'more' if percents < 0.0 else word}".rstrip()
+
+
+def alike(shares: Iterable[float], word: str = "less") -> str:
+    """Return shares that are saved, as a sentence has them: "33, 50 and 53 % less"."""
+    texts = [less(share, word) for share in shares]
+    numbers, units = zip(*(text.split("\N{NO-BREAK SPACE}") for text in texts), strict=True)
+    return f"{listed(numbers)}\N{NO-BREAK SPACE}{units[0]}" if len(set(units)) == 1 else listed(texts)
 
 
 def each(values: Iterable[float], form: str = "{:.2f}", factor: float = 1.0) -> list[str]:
@@ -104,7 +117,7 @@ def environment(root: Path = ROOT) -> jinja2.Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    found.filters |= {one.__name__: one for one in (digits, each, less, listed, percent, spread, table)}
+    found.filters |= {one.__name__: one for one in (alike, digits, each, less, listed, percent, rest, spread, table)}
     found.globals |= {
         path.stem: json.loads(path.read_text(encoding="utf-8")) for path in (root / FIGURES).glob("*.json")
     }

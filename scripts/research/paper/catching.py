@@ -8,8 +8,7 @@ ahead gets there later. Seconds, metres.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 import bpy
 import numpy as np
@@ -27,18 +26,12 @@ from rigid_motion_batch.scenes.nodes import apply_group
 from rigid_motion_batch.scenes.subject import load_subject
 
 from .picture import FAINT, INK, RULE, Sheet
-from .streaming import Link, Playback, receive, send
-from .streaming.smooth import joined
 from .table import PHASES
 
 ENGINES = ("lerp_slerp", "dq_sclerp", "pga_lerp", "motor_spline")
 
 RATES = (5, 10, 15, 20)
 """Updates a second."""
-
-LINK = Link(latency=0.05)
-
-SEED = 2021
 
 GRIP = np.array((0.0, -HAND, 0.0))
 """Where the wrist is, in the axes of the tool that the hand holds."""
@@ -79,30 +72,6 @@ HANDS = {"thrower": "#3A6EA5", "catcher": "#7A5C99"}
 """Who takes part, with the colours of their controllers."""
 
 
-@dataclass(frozen=True)
-class View:
-    """What a mode makes of a rate. The fields are the columns of `catching.csv`."""
-
-    mode: str
-    updates: int
-
-    delay_s: float
-    """How far behind the sender it is shown."""
-
-    rms_shell_m: float
-    max_shell_m: float
-    """Of the tool, against what really happened."""
-
-    slip_m: float
-    """The most that the tool moves in the hand that holds it, between updates at all of which it is held."""
-
-    gap_m: float
-    """Between the tool and where the catching hand would hold it, when it is caught: as the figure shows it."""
-
-    mean_gap_m: float
-    """The same on average over senders that begin one after the other within an interval, as are the errors."""
-
-
 def bodies(clip: Clip) -> tuple[np.ndarray, dict[str, Poses]]:
     """The times of the first throw of a clip, shape (n,), and the poses of the tool and of both hands, (n,) each."""
     part = clip.times <= END
@@ -117,75 +86,76 @@ def bodies(clip: Clip) -> tuple[np.ndarray, dict[str, Poses]]:
     return times, {
         "tool": tool,
         "thrower": interpolate(
-            [*times[throwing], withdrawn, END], joined((held[throwing], held[[0, 0]])), times, "motor_spline"
+            [*times[throwing], withdrawn, END], _joined(held[throwing], held[[0, 0]]), times, "motor_spline"
         ),
         "catcher": interpolate(
             [times[0] - 1.0, times[catching][0] - WITHDRAWN, *times[catching]],
-            joined((ready[[0, 0]], held[catching])),
+            _joined(ready[[0, 0]], held[catching]),
             times,
             "motor_spline",
         ),
     }
 
 
-def receive_all(
+def ticks_of(times: np.ndarray, rate: float) -> np.ndarray:
+    """Return the moments at which a sender sends, from the first sample on."""
+    return times[0] + np.arange(int((times[-1] - times[0]) * rate + 1e-6) + 1) / rate
+
+
+def shown_of(
     times: np.ndarray, poses: Mapping[str, Poses], rate: float, mode: str, moments: np.ndarray
-) -> dict[str, Playback]:
-    """What is shown of every body at these moments of the motion, none of them before the first update."""
-    shown = {}
-    for body, of_body in poses.items():
-        packets = send(times, of_body, rate)
-        arrivals = LINK.carry(packets, np.random.default_rng(SEED))
-        delay = LINK.latency + (1.0 + MODES[mode].ahead) * packets.interval
-        shown[body] = receive(packets, arrivals, moments + delay, mode)
-    return shown
+) -> dict[str, Poses]:
+    """Return what a receiver shows of every body at these moments of the motion: its updates, interpolated."""
+    ticks = ticks_of(times, rate)
+    sent = {body: interpolate(times, of_body, ticks, "dq_sclerp") for body, of_body in poses.items()}
+    return {body: interpolate(ticks, of_body, moments, mode) for body, of_body in sent.items()}
 
 
-def view(times: np.ndarray, poses: Mapping[str, Poses], rate: int, mode: str) -> View:
-    """The figure in numbers, for one mode at one rate."""
+def view(times: np.ndarray, poses: Mapping[str, Poses], rate: int, mode: str) -> dict[str, float]:
+    """Return the figure in numbers, for one mode at one rate, in metres.
+
+    "error" is the RMS shell error of the tool, "slip" the most that it moves in the hand that holds it, between updates
+    at all of which it is held; "gap" is between the tool and where the catching hand would hold it when it is caught,
+    as the figure shows it, and "mean_gap" on average over senders that begin one after the other, as are the others.
+    """
     found = []
     for phase in range(PHASES):
         late = times >= times[0] + phase / (PHASES * rate)
         found.append(_looked_at(times[late], {body: of_body[late] for body, of_body in poses.items()}, rate, mode))
-    errors, slips, gaps, delays = zip(*found, strict=True)
-    return View(
-        mode=mode,
-        updates=rate,
-        delay_s=delays[0],
-        rms_shell_m=rms(np.concatenate(errors)),
-        max_shell_m=float(np.concatenate(errors).max()),
-        slip_m=float(np.concatenate(slips).max(initial=0.0)),
-        gap_m=gaps[0],
-        mean_gap_m=float(np.mean(gaps)),
-    )
+    errors, slips, gaps = zip(*found, strict=True)
+    return {
+        "error": rms(np.concatenate(errors)),
+        "slip": float(np.concatenate(slips).max(initial=0.0)),
+        "gap": gaps[0],
+        "mean_gap": float(np.mean(gaps)),
+    }
 
 
 def _looked_at(
     times: np.ndarray, poses: Mapping[str, Poses], rate: int, mode: str
-) -> tuple[np.ndarray, np.ndarray, float, float]:
-    """For a sender that begins with the first of these times: shell errors, slips while held, gap and delay."""
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return for a sender that begins with the first of these times: shell errors, slips while held, and the gap."""
     let_go, caught = _recorded(times)
     moments = times[(times >= SHOWN[0]) & (times <= SHOWN[1])]
-    shown = receive_all(times, poses, rate, mode, moments)
+    shown = shown_of(times, poses, rate, mode, moments)
     truth = interpolate(times, poses["tool"], moments, "dq_sclerp")
-    ticks = times[0] + np.arange(int((times[-1] - times[0]) * rate) + 1) / rate
+    ticks = ticks_of(times, rate)
     segment = np.searchsorted(ticks, moments, side="right") - 1
     first = ticks[np.maximum(segment - MODES[mode].behind, 0)]
     last = ticks[np.minimum(segment + 1 + MODES[mode].ahead, len(ticks) - 1)]
     slips = [
-        _apart(shown["tool"].poses, shown[hand].poses)[held]
+        _apart(shown["tool"], shown[hand])[held]
         for hand, held in (("thrower", last <= let_go), ("catcher", first >= caught))
     ]
-    then = receive_all(times, poses, rate, mode, np.array((caught,)))
-    gap = float(_apart(then["tool"].poses, then["catcher"].poses)[0])
-    errors = measure(moments, shown["tool"].poses, truth).shell
-    return errors, np.concatenate(slips), gap, shown["tool"].delay
+    then = shown_of(times, poses, rate, mode, np.array((caught,)))
+    gap = float(_apart(then["tool"], then["catcher"])[0])
+    return measure(moments, shown["tool"], truth).shell, np.concatenate(slips), gap
 
 
-def views(clip: Clip) -> list[View]:
-    """All modes at all rates."""
+def figures(clip: Clip) -> dict[str, dict[int, dict[str, float]]]:
+    """Return all modes at all rates."""
     times, poses = bodies(clip)
-    return [view(times, poses, rate, mode) for mode in ENGINES for rate in RATES]
+    return {mode: {rate: view(times, poses, rate, mode) for rate in RATES} for mode in ENGINES}
 
 
 def frame_moments(caught: float) -> np.ndarray:
@@ -195,20 +165,27 @@ def frame_moments(caught: float) -> np.ndarray:
     return caught + np.arange(-before, after + 1.0) / rate
 
 
+def _joined(first: Poses, second: Poses) -> Poses:
+    """Return poses (n,) and others after them."""
+    return Poses(
+        np.concatenate((first.positions, second.positions)), np.concatenate((first.quaternions, second.quaternions))
+    )
+
+
 def _recorded(times: np.ndarray) -> tuple[float, float]:
     """The last sample before the tool is let go, and the first after it is caught."""
     return float(times[times <= RELEASE][-1]), float(times[times >= CATCH][0])
 
 
-def build(clip: Clip, found: Sequence[View], *, film: bool) -> bpy.types.Scene:
-    """The scene of the film, or of the picture at the catch, with the gaps that were found."""
+def build(clip: Clip, *, film: bool) -> bpy.types.Scene:
+    """The scene of the film, or of the picture at the catch, with its gaps."""
     times, poses = bodies(clip)
+    found = figures(clip)
     moments = frame_moments(_recorded(times)[1])
     sheet = Sheet(1400, 5.6, frames=len(moments) if film else 1)
     sheet.scene.render.fps = FPS
     if film:
         sheet.scene.render.resolution_x, sheet.scene.render.resolution_y = FILM_SIZE
-    gaps = {(one.mode, one.updates): one.gap_m for one in found}
     cast = _Cast(sheet, interpolate(times, poses["tool"], moments, "dq_sclerp"))
     columns, pitch = (np.arange(len(RATES)) - 1.5) * 0.243 * sheet.aspect, 0.2135
     sheet.words("Catching a tool", sheet.left, TITLE, 9.0)
@@ -219,8 +196,8 @@ def build(clip: Clip, found: Sequence[View], *, film: bool) -> bpy.types.Scene:
         sheet.card(0.0, top, 2.0 * -sheet.left, 0.0014, RULE)
         sheet.words(label_of(mode), sheet.left, top - 0.025, 6.5)
         for rate, x in zip(RATES, columns, strict=True):
-            cast.perform(mode, rate, receive_all(times, poses, rate, mode, moments), sheet.place(x, top - 0.118))
-            sheet.words(f"{1e3 * gaps[mode, rate]:.0f} mm", x + 0.06, top - 0.055, 6.5, INK, "CENTER")
+            cast.perform(mode, rate, shown_of(times, poses, rate, mode, moments), sheet.place(x, top - 0.118))
+            sheet.words(f"{1e3 * found[mode][rate]['gap']:.0f} mm", x + 0.06, top - 0.055, 6.5, INK, "CENTER")
     _write_legend(sheet, moments)
     sheet.scene.frame_set(1 + int(np.argmax(moments >= CATCH)))
     return sheet.scene
@@ -239,14 +216,14 @@ class _Cast:
         self.turn = layout.yaw_quaternion(YAW)
         self.frames = np.arange(1.0, len(truth) + 1.0)
 
-    def perform(self, mode: str, rate: int, shown: Mapping[str, Playback], place: np.ndarray) -> None:
+    def perform(self, mode: str, rate: int, shown: Mapping[str, Poses], place: np.ndarray) -> None:
         """One panel, its middle at a place."""
         name = f"{mode} {rate}"
-        self._move(name, self.tool, shown["tool"].poses, place, self.tools[mode], whole=False)
+        self._move(name, self.tool, shown["tool"], place, self.tools[mode], whole=False)
         self._move(f"{name} truth", self.tool, self.truth, place, self.ghost, whole=True)
         for hand, paint in self.hands.items():
-            self._move(f"{name} {hand}", self.controller, shown[hand].poses, place, paint, whole=False)
-        self._trace(f"{name} path", shown["tool"].poses, place, 0.010, colour_of(mode))
+            self._move(f"{name} {hand}", self.controller, shown[hand], place, paint, whole=False)
+        self._trace(f"{name} path", shown["tool"], place, 0.010, colour_of(mode))
         self._trace(f"{name} true path", self.truth, place, 0.004, FAINT)
 
     def _move(

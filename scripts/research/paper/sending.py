@@ -1,201 +1,137 @@
-"""The table once more for a live stream whose sender sends when it must: at a delay, and against what a delay costs.
+"""What a live stream costs that is sent when needed, beside even streams of the state of the art that are as good.
 
-The state of the art is `lerp_slerp` with its updates evenly in time, which is shown an interval late. The others may
-take a multiple of that interval, and send what is needed to stay within a tolerance; the tolerance is found at which
-they are as good by each of `YARDSTICKS`. What they show is what the receiver makes of the packets, at every sample.
-Errors are in metres and m/s, times in seconds.
+The even streams are those of the paper, `lerp_slerp` at its rates; the other is the codec of `rigid_motion.streams`,
+over a link that takes no time. It has a tolerance, which is searched for: the one at which the RMS shell error is that
+of the even stream. Bytes are a second's, those of UDP and IPv4 around each datagram among them, and
+what somebody who joins is told once is not. Of each recording the first `SECONDS` are sent. Seconds and metres.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections import deque
+from typing import Any
 
 import numpy as np
 
-from rigid_motion.motion import measure, rms
-from rigid_motion_batch.analysis.metrics import NOTHING
-from rigid_motion_batch.analysis.modes import REFERENCE
+from rigid_motion.motion import Poses, rms, shell_error
+from rigid_motion.motion.quaternions import normalise
+from rigid_motion.streams import Receiver, Sender
+from rigid_motion.streams.wire import DESCRIPTION, kind_of
+from rigid_motion_batch.analysis.metrics import geometric_mean
+from rigid_motion_batch.analysis.needed import part_of
 from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.streaming.measuring import even_rate, straight
+from rigid_motion_batch.streaming.packed import CUBE, PLACE_BITS, STAMP, smallest_three
+from rigid_motion_batch.streaming.sending import body_of, samples_of
+from rigid_motion_batch.streaming.transports import HEADERS
 
-from . import claims
-from .streaming import PACKINGS, TWISTS, receive
-from .streaming.needed import send_when_needed
-from .streaming.packets import HEADER
-from .table import RADIUS, UNIFORM, UPDATES, YARDSTICKS, Point, lowest, mean_rates, point, rates_for, senders
+from .claims import UPDATES
+from .table import RADIUS, even_points, lowest
 
-DELAYS = (1.5, 2.0, 3.0, 4.0)
-"""Intervals of the even stream."""
+DELAYS = (0.1, 0.2)
+"""By which the picture is behind."""
 
-MODES_SENT = (REFERENCE, TWISTS)
+SECONDS = 10.0
 
-TOLERANCES = (1.0, 1.6, 2.4, 3.6, 5.2)
-"""Multiples of the RMS shell error of the even stream."""
+TOLERANCES = 1.0, 5.0, 4
+"""From this multiple of the smallest error wanted to this multiple of the largest, so many."""
 
-HEARTBEAT = 0.5
-"""Seconds of silence after which the newest key is sent again."""
+TURN_BITS = 10
+"""Of each of the smallest three components of a quaternion."""
 
-AROUND_A_PACKET = 28
-"""Bytes that UDP over IPv4 adds."""
-
-
-@dataclass(frozen=True)
-class Sent:
-    """One stream. The fields are columns of `sent.csv`."""
-
-    clip: str
-    mode: str
-    even: int
-    """Updates a second of the even stream whose intervals count."""
-
-    delay: float
-    """In those intervals."""
-
-    tolerance_m: float
-    keys_per_s: float
-    """Updates, heartbeats among them."""
-
-    rms_shell_m: float
-    p95_shell_m: float
-    rms_velocity_m_s: float
+PACKINGS = {
+    "7 doubles": 56,
+    "7 singles": 28,
+    f"places of {PLACE_BITS} bits, smallest three of {TURN_BITS}": (3 * PLACE_BITS + 2 + 3 * TURN_BITS) // 8,
+}
+"""Bytes of a pose."""
 
 
-@dataclass(frozen=True)
-class SentNeeded:
-    """A cell of the table. The fields are columns of `sending.csv`."""
+def sent(clip: Clip, tolerance: float, delay: float) -> tuple[float, float, float]:
+    """Send a clip, show it, and return datagrams and bytes a second, and the RMS shell error of what was shown."""
+    times, poses = samples_of(clip)
+    body = body_of(clip, poses, RADIUS)
+    sender, receiver = Sender([body], tolerance, delay, even_rate(times)), Receiver()
+    frames, shown, sizes = deque((times + delay).tolist()), [], []
 
-    clips: str
-    """The clip, or the set of clips that this is the geometric mean of."""
+    def draw(until: float) -> None:
+        while frames and frames[0] < until:
+            shown.extend(receiver.show(frames.popleft()).values())
 
-    updates: int
-    """Of the state of the art."""
+    def post(datagrams: list[bytes], now: float) -> None:
+        draw(now)
+        for datagram in datagrams:
+            receiver.take(datagram, now)
+            if kind_of(datagram) != DESCRIPTION:
+                sizes.append(len(datagram) + HEADERS)
+            for _, answer in receiver.answers():
+                post(sender.hear(answer, now), now)
 
-    mode: str
-    delay: float
-    """In intervals of the state of the art."""
-
-    yardstick: str
-
-    needed: float
-    """Updates a second that are as good; infinite where none of the tolerances tried was."""
-
-    saved: float
-    """Of the updates, as a share."""
-
-    saved_bytes: float
-    """Of the bytes of packets with everything around them, in doubles: a packet with a twist is larger."""
-
-    saved_small: float
-    """The same in the smallest packing."""
-
-    reached: int
-    asked: int
-
-
-def measure_sending(clip: Clip, advance: Callable[[], object] = lambda: None) -> tuple[list[Point], list[Sent]]:
-    """All streams of a clip: the even ones, and those that are sent when needed.
-
-    Parameters
-    ----------
-    clip : Clip
-    advance : callable
-        Called as often as there are `steps_of` the clip.
-    """
-    even, sent = [], []
-    for rate in _even_rates(clip):
-        reference = point(clip, REFERENCE, UNIFORM, rate, senders(clip, rate))
-        even.append(reference)
-        for delay in DELAYS:
-            for mode in MODES_SENT:
-                if reference.rms_shell_m > NOTHING:
-                    sent += [stream(clip, mode, rate, delay, factor * reference.rms_shell_m) for factor in TOLERANCES]
-                advance()
-    return even, sent
+    for sample, moment in enumerate(times.tolist()):
+        while (due := sender.next) < moment:
+            post(sender.poll(due), due)
+        post(sender.add(moment, poses[:, sample]), moment)
+    post(sender.finish(), float(times[-1]))
+    draw(np.inf)
+    truth = straight(times, poses).at([one.moment for one in shown])[0]
+    own = [one.poses[body.name] for one in shown]
+    filled = Poses(np.concatenate([one.positions for one in own]), np.concatenate([one.quaternions for one in own]))
+    seconds = float(times[-1] - times[0])
+    return len(sizes) / seconds, sum(sizes) / seconds, rms(shell_error(filled, truth, RADIUS))
 
 
-def steps_of(clip: Clip) -> int:
-    """How often `measure_sending` advances."""
-    return len(_even_rates(clip)) * len(DELAYS) * len(MODES_SENT)
+def costs_of(clip: Clip) -> dict[float, dict[int, tuple[float, float]]]:
+    """Return by delay and rate of the state of the art the datagrams and the bytes a second that are as good."""
+    clip = part_of(clip, 0, int(np.searchsorted(clip.times, clip.times[0] + SECONDS, side="right")) - 1)
+    wanted = {rate: row[1] for rate, row in even_points(clip).items()}
+    low, high, count = TOLERANCES
+    tolerances = np.geomspace(low * min(wanted.values()), high * max(wanted.values()), count)
+    found: dict[float, dict[int, tuple[float, float]]] = {}
+    for delay in DELAYS:
+        datagrams, size, errors = np.array([sent(clip, float(tolerance), delay) for tolerance in tolerances]).T
+        found[delay] = {
+            rate: (lowest(datagrams, errors, error), lowest(size, errors, error)) for rate, error in wanted.items()
+        }
+    return found
 
 
-def _even_rates(clip: Clip) -> list[int]:
-    """The rates of the paper's rows that the clip has samples enough for."""
-    rates = rates_for(clip)
-    return [rate for rate in UPDATES if rate in rates]
+def costs(clips: list[Clip]) -> dict[str, Any]:
+    """Return the geometric means over clips, and the bytes of even streams, for each of the paper's rates."""
+    of_clips = {clip.name: costs_of(clip) for clip in clips}
+    needed = {}
+    for delay in DELAYS:
+        rows = [
+            geometric_mean(np.array([own[delay][rate] for own in of_clips.values() if rate in own[delay]]))
+            for rate in UPDATES
+        ]
+        needed[f"{1e3 * delay:.0f}"] = {
+            "datagrams": [row[0] for row in rows],
+            "bytes": [row[1] for row in rows],
+            "saved_datagrams": [1.0 - row[0] / rate for row, rate in zip(rows, UPDATES, strict=True)],
+        }
+    even = {name: [rate * (size + STAMP + HEADERS) for rate in UPDATES] for name, size in PACKINGS.items()}
+    for own in needed.values():
+        own["saved_bytes"] = {
+            name: [1.0 - size / of_even for size, of_even in zip(own["bytes"], row, strict=True)]
+            for name, row in even.items()
+        }
+    return {"seconds": SECONDS, "clips": list(of_clips), "even": even, "needed": needed, "by_clip": of_clips}
 
 
-def stream(clip: Clip, mode: str, even: int, delay: float, tolerance: float) -> Sent:
-    """A clip sent when needed, and what is shown of it over a link that takes no time."""
-    truth, seconds = clip.in_metres(clip.poses), delay / even
-    packets, play_out = send_when_needed(clip.times, truth, tolerance, seconds, mode, RADIUS)
-    # In order: their ages are in single precision.
-    arrivals = np.maximum.accumulate(packets.sent)
-    shown = receive(packets, arrivals, clip.times + seconds, mode, play_out).poses
-    errors = measure(clip.times, shown, truth, RADIUS)
-    silences = np.diff(np.append(arrivals, max(clip.times[-1], arrivals[-1])))
-    updates = len(packets) - 1 + int(np.floor(silences / HEARTBEAT).sum())
-    return Sent(
-        clip=clip.name,
-        mode=mode,
-        even=even,
-        delay=delay,
-        tolerance_m=tolerance,
-        keys_per_s=updates / float(clip.times[-1] - clip.times[0]),
-        rms_shell_m=rms(errors.shell),
-        p95_shell_m=float(np.percentile(errors.shell, 95.0)),
-        rms_velocity_m_s=rms(errors.velocity),
-    )
-
-
-def packet_bytes(packing: str, mode: str) -> int:
-    """Bytes of an update with everything around it."""
-    twist = PACKINGS[packing].twist_size if mode == TWISTS else 0
-    return AROUND_A_PACKET + HEADER.itemsize + PACKINGS[packing].size + twist
-
-
-def sending_needed(even: Iterable[Point], sent: Iterable[Sent]) -> list[SentNeeded]:
-    """The cells for every clip."""
-    curves: dict[tuple[str, int, str, float], list[Sent]] = {}
-    for one in sent:
-        curves.setdefault((one.clip, one.even, one.mode, one.delay), []).append(one)
-    references = {(one.clip, round(one.asked)): one for one in even}
-    cells = []
-    for (clip, rate, mode, delay), curve in curves.items():
-        reference = references[clip, rate]
-        for yardstick in YARDSTICKS:
-            share = lowest(curve, yardstick, getattr(reference, yardstick)) / reference.keys_per_s
-            there = int(np.isfinite(share))
-            cells.append(_cell(clip, rate, mode, delay, yardstick, share, there, 1))
-    return cells
-
-
-def mean_sending(cells: Iterable[SentNeeded], name: str, clips: Iterable[str]) -> list[SentNeeded]:
-    """Geometric means over some clips, of those on which the error was reached."""
-    return [
-        _cell(name, updates, mode, delay, yardstick, rate / updates, there, asked)
-        for (updates, mode, delay, yardstick), rate, there, asked in mean_rates(
-            cells, clips, lambda cell: (cell.updates, cell.mode, cell.delay, cell.yardstick)
-        )
-    ]
-
-
-def _cell(
-    clips: str, updates: int, mode: str, delay: float, yardstick: str, share: float, reached: int, asked: int
-) -> SentNeeded:
-    saved = [
-        1.0 - share * packet_bytes(packing, mode) / packet_bytes(packing, REFERENCE)
-        for packing in ("double", "smallest_three")
-    ]
-    return SentNeeded(clips, updates, mode, delay, yardstick, share * updates, 1.0 - share, *saved, reached, asked)
-
-
-def at_delay(
-    cells: Sequence[SentNeeded], clips: str, mode: str, delay: float, yardstick: str
-) -> list[SentNeeded | None]:
-    """A row of the table, in the order of the paper's; None where there is no cell."""
-    row = {
-        cell.updates: cell
-        for cell in cells
-        if (cell.clips, cell.mode, cell.delay, cell.yardstick) == (clips, mode, delay, yardstick)
+def packings(clip: Clip) -> dict[str, dict[str, float]]:
+    """Return the bytes of a pose in each packing, and the largest shell error that it makes on a clip, in metres."""
+    poses = clip.in_metres(clip.poses)
+    step = CUBE / (2**PLACE_BITS - 1)
+    exact, single, small = PACKINGS
+    packed = {
+        exact: (poses.positions, poses.quaternions),
+        single: (poses.positions.astype(np.float32), normalise(poses.quaternions.astype(np.float32))),
+        small: (np.rint(poses.positions / step) * step, smallest_three(poses.quaternions, TURN_BITS)),
     }
-    return [row.get(one.state_of_the_art) for one in claims.TABLE]
+    return {
+        name: {
+            "bytes": PACKINGS[name],
+            "error": float(shell_error(Poses(positions, quaternions), poses, RADIUS).max()),
+        }
+        for name, (positions, quaternions) in packed.items()
+    }

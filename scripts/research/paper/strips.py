@@ -6,8 +6,6 @@ pose and the last. Metres.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import bpy
 import numpy as np
 
@@ -42,21 +40,6 @@ SIDEWAYS = normalise(np.array((1.0, 0.0, 0.0, 1.0)))
 """The grip to the left."""
 
 
-@dataclass(frozen=True)
-class Instant:
-    """What a moment looks like under one engine. The fields are the columns of `strips.csv`."""
-
-    mode: str
-
-    at: float
-    """Share of the way."""
-
-    turned_deg: float
-
-    tip_off_m: float
-    """How far the tip has left the point that it rests on."""
-
-
 def keys() -> Poses:
     """The first pose and the last: the tip is at the origin in both."""
     swings = np.array((-0.5, 0.5)) * SWING
@@ -71,17 +54,19 @@ def shown() -> dict[str, Poses]:
     return {mode: interpolate([0.0, 1.0], keys(), MOMENTS, mode) for mode in ENGINES}
 
 
-def instants() -> list[Instant]:
-    """The figure in numbers."""
-    start = keys().quaternions[:1]
-    rows = []
+def instants() -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Return by mode, at `MOMENTS`, degrees turned and how far the tip has left the point that it rests on, (7,)."""
+    start, found = keys().quaternions[:1], {}
     for mode, poses in shown().items():
         turned = np.degrees(angle_between(np.broadcast_to(start, poses.quaternions.shape), poses.quaternions))
-        off = np.linalg.norm(
-            poses.positions + rotate(poses.quaternions, np.broadcast_to(TIP, (len(poses), 3))), axis=-1
-        )
-        rows += [Instant(mode, *map(float, row)) for row in zip(MOMENTS, turned, off, strict=True)]
-    return rows
+        tips = poses.positions + rotate(poses.quaternions, np.broadcast_to(TIP, (len(poses), 3)))
+        found[mode] = turned, np.linalg.norm(tips, axis=-1)
+    return found
+
+
+def figures() -> dict[str, float]:
+    """Return how far the tip gets from where it rests, at most, by mode."""
+    return {mode: off.max() for mode, (_, off) in instants().items()}
 
 
 def build() -> bpy.types.Scene:
@@ -90,7 +75,7 @@ def build() -> bpy.types.Scene:
     mesh = load_subject("drill")
     ghost = surface("Pivoting about the tip", DARK.ghost, alpha=0.35)
     rest = interpolate([0.0, 1.0], keys(), MOMENTS, "dq_sclerp")
-    numbers = {(one.mode, one.at): one for one in instants()}
+    numbers = instants()
     columns = np.linspace(-0.378, 0.345, len(MOMENTS)) * sheet.aspect
     pitch = 0.286
     sheet.words("Interpolation algorithms", sheet.left, 0.5 - 0.058, 9.0)
@@ -99,16 +84,15 @@ def build() -> bpy.types.Scene:
         paint = surface(f"Mode {mode}", colour_of(mode))
         sheet.card(0.0, foot + 0.222, 2.0 * -sheet.left, 0.0016, RULE)
         sheet.words(f"{title}: {MODES[mode].label}", sheet.left, foot + 0.193, 7.0)
-        for column, (x, moment) in enumerate(zip(columns, MOMENTS, strict=True)):
+        for column, x in enumerate(columns):
             place = sheet.place(x, foot + 0.028)
-            pose = shown()[mode][column]
+            pose, (turned, off) = shown()[mode][column], (of_moments[column] for of_moments in numbers[mode])
             sheet.solid(f"{mode} {column}", mesh, place, pose, paint, whole=False)
-            if numbers[mode, float(moment)].tip_off_m > 1e-4:
+            if off > 1e-4:
                 sheet.solid(f"{mode} {column} truth", mesh, place, rest[column], ghost, whole=True)
             _mark(sheet, place)
-            number = numbers[mode, float(moment)]
-            sheet.words(f"{1e3 * number.tip_off_m:.0f} mm", x, foot - 0.025, 6.0, INK, "CENTER")
-            sheet.words(f"{number.turned_deg:.1f}°", x, foot - 0.051, 6.0, FAINT, "CENTER")
+            sheet.words(f"{1e3 * off:.0f} mm", x, foot - 0.025, 6.0, INK, "CENTER")
+            sheet.words(f"{turned:.1f}°", x, foot - 0.051, 6.0, FAINT, "CENTER")
     for x, moment in zip(columns, MOMENTS, strict=True):
         sheet.words(f"{moment:.0%}", x, -0.5 + 0.052, 6.0, FAINT, "CENTER")
     sheet.words(

@@ -3,10 +3,10 @@
 Three readings of the same work, one hand after the other for `USERS` users at `FRAMES_PER_S`:
 
 - `fast`: this program's own forms (`motion.interpolate`), which work a segment out once and then fill its frames;
-- `algebra`: the modes in the algebra they are named after (`Mode.reference`), every frame encoded, interpolated and
-  extracted anew as in the paper, all of them in one array;
-- `single`: the same, one frame after the other, the closest to an engine that fills in as it draws. What is timed then
-  is for the most part NumPy's cost of a call, and says more of Python than of an algebra.
+- `in_the_algebra`: the modes in the algebra they are named after (`Mode.reference`), every frame encoded, interpolated
+  and extracted anew as in the paper, all of them in one array;
+- `one_by_one`: the same, one frame after the other, the closest to an engine that fills in as it draws. What is timed
+  then is for the most part NumPy's cost of a call, and says more of Python than of an algebra.
 
 All engines take turns in every round, in an order that moves on from round to round, and each is held against the state
 of the art of the same round; the interval is from a bootstrap over rounds. Seconds. Timings differ from run to run.
@@ -17,6 +17,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -25,12 +26,7 @@ from rigid_motion.motion.quaternions import align_signs
 from rigid_motion_batch.analysis.modes import REFERENCE
 from rigid_motion_batch.recordings.clips import Clip
 
-from . import claims
-
-FAST, ALGEBRA, SINGLE = "fast", "algebra", "single"
-
-EQUAL, AS_GOOD, PAPER = "equal", "as good", "paper"
-"""Whether an engine had as many updates as the state of the art, those that it needs, or those that the paper says."""
+from .claims import PAPER, UPDATES
 
 FRAMES_PER_S = 90.0
 
@@ -54,38 +50,6 @@ SEED = 2021
 CONFIDENCE = 0.95
 
 
-@dataclass(frozen=True)
-class Timing:
-    """One engine in one race. The fields are the columns of `timing.csv`."""
-
-    reading: str
-    """`FAST`, `ALGEBRA` or `SINGLE`."""
-
-    pace: str
-    """`EQUAL`, `AS_GOOD` or `PAPER`."""
-
-    mode: str
-
-    updates: float
-    """Updates a second that the engine had to fill in between."""
-
-    reference_updates: float
-    """Those of the state of the art in the same race."""
-
-    relative: float
-    """The running time of a frame over that of the state of the art, the median of the rounds."""
-
-    low: float
-    high: float
-    """The bounds of its confidence interval."""
-
-    seconds: float
-    """Of a frame, the median of the rounds."""
-
-    processor_s: float
-    """Processor time of a frame, the mean over all rounds."""
-
-
 @dataclass(frozen=True, eq=False)
 class Work:
     """Something to be timed."""
@@ -100,61 +64,62 @@ Engine = Callable[[Clip, str, float], Work]
 """From a clip, a mode and updates a second to the work of generating its frames."""
 
 
-def races(
-    clip: Clip,
-    needed: Mapping[int, Mapping[str, float]],
-    rounds: int = ROUNDS,
-    advance: Callable[[], object] = lambda: None,
-) -> list[Timing]:
-    """Race all engines on a clip, the fast ones in every row of the paper's table.
+def races(clip: Clip, needed: Mapping[str, Mapping[str, list[float]]], rounds: int = ROUNDS) -> dict[str, Any]:
+    """Race all engines on a clip, the fast ones at each rate of the paper's table.
 
     Parameters
     ----------
     clip : Clip
     needed : mapping
-        Updates a second of the state of the art to the modes, each with the updates that it needs to be as good.
+        By mode what it needs to be as good as the state of the art: "updates" at each of the paper's rates.
     rounds : int
-    advance : callable
-        Called after every round, `RACES` times `rounds`.
 
-    Notes
-    -----
-    For the other readings the rate makes no difference: they begin anew with every frame.
+    Returns
+    -------
+    dict
+        "equal" rates, "as good" ones and the "paper"'s: by mode and rate what `race` found. The same of the "algebra"
+        as arrays and "single", for which the rate makes no difference: they begin anew with every frame.
     """
     others = [mode for mode in MODES if mode != REFERENCE]
     exact = [mode for mode in others if not MODES[mode].is_smooth]
-    results = []
-
-    def let_run(reading: str, pace: str, engine: Engine, updates: Mapping[str, float], rate: float) -> None:
-        contestants = {mode: engine(clip, mode, of) for mode, of in ({REFERENCE: rate} | dict(updates)).items()}
-        wall, processor = race(contestants, rounds, advance)
-        for mode, seconds in wall.items():
-            relative, low, high = compared(seconds, wall[REFERENCE])
-            middle, spent = float(np.median(seconds)), float(np.mean(processor[mode]))
-            of = updates.get(mode, rate)
-            results.append(Timing(reading, pace, mode, of, rate, relative, low, high, middle, spent))
-
-    for row in claims.TABLE:
-        rate = float(row.state_of_the_art)
-        as_good = {mode: of for mode, of in needed.get(row.state_of_the_art, {}).items() if mode != REFERENCE}
-        let_run(FAST, EQUAL, fast, dict.fromkeys(others, rate), rate)
-        let_run(FAST, AS_GOOD, fast, as_good, rate)
-        let_run(FAST, PAPER, fast, dict.fromkeys(exact, float(row.multivectors)), rate)
-    first = float(claims.TABLE[0].state_of_the_art)
-    let_run(ALGEBRA, EQUAL, in_the_algebra, dict.fromkeys(exact, first), first)
-    let_run(SINGLE, EQUAL, one_by_one, dict.fromkeys(exact, first), first)
-    return results
+    found: dict[str, Any] = {pace: {mode: {} for mode in MODES} for pace in ("equal", "as good", "paper")}
+    for place, rate in enumerate(UPDATES):
+        paces = {
+            "equal": dict.fromkeys(others, float(rate)),
+            "as good": {mode: own["updates"][place] for mode, own in needed.items() if mode in others},
+            "paper": dict.fromkeys(exact, float(PAPER[rate])),
+        }
+        for pace, updates in paces.items():
+            for mode, timed in race(clip, fast, {REFERENCE: float(rate)} | updates, rounds).items():
+                found[pace][mode][rate] = timed
+    for name, engine in (("algebra", in_the_algebra), ("single", one_by_one)):
+        found[name] = race(clip, engine, dict.fromkeys((REFERENCE, *exact), float(UPDATES[0])), rounds)
+    return {pace: {mode: own for mode, own in of_modes.items() if own} for pace, of_modes in found.items()}
 
 
-RACES = 3 * len(claims.TABLE) + 2
-"""So many times the rounds are run."""
+def race(clip: Clip, engine: Engine, updates: Mapping[str, float], rounds: int) -> dict[str, dict[str, float]]:
+    """Return of each mode, with its updates a second, the running time of a frame.
+
+    "relative" is the median over rounds of its ratio to that of the state of the art, "low" and "high" the bounds of
+    the confidence interval, "processor" the mean processor time of a frame in seconds.
+    """
+    wall, processor = taken({mode: engine(clip, mode, rate) for mode, rate in updates.items()}, rounds)
+    rows = {}
+    for mode, rate in updates.items():
+        relative, low, high = compared(wall[mode], wall[REFERENCE])
+        spent = float(np.mean(processor[mode]))
+        rows[mode] = {"updates": rate, "relative": relative, "low": low, "high": high, "processor": spent}
+    return rows
 
 
 def fast(clip: Clip, mode: str, rate: float) -> Work:
     """All frames of all users from the keys of a sender of that rate, by the fast form."""
     keys = decimate(clip.times, rate)
     frames = frame_times(clip.times[keys])
-    poses = _for_users(clip.poses[keys])
+    poses, shape = clip.poses[keys], (USERS, len(keys))
+    poses = Poses(
+        np.broadcast_to(poses.positions, (*shape, 3)).copy(), np.broadcast_to(poses.quaternions, (*shape, 4)).copy()
+    )
     return Work(lambda: interpolate(clip.times[keys], poses, frames, mode), USERS * len(frames))
 
 
@@ -177,14 +142,12 @@ def one_by_one(clip: Clip, mode: str, rate: float) -> Work:
 
 
 def frame_times(key_times: np.ndarray) -> np.ndarray:
-    """When frames are shown, from the first key to the last."""
+    """Return when frames are shown, from the first key to the last."""
     return np.arange(key_times[0], key_times[-1], 1.0 / FRAMES_PER_S)
 
 
-def race(
-    contestants: Mapping[str, Work], rounds: int, advance: Callable[[], object] = lambda: None
-) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Seconds, and seconds of the processor, that each took for a frame in every round, shape (rounds,).
+def taken(contestants: Mapping[str, Work], rounds: int) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Return seconds, and seconds of the processor, that each took for a frame in every round, shape (rounds,).
 
     Each runs once to find its way into the caches, and then `RUNS` times in its turn. The fastest counts, so that what
     else the machine has to do counts little; of the processor's time it is the mean.
@@ -205,12 +168,11 @@ def race(
                 moments.append(time.perf_counter())
             wall[name][turn] = np.diff(moments).min() / work.frames
             processor[name][turn] = (time.process_time() - spent) / RUNS / work.frames
-        advance()
     return wall, processor
 
 
 def compared(seconds: np.ndarray, reference: np.ndarray) -> tuple[float, float, float]:
-    """The median over rounds of the ratio to the reference, and the bounds of its confidence interval."""
+    """Return the median over rounds of the ratio to the reference, and the bounds of its confidence interval."""
     ratios = seconds / reference
     drawn = np.random.default_rng(SEED).integers(len(ratios), size=(RESAMPLES, len(ratios)))
     low, high = np.quantile(np.median(ratios[drawn], axis=1), ((1.0 - CONFIDENCE) / 2.0, (1.0 + CONFIDENCE) / 2.0))
@@ -218,7 +180,7 @@ def compared(seconds: np.ndarray, reference: np.ndarray) -> tuple[float, float, 
 
 
 def _pairs(clip: Clip, rate: float) -> tuple[Poses, Poses, np.ndarray]:
-    """The keys on either side of every frame, and how far the frame is from one to the other."""
+    """Return the keys on either side of every frame, and how far the frame is from one to the other."""
     keys = decimate(clip.times, rate)
     times, poses = clip.times[keys], clip.poses[keys]
     poses = Poses(poses.positions, align_signs(poses.quaternions))
@@ -226,11 +188,3 @@ def _pairs(clip: Clip, rate: float) -> tuple[Poses, Poses, np.ndarray]:
     segment = np.clip(np.searchsorted(times, frames, side="right") - 1, 0, len(keys) - 2)
     u = (frames - times[segment]) / (times[segment + 1] - times[segment])
     return poses[segment], poses[segment + 1], u
-
-
-def _for_users(poses: Poses) -> Poses:
-    """As many rows of the same keys as there are users."""
-    shape = USERS, len(poses)
-    return Poses(
-        np.broadcast_to(poses.positions, (*shape, 3)).copy(), np.broadcast_to(poses.quaternions, (*shape, 4)).copy()
-    )

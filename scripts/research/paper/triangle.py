@@ -6,8 +6,6 @@ way leaves the other is counted. Metres; the triangle is about as large as one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import bpy
 import numpy as np
 
@@ -35,39 +33,29 @@ EXTREMES = Poses(
 )
 
 
-@dataclass(frozen=True)
-class Step:
-    """An in-between of both kinds. The fields are the columns of `triangle.csv`."""
-
-    at: float
-    """Share of the way."""
-
-    lerp_turned_deg: float
-    slerp_turned_deg: float
-
-    apart_m: float
-    """How far the origins are from one another."""
-
-    apart_deg: float
-    """And the rotations."""
-
-
 def in_betweens() -> tuple[np.ndarray, dict[str, Poses]]:
     """The shares of the way, without the ends, and the poses there of either kind."""
     shares = np.arange(1, IN_BETWEENS + 1) / (IN_BETWEENS + 1.0)
     return shares, {name: interpolate([0.0, 1.0], EXTREMES, shares, mode) for name, mode in ENGINES.items()}
 
 
-def steps() -> list[Step]:
-    """The figure in numbers."""
+def figures() -> dict[str, float]:
+    """Return the figure in numbers: degrees that LERP and SLERP turn at a step, and how far they are apart at most."""
     shares, poses = in_betweens()
+    first = EXTREMES.quaternions[0]
     turned = {
-        name: np.degrees(angle_between(np.broadcast_to(EXTREMES.quaternions[0], p.quaternions.shape), p.quaternions))
-        for name, p in poses.items()
+        name: np.degrees(np.append(0.0, angle_between(np.broadcast_to(first, own.quaternions.shape), own.quaternions)))
+        for name, own in poses.items()
     }
     apart = measure(shares, poses["lerp"], poses["slerp"])
-    columns = shares, turned["lerp"], turned["slerp"], apart.position, np.degrees(apart.rotation)
-    return [Step(*map(float, row)) for row in zip(*columns, strict=True)]
+    return {
+        "in_betweens": IN_BETWEENS,
+        "slerp_step": np.diff(turned["slerp"])[0],
+        "lerp_first_step": np.diff(turned["lerp"])[0],
+        "lerp_largest_step": np.diff(turned["lerp"]).max(),
+        "apart": apart.position.max(),
+        "apart_degrees": np.degrees(apart.rotation.max()),
+    }
 
 
 def build() -> bpy.types.Scene:

@@ -29,7 +29,7 @@ class Command:
 
 
 RESEARCH = {
-    "paper": "reproduce_paper",
+    "paper": "paper.study",
     "benchmark": "benchmark",
     "benchmark_batch": "benchmark_batch",
     "benchmark_live": "benchmark_live",

@@ -26,7 +26,7 @@ from rigid_motion_batch.recordings.figures import Figure
 from rigid_motion_batch.streaming.receiving import Receiving
 from rigid_motion_batch.streaming.rooms import HERE, Room, RoomError, is_loopback, locator, opened, settings
 from rigid_motion_batch.streaming.written import write_bvh
-from tests.scripts.research.paper.streaming.motions import swinging
+from tests.scripts.streaming.motions import swinging
 from tests.streams.links import body, dance
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -8,7 +8,7 @@ import pytest
 from mathutils import Vector
 
 from research.paper import claims, picture, strips, triangle
-from research.paper.catching import build, views
+from research.paper.catching import build
 from rigid_motion_batch.scenes.film import render_still
 from tests.scripts.research.paper.clips import thrown
 
@@ -28,23 +28,18 @@ def words_on(scene: bpy.types.Scene) -> dict[str, np.ndarray]:
     return found
 
 
-def test_lerp_lags_behind_and_then_overtakes_and_slerp_turns_evenly():
-    steps = triangle.steps()
-    assert len(steps) == 20
-    slerp = np.array([one.slerp_turned_deg for one in steps])
-    lerp = np.array([one.lerp_turned_deg for one in steps])
-    np.testing.assert_allclose(np.diff(slerp), slerp[0], rtol=1e-9)
-    assert np.all(lerp[:10] < slerp[:10])
-    assert np.all(lerp[10:] > slerp[10:])
+def test_slerp_turns_evenly_and_lerp_more_slowly_at_first():
+    found = triangle.figures()
+    assert found["slerp_step"] == pytest.approx(150.0 / 21.0)
+    assert found["lerp_first_step"] < found["slerp_step"] < found["lerp_largest_step"]
+    assert 0.0 < found["apart"] < 1.0
 
 
 def test_the_tip_rests_under_screws_and_leaves_its_place_under_the_state_of_the_art():
-    instants = strips.instants()
-    assert {one.mode for one in instants} == set(strips.ENGINES)
-    for one in instants:
-        if one.mode != "lerp_slerp" or one.at in (0.0, 1.0):
-            assert one.tip_off_m < 1e-9
-    assert max(one.tip_off_m for one in instants) > 0.05
+    found = strips.figures()
+    assert set(found) == set(strips.ENGINES)
+    assert max(found["dq_sclerp"], found["pga_lerp"]) < 1e-9
+    assert found["lerp_slerp"] > 0.05
 
 
 def test_the_triangle_is_in_the_colours_of_the_paper():
@@ -61,7 +56,7 @@ def test_all_words_stand_on_the_sheet_and_are_large_enough_to_read(figure: str):
     scene = {
         "triangle": triangle.build,
         "strips": strips.build,
-        "catching": lambda: build(thrown(), views(thrown()), film=False),
+        "catching": lambda: build(thrown(), film=False),
     }[figure]()
     assert scene.render.resolution_x == picture.WIDTH
     words = words_on(scene)

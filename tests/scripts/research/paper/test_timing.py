@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from research.paper import claims, timing
-from research.paper.timing import ALGEBRA, AS_GOOD, EQUAL, FAST, PAPER, SINGLE, Work
+from research.paper import timing
+from research.paper.claims import PAPER, UPDATES
+from research.paper.timing import Work
 from rigid_motion.motion import MODES
 from tests.scripts.research.paper.clips import circling
 
@@ -28,7 +29,7 @@ def test_all_readings_generate_the_same_frames(mode: str):
 def test_everyone_runs_as_often_and_the_turn_to_begin_goes_round():
     ran: list[str] = []
     contestants = {name: Work(lambda name=name: ran.append(name), 10) for name in "abc"}
-    wall, processor = timing.race(contestants, 3)
+    wall, processor = timing.taken(contestants, 3)
     firsts = [ran[turn * 3 * (1 + timing.RUNS)] for turn in range(3)]
     assert firsts == ["a", "b", "c"]
     assert {name: ran.count(name) for name in "abc"} == dict.fromkeys("abc", 3 * (1 + timing.RUNS))
@@ -54,20 +55,18 @@ def test_the_interval_holds_the_ratio_and_narrows_with_more_rounds():
 
 def test_the_races_have_every_mode_at_the_rates_that_were_asked_for(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(timing, "USERS", 2)
-    rounds = []
-    needed = {30: {"lerp_slerp": 29.0, "dq_sclerp": 25.0, "motor_spline": 19.0}, 12: {"pga_lerp": 11.0}}
-    found = timing.races(CLIP, needed, 2, lambda: rounds.append(1))
-    races: dict[tuple[str, str, float], dict[str, float]] = {}
-    for one in found:
-        races.setdefault((one.reading, one.pace, one.reference_updates), {})[one.mode] = one.updates
-        assert one.seconds > 0.0
-        assert one.relative == 1.0 or one.mode != "lerp_slerp"
-    for row in claims.TABLE:
-        rate = row.state_of_the_art
-        assert races[FAST, EQUAL, rate] == dict.fromkeys(MODES, rate)
-        others = dict.fromkeys((mode for mode in EXACT if mode != "lerp_slerp"), row.multivectors)
-        assert races[FAST, PAPER, rate] == {"lerp_slerp": rate} | others
-    assert races[FAST, AS_GOOD, 30] == {"lerp_slerp": 30.0, "dq_sclerp": 25.0, "motor_spline": 19.0}
-    assert races[FAST, AS_GOOD, 12] == {"lerp_slerp": 12.0, "pga_lerp": 11.0}
-    assert races[ALGEBRA, EQUAL, 30] == races[SINGLE, EQUAL, 30] == dict.fromkeys(EXACT, 30.0)
-    assert len(rounds) == 2 * timing.RACES
+    monkeypatch.setattr(timing, "SINGLES", 4)
+    needed = {"lerp_slerp": {"updates": [29.0, 19.0, 14.0, 11.0]}, "pga_lerp": {"updates": [25.0, 16.0, 13.0, 11.5]}}
+    found = timing.races(CLIP, needed, 2)
+
+    def updates(pace: str, rate: int) -> dict[str, float]:
+        return {mode: own[rate]["updates"] for mode, own in found[pace].items()}
+
+    for place, rate in enumerate(UPDATES):
+        assert updates("equal", rate) == dict.fromkeys(MODES, rate)
+        assert updates("paper", rate) == dict.fromkeys(EXACT, PAPER[rate]) | {"lerp_slerp": rate}
+        as_good = {"lerp_slerp": rate, "pga_lerp": needed["pga_lerp"]["updates"][place]}
+        assert updates("as good", rate) == as_good
+        assert found["equal"]["lerp_slerp"][rate]["relative"] == 1.0
+    assert set(found["algebra"]) == set(found["single"]) == set(EXACT)
+    assert all(one["processor"] > 0.0 for one in found["algebra"].values())

@@ -1,0 +1,80 @@
+"""`python scripts/research paper`, as people run it, and what a stream costs."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from research.paper import sending, study, table
+from research.paper.claims import UPDATES
+from rigid_motion_batch.streaming.transports import HEADERS
+from tests.scripts.research.paper.clips import circling
+
+CLIP = circling(turns=0.7, rate=90.0, seconds=3.0)
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(table, "STEP", 2.0)
+    monkeypatch.setattr(table, "TOLERANCES", (0.5, 2.0, 2))
+    monkeypatch.setattr(study.motions, "assets", lambda: [CLIP])
+
+
+@pytest.mark.usefixtures("small")
+def test_a_part_writes_its_figures(tmp_path: Path) -> None:
+    assert study.main(["--only", "table", "--root", str(tmp_path)]) == 0
+    (path,) = (tmp_path / "docs" / "figures").iterdir()
+    assert path.name == "paper_table.json"
+    found = json.loads(path.read_text(encoding="utf-8"))
+    assert found["made_by"].startswith("`python scripts/research paper --only table")
+    assert found["clips"] == {"assets": ["circling"]}
+    assert found["needed"]["assets"]["rms_shell"]["lerp_slerp"]["updates"] == pytest.approx(UPDATES, rel=1e-3)
+    assert found["by_clip"]["circling"]["motor_spline"][0] > 0.3
+    assert set(found["bows"]["circling"]) == {"5", "8", "12", "15", "20", "30"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--recordings", "nowhere"], "no such folder"),
+        (["--only", "bodies", "--bodies", "nowhere"], "no such file or folder"),
+        (["--only", "nothing"], "invalid choice"),
+        (["--unknown"], "unrecognized arguments"),
+    ],
+)
+def test_a_wrong_option_is_named_and_ends_with_code_2(
+    arguments: list[str], said: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    try:
+        code = study.main([*arguments, "--root", str(tmp_path)])
+    except SystemExit as ended:
+        code = ended.code
+    assert code == 2
+    assert said in capfd.readouterr().err
+
+
+@pytest.mark.network
+def test_a_stream_costs_less_the_more_it_may_be_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sending, "DELAYS", (0.1,))
+    monkeypatch.setattr(sending, "TOLERANCES", (1.0, 5.0, 3))
+    found = sending.costs([CLIP])
+    own = found["needed"]["100"]
+    assert own["bytes"] == sorted(own["bytes"], reverse=True)
+    for datagrams, size in zip(own["datagrams"], own["bytes"], strict=True):
+        assert size > HEADERS * datagrams > 0.0
+    assert found["even"]["7 doubles"][0] == 30 * (56 + HEADERS + sending.STAMP)
+    assert own["saved_bytes"]["7 doubles"][0] == pytest.approx(1.0 - own["bytes"][0] / found["even"]["7 doubles"][0])
+
+
+def test_a_packing_is_off_by_no_more_than_its_steps() -> None:
+    found = sending.packings(CLIP)
+    exact, single, small = found.values()
+    assert exact == {"bytes": 56, "error": 0.0}
+    assert (single["bytes"], small["bytes"]) == (28, 10)
+    assert 0.0 < single["error"] < 1e-6
+    # Half a step in each of three coordinates and of three components.
+    step, turn = 8.0 / (2**16 - 1), np.sqrt(2.0) / (2**10 - 2)
+    assert 0.1 * step < small["error"] < np.sqrt(3.0) * step / 2.0 + 0.1 * 4.0 * np.sqrt(3.0) * turn / 2.0
