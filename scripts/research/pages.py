@@ -87,6 +87,13 @@ def less(share: float, word: str = "less", decimals: int = 0) -> str:
     return f"{abs(percents):.{decimals}f}\N{NO-BREAK SPACE}% {'more' if percents < 0.0 else word}".rstrip()
 
 
+def alike(shares: Iterable[float], word: str = "less") -> str:
+    """Return shares that are saved, as a sentence has them: "33, 50 and 53 % less"."""
+    texts = [less(share, word) for share in shares]
+    numbers, units = zip(*(text.split("\N{NO-BREAK SPACE}") for text in texts), strict=True)
+    return f"{listed(numbers)}\N{NO-BREAK SPACE}{units[0]}" if len(set(units)) == 1 else listed(texts)
+
+
 def each(values: Iterable[float], form: str = "{:.2f}", factor: float = 1.0) -> list[str]:
     """Return numbers as texts of this form, times a factor; a dash where there is none."""
     return ["\N{EN DASH}" if value is None else form.format(factor * value) for value in values]
@@ -110,7 +117,7 @@ def environment(root: Path = ROOT) -> jinja2.Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    found.filters |= {one.__name__: one for one in (digits, each, less, listed, percent, rest, spread, table)}
+    found.filters |= {one.__name__: one for one in (alike, digits, each, less, listed, percent, rest, spread, table)}
     found.globals |= {
         path.stem: json.loads(path.read_text(encoding="utf-8")) for path in (root / FIGURES).glob("*.json")
     }

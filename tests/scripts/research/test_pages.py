@@ -10,7 +10,7 @@ import jinja2
 import numpy as np
 import pytest
 
-from research.pages import QUOTE, ROOT, each, environment, filled, less, pages, spread, table, write_figures
+from research.pages import QUOTE, ROOT, alike, each, environment, filled, less, pages, spread, table, write_figures
 
 TEMPLATES = environment()
 
@@ -88,5 +88,7 @@ def test_how_figures_are_written():
     assert spread([5.0, 5.2]) == "5"
     assert less(0.031, "fewer") == "3\N{NO-BREAK SPACE}% fewer"
     assert less(-0.031, decimals=1) == "3.1\N{NO-BREAK SPACE}% more"
+    assert alike([0.33, 0.5], "fewer") == "33 and 50\N{NO-BREAK SPACE}% fewer"
+    assert alike([0.33, -0.5]) == "33\N{NO-BREAK SPACE}% less and 50\N{NO-BREAK SPACE}% more"
     assert each([1.234, None]) == ["1.23", "\N{EN DASH}"]
     assert table([["a", 1]], "x", "y") == "| x | y |\n| --- | ---: |\n| a | 1 |"
