@@ -10,6 +10,8 @@ import pytest
 
 from research.paper import sending, study, table
 from research.paper.claims import UPDATES
+from rigid_motion_batch.streaming.measuring import measure
+from rigid_motion_batch.streaming.sending import body_of, samples_of
 from rigid_motion_batch.streaming.transports import HEADERS
 from tests.scripts.research.paper.clips import circling
 
@@ -56,7 +58,6 @@ def test_a_wrong_option_is_named_and_ends_with_code_2(
     assert said in capfd.readouterr().err
 
 
-@pytest.mark.network
 def test_a_stream_costs_less_the_more_it_may_be_off(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sending, "DELAYS", (0.1,))
     monkeypatch.setattr(sending, "TOLERANCES", (1.0, 5.0, 3))
@@ -67,6 +68,16 @@ def test_a_stream_costs_less_the_more_it_may_be_off(monkeypatch: pytest.MonkeyPa
         assert size > HEADERS * datagrams > 0.0
     assert found["even"]["7 doubles"][0] == 30 * (56 + HEADERS + sending.STAMP)
     assert own["saved_bytes"]["7 doubles"][0] == pytest.approx(1.0 - own["bytes"][0] / found["even"]["7 doubles"][0])
+
+
+@pytest.mark.network
+def test_a_stream_is_that_which_another_process_shows() -> None:
+    times, poses = samples_of(CLIP)
+    cost = measure(body_of(CLIP, poses, 0.1), times, poses, 0.005, 0.1).cost
+    datagrams, size, error = sending.sent(CLIP, 0.005, 0.1)
+    assert datagrams == pytest.approx((cost.bytes_a_second_with_headers - cost.bytes_a_second) / HEADERS)
+    assert size == pytest.approx(cost.bytes_a_second_with_headers)
+    assert error == pytest.approx(1e-3 * cost.rms_mm, rel=0.05)
 
 
 def test_a_packing_is_off_by_no_more_than_its_steps() -> None:
