@@ -9,6 +9,7 @@ import pytest
 from rigid_motion.live import driving, receiving
 from rigid_motion.motion import Poses
 from rigid_motion.streams import Body, Sender
+from rigid_motion.streams.vmc import write_trackers
 from tests.live.performing import (
     BODY,
     JOINTS,
@@ -80,6 +81,18 @@ def test_without_a_rig_a_body_is_an_armature_with_its_rest(live, sent):
     world = in_world(dance(TIMES)).positions[:, 9]
     for joint, name in enumerate(JOINTS):
         assert heads[name] == pytest.approx(world[joint], abs=SINGLE)
+
+
+def test_trackers_of_vmc_are_objects_beside_the_performer(live, sent):
+    live.armature = rig = new_rig()
+    world = in_world(dance(TIMES)).positions
+    for row, datagrams in enumerate(frames_of_vmc(TIMES)[:10]):
+        ball = {"ball": Poses([TIMES[row], 2.0, 1.0], [0.0, 1.0, 0.0, 0.0])}
+        sent.send([*write_trackers(ball), *datagrams], 50.0 + TIMES[row])
+    assert heads_of(rig) == pytest.approx(world[:, 9], abs=SINGLE)
+    obj = bpy.data.objects["ball"]
+    assert obj.location == pytest.approx((TIMES[9], 2.0, 1.0), abs=SINGLE)
+    assert abs(obj.rotation_quaternion[1]) == pytest.approx(1.0)
 
 
 def test_rigid_bodies_of_the_codec_are_objects_and_a_skeleton_moves_the_rig(live, sent):

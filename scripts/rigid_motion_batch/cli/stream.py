@@ -79,7 +79,7 @@ examples:
   python scripts/stream.py send walk.bvh --room studio
   python scripts/stream.py send log.csv:left log.csv:right --room studio --user ada --tolerance 2mm --delay 0.2
   python scripts/stream.py send hand.csv --axes unity --room studio --at studio.local --rate 20
-  python scripts/stream.py send --from-vmc 39539 --room studio   what another program performs
+  python scripts/stream.py send --from-vmc 39539 --room studio   a performer and trackers of another program
   python scripts/stream.py send walk.bvh --to-vmc 127.0.0.1:39539
 
 All recordings begin together, and take as long as they take, even if nobody listens.
@@ -115,7 +115,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
 
     sending = commands.add_parser("send", help="play recordings", epilog=as_called(SEND_EPILOG, SCRIPT), **style)
     sending.add_argument("recordings", nargs="*", metavar="RECORDING", help="FILE, or FILE:BODY for one of several")
-    help = "send what another program sends by VMC to this port of this machine, instead of recordings"
+    help = "send the performer and trackers that come by VMC to this port of this machine, instead of recordings"
     sending.add_argument("--from-vmc", type=_port, metavar="PORT", help=help)
     _add_room(sending, "to send")
     help = "play it to this program by VMC instead: Blender's panel Live, VSeeFace, Warudo, Unity"
@@ -231,17 +231,17 @@ def send_performer(options: argparse.Namespace, stopped: list[int]) -> None:
     """Send what another program performs until that is to end. Raises what says why it could not be."""
     tolerance, delay = Tolerance(options.tolerance).metres(1.0), options.delay or DELAY
     sending: Sending | None = None
-    sent: Body | None = None
+    sent: tuple[Body, ...] = ()
     with _room(options) as room, vmc.Performers(options.from_vmc) as performers:
         _say(f"{options.user} listens to port {performers.port} and sends to {options.room}")
         while not stopped:
-            for body, moments, poses in performers.samples():
+            for bodies, moments, poses in performers.samples():
                 if sending is None:
-                    sending = Sending(room, options.user, Sender([body], tolerance, delay))
-                elif body is not sent:  # Bones came that were not there before.
-                    sending.sender = Sender([body], tolerance, delay)
+                    sending = Sending(room, options.user, Sender(bodies, tolerance, delay))
+                elif bodies is not sent:  # Bones or trackers came that were not there before.
+                    sending.sender = Sender(bodies, tolerance, delay)
                     sending.say(sending.sender.join())
-                sent = body
+                sent = bodies
                 for sample, moment in enumerate(moments.tolist()):
                     sending.say(sending.sender.add(moment, poses[:, sample]))
                 ahead = float(moments[-1]) - time.monotonic()
