@@ -91,7 +91,7 @@ def test_trackers_of_vmc_are_objects_beside_the_performer(live, sent):
         sent.send([*write_trackers(ball), *datagrams], 50.0 + TIMES[row])
     assert heads_of(rig) == pytest.approx(world[:, 9], abs=SINGLE)
     obj = bpy.data.objects["ball"]
-    assert obj.location == pytest.approx((TIMES[9], 2.0, 1.0), abs=SINGLE)
+    assert tuple(obj.location) == pytest.approx((TIMES[9], 2.0, 1.0), abs=SINGLE)
     assert abs(obj.rotation_quaternion[1]) == pytest.approx(1.0)
 
 

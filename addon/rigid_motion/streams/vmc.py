@@ -136,7 +136,7 @@ class Performer:
 
 
 class VmcReceiver:
-    """Takes datagrams of performers and their devices, and shows them a delay later: what `Receiver` is for the codec."""
+    """Shows performers and their devices a delay later: what `Receiver` is for the codec."""
 
     def __init__(self, delay: float = 0.1) -> None:
         self.delay = delay
