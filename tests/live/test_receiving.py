@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.live import driving, receiving
+from rigid_motion.live import receiving
 from rigid_motion.motion import Poses
 from rigid_motion.streams import Body, Sender
 from rigid_motion.streams.vmc import write_trackers
@@ -14,7 +14,6 @@ from tests.live.performing import (
     BODY,
     JOINTS,
     REST,
-    SKELETON,
     Sent,
     dance,
     frames_of_vmc,
@@ -249,10 +248,3 @@ def test_at_rest_nothing_of_a_rig_is_turned(live, sent):
         sent.send((sender.describe() if row == 0 else []) + sender.add(row / 60, REST), 50.0 + row / 60)
     for bone in rig.pose.bones:
         assert np.array(bone.matrix_basis) == pytest.approx(np.eye(4), abs=1e-4)
-
-
-def test_the_quick_way_into_root_space_is_the_way(extension):
-    quick = driving._in_root_space(SKELETON, dance(TIMES[:7]))
-    slow = SKELETON.in_root_space(dance(TIMES[:7]))
-    assert quick.positions == pytest.approx(slow.positions)
-    assert np.abs(np.einsum("...i,...i", quick.quaternions, slow.quaternions)) == pytest.approx(1.0)
