@@ -198,7 +198,7 @@ def test_linked_rigs_are_left_alone(live, sent, tmp_path):
     live.armature = wanted.objects[0]
     for row, datagrams in enumerate(frames_of_vmc(TIMES)[:5]):
         sent.send(datagrams, 50.0 + TIMES[row])
-    assert receiving.trouble == ""
+    assert receiving.running.trouble == ""
 
 
 def test_a_port_that_is_taken_is_named(live, port, sent):
@@ -218,9 +218,9 @@ def test_a_new_file_and_switching_off_close_the_port(live, port, sent):
 
 def test_an_error_closes_the_port_and_says_so(live, sent, monkeypatch, caplog):
     monkeypatch.setattr(receiving.Listening, "tick", lambda *_: 1 / 0)
-    assert receiving._look() is None
+    assert receiving.running.look() is None
     assert receiving.listening() is None
-    assert receiving.trouble == "division by zero"
+    assert receiving.running.trouble == "division by zero"
 
 
 def test_any_datagram_does_no_harm(live, sent):
