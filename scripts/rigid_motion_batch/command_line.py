@@ -10,7 +10,7 @@ import os
 import shlex
 import sys
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -115,6 +115,18 @@ def number(text: str) -> float:
         return float(text)
     except ValueError:
         return math.nan
+
+
+def bounded(what: str, least: float, most: float, above: bool = False) -> Callable[[str], float]:
+    """A type of argument: a number from the least to the most, or above the least."""
+
+    def parse_number(text: str) -> float:
+        value = number(text)
+        if not least <= value <= most or (above and value == least):
+            raise argparse.ArgumentTypeError(f"{text!r} is no {what}; give {'more than ' * above}{least:g} to {most:g}")
+        return value
+
+    return parse_number
 
 
 def folder_path(text: str) -> Path:

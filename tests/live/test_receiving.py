@@ -6,14 +6,14 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.live import driving, receiving
+from rigid_motion.live import receiving
 from rigid_motion.motion import Poses
 from rigid_motion.streams import Body, Sender
+from rigid_motion.streams.vmc import write_trackers
 from tests.live.performing import (
     BODY,
     JOINTS,
     REST,
-    SKELETON,
     Sent,
     dance,
     frames_of_vmc,
@@ -80,6 +80,18 @@ def test_without_a_rig_a_body_is_an_armature_with_its_rest(live, sent):
     world = in_world(dance(TIMES)).positions[:, 9]
     for joint, name in enumerate(JOINTS):
         assert heads[name] == pytest.approx(world[joint], abs=SINGLE)
+
+
+def test_trackers_of_vmc_are_objects_beside_the_performer(live, sent):
+    live.armature = rig = new_rig()
+    world = in_world(dance(TIMES)).positions
+    for row, datagrams in enumerate(frames_of_vmc(TIMES)[:10]):
+        ball = {"ball": Poses([TIMES[row], 2.0, 1.0], [0.0, 1.0, 0.0, 0.0])}
+        sent.send([*write_trackers(ball), *datagrams], 50.0 + TIMES[row])
+    assert heads_of(rig) == pytest.approx(world[:, 9], abs=SINGLE)
+    obj = bpy.data.objects["ball"]
+    assert tuple(obj.location) == pytest.approx((TIMES[9], 2.0, 1.0), abs=SINGLE)
+    assert abs(obj.rotation_quaternion[1]) == pytest.approx(1.0)
 
 
 def test_rigid_bodies_of_the_codec_are_objects_and_a_skeleton_moves_the_rig(live, sent):
@@ -186,7 +198,7 @@ def test_linked_rigs_are_left_alone(live, sent, tmp_path):
     live.armature = wanted.objects[0]
     for row, datagrams in enumerate(frames_of_vmc(TIMES)[:5]):
         sent.send(datagrams, 50.0 + TIMES[row])
-    assert receiving.trouble == ""
+    assert receiving.running.trouble == ""
 
 
 def test_a_port_that_is_taken_is_named(live, port, sent):
@@ -206,9 +218,9 @@ def test_a_new_file_and_switching_off_close_the_port(live, port, sent):
 
 def test_an_error_closes_the_port_and_says_so(live, sent, monkeypatch, caplog):
     monkeypatch.setattr(receiving.Listening, "tick", lambda *_: 1 / 0)
-    assert receiving._look() is None
+    assert receiving.running.look() is None
     assert receiving.listening() is None
-    assert receiving.trouble == "division by zero"
+    assert receiving.running.trouble == "division by zero"
 
 
 def test_any_datagram_does_no_harm(live, sent):
@@ -236,10 +248,3 @@ def test_at_rest_nothing_of_a_rig_is_turned(live, sent):
         sent.send((sender.describe() if row == 0 else []) + sender.add(row / 60, REST), 50.0 + row / 60)
     for bone in rig.pose.bones:
         assert np.array(bone.matrix_basis) == pytest.approx(np.eye(4), abs=1e-4)
-
-
-def test_the_quick_way_into_root_space_is_the_way(extension):
-    quick = driving._in_root_space(SKELETON, dance(TIMES[:7]))
-    slow = SKELETON.in_root_space(dance(TIMES[:7]))
-    assert quick.positions == pytest.approx(slow.positions)
-    assert np.abs(np.einsum("...i,...i", quick.quaternions, slow.quaternions)) == pytest.approx(1.0)

@@ -80,7 +80,7 @@ def test_what_is_deleted_or_has_no_known_bones_is_not_sent(listener):
     rig.select_set(True)
     assert bpy.ops.rigid_motion.live_send() == {"FINISHED"}
     bpy.data.objects.remove(bpy.data.objects["Empty"])
-    sending._look()
+    sending.running.look()
     assert received(listener) == []
     assert bpy.ops.rigid_motion.live_stop_sending() == {"FINISHED"}
     assert sending.sending() is None

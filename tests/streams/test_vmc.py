@@ -15,6 +15,7 @@ from rigid_motion.streams import Body, osc
 from rigid_motion.streams.humanoid import HUMANOID, Retargeting, humanoid_bones, matched
 from rigid_motion.streams.vmc import (
     JOINTS,
+    MOST_DEVICES,
     MOST_SOURCES,
     ROOT,
     Performer,
@@ -22,6 +23,7 @@ from rigid_motion.streams.vmc import (
     from_unity,
     to_unity,
     write,
+    write_trackers,
 )
 from tests.thoroughness import sample
 
@@ -182,6 +184,47 @@ def test_what_is_written_is_what_is_shown():
     shown = receiver.show(5.0 + 19 / 60)[keys.stream]
     assert shown.moment == pytest.approx(19 / 60 - 0.05, abs=1e-6)
     assert receiver.show(30.0) == {}
+
+
+TRACKER = b"/VMC/Ext/Tra/Pos\0\0\0\0,sfffffff\0\0\0LHR-1\0\0\0" + POSE_7
+CONTROLLER = b"/VMC/Ext/Con/Pos\0\0\0\0,sfffffff\0\0\0LHR-2\0\0\0" + POSE_7
+HEADSET = b"/VMC/Ext/Hmd/Pos\0\0\0\0,sfffffff\0\0\0LHR-3\0\0\0" + POSE_7
+
+
+@pytest.mark.parametrize("messages", [[TRACKER, CONTROLLER, HEADSET], [ROOT_7, HIPS, TRACKER, CONTROLLER, HEADSET]])
+def test_devices_are_rigid_bodies_beside_the_performer(messages):
+    """After the documentation: a serial number and a pose in the world."""
+    receiver = heard([*messages, TIME], 1.0, VmcReceiver(delay=0.0))
+    ((stream, shown),) = receiver.show(1.0).items()
+    bodies = receiver.bodies(stream)
+    assert [body.name for body in bodies] == ["VMC"] * (HIPS in messages) + ["LHR-1", "LHR-2", "LHR-3"]
+    for body in bodies[-3:]:
+        assert body.joints == (body.name,)
+        assert shown.poses[body.name].positions == pytest.approx(np.array([[-1.0, -3.0, 2.0]]))
+        assert shown.poses[body.name].quaternions == pytest.approx(about(2, -90)[None], abs=1e-7)
+
+
+def test_a_tracker_that_joins_leaves_the_other_bodies_as_they_are():
+    receiver = heard([ROOT_7, HIPS, TRACKER, TIME], 1.0, VmcReceiver(delay=0.0))
+    (stream,) = receiver.show(1.0)
+    before = receiver.bodies(stream)
+    heard([ROOT_7, HIPS, TRACKER, CONTROLLER, TIME.replace(b"\x41\x20", b"\x41\x28")], 1.5, receiver)
+    after = receiver.bodies(stream)
+    assert after[:2] == before
+    assert [body.name for body in after] == ["VMC", "LHR-1", "LHR-2"]
+
+
+def test_trackers_that_are_written_are_shown_without_times():
+    receiver, rng = VmcReceiver(delay=0.0), np.random.default_rng(2)
+    places = rng.normal(size=(4, MOST_DEVICES + 5, 3))
+    for row in range(4):
+        turns = random_turns(MOST_DEVICES + 5, row)
+        poses = {f"ball {number}": Poses(places[row, number], turns[number]) for number in range(MOST_DEVICES + 5)}
+        heard(write_trackers(poses), 0.1 * row, receiver)
+    (keys,) = receiver.keys()
+    assert len(keys.poses) == MOST_DEVICES
+    for number in range(MOST_DEVICES):
+        assert keys.poses[f"ball {number}"].positions[:, 0] == pytest.approx(places[:3, number], abs=1e-6)
 
 
 def skeleton(rest_turns: np.ndarray, arms_down: float, larger: float, prefix: str) -> tuple[list[str], Poses]:

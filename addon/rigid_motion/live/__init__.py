@@ -3,7 +3,8 @@
 sockets    the only module that opens one
 driving    from bodies to objects and bones
 recording  from what came to keys
-receiving  what listens: the timer, and what becomes of what comes
+ticking    the timer of the two that follow
+receiving  what listens, and what becomes of what comes
 sending    what goes out
 
 Nothing listens or sends until an operator asks for it. Each module imports only those above it.

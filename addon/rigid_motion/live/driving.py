@@ -145,7 +145,7 @@ class RigDriver(Driver):
         return rows.get(joint, -1)
 
     def values(self, poses: Poses) -> Values:
-        target = self._retarget(_in_root_space(self._skeleton, poses))
+        target = self._retarget(self._skeleton.in_root_space(poses))
         back = conjugate(self._turn)
         turns = multiply(back, target.quaternions)
         places = rotate(back, target.positions) / self._scale
@@ -183,24 +183,6 @@ def _beside(placed: Poses, follows: np.ndarray) -> Poses:
         rotate(back, placed.positions - np.where(hanging, placed.positions[follows], 0.0)),
         multiply(back, placed.quaternions),
     )
-
-
-def _in_root_space(skeleton: Skeleton, poses: Poses) -> Poses:
-    """What `Skeleton.in_root_space` says of poses (joints, n), at a third of the time where n is 1."""
-    turns = poses.quaternions[..., _LEFT] * _LEFT_SIGNS
-    for joints in skeleton.levels[1:]:
-        turns[joints] = turns[skeleton.parents[joints]] @ turns[joints]
-    quaternions = turns[..., 0]
-    hanging = (skeleton.parents >= 0)[:, None, None]
-    positions = np.where(hanging, rotate(quaternions[skeleton.parents], poses.positions), poses.positions)
-    for joints in skeleton.levels[1:]:
-        positions[joints] += positions[skeleton.parents[joints]]
-    return Poses(positions, quaternions)
-
-
-_LEFT = np.array(((0, 1, 2, 3), (1, 0, 3, 2), (2, 3, 0, 1), (3, 2, 1, 0)))
-_LEFT_SIGNS = np.array(((1, -1, -1, -1), (1, 1, -1, 1), (1, 1, 1, -1), (1, -1, 1, 1)))
-"""A quaternion q as a matrix, of these components with these signs: matrix(p) @ matrix(q) is matrix(p q)."""
 
 
 def object_of(label: str, body: Body) -> bpy.types.Object | None:

@@ -7,7 +7,6 @@ after it, and they are made again; what is deleted stays away until somebody lis
 from __future__ import annotations
 
 import itertools
-import logging
 import time
 from collections import deque
 from collections.abc import Callable, Container, Mapping
@@ -17,7 +16,6 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ..animation.handlers import append_handlers, remove_handlers
 from ..motion import Poses
 from ..streams import Body, Keys, Receiver
 from ..streams.osc import is_osc
@@ -26,11 +24,7 @@ from ..streams.vmc import VmcReceiver
 from .driving import Driver, ObjectDriver, RigDriver, object_of
 from .recording import Take
 from .sockets import Port
-
-log = logging.getLogger(__package__)
-
-RATE = 60
-"""Looks a second."""
+from .ticking import Ticking
 
 Which = tuple[Stream, str]
 """A stream, and the name of one of its bodies."""
@@ -244,67 +238,31 @@ class Listening:
         self._port.close()
 
 
-_listening: Listening | None = None
-trouble = ""
-"""Why it ended by itself."""
-
-
-def listening() -> Listening | None:
-    """What listens, if anything does."""
-    return _listening
-
-
-def start(host: str, port: int, settings: Callable[[], Settings], pairs: Pairs) -> Listening:
-    """Listen to a port, and to nothing else any more. Raises OSError where it is taken, and NotAllowed."""
-    global _listening, trouble
-    stop()
-    _listening, trouble = Listening(host, port, settings, pairs), ""
-    append_handlers(HANDLERS)
-    bpy.app.timers.register(_look)
-    return _listening
-
-
-def stop() -> None:
-    """Listen no more. What is recorded and not finished is given up."""
-    global _listening
-    if _listening is not None:
-        _listening.close()
-        _listening = None
-        remove_handlers(HANDLERS)
-        if bpy.app.timers.is_registered(_look):
-            bpy.app.timers.unregister(_look)
-
-
-def _look() -> float | None:
-    global trouble
-    if _listening is None:
-        return None
-    try:
-        _listening.tick(time.monotonic())
-    except Exception as error:
-        # Blender would only drop the timer, and leave the port open.
-        log.exception("What came over the network cannot be shown")
-        stop()
-        trouble = str(error)
-        return None
-    return 1.0 / RATE
-
-
-@persistent
-def _on_load(*_: object) -> None:
-    stop()
-
-
 @persistent
 def _on_undo(*_: object) -> None:
-    if _listening is not None:
-        _listening.look_anew(for_all=True)
+    running.thing.look_anew(for_all=True)
 
 
 @persistent
 def _on_frame(*_: object) -> None:
-    if _listening is not None:
-        _listening.show_again()
+    running.thing.show_again()
 
 
-HANDLERS = {"load_pre": _on_load, "undo_post": _on_undo, "redo_post": _on_undo, "frame_change_post": _on_frame}
+HANDLERS = {"undo_post": _on_undo, "redo_post": _on_undo, "frame_change_post": _on_frame}
+
+running: Ticking[Listening] = Ticking("What came over the network cannot be shown", HANDLERS)
+
+
+def listening() -> Listening | None:
+    """What listens, if anything does."""
+    return running.thing
+
+
+def start(host: str, port: int, settings: Callable[[], Settings], pairs: Pairs) -> Listening:
+    """Listen to a port, and to nothing else any more. Raises OSError where it is taken, and NotAllowed."""
+    return running.start(lambda: Listening(host, port, settings, pairs))
+
+
+def stop() -> None:
+    """Listen no more. What is recorded and not finished is given up."""
+    running.stop()

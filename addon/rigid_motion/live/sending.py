@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-import logging
 import time
 from collections.abc import Iterable
 
 import bpy
 import numpy as np
-from bpy.app.handlers import persistent
 
-from ..animation.handlers import append_handlers, remove_handlers
 from ..motion import Poses
 from ..streams.vmc import Performer, write, write_trackers
 from .driving import unscaled
 from .sockets import Outlet
-
-log = logging.getLogger(__package__)
-
-RATE = 60
-"""Frames a second."""
+from .ticking import Ticking
 
 
 class Sending:
@@ -70,51 +63,19 @@ def _bones(obj: bpy.types.Object) -> Poses:
     return unscaled(np.array(obj.matrix_world) @ matrices)
 
 
-_sending: Sending | None = None
+running: Ticking[Sending] = Ticking("What is selected cannot be sent")
 
 
 def sending() -> Sending | None:
     """What is sent, if anything is."""
-    return _sending
+    return running.thing
 
 
 def start(host: str, port: int, objects: Iterable[bpy.types.Object]) -> Sending:
     """Send objects, and nothing else any more. Raises OSError where the address is none, and NotAllowed."""
-    global _sending
-    stop()
-    _sending = Sending(host, port, objects)
-    append_handlers(HANDLERS)
-    bpy.app.timers.register(_look)
-    return _sending
+    return running.start(lambda: Sending(host, port, objects))
 
 
 def stop() -> None:
     """Send no more."""
-    global _sending
-    if _sending is not None:
-        _sending.close()
-        _sending = None
-        remove_handlers(HANDLERS)
-        if bpy.app.timers.is_registered(_look):
-            bpy.app.timers.unregister(_look)
-
-
-def _look() -> float | None:
-    if _sending is None:
-        return None
-    try:
-        _sending.tick(time.monotonic())
-    except Exception:
-        # Blender would only drop the timer, and leave the port open.
-        log.exception("What is selected cannot be sent")
-        stop()
-        return None
-    return 1.0 / RATE
-
-
-@persistent
-def _on_load(*_: object) -> None:
-    stop()
-
-
-HANDLERS = {"load_pre": _on_load}
+    running.stop()

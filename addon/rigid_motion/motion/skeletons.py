@@ -13,9 +13,17 @@ from numpy.typing import ArrayLike
 
 from .checks import check_poses
 from .poses import PackedPoses, Poses, placed
+from .quaternions import rotate
 
 AT_ONCE = 2**15
 """Poses that are looked at in one go, for the processor's caches."""
+
+FEW = 64
+"""Poses of each joint for which products of matrices are the quicker way."""
+
+_LEFT = np.array(((0, 1, 2, 3), (1, 0, 3, 2), (2, 3, 0, 1), (3, 2, 1, 0)))
+_LEFT_SIGNS = np.array(((1, -1, -1, -1), (1, 1, -1, 1), (1, 1, 1, -1), (1, -1, 1, 1)))
+"""A quaternion q as a matrix, of these components with these signs: matrix(p) @ matrix(q) is matrix(p q)."""
 
 
 class Skeleton:
@@ -152,8 +160,22 @@ class Skeleton:
         check_poses(poses, "poses")
         if poses.shape[:1] != (len(self),):
             raise ValueError(f"poses of shape {poses.shape} do not fit {len(self)} joints, which come first")
+        if poses.scales is None and poses.quaternions[0].size <= 4 * FEW:
+            return self._few_in_root_space(poses)
         there = PackedPoses(poses)
         for part in there.blocks(AT_ONCE):
             for joints in self.levels[1:]:
                 part.put(joints, placed(part.of(self.parents[joints]), part.of(joints)))
         return there.of(slice(None))
+
+    def _few_in_root_space(self, poses: Poses) -> Poses:
+        turns = poses.quaternions[..., _LEFT] * _LEFT_SIGNS
+        for joints in self.levels[1:]:
+            turns[joints] = turns[self.parents[joints]] @ turns[joints]
+        quaternions = turns[..., 0]
+        arms = rotate(quaternions[self.parents], poses.positions)
+        hanging = (self.parents >= 0).reshape(-1, *(1,) * (arms.ndim - 1))
+        positions = np.where(hanging, arms, poses.positions)
+        for joints in self.levels[1:]:
+            positions[joints] += positions[self.parents[joints]]
+        return Poses(positions, quaternions)

@@ -1,4 +1,4 @@
-"""The Virtual Motion Capture protocol (VMC): performers' humanoid bones by OSC, in and out.
+"""The Virtual Motion Capture protocol (VMC): performers' humanoid bones and tracked devices by OSC, in and out.
 
 What VSeeFace, SlimeVR, Warudo and Unity speak: every frame, the pose of each bone in its parent's space, seen from a
 T-pose in which nothing is turned; then the time. Unity's axes are left-handed, y up, z forward; a performer that looks
@@ -16,7 +16,7 @@ import numpy as np
 
 from ..motion import Poses
 from ..motion.quaternions import conjugate, multiply, rotate
-from .bodies import Body
+from .bodies import LONGEST_NAME, Body
 from .humanoid import HUMANOID, alignments, humanoid_bones
 from .osc import Message, read, write_bundle, write_message
 from .paths import Path
@@ -33,7 +33,13 @@ JOINTS = (ROOT, *HUMANOID)
 NUMBERS = {name: number for number, name in enumerate(JOINTS) if number}
 PARENTS = {ROOT: "", **{bone: above or ROOT for bone, above in HUMANOID.items()}}
 
-MOST_SOURCES = 16
+DEVICES = {f"/VMC/Ext/{kind}/Pos" for kind in ("Tra", "Con", "Hmd")}
+"""Trackers, controllers and headsets: rigid bodies in the world, by their serial numbers."""
+
+PERFORMER = "VMC"
+"""The name of a performer's body."""
+
+MOST_SOURCES, MOST_DEVICES = 16, 32
 MOST_SAMPLES = 512
 """Of a source that wait to be shown, or to be recorded."""
 
@@ -130,7 +136,7 @@ class Performer:
 
 
 class VmcReceiver:
-    """Takes datagrams of any number of performers, and shows them a delay later: what `Receiver` is for the codec."""
+    """Shows performers and their devices a delay later: what `Receiver` is for the codec."""
 
     def __init__(self, delay: float = 0.1) -> None:
         self.delay = delay
@@ -156,9 +162,9 @@ class VmcReceiver:
         return {stream: what for stream, what in shown.items() if what is not None}
 
     def bodies(self, stream: Stream) -> tuple[Body, ...]:
-        """The performer of a stream, at rest."""
+        """The performer of a stream, at rest, and its devices."""
         known = self._sources.get(stream)
-        return (known.body,) if known and known.body else ()
+        return known.bodies if known else ()
 
     def keys(self) -> list[Keys]:
         """All samples that came since the last call."""
@@ -167,14 +173,17 @@ class VmcReceiver:
 
 
 class _Source:
-    """What one performer sends."""
+    """What one program sends: a performer, devices, or both."""
 
     def __init__(self, delay: float) -> None:
         self.heard = -np.inf
-        self.body: Body | None = None
+        self.bodies: tuple[Body, ...] = ()
         self._playing = Playing(delay)
-        self._positions = np.zeros((len(JOINTS), 3))
-        self._quaternions = np.tile((1.0, 0.0, 0.0, 0.0), (len(JOINTS), 1))
+        self._positions = np.zeros((len(JOINTS) + MOST_DEVICES, 3))
+        self._quaternions = np.tile((1.0, 0.0, 0.0, 0.0), (len(self._positions), 1))
+        self._rows: dict[str, list[int]] = {}
+        """The joints of each body: those of `JOINTS`, and one for each device."""
+        self._devices: dict[str, int] = {}
         self._known = {0}
         """Joints that were ever said."""
         self._said: set[int] = set()
@@ -191,9 +200,20 @@ class _Source:
             self._place(NUMBERS[arguments[0]], arguments[1:], arrival)
         elif message.address == "/VMC/Ext/Root/Pos":
             self._place(0, arguments[1:], arrival)
+        elif message.address in DEVICES and arguments and (joint := self._device(arguments[0])):
+            self._place(joint, arguments[1:], arrival)
         elif message.address == "/VMC/Ext/T" and len(arguments) == 1 and _is_finite(arguments[0]):
             self._has_time = True
             self._sample(float(arguments[0]), arrival)
+
+    def _device(self, serial: object) -> int | None:
+        """The joint of a device; None for what is no name, and for too many."""
+        if serial not in self._devices:
+            is_name = isinstance(serial, str) and serial != PERFORMER and 0 < len(serial.encode()) <= LONGEST_NAME
+            if not is_name or len(self._devices) == MOST_DEVICES:
+                return None
+            self._devices[serial] = len(JOINTS) + len(self._devices)
+        return self._devices[serial]
 
     def _place(self, joint: int, numbers: tuple[object, ...], arrival: float) -> None:
         try:
@@ -216,9 +236,9 @@ class _Source:
         """A frame is complete."""
         if not self._said - {0}:
             return
-        if self._said - self._known or self.body is None:
-            self._known |= self._said
-            self._describe()
+        if new := self._said - self._known:
+            self._known |= new
+            self._describe(new)
         self._said = set()
         last = self._samples[-1][0] if self._samples else -np.inf
         if abs(moment - last) > SET:
@@ -232,9 +252,22 @@ class _Source:
         self._playing.heard(moment, arrival)
         self.heard = arrival
 
-    def _describe(self) -> None:
-        names = [JOINTS[joint] for joint in sorted(self._known)]
-        rest = from_unity(Poses(self._positions[sorted(self._known)], np.tile((1.0, 0.0, 0.0, 0.0), (len(names), 1))))
+    def _describe(self, new: set[int]) -> None:
+        """Have bodies for joints that were never said before; the others stay the same."""
+        bodies = {body.name: body for body in self.bodies}
+        if min(new) < len(JOINTS):
+            bodies = {PERFORMER: self._performer()} | {name: it for name, it in bodies.items() if name != PERFORMER}
+        places = from_unity(Poses(self._positions, self._quaternions))
+        for serial, joint in self._devices.items():
+            if joint in new:
+                bodies[serial] = Body.rigid(serial, places[joint : joint + 1])
+                self._rows[serial] = [joint]
+        self.bodies = tuple(bodies.values())
+
+    def _performer(self) -> Body:
+        rows = self._rows[PERFORMER] = sorted(joint for joint in self._known if joint < len(JOINTS))
+        names = [JOINTS[joint] for joint in rows]
+        rest = from_unity(Poses(self._positions[rows], np.tile((1.0, 0.0, 0.0, 0.0), (len(names), 1))))
         parents = []
         for name in names:
             above = PARENTS[name]
@@ -242,12 +275,15 @@ class _Source:
                 above = PARENTS[above]
             parents.append(names.index(above) if above else -1)
         sliding = np.array([name in (ROOT, "Hips") for name in names])
-        self.body = Body("VMC", tuple(names), np.array(parents), rest, sliding=sliding)
+        return Body(PERFORMER, tuple(names), np.array(parents), rest, sliding=sliding)
 
     def _poses(self, positions: np.ndarray, quaternions: np.ndarray) -> dict[str, Poses]:
-        """Of the body, of arrays (n, all joints, ...)."""
-        known = sorted(self._known)
-        return {self.body.name: Poses(positions[..., known, :], quaternions[..., known, :])}
+        """Of each body, of arrays (n, all joints, ...)."""
+        return {
+            body.name: Poses(positions[..., rows, :], quaternions[..., rows, :])
+            for body in self.bodies
+            for rows in (self._rows[body.name],)
+        }
 
     def show(self, now: float) -> Shown | None:
         moment = self._playing.moment(now)
@@ -257,7 +293,7 @@ class _Source:
             self._samples.popleft()
         few = [self._samples[0], self._samples[min(1, len(self._samples) - 1)]][: len(self._samples)]
         moments, positions, quaternions = (np.array(part) for part in zip(*few, strict=True))
-        still = np.zeros((len(JOINTS), 3))
+        still = np.zeros_like(self._positions)
         poses = Path(moments, positions, quaternions, still, still).at(np.array([moment]))[:, 0]
         return Shown(moment, self._poses(poses.positions, poses.quaternions))
 

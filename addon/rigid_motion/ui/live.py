@@ -297,8 +297,8 @@ class RIGID_MOTION_PT_live(bpy.types.Panel):
         layout.prop(live, "armature")
         if listening is None:
             layout.operator("rigid_motion.live_listen", icon="PLAY")
-            if receiving.trouble:
-                draw_text(context, layout, receiving.trouble, "ERROR")
+            if receiving.running.trouble:
+                draw_text(context, layout, receiving.running.trouble, "ERROR")
             return
         layout.operator("rigid_motion.live_stop", icon="PAUSE")
         joints = listening.joints

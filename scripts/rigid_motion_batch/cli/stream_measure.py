@@ -20,7 +20,7 @@ from rigid_motion.streams.bodies import RADIUS, Forest
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.metrics import write_poses
 from rigid_motion_batch.axes import from_blender
-from rigid_motion_batch.command_line import number, path_line
+from rigid_motion_batch.command_line import bounded, path_line
 from rigid_motion_batch.files import replacing
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import read_clips
@@ -40,6 +40,11 @@ Bytes a second leave out what somebody who joins is told once (names, parents, r
 poses); they are a line of their own. Headers are those of UDP and IPv4, 28 bytes a datagram. shown.bvh is what was
 shown at the recording's moments, in its units and axes.
 """
+
+
+_delay = bounded("number of seconds", 0.0, 4.0, above=True)
+_seconds = bounded("number of seconds", 0.0, 4.0)
+_share = bounded("part of all", 0.0, 0.99)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -126,24 +131,3 @@ def lines(found: Measured, beside: dict[str, dict[str, float]], tolerance: float
         alone, whole = row["bytes_a_second"], row["bytes_a_second_with_headers"]
         rows.append(f"{label:36}{alone:10.0f}{whole:14.0f}{row['rms_mm']:9.2f}{row['largest_mm']:12.2f}")
     return rows
-
-
-def _delay(text: str) -> float:
-    value = number(text)
-    if not 0.0 < value <= 4.0:
-        raise argparse.ArgumentTypeError(f"{text!r} is not more than 0 and at most 4")
-    return value
-
-
-def _seconds(text: str) -> float:
-    value = number(text)
-    if not 0.0 <= value <= 4.0:
-        raise argparse.ArgumentTypeError(f"{text!r} is not 0 to 4 seconds")
-    return value
-
-
-def _share(text: str) -> float:
-    value = number(text)
-    if not 0.0 <= value < 1.0:
-        raise argparse.ArgumentTypeError(f"{text!r} is no part of all: give 0 to 1")
-    return value

@@ -24,7 +24,7 @@ ANSWERS_A_SECOND = 100.0
 """To all streams together."""
 
 LINGER = 0.3
-"""Seconds without anybody who sends, after somebody did, that are the end."""
+"""Seconds without anybody who sends, after somebody did, that are the end: a sender may be followed by another."""
 
 SILENT = 10.0
 """Seconds after which a user who says nothing has gone."""

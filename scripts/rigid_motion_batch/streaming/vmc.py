@@ -2,7 +2,7 @@
 
 play(clip, ("127.0.0.1", 39539), stopped)         `send RECORDING --to-vmc HOST:PORT`
 with Performers(port) as performers:              `send --from-vmc PORT`: what comes, for a sender of a room
-    for body, moments, poses in performers.samples(): ...
+    for bodies, moments, poses in performers.samples(): ...
 show = ToVmc(receiver, address)                   `receive --to-vmc HOST:PORT`: called with what each frame shows
 """
 
@@ -18,6 +18,7 @@ import numpy as np
 
 from rigid_motion.motion import Poses, Skeleton
 from rigid_motion.streams import Body, Receiver, Shown
+from rigid_motion.streams.paths import transposed
 from rigid_motion.streams.receiver import Stream
 from rigid_motion.streams.vmc import PORT, Performer, VmcReceiver, write, write_trackers
 from rigid_motion_batch.axes import to_blender
@@ -119,10 +120,10 @@ class Performers:
     def __exit__(self, *_: object) -> None:
         self._socket.close()
 
-    def samples(self) -> list[tuple[Body, np.ndarray, Poses]]:
-        """What came since the last call: the body, moments (n,) of its clock, and poses (joints, n).
+    def samples(self) -> list[tuple[tuple[Body, ...], np.ndarray, Poses]]:
+        """What came since the last call: bodies, moments (n,) of their clock, and poses (joints, n) of all.
 
-        It is another body as soon as bones come that it had not before.
+        They are others as soon as bones or devices come that were not there before.
         """
         now = time.monotonic()
         while True:
@@ -142,10 +143,10 @@ class Performers:
             if keys.stream != self._stream:
                 continue
             self._heard = now
-            for body in self._receiver.bodies(keys.stream):
-                poses = keys.poses[body.name]
-                swapped = Poses(poses.positions.swapaxes(0, 1), poses.quaternions.swapaxes(0, 1))
-                found.append((body, keys.moments, swapped))
+            bodies = self._receiver.bodies(keys.stream)
+            positions = np.concatenate([keys.poses[body.name].positions for body in bodies], axis=1)
+            quaternions = np.concatenate([keys.poses[body.name].quaternions for body in bodies], axis=1)
+            found.append((bodies, keys.moments, transposed(Poses(positions, quaternions))))
         return found
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from rigid_motion.motion import Poses, Skeleton
 from rigid_motion.streams import Body, Receiver, Sender
-from rigid_motion.streams.vmc import VmcReceiver
+from rigid_motion.streams.vmc import VmcReceiver, write_trackers
 from rigid_motion_batch.cli import stream
 from rigid_motion_batch.places import CHECKOUT
 from rigid_motion_batch.streaming.vmc import Performers, ToVmc, play
@@ -135,7 +135,7 @@ def test_performers_are_bodies_with_samples():
             for datagram in datagrams:
                 other.sendto(datagram, ("127.0.0.1", performers.port))
         time.sleep(0.01)
-        ((body, moments, poses),) = performers.samples()
+        (((body,), moments, poses),) = performers.samples()
         assert performers.samples() == []
     assert moments == pytest.approx(TIMES_OF_A_SECOND, abs=1e-6)
     shown = dict(zip(body.joints, Skeleton(body.parents).in_root_space(poses).positions, strict=True))
@@ -143,6 +143,19 @@ def test_performers_are_bodies_with_samples():
         assert shown[name] == pytest.approx(places, abs=1e-5)
     # What a sender of a room takes.
     assert Sender([body]).add(float(moments[0]), poses[:, 0])
+
+
+def test_trackers_beside_a_performer_are_bodies_with_samples():
+    with Performers(0) as performers, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        for moment, datagrams in zip(TIMES_OF_A_SECOND, frames_of_vmc(TIMES_OF_A_SECOND), strict=True):
+            ball = {"ball": Poses([moment, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0])}
+            for datagram in [*write_trackers(ball), *datagrams]:
+                other.sendto(datagram, ("127.0.0.1", performers.port))
+        time.sleep(0.01)
+        ((bodies, moments, poses),) = performers.samples()
+    assert [body.name for body in bodies] == ["VMC", "ball"]
+    assert poses.positions[-1, :, 0] == pytest.approx(moments, abs=1e-6)
+    assert Sender(bodies).add(float(moments[0]), poses[:, 0])
 
 
 def test_what_a_receiver_shows_goes_to_another_program(listener):
