@@ -28,11 +28,11 @@ from research.paper.steps import PAGE, SECTIONS, plan, plan_bodies, plan_sending
 from research.paper.timing import ROUNDS
 from research.study import Study
 from rigid_motion_batch.files import write_text, written_beside
-from rigid_motion_batch.pipeline.performing import SerialExecutor
-from rigid_motion_batch.pipeline.running import Outcome, Progress, State, run
-from rigid_motion_batch.pipeline.steps import Task
+from rigid_motion_batch.pipeline.performing import Executor
+from rigid_motion_batch.pipeline.running import Outcome, run
 from rigid_motion_batch.pipeline.store import FolderInUse, OutputError, Store
 from rigid_motion_batch.places import ASSETS, CHECKOUT, from_here, output_folder
+from rigid_motion_batch.progress import Progress
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.supervising import report
 
@@ -101,12 +101,12 @@ def main(arguments: list[str]) -> int:
     try:
         if options.only and options.docs and not (options.docs / PAGE).is_file():
             raise ValueError(f"{options.docs / PAGE}: there is no page to put the section into; leave --docs out")
-        with Store(options.output, overwrite=True) as store, SerialExecutor() as executor:
+        with Store(options.output, overwrite=True) as store, Executor() as executor:
             tasks = list(_studied(options, store).tasks.values())
             if options.force:
                 for task in tasks:
                     store.discard(task.key)
-            outcome = run(lambda: tasks, store, executor, progress=Notes())
+            outcome = run(lambda: tasks, store, executor, progress=Progress(program=PROGRAM), title="Reproducing")
             there = [path for task in tasks if store.result(task.key) for path in task.publish]
         if options.docs and not (outcome.interrupted or outcome.problem):
             if options.only:
@@ -122,16 +122,6 @@ def main(arguments: list[str]) -> int:
         complain(PROGRAM, error, options.output)
         return 2
     return _report(outcome, page)
-
-
-class Notes(Progress):
-    """Says on the standard error what is done."""
-
-    def note(self, text: str) -> None:
-        print(f"{PROGRAM}: {text}", file=sys.stderr)
-
-    def finish(self, task: Task, state: State, problem: str) -> None:
-        print(f"{task.name}: {problem or state.value}", file=sys.stderr)
 
 
 def copy_page(there: Iterable[str], output: Path, docs: Path) -> None:
