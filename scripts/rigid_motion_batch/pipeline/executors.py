@@ -84,7 +84,7 @@ def _perform(order: Order) -> Answer:
 
 
 def _print_to(path: str | os.PathLike[str]) -> None:
-    opened = os.open(path, os.O_WRONLY | os.O_CREAT)
+    opened = os.open(path, os.O_WRONLY | os.O_CREAT, 0o600)
     for stream in (1, 2):
         os.dup2(opened, stream)
     os.close(opened)

@@ -446,6 +446,13 @@ def test_a_task_that_kills_every_worker_is_given_up_and_the_others_go_on(output:
     assert contents(output) == {"a.txt": "a"}
 
 
+@needs_signals
+def test_the_last_line_that_a_dying_worker_printed_is_said(output: Path, tmp_path: Path) -> None:
+    dying = task("b", steps.die, Die(str(tmp_path / "marker"), 99, "reading\nno such bone: Hand\n\n"))
+    outcome = run_in(output, dying, executor=ProcessExecutor(1))
+    assert "(SIGKILL, perhaps for want of memory): no such bone: Hand; given up after 3" in outcome.failures["b"]
+
+
 def test_what_is_printed_in_a_worker_does_not_get_in_the_way(output: Path, capfd: pytest.CaptureFixture) -> None:
     run_in(output, task("a", steps.chatter), executor=ProcessExecutor(1))
     assert capfd.readouterr() == ("", "")
