@@ -14,6 +14,9 @@ from typing import Any, Self, TextIO
 
 from rigid_motion_batch.command_line import printable
 
+FARM = "RIGID_MOTION_PROGRESS"
+"""Of the environment: "openjd" where a farm listens, to the lines that Open Job Description knows."""
+
 BAR_COLUMNS = 24
 
 INTERVAL = 10.0
@@ -59,15 +62,24 @@ class Progress:
     stream : text stream, optional
         The standard error unless given. Where Python has none, as in a windowed program, nothing is shown.
     quiet : bool
-        Whether to show notes alone.
+        Whether to show only what has a style: warnings and errors.
+    program : str
+        What lines about errors begin with.
     clock : callable
         Seconds that never run backwards.
     """
 
     def __init__(
-        self, stream: TextIO | None = None, *, quiet: bool = False, clock: Callable[[], float] = time.monotonic
+        self,
+        stream: TextIO | None = None,
+        *,
+        quiet: bool = False,
+        program: str = "",
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._stream = sys.stderr if stream is None else stream
+        self._program = program
+        self._on_farm = os.environ.get(FARM) == "openjd"
         self._quiet = quiet or self._stream is None
         self._clock = clock
         self._stage: Stage | None = None
@@ -87,7 +99,7 @@ class Progress:
         self._started = self._shown_at = self._clock()
         self._shown = None
         self._stage = stage = Stage(title, total, self._redraw)
-        if total and not self._quiet:
+        if total and not self._quiet and not self._on_farm:
             self._bar = _bar(self._stream, self._line)
             if self._bar:
                 self._bar.start()
@@ -106,15 +118,25 @@ class Progress:
 
     def note(self, text: str, style: str = "") -> None:
         """Write a line of its own, above the bar; on a terminal in a style of rich, such as "red"."""
+        if self._quiet and not style:
+            return
         if self._bar:
             self._bar.console.print(_fitting(text, self._stream), markup=False, style=style)
         elif self._stream is not None:
             self._stream.write(_fitting(text, self._stream) + "\n")
             self._stream.flush()
 
+    def error(self, text: str) -> None:
+        """Write what is wrong, in a line."""
+        self.note(": ".join(filter(None, (self._program, text))), "red")
+
     def _redraw(self, now: bool = False) -> None:
         if self._bar:
             self._bar.update(self._bar.task_ids[0], completed=self._stage.fraction)
+        elif self._on_farm:
+            done, words = 100.0 * self._stage.fraction, self._stage.doing or self._stage.title
+            self._stream.write(f"openjd_progress: {done:.1f}\nopenjd_status: {_fitting(words, self._stream)}\n")
+            self._stream.flush()
         elif not self._quiet and (now or self._clock() - self._shown_at >= INTERVAL):
             self._shown_at, self._shown = self._clock(), self._stage.fraction
             self._stream.write(f"{self._stage.fraction:4.0%}  {self._line()}\n")

@@ -97,7 +97,7 @@ def supervise(program: str) -> int:
 
     before = {one: signal.signal(one, handle) for one in stop_signals()}
     try:
-        with _held_back(before):
+        with held_back(before):
             early = bool(received)
             child = subprocess.Popen(_this_command(), env=_environment(folder))
         if early and ASK:
@@ -116,7 +116,7 @@ def supervise(program: str) -> int:
         stopped = bool(by) and code != 0
         journal.remove_half_written()  # Also of workers that were killed.
         if code < 0 or (stopped and not journal.ended):
-            journal.say_last_words(None if stopped else f"{program}: {_death(code, journal.at)}")
+            journal.say_last_words(None if stopped else f"{program}: {_crash(code, journal.at)}")
         return 128 + by if stopped else 1 if code < 0 else code
     finally:
         if folder is not None:
@@ -125,8 +125,16 @@ def supervise(program: str) -> int:
             signal.signal(one, signal.SIG_DFL if handler is None else handler)
 
 
+def death(code: int) -> str:
+    """How a process ended, by its exit code."""
+    if -code not in {*signal.Signals}:
+        return f"exit code {code}"
+    name = signal.Signals(-code).name
+    return f"{name}, perhaps for want of memory" if name == "SIGKILL" else name
+
+
 @contextmanager
-def _held_back(signals: Iterable[int]) -> Iterator[None]:
+def held_back(signals: Iterable[int]) -> Iterator[None]:
     """Hold signals back meanwhile, and in processes that are started meanwhile until these let them through."""
     if ASK:
         before = signal.pthread_sigmask(signal.SIG_BLOCK, signals)
@@ -282,13 +290,11 @@ def _this_command() -> Sequence[str]:
     return [blender, *sys.argv[1:]] if blender else [sys.executable, *sys.orig_argv[1:]]
 
 
-def _death(code: int, at: str) -> str:
+def _crash(code: int, at: str) -> str:
     """How a child ended that nobody stopped, and the way out."""
-    how = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
-    how += ", perhaps for want of memory" if how == "SIGKILL" else ""
     if not at:
-        return f"the process died ({how}) before it had done anything"
-    return f"the process died ({how}) at {printable(at)}: leave that out, or see whether Blender opens it"
+        return f"the process died ({death(code)}) before it had done anything"
+    return f"the process died ({death(code)}) at {printable(at)}: leave that out, or see whether Blender opens it"
 
 
 def _writable(stream: Any) -> bool:

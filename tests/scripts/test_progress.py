@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from rigid_motion_batch.progress import Progress
+from rigid_motion_batch.progress import FARM, Progress
 
 
 class Clock:
@@ -171,12 +171,13 @@ def test_control_characters_in_names_reach_no_terminal() -> None:
     assert "evil\\x1b[2J\\nname" in terminal.getvalue()
 
 
-def test_where_nothing_is_to_be_shown_notes_are() -> None:
+def test_where_nothing_is_to_be_shown_errors_are() -> None:
     log = io.StringIO()
-    with Progress(log, quiet=True) as progress, progress.stage("Rendering", 2) as stage:
+    with Progress(log, quiet=True, program="compare.py") as progress, progress.stage("Rendering", 2) as stage:
         stage.advance()
         progress.note("reach.csv: dropped 1 row")
-    assert log.getvalue() == "reach.csv: dropped 1 row\n"
+        progress.error("hand.csv: no such file")
+    assert log.getvalue() == "compare.py: hand.csv: no such file\n"
 
 
 def test_a_program_without_a_standard_error_shows_nothing_and_works(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -196,3 +197,12 @@ def test_work_that_many_do_is_counted_as_a_whole_and_may_be_lost_again() -> None
         assert stage.doing == "two at once"
         stage.reach(9.0)
         assert stage.fraction == 1.0
+
+
+def test_progress_is_said_as_farms_hear_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(FARM, "openjd")
+    stream = io.StringIO()
+    with Progress(stream) as progress, progress.stage("Measuring", 8.0) as stage:
+        stage.reach(2.0, "toss at 5 keys/s, frame 3 of 12")
+    said = stream.getvalue()
+    assert said.startswith("openjd_progress: 25.0\nopenjd_status: toss at 5 keys/s, frame 3 of 12\n")

@@ -11,22 +11,21 @@ import json
 import os
 import sys
 import webbrowser
-from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager, nullcontext, suppress
+from collections.abc import Iterator
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from itertools import chain, count, groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.needed import KeysNeeded
 from rigid_motion_batch.analysis.results import ChoiceNumbers
-from rigid_motion_batch.cli.compare_options import ALL, SCRIPT, own_recordings, parse, without
+from rigid_motion_batch.cli.compare_options import ALL, SCRIPT, own_recordings, parse
 from rigid_motion_batch.command_line import as_typed, complain, path_line, program_of
 from rigid_motion_batch.pipeline import comparison_steps as steps
 from rigid_motion_batch.pipeline import values
-from rigid_motion_batch.pipeline.bundle import PROGRESS, STAGES, FarmProgress
 from rigid_motion_batch.pipeline.comparison import (
     DECIMATED,
     IN_BLENDER,
@@ -39,13 +38,12 @@ from rigid_motion_batch.pipeline.comparison import (
 from rigid_motion_batch.pipeline.comparison_steps import PAGE
 from rigid_motion_batch.pipeline.executors import ProcessExecutor
 from rigid_motion_batch.pipeline.explain import explain
-from rigid_motion_batch.pipeline.performing import Executor, ExecutorError, SerialExecutor, processors
+from rigid_motion_batch.pipeline.performing import Executor, ExecutorError, processors
 from rigid_motion_batch.pipeline.running import Outcome, Plan, Share, State, Survey, run
-from rigid_motion_batch.pipeline.running import Progress as Listener
 from rigid_motion_batch.pipeline.steps import OWN, Task
 from rigid_motion_batch.pipeline.store import FolderInUse, OutputError, Store
 from rigid_motion_batch.places import CHECKOUT, manifest, output_folder
-from rigid_motion_batch.progress import Progress, Stage
+from rigid_motion_batch.progress import FARM, Progress
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import folder_names
 from rigid_motion_batch.recordings.reading import split_source
@@ -57,9 +55,6 @@ from rigid_motion_batch.supervising import blender_program, report
 from rigid_motion_batch.system_libraries import missing_for_rendering, way_out, without_blender
 
 from . import terminal
-
-if TYPE_CHECKING:
-    from rigid_motion_batch.pipeline.dask import Farm
 
 PROGRAM = program_of(SCRIPT)
 
@@ -91,11 +86,10 @@ def main(arguments: list[str]) -> int:
             if options.explain:
                 return _explain(plan, store, _share(options))
             with (
-                Progress(quiet=options.quiet) as progress,
-                SerialExecutor() if options.jobs == 0 else ProcessExecutor(options.jobs or processors()) as executor,
-                _farm(options, store, progress) as farm,
+                Progress(quiet=options.quiet, program=PROGRAM) as progress,
+                _executor(options, store, progress) as executor,
             ):
-                return _Run(options, plan, executor, progress, farm, said).run()
+                return _Run(options, plan, executor, progress).run()
     except (SubjectError, FolderInUse, ExecutorError, OutputError, Refused) as error:
         print(*(f"{PROGRAM}: {error}".splitlines()), sep="\n", file=sys.stderr)
     except OSError as error:
@@ -246,63 +240,30 @@ def _suffix(source: str) -> str:
     return next((end for end in IN_BLENDER if lower.endswith(end) or f"{end}:" in lower), "")
 
 
-def _farm(options: argparse.Namespace, store: Store, progress: Progress) -> AbstractContextManager[Farm | None]:
-    """Who does shares of the work, if not all is done here. Raises ExecutorError where that cannot be."""
+def _executor(options: argparse.Namespace, store: Store, progress: Progress) -> Executor:
+    """Who does the tasks. Raises ExecutorError where that cannot be."""
     if options.scheduler is None:
-        return nullcontext()
+        return Executor() if options.jobs == 0 else ProcessExecutor(options.jobs or processors())
     try:
-        from rigid_motion_batch.pipeline.dask import Farm
+        from rigid_motion_batch.pipeline.dask import DaskExecutor
     except ImportError as error:
         way = "python scripts/bootstrap.py dask" if CHECKOUT else "pip install 'rigid-motion[farm]'"
         raise ExecutorError(f"--scheduler: {error}; `{way}` installs it") from None
-    return Farm(options.scheduler, store.output, lambda text: progress.note(f"{PROGRAM}: {text}"))
+    return DaskExecutor(options.scheduler, store.output, progress.error)
 
 
 # -- doing it ---------------------------------------------------------------------------------------------------------
-
-
-class _Shown(Listener):
-    """A run of tasks as a stage on the terminal."""
-
-    def __init__(self, progress: Progress, stage: Stage, quiet: bool) -> None:
-        self._progress, self._stage, self._quiet = progress, stage, quiet
-        self.page = True
-        """Whether the page is there."""
-
-    def begin(self, total: float) -> None:
-        self._stage.total = total
-
-    def reach(self, done: float, doing: str, counts: Mapping[str, tuple[int, int]]) -> None:
-        counted = (f"{unit} {number} of {total}" for unit, (number, total) in counts.items())
-        self._stage.reach(done, ", ".join(filter(None, (doing, *counted))))
-
-    def note(self, text: str) -> None:
-        if not self._quiet:
-            self._progress.note(text)
-
-    def finish(self, task: Task, state: State, problem: str) -> None:
-        if task.name == PAGE:
-            self.page = state in (State.DONE, State.UP_TO_DATE)
-        if problem:
-            self._progress.note(f"{PROGRAM}: {problem}", "red")
 
 
 class _Run:
     """A comparison in its opened folder."""
 
     def __init__(
-        self,
-        options: argparse.Namespace,
-        plan: ComparisonPlan,
-        executor: Executor,
-        progress: Progress,
-        farm: Farm | None,
-        arguments: list[str],
+        self, options: argparse.Namespace, plan: ComparisonPlan, executor: Executor, progress: Progress
     ) -> None:
-        self.options, self.plan, self.store, self.executor = options, plan, plan.store, executor
-        self.progress, self.farm, self.arguments = progress, farm, arguments
-        self.share = Share(frozenset({"report"})) if farm else _share(options)
-        self.on_farm = os.environ.get(PROGRESS) == "openjd"
+        self.options, self.plan, self.store = options, plan, plan.store
+        self.executor, self.progress = executor, progress
+        self.on_farm = os.environ.get(FARM) == "openjd"
         self.notes: list[str] = []
         self.outcome = Outcome()
         self.page = False
@@ -351,42 +312,17 @@ class _Run:
         return self._end()
 
     def _do(self, title: str, tasks: Plan) -> None:
-        if self.farm:
-            self._share_out(tasks)
-            if self.outcome.interrupted or self.outcome.problem:
-                return
-        with self.progress.stage(title, 1.0) as stage:
-            shown = FarmProgress() if self.on_farm else _Shown(self.progress, stage, self.options.quiet)
-            self.outcome = run(
-                tasks,
-                self.store,
-                self.executor,
-                progress=shown,
-                share=self.share,
-                blender=self.options.blender or "",
-                before=self.outcome,
-            )
-        if self.plan.studies and not self.outcome.interrupted:
-            self.page = getattr(shown, "page", True)
-
-    def _share_out(self, tasks: Plan) -> None:
-        """Have the machines of the farm do all stages before the report."""
-        arguments, outcome = without(self.arguments, "--scheduler", "--output", "-o"), self.outcome
-        try:
-            for name in STAGES[:-1]:
-                todo = Survey.of(tasks, self.store, Share(frozenset({name}))).tasks
-                with self.progress.stage(name.capitalize(), 1.0) as stage:
-                    for done, answer in self.farm.run(arguments, name, todo) if todo else ():
-                        stage.reach(done, f"{name}, on {len(self.farm.workers())} workers")
-                        for problem in answer.get("failures", {}).values():
-                            self.progress.note(f"{PROGRAM}: {problem}", "red")
-                        outcome.failures |= answer.get("failures", {})
-                        outcome.counts.update({State(what): n for what, n in answer.get("tasks", {}).items()})
-        except ExecutorError as error:
-            outcome.problem = str(error)
-        except KeyboardInterrupt:
-            outcome.interrupted = True
-        outcome.note_failures(self.store)
+        self.outcome = run(
+            tasks,
+            self.store,
+            self.executor,
+            progress=self.progress,
+            title=title,
+            share=_share(self.options),
+            blender=self.options.blender or "",
+            before=self.outcome,
+        )
+        self.page = bool(self.plan.studies) and not self.outcome.interrupted
 
     def _note(self, text: str, style: str = "") -> None:
         self.notes.append(text)

@@ -22,17 +22,7 @@ from pathlib import Path
 
 from rigid_motion_batch.command_line import complain, path_line, printable
 from rigid_motion_batch.pipeline import steps
-from rigid_motion_batch.pipeline.performing import (
-    Executor,
-    ExecutorError,
-    Failed,
-    Lost,
-    Made,
-    Order,
-    SerialExecutor,
-    outcome_of,
-    processors,
-)
+from rigid_motion_batch.pipeline.performing import Answer, Executor, ExecutorError, Order, answer_of, processors
 from rigid_motion_batch.progress import Progress, Stage
 from rigid_motion_batch.supervising import blender_program, report, stop_signals, written_of
 
@@ -231,7 +221,7 @@ class _Session:
         """By the places of the inputs."""
         self._at_work: dict[int, str] = {}
         """Places of inputs to the keys of their results."""
-        self._futures: dict[Future[Made | Failed | Lost], int] = {}
+        self._futures: dict[Future[Answer], tuple[int, Order]] = {}
 
     @property
     def in_order(self) -> list[Outcome]:
@@ -249,7 +239,8 @@ class _Session:
                     stop_if_asked()
             ended, _ = wait(self._futures, LOOK, FIRST_COMPLETED)
             for future in ended:
-                self._end(self._futures.pop(future), outcome_of(future))
+                place, order = self._futures.pop(future)
+                self._end(place, answer_of(future, order))
             self._show(stage)
 
     def take_partly(self, stopped: Stopped) -> None:
@@ -299,21 +290,21 @@ class _Session:
         self._at_work[place] = key
         self._show(stage)
         stop_if_asked()
-        self._futures[self._executor.submit(order, lambda share, doing: None)] = place
+        self._futures[self._executor.submit(order, lambda share, doing: None)] = place, order
 
-    def _end(self, place: int, message: Made | Failed | Lost) -> None:
+    def _end(self, place: int, answer: Answer) -> None:
         """Take what came of an input."""
         job, key = self._jobs[place], self._at_work.pop(place)
-        for note in message.notes:
+        for note in answer.notes:
             self._note(note)
-        if isinstance(message, Made):
-            outcome = message.index["facts"]["outcome"]
+        if answer.index:
+            outcome = answer.index["facts"]["outcome"]
             if key and outcome.is_whole and not self._work.dry_run:
                 facts = {"matched": sorted(outcome.matched)}
                 _record_of(self._work, job).keep(key, outcome.written, outcome.beside, outcome.read, facts)
         else:
-            way_out = ": leave it out, or see whether Blender opens it" if isinstance(message, Lost) else ""
-            self._note(f"{job.source}: {message.message.removeprefix(f'{job.source}: ')}{way_out}")
+            way_out = ": leave it out, or see whether Blender opens it" if answer.lost else ""
+            self._note(f"{job.source}: {answer.problem.removeprefix(f'{job.source}: ')}{way_out}")
             outcome = Outcome(job.source, failed=True)
         self._outcomes[place] = outcome
 
@@ -336,14 +327,14 @@ def _inputs(job: Job) -> tuple[steps.Input, ...]:
 def _executor(workers: int | None, count: int) -> Executor:
     """Who does so many inputs. Raises ExecutorError where there cannot be that many processes."""
     if workers == 0 or (workers is None and count == 1):
-        return SerialExecutor()
+        return Executor()
     try:
         if blender_program():
             raise ImportError("Blender itself starts no workers")
         from rigid_motion_batch.pipeline.executors import ProcessExecutor
     except ImportError as error:
         if workers is None:
-            return SerialExecutor()
+            return Executor()
         raise ExecutorError(f"--jobs {workers}: {error}; leave it out, and inputs are done one by one") from None
     return ProcessExecutor(min(workers or processors(), count))
 

@@ -12,15 +12,14 @@ import re
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 from rigid_motion_batch.places import EXTENSION, PACKAGE
-from rigid_motion_batch.supervising import end_with_parent
+from rigid_motion_batch.supervising import death, end_with_parent
 
-from .performing import INTERVAL, ExecutorError, Failed, Lost, Made, Order, progress_of
+from .performing import INTERVAL, Answer, ExecutorError, Order, Tell, last_words, progress_of
 from .steps import Step
 
 WORKER = Path(__file__).with_name("worker.py")
@@ -44,7 +43,7 @@ def version_of(blender: str) -> str:
     return found[1]
 
 
-def perform_in_blender(order: Order, tell: Callable[[float, str], object] | None) -> Made | Failed | Lost:
+def perform_in_blender(order: Order, tell: Tell | None) -> Answer:
     """Do an order in a Blender of its own, as `perform` does it here."""
     path = [os.fspath(place) for place in (PACKAGE.parent, EXTENSION.parent, *_of_module(order.step))]
     try:
@@ -67,10 +66,9 @@ def perform_in_blender(order: Order, tell: Callable[[float, str], object] | None
                         tell(*progress)
             if answer.exists():
                 return pickle.loads(answer.read_bytes())
-            said = next((line for line in reversed(log.read_text(errors="replace").splitlines()) if line.strip()), "")
-            return Lost(f"Blender died (exit code {process.returncode}){f': {said[:200]}' if said else ''}")
+            return Answer(problem=f"Blender died ({death(process.returncode)}){last_words(log)}", lost=True)
     except OSError as error:
-        return Failed(f"{order.blender}: {error.strerror}")
+        return Answer(problem=f"{order.blender}: {error.strerror}")
 
 
 def _is_at_work(process: subprocess.Popen) -> bool:

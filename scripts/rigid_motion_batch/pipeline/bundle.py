@@ -11,13 +11,13 @@ import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from rigid_motion_batch.files import write_text
 from rigid_motion_batch.places import PACKAGE
+from rigid_motion_batch.progress import FARM
 
-from .running import Progress, State
-from .steps import Task, version_here
+from .steps import version_here
 
 STAGES = ("read", "measure", "build", "render", "encode", "report")
 """Of a comparison; each begins when all before it have ended."""
@@ -29,31 +29,6 @@ CHECK = ("-m", "rigid_motion_batch.pipeline.bundle")
 
 MOST_PARTS = 1024
 """Values of a parameter, in Open Job Description."""
-
-PROGRESS = "RIGID_MOTION_PROGRESS"
-"""Of the environment: "openjd" where a farm listens."""
-
-
-class FarmProgress(Progress):
-    """Says how far a run is in the lines that Open Job Description knows."""
-
-    def __init__(self, stream: TextIO | None = None) -> None:
-        self._stream, self._total = stream or sys.stdout, 0.0
-
-    def begin(self, total: float) -> None:
-        self._total = total
-
-    def reach(self, done: float, doing: str, counts: Mapping[str, tuple[int, int]]) -> None:
-        counted = "".join(f", {unit} {number} of {total}" for unit, (number, total) in counts.items())
-        share = 100.0 * done / self._total if self._total else 100.0
-        print(f"openjd_progress: {share:.1f}\nopenjd_status: {doing}{counted}", file=self._stream, flush=True)
-
-    def note(self, text: str) -> None:
-        print(text, file=self._stream, flush=True)
-
-    def finish(self, task: Task, state: State, problem: str) -> None:
-        if problem:
-            self.note(problem)
 
 
 def write_bundle(
@@ -101,11 +76,6 @@ def write_bundle(
     return values
 
 
-def share_of(output: str, stage: str, number: int | str, of: int) -> list[str]:
-    """The options of a comparison that do a share of a stage."""
-    return ["--output", output, "--only", stage, "--part", f"{number}/{of}"]
-
-
 def below_inputs(arguments: Sequence[str]) -> tuple[list[str], Path]:
     """Arguments with the files that they name, FILE, FILE:BODY or --option=FILE, as the job finds them, and where.
 
@@ -150,7 +120,7 @@ def _template(command: Sequence[str], parts: Mapping[str, int], name: str) -> di
         "jobEnvironments": [
             {
                 "name": "Rigid Motion",
-                "variables": {"PYTHONPATH": "{{Param.Program}}", PROGRESS: "openjd"},
+                "variables": {"PYTHONPATH": "{{Param.Program}}", FARM: "openjd"},
                 "script": {"actions": {"onEnter": _action([*CHECK, version_here()])}},
             }
         ],
@@ -162,7 +132,7 @@ def _template(command: Sequence[str], parts: Mapping[str, int], name: str) -> di
 
 
 def _step(stage: str, before: str | None, parts: int, command: Sequence[str]) -> dict[str, Any]:
-    share = share_of("{{Param.Output}}", stage, "{{Task.Param.Part}}", parts)
+    share = ("--output", "{{Param.Output}}", "--only", stage, "--part", f"{{{{Task.Param.Part}}}}/{parts}")
     return {
         "name": stage.capitalize(),
         **({"dependencies": [{"dependsOn": before.capitalize()}]} if before else {}),

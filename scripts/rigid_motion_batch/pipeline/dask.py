@@ -1,76 +1,64 @@
-"""Many machines: the workers of a Dask scheduler do shares of a comparison's stages, as the tasks of a job bundle do.
+"""Many machines: the workers of a Dask scheduler do orders, each in processes of its own, as they are done here.
 
 The output folder is on a disk that all share. Every worker is asked first whether it has this version of the program,
-and sees the folder; only those that fit get shares. A share is a process of its own, which Dask's worker waits for.
+and sees the folder; only those that fit get orders.
 """
 
 from __future__ import annotations
 
 import asyncio
-import json
 import logging
+import multiprocessing
 import os
-import subprocess
-import sys
 import time
-from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import CancelledError
+from collections import Counter
+from collections.abc import Callable
+from concurrent.futures import CancelledError, Future, wait
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
-from distributed import Client, Future, Security, get_worker
+from distributed import Client, Security, get_worker
 from distributed.comm import connect
 
-from rigid_motion_batch.supervising import end_with_parent
-
-from .bundle import CHECK, COMPARE, share_of
-from .performing import ExecutorError
-from .running import RETRIES
+from .executors import ProcessExecutor
+from .performing import Answer, Executor, ExecutorError, Order, Tell, answer_of
 from .steps import version_here
 
 CONNECTING = 5.0
 """Seconds that a scheduler has to answer."""
 
-LOOK = 0.5
-"""Seconds between two looks at which workers there are, and at whether a share is done or still wanted."""
+BUSY = 30.0
+"""Seconds that one may take to answer which is connected: where it is gone, that is seen at once."""
 
-SHARES = 4
-"""Of a stage for each thread of a worker: no worker waits long for the last one."""
+LOOK = 0.5
+"""Seconds between two looks at which workers there are, and at whether an order is still wanted."""
 
 UNREACHABLE = (OSError, RuntimeError, TimeoutError, CancelledError)
 """What Dask raises where its scheduler does not answer."""
 
 
-def do(arguments: Sequence[str], here: str) -> dict[str, Any]:
-    """On a worker: what Python prints as JSON with these arguments. It ends with the worker, or as that is told to."""
+def do(order: Order) -> Answer:
+    """On a worker: do an order in a process of its own, which ends with the worker, or where the order is cancelled."""
     worker = get_worker()
-    key = worker.get_current_task()
-    with subprocess.Popen(
-        [sys.executable, *arguments],
-        cwd=here if os.path.isdir(here) else None,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=end_with_parent if sys.platform == "linux" else None,
-    ) as process:
-        while True:
-            with suppress(subprocess.TimeoutExpired):
-                printed, said = process.communicate(timeout=LOOK)
-                break
-            task = worker.state.tasks.get(key)
-            if task is None or task.state == "cancelled":
-                process.kill()
-    try:
-        return json.loads(printed)
-    except ValueError:
-        raise RuntimeError(f"exit code {process.returncode}: {said.strip()[-500:]}") from None
+    key, future = worker.get_current_task(), _processes(worker.state.nthreads).submit(order)
+    while not wait([future], LOOK).done:
+        task = worker.state.tasks.get(key)
+        if (task is None or task.state == "cancelled") and future.cancel():
+            break
+    return answer_of(future, order)
 
 
-class Farm:
-    """The workers of a Dask scheduler, as a context.
+@cache
+def _processes(jobs: int) -> ProcessExecutor:
+    # Dask's nanny makes daemons of workers, which Python lets have no children.
+    multiprocessing.current_process()._config["daemon"] = False
+    return ProcessExecutor(jobs)
+
+
+class DaskExecutor(Executor):
+    """The workers of a Dask scheduler.
 
     Parameters
     ----------
@@ -91,50 +79,35 @@ class Farm:
         self._address, self._folder, self._note = address, folder, note
         self._fit: dict[str, bool] = {}
         """The workers that were asked, by their addresses."""
+        self._workers: dict[str, int] = {}
+        """Those that fit when it was looked last, and how many threads each has."""
+        self._looked_at = 0.0
         self._alone = False
         """Whether it was said that there is no worker."""
+        self._at_work: dict[Future[Answer], str] = {}
         self._client: Client
 
-    def run(self, arguments: Sequence[str], stage: str, tasks: int) -> Iterator[tuple[float, dict[str, Any]]]:
-        """Have a stage of so many tasks done by the command of these arguments; the share done, and each answer."""
-        parts = max(1, min(tasks, SHARES * sum(self.workers().values())))
-        waiting = deque(range(1, parts + 1))
-        losses: Counter[int] = Counter()
-        at_work: dict[Future, tuple[int, str]] = {}
-        try:
-            while waiting or at_work:
-                workers = self.workers()
-                for future, (number, worker) in [*at_work.items()]:
-                    if worker in workers and not future.done():
-                        continue
-                    del at_work[future]
-                    try:
-                        if worker not in workers:
-                            future.cancel(force=True)
-                            raise RuntimeError("its worker is gone")
-                        answer = future.result(CONNECTING)
-                    except (CancelledError, Exception) as error:
-                        losses[number] += 1
-                        if losses[number] > RETRIES:
-                            name = f"{stage} {number}/{parts}"
-                            said = f"{name}: {_first_line(error)}; given up after {losses[number]} attempts"
-                            yield 1.0 - (len(waiting) + len(at_work)) / parts, {"failures": {name: said}}
-                        else:
-                            waiting.appendleft(number)
-                        continue
-                    yield 1.0 - (len(waiting) + len(at_work)) / parts, answer
-                busy = Counter(worker for _, worker in at_work.values())
-                for worker, threads in workers.items():
-                    for number in [waiting.popleft() for _ in range(min(threads - busy[worker], len(waiting)))]:
-                        share = [*COMPARE, *arguments, *share_of(os.fspath(self._folder), stage, number, parts)]
-                        future = self._client.submit(
-                            do, [*share, "--json", "--jobs", "1"], os.getcwd(), workers=[worker], pure=False
-                        )
-                        at_work[future] = number, worker
-                time.sleep(LOOK)
-        finally:
-            with suppress(*UNREACHABLE):
-                self._client.cancel([*at_work], force=True)
+    @property
+    def capacity(self) -> int:
+        """The threads of all workers as they are now. What was done by one that is gone is cancelled."""
+        if time.monotonic() - self._looked_at > LOOK:
+            self._workers, self._looked_at = self.workers(), time.monotonic()
+            for future, worker in [*self._at_work.items()]:
+                if worker not in self._workers:
+                    future.cancel()
+        return sum(self._workers.values())
+
+    def submit(self, order: Order, tell: Tell | None = None) -> Future[Answer]:
+        busy = Counter(self._at_work.values())
+        worker = max(self._workers, key=lambda one: self._workers[one] - busy[one])
+        future = self._client.get_executor(workers=[worker], pure=False).submit(do, order)
+        self._at_work[future] = worker
+        future.add_done_callback(lambda future: self._at_work.pop(future, None))
+        return future
+
+    def stop(self) -> None:
+        for future in [*self._at_work] if self._client.status == "running" else ():
+            future.cancel()
 
     def workers(self) -> dict[str, int]:
         """Those that fit, by address, and how many threads each has. Raises ExecutorError where there are none ever."""
@@ -145,7 +118,7 @@ class Farm:
         if strangers := [*threads.keys() - self._fit.keys()]:
             answers: dict[str, str | BaseException] = {}
             with suppress(*UNREACHABLE):
-                ask = _asker([*CHECK, version_here()], os.fspath(self._folder))
+                ask = _asker(version_here(), os.fspath(self._folder))
                 answers = self._client.run(ask, workers=strangers, on_error="return")
             for address, said in answers.items():
                 if isinstance(said, OSError):
@@ -188,6 +161,7 @@ class Farm:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.stop()
         with suppress(*UNREACHABLE):
             self._client.close(timeout=2.0)
 
@@ -195,7 +169,7 @@ class Farm:
         """The workers that the scheduler knows, and how many threads each has."""
         with suppress(*UNREACHABLE):
             if self._client.status == "running":
-                found = self._client.sync(self._client.scheduler.identity, n_workers=-1, callback_timeout=CONNECTING)
+                found = self._client.sync(self._client.scheduler.identity, n_workers=-1, callback_timeout=BUSY)
                 return {address: worker["nthreads"] for address, worker in found["workers"].items()}
         raise ExecutorError(f"{self._address}: the Dask scheduler is gone")
 
@@ -207,18 +181,17 @@ async def _knock(address: str) -> None:
     comm.abort()
 
 
-def _asker(check: Sequence[str], folder: str) -> Callable[[], str]:
+def _asker(wanted: str, folder: str) -> Callable[[], str]:
     """What a worker answers where it does not fit, in a function that is sent whole: it may not have this program."""
 
     def ask() -> str:
         if not os.path.isdir(folder):
             return f"it does not see {folder}; choose one on a disk that all share"
-        ended = subprocess.run([sys.executable, *check], capture_output=True, text=True, check=False)
-        lines = (ended.stdout + ended.stderr).strip().splitlines()
-        return lines[-1].removeprefix("openjd_fail: ") if ended.returncode and lines else ""
+        try:
+            from rigid_motion_batch.pipeline.steps import version_here
+        except ImportError as error:
+            return str(error)
+        found = version_here()
+        return "" if found == wanted else f"it has {found}, and this run is of {wanted}; start it anew with that"
 
     return ask
-
-
-def _first_line(error: BaseException) -> str:
-    return (str(error).strip().splitlines() or [type(error).__name__])[0]

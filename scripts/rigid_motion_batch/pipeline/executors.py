@@ -9,15 +9,14 @@ import multiprocessing
 import os
 import signal
 import sys
-from collections.abc import Iterator
 from concurrent.futures import Future
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 
 from pebble import CONSTS, ProcessPool
 
-from rigid_motion_batch.supervising import end_with_parent, join_session, session
+from rigid_motion_batch.supervising import end_with_parent, held_back, join_session, session
 
-from .performing import Executor, Failed, Lost, Made, Order, Tell, perform
+from .performing import Answer, Executor, Order, Tell, log_of, perform
 
 CONSTS.term_timeout = 0.05
 """Seconds that a worker has to end by itself before it is killed: Blender at work does not listen."""
@@ -37,10 +36,10 @@ class ProcessExecutor(Executor):
         self._pools: list[ProcessPool] = []
         self._idle: list[ProcessPool] = []
 
-    def submit(self, order: Order, tell: Tell) -> Future[Made | Failed | Lost]:
-        with _without_interrupts():
+    def submit(self, order: Order, tell: Tell | None = None) -> Future[Answer]:
+        with held_back({signal.SIGINT}):  # Ctrl-C reaches this process alone, which decides what comes of it.
             pool = self._pool()
-            future = pool.schedule(perform, (order,))
+            future = pool.schedule(_perform, (order,))
         future.add_done_callback(lambda _: self._idle.append(pool))
         return future
 
@@ -53,9 +52,10 @@ class ProcessExecutor(Executor):
                 pool.join()
 
     def _pool(self) -> ProcessPool:
-        while self._idle:
-            if (pool := self._idle.pop()).active:  # And not killed while it had nothing to do.
-                return pool
+        with suppress(IndexError):
+            while pool := self._idle.pop():
+                if pool.active:  # And not killed while it had nothing to do.
+                    return pool
         spawn = multiprocessing.get_context("spawn")
         self._pools.append(ProcessPool(1, initializer=_begin, initargs=(session(),), context=spawn))
         return self._pools[-1]
@@ -67,19 +67,24 @@ def _begin(command: str) -> None:
     join_session(command)
     # Where Blender is loaded in the parent, its own modules hide what brings them.
     sys.path[:] = [folder for folder in sys.path if not os.path.exists(os.path.join(folder, "addon_utils.py"))]
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    for stream in (1, 2):
-        os.dup2(nowhere, stream)
+    _print_to(os.devnull)
 
 
-@contextmanager
-def _without_interrupts() -> Iterator[None]:
-    """Have Ctrl-C reach this process alone, and none that is started meanwhile: the parent decides what comes of it."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+def _perform(order: Order) -> Answer:
+    """Do an order in a worker. What is printed is kept until it is done: of one that dies these are the last words."""
+    log = log_of(order)
+    with suppress(OSError):
+        os.chdir(order.here)
+        _print_to(log)
     try:
-        yield
+        return perform(order)
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        with suppress(OSError):
+            log.unlink(missing_ok=True)
+
+
+def _print_to(path: str | os.PathLike[str]) -> None:
+    opened = os.open(path, os.O_WRONLY | os.O_CREAT, 0o600)
+    for stream in (1, 2):
+        os.dup2(opened, stream)
+    os.close(opened)

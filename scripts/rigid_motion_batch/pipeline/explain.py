@@ -8,7 +8,6 @@ from typing import Any
 from .running import EVERYTHING, Plan, Share, look_through
 from .steps import Task
 from .store import OutputError, Result, Store
-from .values import to_plain
 
 MOST = 3
 """Of several changes, how many are named."""
@@ -32,21 +31,18 @@ def explain(plan: Plan, store: Store, share: Share = EVERYTHING) -> Iterator[tup
 
 def _reason(task: Task, earlier: Result | None, changed: Mapping[str, str]) -> str:
     """Why a task without a result would be done, by what its last result was made of."""
-    if earlier is None or not isinstance(made_of := earlier.index.get("made_of"), dict):
+    if earlier is None or not isinstance(before := earlier.index.get("made_of"), dict):
         return "never done"
-    reasons = [
-        *_of("program", _differences(made_of.get("versions"), task.step.versions, values=False)),
-        *_of("parameters", _differences(made_of.get("parameters"), to_plain(task.parameters))),
-        *_of("input file", _differences(made_of.get("inputs"), {one.path: one.sha256 for one in task.inputs}, False)),
-    ]
-    if made_of.get("after") != [*task.after]:
+    now = task.made_of
+    changes = {
+        what: _differences(before.get(part), now[part], values=part == "parameters")
+        for what, part in (("program", "versions"), ("parameters", "parameters"), ("input file", "inputs"))
+    }
+    reasons = [f"{what} changed ({_few(found)})" for what, found in changes.items() if found]
+    if before.get("after") != now["after"]:
         anew = [changed[key] for key in task.after if key in changed]
         reasons.append(f"an earlier step changed ({_few(anew)})" if anew else "earlier steps are others")
     return "; ".join(reasons) or "its step is another"
-
-
-def _of(what: str, differences: list[str]) -> list[str]:
-    return [f"{what} changed ({_few(differences)})"] if differences else []
 
 
 def _differences(before: Any, now: Any, values: bool = True, name: str = "") -> list[str]:

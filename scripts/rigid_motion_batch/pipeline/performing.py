@@ -1,7 +1,7 @@
-"""Doing one task, wherever that is: from an order to a folder with files, and a message of what came of it.
+"""Doing one task, wherever that is: from an order to a folder with files, and an answer.
 
 Nothing here touches a store, so it does not matter where it happens or how it ends: here, in a worker, in a Blender.
-Orders and messages are pickled. How far a task is, it writes into a file beside its folder.
+Orders and answers are pickled. How far a task is, it writes into a file beside its folder.
 """
 
 from __future__ import annotations
@@ -10,16 +10,17 @@ import errno
 import json
 import os
 import shutil
-import signal
 import stat
 import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import CancelledError, Future
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Any, Self
+
+from rigid_motion_batch.supervising import death
 
 from .steps import Input, Job, Step, TaskError, sha256_of
 
@@ -31,6 +32,9 @@ NEARLY_NOTHING = 1 << 20
 
 INTERVAL = 0.2
 """Seconds between two messages about how far a task is."""
+
+Tell = Callable[[float, str], object]
+"""Takes the share of a task that is done, and what is being done."""
 
 
 @dataclass(frozen=True)
@@ -53,49 +57,47 @@ class Order:
     blender: str = ""
     """The program that does it, if that is not to be this one."""
 
-
-@dataclass(frozen=True)
-class Made:
-    """A task's files are in `folder`."""
-
-    folder: str
-    index: Mapping[str, Any]
-    notes: Sequence[str] = ()
+    here: str = field(default_factory=os.getcwd)
+    """Where relative paths start."""
 
 
 @dataclass(frozen=True)
-class Failed:
-    """A task cannot be done."""
+class Answer:
+    """What came of an order."""
 
-    message: str
+    index: Mapping[str, Any] | None = None
+    """Of the files that are in its folder now; None where nothing was made."""
+
+    problem: str = ""
+    """Why not, in one line."""
+
     details: str = ""
     """Where in the program, for an error that nobody foresaw."""
 
     hopeless: bool = False
     """Whether the others will fail for the same reason: the disk is full."""
 
+    lost: bool = False
+    """Whether whoever did it is gone; nothing is known of the task itself, so it may be tried again."""
+
     notes: Sequence[str] = ()
 
 
-@dataclass(frozen=True)
-class Lost:
-    """Whoever did a task is gone; nothing is known of the task itself, so it may be tried again."""
-
-    message: str
-    notes: Sequence[str] = ()
+class ExecutorError(Exception):
+    """Why nothing can be done by these means, and the way out, in one line."""
 
 
-Tell = Callable[[float, str], object]
+class Executor:
+    """Who does orders: this class at once, in this process. A context; may be used again after `stop`."""
 
-
-class Executor(Protocol):
-    """Who does orders. A context; may be used again after `stop`."""
-
-    capacity: int
+    capacity = 1
     """How many orders it takes at a time."""
 
-    def submit(self, order: Order, tell: Tell) -> Future[Made | Failed | Lost]:
-        """Begin an order. How far it is, is told here, or written for `progress_of`."""
+    def submit(self, order: Order, tell: Tell) -> Future[Answer]:
+        """Begin an order; `answer_of` tells what came of it. How far it is, is told, or written for `progress_of`."""
+        future: Future[Answer] = Future()
+        future.set_result(perform(order, tell))
+        return future
 
     def stop(self) -> None:
         """End what is at work, within a second."""
@@ -107,67 +109,52 @@ class Executor(Protocol):
         self.stop()
 
 
-class SerialExecutor(Executor):
-    """Does an order at once, in this process."""
-
-    capacity = 1
-
-    def submit(self, order: Order, tell: Tell) -> Future[Made | Failed | Lost]:
-        future: Future[Made | Failed | Lost] = Future()
-        future.set_result(perform(order, tell))
-        return future
-
-    def stop(self) -> None:
-        pass
-
-
 def processors() -> int:
     """How many this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def outcome_of(future: Future[Made | Failed | Lost]) -> Made | Failed | Lost:
-    """What became of an order."""
+def answer_of(future: Future[Answer], order: Order) -> Answer:
+    """What came of an order that was submitted."""
     try:
         return future.result()
-    except (CancelledError, Exception) as error:  # Of pebble's, or at unpickling; not of the task's.
-        if code := getattr(error, "exitcode", None):
-            return Lost(f"its process died ({_death(code)})")
-        return Lost(f"its process failed: {type(error).__name__}: {error}")
+    except (CancelledError, Exception) as error:  # Of whoever was to do it; not of the task's.
+        if isinstance(error, CancelledError):
+            return Answer(problem="its worker is gone", lost=True)
+        code = getattr(error, "exitcode", None)
+        how = f"died ({death(code)})" if code else f"failed: {type(error).__name__}: {error}"
+        return Answer(problem=f"its process {how}{last_words(log_of(order))}", lost=True)
 
 
-def _death(code: int) -> str:
-    if -code in {*signal.Signals}:
-        name = signal.Signals(-code).name
-        return f"{name}, perhaps for want of memory" if name == "SIGKILL" else name
-    return f"exit code {code}"
+def log_of(order: Order) -> Path:
+    """Where a worker prints what libraries print while it does an order."""
+    return Path(f"{order.folder}.log")
 
 
-class ExecutorError(Exception):
-    """Why nothing can be done by these means, and the way out, in one line."""
+def last_words(log: Path) -> str:
+    """The last line of a log, behind a colon; nothing where there is none."""
+    with suppress(OSError):
+        said = [line.strip() for line in log.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()]
+        return f": {said[-1][:200]}" if said else ""
+    return ""
 
 
-def perform(order: Order, tell: Tell | None = None) -> Made | Failed | Lost:
+def perform(order: Order, tell: Tell | None = None) -> Answer:
     """Do a task. Its folder is there afterwards if it was made, and only then.
 
     Parameters
     ----------
     order : Order
     tell : callable, optional
-        Takes the share that is done and what is being done; written into a file for `progress_of` unless given.
+        Told how far it is, which is written into a file for `progress_of` unless given.
     """
     if order.step.blender and order.blender:
         from .blender import perform_in_blender
 
         return perform_in_blender(order, tell)
-    job = Job(
-        Path(order.folder),
-        [None if before is None else Path(before) for before in order.before],
-        [Path(one.path) for one in order.inputs],
-        tell or _writing(order),
-    )
-    started = time.perf_counter()
-    done: Made | Failed | None = None
+    before = [None if one is None else Path(one) for one in order.before]
+    job = Job(Path(order.folder), before, [Path(one.path) for one in order.inputs], tell or _writing(order))
+    started, answer = time.perf_counter(), Answer()
     try:
         for one in order.inputs:
             if os.path.exists(one.path) and not os.path.isfile(one.path):
@@ -177,30 +164,29 @@ def perform(order: Order, tell: Tell | None = None) -> Made | Failed | Lost:
         for one in order.inputs:
             if _changed(one):
                 raise TaskError(f"{one.path}: this file changed while it was read; run the same command again")
-        files = {path.relative_to(job.folder).as_posix(): path for path in sorted(job.folder.rglob("*"))}
-        files = {name: _state_of(path) for name, path in files.items() if not path.is_dir()}
+        paths = [path for path in sorted(job.folder.rglob("*")) if not path.is_dir()]
+        files = {path.relative_to(job.folder).as_posix(): _state_of(path) for path in paths}
         for name, shown in order.wanted.items():
             if not name.endswith("/") and name not in files:
                 raise TaskError(f"{shown}: this was to be made, and was not")
-        index = {"files": files, "seconds": time.perf_counter() - started, "facts": dict(facts or {})}
-        done = Made(order.folder, index, job.notes)
+        answer = Answer({"files": files, "seconds": time.perf_counter() - started, "facts": dict(facts or {})})
     except TaskError as error:
-        done = Failed(str(error), notes=job.notes)
+        answer = Answer(problem=str(error))
     except OSError as error:
         where = f"{_shown(error.filename, order)}: " if error.filename else ""
-        own = str(error.filename or "").startswith(order.output)
-        hopeless = error.errno in FULL_OR_FORBIDDEN and (own or error.errno == errno.ENOSPC)
-        done = Failed(f"{where}{error.strerror or error}", traceback.format_exc(), hopeless, job.notes)
+        is_own = str(error.filename or "").startswith(order.output)
+        hopeless = error.errno in FULL_OR_FORBIDDEN and (is_own or error.errno == errno.ENOSPC)
+        answer = Answer(None, f"{where}{error.strerror or error}", traceback.format_exc(), hopeless)
     except Exception as error:
-        done = Failed(f"{type(error).__name__}: {error}", traceback.format_exc(), notes=job.notes)
+        answer = Answer(None, f"{type(error).__name__}: {error}", traceback.format_exc())
     finally:
         with suppress(OSError):
             os.remove(f"{order.folder}.progress")
-        if not isinstance(done, Made):
+        if answer.index is None:
             shutil.rmtree(order.folder, ignore_errors=True)
-    if isinstance(done, Failed) and not done.hopeless and _is_full(order.output):
-        return Failed(f"{os.strerror(errno.ENOSPC)} ({done.message})", done.details, True, done.notes)
-    return done
+    if answer.problem and not answer.hopeless and _is_full(order.output):
+        answer = replace(answer, problem=f"{os.strerror(errno.ENOSPC)} ({answer.problem})", hopeless=True)
+    return replace(answer, notes=job.notes)
 
 
 def progress_of(order: Order) -> tuple[float, str] | None:
@@ -212,7 +198,7 @@ def progress_of(order: Order) -> tuple[float, str] | None:
         return None
 
 
-def _writing(order: Order) -> Callable[[float, str], None]:
+def _writing(order: Order) -> Tell:
     """What writes how far a task is for `progress_of`, not too often."""
     said_at = 0.0
 

@@ -8,17 +8,21 @@ What ends a run is Ctrl-C, and a disk that is full or must not be written. Nothi
 from __future__ import annotations
 
 import enum
-import heapq
+import io
 import os
 import shutil
+import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-from .performing import FULL_OR_FORBIDDEN, Executor, Failed, Lost, Made, Order, outcome_of, progress_of
+from rigid_motion_batch.progress import Progress, Stage
+
+from .performing import FULL_OR_FORBIDDEN, Answer, Executor, ExecutorError, Order, answer_of, progress_of
 from .steps import Task
 from .store import OutputError, Result, Store, not_written
 
@@ -43,22 +47,6 @@ class State(enum.Enum):
     STOPPED = "not begun or stopped"
 
 
-class Progress:
-    """Is told how a run gets on. This one does nothing."""
-
-    def begin(self, total: float) -> None:
-        """So many seconds of work, as far as one can say."""
-
-    def reach(self, done: float, doing: str, counts: Mapping[str, tuple[int, int]]) -> None:
-        """So much of the total is done; what is being done, and of what is counted ("frame") how many of how many."""
-
-    def note(self, text: str) -> None:
-        """A line for the user."""
-
-    def finish(self, task: Task, state: State, problem: str) -> None:
-        """What became of a task, and in a line what was wrong with it."""
-
-
 @dataclass
 class Outcome:
     """What became of a run."""
@@ -76,12 +64,10 @@ class Outcome:
     problem: str = ""
     """Why nothing more could be done, in one line; empty where everything was tried."""
 
-    def continued(self, later: Outcome) -> Outcome:
-        """What became of this and a later run, which found done what this one has done."""
+    def later(self) -> Outcome:
+        """To begin a later run with, which finds done what this one has done."""
         done = self.counts[State.DONE]
-        later.counts.update({State.DONE: done, State.UP_TO_DATE: -done})
-        later.failures, later.details = self.failures | later.failures, self.details | later.details
-        return later
+        return Outcome(Counter({State.DONE: done, State.UP_TO_DATE: -done}), self.failures, self.details)
 
     def note_failures(self, store: Store) -> None:
         """Have the store keep what failed, for whoever asks later."""
@@ -184,6 +170,7 @@ def run(
     executor: Executor,
     *,
     progress: Progress | None = None,
+    title: str = "",
     share: Share = EVERYTHING,
     blender: str = "",
     before: Outcome | None = None,
@@ -197,6 +184,7 @@ def run(
     store, executor
         Opened. An executor may do several plans, one after the other.
     progress : Progress, optional
+        Gets a stage of this title, and what is said of tasks.
     share : Share
         What is to be done here; of the rest, what is there is used.
     blender : str
@@ -214,19 +202,17 @@ def run(
     OutputError
         Before anything is done, where something would be replaced that must not be.
     """
-    survey = Survey.of(plan, store, share)
-    if survey.tasks:
-        outcome = _Run(plan, store, executor, progress or Progress(), share, blender, survey).run()
-    else:
-        outcome = Outcome(Counter({State.UP_TO_DATE: survey.up_to_date}))
-    outcome = (before or Outcome()).continued(outcome)
+    progress, outcome = progress or Progress(io.StringIO()), (before or Outcome()).later()
+    with progress.stage(title, 1.0) as stage:
+        survey = Survey.of(plan, store, share)
+        stage.total = survey.weight
+        if survey.tasks:
+            _Run(plan, store, executor, progress, stage, share, blender, survey, outcome).run()
+        else:
+            outcome.counts[State.UP_TO_DATE] += survey.up_to_date
     if share == EVERYTHING:
         outcome.note_failures(store)
     return outcome
-
-
-class _Hopeless(Exception):
-    """Raised where no task can be done any more."""
 
 
 @dataclass(eq=False)
@@ -234,9 +220,8 @@ class _Open:
     """A task that is not settled."""
 
     task: Task
-    number: int = 0
-    waits: int = 0
-    """For how many others."""
+    pending: list[str]
+    """The keys of the tasks that it waits for, and perhaps of others that are settled."""
 
     key: str = ""
     """Under which its result is kept: that of the task, but for a partial one where something failed."""
@@ -253,75 +238,78 @@ class _Run:
     store: Store
     executor: Executor
     progress: Progress
+    stage: Stage
     share: Share
     blender: str
     survey: Survey
+    outcome: Outcome
 
-    def __post_init__(self) -> None:
-        self.outcome = Outcome()
-        self.settled: dict[str, str | None] = {}
-        """Key of a task to that of its result; None where it has none."""
-        self.readers: dict[str, list[_Open]] = {}
-        """Key of an open task to those that wait for it."""
-        self.ready: list[tuple[int, _Open]] = []
-        self.at_work: dict[Future[Made | Failed | Lost], tuple[_Open, Order]] = {}
-        self.number, self.weight_done = 0, 0.0
-        self.amounts_done: Counter[str] = Counter()
-        self.shown: Counter[str] = Counter()
+    settled: dict[str, str | None] = field(default_factory=dict)
+    """Key of a task to that of its result; None where it has none."""
 
-    def run(self) -> Outcome:
-        self.progress.begin(self.survey.weight)
-        outcome = self.outcome
+    open: set[str] = field(default_factory=set)
+    """The keys of tasks that are met, and not settled."""
+
+    waiting: list[_Open] = field(default_factory=list)
+    at_work: dict[Future[Answer], tuple[_Open, Order]] = field(default_factory=dict)
+    weight_done: float = 0.0
+    amounts_done: Counter[str] = field(default_factory=Counter)
+    shown: Counter[str] = field(default_factory=Counter)
+
+    def run(self) -> None:
         try:
             self._work()
-            if self.share == EVERYTHING and not outcome.failures:
+            if self.share == EVERYTHING and not self.outcome.failures:
                 self.store.sweep(key for key in self.settled.values() if key)
-        except _Hopeless as error:
-            outcome.problem = str(error)
+        except ExecutorError as error:
+            self.outcome.problem = str(error)
         except KeyboardInterrupt:
-            outcome.interrupted = True
-        if outcome.problem or outcome.interrupted:
+            self.outcome.interrupted = True
+        if self.outcome.problem or self.outcome.interrupted:
             self.executor.stop()
-            over = sum(outcome.counts[state] for state in (State.DONE, State.FAILED, State.SKIPPED))
-            outcome.counts[State.STOPPED] = max(0, self.survey.tasks - over)
-        return outcome
+            self.outcome.counts[State.STOPPED] = max(0, self.survey.tasks)
 
     def _work(self) -> None:
         rest = look_through(self.plan, self.store, self.share)
-        found: Found | None
         more = True
-        while more or self.ready or self.at_work:
-            while more and len(self.ready) < self.executor.capacity:
-                if found := next(rest, None):
-                    self._meet(found)
-                more = found is not None
-            while self.ready and len(self.at_work) < self.executor.capacity:
-                self._begin(heapq.heappop(self.ready)[1])
+        while more or self.waiting or self.at_work:
+            capacity = self.executor.capacity
+            ready = [one for one in self.waiting if self._is_ready(one)]
+            while more and len(ready) < capacity:
+                found = next(rest, None)
+                if more := found is not None:
+                    ready += filter(self._is_ready, self._meet(found))
+            for opened in ready[: max(0, capacity - len(self.at_work))]:
+                self.waiting.remove(opened)
+                self._begin(opened)
+            if not capacity:
+                time.sleep(LOOK)
             ended, _ = wait(self.at_work, LOOK, FIRST_COMPLETED)
             for future in ended:
                 opened, order = self.at_work.pop(future)
-                self._end(opened, order, outcome_of(future))
+                self._end(opened, order, answer_of(future, order))
             for opened, order in () if ended else self.at_work.values():
                 if progress := progress_of(order):
                     self._tell(opened, *progress)
 
-    def _meet(self, found: Found) -> None:
-        """Take a task from the plan: it is up to date, or ready, or waits for others."""
+    def _is_ready(self, opened: _Open) -> bool:
+        while opened.pending and opened.pending[-1] not in self.open:
+            opened.pending.pop()
+        return not opened.pending
+
+    def _meet(self, found: Found) -> list[_Open]:
+        """Take a task from the plan: it is up to date, or waits from now on, and is returned."""
         task = found.task
-        if found.done and task.key not in self.readers:
+        if found.done and task.key not in self.open:
             self.settled[task.key] = task.key
-            if found.chosen:
-                self._count(task, State.UP_TO_DATE)
+            self.outcome.counts[State.UP_TO_DATE] += found.chosen
         elif found.chosen:
-            self.number += 1
-            opened = _Open(task, self.number)
             # A task that is there twice waits for itself.
-            for key in {*task.after, task.key} & self.readers.keys():
-                self.readers[key].append(opened)
-                opened.waits += 1
-            self.readers.setdefault(task.key, [])
-            if not opened.waits:
-                heapq.heappush(self.ready, (opened.number, opened))
+            pending = [key for key in (task.key, *task.after) if key in self.open]
+            self.waiting.append(_Open(task, pending))
+            self.open.add(task.key)
+            return self.waiting[-1:]
+        return []
 
     def _before(self, task: Task) -> list[str | None]:
         """The keys of the results of the tasks before one, also of earlier plans; None where there is none."""
@@ -335,8 +323,8 @@ class _Run:
         task = opened.task
         before = self._before(task)
         opened.key = task.key_after(before)
-        if result := self.store.result(opened.key):
-            self._settle(opened, result)
+        if self.store.result(opened.key):
+            self._settle(opened)
         elif self.settled.get(task.key, "") is None or (None in before and not (task.step.partial and any(before))):
             self.store.withdraw(task.publish.values())
             self._close(opened, State.SKIPPED)
@@ -355,90 +343,77 @@ class _Run:
             future = self.executor.submit(order, lambda share, doing: self._tell(opened, share, doing))
             self.at_work[future] = opened, order
 
-    def _end(self, opened: _Open, order: Order, message: Made | Failed | Lost) -> None:
+    def _end(self, opened: _Open, order: Order, answer: Answer) -> None:
         """Take what came of an order."""
         shown = opened.task.shown
-        for note in message.notes:
+        for note in answer.notes:
             self.progress.note(note)
-        if isinstance(message, Made):
-            self._settle(opened, message)
-        elif isinstance(message, Failed):
-            self._failed(opened, message)
-        else:
+        if answer.index:
+            self._settle(opened, order.folder, answer.index)
+        elif answer.lost:
             shutil.rmtree(order.folder, ignore_errors=True)
             opened.losses += 1
             if opened.losses <= RETRIES:
-                self.progress.note(f"{shown}: {message.message}; trying again")
-                heapq.heappush(self.ready, (opened.number, opened))
+                self.progress.note(f"{shown}: {answer.problem}; trying again")
+                self.waiting.insert(0, opened)
             else:
-                self._failed(opened, Failed(f"{shown}: {message.message}; given up after {opened.losses} attempts"))
+                self._fail(opened, f"{shown}: {answer.problem}; given up after {opened.losses} attempts")
+        else:
+            # An error that nobody foresaw does not say by itself what it is about.
+            said = f"{shown}: {answer.problem}" if answer.details else answer.problem
+            self._fail(opened, said, answer.details, hopeless=answer.hopeless)
 
-    def _settle(self, opened: _Open, made: Made | Result) -> None:
-        """Keep what was made, and put its files in place."""
+    def _settle(self, opened: _Open, made: str = "", index: Mapping[str, Any] | None = None) -> None:
+        """Keep what was made, unless it is there, and put its files in place."""
         task, is_new = opened.task, True
         try:
-            if isinstance(made, Made):
-                made = self.store.keep(task, opened.key, Path(made.folder), made.index)
+            if index:
+                result = self.store.keep(task, opened.key, Path(made), index)
             else:
-                is_new = not self.store.is_published(task, made)
-            self.store.publish(task, made)
+                result = self.store.result(opened.key)
+                is_new = not self.store.is_published(task, result)
+            self.store.publish(task, result)
         except OutputError as error:
-            self._failed(opened, Failed(str(error)))
+            self._fail(opened, str(error))
         except OSError as error:
-            self._failed(opened, _of_system(error))
+            said = f"{error.filename2 or error.filename}: {error.strerror or error}"
+            self._fail(opened, said, hopeless=error.errno in FULL_OR_FORBIDDEN)
         else:
             for key in task.spends:
                 self.store.discard(key)
             self._close(opened, State.DONE if is_new else State.UP_TO_DATE)
 
-    def _failed(self, opened: _Open, failed: Failed) -> None:
-        # An error that nobody foresaw does not say by itself what it is about.
+    def _fail(self, opened: _Open, said: str, details: str = "", *, hopeless: bool = False) -> None:
         task = opened.task
-        said = f"{task.shown}: {failed.message}" if failed.details else failed.message
-        if not failed.hopeless and self.store.discard_damaged(key for key in self._before(task) if key):
+        if not hopeless and self.store.discard_damaged(key for key in self._before(task) if key):
             said = f"{task.shown}: what it reads was damaged; run the same command again"
-        self.outcome.failures[task.name], self.outcome.details[task.name] = said, failed.details
-        self._close(opened, State.FAILED, said)
-        if failed.hopeless:
-            raise _Hopeless(said)
+        self.outcome.failures[task.name], self.outcome.details[task.name] = said, details
+        self.progress.error(said)
+        self._close(opened, State.FAILED)
+        if hopeless:
+            raise ExecutorError(said)
         # What is there under its name was made of something else.
         self.store.withdraw(task.publish.values())
 
-    def _close(self, opened: _Open, state: State, problem: str = "") -> None:
+    def _close(self, opened: _Open, state: State) -> None:
         """An open task has come to its end: those after it may begin."""
-        task, there = opened.task, state in (State.DONE, State.UP_TO_DATE)
-        waiting = self.readers.pop(task.key, [])
-        self.settled[task.key] = opened.key if there else None
+        task = opened.task
+        self.open.discard(task.key)
+        self.settled[task.key] = opened.key if state in (State.DONE, State.UP_TO_DATE) else None
+        self.survey.tasks -= 1
         self.weight_done += task.weight
         self.amounts_done[task.unit] += task.amount
-        self._count(task, state, problem)
-        for one in waiting:
-            if one.task.key == task.key:
-                self.readers.setdefault(task.key, [])
-            one.waits -= 1
-            if not one.waits:
-                heapq.heappush(self.ready, (one.number, one))
-
-    def _count(self, task: Task, state: State, problem: str = "") -> None:
         self.outcome.counts[state] += 1
-        self.progress.finish(task, state, problem)
 
     def _tell(self, opened: _Open, share: float, doing: str) -> None:
         """Tell how far a task is, and with it the whole."""
         opened.share = share
-        at_work = {opened, *(one for one, _ in self.at_work.values())}
-        weight = self.weight_done + sum(one.share * one.task.weight for one in at_work)
-        by_now = Counter(self.amounts_done)
-        for one in at_work:
+        weight, by_now = self.weight_done, Counter(self.amounts_done)
+        for one in {opened, *(one for one, _ in self.at_work.values())}:
+            weight += one.share * one.task.weight
             by_now[one.task.unit] += one.share * one.task.amount
-        del by_now[""]
         # What a worker that died had done does not make the count go back.
-        self.shown |= Counter({unit: int(number) for unit, number in by_now.items()})
-        counts = {unit: (number, self.survey.amounts[unit]) for unit, number in self.shown.items()}
-        shown = opened.task.shown
-        self.progress.reach(min(weight, self.survey.weight), f"{shown}: {doing}" if doing else shown, counts)
-
-
-def _of_system(error: OSError) -> Failed:
-    where = error.filename2 or error.filename
-    return Failed(f"{where}: {error.strerror or error}", hopeless=error.errno in FULL_OR_FORBIDDEN)
+        self.shown |= Counter({unit: int(number) for unit, number in by_now.items() if unit})
+        counted = [f"{unit} {number} of {self.survey.amounts[unit]}" for unit, number in self.shown.items()]
+        shown = ": ".join(filter(None, (opened.task.shown, doing)))
+        self.stage.reach(weight, ", ".join([shown, *counted]))

@@ -180,6 +180,17 @@ class Task:
         inputs = [one.sha256 for one in self.inputs]
         return _digest([self.step.digest, to_plain(self.parameters), list(after), inputs])[:DIGITS]
 
+    @property
+    def made_of(self) -> dict[str, Any]:
+        """What its result depends on, for people; `explain` compares it."""
+        return {
+            "step": self.step.name,
+            "versions": dict(self.step.versions),
+            "parameters": to_plain(self.parameters),
+            "inputs": {one.path: one.sha256 for one in self.inputs},
+            "after": list(self.after),
+        }
+
     def published(self, files: Iterable[str] = ()) -> Iterator[tuple[str, str]]:
         """Each file that is published and where it goes, of a result with these files."""
         for name, path in self.publish.items():

@@ -32,7 +32,6 @@ from filelock import FileLock, Timeout
 from rigid_motion_batch.files import append_lines, lines_of, write_text
 
 from .steps import OWN, Input, Task, sha256_of
-from .values import to_plain
 
 INDEX = ".index.json"
 """Of a result: its files with size, time of change and digest; what it was made of, in how long, and facts."""
@@ -218,13 +217,7 @@ class Store:
 
     def keep(self, task: Task, key: str, made: Path, index: Mapping[str, Any]) -> Result:
         """Take a folder as the result of a task. Raises OSError where that cannot be."""
-        made_of = {
-            "step": task.step.name,
-            "versions": task.step.versions,
-            "inputs": {one.path: one.sha256 for one in task.inputs},
-            "after": list(task.after),
-        }
-        content = {**index, "name": task.name, "made_of": {**made_of, "parameters": to_plain(task.parameters)}}
+        content = {**index, "name": task.name, "made_of": task.made_of}
         (made / INDEX).write_text(json.dumps(content), encoding="utf-8")
         target = self._results / key
         try:

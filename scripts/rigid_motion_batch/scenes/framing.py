@@ -33,7 +33,7 @@ THREE_QUARTER = np.radians(30.0)
 SMOOTHING = 0.12
 """Seconds of the film: the standard deviation of the bell by which the focus is smoothed, at most."""
 
-BESIDE = 0.25
+BESIDE = 0.5
 """What is off from the recording by more than so much of the room that this needs is cut where it leaves the view."""
 
 LAG = 1.35

@@ -6,11 +6,11 @@ import argparse
 import sys
 from pathlib import Path
 
-from rigid_motion_batch.pipeline.bundle import FarmProgress
 from rigid_motion_batch.pipeline.comparison import ComparisonPlan
-from rigid_motion_batch.pipeline.performing import SerialExecutor
+from rigid_motion_batch.pipeline.performing import Executor
 from rigid_motion_batch.pipeline.running import Share, run
 from rigid_motion_batch.pipeline.store import Store
+from rigid_motion_batch.progress import Progress
 from tests.scripts.pipeline.test_comparison import ABOUT, STAGE, wanted
 
 if __name__ == "__main__":
@@ -22,8 +22,8 @@ if __name__ == "__main__":
     parser.add_argument("--part")
     options = parser.parse_args()
     number, of = map(int, options.part.split("/"))
-    share, progress = Share(frozenset({options.only}), number, of), FarmProgress()
-    with Store(options.output, alone=False) as store, SerialExecutor() as executor:
+    share, progress = Share(frozenset({options.only}), number, of), Progress()
+    with Store(options.output, alone=False) as store, Executor() as executor:
         plan = ComparisonPlan(wanted(*options.inputs, stage=STAGE, about=ABOUT), store)
         outcome = run(plan.reading, store, executor, share=share, progress=progress)
         plan.look_into()

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from rigid_motion_batch.pipeline.executors import ProcessExecutor
-from rigid_motion_batch.pipeline.performing import Executor, SerialExecutor
-from rigid_motion_batch.pipeline.running import Outcome, Progress, State, run
+from rigid_motion_batch.pipeline.performing import Executor
+from rigid_motion_batch.pipeline.running import Outcome, run
 from rigid_motion_batch.pipeline.steps import OWN, Step, Task
-from rigid_motion_batch.pipeline.store import Store
+from rigid_motion_batch.pipeline.store import Result, Store
+from rigid_motion_batch.progress import Progress, Stage
 from tests.scripts.pipeline import steps
 from tests.scripts.pipeline.steps import FILE, Nothing, Write
 
-EXECUTORS = {"serial": SerialExecutor, "processes": lambda: ProcessExecutor(2)}
+EXECUTORS = {"serial": Executor, "processes": lambda: ProcessExecutor(2)}
 
 
 def task(name: str, step: Step = steps.write, parameters: object = None, *after: Task, **fields: object) -> Task:
@@ -36,30 +39,40 @@ class Listener(Progress):
     """Keeps what it is told."""
 
     def __init__(self) -> None:
+        super().__init__(io.StringIO())
         self.total = 0.0
-        self.reached: list[tuple[float, str, Mapping[str, tuple[int, int]]]] = []
+        self.reached: list[tuple[float, str]] = []
         self.notes: list[str] = []
-        self.states: dict[str, str] = {}
-        self.done: set[str] = set()
 
-    def begin(self, total: float) -> None:
-        self.total = total
+    @contextmanager
+    def stage(self, title: str, total: float) -> Iterator[Stage]:
+        def keep() -> None:
+            self.reached.append((stage.done, stage.doing))
 
-    def reach(self, done: float, doing: str, counts: Mapping[str, tuple[int, int]]) -> None:
-        self.reached.append((done, doing, dict(counts)))
+        stage = Stage(title, total, keep)
+        yield stage
+        self.total = stage.total
 
-    def note(self, text: str) -> None:
-        self.notes.append(text)
+    def note(self, text: str, style: str = "") -> None:
+        self.notes += [] if style else [text]
 
-    def finish(self, task: Task, state: State, problem: str) -> None:
-        self.states[task.name] = state.value
-        self.done |= {task.name} if state is State.DONE else set()
+
+class Watched(Store):
+    """Keeps the names of the tasks that made something."""
+
+    def __init__(self, output: Path, **options: object) -> None:
+        super().__init__(output, **options)
+        self.made: list[str] = []
+
+    def keep(self, task: Task, *made: object) -> Result:
+        self.made.append(task.name)
+        return super().keep(task, *made)
 
 
 def run_in(output: Path, *tasks: Task, executor: Executor | None = None, **options: object) -> Outcome:
     """Run a plan in a folder."""
     of_store = {name: options.pop(name) for name in ("alone", "overwrite") if name in options}
-    with Store(output, **of_store) as store, executor or SerialExecutor() as opened:
+    with Store(output, **of_store) as store, executor or Executor() as opened:
         return run(lambda: tasks, store, opened, **options)
 
 

@@ -34,6 +34,7 @@ class Nothing:
 class Die:
     marker: str
     times: int
+    words: str = ""
 
 
 @dataclass(frozen=True)
@@ -117,6 +118,7 @@ def die(job: Job, parameters: Die) -> None:
     with Path(parameters.marker).open("a") as stream:
         stream.write("x")
     if len(Path(parameters.marker).read_text()) <= parameters.times:
+        os.write(2, parameters.words.encode())
         os.kill(os.getpid(), signal.SIGKILL)
     (job.folder / FILE).write_text("whole")
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import subprocess
@@ -12,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from rigid_motion_batch.pipeline import bundle
-from rigid_motion_batch.pipeline.bundle import FarmProgress, below_inputs, write_bundle
+from rigid_motion_batch.pipeline.bundle import below_inputs, write_bundle
 from rigid_motion_batch.pipeline.executors import ProcessExecutor
 from tests.scripts.comparing import write_toss
 from tests.scripts.pipeline.test_comparison import ABOUT, STAGE, compared, published, wanted
@@ -100,11 +99,3 @@ def test_a_machine_with_another_version_is_told_so(capsys: pytest.CaptureFixture
     assert bundle.main(bundle.version_here()) == 0
     assert bundle.main("program 0") == 1
     assert "and the bundle is of program 0" in capsys.readouterr().out
-
-
-def test_progress_is_said_as_farms_hear_it() -> None:
-    stream = io.StringIO()
-    progress = FarmProgress(stream)
-    progress.begin(8.0)
-    progress.reach(2.0, "toss at 5 keys/s", {"frame": (3, 12)})
-    assert stream.getvalue() == "openjd_progress: 25.0\nopenjd_status: toss at 5 keys/s, frame 3 of 12\n"

@@ -21,7 +21,7 @@ from rigid_motion_batch.pipeline import values
 from rigid_motion_batch.pipeline.comparison import Comparison, ComparisonPlan
 from rigid_motion_batch.pipeline.comparison_steps import result_in
 from rigid_motion_batch.pipeline.executors import ProcessExecutor
-from rigid_motion_batch.pipeline.performing import Executor, SerialExecutor
+from rigid_motion_batch.pipeline.performing import Executor
 from rigid_motion_batch.pipeline.running import Outcome, Share, run
 from rigid_motion_batch.pipeline.steps import OWN, Task
 from rigid_motion_batch.pipeline.store import OutputError, Store
@@ -31,7 +31,7 @@ from rigid_motion_batch.report.settings import Settings
 from rigid_motion_batch.scenes.settings import StageSettings
 from tests.scripts.bvh_bodies import write_body
 from tests.scripts.comparing import write_toss
-from tests.scripts.pipeline.plans import Listener, states
+from tests.scripts.pipeline.plans import Listener, Watched, states
 from tests.thoroughness import THOROUGH
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -53,11 +53,12 @@ def compared(
     """Run a comparison in a folder."""
     listener = Listener()
     of_store = {name: options.pop(name) for name in ("alone", "overwrite") if name in options}
-    with Store(output, **of_store) as store, executor or SerialExecutor() as opened:
+    with Watched(output, **of_store) as store, executor or Executor() as opened:
         plan = ComparisonPlan(comparison, store)
         outcome, notes = run(plan.reading, store, opened, progress=listener, **options), plan.look_into()
         listener.notes += notes
         later = run(plan.tasks, store, opened, progress=listener, **options)
+        listener.made = store.made
     later.failures = outcome.failures | later.failures
     return later, listener
 
@@ -134,19 +135,19 @@ def test_a_film_and_a_page_of_a_clip(output: Path, toss: Path) -> None:
     assert outcome.failures == {}
     assert {"toss/5/comparison.mp4", "toss/5/comparison.blend", "report.html"} <= {*published(output)}
     assert "toss/5/comparison.mp4" in (output / "report.html").read_text()
-    assert any(doing.startswith("toss at 5 keys/s") for _, doing, _ in listener.reached)
-    assert {*listener.reached[-1][2].values()} == {(7, 7)}
+    assert any(doing.startswith("toss at 5 keys/s") for _, doing in listener.reached)
+    assert listener.reached[-1][1].endswith(", frame 7 of 7")
     _, again = compared(output, comparison)
-    assert again.done == set()
+    assert again.made == []
     _, other = compared(output, replace(comparison, about=replace(ABOUT, command="compare ./toss.csv")))
-    assert other.done == {"report.html"}
+    assert {*other.made} == {"report.html"}
     _, lighter = compared(output, replace(comparison, stage=replace(STAGE, theme="light")))
-    assert lighter.done == {"build toss/5", "render toss/5 from 1", "encode toss/5", "report.html"}
+    assert {*lighter.made} == {"build toss/5", "render toss/5 from 1", "encode toss/5", "report.html"}
 
 
 def test_a_page_may_be_made_before_its_films(output: Path, toss: Path) -> None:
     comparison = wanted(toss, stage=STAGE, about=ABOUT)
-    with Store(output) as store, SerialExecutor() as executor:
+    with Store(output) as store, Executor() as executor:
         plan = ComparisonPlan(comparison, store)
         run(plan.reading, store, executor)
         plan.look_into()
@@ -196,7 +197,7 @@ def test_one_bad_clip_stops_nobody(output: Path, toss: Path) -> None:
 def test_a_source_that_is_given_twice_is_read_and_measured_under_two_names(output: Path, toss: Path) -> None:
     outcome, listener = compared(output, wanted(toss, toss))
     assert outcome.failures == {}
-    assert sum(name.startswith("read ") for name in listener.states) == 1
+    assert sum(name.startswith("read ") for name in listener.made) == 1
     assert {"toss/5/keys.csv", "toss-2/5/keys.csv"} <= {*published(output)}
 
 
@@ -213,14 +214,14 @@ def test_only_what_an_option_changes_is_done_again(
 ) -> None:
     compared(output, wanted(toss))
     _, listener = compared(output, wanted(toss, **change))
-    assert {name.replace(str(toss), "toss") for name in listener.done} == redone
+    assert {name.replace(str(toss), "toss") for name in listener.made} == redone
 
 
 def test_a_recording_that_was_edited_is_read_and_measured_again(output: Path, toss: Path) -> None:
     compared(output, wanted(toss))
     write_toss(toss, samples=70)
     _, listener = compared(output, wanted(toss))
-    assert len(listener.done) == 5
+    assert len(listener.made) == 5
 
 
 @pytest.mark.parametrize("place", ["metrics.csv", "toss/5/keys.csv"])
@@ -379,11 +380,11 @@ sys.modules["bpy"] = sys.modules["mathutils"] = None
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.pipeline.comparison import Comparison, ComparisonPlan
 from rigid_motion_batch.report.settings import Settings
-from rigid_motion_batch.pipeline.performing import SerialExecutor
+from rigid_motion_batch.pipeline.performing import Executor
 from rigid_motion_batch.pipeline.running import run
 from rigid_motion_batch.pipeline.store import Store
 
-with Store(Path(sys.argv[2])) as store, SerialExecutor() as executor:
+with Store(Path(sys.argv[2])) as store, Executor() as executor:
     choices, modes = (Tolerance("2cm"),), ("lerp_slerp", "motor_spline")
     about = Settings(0.1, "x", "y")
     plan = ComparisonPlan(Comparison((sys.argv[1],), choices, modes, count_keys=True, about=about), store)
@@ -404,6 +405,6 @@ def test_without_blender_a_page_shows_a_drill_and_a_line_says_so(output: Path, t
     outcome, listener = compared(output, wanted(toss, about=ABOUT, subject="controller", blender=""))
     assert outcome.failures == {}
     assert "the report shows a drill, for there is no Blender here that reads controller" in listener.notes
-    assert "object controller" not in listener.done
+    assert "object controller" not in listener.made
     _, again = compared(output, wanted(toss, about=ABOUT, subject="controller"))
-    assert again.done == {"object controller", "report.html"}
+    assert {*again.made} == {"object controller", "report.html"}

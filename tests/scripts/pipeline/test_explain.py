@@ -8,7 +8,7 @@ import pytest
 
 from rigid_motion_batch.pipeline import steps as pipeline_steps
 from rigid_motion_batch.pipeline.explain import explain
-from rigid_motion_batch.pipeline.performing import SerialExecutor
+from rigid_motion_batch.pipeline.performing import Executor
 from rigid_motion_batch.pipeline.running import run
 from rigid_motion_batch.pipeline.steps import OWN, Step, Task, digest_of
 from rigid_motion_batch.pipeline.store import Store
@@ -55,7 +55,7 @@ def test_a_changed_file_is_named(output: Path, tmp_path: Path) -> None:
         return task("a", steps.copy, inputs=(store.input(source),))
 
     with Store(output) as store:
-        run(lambda: [copying(store)], store, SerialExecutor())
+        run(lambda: [copying(store)], store, Executor())
     source.write_text("2")
     store = Store(output)
     assert [reason for _, reason in explain(lambda: [copying(store)], store)] == [f"input file changed ({source})"]

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from rigid_motion_batch.pipeline.executors import ProcessExecutor
-from rigid_motion_batch.pipeline.performing import SerialExecutor
+from rigid_motion_batch.pipeline.performing import Executor
 from rigid_motion_batch.pipeline.running import Outcome, Share, State, run
 from rigid_motion_batch.pipeline.steps import OWN, Step, Task
 from rigid_motion_batch.pipeline.store import Store
@@ -90,7 +90,7 @@ def test_a_changed_input_redoes_its_task_and_those_that_read_it(output: Path, lo
     source.write_text("1")
 
     def redone() -> list[str]:
-        with Store(output) as store, SerialExecutor() as executor:
+        with Store(output) as store, Executor() as executor:
             first = task("a", steps.copy, Nothing(str(log)), inputs=(store.input(source),))
             tasks = first, joining("c", first, log=log), writing("b", "b", log)
             run(lambda: tasks, store, executor)
@@ -142,7 +142,7 @@ def test_a_task_that_failed_is_tried_again_the_next_time(output: Path, tmp_path:
     source = tmp_path / "in.csv"
 
     def attempt() -> Outcome:
-        with Store(output) as store, SerialExecutor() as executor:
+        with Store(output) as store, Executor() as executor:
             first = task("a", steps.copy, inputs=(store.input(source),))
             return run(lambda: (first, joining("b", first), writing("c")), store, executor)
 
@@ -157,7 +157,7 @@ def test_an_input_that_vanishes_while_it_is_read_is_said_and_nothing_comes_of_it
     source = tmp_path / "in.csv"
     source.write_text("1")
     with Store(output) as store:
-        outcome = run(lambda: [task("a", steps.vanish, inputs=(store.input(source),))], store, SerialExecutor())
+        outcome = run(lambda: [task("a", steps.vanish, inputs=(store.input(source),))], store, Executor())
     assert "changed while it was read" in outcome.failures["a"]
     assert contents(output) == {}
 
@@ -175,7 +175,7 @@ def test_an_input_that_is_no_file_is_refused_and_not_waited_for(tmp_path: Path, 
     source = f"{path}\0" if kind == "NUL" else path
     with Store(tmp_path / "out") as store:
         tasks = [task("a", steps.copy, inputs=(store.input(source),)), writing("b")]
-        outcome = run(lambda: tasks, store, SerialExecutor())
+        outcome = run(lambda: tasks, store, Executor())
     assert states(outcome) == {"failed": 1, "done": 1}
 
 
@@ -208,7 +208,7 @@ def test_a_plan_is_taken_task_by_task(output: Path) -> None:
             yield writing(f"{number}")
 
     with Store(output) as store:
-        run(plan, store, SerialExecutor())
+        run(plan, store, Executor())
     assert max(ahead[40:]) <= 1
 
 
@@ -219,7 +219,7 @@ def test_a_partial_task_makes_the_best_of_what_there_is(output: Path, tmp_path: 
     source = tmp_path / "in.csv"
 
     def attempt() -> dict[str, int]:
-        with Store(output) as store, SerialExecutor() as executor:
+        with Store(output) as store, Executor() as executor:
             tasks = [writing("a", "1"), task("b", steps.copy, inputs=(store.input(source),))]
             tasks.append(task("report", steps.report, None, *tasks))
             tasks.append(task("overview", steps.report, None, tasks[-1]))
@@ -243,7 +243,7 @@ def film(output: Path, log: object, piece: str = "1", step: Step = steps.join, *
     pieces = [Task(steps.write, Write(text, str(log)), f"piece {text}") for text in (piece, "2")]
     parameters = Fail() if step is steps.fail else Nothing(str(log))
     whole = task("film", step, parameters, *pieces, spends=tuple(one.key for one in pieces))
-    with Store(output, **options) as store, SerialExecutor() as executor:
+    with Store(output, **options) as store, Executor() as executor:
         return run(lambda: [whole] if store.result(whole.key) else [*pieces, whole], store, executor)
 
 
@@ -384,11 +384,11 @@ def test_ctrl_c_leaves_what_is_done_and_nothing_half_written(output: Path, execu
 def test_progress_is_told_in_weights_and_words(output: Path, executor: str) -> None:
     listener = Listener()
     tasks = [writing("a", weight=2.0, title="The first"), task("b", steps.chatter, weight=4.0, title="The second")]
-    run_in(output, *tasks, executor=EXECUTORS[executor](), progress=listener)
+    outcome = run_in(output, *tasks, executor=EXECUTORS[executor](), progress=listener)
     assert listener.total == 6.0
-    assert any(doing == "The second: half way" and done in (2.0, 4.0) for done, doing, _ in listener.reached)
+    assert any(doing == "The second: half way" and done in (2.0, 4.0) for done, doing in listener.reached)
     assert listener.notes == ["it is nearly there"]
-    assert listener.states == {"a": "done", "b": "done"}
+    assert states(outcome) == {"done": 2}
 
 
 @pytest.mark.parametrize("executor", EXECUTORS)
@@ -397,9 +397,9 @@ def test_what_is_counted_is_counted_over_all_tasks_and_never_goes_back(output: P
     run_in(output, films[1])
     listener = Listener()
     run_in(output, *films, writing("a"), executor=EXECUTORS[executor](), progress=listener)
-    counts = [counts["frame"] for *_, counts in listener.reached if "frame" in counts]
-    assert {total for _, total in counts} == {7}  # Two are there already.
-    numbers = [number for number, _ in counts]
+    counts = [doing.partition(", frame ")[2].split(" of ") for _, doing in listener.reached if ", frame " in doing]
+    assert {total for _, total in counts} == {"7"}  # Two are there already.
+    numbers = [int(number) for number, _ in counts]
     assert numbers == sorted(numbers)
     if executor == "serial":
         assert {*numbers} >= {1, 2, 3, 4, 5, 6, 7}
@@ -444,6 +444,13 @@ def test_a_task_that_kills_every_worker_is_given_up_and_the_others_go_on(output:
     assert outcome.failures["b"].startswith("b: its process died (SIGKILL, perhaps for want of memory)")
     assert outcome.failures["b"].endswith("; given up after 3 attempts")
     assert contents(output) == {"a.txt": "a"}
+
+
+@needs_signals
+def test_the_last_line_that_a_dying_worker_printed_is_said(output: Path, tmp_path: Path) -> None:
+    dying = task("b", steps.die, Die(str(tmp_path / "marker"), 99, "reading\nno such bone: Hand\n\n"))
+    outcome = run_in(output, dying, executor=ProcessExecutor(1))
+    assert "(SIGKILL, perhaps for want of memory): no such bone: Hand; given up after 3" in outcome.failures["b"]
 
 
 def test_what_is_printed_in_a_worker_does_not_get_in_the_way(output: Path, capfd: pytest.CaptureFixture) -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from rigid_motion_batch.pipeline import steps as pipeline_steps
-from rigid_motion_batch.pipeline.performing import SerialExecutor
+from rigid_motion_batch.pipeline.performing import Executor
 from rigid_motion_batch.pipeline.running import run
 from rigid_motion_batch.pipeline.steps import OWN, Task
 from rigid_motion_batch.pipeline.store import FolderInUse, OutputError, Store
@@ -38,7 +38,7 @@ def whole() -> tuple[Task, Task, Task]:
 
 def copying(output: Path, source: Path, name: str = "a", **options: object) -> dict[str, int]:
     """Run a task that reads a file."""
-    with Store(output, **options) as store, SerialExecutor() as executor:
+    with Store(output, **options) as store, Executor() as executor:
         return states(run(lambda: [task(name, steps.copy, inputs=(store.input(source),))], store, executor))
 
 
@@ -449,4 +449,4 @@ def test_what_is_kept_of_a_result_says_what_it_was_made_of(output: Path) -> None
         "files": [],
     }
     assert made_of["step"] == "tests.scripts.pipeline.steps:write"
-    assert states(run_in(output, task("a", steps.write, Nothing()), executor=SerialExecutor())) == {"failed": 1}
+    assert states(run_in(output, task("a", steps.write, Nothing()), executor=Executor())) == {"failed": 1}
