@@ -73,16 +73,3 @@ def test_a_renamed_bone_keeps_its_turns(live_file):
     assert angle == pytest.approx(0.0, abs=1e-5)
     assert turned.angle == pytest.approx(tau / 2.0, abs=1e-3)
     assert abs(turned.axis.y) == pytest.approx(1.0, abs=1e-5)
-
-
-def test_a_key_of_turns_that_is_edited_and_a_muted_channel_are_followed(live_file):
-    rig = moving_rig("dq_sclerp", interpolation="LINEAR")
-    set_turns(rig.pose.bones["Hand"], 2, [FRAMES[0]])
-    curve = curve_of(rig.pose.bones["Hand"], "rigid_motion.turns")
-    curve.keyframe_points[0].co_ui.y = -3.0
-    curve.update()
-    bpy.context.view_layer.update()
-    assert_posed(rig, PLAYED)
-    curve_of(rig.pose.bones["Hand"], "rigid_motion.turns").mute = True
-    bpy.context.view_layer.update()
-    assert_posed(rig, PLAYED)

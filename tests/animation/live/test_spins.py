@@ -13,7 +13,6 @@ from rigid_motion import animation
 from rigid_motion.animation import set_mode, set_turns, write_channel
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion.motion.eulers import ORDERS
-from tests.animation.edit_steps import Edit
 from tests.animation.oracle import assert_shown, curve_of, rotation_path, shown_worlds
 from tests.animation.scenes import give_own_deltas, new_object
 
@@ -138,16 +137,6 @@ def test_a_key_in_between_shares_the_turns_out(live_file, mode, turns, frame):
         assert np.abs(after - before).max() < 1e-4
 
 
-@pytest.mark.parametrize("frame", [3, 9, 20])
-def test_a_key_in_between_euler_keys_keeps_their_turns(live_file, frame):
-    obj = wheel((0.0, 3.0 * tau), "dq_sclerp", frames=(1.0, 25.0))
-    before = turned(obj, EACH[:25])
-    bpy.context.scene.frame_set(frame)
-    obj.keyframe_insert("rotation_euler")
-    bpy.context.view_layer.update()
-    assert np.abs(turned(obj, EACH[:25]) - before).max() < 1e-5
-
-
 @pytest.mark.parametrize("interpolation", ["LINEAR", "BEZIER"])
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("mode", KEYFRAME_MODES)
@@ -183,16 +172,6 @@ def test_a_wheel_at_constant_speed_keeps_it_through_keys_of_turns(live_file):
     set_turns(obj, 4, [13.0])
     even = rotations(2.0 * np.radians(380.0) * np.arange(49) / 12.0, 1)
     assert np.abs(turned(obj, EACH[:49]) - even).max() < 1e-5
-
-
-def test_what_is_eased_and_does_not_turn_spins_by_its_interpolation(live_file):
-    obj = propeller("dq_sclerp", frames=(1.0, 25.0), moves=False, angle=0.0)
-    for index in range(4):
-        curve_of(obj, "rotation_quaternion", index).keyframe_points[0].interpolation = "QUAD"
-    set_turns(obj, 1, [1.0], axis="X")
-    expected = rotations(tau * (np.arange(25) / 24.0) ** 2, 0)
-    expected = np.array(obj.rotation_quaternion.to_matrix()) @ expected
-    assert np.abs(turned(obj, EACH[:25]) - expected).max() < 1e-5
 
 
 @pytest.mark.parametrize("interpolation", ["BEZIER", "ELASTIC", "CONSTANT"])
@@ -273,19 +252,6 @@ def test_cycles_repeat_turns(live_file, axis, after):
         assert np.abs(second - first).max() < 1e-4
 
 
-def test_a_strip_has_the_turns_of_its_action(live_file):
-    obj = propeller("dq_sclerp")
-    set_turns(obj, 2, [1.0])
-    before = turned(obj, EACH[:49])
-    data = obj.animation_data
-    action, slot = data.action, data.action_slot
-    strip = data.nla_tracks.new().strips.new("Strip", 11, action)
-    strip.action_slot = slot
-    data.action = None
-    bpy.context.view_layer.update()
-    assert np.abs(turned(obj, EACH[:49] + 10.0) - before).max() < 1e-5
-
-
 def test_the_property_is_that_of_the_segment_on_the_frame(live_file):
     obj = propeller("dq_sclerp")
     bpy.context.scene.frame_set(30)
@@ -345,31 +311,6 @@ def test_keys_all_along_have_no_turns_of_their_own(live_file, mode):
                 curve.keyframe_points.insert(frame, value).interpolation = "LINEAR"
     bpy.context.view_layer.update()
     assert np.abs(shown_worlds([obj], EACH[:49])[0] - before).max() < 2e-4
-
-
-def test_undo_takes_turns_back_and_redo_brings_them_again(live_file):
-    bpy.utils.register_class(Edit)
-    try:
-        obj = propeller("dq_sclerp")
-        bpy.ops.ed.undo_push(message="Keys")
-        before = shown_worlds([obj], EACH[:49])[0]
-        after = []
-        for change in (
-            lambda: set_turns(bpy.data.objects["Tool"], 3, [1.0]),
-            lambda: insert(bpy.data.objects["Tool"], 9),
-        ):
-            Edit.change = change
-            bpy.ops.test.edit("EXEC_DEFAULT", True)
-            after.append(shown_worlds([bpy.data.objects["Tool"]], EACH[:49])[0])
-        assert np.abs(after[1] - after[0]).max() < 1e-4
-        for wanted in (after[0], before):
-            bpy.ops.ed.undo()
-            assert np.abs(shown_worlds([bpy.data.objects["Tool"]], EACH[:49])[0] - wanted).max() < 1e-4
-        for wanted in after:
-            bpy.ops.ed.redo()
-            assert np.abs(shown_worlds([bpy.data.objects["Tool"]], EACH[:49])[0] - wanted).max() < 1e-4
-    finally:
-        bpy.utils.unregister_class(Edit)
 
 
 def test_without_the_key_in_between_turns_are_whole_again(live_file):
