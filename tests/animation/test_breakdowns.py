@@ -9,7 +9,7 @@ from mathutils import Matrix, Quaternion
 
 from rigid_motion.animation import Breakdowns, Refused, breakdown, set_mode, set_turns, write_channel
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
-from tests.animation.bones.rigs import new_rig
+from tests.animation.bones.rigs import in_turn, new_rig
 from tests.animation.oracle import (
     Own,
     as_quaternion,
@@ -59,8 +59,7 @@ def basis(obj: bpy.types.Object) -> np.ndarray:
     return np.array(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_basis)
 
 
-@pytest.mark.parametrize("mode", KEYFRAME_MODES)
-@pytest.mark.parametrize("order", ["QUATERNION", "YZX"])
+@pytest.mark.parametrize(("mode", "order"), in_turn(KEYFRAME_MODES, ["QUATERNION", "YZX"]))
 @pytest.mark.parametrize("scale", [None, "even"])
 def test_a_breakdown_is_on_the_path_of_the_mode(live_file, mode, order, scale):
     obj = new_object(rotation_mode=order)

@@ -31,6 +31,7 @@ from rigid_motion.animation.baking import fewer_keys
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate, interpolate_by_segments, repair, shell_error, twists
 from rigid_motion.motion.quaternions import multiply
 from rigid_motion_batch.recordings import read_trajectories
+from tests.animation.bones.rigs import in_turn
 from tests.animation.oracle import curves_of, rotation_path, snapshot
 from tests.animation.scenes import give_own_deltas, key, new_object
 
@@ -63,8 +64,9 @@ def keys_of(obj: bpy.types.Object, path: str, index: int = 0) -> list[float]:
     return [point.co.x for point in curves_of(obj)[path, index].keyframe_points]
 
 
-@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XYZ", "ZXY"])
-@pytest.mark.parametrize("name", ["reach", "pivot", "throw", "screw"])
+@pytest.mark.parametrize(
+    ("name", "rotation_mode"), in_turn(["reach", "pivot", "throw", "screw"], ["QUATERNION", "XYZ", "ZXY"])
+)
 def test_few_keys_show_the_recording_within_the_tolerance_on_every_frame(live_file, name, rotation_mode):
     obj = recorded(name, rotation_mode)
     frames = key_frames(obj)

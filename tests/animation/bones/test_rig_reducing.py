@@ -19,6 +19,7 @@ from rigid_motion.animation import (
     write_channel,
 )
 from rigid_motion.ui.wording import reduction_summary
+from tests.animation.bones.rigs import in_turn
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import new_object
 from tests.balls import largest_displacements
@@ -50,10 +51,9 @@ def errors(rig: bpy.types.Object, truth: dict[str, np.ndarray]) -> dict[str, flo
     return {name: float(largest(rows, truth[name]).max()) for name, rows in matrices(rig).items()}
 
 
-@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XZY"])
 @pytest.mark.parametrize("best_of", [False, True])
 @pytest.mark.parametrize("shared", [False, True])
-@pytest.mark.parametrize("mode", ["motor_spline", "lerp_slerp"])
+@pytest.mark.parametrize(("mode", "rotation_mode"), in_turn(["motor_spline", "lerp_slerp"], ["QUATERNION", "XZY"]))
 def test_no_bone_gets_further_off_than_the_tolerance(live_file, mode, shared, best_of, rotation_mode):
     rig = recorded_rig(rotation_mode)
     truth = matrices(rig)
@@ -74,8 +74,7 @@ def test_no_bone_gets_further_off_than_the_tolerance(live_file, mode, shared, be
 
 
 @pytest.mark.parametrize("best_of", [False, True])
-@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XZY"])
-@pytest.mark.parametrize("count", [4, 12])
+@pytest.mark.parametrize(("count", "rotation_mode"), in_turn([4, 12], ["QUATERNION", "XZY"]))
 def test_so_many_key_poses_are_shared_by_all_bones_and_their_error_is_what_is_said(
     live_file, count, rotation_mode, best_of
 ):

@@ -11,6 +11,7 @@ from rigid_motion.animation.actions.reading import keyed_in
 from rigid_motion.animation.actions.slots import slot_transforms_of
 from rigid_motion.animation.compute.differences import in_betweens
 from rigid_motion.animation.transforms import transform_of
+from tests.animation.bones.rigs import in_turn
 from tests.animation.oracle import curves_of, matrices, shown_worlds
 from tests.animation.scenes import new_object
 
@@ -67,8 +68,7 @@ def speeds(obj, frame: float, step: float = 0.02) -> tuple[np.ndarray, np.ndarra
     return before, after
 
 
-@pytest.mark.parametrize("easing", ["AUTO", "EASE_IN", "EASE_IN_OUT"])
-@pytest.mark.parametrize("interpolation", INTERPOLATIONS)
+@pytest.mark.parametrize(("interpolation", "easing"), in_turn(INTERPOLATIONS, ["AUTO", "EASE_IN", "EASE_IN_OUT"]))
 def test_between_two_keys_it_is_the_screw_with_its_easing(live_file, interpolation, easing):
     obj = keyed((1.0, 25.0), interpolation=interpolation)
     for point in points(obj):

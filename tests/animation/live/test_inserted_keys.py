@@ -114,9 +114,8 @@ TARGETS = {
 }
 
 
-@pytest.mark.parametrize("every", [True, False], ids=["all keyed", "location keyed"])
+@pytest.mark.parametrize(("every", "then"), [(True, "update"), (False, "frame")])
 @pytest.mark.parametrize("target", TARGETS)
-@pytest.mark.parametrize("then", ["update", "frame"])
 def test_a_matrix_that_is_set_and_keyed_in_one_go_is_where_it_lands(shown, target, every, then):
     matrix = TARGETS[target](shown)
     shown.matrix_world = matrix

@@ -13,7 +13,7 @@ from rigid_motion.animation.actions.reading import keyed_in
 from rigid_motion.animation.actions.slots import slot_transforms_of
 from rigid_motion.animation.compute.differences import in_betweens
 from rigid_motion.animation.transforms import transform_of
-from tests.animation.bones.rigs import new_rig
+from tests.animation.bones.rigs import in_turn, new_rig
 from tests.animation.oracle import MODE_IDS, curves_of, matrices, shown_worlds, snapshot
 from tests.animation.scenes import new_object, push_down, tweak
 
@@ -142,8 +142,7 @@ def key_on(carrier, frame: int) -> None:
     bpy.context.view_layer.update()
 
 
-@pytest.mark.parametrize("handles", HANDLES)
-@pytest.mark.parametrize("mode", [mode for mode in MODE_IDS if mode != "BLENDER"])
+@pytest.mark.parametrize(("handles", "mode"), in_turn(HANDLES, [mode for mode in MODE_IDS if mode != "BLENDER"]))
 def test_a_key_in_between_leaves_the_motion_as_it_was(live_file, mode, handles):
     obj = keyed(new_object())
     HANDLES[handles](obj)

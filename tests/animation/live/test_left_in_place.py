@@ -12,7 +12,7 @@ from mathutils import Euler, Matrix
 from rigid_motion import animation
 from rigid_motion.animation import set_exact, set_mode
 from tests.animation.bones.rig_editing import own_constraints
-from tests.animation.bones.rigs import key_all, new_rig, select_only
+from tests.animation.bones.rigs import in_turn, key_all, new_rig, select_only
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import editor, give_own_deltas, key, new_object, own_deltas
 
@@ -68,10 +68,8 @@ ENDS: dict[str, Callable[[bpy.types.Object], None]] = {
 }
 
 
-@pytest.mark.parametrize("exact", [False, True], ids=["", "exact"])
-@pytest.mark.parametrize("own", [False, True], ids=["", "own deltas"])
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("end", ENDS)
+@pytest.mark.parametrize(("own", "exact"), [(False, False), (True, False), (True, True)])
+@pytest.mark.parametrize(("end", "order"), in_turn(ENDS, ORDERS))
 def test_an_object_stays_where_it_is_seen(live_file, end, order, own, exact):
     obj = new_object("Tool", order)
     before = give_own_deltas(obj) if own else own_deltas(obj)
@@ -89,8 +87,7 @@ def test_an_object_stays_where_it_is_seen(live_file, end, order, own, exact):
     assert own_deltas(obj) == before
 
 
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("end", ENDS)
+@pytest.mark.parametrize(("end", "order"), in_turn(ENDS, ORDERS))
 def test_the_bones_of_a_rig_stay_where_they_are_seen(live_file, end, order):
     rig = key_all(new_rig(rotation_mode=order))
     set_mode(list(rig.pose.bones), "dq_sclerp")

@@ -11,9 +11,11 @@ from rigid_motion.animation import key_frames, read_poses, set_mode
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
 from rigid_motion.motion.eulers import ORDERS
 from rigid_motion.motion.quaternions import angle_between
+from tests.animation.bones.rigs import in_turn
 
 FRAMES = np.arange(1.0, 42.0)
 KEYS = np.array((1.0, 11.0, 21.0, 31.0, 41.0))
+EASED = ("SINE", "QUAD", "CUBIC", "QUART", "QUINT", "EXPO", "CIRC", "BACK", "BOUNCE")
 
 
 @pytest.fixture
@@ -69,8 +71,7 @@ def assert_same(read: Poses, wanted: Poses) -> None:
     assert angle_between(read.quaternions, wanted.quaternions).max() < 1e-5
 
 
-@pytest.mark.parametrize("mode", KEYFRAME_MODES)
-@pytest.mark.parametrize("rotation_mode", ["QUATERNION", *ORDERS])
+@pytest.mark.parametrize(("mode", "rotation_mode"), in_turn(KEYFRAME_MODES, ["QUATERNION", *ORDERS]))
 def test_every_mode_and_rotation_order_arrives_on_every_frame(scene, mode, rotation_mode):
     obj = keyed(rotation_mode=rotation_mode)
     poses, keys = read_poses(obj, KEYS), keys_of(obj)
@@ -79,8 +80,7 @@ def test_every_mode_and_rotation_order_arrives_on_every_frame(scene, mode, rotat
     assert keys_of(obj) == keys
 
 
-@pytest.mark.parametrize("interpolation", ["SINE", "QUAD", "CUBIC", "QUART", "QUINT", "EXPO", "CIRC", "BACK", "BOUNCE"])
-@pytest.mark.parametrize("easing", ["EASE_IN", "EASE_OUT", "EASE_IN_OUT"])
+@pytest.mark.parametrize(("interpolation", "easing"), in_turn(EASED, ["EASE_IN", "EASE_OUT", "EASE_IN_OUT"]))
 def test_timing_follows_the_easing_of_the_keys(scene, interpolation, easing):
     obj = keyed(interpolation=interpolation)
     for fcurve in curves(obj):
