@@ -160,20 +160,6 @@ def test_a_screw_and_a_straight_flight_get_their_own_modes(live_file):
             assert mode == "lerp_slerp"
 
 
-def test_what_grows_gets_its_best_modes_too(live_file):
-    frames, poses = motion()
-    obj = new_object()
-    bake_poses(obj, frames, Poses(poses.positions, poses.quaternions, np.exp(0.01 * frames)))
-    truth = read_poses(obj, frames)
-    kept, modes = best_of(obj)
-    keys = truth[np.isin(frames, kept)]
-    shown = read_poses(obj, frames)
-    expected = interpolate_by_segments(kept, keys, frames, modes)
-    assert len(set(modes)) > 1
-    assert shell_error(shown, expected, RADIUS).max() < 1e-5
-    assert off(obj, frames, truth) <= TOLERANCE * (1.0 + 1e-5)
-
-
 def test_one_mode_stays_where_several_would_go_elsewhere_outside_of_the_keys(live_file, monkeypatch):
     # Seen with no motion yet; only cycles of different lengths could come to it.
     monkeypatch.setattr(fewer_keys, "with_best_modes", lambda _, source, *__: replace(source, mode=1))

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import key_frames, refresh, set_mode
+from rigid_motion.animation import refresh, set_mode
 from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
 from tests.animation.bones.rigs import (
     ORDERS,
@@ -23,7 +23,7 @@ from tests.animation.bones.rigs import (
     twin_of,
 )
 from tests.animation.oracle import curves_of, expected_bases
-from tests.animation.scenes import new_strip, push_down, tweak
+from tests.animation.scenes import new_strip, push_down
 
 KEYS = (1.0, 11.0, 21.0, 41.0)
 ACTION_FRAMES = np.arange(1.0, 42.0)
@@ -65,24 +65,6 @@ def test_a_strip_shows_the_modes_of_its_action(live_file, place, order):
     assert whole.sum() >= 19
     action_frames = since[whole].astype(int)
     assert_at(rig, frames[whole], rows(wanted, 40 - action_frames if reverse else action_frames))
-
-
-def test_before_and_after_a_strip_its_ends_are_held(live_file):
-    rig, wanted = filled()
-    push_down(rig, 101)
-    assert_at(rig, np.array((60.0, 99.0, 145.0, 300.0)), rows(wanted, np.array((0, 0, -1, -1))))
-
-
-def test_where_no_strip_plays_nothing_is_left_of_the_mode(live_file):
-    rig, wanted = filled()
-    twin = twin_of(rig)
-    key_wanted(twin, rig, ACTION_FRAMES)
-    for owner in (rig, twin):
-        push_down(owner, 101, extrapolation="NOTHING")
-    assert_at(rig, ACTION_FRAMES + 100, wanted)
-    outside = np.array((60.0, 99.0, 145.0, 300.0))
-    shown, resting = shown_poses([rig, twin], outside)
-    assert_same_poses(rig, outside, shown, resting)
 
 
 def several(
@@ -223,19 +205,6 @@ def test_a_strip_of_less_influence_takes_its_share_of_the_mode(live_file, influe
     shown, real = shown_poses([rig, twin], ACTION_FRAMES)
     assert_same_poses(rig, ACTION_FRAMES, shown, real)
     assert (influence < 1.0) == bool(np.abs(shown["Hand"] - wanted["Hand"]).max() > 1e-3)
-
-
-@pytest.mark.parametrize(("start", "scale"), [(101, 1.0), (31, 2.0)])
-def test_in_tweak_mode_a_key_inserted_in_between_keeps_the_pose_on_the_screen(live_file, start, scale):
-    rig, wanted = filled()
-    strip = push_down(rig, start, scale=scale)
-    tweak(rig, strip)
-    scene_frame = start + int(15 * scale)
-    live_file.scene.frame_set(scene_frame)
-    assert rig.pose.bones["Hand"].keyframe_insert("location")
-    bpy.context.view_layer.update()
-    assert 16.0 in key_frames(rig.pose.bones["Hand"])
-    assert_at(rig, np.array((float(scene_frame),)), rows(wanted, np.array((15,))))
 
 
 def test_a_cyclic_action_repeats_in_its_strip(live_file):

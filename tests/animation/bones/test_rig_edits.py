@@ -240,26 +240,6 @@ def test_names_swapped_while_an_action_is_not_used_leave_its_modes_with_its_keys
     assert_posed(rig, PLAYED)
 
 
-@pytest.mark.parametrize("original", ["stays", "is renamed"])
-def test_a_copy_of_a_bone_has_no_mode_and_leaves_the_original_its_own(live_file, original):
-    rig = rig_of_two_modes()
-    select_only(rig)
-    bpy.ops.object.mode_set(mode="EDIT")
-    for bone in rig.data.edit_bones:
-        bone.select = bone.select_head = bone.select_tail = bone.name == "Lower"
-    bpy.ops.armature.duplicate()
-    bpy.ops.object.mode_set(mode="OBJECT")
-    assert "Lower.001" in rig.pose.bones
-    if original == "is renamed":
-        make_lower_fore(rig)
-    bpy.context.view_layer.update()
-    assert modes_in(rig) == {"Upper": "dq_sclerp", "Lower" if original == "stays" else "Fore": "pga_lerp"}
-    assert_posed(rig, PLAYED)
-    rig.data.bones["Lower.001"].name = "Copy"
-    bpy.context.view_layer.update()
-    assert modes_in(rig) == {"Upper": "dq_sclerp", "Lower" if original == "stays" else "Fore": "pga_lerp"}
-
-
 def test_a_bone_that_takes_the_name_of_one_deleted_just_now_keeps_its_mode(live_file):
     rig = rig_of_two_modes(location=False)
 
@@ -314,21 +294,6 @@ def test_armatures_that_are_joined_move_on(live_file, second):
     assert_posed(rig, PLAYED, [rest.name for rest in ARM])
     # Blender leaves the keys of what is joined behind: those bones rest, without in-betweens.
     assert_posed(rig, PLAYED)
-
-
-@pytest.mark.parametrize("linked", [True, False])
-def test_a_rig_is_duplicated_as_in_the_window(live_file, linked):
-    rig = moving_rig()
-    select_only(rig)
-    bpy.ops.object.duplicate(linked=linked)
-    copy = live_file.view_layer.objects.active
-    assert copy != rig
-    bpy.context.view_layer.update()
-    assert_posed(rig, PLAYED)
-    assert_posed(copy, PLAYED)
-    set_mode(list(rig.pose.bones), "BLENDER")
-    assert_posed(rig, PLAYED)
-    assert_posed(copy, PLAYED)
 
 
 def test_another_slot_of_the_same_action_shows_its_own_modes(live_file):
