@@ -180,6 +180,18 @@ class Editing(RuleBasedStateMachine):
     def _named(self, share: float) -> Name:
         return self.names[int(share * len(self.names))]
 
+    @staticmethod
+    def _linked(obj: bpy.types.Object) -> tuple:
+        data = obj.animation_data
+        return (None, None) if data is None or data.action is None else (data.action, data.action_slot)
+
+    @staticmethod
+    def _link(obj: bpy.types.Object, action: bpy.types.Action | None, slot: bpy.types.ActionSlot | None) -> None:
+        data = obj.animation_data_create()
+        data.action = action
+        if action is not None:
+            data.action_slot = slot
+
     # What the machine does with an edit
 
     def _start_history(self) -> None:

@@ -10,7 +10,7 @@ from bpy_extras.anim_utils import action_get_channelbag_for_slot
 from rigid_motion.animation import bake, bake_poses, read_poses, set_mode, unbake, write_channel
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
 from rigid_motion.motion.eulers import ORDERS
-from rigid_motion.motion.quaternions import angle_between, multiply, rotate
+from rigid_motion.motion.quaternions import angle_between
 from tests.animation.oracle import assert_shown, curves_of, expected_worlds, shown_worlds, snapshot
 from tests.animation.scenes import FRAMES, key, new_object
 
@@ -69,43 +69,6 @@ def test_every_mode_arrives_in_the_evaluated_scene_on_every_frame(empty, mode, s
     assert_read_back(empty, frames, poses)
 
 
-def test_sub_frames_are_kept(empty):
-    frames, poses = motion(step=0.25)
-    bake_poses(empty, frames, poses)
-    assert_read_back(empty, frames, poses)
-
-
-def test_a_parent_carries_the_baked_poses_along(empty):
-    frames, poses = motion()
-    bake_poses(empty, frames, poses)
-    parent = new_empty("Arm")
-    parent.location, parent.rotation_quaternion = (1, 2, 3), (0.5, 0.5, 0.5, 0.5)
-    empty.parent = parent
-    turn = np.broadcast_to((0.5, 0.5, 0.5, 0.5), poses.quaternions.shape)
-    expected = Poses(np.array((1, 2, 3)) + rotate(turn, poses.positions), multiply(turn, poses.quaternions))
-    assert_read_back(empty, frames, expected)
-
-
-def test_keys_are_generated_straight_and_in_one_group(empty):
-    frames, poses = motion()
-    bake_poses(empty, frames, poses)
-    curves = keys_of(empty)
-    assert len(curves) == 7
-    for fcurve in curves.values():
-        assert fcurve.group.name == "Object Transforms"
-        assert len(fcurve.keyframe_points) == len(frames)
-        assert {key.type for key in fcurve.keyframe_points} == {"GENERATED"}
-        assert {key.interpolation for key in fcurve.keyframe_points} == {"LINEAR"}
-
-
-def test_quaternions_do_not_flip_between_frames(empty):
-    frames, poses = motion()
-    bake_poses(empty, frames, poses)
-    curves = keys_of(empty)
-    baked = np.array([[key.co.y for key in curves["rotation_quaternion", i].keyframe_points] for i in range(4)]).T
-    assert np.all(np.sum(baked[1:] * baked[:-1], axis=1) > 0.0)
-
-
 def test_baking_again_replaces_the_keys_and_leaves_other_channels(empty):
     frames, poses = motion()
     write_channel(empty, "hide_render", frames[:2], np.array([0.0, 1.0]), interpolation="CONSTANT")
@@ -144,18 +107,6 @@ def test_an_object_that_turns_by_axis_and_angle_is_refused_untouched(empty):
     with pytest.raises(ValueError, match="Tool: rotation by axis and angle"):
         bake_poses(empty, *motion())
     assert empty.animation_data is None
-
-
-def test_poses_that_do_not_fit_the_frames_are_refused(empty):
-    frames, poses = motion()
-    with pytest.raises(ValueError, match="Tool"):
-        bake_poses(empty, frames[1:], poses)
-
-
-def test_reading_leaves_the_scene_on_its_frame(empty):
-    bpy.context.scene.frame_set(17, subframe=0.5)
-    read_poses(empty, np.arange(1.0, 5.0))
-    assert bpy.context.scene.frame_current_final == 17.5
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -199,16 +150,6 @@ def test_a_bake_on_twos_or_threes_holds_the_poses_of_the_mode(live_file, order, 
         assert {point.interpolation for point in fcurve.keyframe_points} <= {"CONSTANT"}
     unbake(obj)
     assert snapshot(obj) == keyed
-
-
-def test_a_bake_of_a_part_holds_there_and_moves_on_behind_it(live_file):
-    obj = key(new_object(), seed=3)
-    set_mode(obj, "dq_sclerp")
-    frames = np.arange(1.0, 41.0)
-    held = np.where((frames >= 11.0) & (frames < 24.0), 11.0 + 2.0 * np.floor((frames - 11.0) / 2.0), frames)
-    wanted = expected_worlds(obj, held)
-    bake(obj, step=2.0, first=12.0, last=20.0, interpolation="CONSTANT")
-    np.testing.assert_allclose(shown_worlds([obj], frames)[0], wanted, rtol=0, atol=1e-5 * np.abs(wanted).max())
 
 
 def test_only_lines_and_holds_are_baked(live_file):

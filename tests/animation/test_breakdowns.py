@@ -9,7 +9,7 @@ from mathutils import Matrix, Quaternion
 
 from rigid_motion.animation import Breakdowns, Refused, breakdown, set_mode, set_turns, write_channel
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
-from tests.animation.bones.rigs import new_rig
+from tests.animation.bones.rigs import in_turn, new_rig
 from tests.animation.oracle import (
     Own,
     as_quaternion,
@@ -21,7 +21,7 @@ from tests.animation.oracle import (
     snapshot,
     unit,
 )
-from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, push_down, random_values, tweak
+from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, random_values
 
 FACTORS = (-0.3, 0.0, 0.35, 1.0, 1.25)
 BEFORE, NOW, AFTER = 11.0, 17.0, 24.0
@@ -59,8 +59,7 @@ def basis(obj: bpy.types.Object) -> np.ndarray:
     return np.array(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_basis)
 
 
-@pytest.mark.parametrize("mode", KEYFRAME_MODES)
-@pytest.mark.parametrize("order", ["QUATERNION", "YZX"])
+@pytest.mark.parametrize(("mode", "order"), in_turn(KEYFRAME_MODES, ["QUATERNION", "YZX"]))
 @pytest.mark.parametrize("scale", [None, "even"])
 def test_a_breakdown_is_on_the_path_of_the_mode(live_file, mode, order, scale):
     obj = new_object(rotation_mode=order)
@@ -206,18 +205,6 @@ def test_bones_of_a_rig_each_go_between_their_own_keys(live_file):
     # The constraint adds nothing on a key.
     for bone in (upper, hand):
         assert bone.constraints[0].name == "Rigid Motion"
-
-
-def test_in_a_strip_it_is_the_frame_of_the_strip(live_file):
-    obj = key(new_object(), seed=1)
-    set_mode(obj, "dq_sclerp")
-    strip = push_down(obj, 101)
-    tweak(obj, strip)
-    bpy.context.scene.frame_set(100 + int(NOW))
-    breakdown(obj, 0.5)
-    wanted = interpolate((0.0, 1.0), key_poses(obj, 1, Own())[1:3], np.array([0.5]), "dq_sclerp")
-    assert NOW in key_frames(obj).tolist()
-    np.testing.assert_allclose(basis(obj), as_matrix(wanted, 1.0), atol=2e-5)
 
 
 def axis_and_angle(obj: bpy.types.Object) -> None:

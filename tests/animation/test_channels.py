@@ -95,13 +95,6 @@ def test_what_is_not_keyed_rests_at_its_value(live_file, missing, own):
     assert_shown([obj], PLAYED, owns)
 
 
-def test_a_muted_channel_has_no_say(live_file):
-    obj = key(new_object("Tool", "XYZ"))
-    curves_of(obj)["location", 2].mute = curves_of(obj)["rotation_euler", 0].mute = True
-    set_mode_leaving_keys(obj, "pga_lerp")
-    assert_shown([obj], PLAYED)
-
-
 def test_a_muted_mode_channel_has_no_say_until_a_mode_is_chosen(live_file):
     obj = key(new_object())
     set_mode(obj, "dq_sclerp")
@@ -125,15 +118,6 @@ def test_scale_that_differs_from_axis_to_axis_stays_blenders_while_the_rest_foll
     set_mode_leaving_keys(obj, "cga_slerp")
     assert not any(path == "delta_scale" for path, _ in curves_of(obj))
     assert_shown([obj], PLAYED, owns)
-
-
-@pytest.mark.parametrize("factor", [0.0, -1.0])
-def test_scale_that_is_zero_or_negative_stays_blenders(live_file, factor):
-    obj = key(new_object(), scale="even")
-    for index in range(3):
-        curves_of(obj)["scale", index].keyframe_points[1].co_ui.y *= factor
-    set_mode_leaving_keys(obj, "cga_lerp")
-    assert_shown([obj], PLAYED)
 
 
 @pytest.mark.parametrize("order", ["QUATERNION", "XYZ"])
@@ -170,14 +154,6 @@ def test_linear_extrapolation_goes_on_to_where_a_scene_ends_that_was_made_anew(l
     bpy.context.scene.frame_end = 70
     bpy.context.view_layer.update()
     assert_shown(bpy.context.scene.objects, np.arange(71.0))
-
-
-def test_linear_extrapolation_of_some_channels_leaves_the_others_at_rest(live_file):
-    obj = key(new_object(), (5.0, 11.0, 30.0), interpolation="LINEAR")
-    live_file.scene.frame_start, live_file.scene.frame_end = 0, 45
-    curves_of(obj)["location", 0].extrapolation = "LINEAR"
-    set_mode_leaving_keys(obj, "dq_sclerp")
-    assert_shown([obj], np.arange(46.0))
 
 
 def share(obj: bpy.types.Object, name: str) -> bpy.types.Object:
@@ -236,13 +212,4 @@ def test_a_driver_on_anything_else_is_no_hindrance(live_file):
     obj.driver_add('["grip"]').driver.expression = "frame"
     obj.driver_add("hide_render").driver.expression = "frame > 20"
     set_mode_leaving_keys(obj, "dq_sclerp")
-    assert_shown([obj], PLAYED)
-
-
-@pytest.mark.parametrize("frames", [(FRAMES[0],), FRAMES[:1] * 2])
-def test_a_single_key_leaves_nothing_to_fill_in(live_file, frames):
-    obj = key(new_object(), frames)
-    set_mode(obj, "dq_sclerp")
-    assert not is_filled_in(obj)
-    assert problem_of(obj) == ""
     assert_shown([obj], PLAYED)

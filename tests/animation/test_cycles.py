@@ -10,6 +10,7 @@ import pytest
 
 from rigid_motion.animation import set_mode, write_channel
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
+from tests.animation.bones.rigs import in_turn
 from tests.animation.oracle import (
     curves_of,
     expected_bases,
@@ -98,9 +99,9 @@ def assert_unrolled(obj: bpy.types.Object, *cycles: object) -> None:
     assert error.max() < 1e-5, f"off by {error.max():.3g} on frame {AROUND[error.argmax()]}"
 
 
-@pytest.mark.parametrize("count", [0, 1, 2], ids=["without end", "once", "twice"])
-@pytest.mark.parametrize(("before", "after"), list(itertools.product(CYCLES, repeat=2)))
-def test_cycles_repeat_the_rigid_motion_on_both_sides(live_file, before, after, count):
+@pytest.mark.parametrize(("sides", "count"), in_turn(itertools.product(CYCLES, repeat=2), [0, 1, 2]))
+def test_cycles_repeat_the_rigid_motion_on_both_sides(live_file, sides, count):
+    before, after = sides
     obj = cyclic("QUATERNION", mode_before=before, mode_after=after, cycles_before=count, cycles_after=count)
     keys = snapshot(obj)
     set_mode(obj, "dq_sclerp")

@@ -8,7 +8,7 @@ import pytest
 
 from rigid_motion import animation
 from rigid_motion.animation import key_frames, modes_of, problem_of, read_poses, refresh, set_mode
-from tests.animation.oracle import Own, assert_shown, curves_of, expected_bases, shown_worlds, snapshot
+from tests.animation.oracle import Own, assert_shown, curves_of
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own_deltas
 
 PLAYED = np.arange(-2.0, 44.0)
@@ -47,47 +47,6 @@ def assert_has_its_own(obj: bpy.types.Object, own: Own) -> None:
     """Nothing of any in-between is left in its delta transforms."""
     assert own_deltas(obj) == own
     assert not any(obj.rigid_motion.filled)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_an_action_that_is_unlinked_and_chosen_again_moves_as_before(live_file, order, with_own):
-    obj = new_object("Tool", order)
-    own = give_own_deltas(obj) if with_own else own_deltas(obj)
-    key(obj)
-    set_mode(obj, "dq_sclerp")
-    live_file.scene.frame_set(BETWEEN)
-    action, slot = obj.animation_data.action, obj.animation_data.action_slot
-    for _ in range(2):
-        link(obj, None)
-        assert_has_its_own(obj, own)
-        assert obj.rigid_motion.mode == "BLENDER"
-        link(obj, action, slot)
-        assert obj.rigid_motion.mode == "dq_sclerp"
-        assert_shown([obj], PLAYED, {"Tool": own})
-    assert problem_of(obj) == ""
-
-
-def test_an_action_that_is_exchanged_in_one_go_leaves_nothing_of_it(live_file, with_own):
-    obj = tool(own=with_own)
-    own = Own(*_original(obj))
-    first = obj.animation_data.action, obj.animation_data.action_slot
-    link(obj, None)
-    key(obj, seed=4)
-    second = obj.animation_data.action, obj.animation_data.action_slot
-    assert modes_of(obj, np.array(FRAMES[:1])) == ["BLENDER"], "a new Action has no mode"
-    for action, mode in ((first, "dq_sclerp"), (second, "BLENDER"), (first, "dq_sclerp")):
-        link(obj, *action)
-        assert modes_of(obj, np.array(FRAMES[:1])) == [mode]
-        assert_shown([obj], PLAYED, {"Tool": own})
-
-
-def _original(obj: bpy.types.Object) -> tuple:
-    motion = obj.rigid_motion
-    return (
-        tuple(motion.own_location if motion.filled[0] else obj.delta_location),
-        tuple(motion.own_quaternion if motion.filled[1] else obj.delta_rotation_quaternion.normalized()),
-        tuple(motion.own_scale if motion.filled[3] else obj.delta_scale),
-    )
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -132,43 +91,6 @@ def test_however_an_action_goes_the_own_delta_transforms_come_back(live_file, go
     assert_has_its_own(obj, own)
 
 
-def test_a_strip_that_is_deleted_gives_the_own_delta_transforms_back(live_file):
-    obj = new_object()
-    own = give_own_deltas(obj)
-    key(obj)
-    set_mode(obj, "dq_sclerp")
-    data = obj.animation_data
-    action, slot = data.action, data.action_slot
-    data.action = None
-    track = data.nla_tracks.new()
-    strip = track.strips.new("Strip", 1, action)
-    strip.action_slot = slot
-    bpy.context.view_layer.update()
-    live_file.scene.frame_set(BETWEEN)
-    track.strips.remove(strip)
-    bpy.context.view_layer.update()
-    assert_has_its_own(obj, own)
-    link(obj, action, slot)
-    assert_shown([obj], PLAYED, {"Tool": own})
-
-
-def test_while_the_extension_is_off_an_action_may_go_and_come(live_file, with_own):
-    obj = new_object()
-    own = give_own_deltas(obj) if with_own else own_deltas(obj)
-    key(obj)
-    set_mode(obj, "dq_sclerp")
-    live_file.scene.frame_set(BETWEEN)
-    action, slot = obj.animation_data.action, obj.animation_data.action_slot
-    animation.unregister()
-    link(obj, None)
-    animation.register()
-    bpy.context.view_layer.update()
-    live_file.scene.frame_set(BETWEEN)
-    assert_has_its_own(obj, own)
-    link(obj, action, slot)
-    assert_shown([obj], PLAYED, {"Tool": own})
-
-
 @pytest.mark.parametrize("by_name", [False, True], ids=["slot chosen", "slot found by Blender"])
 def test_an_action_on_a_fresh_object_brings_its_mode_along(live_file, by_name):
     obj = tool()
@@ -183,19 +105,6 @@ def test_an_action_on_a_fresh_object_brings_its_mode_along(live_file, by_name):
         assert_shown([fresh], PLAYED)
     link(fresh, None)
     assert_has_its_own(fresh, own)
-
-
-def test_an_action_that_a_second_object_gets_moves_both_by_its_mode(live_file):
-    obj, second = tool(), new_object("Second")
-    link(second, obj.animation_data.action, obj.animation_data.action_slot)
-    assert_shown([obj, second], PLAYED)
-    assert problem_of(obj) == problem_of(second) == ""
-    set_mode(second, "lerp_slerp")
-    assert obj.rigid_motion.mode == second.rigid_motion.mode == "lerp_slerp"
-    assert_shown([obj, second], PLAYED)
-    link(obj, None)
-    assert_has_its_own(obj, Own())
-    assert_shown([second], PLAYED)
 
 
 def test_a_linked_copy_that_gets_another_rotation_mode_leaves_the_original_its_mode(live_file):
@@ -255,23 +164,6 @@ def test_a_frame_range_that_the_animator_has_set_stays(live_file):
     assert (action.use_frame_range, action.frame_start, action.frame_end) == (True, -3.0, 9.0)
 
 
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("shift", [-20.0, -100.0, -1000.0], ids=["about zero", "below zero", "far below zero"])
-def test_between_whole_frames_below_zero_it_is_as_exact_as_above(live_file, order, shift):
-    keys, quarters = np.array((2.0, 15.0, 31.0)), np.arange(0.0, 34.0, 0.25)
-    errors = []
-    for offset in (0.0, shift):
-        obj = key(new_object("Tool", order), keys + offset, seed=2, interpolation="LINEAR")
-        set_mode(obj, "dq_sclerp")
-        frames = quarters + offset
-        errors.append(np.abs(shown_worlds([obj], frames)[0] - expected_bases(obj, frames)).max(axis=(1, 2)))
-        bpy.data.objects.remove(obj)
-    above, below = errors
-    assert above.max() > 1e-3, "or it says nothing"
-    assert np.abs(above - below).max() < 0.02 * above.max() + 2e-5
-    assert below[::4].max() < 1e-5
-
-
 def test_a_mode_that_was_chosen_before_there_were_keys_waits_for_them(live_file):
     obj = new_object()
     obj.rigid_motion.mode = "pga_lerp"
@@ -285,25 +177,6 @@ def test_a_mode_that_was_chosen_before_there_were_keys_waits_for_them(live_file)
         key(waiting, seed=3)
         bpy.context.view_layer.update()
         assert modes_of(waiting, np.array(FRAMES[:1])) == ["BLENDER"], "it was for the first Action"
-
-
-def test_an_action_keeps_its_mode_where_the_object_is_deleted(live_file):
-    obj = tool()
-    action, slot = obj.animation_data.action, obj.animation_data.action_slot
-    bpy.data.objects.remove(obj)
-    fresh = new_object("Another")
-    link(fresh, action, slot)
-    assert_shown([fresh], PLAYED)
-
-
-def test_a_copy_of_an_action_has_its_mode_and_in_betweens(live_file):
-    obj = tool()
-    keys = snapshot(obj)
-    obj.animation_data.action = obj.animation_data.action.copy()
-    bpy.context.view_layer.update()
-    assert snapshot(obj) == keys
-    assert obj.rigid_motion.mode == "dq_sclerp"
-    assert_shown([obj], PLAYED)
 
 
 def test_a_slot_that_moves_to_another_action_takes_its_mode_along(live_file):

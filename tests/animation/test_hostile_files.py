@@ -21,6 +21,7 @@ from rigid_motion.animation import MODE_IDS, channelbag_of, modes_of, problem_of
 from tests.animation.oracle import WIDTHS, assert_shown, curves_of, expected_worlds, shown_worlds, snapshot
 from tests.animation.scenes import FRAMES, key, new_object
 from tests.blank import blank
+from tests.thoroughness import sample
 
 SEEN = range(-2, 46)
 
@@ -188,7 +189,7 @@ REFUSED |= {
 }
 
 
-@pytest.mark.parametrize("what", REFUSED)
+@pytest.mark.parametrize("what", sample([*REFUSED]))
 def test_what_cannot_move_rigidly_keeps_blenders_motion_and_says_why(tmp_path, what):
     damage, reason = REFUSED[what]
     make(damage, "BLENDER")
@@ -421,24 +422,26 @@ def test_without_keys_an_object_rests_with_its_own_delta_transforms(tmp_path, da
 
 @pytest.mark.parametrize(
     "name",
-    [
-        *(
-            '"',
-            "'",
-            "\\",
-            "]",
-            '["x"]',
-            "a\nb",
-            "\t",
-            " ",
-            "%s{0}",
-            "../..",
-            "\N{PILE OF POO}" * 15,
-            "x" * 63,
-            "\u202e",
-        ),
-        *("Ä" * 31, "OBBroken", "rigid_motion.mode", "\x7f\x01"),
-    ],
+    sample(
+        [
+            *(
+                '"',
+                "'",
+                "\\",
+                "]",
+                '["x"]',
+                "a\nb",
+                "\t",
+                " ",
+                "%s{0}",
+                "../..",
+                "\N{PILE OF POO}" * 15,
+                "x" * 63,
+                "\u202e",
+            ),
+            *("Ä" * 31, "OBBroken", "rigid_motion.mode", "\x7f\x01"),
+        ]
+    ),
     ids=repr,
 )
 def test_odd_names_change_nothing(tmp_path, name):

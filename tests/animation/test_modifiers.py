@@ -181,27 +181,6 @@ def test_in_a_strip_and_after_saving_holds_and_noise_are_there(live_file, tmp_pa
     assert_same(seen(obj, frames[inside] + 100.0), wanted[inside])
 
 
-def test_another_step_is_followed_and_so_is_muting(live_file):
-    obj = key(new_object(), seed=4)
-    set_mode(obj, "dq_sclerp")
-    added = modify(channels(obj), "STEPPED", frame_step=2.0)
-    for step in (5.0, 3.0):
-        for one in added:
-            one.frame_step = step
-        bpy.context.view_layer.update()
-        assert_same(shown_worlds([obj], PLAYED)[0], expected(obj, led_to([{"frame_step": step}], PLAYED)))
-    for one in added:
-        one.mute = True
-    bpy.context.view_layer.update()
-    assert_same(shown_worlds([obj], PLAYED)[0], expected(obj, PLAYED))
-    moved = curves_of(obj)["location", 0].keyframe_points[1]
-    for one in added:
-        one.mute = False
-    moved.co_ui.y += 2.0
-    bpy.context.view_layer.update()
-    assert_same(shown_worlds([obj], PLAYED)[0], expected(obj, led_to([{"frame_step": 3.0}], PLAYED)))
-
-
 def test_one_behind_another_and_a_channel_with_a_single_key(live_file):
     obj = key(new_object(), seed=4)
     for axis in range(3):
@@ -295,18 +274,6 @@ def test_what_is_added_to_a_rotation_turns_the_mode_by_what_it_turns_blenders(li
     assert_same(shown_worlds([obj], PLAYED)[0], wanted)
 
 
-def test_noise_of_bones_is_on_top_of_the_mode(live_file):
-    rig = new_rig(use_local_location=False)
-    for number, bone in enumerate(rig.pose.bones):
-        key_bone(bone, seed=number)
-        set_mode(bone, "dq_sclerp")
-    hand = rig.pose.bones["Hand"]
-    modify([curves_of(hand)["location", axis] for axis in range(3)], "NOISE", **NOISE)
-    bases = {bone.name: expected(bone, PLAYED) for bone in rig.pose.bones}
-    bases["Hand"][:, :3, 3] += difference(hand, "location", PLAYED)
-    assert_same_poses(rig, PLAYED, *shown_poses([rig], PLAYED), expected_poses(rig, PLAYED, bases))
-
-
 def test_a_scale_with_noise_is_blenders_own(live_file):
     obj = key(new_object(), seed=2, scale="even")
     set_mode(obj, "cga_slerp")
@@ -364,18 +331,6 @@ def test_a_key_in_between_keeps_the_pose_that_is_seen_with_its_noise(live_file, 
     bpy.context.scene.frame_set(18)
     bpy.context.scene.frame_set(17)
     assert_same(seen(), before)
-
-
-def test_a_key_where_a_hold_begins_keeps_the_pose_that_is_seen(live_file):
-    obj = key(new_object(), seed=5)
-    set_mode(obj, "dq_sclerp")
-    modify(channels(obj), "STEPPED", frame_step=4.0, frame_offset=1.0)
-    bpy.context.scene.frame_set(17)
-    before = np.array(obj.matrix_world)
-    obj.keyframe_insert("location", frame=17)
-    obj.keyframe_insert("rotation_quaternion", frame=17)
-    bpy.context.view_layer.update()
-    assert_same(np.array(obj.matrix_world), before)
 
 
 def different_steps(obj: bpy.types.Object) -> None:

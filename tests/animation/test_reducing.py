@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import (
-    MODE_IDS,
     Refused,
     bake,
     bake_poses,
@@ -32,6 +31,7 @@ from rigid_motion.animation.baking import fewer_keys
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate, interpolate_by_segments, repair, shell_error, twists
 from rigid_motion.motion.quaternions import multiply
 from rigid_motion_batch.recordings import read_trajectories
+from tests.animation.bones.rigs import in_turn
 from tests.animation.oracle import curves_of, rotation_path, snapshot
 from tests.animation.scenes import give_own_deltas, key, new_object
 
@@ -64,8 +64,9 @@ def keys_of(obj: bpy.types.Object, path: str, index: int = 0) -> list[float]:
     return [point.co.x for point in curves_of(obj)[path, index].keyframe_points]
 
 
-@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XYZ", "ZXY"])
-@pytest.mark.parametrize("name", ["reach", "pivot", "throw", "screw"])
+@pytest.mark.parametrize(
+    ("name", "rotation_mode"), in_turn(["reach", "pivot", "throw", "screw"], ["QUATERNION", "XYZ", "ZXY"])
+)
 def test_few_keys_show_the_recording_within_the_tolerance_on_every_frame(live_file, name, rotation_mode):
     obj = recorded(name, rotation_mode)
     frames = key_frames(obj)
@@ -100,18 +101,6 @@ def test_no_motion_has_fewer_keys_than_two_or_more_than_it_had(live_file, count,
     with pytest.raises(Refused, match=why):
         reduce_keys_of(obj, count=count)
     assert not is_reduced(obj)
-
-
-@pytest.mark.parametrize("mode", KEYFRAME_MODES)
-def test_every_mode_gets_the_keys_that_it_needs(live_file, mode):
-    obj = recorded()
-    frames = key_frames(obj)
-    truth = read_poses(obj, frames)
-    set_mode(obj, "cga_lerp", frames[::5])
-    reduce_keys_of(obj, mode, TOLERANCE, RADIUS)
-    assert ("rigid_motion.mode", 0) not in curves_of(obj), "one mode for all segments needs no keys"
-    assert set(modes_of(obj, key_frames(obj))) == {mode}
-    assert off(obj, frames, truth) <= TOLERANCE * (1.0 + 1e-5)
 
 
 def best_of(obj: bpy.types.Object, mode: str = "motor_spline", tolerance: float = TOLERANCE):
@@ -171,26 +160,6 @@ def test_a_screw_and_a_straight_flight_get_their_own_modes(live_file):
             assert mode == "lerp_slerp"
 
 
-def test_modes_that_are_one_motion_stay_the_one_that_was_asked_for(live_file):
-    _, modes = best_of(recorded("screw"), "pga_slerp")
-    assert "pga_slerp" in modes
-    assert not {"dq_sclerp", "cga_slerp"} & set(modes)
-
-
-def test_what_grows_gets_its_best_modes_too(live_file):
-    frames, poses = motion()
-    obj = new_object()
-    bake_poses(obj, frames, Poses(poses.positions, poses.quaternions, np.exp(0.01 * frames)))
-    truth = read_poses(obj, frames)
-    kept, modes = best_of(obj)
-    keys = truth[np.isin(frames, kept)]
-    shown = read_poses(obj, frames)
-    expected = interpolate_by_segments(kept, keys, frames, modes)
-    assert len(set(modes)) > 1
-    assert shell_error(shown, expected, RADIUS).max() < 1e-5
-    assert off(obj, frames, truth) <= TOLERANCE * (1.0 + 1e-5)
-
-
 def test_one_mode_stays_where_several_would_go_elsewhere_outside_of_the_keys(live_file, monkeypatch):
     # Seen with no motion yet; only cycles of different lengths could come to it.
     monkeypatch.setattr(fewer_keys, "with_best_modes", lambda _, source, *__: replace(source, mode=1))
@@ -199,26 +168,6 @@ def test_one_mode_stays_where_several_would_go_elsewhere_outside_of_the_keys(liv
     truth = read_poses(obj, frames)
     assert best_of(obj)[1][0] == "motor_spline"
     assert off(obj, frames, truth) <= TOLERANCE * (1.0 + 1e-5)
-
-
-def test_keys_with_the_best_modes_give_way_to_all_that_was_there(live_file):
-    obj = recorded()
-    set_mode(obj, "pga_lerp", [11.0])
-    before = snapshot(obj)
-    best_of(obj)
-    assert snapshot(obj) != before
-    restore_keys(obj)
-    assert snapshot(obj) == before
-
-
-def test_the_keys_are_those_of_the_mode_and_too_few_for_another(live_file):
-    obj = recorded()
-    frames = key_frames(obj)
-    truth = read_poses(obj, frames)
-    reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
-    for other in ("lerp_slerp", "dq_sclerp", "BLENDER"):
-        set_mode(obj, other)
-        assert off(obj, frames, truth) > 1.5 * TOLERANCE
 
 
 def test_all_channels_have_keys_on_the_same_frames_with_what_was_recorded_there(live_file):
@@ -235,14 +184,6 @@ def test_all_channels_have_keys_on_the_same_frames_with_what_was_recorded_there(
             assert {point.interpolation for point in fcurve.keyframe_points} == {"LINEAR"}
     at_keys = read_poses(obj, kept)
     assert np.abs(at_keys.positions - poses.positions[np.isin(frames, kept)]).max() < 1e-6
-
-
-def test_a_larger_tolerance_needs_fewer_keys_and_a_larger_radius_more(live_file):
-    def count(tolerance, radius):
-        return reduce_keys_of(recorded(obj=new_object()), "motor_spline", tolerance, radius).after
-
-    assert count(0.02, RADIUS) < count(TOLERANCE, RADIUS) < count(0.001, RADIUS)
-    assert count(TOLERANCE, 1.0) > count(TOLERANCE, RADIUS)
 
 
 @pytest.mark.parametrize("rotation_mode", ["QUATERNION", "YZX"])
@@ -278,16 +219,6 @@ def test_the_tolerance_is_one_of_the_scene_also_under_a_parent_in_other_units(li
     error = off(below, frames, truth)
     assert error <= TOLERANCE * (1.0 + 1e-4)
     assert reductions[1].largest_error == pytest.approx(error, rel=1e-3)
-
-
-def test_a_constraint_on_top_of_the_keys_stays(live_file):
-    obj = recorded()
-    obj.constraints.new("COPY_LOCATION").target = new_object("Target")
-    obj.constraints[0].use_offset = True
-    frames = key_frames(obj)
-    truth = read_poses(obj, frames)
-    reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
-    assert off(obj, frames, truth) <= TOLERANCE * (1.0 + 1e-5)
 
 
 @pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XZY"])
@@ -356,18 +287,6 @@ def test_what_has_no_keys_gets_none(live_file, keyed):
     assert found == wanted
 
 
-def test_an_even_scale_is_part_of_the_pose(live_file):
-    obj = recorded()
-    frames = key_frames(obj)
-    sizes = np.exp(np.sin(0.1 * frames))
-    write_channel(obj, "scale", frames, np.repeat(sizes[:, None], 3, axis=1))
-    truth = read_poses(obj, frames)
-    reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
-    size = np.array(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).scale).mean()
-    assert off(obj, frames, truth, RADIUS / size) <= TOLERANCE * (1.0 + 1e-4)
-    assert keys_of(obj, "scale") == key_frames(obj).tolist()
-
-
 @pytest.mark.parametrize("scale", [(1.0, 1.0, 1.0), (2.0, 2.0, 2.0), (1.0, 2.0, 0.5), (-1.0, 1.0, 1.0)], ids=str)
 def test_a_scale_that_only_stands_there_on_every_frame_goes_with_the_keys(live_file, scale):
     obj = recorded()
@@ -428,29 +347,6 @@ def test_cycles_that_fewer_keys_would_change_are_refused(live_file):
     with pytest.raises(Refused, match=r"Tool goes on outside of its keys.*constant extrapolation"):
         reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
     assert snapshot(obj) == before
-
-
-def test_what_is_live_already_is_reduced_as_it_is_seen(live_file):
-    obj = recorded()
-    frames = key_frames(obj)
-    fine = reduce_keys_of(obj, "motor_spline", 0.002, RADIUS)
-    truth = read_poses(obj, frames)
-    coarse = reduce_keys_of(obj, "dq_sclerp", 0.02, RADIUS)
-    assert coarse.before == fine.after
-    assert coarse.after < coarse.before
-    assert off(obj, frames, truth) <= 0.02 * (1.0 + 1e-5)
-
-
-def test_another_object_with_the_same_action_keeps_its_keys(live_file):
-    obj, other = recorded(), new_object("Other")
-    other.animation_data_create().action = obj.animation_data.action
-    other.animation_data.action_slot = obj.animation_data.action_slot
-    before = snapshot(other)
-    reduce_keys_of(obj, tolerance=TOLERANCE, radius=RADIUS)
-    assert snapshot(other) == before
-    assert snapshot(obj) != before
-    restore_keys(obj)
-    assert obj.animation_data.action == other.animation_data.action
 
 
 def test_a_strip_shows_the_reduced_keys_and_then_its_own_again(live_file):
@@ -545,14 +441,6 @@ def test_an_action_that_something_else_needs_stays_when_it_is_discarded(live_fil
     assert action in list(bpy.data.actions)
 
 
-def test_an_action_that_an_importer_keeps_by_a_fake_user_goes_when_it_is_discarded(live_file):
-    obj = recorded()
-    obj.animation_data.action.use_fake_user = True
-    reduce_keys_of(obj, tolerance=TOLERANCE, radius=RADIUS)
-    discard_dense_keys(obj)
-    assert list(bpy.data.actions) == [obj.animation_data.action]
-
-
 def test_what_was_done_last_is_taken_back_first(live_file):
     obj = recorded()
     dense = snapshot(obj)
@@ -572,28 +460,6 @@ def test_what_was_done_last_is_taken_back_first(live_file):
     restore_keys(obj)
     assert (snapshot(obj), is_baked(obj), is_reduced(obj)) == (dense, False, False)
     assert len(bpy.data.actions) == 1
-
-
-def test_letting_go_of_baked_keys_leaves_the_way_back_to_what_was_baked(live_file):
-    obj = key(new_object(), np.arange(1.0, 100.0, 20.0))
-    set_mode(obj, "dq_sclerp")
-    before = snapshot(obj)
-    bake(obj)
-    reduce_keys_of(obj, "lerp_slerp", 0.1, RADIUS)
-    discard_dense_keys(obj)
-    assert len(bpy.data.actions) == 2
-    unbake(obj)
-    assert snapshot(obj) == before
-
-
-def test_an_action_that_was_put_in_the_place_of_reduced_keys_is_not_replaced(live_file):
-    obj = recorded()
-    reduce_keys_of(obj, tolerance=TOLERANCE, radius=RADIUS)
-    obj.animation_data.action = bpy.data.actions.new("Mine")
-    assert reduction_of(obj) is None
-    with pytest.raises(Refused, match="Tool is not reduced, or has another Action by now"):
-        restore_keys(obj)
-    assert obj.animation_data.action.name == "Mine"
 
 
 def moved_by_a_simulation():
@@ -687,12 +553,6 @@ def test_where_nothing_can_be_reduced_it_says_why_and_the_way_out_and_changes_no
 def test_a_tolerance_that_is_none_is_refused(live_file, tolerance):
     with pytest.raises(Refused, match="the tolerance has to be a number above zero"):
         reduce_keys_of(recorded(), tolerance=tolerance)
-
-
-def test_blenders_own_in_betweens_are_no_mode_to_reduce_for(live_file):
-    assert MODE_IDS[0] == "BLENDER"
-    with pytest.raises(Refused, match="there is no mode 'BLENDER'"):
-        reduce_keys_of(recorded(), "BLENDER")
 
 
 def test_linked_keys_are_refused(live_file, tmp_path):

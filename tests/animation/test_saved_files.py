@@ -137,19 +137,6 @@ def test_what_was_not_followed_before_saving_is_caught_up_with_after_loading(liv
     assert np.abs(shown_worlds([obj], PLAYED)[0] - before).max() > 0.1
 
 
-def test_what_was_not_followed_is_caught_up_with_by_refresh_before_a_farm_gets_it(live_file, tmp_path):
-    obj = key(new_object())
-    set_mode(obj, "dq_sclerp")
-    set_enabled(False)
-    try:
-        key(obj, seed=5)
-        assert refresh() == 1
-        _, played = played_on_a_farm(save(tmp_path / "shot.blend"), ["Tool"], PLAYED)
-    finally:
-        set_enabled(True)
-    assert_same(played, [expected_worlds(obj, PLAYED)], 1e-5)
-
-
 def test_a_baked_object_plays_alike_on_a_farm_and_can_be_un_baked_after_it_saved_the_file(live_file, tmp_path):
     obj = key(new_object())
     set_mode(obj, "dq_sclerp")

@@ -9,9 +9,8 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import bake, key_frames, modes_of, problem_of, refresh, set_mode, unbake
-from rigid_motion.animation.writers import deltas, sampled
-from tests.animation.oracle import Own, curves_of, expected_bases, shown_worlds, snapshot
+from rigid_motion.animation import bake, key_frames, problem_of, refresh, set_mode, unbake
+from tests.animation.oracle import Own, curves_of, expected_bases, shown_worlds
 from tests.animation.scenes import give_own_deltas, key, new_object, new_strip, own_deltas, push_down, tweak
 
 KEYS = (1.0, 11.0, 21.0, 41.0)
@@ -52,12 +51,6 @@ def test_a_strip_shows_the_in_betweens_of_its_action(live_file, order, start, sc
     outside = np.array((strip.frame_start - 5.0, strip.frame_end + 5.0))
     held = shown_worlds([obj], np.array((strip.frame_start, strip.frame_end)))[0]
     assert_at(obj, outside, held)
-
-
-def test_a_strip_may_show_a_part_of_its_action(live_file):
-    obj, wanted = filled()
-    push_down(obj, 51, action_frame_start=6, action_frame_end=30)
-    assert_at(obj, np.arange(51.0, 76.0), wanted[5:30])
 
 
 def test_a_mode_is_chosen_for_an_action_that_is_in_a_strip_already(live_file):
@@ -162,18 +155,6 @@ def test_what_a_strip_holds_goes_and_comes_with_the_mode_of_the_other(live_file)
     assert_at(obj, ACTION_FRAMES + 100, expected_bases(obj, ACTION_FRAMES, own))
 
 
-def test_an_action_that_holds_them_takes_no_mode_from_the_one_before_it(live_file):
-    obj, _, actions, wanted = two_strips()
-    data = obj.animation_data
-    for track in list(data.nla_tracks):
-        track.mute = True
-    for action, mode, worlds in zip(actions * 2, ("dq_sclerp", "BLENDER") * 2, wanted * 2, strict=True):
-        data.action, data.action_slot = action, action.slots[0]
-        bpy.context.view_layer.update()
-        assert set(modes_of(obj, np.array(KEYS[:3]))) == {mode}
-        assert_at(obj, ACTION_FRAMES, worlds)
-
-
 def test_baking_the_other_strip_and_back_keeps_the_own_delta_transforms(live_file):
     obj, _, actions, wanted = two_strips()
     strips = [track.strips[0] for track in obj.animation_data.nla_tracks]
@@ -184,19 +165,6 @@ def test_baking_the_other_strip_and_back_keeps_the_own_delta_transforms(live_fil
             assert_at(obj, ACTION_FRAMES + start - 1, worlds)
         assert (held_in(actions[1]) == set()) == (act is bake)
         assert (strips[0].action == actions[0]) == (act is unbake)
-
-
-def test_what_a_strip_holds_is_written_once(live_file, monkeypatch):
-    obj, _, actions, _ = two_strips()
-    written = []
-    # Noted rather than raised: Blender swallows what is raised in a handler.
-    monkeypatch.setattr(sampled, "replace_samples", lambda *what: written.append(what))
-    monkeypatch.setattr(deltas, "replace_samples", lambda *what: written.append(what))
-    refresh()
-    refresh([obj])
-    fcurves_of(actions[1]).find("location", index=0).keyframe_points[1].co_ui.y += 1.0
-    bpy.context.view_layer.update()
-    assert written == []
 
 
 def test_delta_keys_of_the_animators_are_left_alone_in_the_other_strip(live_file):
@@ -293,24 +261,6 @@ def test_an_action_that_is_in_two_strips_and_cycles_is_filled_in_as_far_as_eithe
         assert_at(obj, start + np.arange(1.0, 40.0), wanted[1:])
 
 
-def test_in_tweak_mode_edits_of_the_strips_action_show_at_once(live_file):
-    obj, _ = filled()
-    strip = push_down(obj, 101)
-    tweak(obj, strip)
-    curves_of(obj)["location", 0].keyframe_points[1].co_ui.y += 2.0
-    bpy.context.view_layer.update()
-    assert_at(obj, ACTION_FRAMES + 100, expected_bases(obj, ACTION_FRAMES))
-    keys = snapshot(obj)
-    set_mode(obj, "lerp_slerp", [11.0])
-    assert modes_of(obj, np.array(KEYS[:3])) == ["dq_sclerp", "lerp_slerp", "dq_sclerp"]
-    assert {name: curve for name, curve in snapshot(obj).items() if name[0] != "rigid_motion.mode"} == keys
-    wanted = expected_bases(obj, ACTION_FRAMES)
-    assert_at(obj, ACTION_FRAMES + 100, wanted)
-    obj.animation_data.use_tweak_mode = False
-    bpy.context.view_layer.update()
-    assert_at(obj, ACTION_FRAMES + 100, wanted)
-
-
 @pytest.mark.parametrize(("start", "scale"), [(101, 1.0), (31, 2.0)])
 def test_in_tweak_mode_a_key_inserted_in_between_keeps_the_pose_on_the_screen(live_file, start, scale):
     obj, wanted = filled()
@@ -323,19 +273,6 @@ def test_in_tweak_mode_a_key_inserted_in_between_keeps_the_pose_on_the_screen(li
     bpy.context.view_layer.update()
     assert 16.0 in key_frames(obj)
     assert_at(obj, np.array((float(scene_frame),)), wanted[[15]])
-
-
-def test_an_action_that_leaves_its_strip_gives_the_own_delta_transforms_back(live_file):
-    obj = new_object()
-    own = give_own_deltas(obj)
-    key(obj, KEYS)
-    set_mode(obj, "dq_sclerp")
-    push_down(obj)
-    obj.animation_data.nla_tracks.remove(obj.animation_data.nla_tracks[0])
-    bpy.context.view_layer.update()
-    assert tuple(obj.delta_location) == own.location
-    assert tuple(obj.delta_scale) == own.scale
-    assert not any(obj.rigid_motion.filled)
 
 
 def test_a_strip_without_an_action_to_set_keys_on_is_explained(live_file):

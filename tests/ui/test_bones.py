@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import bpy
 import numpy as np
 import pytest
@@ -16,16 +14,14 @@ from rigid_motion.animation.writers.constraint_repair import CHANGED, MUTED, NOT
 from rigid_motion.ui import menus
 from rigid_motion.ui.notes import facts_and_notes
 from rigid_motion.ui.targets import (
-    CURRENT,
     KEY_EDITORS,
     SELECTED,
     WHOLE,
     active_target,
-    modes_meant,
     scope_for,
     targets_of,
 )
-from rigid_motion.ui.wording import BLENDED, NO_KEYS, NO_SEGMENT, TROUBLES, kind_of, reduction_rows, spoken_of
+from rigid_motion.ui.wording import BLENDED, NO_KEYS, NO_SEGMENT, TROUBLES
 from tests.animation.scenes import editor
 from tests.rigs.recorded import FRAMES as RECORDED
 from tests.rigs.recorded import recorded_rig
@@ -65,19 +61,6 @@ def test_in_pose_mode_the_selected_bones_are_meant_and_not_the_rig(rig):
         assert names(targets_of(bpy.context)) == ["Rig/Arm", "Rig/Hand"]
         assert active_target(bpy.context) == transform_of(bone(rig))
         assert scope_for(bpy.context) == WHOLE
-
-
-def test_in_pose_mode_without_selected_bones_nothing_is_meant(rig):
-    select(rig, ())
-    assert targets_of(bpy.context) == []
-    assert active_target(bpy.context) is None
-    with pytest.raises(RuntimeError, match="Select bones first"):
-        operators.set_mode(mode=SCREW)
-
-
-def test_out_of_pose_mode_the_rig_itself_is_meant(rig):
-    bpy.ops.object.mode_set(mode="OBJECT")
-    assert targets_of(bpy.context) == [transform_of(rig)] == [active_target(bpy.context)]
 
 
 def test_the_bones_of_all_rigs_in_pose_mode_are_meant(rig):
@@ -135,78 +118,6 @@ def test_each_bone_gets_the_mode_from_its_own_selected_keys_on(rig, kind):
     assert modes(rig, "Arm") == [SCREW, "BLENDER", "BLENDER"]
     assert modes(rig, "Hand") == ["BLENDER", SCREW, SCREW]
     assert modes(rig, "Hip") == ["BLENDER"] * 3
-
-
-def test_mode_channel_and_evaluation_time_are_in_the_bones_group(rig):
-    select_keys(bone(rig), 11.0)
-    operators.set_mode(mode=SCREW, on=SELECTED)
-    data = rig.animation_data
-    fcurves = data.action.layers[0].strips[0].channelbag(data.action_slot).fcurves
-    groups = {c.data_path.partition('"].')[2]: c.group.name for c in fcurves if '"Hand"' in c.data_path and c.group}
-    assert groups["rigid_motion.mode"] == "Hand"
-    assert groups[f'constraints["{CONSTRAINT}"].eval_time'] == "Hand"
-
-
-def test_the_segment_under_the_playhead_of_a_bone_gets_the_mode(rig):
-    bpy.context.scene.frame_set(15)
-    operators.set_mode(mode=SCREW, on=CURRENT)
-    assert modes(rig, "Hand") == modes(rig, "Arm") == ["BLENDER", SCREW, "BLENDER"]
-    assert modes_meant(bpy.context, transform_of(bone(rig)), CURRENT) == {SCREW}
-
-
-def test_a_report_speaks_of_bones(rig, capfd):
-    bone(rig, "Arm").rotation_mode = "AXIS_ANGLE"
-    operators.set_mode(mode=SCREW)
-    said = capfd.readouterr().out
-    assert "1 of 2 bones: Screw (Dual Quaternion). But" in said
-    assert "Rig/Arm turns by axis and angle" in said
-
-
-REASONS = {
-    "clear": "These bones have Blender's own in-betweens already",
-    "bake": "choose a mode for keys of these bones first",
-    "unbake": "None of these bones is baked",
-    "reduce_keys": r"None of these bones has more than two keys.*Pose > Animation > Bake Action",
-    "restore_keys": "The keys of these bones are not reduced",
-    "mend": "None of these bones lacks its constraint",
-}
-
-
-@pytest.mark.parametrize("name", REASONS)
-def test_where_there_is_nothing_to_do_on_bones_the_reason_speaks_of_bones(extension, name):
-    rig = new_rig()
-    select(rig, ("Arm", "Hand"))
-    with pytest.raises(RuntimeError, match=REASONS[name]):
-        getattr(operators, name)()
-
-
-def test_clearing_modes_is_for_the_selected_bones_alone(rig):
-    set_mode(list(rig.pose.bones), SCREW)
-    assert operators.clear() == {"FINISHED"}
-    assert modes(rig, "Arm") == modes(rig, "Hand") == ["BLENDER"] * 3
-    assert modes(rig, "Hip") == [SCREW] * 3
-    with pytest.raises(RuntimeError, match="Blender's own in-betweens already"):
-        operators.clear()
-
-
-def test_bones_are_baked_and_un_baked(rig):
-    operators.set_mode(mode=SCREW)
-    bpy.context.scene.frame_set(6)
-    before = pose_of(rig)
-    assert operators.bake() == {"FINISHED"}
-    bpy.context.scene.frame_set(6)
-    assert pose_of(rig) == pytest.approx(before, abs=1e-5)
-    assert modes(rig, "Hand") == ["BLENDER"] * 3
-    assert operators.unbake() == {"FINISHED"}
-    assert modes(rig, "Hand") == [SCREW] * 3
-
-
-def test_keys_of_bones_are_reduced_and_restored(rig):
-    assert operators.reduce_keys(tolerance=10.0) == {"FINISHED"}
-    assert not operators.unbake.poll()
-    assert animation.is_reduced(bone(rig))
-    assert operators.restore_keys() == {"FINISHED"}
-    assert not animation.is_reduced(bone(rig))
 
 
 @pytest.fixture
@@ -267,33 +178,6 @@ def test_in_pose_mode_it_is_the_selected_bones_alone(body):
     assert [bone.name for bone in body.pose.bones if animation.is_reduced(bone)] == ["Arm.L", "Hand.L"]
 
 
-def test_a_reason_that_all_bones_have_is_said_once(body):
-    with pytest.raises(RuntimeError) as refused:
-        operators.reduce_keys(tolerance=1e-6)
-    assert str(refused.value).count("allow a larger one") == 1
-
-
-def test_what_became_of_a_rig_reads_as_rows(body):
-    operators.reduce_keys(tolerance=0.02)
-    reduction = animation.total_reduction(list(body.pose.bones))
-    rows = dict(reduction_rows(bpy.context.scene, reduction))
-    assert rows["Keys"] == f"630 \N{RIGHTWARDS ARROW} {reduction.after}"
-    assert rows["Frames"] == f"{reduction.rig.frames} with keys"
-    standing = replace(reduction, rig=animation.WholeRig(9, 0.001, 0.002))
-    assert dict(reduction_rows(bpy.context.scene, standing))["Feet"] == "slide 2 mm, recorded 1 mm"
-
-
-@pytest.mark.parametrize("text", ["An object", "Select an object with keys", "of the objects", "Object > Animation"])
-def test_texts_about_objects_are_spoken_of_bones(text):
-    assert "bject" not in spoken_of(text.replace("An", "an"), "bones")
-    assert spoken_of(text, "objects") == text
-
-
-def test_objects_and_bones_together_are_called_so(rig):
-    both = [transform_of(rig), transform_of(bone(rig))]
-    assert [kind_of(some) for some in (both, both[:1], both[1:])] == ["objects and bones", "objects", "bones"]
-
-
 def test_the_menu_of_poses_ticks_the_mode_of_the_active_bone_and_has_a_pie(rig):
     set_mode(bone(rig, "Arm"), "pga_lerp")
     set_mode(bone(rig), SCREW)
@@ -301,16 +185,6 @@ def test_the_menu_of_poses_ticks_the_mode_of_the_active_bone_and_has_a_pie(rig):
     assert [p.mode for name, icon, p in entries if name == "rigid_motion.set_mode" and icon == "CHECKMARK"] == [SCREW]
     assert "rigid_motion.mend" in [name for name, *_ in entries]
     assert [p.name for name, _, p in entries if name == "wm.call_menu_pie"] == ["RIGID_MOTION_MT_pie_pose"]
-
-
-def test_blenders_animation_menu_is_one_for_objects_and_poses(rig):
-    assert {"VIEW3D_MT_object_animation", "VIEW3D_MT_pose_context_menu"} <= menus.ENTRIES.keys()
-    seen = []
-    for mode in ("POSE", "OBJECT"):
-        bpy.ops.object.mode_set(mode=mode)
-        layout = type("Layout", (), {"separator": lambda _: None, "menu": lambda _, name: seen.append(name)})()
-        menus.ENTRIES["VIEW3D_MT_object_animation"](type("Menu", (), {"layout": layout})(), bpy.context)
-    assert seen == ["RIGID_MOTION_MT_pose", "RIGID_MOTION_MT_object"]
 
 
 def notes_on(target, frame=5.0):
@@ -421,13 +295,6 @@ def test_a_constraint_that_is_not_as_it_was_made_is_noted_and_mended(rig, tamper
     bpy.context.scene.frame_set(5)
     assert pose_of(rig) == pytest.approx(seen, abs=1e-5)
     assert not operators.mend.poll()
-
-
-def test_a_constraint_that_is_behind_a_muted_one_is_well(rig):
-    set_mode(bone(rig), SCREW)
-    _put_behind(bone(rig))
-    bone(rig).constraints[0].mute = True
-    assert constraint_trouble(bone(rig)) == ""
 
 
 def test_an_influence_that_is_keyed_is_meant_so(rig):

@@ -10,15 +10,10 @@ import pytest
 
 from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate
-from rigid_motion.ui import manual, menus
 from rigid_motion.ui.breakdown import CLASSES
 from rigid_motion.ui.slider import WAY, Slider
 from tests.animation.oracle import snapshot
-from tests.animation.scenes import new_object
-from tests.ui import rigs
 from tests.ui.conftest import FRAMES
-from tests.ui.test_manual import page
-from tests.ui.test_menus import drawn
 
 operators = bpy.ops.rigid_motion
 
@@ -61,44 +56,11 @@ def test_push_and_relax_undo_each_other(tool):
     np.testing.assert_allclose(tool.location, before, atol=1e-5)
 
 
-def test_selected_bones_are_meant_in_pose_mode(extension):
-    rig = rigs.keyed_rig()
-    animation.set_mode(list(rig.pose.bones), "dq_sclerp")
-    bpy.context.scene.frame_set(15)
-    operators.breakdown(factor=0.5)
-    keys = {bone.name: animation.key_frames(bone).tolist() for bone in rig.pose.bones}
-    assert {name for name, frames in keys.items() if 15.0 in frames} == {"Arm", "Hand"}
-
-
 @pytest.mark.parametrize("cls", CLASSES)
 def test_without_a_mode_it_is_greyed_out(tool, cls):
     assert not cls.poll(bpy.context)
     animation.set_mode(tool, "dq_sclerp")
     assert cls.poll(bpy.context)
-
-
-def test_outside_of_the_keys_it_is_refused(tool):
-    animation.set_mode(tool, "dq_sclerp")
-    bpy.context.scene.frame_set(60)
-    with pytest.raises(RuntimeError, match="Tool needs a key before and a key after frame 60"):
-        operators.breakdown(factor=0.25)
-
-
-def test_what_has_no_keys_does_not_keep_the_others_from_theirs(tool):
-    animation.set_mode(tool, "dq_sclerp")
-    new_object("Idle").select_set(True)
-    bpy.context.scene.frame_set(14)
-    assert operators.breakdown(factor=0.25) == {"FINISHED"}
-    assert 14.0 in animation.key_frames(tool).tolist()
-
-
-@pytest.mark.parametrize("cls", CLASSES, ids=lambda cls: cls.__name__)
-def test_they_are_in_menus_and_have_a_page(cls, tool):
-    name = cls.bl_idname
-    for menu in (menus.RIGID_MOTION_MT_object, menus.RIGID_MOTION_MT_pose, menus.RIGID_MOTION_MT_keys):
-        assert name in [drawn_name for drawn_name, *_ in drawn(menu)]
-    assert any(draw is menus._draw_in_betweens for draw in bpy.types.VIEW3D_MT_pose_slide.draw._draw_funcs)
-    assert page(name).startswith(manual.DOCS)
 
 
 def test_the_mouse_moves_the_factor_and_stops_at_the_ends(extension):
@@ -138,8 +100,3 @@ def test_a_number_is_typed_in_per_cent(extension):
     for _ in range(10):
         slider.handle(event("BACK_SPACE"))
     assert slider.factor == 0.5
-
-
-@pytest.mark.parametrize("kind", ["LEFTMOUSE", "ESC", "A", "TIMER"])
-def test_other_keys_are_not_for_the_slider(extension, kind):
-    assert not Slider(0.5, 0.0, 1.0).handle(event(kind))

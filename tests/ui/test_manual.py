@@ -5,9 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from pathlib import Path
-from types import SimpleNamespace
 
-import bpy
 import pytest
 from bl_operators.wm import WM_OT_doc_view_manual, _wm_doc_get_id
 
@@ -51,27 +49,8 @@ def test_every_property_that_is_drawn_has_a_page(cls, extension):
         assert url.startswith(manual.DOCS), name
 
 
-def test_the_page_is_the_one_on_what_was_pointed_at(extension):
-    assert page("rigid_motion.set_mode").endswith("animators.md#which-mode-is-good-for-what")
-    assert page("RIGID_MOTION_OT_reduce_keys.tolerance").endswith("reduction.md")
-    assert page("rigid_motion.restore_keys").endswith("animators.md#reduce-keys")
-    assert page("RIGID_MOTION_OT_bake.step").endswith("animators.md#bake")
-    assert page("rigid_motion.unbake").endswith("animators.md#bake")
-    assert page("rigid_motion.push").endswith("animators.md#breakdown-push-and-relax")
-    assert page("rigid_motion.copy_pose").endswith("animators.md#edit")
-    assert page("BoneMotion.mode").endswith("animators.md#rigs")
-
-
 def test_blenders_own_pages_stay_its_own(extension):
     assert page("Object.location").startswith("https://docs.blender.org/")
-
-
-def test_without_the_extension_there_are_none(extension):
-    hooks = [prefix for prefix, _ in bpy.utils.manual_map()]
-    assert hooks.count(manual.DOCS) == 1
-    manual.unregister()
-    assert manual.DOCS not in [prefix for prefix, _ in bpy.utils.manual_map()]
-    manual.register()
 
 
 @pytest.mark.parametrize("target", sorted({page for _, page in manual.PAGES} | {manual.ANIMATORS}))
@@ -85,26 +64,3 @@ def test_the_address_is_that_of_the_manifest():
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
     assert manifest["website"] == manual.WEBSITE
     assert manual.DOCS.startswith(manual.WEBSITE)
-
-
-class Layout:
-    """Notes what buttons are for."""
-
-    def __init__(self) -> None:
-        self.buttons: list[tuple[str, SimpleNamespace]] = []
-
-    def row(self) -> Layout:
-        return self
-
-    def operator(self, name: str, text: str, icon: str) -> SimpleNamespace:
-        self.buttons.append((name, SimpleNamespace(url="")))
-        return self.buttons[-1][1]
-
-
-def test_the_buttons_open_the_documentation_and_the_website():
-    layout = Layout()
-    manual.draw(layout)
-    assert [(name, properties.url) for name, properties in layout.buttons] == [
-        ("wm.url_open", f"{manual.DOCS}animators.md"),
-        ("wm.url_open", manual.WEBSITE),
-    ]

@@ -6,17 +6,14 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion import animation
 from rigid_motion.animation import (
     MODE_IDS,
     bake_poses,
     is_baked,
-    is_reduced,
     key_frames,
     modes_of,
     read_poses,
     reduction_of,
-    set_enabled,
 )
 from rigid_motion.motion import MODES, Poses, interpolate, shell_error
 from rigid_motion.ui import CLASSES, gltf_export, live, pose_operators
@@ -51,14 +48,6 @@ def test_every_mode_can_be_set(tool, mode):
     assert modes(tool) == [mode] * 3
 
 
-def test_a_mode_fills_in_at_once_and_leaves_the_keys_alone(tool):
-    before = values(tool)
-    operators.set_mode(mode="dq_sclerp")
-    bpy.context.scene.frame_set(6)
-    assert np.linalg.norm(tool.delta_location) > 0.1
-    assert values(tool) == before
-
-
 def turns(obj):
     """The keys of the channel of turns, frames and values."""
     fcurve = curves_of(obj).get(("rigid_motion.turns", 0))
@@ -89,26 +78,10 @@ def test_turns_of_selected_keys_keep_the_axis_unless_there_is_another(tool):
     assert record.turns_axis == "X"
 
 
-def test_another_axis_moves_what_turns_at_once(tool):
-    operators.set_mode(mode="dq_sclerp")
-    bpy.context.scene.frame_set(int(FRAMES[0]) + 3)
-    operators.set_turns(turns=1)
-    before = np.array(tool.matrix_world)
-    tool.animation_data.action.rigid_motion.slots[0].turns_axis = "X"
-    bpy.context.scene.frame_set(int(FRAMES[0]) + 3)
-    assert np.abs(np.array(tool.matrix_world) - before).max() > 0.1
-
-
 def test_blenders_own_in_betweens_refuse_turns(tool):
     with pytest.raises(RuntimeError, match="choose a mode first"):
         operators.set_turns(turns=1)
     assert turns(tool) == {}
-
-
-def test_selected_keys_get_the_mode_for_the_segments_they_begin(tool):
-    select_keys(tool, 11.0)
-    operators.set_mode(mode="dq_sclerp", on="SELECTED")
-    assert modes(tool) == ["BLENDER", "dq_sclerp", "BLENDER"]
 
 
 def test_a_mode_key_is_selected_with_its_pose_and_the_one_that_ends_it_is_not(tool):
@@ -129,35 +102,11 @@ def test_the_segment_under_the_playhead_gets_the_mode(tool, frame, segment):
     assert modes(tool) == ["pga_lerp" if place == segment else "BLENDER" for place in range(3)]
 
 
-def test_under_the_playhead_of_a_repeated_motion_is_the_segment_that_is_repeated(tool):
-    channelbag = tool.animation_data.action.layers[0].strips[0].channelbag(tool.animation_data.action_slot)
-    for fcurve in channelbag.fcurves:
-        fcurve.modifiers.new("CYCLES")
-    bpy.context.scene.frame_set(40 + 15)
-    operators.set_mode(mode="dq_sclerp", on="CURRENT")
-    assert modes(tool) == ["BLENDER", "dq_sclerp", "BLENDER"]
-
-
-def test_outside_of_the_keys_there_is_no_current_segment(tool):
-    bpy.context.scene.frame_set(50)
-    with pytest.raises(RuntimeError, match="Tool: the playhead is not between two keys"):
-        operators.set_mode(mode="pga_lerp", on="CURRENT")
-
-
 def test_without_selected_keys_nothing_changes(tool):
     select_keys(tool)
     with pytest.raises(RuntimeError, match="Select keys of location, rotation or scale"):
         operators.set_mode(mode="dq_sclerp", on="SELECTED")
     assert modes(tool) == ["BLENDER"] * 3
-
-
-def test_only_objects_with_selected_keys_are_meant_by_selected_keys(tool):
-    other = keyed("Other")
-    select_keys(tool, 1.0)
-    select_keys(other)
-    operators.set_mode(mode="dq_sclerp", on="SELECTED")
-    assert modes(tool) == ["dq_sclerp", "BLENDER", "BLENDER"]
-    assert modes(other) == ["BLENDER"] * 3
 
 
 def test_setting_a_mode_for_the_whole_object_replaces_those_of_its_segments(tool):
@@ -178,15 +127,6 @@ def test_one_that_refuses_is_named_and_the_others_are_done(tool, capfd):
     assert "Stubborn turns by axis and angle" in said
 
 
-def test_where_all_refuse_nothing_has_changed(extension):
-    stubborn = keyed("Stubborn", "AXIS_ANGLE")
-    before = values(stubborn)
-    with pytest.raises(RuntimeError, match="Stubborn turns by axis and angle"):
-        operators.set_mode(mode="dq_sclerp")
-    assert stubborn.rigid_motion.mode == "BLENDER"
-    assert values(stubborn) == before
-
-
 def test_without_a_selection_the_active_object_is_meant(tool):
     tool.select_set(False)
     operators.set_mode(mode="dq_sclerp")
@@ -201,16 +141,6 @@ def test_without_any_object_an_operator_says_why_not(extension, name):
     assert not operator.poll()
     with pytest.raises(RuntimeError, match="Select an object with keys first"):
         operator()
-
-
-def test_clearing_brings_blenders_own_in_betweens_back_and_keeps_the_keys(tool):
-    before = values(tool)
-    select_keys(tool, 1.0, 11.0)
-    operators.set_mode(mode="dq_sclerp", on="SELECTED")
-    assert operators.clear() == {"FINISHED"}
-    assert values(tool) == before
-    bpy.context.scene.frame_set(6)
-    assert tuple(tool.delta_location) == (0.0, 0.0, 0.0)
 
 
 def test_undo_and_redo_take_a_mode_back_and_bring_it_again(tool):
@@ -261,17 +191,6 @@ def test_a_range_that_ends_before_its_start_is_refused(tool):
     assert not is_baked(tool)
 
 
-def test_a_mode_for_many_is_one_verb_and_is_reported_in_one_line(tool, capfd, monkeypatch):
-    calls = []
-    set_mode = animation.set_mode
-    monkeypatch.setattr(animation, "set_mode", lambda *args, **kwargs: calls.append(args) or set_mode(*args, **kwargs))
-    others = [keyed(f"Other {number}") for number in range(3)]
-    operators.set_mode(mode="dq_sclerp")
-    assert len(calls) == 1
-    assert [modes(obj) for obj in (tool, *others)] == [["dq_sclerp"] * 3] * 4
-    assert "4 objects: Screw (Dual Quaternion)" in capfd.readouterr().out
-
-
 def test_selected_keys_that_differ_from_object_to_object_are_each_ones_own(tool):
     other, third = keyed("Other"), keyed("Third")
     for obj, frame in ((tool, 1.0), (other, 11.0), (third, 11.0)):
@@ -312,32 +231,12 @@ def test_buttons_with_nothing_to_do_are_greyed_out_with_the_reason(tool):
     assert "Blender's own in-betweens already" in refusal_of("clear")
 
 
-def test_a_mode_on_a_single_key_can_be_cleared(tool):
-    select_keys(tool, 11.0)
-    operators.set_mode(mode="dq_sclerp", on="SELECTED")
-    assert refusal_of("clear") == refusal_of("bake") == ""
-
-
 def test_a_mode_that_waits_for_keys_can_be_cleared_and_has_nothing_to_bake(extension):
     obj = new_object()
     obj.select_set(True)
     operators.set_mode(mode="dq_sclerp")
     assert refusal_of("clear") == ""
     assert "choose a mode" in refusal_of("bake")
-
-
-def test_two_keys_have_nothing_to_reduce(tool):
-    assert refusal_of("reduce_keys") == ""
-    for fcurve in curves_of(tool).values():
-        for _ in range(2):
-            fcurve.keyframe_points.remove(fcurve.keyframe_points[-1])
-    assert "more than two keys" in refusal_of("reduce_keys")
-
-
-def test_one_object_with_something_to_do_is_enough(tool):
-    operators.set_mode(mode="dq_sclerp")
-    keyed("Other")
-    assert refusal_of("bake") == refusal_of("clear") == ""
 
 
 def recorded(name: str = "Tool", size: float = 1.0) -> bpy.types.Object:
@@ -350,17 +249,6 @@ def recorded(name: str = "Tool", size: float = 1.0) -> bpy.types.Object:
     obj.select_set(True)
     bpy.context.view_layer.objects.active = obj
     return obj
-
-
-def test_reducing_says_what_became_of_the_keys(extension, capfd):
-    obj = recorded()
-    assert operators.reduce_keys(tolerance=0.02, radius=0.5) == {"FINISHED"}
-    reduction = reduction_of(obj)
-    assert reduction.before == 251
-    assert reduction.after == len(key_frames(obj)) < 60
-    said = capfd.readouterr().out
-    assert f"Tool: 251 keys became {reduction.after}, largest error " in said
-    assert set(modes_of(obj, key_frames(obj))) == {"motor_spline"}
 
 
 def test_the_best_mode_of_each_segment_is_said_and_is_one_step_to_undo(extension, capfd):
@@ -378,23 +266,6 @@ def test_the_best_mode_of_each_segment_is_said_and_is_one_step_to_undo(extension
         assert f"{count} {MODES[mode].short_label}" in said
     bpy.ops.ed.undo()
     assert values(bpy.data.objects["Tool"]) == before
-
-
-def test_all_selected_objects_are_reduced_and_one_that_cannot_be_is_named(extension, capfd):
-    obj, other = recorded(), recorded("Other")
-    keyed("Sparse")
-    assert operators.reduce_keys(tolerance=0.02) == {"FINISHED"}
-    assert is_reduced(obj)
-    assert is_reduced(other)
-    assert "Sparse needs its 4 keys to stay within the tolerance: allow a larger one" in capfd.readouterr().out
-
-
-def test_where_no_key_can_be_spared_nothing_has_changed(tool):
-    before = values(tool)
-    with pytest.raises(RuntimeError, match="Tool needs its 4 keys"):
-        operators.reduce_keys()
-    assert values(tool) == before
-    assert not is_reduced(tool)
 
 
 def test_the_tolerance_is_a_millimetre_in_any_unit(extension):
@@ -422,22 +293,6 @@ def test_each_object_has_the_radius_of_its_own_size(extension):
     assert len(key_frames(bpy.data.objects["Large"])) > len(key_frames(bpy.data.objects["Small"]))
 
 
-def test_reducing_is_one_step_to_undo_and_to_redo(extension):
-    obj = recorded()
-    before = values(obj)
-    bpy.ops.ed.undo_push(message="recording")
-    operators.reduce_keys(tolerance=0.02)
-    bpy.ops.ed.undo_push(message="reduction")
-    after = values(obj)
-    assert after != before
-    bpy.ops.ed.undo()
-    assert values(bpy.data.objects["Tool"]) == before
-    assert [action.name for action in bpy.data.actions] == ["ToolAction"]
-    bpy.ops.ed.redo()
-    assert values(bpy.data.objects["Tool"]) == after
-    assert is_reduced(bpy.data.objects["Tool"])
-
-
 def test_reduced_keys_are_restored_or_the_others_discarded(extension):
     obj = recorded()
     before = values(obj)
@@ -454,33 +309,6 @@ def test_reduced_keys_are_restored_or_the_others_discarded(extension):
     assert [action.name for action in bpy.data.actions] == ["ToolAction Reduced"]
 
 
-def test_reduced_keys_that_were_baked_since_come_back_after_un_baking(extension):
-    obj = recorded()
-    operators.reduce_keys(tolerance=0.02)
-    operators.bake()
-    with pytest.raises(RuntimeError, match="These keys were baked since: Un-Bake first"):
-        operators.restore_keys()
-    operators.unbake()
-    operators.restore_keys()
-    assert len(key_frames(obj)) == 251
-
-
-def test_refreshing_makes_up_for_edits_that_were_not_followed(tool):
-    operators.set_mode(mode="dq_sclerp")
-    bpy.context.scene.frame_set(6)
-    before = tuple(tool.delta_location)
-    set_enabled(False)
-    slot = tool.animation_data.action_slot
-    fcurve = tool.animation_data.action.layers[0].strips[0].channelbag(slot).fcurves.find("location", index=0)
-    fcurve.keyframe_points[1].co_ui.y += 3.0
-    fcurve.update()
-    bpy.context.scene.frame_set(6)
-    assert tuple(tool.delta_location) == pytest.approx(before)
-    assert operators.refresh() == {"FINISHED"}
-    bpy.context.scene.frame_set(6)
-    assert tuple(tool.delta_location) != pytest.approx(before)
-
-
 @pytest.mark.parametrize("operator", OPERATORS, ids=lambda operator: operator.bl_idname)
 def test_every_operator_and_property_says_what_it_is_for(extension, operator):
     assert operator.bl_idname.startswith("rigid_motion.")
@@ -495,8 +323,3 @@ def test_every_operator_and_property_says_what_it_is_for(extension, operator):
             assert prop.name, prop.identifier
             assert prop.description, prop.identifier
             assert all(item.description for item in getattr(prop, "enum_items", ())), prop.identifier
-
-
-def test_the_names_of_operators_are_unique():
-    names = [operator.bl_idname for operator in OPERATORS]
-    assert len(set(names)) == len(names)

@@ -11,7 +11,7 @@ from mathutils import Euler, Matrix, Quaternion, Vector
 
 from rigid_motion.animation import bake, set_enabled, set_mode, unbake
 from rigid_motion.ui.notes import facts_and_notes
-from rigid_motion.ui.wording import BAKED, DELTA_EDITED, NO_KEYS, NO_SEGMENT, OUT_OF_DATE, STRIPS
+from rigid_motion.ui.wording import BAKED, DELTA_EDITED, OUT_OF_DATE, STRIPS
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import give_own_deltas, key, new_object
 from tests.ui.conftest import keyed
@@ -36,27 +36,11 @@ def test_of_a_plain_segment_its_facts_are_shown_and_no_more(tool):
     assert segment.distance == pytest.approx(2.0)
 
 
-def test_without_keys_it_says_so(extension):
-    assert notes_on(new_object()) == ([NO_KEYS], None)
-
-
-def test_outside_the_keys_there_is_no_segment(tool):
-    assert notes_on(tool, 50.0) == ([NO_SEGMENT], None)
-
-
 def test_a_refusal_is_shown_with_the_way_out_and_without_a_segment(tool):
     set_mode(tool, "dq_sclerp")
     tool.driver_add("delta_location", 2)
     (text,), mode = notes_on(tool)
     assert "Delta Location Z is driven" in text
-    assert mode is None
-
-
-def test_numbers_that_make_no_motion_are_noted(tool):
-    set_mode(tool, "dq_sclerp")
-    curves_of(tool)["location", 0].keyframe_points[0].co.y = math.nan
-    (text,), mode = notes_on(tool)
-    assert "Tool" in text
     assert mode is None
 
 
@@ -111,15 +95,6 @@ def test_the_transform_on_screen_is_what_the_object_looks_like(extension, order,
         assert shown == pytest.approx(np.array(obj.matrix_basis), abs=1e-5), frame
 
 
-def test_the_transform_on_screen_is_that_of_the_keys_where_there_are_no_in_betweens(tool):
-    bpy.context.scene.frame_set(6)
-    shown = bpy.context.window_manager.rigid_motion_shown
-    set_mode(tool, "dq_sclerp")
-    bpy.context.scene.frame_set(11)
-    assert tuple(shown.location) == pytest.approx(tuple(tool.location))
-    assert tuple(shown.rotation_quaternion) == pytest.approx(tuple(tool.rotation_quaternion))
-
-
 def test_euler_angles_on_screen_are_those_next_to_the_keyed_ones(extension):
     obj = keyed("Tool", "XYZ")
     obj.delta_rotation_euler = (0.0, 0.0, 2.0)
@@ -157,12 +132,6 @@ def test_without_in_betweens_there_is_nothing_to_show_and_no_error(extension, ca
     assert not caplog.records
     bpy.context.view_layer.objects.active = None
     assert tuple(bpy.context.window_manager.rigid_motion_shown.scale) == (1.0, 1.0, 1.0)
-
-
-def test_the_transform_on_screen_is_for_looking_at(tool):
-    set_mode(tool, "dq_sclerp")
-    with pytest.raises(AttributeError, match="read-only"):
-        bpy.context.window_manager.rigid_motion_shown.location = (1.0, 2.0, 3.0)
 
 
 @pytest.mark.parametrize("clear", ["location_clear", "rotation_clear"])

@@ -8,7 +8,6 @@ import pytest
 
 from rigid_motion.animation import key_frames, set_mode
 from rigid_motion.animation.live.follower import show_seen_in_channels
-from rigid_motion.animation.queries.visible_pose import shown_components
 from rigid_motion.animation.transforms import transform_of
 from tests.animation.bones.rigs import Rest, key_all, new_rig, select_only
 from tests.animation.oracle import rotation_path
@@ -72,25 +71,6 @@ def test_a_copied_pose_is_pasted_flipped_as_it_was_seen(rig, extension):
     assert np.abs(seen(rig, "Hand.R") - flipped).max() < 2e-5
     key_pose(rig, "Hand.R")
     assert np.abs(seen(rig, "Hand.R") - flipped).max() < 2e-5
-
-
-def test_a_key_inserted_after_a_copy_has_what_is_seen(rig):
-    copied = seen(rig)
-    bpy.ops.rigid_motion.copy_pose("EXEC_DEFAULT", True)
-    key_pose(rig)
-    assert np.abs(seen(rig) - copied).max() < 2e-5
-
-
-def test_the_channels_have_what_is_seen_until_the_frame_changes(rig, extension):
-    bone = transform_of(rig.pose.bones["Hand.L"])
-    before, shown = bone.components(), shown_components(bone)
-    bpy.ops.rigid_motion.copy_pose("EXEC_DEFAULT", True)
-    assert np.abs(bone.components() - shown).max() < 1e-6
-    assert np.abs(shown_components(bone) - shown).max() < 1e-5
-    extension.scene.frame_set(OTHER)
-    extension.scene.frame_set(BETWEEN)
-    assert np.abs(bone.components() - before).max() < 1e-6
-    assert np.abs(shown_components(bone) - shown).max() < 1e-6
 
 
 def test_an_asset_has_the_pose_that_was_seen(rig, extension):

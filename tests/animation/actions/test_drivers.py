@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import Refused, bake, problem_of, reduce_keys_of, set_mode
+from rigid_motion.animation import bake, problem_of, set_mode
 from tests.animation.bones.rigs import key_all, new_rig
 from tests.animation.oracle import curves_of, shown_worlds, snapshot
 from tests.animation.scenes import key, new_object
@@ -104,27 +104,6 @@ def test_its_motion_is_baked_and_the_driver_stays(live_file):
     assert snapshot(obj)["location", 2] == keyed
     assert np.abs(shown(obj) - before).max() < 1e-5
     assert len(obj.animation_data.drivers) == 1
-
-
-def test_a_key_in_between_leaves_the_keys_of_a_driven_channel_alone(live_file):
-    obj = key(new_object())
-    set_mode(obj, "dq_sclerp")
-    drive(obj, "location", 2)
-    bpy.context.scene.frame_set(15)
-    keyed = snapshot(obj)["location", 2]
-    before = np.array(obj.matrix_world)
-    for path, index in (("location", 0), ("location", 1), ("rotation_quaternion", -1)):
-        obj.keyframe_insert(path, index=index)
-    bpy.context.view_layer.update()
-    assert snapshot(obj)["location", 2] == keyed
-    assert np.abs(np.array(obj.matrix_world) - before).max() < 1e-5
-
-
-def test_few_keys_are_refused_where_a_driver_moves_part_of_it(live_file):
-    obj = key(new_object(), np.arange(1.0, 30.0))
-    drive(obj, "location", 2)
-    with pytest.raises(Refused, match="Location Z is driven"):
-        reduce_keys_of(obj, "dq_sclerp", 0.01, 0.1)
 
 
 def test_a_muted_driver_is_none(live_file):

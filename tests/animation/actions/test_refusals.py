@@ -148,33 +148,6 @@ def test_what_comes_in_the_way_later_gives_blenders_own_motion_and_a_reason(live
     assert_shown([other], PLAYED)
 
 
-def test_nothing_can_be_keyed_where_in_betweens_are(live_file):
-    obj = key(new_object())
-    set_mode(obj, "dq_sclerp")
-    assert not obj.keyframe_insert("delta_location", frame=5)
-    bpy.context.view_layer.update()
-    assert problem_of(obj) == ""
-    assert_shown([obj], PLAYED)
-
-
-@pytest.mark.parametrize("hindrance", ["noise", "all driven", "axis and angle", "cycles in a range"])
-def test_in_betweens_are_back_as_soon_as_nothing_is_in_the_way_any_more(live_file, hindrance):
-    obj = key(new_object())
-    set_mode(obj, "dq_sclerp")
-    HINDRANCES[hindrance][0](obj)
-    bpy.context.view_layer.update()
-    assert problem_of(obj) != ""
-    for fcurve in curves_of(obj).values():
-        for added in list(fcurve.modifiers):
-            fcurve.modifiers.remove(added)
-    for driven in list(obj.animation_data.drivers):
-        obj.driver_remove(driven.data_path, driven.array_index)
-    obj.rotation_mode = "QUATERNION"
-    bpy.context.view_layer.update()
-    assert problem_of(obj) == ""
-    assert_shown([obj], PLAYED)
-
-
 @pytest.mark.parametrize("kind", ["NOISE", "LIMITS", "STEPPED"])
 def test_a_muted_modifier_is_no_hindrance(live_file, kind):
     obj = key(new_object())
@@ -221,14 +194,6 @@ def test_of_objects_that_share_a_slot_and_differ_one_leads_and_the_other_is_told
     assert problem_of(twin) == ""
 
 
-def test_a_mode_for_one_of_two_objects_that_share_a_slot_is_for_both(live_file):
-    obj, twin = twins()
-    set_mode(obj, "dq_sclerp")
-    twin.rigid_motion.mode = "pga_lerp"
-    assert obj.rigid_motion.mode == "pga_lerp"
-    assert_shown([obj, twin], PLAYED)
-
-
 @pytest.fixture
 def library(live_file, tmp_path) -> Path:
     """A file with an object that has the screw mode, one that has none, and where the first is on the frames played."""
@@ -271,22 +236,11 @@ def test_a_linked_object_is_refused_and_keeps_the_in_betweens_of_its_library(lib
     assert_as_in_the_library(obj, library)
 
 
-def test_a_linked_object_without_a_mode_is_refused(library):
-    assert_refused_unchanged(linked(library, "Lid"), "^Lid is linked from another file")
-
-
 def test_an_object_whose_action_is_linked_is_refused(library):
     obj = linked(library, "Door").make_local()
     assert obj.library is None
     assert obj.animation_data.action.library is not None
     assert_refused_unchanged(obj, "^DoorAction is linked from another file: make it local first")
-    refresh()
-    assert_as_in_the_library(obj, library)
-
-
-def test_a_library_override_is_refused_by_the_name_of_its_linked_action(library):
-    obj = linked(library, "Door").override_create(remap_local_usages=True)
-    assert_refused_unchanged(obj, "^DoorAction is linked from another file")
     refresh()
     assert_as_in_the_library(obj, library)
 

@@ -32,12 +32,6 @@ def test_all_users_of_a_slot_are_found_by_their_names(live_file):
     assert names(slots_in([action])) == names(slots_of([owner])) == [(action.name, ["A", "M", "Z"], {None})]
 
 
-def test_objects_in_no_scene_are_users_too(live_file):
-    owner = key(new_object("Tool", "QUATERNION"))
-    use(bpy.data.objects.new("Stored", None), owner)
-    assert [user.name for user in slots_in([owner.animation_data.action])[0].users] == ["Stored", "Tool"]
-
-
 def test_a_strip_makes_its_object_a_user_with_the_frames_that_it_shows(live_file):
     obj = key(new_object("Tool", "QUATERNION"))
     action, slot = obj.animation_data.action, obj.animation_data.action_slot

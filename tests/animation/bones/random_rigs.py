@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from hypothesis import strategies as st
 
 from rigid_motion.animation import write_channel
 from rigid_motion.motion.quaternions import normalise
@@ -59,6 +60,37 @@ class RigCase:
     hold: bool = True
     best_of: bool = False
     tolerance: float = 0.01
+
+
+BONES = st.builds(
+    BoneCase,
+    parent=st.integers(0, 3),
+    seed=st.integers(0, 1 << 20),
+    rotation_mode=st.sampled_from(ROTATION_MODES),
+    inherit_rotation=st.booleans(),
+    inherit_scale=st.sampled_from(INHERIT_SCALES),
+    local_location=st.booleans(),
+    connected=st.booleans(),
+    step=st.sampled_from((1.0, 1.0, 0.8, 2.0, 5.0, 0.0)),
+    location=st.booleans(),
+    scale=st.sampled_from(("", "", "even", "uneven", "negative", "still")),
+    follows=st.sampled_from((*[""] * 8, "DAMPED_TRACK", "IK", "COPY_ROTATION", "LIMIT_ROTATION", "DRIVER")),
+)
+
+RIGS = st.builds(
+    RigCase,
+    bones=st.lists(BONES, min_size=1, max_size=6).map(tuple),
+    seed=st.integers(0, 1 << 20),
+    object_keys=st.booleans(),
+    parented=st.booleans(),
+    size=st.sampled_from(((1.0, 1.0, 1.0), (0.5, 0.5, 0.5), (1.0, 2.0, 0.7))),
+    strip=st.sampled_from((0.0, 0.0, 1.0, 1.5, 2.0)),
+    mode=st.sampled_from(("motor_spline", "lerp_slerp", "dq_sclerp", "cga_lerp")),
+    shared=st.booleans(),
+    hold=st.booleans(),
+    best_of=st.booleans(),
+    tolerance=st.sampled_from((0.003, 0.01, 0.05)),
+)
 
 
 def name_of(number: int) -> str:
@@ -163,43 +195,3 @@ def _move(rig: bpy.types.Object, case: RigCase, random: np.random.Generator) -> 
         strip = data.nla_tracks.new().strips.new("Strip", 1, action)
         strip.action_slot, strip.scale = slot, case.strip
     bpy.context.view_layer.update()
-
-
-def random_case(random: np.random.Generator, *, follows: bool = True) -> RigCase:
-    """A case by NumPy's random numbers, for runs at large; hypothesis makes those of the tests."""
-
-    def some(chance: float) -> bool:
-        return bool(random.random() < chance)
-
-    bones = []
-    for number in range(random.integers(1, 8)):
-        bones.append(
-            BoneCase(
-                parent=int(random.integers(0, min(number, 3) + 1)) if number and some(0.95) else 0,
-                seed=int(random.integers(1 << 30)),
-                rotation_mode=str(random.choice(ROTATION_MODES)) if some(0.5) else "QUATERNION",
-                inherit_rotation=some(0.75),
-                inherit_scale=str(random.choice(INHERIT_SCALES)) if some(0.5) else "FULL",
-                local_location=some(0.75),
-                connected=some(0.3),
-                step=float(random.choice((0.0, 0.8, 1.0, 1.0, 1.0, 2.0, 5.0))),
-                location=some(0.4),
-                scale=str(random.choice(("even", "uneven", "negative", "still"))) if some(0.3) else "",
-                follows=str(random.choice(("DAMPED_TRACK", "IK", "COPY_ROTATION", "LIMIT_ROTATION", "DRIVER")))
-                if follows and some(0.1)
-                else "",
-            )
-        )
-    return RigCase(
-        tuple(bones),
-        seed=int(random.integers(1 << 30)),
-        object_keys=some(0.3),
-        parented=some(0.3),
-        size=tuple(random.uniform(0.5, 2.0, 3).tolist()) if some(0.2) else (1.0, 1.0, 1.0),
-        strip=float(random.choice((1.0, 1.5, 2.0))) if some(0.25) else 0.0,
-        mode=str(random.choice(("motor_spline", "lerp_slerp", "dq_sclerp", "cga_lerp"))),
-        shared=some(0.3),
-        hold=some(0.5),
-        best_of=some(0.2),
-        tolerance=float(random.choice((0.003, 0.01, 0.05))),
-    )

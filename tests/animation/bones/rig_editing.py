@@ -154,18 +154,6 @@ class RigEditing(TakenAway, Editing):
         bags = [bag for bag in channelbags(action) if bag.slot_handle in handles] if handles else ()
         return any(curve.data_path.startswith(f"{bone.path_from_id()}.") for bag in bags for curve in bag.fcurves)
 
-    @staticmethod
-    def _linked(obj: bpy.types.Object) -> tuple:
-        data = obj.animation_data
-        return (None, None) if data is None or data.action is None else (data.action, data.action_slot)
-
-    @staticmethod
-    def _link(obj: bpy.types.Object, action: bpy.types.Action | None, slot: bpy.types.ActionSlot | None) -> None:
-        data = obj.animation_data_create()
-        data.action = action
-        if action is not None:
-            data.action_slot = slot
-
     # What holds all the time
 
     def _motion(self, bone: bpy.types.PoseBone, frames: np.ndarray, how: Callable = expected_bases) -> Motion:

@@ -79,21 +79,6 @@ def test_a_key_edited_far_from_a_mode_that_ends_off_whole_frames_is_followed(liv
     assert refresh() == 0
 
 
-def test_an_edit_of_a_key_off_whole_frames_is_followed(live_file):
-    rig = key_all(new_rig(), OFF_WHOLE_FRAMES)
-    set_mode(list(rig.pose.bones), "dq_sclerp")
-    bpy.context.view_layer.update()
-    for number, (frame, value) in enumerate(((16.4, 0.3), (12.3, 0.1), (12.0, 0.0), (16.6, 0.2))):
-        for bone in rig.pose.bones:
-            for (path, index), fcurve in curves_of(bone).items():
-                if path.endswith("location"):
-                    fcurve.keyframe_points[3].co_ui = frame, value * (index + 1)
-        bpy.context.view_layer.update()
-        errors = largest_error(rig, np.sort([*OFF_WHOLE_FRAMES, frame]))
-        assert max(errors.values()) < 2e-5, (number, errors)
-        assert refresh() == 0
-
-
 def test_more_samples_make_neither_the_action_longer_nor_a_strip(live_file):
     rig = moving_rig()
     bpy.context.view_layer.update()

@@ -8,9 +8,9 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import bake, is_baked, modes_of, problem_of, refresh, set_enabled, set_mode, unbake
+from rigid_motion.animation import bake, is_baked, modes_of, problem_of, refresh, set_mode, unbake
 from rigid_motion.motion import KEYFRAME_MODES
-from tests.animation.bones.poses import assert_posed, assert_same_poses, expected_poses, names_of, shown_poses
+from tests.animation.bones.poses import assert_posed, assert_same_poses, expected_poses, names_of
 from tests.animation.bones.rigs import (
     FRAMES,
     INHERIT_SCALES,
@@ -22,7 +22,6 @@ from tests.animation.bones.rigs import (
 )
 from tests.animation.farm import on_a_farm
 from tests.animation.oracle import curves_of, snapshot
-from tests.animation.scenes import key, new_object
 from tests.thoroughness import sample
 
 PLAY_BONES = """
@@ -101,21 +100,6 @@ def test_what_a_farm_saves_again_comes_back_whole(live_file, tmp_path):
     assert not any(len(pose_bone.constraints) for pose_bone in rig.pose.bones)
 
 
-def test_keys_that_a_farm_edits_are_followed_when_the_extension_is_there_again(live_file, tmp_path):
-    rig = moving_rig()
-    (before,) = shown_poses([rig], PLAYED)
-    edit = """
-for fcurve in bpy.data.actions[0].layers[0].strips[0].channelbags[0].fcurves:
-    if fcurve.data_path == 'pose.bones["Hand"].location':
-        fcurve.keyframe_points[1].co_ui.y += 2.0
-bpy.ops.wm.save_as_mainfile(filepath=found)
-"""
-    on_a_farm(edit, save(tmp_path / "shot.blend"), tmp_path / "farm.blend")
-    rig = reopened(tmp_path / "farm.blend")
-    assert_posed(rig, PLAYED)
-    assert np.abs(shown_poses([rig], PLAYED)[0]["Hand"] - before["Hand"]).max() > 0.5
-
-
 def test_a_bone_that_a_farm_renames_is_followed(live_file, tmp_path):
     moving_rig()
     rename = "bpy.data.armatures[0].bones['Lower'].name = 'Fore'\nbpy.ops.wm.save_as_mainfile(filepath=found)"
@@ -123,17 +107,6 @@ def test_a_bone_that_a_farm_renames_is_followed(live_file, tmp_path):
     rig = reopened(tmp_path / "farm.blend")
     assert modes_of(rig.pose.bones["Fore"], np.array(FRAMES[:1])) == ["dq_sclerp"]
     assert_posed(rig, PLAYED)
-
-
-def test_what_was_not_followed_before_saving_is_caught_up_with_after_loading(live_file, tmp_path):
-    rig = moving_rig()
-    set_enabled(False)
-    try:
-        key_all(rig, seed=5)
-        path = save(tmp_path / "shot.blend")
-    finally:
-        set_enabled(True)
-    assert_posed(reopened(path), PLAYED)
 
 
 def test_baked_bones_play_alike_on_a_farm_and_can_be_un_baked_after_it_saved_the_file(live_file, tmp_path):
@@ -289,11 +262,3 @@ def test_a_rig_is_appended_with_its_modes(library):
     assert_posed(rig, PLAYED)
     set_mode(rig.pose.bones["Hand"], "pga_lerp")
     assert_posed(rig, PLAYED)
-
-
-def test_objects_and_bones_are_undone_with_the_file(live_file, tmp_path):
-    key(new_object())
-    rig = moving_rig()
-    path = save(tmp_path / "shot.blend")
-    set_mode(list(rig.pose.bones), "BLENDER")
-    assert_posed(reopened(path), PLAYED)

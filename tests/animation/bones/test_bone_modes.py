@@ -6,11 +6,10 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import modes_of, problem_of, set_mode
+from rigid_motion.animation import problem_of, set_mode
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import assert_posed, assert_same_poses, expected_poses, shown_poses
 from tests.animation.bones.rigs import (
-    FRAMES,
     INHERIT_SCALES,
     ORDERS,
     PLAYED,
@@ -26,7 +25,6 @@ from tests.animation.bones.rigs import (
     with_edit_bones,
 )
 from tests.animation.oracle import (
-    SMOOTH,
     assert_shown,
     curves_of,
     key_frames,
@@ -96,16 +94,6 @@ def test_below_parents_that_are_scaled_unevenly_bones_move_as_with_real_keys(liv
     assert_same_poses(rig, PLAYED, shown, wanted)
 
 
-@pytest.mark.parametrize("order", sample(ORDERS))
-def test_the_modes_are_to_be_seen(live_file, order):
-    rig = pairs(order, None, "plain")
-    (shown,) = shown_poses([rig], PLAYED)
-    set_mode(list(rig.pose.bones), "BLENDER")
-    (native,) = shown_poses([rig], PLAYED)
-    assert all(np.abs(shown[name] - native[name]).max() > 1e-2 for name in shown), "or these tests say nothing"
-    assert_posed(rig, PLAYED)
-
-
 def test_what_is_only_drawn_or_locked_makes_no_difference(live_file):
     rig = key_all(new_rig(), scale="even")
     shape = new_object("Shape", data=bpy.data.meshes.new("Shape"))
@@ -169,37 +157,6 @@ def test_channels_without_keys_count_as_they_are(live_file, mode, kept, order):
     assert_posed(rig, PLAYED)
 
 
-@pytest.mark.parametrize("order", sample(ORDERS))
-def test_every_key_may_have_a_mode_of_its_own(live_file, order):
-    rig = key_all(new_rig(rotation_mode=order), frames := (1.0, 9.0, 17.0, 25.0, 33.0, 41.0, 49.0, 57.0, 65.0))
-    for place, pose_bone in enumerate(rig.pose.bones):
-        for number, frame in enumerate(frames[:-1]):
-            set_mode(pose_bone, (*MODES, "BLENDER")[(number + 3 * place) % 8], [frame])
-    hand = rig.pose.bones["Hand"]
-    assert modes_of(hand, np.array(frames[:-1])) == [(*MODES, "BLENDER")[(number + 9) % 8] for number in range(8)]
-    assert_posed(rig, np.arange(-2.0, 70.0))
-
-
-def test_the_mode_of_a_bone_can_be_keyed_as_any_property(live_file):
-    rig = moving_rig("dq_sclerp")
-    hand = rig.pose.bones["Hand"]
-    for frame, mode in ((1, "pga_lerp"), (24, "BLENDER")):
-        hand.rigid_motion.mode = mode
-        assert rig.keyframe_insert('pose.bones["Hand"].rigid_motion.mode', frame=frame)
-    bpy.context.view_layer.update()
-    assert modes_of(hand, np.array(FRAMES)) == ["pga_lerp", "pga_lerp", "BLENDER", "BLENDER"]
-    assert_posed(rig, PLAYED)
-
-
-def test_the_mode_of_a_bone_is_chosen_by_its_property(live_file):
-    rig = key_all(new_rig())
-    for pose_bone, mode in zip(rig.pose.bones, MODES, strict=False):
-        pose_bone.rigid_motion.mode = mode
-    bpy.context.view_layer.update()
-    assert [modes_of(bone, np.array(FRAMES[:1])) for bone in rig.pose.bones] == [[mode] for mode in MODES[:4]]
-    assert_posed(rig, PLAYED)
-
-
 @pytest.mark.parametrize("mode", MODES)
 def test_linear_extrapolation_goes_on(live_file, mode):
     rig = key_all(new_rig(), (21.0, 31.0, 44.0, 60.0), interpolation="LINEAR")
@@ -219,18 +176,6 @@ def cyclic(order: str, kind: str, interpolation: str) -> bpy.types.Object:
         fcurve.update()
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = 0, 75
     return rig
-
-
-@pytest.mark.parametrize(("mode", "order"), in_turn([mode for mode in MODES if mode not in SMOOTH], ORDERS))
-def test_a_cycle_repeats_the_motion_of_its_first_round(live_file, mode, order):
-    rig = cyclic(order, "REPEAT", "BEZIER")
-    around = np.arange(76.0)
-    set_mode(list(rig.pose.bones), mode)
-    # On a seam the last pose of one round and the first pose of the next are one frame.
-    around = around[(around - 31.0) % 11.0 != 0.0]
-    first = 31.0 + (around - 31.0) % 11.0
-    (shown,) = shown_poses([rig], around)
-    assert_same_poses(rig, around, shown, expected_poses(rig, first))
 
 
 @pytest.mark.parametrize("order", ["QUATERNION", "YXZ"])
@@ -267,18 +212,6 @@ def test_bones_are_as_exact_where_the_armature_is_scaled_unevenly_moved_and_pare
     assert problem_of(rig) == ""
 
 
-def test_an_armature_and_its_bones_have_modes_in_one_action(live_file):
-    rig = moving_rig("dq_sclerp", "XYZ")
-    rig.rotation_mode = "QUATERNION"
-    key(rig)
-    set_mode([rig, rig.pose.bones["Hand"]], "pga_lerp")
-    assert_posed(rig, PLAYED)
-    assert_shown([rig], PLAYED)
-    set_mode(rig, "BLENDER")
-    assert_posed(rig, PLAYED)
-    assert_shown([rig], PLAYED)
-
-
 def test_objects_and_bones_of_several_rigs_take_a_mode_at_once(live_file):
     rigs, obj = (
         [key_all(new_rig(name, rotation_mode=order)) for name, order in zip("AB", ORDERS[:2], strict=True)],
@@ -290,21 +223,6 @@ def test_objects_and_bones_of_several_rigs_take_a_mode_at_once(live_file):
     assert_shown([obj], PLAYED)
 
 
-@pytest.mark.parametrize("order", sample(ORDERS))
-def test_blenders_own_mode_leaves_nothing_behind(live_file, order):
-    rig = key_all(new_rig(rotation_mode=order))
-    (native,), keys = shown_poses([rig], PLAYED), snapshot(rig)
-    action = rig.animation_data.action
-    slots = [slot.identifier for slot in action.slots]
-    set_mode(list(rig.pose.bones), "dq_sclerp")
-    set_mode(list(rig.pose.bones), "BLENDER")
-    assert snapshot(rig) == keys
-    assert [slot.identifier for slot in action.slots] == slots
-    assert not any(len(bone.constraints) for bone in rig.pose.bones)
-    (shown,) = shown_poses([rig], PLAYED)
-    assert all(np.array_equal(shown[name], native[name]) for name in native)
-
-
 def test_bone_names_may_hold_any_sign(live_file):
     names = ('Hand "left"', "a\\b", "hand.L", "pose.bones[0]", "Ärmel", '"]')
     rest = [Rest(name, (0.2 * i, 0, 1), (0.2 * i, 0.1, 1.2), names[i - 1] if i else "") for i, name in enumerate(names)]
@@ -312,14 +230,6 @@ def test_bone_names_may_hold_any_sign(live_file):
     set_mode(list(rig.pose.bones), "dq_sclerp")
     assert_posed(rig, PLAYED)
     assert {bone.name for bone in rig.pose.bones} == set(names)
-
-
-def test_a_bone_of_a_mode_below_and_above_bones_without(live_file):
-    rig = key_all(new_rig())
-    for bone in rig.pose.bones[1], rig.pose.bones[3]:
-        set_mode(bone, "pga_slerp")
-    assert_posed(rig, PLAYED)
-    assert [len(bone.constraints) for bone in rig.pose.bones] == [0, 1, 0, 1]
 
 
 def test_a_rest_pose_that_is_edited_moves_along(live_file):

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import key_frames, modes_of, problem_of, refresh, set_mode
+from rigid_motion.animation import refresh, set_mode
 from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
 from tests.animation.bones.rigs import (
     ORDERS,
@@ -20,11 +20,10 @@ from tests.animation.bones.rigs import (
     key_wanted,
     moving_rig,
     new_rig,
-    own_constraints,
     twin_of,
 )
 from tests.animation.oracle import curves_of, expected_bases
-from tests.animation.scenes import new_strip, push_down, tweak
+from tests.animation.scenes import new_strip, push_down
 
 KEYS = (1.0, 11.0, 21.0, 41.0)
 ACTION_FRAMES = np.arange(1.0, 42.0)
@@ -66,42 +65,6 @@ def test_a_strip_shows_the_modes_of_its_action(live_file, place, order):
     assert whole.sum() >= 19
     action_frames = since[whole].astype(int)
     assert_at(rig, frames[whole], rows(wanted, 40 - action_frames if reverse else action_frames))
-
-
-def test_before_and_after_a_strip_its_ends_are_held(live_file):
-    rig, wanted = filled()
-    push_down(rig, 101)
-    assert_at(rig, np.array((60.0, 99.0, 145.0, 300.0)), rows(wanted, np.array((0, 0, -1, -1))))
-
-
-def test_where_no_strip_plays_nothing_is_left_of_the_mode(live_file):
-    rig, wanted = filled()
-    twin = twin_of(rig)
-    key_wanted(twin, rig, ACTION_FRAMES)
-    for owner in (rig, twin):
-        push_down(owner, 101, extrapolation="NOTHING")
-    assert_at(rig, ACTION_FRAMES + 100, wanted)
-    outside = np.array((60.0, 99.0, 145.0, 300.0))
-    shown, resting = shown_poses([rig, twin], outside)
-    assert_same_poses(rig, outside, shown, resting)
-
-
-def test_a_strip_may_show_a_part_of_its_action(live_file):
-    rig, wanted = filled()
-    push_down(rig, 51, action_frame_start=6, action_frame_end=30)
-    assert_at(rig, np.arange(51.0, 76.0), rows(wanted, slice(5, 30)))
-
-
-def test_a_mode_is_chosen_for_an_action_that_is_in_a_strip_already(live_file):
-    rig = key_all(new_rig(), KEYS)
-    action = rig.animation_data.action
-    push_down(rig, 101)
-    set_mode(list(rig.pose.bones), "pga_slerp")
-    assert {problem_of(pose_bone) for pose_bone in rig.pose.bones} == {""}
-    rig.animation_data.action = action
-    wanted = expected_poses(rig, ACTION_FRAMES)
-    rig.animation_data.action = None
-    assert_at(rig, ACTION_FRAMES + 100, wanted)
 
 
 def several(
@@ -244,47 +207,6 @@ def test_a_strip_of_less_influence_takes_its_share_of_the_mode(live_file, influe
     assert (influence < 1.0) == bool(np.abs(shown["Hand"] - wanted["Hand"]).max() > 1e-3)
 
 
-def test_an_action_above_the_strips_shows_its_own_mode(live_file):
-    rig, actions, wanted = several("dq_sclerp", "pga_lerp")
-    put_into_strips(rig, actions[:1], (1,))
-    rig.animation_data.action, rig.animation_data.action_slot = actions[1]
-    bpy.context.view_layer.update()
-    assert_at(rig, ACTION_FRAMES, wanted[1])
-    rig.animation_data.action = None
-    bpy.context.view_layer.update()
-    assert_at(rig, ACTION_FRAMES, wanted[0])
-
-
-def test_in_tweak_mode_edits_of_the_strips_action_show_at_once(live_file):
-    rig, _ = filled()
-    strip = push_down(rig, 101)
-    tweak(rig, strip)
-    hand = rig.pose.bones["Hand"]
-    curves_of(hand)["location", 0].keyframe_points[1].co_ui.y += 2.0
-    bpy.context.view_layer.update()
-    assert_at(rig, ACTION_FRAMES + 100, expected_poses(rig, ACTION_FRAMES))
-    set_mode(hand, "lerp_slerp", [11.0])
-    assert modes_of(hand, np.array(KEYS[:3])) == ["dq_sclerp", "lerp_slerp", "dq_sclerp"]
-    wanted = expected_poses(rig, ACTION_FRAMES)
-    assert_at(rig, ACTION_FRAMES + 100, wanted)
-    rig.animation_data.use_tweak_mode = False
-    bpy.context.view_layer.update()
-    assert_at(rig, ACTION_FRAMES + 100, wanted)
-
-
-@pytest.mark.parametrize(("start", "scale"), [(101, 1.0), (31, 2.0)])
-def test_in_tweak_mode_a_key_inserted_in_between_keeps_the_pose_on_the_screen(live_file, start, scale):
-    rig, wanted = filled()
-    strip = push_down(rig, start, scale=scale)
-    tweak(rig, strip)
-    scene_frame = start + int(15 * scale)
-    live_file.scene.frame_set(scene_frame)
-    assert rig.pose.bones["Hand"].keyframe_insert("location")
-    bpy.context.view_layer.update()
-    assert 16.0 in key_frames(rig.pose.bones["Hand"])
-    assert_at(rig, np.array((float(scene_frame),)), rows(wanted, np.array((15,))))
-
-
 def test_a_cyclic_action_repeats_in_its_strip(live_file):
     rig = key_all(new_rig(), KEYS, interpolation="LINEAR")
     for fcurve in curves_of(rig).values():
@@ -297,21 +219,6 @@ def test_a_cyclic_action_repeats_in_its_strip(live_file):
     refresh()
     for start in (200.0, 240.0, 280.0):
         assert_at(rig, start + np.arange(2.0, 41.0), rows(wanted, slice(1, 40)))
-
-
-def test_an_action_that_leaves_its_strip_leaves_nothing(live_file):
-    rig, _ = filled()
-    twin = twin_of(rig)
-    key_wanted(twin, rig, ACTION_FRAMES)
-    for owner in (rig, twin):
-        push_down(owner)
-        live_file.scene.frame_set(1)
-        owner.animation_data.nla_tracks.remove(owner.animation_data.nla_tracks[0])
-    bpy.context.view_layer.update()
-    frames = np.array((1.0, 17.0, 33.0))
-    shown, resting = shown_poses([rig, twin], frames)
-    assert_same_poses(rig, frames, shown, resting)
-    assert not any(own_constraints(rig).values())
 
 
 @pytest.mark.parametrize("name", ["Before", "Zulu"])

@@ -12,7 +12,7 @@ from mathutils import Euler, Matrix, Vector
 
 from rigid_motion import animation
 from rigid_motion.motion import KEYFRAME_MODES
-from tests.animation.bones.rigs import with_edit_bones
+from tests.animation.bones.rigs import in_turn, with_edit_bones
 from tests.animation.oracle import curves_of
 from tests.rigs import scenes
 
@@ -60,8 +60,7 @@ def shown(bones: tuple[bpy.types.PoseBone, ...]) -> list[np.ndarray]:
     return list(np.moveaxis(np.array(rows), 1, 0))
 
 
-@pytest.mark.parametrize("mode", KEYFRAME_MODES)
-@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "YXZ"])
+@pytest.mark.parametrize(("mode", "rotation_mode"), in_turn(KEYFRAME_MODES, ["QUATERNION", "YXZ"]))
 def test_it_goes_as_a_bone_that_is_moved_along_its_own_axes(pair, mode, rotation_mode):
     pose(pair, rotation_mode)
     animation.set_mode(list(pair), mode)

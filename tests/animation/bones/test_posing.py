@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
-import pytest
+from hypothesis import HealthCheck, given, settings
 
 from rigid_motion.animation.baking.channel_maps import evaluated
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion.animation.transforms.posing import Hierarchy
 from rigid_motion.motion.affine import AffineMaps
-from tests.animation.bones.random_rigs import LAST, build, random_case
+from tests.animation.bones.random_rigs import LAST, RIGS, RigCase, build
 from tests.animation.oracle import curves_of
+from tests.blank import blank
 from tests.thoroughness import tried
 
 FRAMES = np.arange(1.0, LAST + 1.0, 3.0)
@@ -34,14 +37,12 @@ def posed_by_blender(rig: bpy.types.Object) -> np.ndarray:
     return np.array(played).swapaxes(0, 1)
 
 
-@pytest.mark.parametrize("seed", range(tried(120)))
-def test_bones_are_where_blender_poses_them(empty_file, seed):
-    rig = build(random_case(np.random.default_rng(seed), follows=False))
-    if rig.animation_data is not None:
-        while rig.animation_data.nla_tracks:
-            action = rig.animation_data.nla_tracks[0].strips[0].action
-            rig.animation_data.nla_tracks.remove(rig.animation_data.nla_tracks[0])
-            rig.animation_data.action = action
+@settings(max_examples=tried(120), suppress_health_check=[HealthCheck.too_slow])
+@given(case=RIGS)
+def test_bones_are_where_blender_poses_them(case: RigCase):
+    blank()
+    bones = tuple(replace(bone, follows="") for bone in case.bones)
+    rig = build(replace(case, bones=bones, strip=0.0))
     posed, truth = Hierarchy(rig.pose.bones).posed(channel_maps(rig)), posed_by_blender(rig)
     size = max(1.0, np.abs(truth).max())
     np.testing.assert_allclose(posed.origins, truth[..., :3, 3], rtol=0.0, atol=1e-5 * size)

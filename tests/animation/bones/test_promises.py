@@ -13,7 +13,6 @@ import bpy
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 from rigid_motion import animation
 from rigid_motion.animation import Refused, reduce_keys_of, total_reduction
@@ -21,43 +20,12 @@ from rigid_motion.animation.baking.followers import not_promised
 from rigid_motion.animation.queries.polls import with_more_keys_than
 from rigid_motion.animation.transforms import transform_of
 from tests.animation.bones.players import Player
-from tests.animation.bones.random_rigs import LAST, ROTATION_MODES, BoneCase, RigCase, build
-from tests.animation.bones.rigs import INHERIT_SCALES
+from tests.animation.bones.random_rigs import LAST, RIGS, RigCase, build
 from tests.blank import blank
 from tests.thoroughness import tried
 
 ROUNDING = 2e-5
 """Single precision, relative to the size of a rig of about a metre, through its bones."""
-
-BONES = st.builds(
-    BoneCase,
-    parent=st.integers(0, 3),
-    seed=st.integers(0, 1 << 20),
-    rotation_mode=st.sampled_from(ROTATION_MODES),
-    inherit_rotation=st.booleans(),
-    inherit_scale=st.sampled_from(INHERIT_SCALES),
-    local_location=st.booleans(),
-    connected=st.booleans(),
-    step=st.sampled_from((1.0, 1.0, 0.8, 2.0, 5.0, 0.0)),
-    location=st.booleans(),
-    scale=st.sampled_from(("", "", "even", "uneven", "negative", "still")),
-    follows=st.sampled_from((*[""] * 8, "DAMPED_TRACK", "IK", "COPY_ROTATION", "LIMIT_ROTATION", "DRIVER")),
-)
-
-RIGS = st.builds(
-    RigCase,
-    bones=st.lists(BONES, min_size=1, max_size=6).map(tuple),
-    seed=st.integers(0, 1 << 20),
-    object_keys=st.booleans(),
-    parented=st.booleans(),
-    size=st.sampled_from(((1.0, 1.0, 1.0), (0.5, 0.5, 0.5), (1.0, 2.0, 0.7))),
-    strip=st.sampled_from((0.0, 0.0, 1.0, 1.5, 2.0)),
-    mode=st.sampled_from(("motor_spline", "lerp_slerp", "dq_sclerp", "cga_lerp")),
-    shared=st.booleans(),
-    hold=st.booleans(),
-    best_of=st.booleans(),
-    tolerance=st.sampled_from((0.003, 0.01, 0.05)),
-)
 
 
 @pytest.fixture(scope="module")

@@ -173,25 +173,6 @@ def test_a_mode_that_is_set_right_after_names_were_swapped_leaves_the_other_bone
         assert_posed(rig, PLAYED)
 
 
-def test_names_that_are_swapped_and_swapped_back_by_undo_have_their_modes_each_time(live_file):
-    rig = rig_of_two_modes()
-    name, before = rig.name, shown_poses([rig], PLAYED)[0]
-    bpy.ops.ed.undo_push(message="Modes")
-    swap_two(rig)
-    bpy.context.view_layer.update()
-    bpy.ops.ed.undo_push(message="Swap")
-    for turn, modes in (
-        (bpy.ops.ed.undo, {"Upper": "dq_sclerp", "Lower": "pga_lerp"}),
-        (bpy.ops.ed.redo, {"Lower": "dq_sclerp", "Upper": "pga_lerp"}),
-        (bpy.ops.ed.undo, {"Upper": "dq_sclerp", "Lower": "pga_lerp"}),
-    ):
-        assert turn() == {"FINISHED"}
-        rig = bpy.data.objects[name]
-        assert modes_in(rig) == modes
-        assert_posed(rig, PLAYED)
-    assert_same_poses(rig, PLAYED, shown_poses([rig], PLAYED)[0], before)
-
-
 def test_names_swapped_in_a_rig_that_is_duplicated_linked_are_swapped_in_both(live_file):
     rig = rig_of_two_modes()
     copy = rig.copy()
@@ -259,26 +240,6 @@ def test_names_swapped_while_an_action_is_not_used_leave_its_modes_with_its_keys
     assert_posed(rig, PLAYED)
 
 
-@pytest.mark.parametrize("original", ["stays", "is renamed"])
-def test_a_copy_of_a_bone_has_no_mode_and_leaves_the_original_its_own(live_file, original):
-    rig = rig_of_two_modes()
-    select_only(rig)
-    bpy.ops.object.mode_set(mode="EDIT")
-    for bone in rig.data.edit_bones:
-        bone.select = bone.select_head = bone.select_tail = bone.name == "Lower"
-    bpy.ops.armature.duplicate()
-    bpy.ops.object.mode_set(mode="OBJECT")
-    assert "Lower.001" in rig.pose.bones
-    if original == "is renamed":
-        make_lower_fore(rig)
-    bpy.context.view_layer.update()
-    assert modes_in(rig) == {"Upper": "dq_sclerp", "Lower" if original == "stays" else "Fore": "pga_lerp"}
-    assert_posed(rig, PLAYED)
-    rig.data.bones["Lower.001"].name = "Copy"
-    bpy.context.view_layer.update()
-    assert modes_in(rig) == {"Upper": "dq_sclerp", "Lower" if original == "stays" else "Fore": "pga_lerp"}
-
-
 def test_a_bone_that_takes_the_name_of_one_deleted_just_now_keeps_its_mode(live_file):
     rig = rig_of_two_modes(location=False)
 
@@ -300,19 +261,6 @@ def test_rigs_of_a_version_that_kept_no_names_of_bones_have_the_modes_they_had(l
     swap_two(rig)
     bpy.context.view_layer.update()
     assert modes_in(rig) == {"Lower": "dq_sclerp", "Upper": "pga_lerp"}
-    assert_posed(rig, PLAYED)
-
-
-@pytest.mark.parametrize("deleted", ["Hand", "Lower", "Body"])
-def test_a_bone_that_is_deleted_takes_its_in_betweens_along(live_file, deleted):
-    rig = moving_rig()
-    with_edit_bones(rig, lambda edit_bones: edit_bones.remove(edit_bones[deleted]))
-    bpy.context.view_layer.update()
-    refresh()
-    assert_posed(rig, PLAYED)
-    assert deleted not in {name for held in own_constraints(rig) for name in (held,)}
-    curves_of(rig.pose.bones["Upper"])["location", 0].keyframe_points[1].co_ui.y += 1.0
-    bpy.context.view_layer.update()
     assert_posed(rig, PLAYED)
 
 
@@ -346,149 +294,6 @@ def test_armatures_that_are_joined_move_on(live_file, second):
     assert_posed(rig, PLAYED, [rest.name for rest in ARM])
     # Blender leaves the keys of what is joined behind: those bones rest, without in-betweens.
     assert_posed(rig, PLAYED)
-
-
-@pytest.mark.parametrize("action", ["linked", "copied"])
-def test_a_copy_of_a_rig_moves_alike_and_goes_its_own_way(live_file, action):
-    rig = moving_rig()
-    copy = rig.copy()
-    copy.name = "Copy"
-    live_file.scene.collection.objects.link(copy)
-    if action == "copied":
-        copy.animation_data.action = rig.animation_data.action.copy()
-    bpy.context.view_layer.update()
-    assert_posed(rig, PLAYED)
-    assert_posed(copy, PLAYED)
-    curves_of(copy.pose.bones["Hand"])["location", 0].keyframe_points[1].co_ui.y += 1.0
-    bpy.context.view_layer.update()
-    assert_posed(rig, PLAYED)
-    assert_posed(copy, PLAYED)
-    set_mode(list(copy.pose.bones), "pga_lerp")
-    assert modes_of(rig.pose.bones["Hand"], np.array(FRAMES[:1])) == ["pga_lerp" if action == "linked" else "dq_sclerp"]
-    assert_posed(rig, PLAYED)
-    assert_posed(copy, PLAYED)
-    bpy.data.objects.remove(rig)
-    bpy.context.view_layer.update()
-    assert_posed(copy, PLAYED)
-    set_mode(list(copy.pose.bones), "BLENDER")
-    assert_posed(copy, PLAYED)
-    assert not any(own_constraints(copy).values())
-
-
-@pytest.mark.parametrize("linked", [True, False])
-def test_a_rig_is_duplicated_as_in_the_window(live_file, linked):
-    rig = moving_rig()
-    select_only(rig)
-    bpy.ops.object.duplicate(linked=linked)
-    copy = live_file.view_layer.objects.active
-    assert copy != rig
-    bpy.context.view_layer.update()
-    assert_posed(rig, PLAYED)
-    assert_posed(copy, PLAYED)
-    set_mode(list(rig.pose.bones), "BLENDER")
-    assert_posed(rig, PLAYED)
-    assert_posed(copy, PLAYED)
-
-
-@pytest.mark.parametrize("first", ["the mode", "the second rig"])
-def test_rigs_that_share_an_action_share_its_modes(live_file, first):
-    rig = key_all(new_rig("One"))
-    other_rests = [
-        Rest(rest.name, rest.head[::-1], rest.tail[::-1], rest.parent, 0.3 * place) for place, rest in enumerate(ARM)
-    ]
-    if first == "the mode":
-        set_mode(list(rig.pose.bones), "dq_sclerp")
-    other = new_rig("Two", other_rests)
-    other.animation_data_create().action = rig.animation_data.action
-    other.animation_data.action_slot = rig.animation_data.action_slot
-    bpy.context.view_layer.update()
-    if first != "the mode":
-        set_mode(list(rig.pose.bones), "dq_sclerp")
-        bpy.context.view_layer.update()
-    assert_posed(rig, PLAYED)
-    assert_posed(other, PLAYED)
-    set_mode(other.pose.bones["Hand"], "pga_lerp")
-    assert_posed(rig, PLAYED)
-    assert_posed(other, PLAYED)
-    other.animation_data.action = None
-    bpy.context.view_layer.update()
-    assert_posed(rig, PLAYED)
-    set_mode(list(rig.pose.bones), "BLENDER")
-    assert_posed(rig, PLAYED)
-
-
-def two_actions(*modes: str) -> tuple[bpy.types.Object, list[bpy.types.Action]]:
-    """A rig with two Actions, of which it has the second, each with a mode on all bones."""
-    rig, actions = new_rig(), []
-    for seed, mode in enumerate(modes):
-        rig.animation_data_create().action = None
-        key_all(rig, seed=seed)
-        set_mode(list(rig.pose.bones), mode, FRAMES)
-        actions.append(rig.animation_data.action)
-        actions[-1].use_fake_user = True
-    return rig, actions
-
-
-@pytest.mark.parametrize("modes", [("dq_sclerp", "pga_lerp"), ("dq_sclerp", "BLENDER"), ("motor_spline", "dq_sclerp")])
-def test_each_action_that_a_rig_switches_to_shows_its_own_modes(live_file, modes):
-    rig, actions = two_actions(*modes)
-    for action, mode in zip(actions * 2, modes * 2, strict=True):
-        rig.animation_data.action, rig.animation_data.action_slot = action, action.slots[0]
-        bpy.context.view_layer.update()
-        assert modes_of(rig.pose.bones["Hand"], np.array(FRAMES[:3])) == [mode] * 3
-        assert {problem_of(pose_bone) for pose_bone in rig.pose.bones} == {""}
-        assert_posed(rig, PLAYED)
-
-
-def test_an_action_that_is_unlinked_leaves_nothing_of_its_modes(live_file):
-    rig = moving_rig()
-    action = rig.animation_data.action
-    action.use_fake_user = True
-    live_file.scene.frame_set(17)
-    rig.animation_data.action = None
-    bpy.context.view_layer.update()
-    assert_posed(rig, PLAYED)
-    rig.animation_data.action, rig.animation_data.action_slot = action, action.slots[0]
-    bpy.context.view_layer.update()
-    assert_posed(rig, PLAYED)
-
-
-def test_an_action_that_is_deleted_leaves_nothing(live_file):
-    rig = moving_rig()
-    live_file.scene.frame_set(17)
-    bpy.data.actions.remove(rig.animation_data.action)
-    bpy.context.view_layer.update()
-    refresh()
-    assert_posed(rig, PLAYED)
-    assert not any(own_constraints(rig).values())
-    key_all(rig, seed=4)
-    set_mode(list(rig.pose.bones), "dq_sclerp")
-    assert_posed(rig, PLAYED)
-
-
-def test_all_animation_that_is_cleared_leaves_nothing(live_file):
-    rig = moving_rig()
-    live_file.scene.frame_set(17)
-    rig.animation_data_clear()
-    bpy.context.view_layer.update()
-    refresh()
-    assert_posed(rig, PLAYED)
-
-
-def test_a_copy_of_an_action_has_its_modes_and_its_own_keys(live_file):
-    rig = moving_rig()
-    action = rig.animation_data.action
-    copy = action.copy()
-    rig.animation_data.action = copy
-    bpy.context.view_layer.update()
-    assert_posed(rig, PLAYED)
-    curves_of(rig.pose.bones["Hand"])["location", 0].keyframe_points[1].co_ui.y += 1.0
-    bpy.context.view_layer.update()
-    assert_posed(rig, PLAYED)
-    bpy.data.actions.remove(action)
-    bpy.context.view_layer.update()
-    assert_posed(rig, PLAYED)
-    assert {c.action for held in own_constraints(rig).values() for c in held} == {copy}
 
 
 def test_another_slot_of_the_same_action_shows_its_own_modes(live_file):

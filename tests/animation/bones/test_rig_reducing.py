@@ -15,11 +15,11 @@ from rigid_motion.animation import (
     reduce_keys_of,
     reduction_of,
     restore_keys,
-    set_mode,
     total_reduction,
     write_channel,
 )
 from rigid_motion.ui.wording import reduction_summary
+from tests.animation.bones.rigs import in_turn
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import new_object
 from tests.balls import largest_displacements
@@ -51,10 +51,9 @@ def errors(rig: bpy.types.Object, truth: dict[str, np.ndarray]) -> dict[str, flo
     return {name: float(largest(rows, truth[name]).max()) for name, rows in matrices(rig).items()}
 
 
-@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XZY"])
 @pytest.mark.parametrize("best_of", [False, True])
 @pytest.mark.parametrize("shared", [False, True])
-@pytest.mark.parametrize("mode", ["motor_spline", "lerp_slerp"])
+@pytest.mark.parametrize(("mode", "rotation_mode"), in_turn(["motor_spline", "lerp_slerp"], ["QUATERNION", "XZY"]))
 def test_no_bone_gets_further_off_than_the_tolerance(live_file, mode, shared, best_of, rotation_mode):
     rig = recorded_rig(rotation_mode)
     truth = matrices(rig)
@@ -75,8 +74,7 @@ def test_no_bone_gets_further_off_than_the_tolerance(live_file, mode, shared, be
 
 
 @pytest.mark.parametrize("best_of", [False, True])
-@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XZY"])
-@pytest.mark.parametrize("count", [4, 12])
+@pytest.mark.parametrize(("count", "rotation_mode"), in_turn([4, 12], ["QUATERNION", "XZY"]))
 def test_so_many_key_poses_are_shared_by_all_bones_and_their_error_is_what_is_said(
     live_file, count, rotation_mode, best_of
 ):
@@ -121,17 +119,6 @@ def test_more_keys_in_all_channels_than_before_are_no_secret(live_file):
     assert f"but channels have {has} keys together, and had {had}" in said
 
 
-def test_own_keys_are_fewer_than_key_poses_and_key_poses_are_on_fewer_frames(live_file):
-    counts, frames = {}, {}
-    for shared in (False, True):
-        rig = recorded_rig()
-        reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS, shared=shared)
-        total = total_reduction(bones(rig))
-        counts[shared], frames[shared] = total.after, total.rig.frames
-    assert counts[False] < counts[True]
-    assert frames[True] < frames[False]
-
-
 def test_what_hangs_on_a_target_keeps_its_own_keys_and_to_the_tolerance(live_file):
     rig = recorded_rig()
     truth = matrices(rig)
@@ -153,22 +140,6 @@ def test_what_hangs_on_a_target_keeps_its_own_keys_and_to_the_tolerance(live_fil
     assert len(key_frames(alone.pose.bones["Spine"])) < together
 
 
-@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XZY"])
-def test_what_rests_in_another_pose_with_one_key_is_measured_as_it_is_shown(live_file, rotation_mode):
-    rig = recorded_rig(rotation_mode, still=("Arm.L",))
-    arm = rig.pose.bones["Arm.L"]
-    path = "rotation_quaternion" if rotation_mode == "QUATERNION" else "rotation_euler"
-    turn = (0.8, 0.0, 0.6, 0.0) if rotation_mode == "QUATERNION" else (0.7, -0.4, 1.1)
-    write_channel(rig, arm.path_from_id(path), FRAMES, np.tile(turn, (len(FRAMES), 1)))
-    truth = matrices(rig)
-    reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS)
-    assert len(key_frames(arm)) == 1
-    off = errors(rig, truth)
-    assert max(off.values()) <= TOLERANCE * (1.0 + 1e-4)
-    for bone in bones(rig):
-        assert reduction_of(bone).largest_error == pytest.approx(off[bone.name], abs=2e-6)
-
-
 def test_a_bone_that_hardly_moves_is_left_with_one_key(live_file):
     rig = recorded_rig(still=("Head",))
     turns = np.tile((1.0, 0.0, 0.0, 0.0), (len(FRAMES), 1))
@@ -178,19 +149,6 @@ def test_a_bone_that_hardly_moves_is_left_with_one_key(live_file):
     reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS)
     assert len(key_frames(rig.pose.bones["Head"])) == 1
     assert max(errors(rig, truth).values()) <= TOLERANCE * (1.0 + 1e-4)
-
-
-def test_everything_comes_back(live_file):
-    rig = recorded_rig()
-    action, truth = rig.animation_data.action, matrices(rig)
-    set_mode(bones(rig, "Arm.L"), "dq_sclerp")
-    truth = matrices(rig)
-    reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS, shared=True)
-    assert all(map(is_reduced, bones(rig)))
-    restore_keys(bones(rig))
-    assert rig.animation_data.action == action
-    assert total_reduction(bones(rig)) is None
-    assert all(np.array_equal(rows, truth[name]) for name, rows in matrices(rig).items())
 
 
 @pytest.mark.parametrize("size", [0.01, 100.0])
@@ -208,35 +166,6 @@ def test_the_tolerance_is_one_of_the_scene_also_for_a_rig_in_other_units(live_fi
         now = np.concatenate((shown[name][:, :3, :3] / size, shown[name][:, :3, 3:]), axis=2)
         assert largest(now, rows, RADIUS * size).max() <= TOLERANCE * size * (1.0 + 1e-3)
     assert total_reduction(bones(rig)).after < 0.6 * len(NAMES) * len(FRAMES)
-
-
-@pytest.mark.parametrize("setting", ["no rotation", "no scale", "global location", "connected", "scaled"])
-def test_bones_that_inherit_otherwise_keep_to_it_too(live_file, setting):
-    """Each begins a chain of its own where its parent's error is no part of its own."""
-    rig = recorded_rig()
-    bone = rig.data.bones["Arm.L"]
-    if setting == "no rotation":
-        bone.use_inherit_rotation = False
-    elif setting == "global location":
-        bone.use_local_location = False
-        write_channel(rig, 'pose.bones["Arm.L"].location', FRAMES, 0.1 * np.sin(0.1 * FRAMES[:, None] * (1, 2, 3)))
-    elif setting == "connected":
-        bpy.context.view_layer.objects.active = rig
-        bpy.ops.object.mode_set(mode="EDIT")
-        rig.data.edit_bones["Arm.L"].use_connect = True
-        bpy.ops.object.mode_set(mode="OBJECT")
-    else:
-        bone.inherit_scale = "NONE" if setting == "no scale" else "FULL"
-        write_channel(
-            rig, 'pose.bones["Spine"].scale', FRAMES, np.repeat(1.2 + 0.2 * np.sin(0.1 * FRAMES)[:, None], 3, 1)
-        )
-    truth = matrices(rig)
-    reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS)
-    off = errors(rig, truth)
-    for name, error in off.items():
-        # What begins a chain of its own is still carried by its parent, which is off by no more.
-        own_chain = setting in ("no rotation", "no scale") and name in ("Arm.L", "Hand.L")
-        assert error <= (2.0 if own_chain else 1.0 + 1e-3) * TOLERANCE, name
 
 
 @pytest.mark.parametrize("carried", [False, True])
@@ -272,19 +201,6 @@ def test_a_foot_that_stands_is_held(live_file, carried):
             assert np.linalg.norm(places - places[0], axis=1).max() == pytest.approx(slide, abs=1e-5)
         restore_keys(every)
     assert slides[True] < 0.6 * slides[False]
-
-
-def test_a_rig_that_is_a_strip_is_reduced(live_file):
-    rig = recorded_rig()
-    data = rig.animation_data
-    track = data.nla_tracks.new()
-    strip = track.strips.new("Strip", 1, data.action)
-    strip.action_slot = data.action_slot
-    data.action = None
-    truth = matrices(rig)
-    reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS)
-    assert max(errors(rig, truth).values()) <= TOLERANCE * (1.0 + 1e-3)
-    assert strip.action.name.endswith("Reduced")
 
 
 def test_bones_that_cannot_be_reduced_say_so_and_the_others_are(live_file):

@@ -11,7 +11,7 @@ import pytest
 from mathutils import Matrix
 
 from rigid_motion.animation import key_frames, set_mode
-from tests.animation.bones.rigs import key_all, key_bone, new_rig, select_only
+from tests.animation.bones.rigs import key_all, new_rig, select_only
 from tests.animation.oracle import curves_of, rotation_path
 
 BETWEEN = 15
@@ -75,25 +75,6 @@ def test_the_visual_transform_applied_leaves_bones_where_they_are(rig, live_file
     assert np.abs(placed(rig) - seen).max() < 2e-5
 
 
-def test_the_visual_transform_applied_is_given_up_with_the_frame(rig, live_file):
-    seen = placed(rig)
-    apply_visual_transform(rig)
-    live_file.scene.frame_set(BETWEEN + 1)
-    live_file.scene.frame_set(BETWEEN)
-    assert np.abs(placed(rig) - seen).max() < 1e-6
-
-
-def test_of_bones_that_only_turn_the_visual_transform_leaves_them_where_they_are(live_file):
-    rig = new_rig(rotation_mode="XYZ")
-    for bone in rig.pose.bones:
-        key_bone(bone, location=False)
-    set_mode(list(rig.pose.bones), "dq_sclerp")
-    live_file.scene.frame_set(BETWEEN)
-    seen = placed(posing(rig))
-    apply_visual_transform(rig)
-    assert np.abs(placed(rig) - seen).max() < 2e-5
-
-
 def test_the_visual_transform_below_another_constraint_is_kept_when_that_is_removed(rig):
     hand = rig.pose.bones["Hand"]
     limit = hand.constraints.new("LIMIT_LOCATION")
@@ -122,13 +103,6 @@ def test_a_bone_that_is_moved_on_by_hand_is_keyed_where_it_is(rig):
     seen = placed(rig)
     insert_keys(rig)
     assert np.abs(placed(rig) - seen).max() < 2e-5
-
-
-def test_a_single_property_is_moved_on_from_what_is_seen(rig):
-    before = placed(rig)
-    rig.pose.bones["Body"].location.y += 0.01
-    moved = placed(rig)[0] - before[0]
-    assert 0.001 < np.abs(moved).max() < 0.011
 
 
 @pytest.mark.parametrize("keyed", ["at once", "later"])

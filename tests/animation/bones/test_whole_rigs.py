@@ -7,7 +7,7 @@ from collections.abc import Callable
 import bpy
 import pytest
 
-from rigid_motion.animation import bake, set_mode, unbake
+from rigid_motion.animation import bake, set_mode
 from rigid_motion.animation.actions import slots
 from tests.animation.bones.rigs import Rest, key_all, new_rig
 from tests.animation.scenes import push_down
@@ -30,20 +30,8 @@ def clearing(rig: bpy.types.Object) -> Edit:
     return lambda: set_mode(list(rig.pose.bones), "BLENDER")
 
 
-def clearing_beside_a_strip(rig: bpy.types.Object) -> Edit:
-    making_a_strip(rig)()
-    bpy.context.view_layer.update()
-    return clearing(rig)
-
-
 def baking(rig: bpy.types.Object) -> Edit:
     return lambda: bake(list(rig.pose.bones))
-
-
-def un_baking(rig: bpy.types.Object) -> Edit:
-    baking(rig)()
-    bpy.context.view_layer.update()
-    return lambda: unbake(list(rig.pose.bones))
 
 
 def inserting(rig: bpy.types.Object) -> Edit:
@@ -69,7 +57,7 @@ def making_a_strip(rig: bpy.types.Object) -> Edit:
 
 @pytest.mark.parametrize(
     "prepared",
-    [clearing, clearing_beside_a_strip, baking, un_baking, inserting, making_a_strip],
+    [clearing, baking, inserting, making_a_strip],
     ids=lambda p: p.__name__,
 )
 def test_f_curves_are_looked_through_as_often_for_many_bones_as_for_few(live_file, monkeypatch, prepared):

@@ -11,7 +11,7 @@ from rigid_motion.animation.actions.reading import keyed_in
 from rigid_motion.animation.actions.slots import slot_transforms_of
 from rigid_motion.animation.compute.differences import in_betweens
 from rigid_motion.animation.transforms import transform_of
-from tests.animation.bones.rigs import new_rig
+from tests.animation.bones.rigs import in_turn
 from tests.animation.oracle import curves_of, matrices, shown_worlds
 from tests.animation.scenes import new_object
 
@@ -68,8 +68,7 @@ def speeds(obj, frame: float, step: float = 0.02) -> tuple[np.ndarray, np.ndarra
     return before, after
 
 
-@pytest.mark.parametrize("easing", ["AUTO", "EASE_IN", "EASE_IN_OUT"])
-@pytest.mark.parametrize("interpolation", INTERPOLATIONS)
+@pytest.mark.parametrize(("interpolation", "easing"), in_turn(INTERPOLATIONS, ["AUTO", "EASE_IN", "EASE_IN_OUT"]))
 def test_between_two_keys_it_is_the_screw_with_its_easing(live_file, interpolation, easing):
     obj = keyed((1.0, 25.0), interpolation=interpolation)
     for point in points(obj):
@@ -77,18 +76,6 @@ def test_between_two_keys_it_is_the_screw_with_its_easing(live_file, interpolati
     frames = np.arange(-3.0, 30.0)
     difference = worlds(obj, "motor_spline", frames) - worlds(obj, "dq_sclerp", frames)
     assert np.abs(difference).max() < 1e-5
-
-
-@pytest.mark.parametrize("factor", [0.0, 0.4, 2.5, 40.0])
-def test_handles_that_are_pulled_ease_it_as_they_do_the_screw(live_file, factor):
-    obj = keyed((1.0, 25.0))
-    for point in points(obj):
-        point.handle_left_type = point.handle_right_type = "FREE"
-        point.handle_right.y += factor * 0.1
-        point.handle_left.x -= 3.0
-    frames = np.arange(1.0, 26.0)
-    screw = worlds(obj, "dq_sclerp", frames)
-    assert np.abs(worlds(obj, "motor_spline", frames) - screw).max() < 1e-5
 
 
 def test_it_starts_and_stops_gently_by_default(live_file):
@@ -144,16 +131,3 @@ def test_nothing_swings_beside_a_change_of_space(live_file, interpolation):
     frames = np.arange(1.0, 41.0)
     difference = worlds(obj, "motor_spline", frames) - worlds(obj, "dq_sclerp", frames)
     assert np.abs(difference).max() < 1e-5
-
-
-def test_bones_ease_likewise(live_file):
-    rig = new_rig()
-    hand = rig.pose.bones["Hand"]
-    hand.rotation_mode = "QUATERNION"
-    keyed((1.0, 25.0), [((0.0, 0.0, 0.0), POSES[0][1]), ((0.1, 0.2, 0.0), POSES[1][1])], carrier=hand)
-    shown = {}
-    for mode in ("dq_sclerp", "motor_spline"):
-        set_mode(hand, mode)
-        bpy.context.scene.frame_set(7)
-        shown[mode] = np.array(rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones["Hand"].matrix)
-    assert np.abs(shown["dq_sclerp"] - shown["motor_spline"]).max() < 1e-5

@@ -102,23 +102,6 @@ def test_a_curve_without_keys_is_0_as_in_blender():
         assert evaluate_one(read_one(fcurve), np.array([-1.0, 7.0])).tolist() == [0.0, 0.0]
 
 
-def test_automatic_handles_have_blenders_values_on_a_thousand_frames():
-    random = np.random.default_rng(5)
-    with as_fcurve(keys_of(np.linspace(1, 1000, 10).round(), random.normal(size=10), "BEZIER")) as fcurve:
-        for key in fcurve.keyframe_points:
-            key.handle_left_type = key.handle_right_type = "AUTO_CLAMPED"
-        fcurve.update()
-        frames = np.arange(1.0, 1001.0)
-        found = evaluate_one(read_one(fcurve), frames)
-        expected = [fcurve.evaluate(frame) for frame in frames.tolist()]
-    np.testing.assert_allclose(found, expected, rtol=0.0, atol=3e-6)
-
-
-def test_nothing_to_evaluate_gives_nothing():
-    assert evaluate([], []) == []
-    assert evaluate([keys_of((1, 2), (3, 4))], [np.empty(0)])[0].shape == (1, 0)
-
-
 anything = st.sampled_from((np.nan, np.inf, -np.inf, 3e38, -3e38, 1e-40, 0.0, 1.0, 2.0, 7.0))
 
 

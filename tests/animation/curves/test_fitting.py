@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation.curves.fitting import fit_together
-from rigid_motion.animation.curves.solvers import bezier_cubics, solve_cubics
 
 TIMES = np.linspace(0.0, 1.0, 41)
 
@@ -63,17 +62,3 @@ def test_what_no_single_segment_is_can_be_the_mean_of_several():
         mean = sum(share * values_of(each, TIMES) for share, each in zip(new, found, strict=True))
         errors.append(np.abs(mean - values).max())
     assert max(errors) < 2e-4
-
-
-def test_a_part_of_a_segment_has_the_handles_of_de_casteljau():
-    """The same that Blender sets where it inserts a key on an F-curve."""
-    points = np.array(((0.0, 0.0), (0.2, 0.9), (0.7, 0.3), (1.0, 1.0)))
-    t = 0.4
-    q = points[:-1] + t * np.diff(points, axis=0)
-    r = q[:-1] + t * np.diff(q, axis=0)
-    end = r[0] + t * (r[1] - r[0])
-    cubic = bezier_cubics(*(point[None].astype(np.float32) for point in points))[:, 0]
-    parameters = solve_cubics(TIMES * end[0], np.repeat(cubic[:, :1], len(TIMES), axis=1))
-    values = cubic[:, 1] @ np.stack((parameters, parameters**2, parameters**3)) / end[1]
-    found = fit_together(TIMES, values, np.array((1.0,)), np.array(((0.3, 0.6),)))[0]
-    np.testing.assert_allclose(values_of(found, TIMES), values_of(np.stack((q[0], r[0])) / end, TIMES), atol=1e-5)

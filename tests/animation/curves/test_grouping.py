@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_motion.animation.curves import EASINGS, Cycles, Keys, evaluate
-from rigid_motion.animation.curves.grouping import BLOCK, Group, blocks, group_by_timing
-from rigid_motion.animation.curves.spans import Spans
+from rigid_motion.animation.curves import EASINGS, evaluate
 from tests.animation.curves.examples import all_cycles, curves, evaluate_one, frames_about, joined, keys_of
 from tests.thoroughness import tried
 
@@ -93,75 +90,3 @@ def test_the_elastic_timing_of_channels_is_their_own_or_that_of_a_curve_from_0_t
     unit = np.concatenate(evaluate(together, [frames] * 3, unit_elastic=True))
     np.testing.assert_allclose(unit, np.multiply.outer(ways, alone[2]), rtol=0.0, atol=1e-12)
     assert not np.allclose(unit[:2], alone[:2])
-
-
-def groups_of(curves: Sequence[Keys], times: Sequence[np.ndarray]) -> list[Group]:
-    return list(group_by_timing(curves, times, Spans.of(curves, unit_elastic=False)))
-
-
-def channels_with(frames: Sequence[float], interpolation: str = "LINEAR", **others: object) -> Keys:
-    """Seven channels keyed together."""
-    return joined([keys_of(frames, np.arange(len(frames)) * row, interpolation, **others) for row in range(7)])
-
-
-def test_curves_with_the_same_timing_on_the_same_frames_are_one_group():
-    frames = np.arange(20.0)
-    curves = [channels_with((1, 5, 9)), channels_with((2, 5, 9)), channels_with((1, 5, 9))]
-    groups = groups_of(curves, [frames, frames, frames.copy()])
-    assert [[number for number, _ in group.members] for group in groups] == [[0, 2], [1]]
-    assert [group.curves.tolist() for group in groups] == [[*range(7), *range(14, 21)], [*range(7, 14)]]
-
-
-@pytest.mark.parametrize(
-    "other",
-    [
-        channels_with((1, 5, 9), "CONSTANT"),
-        channels_with((1, 5, 9), cycles=Cycles("REPEAT", "NONE", 0, 0)),
-        channels_with((1, 5, 9), left=((0, 0), (4, 0), (7, 0))),
-    ],
-    ids=["interpolation", "cycles", "handles"],
-)
-def test_curves_that_differ_in_what_timing_depends_on_are_groups_apart(other):
-    assert len(groups_of([channels_with((1, 5, 9)), other], [np.arange(20.0)] * 2)) == 2
-
-
-def test_values_are_no_part_of_the_timing():
-    curves = [
-        channels_with((1, 5)),
-        dataclasses.replace(channels_with((1, 5)), points=np.float32([[[1, 8], [5, 9]]] * 7)),
-    ]
-    assert len(groups_of(curves, [np.arange(9.0)] * 2)) == 1
-
-
-def test_elastic_curves_have_a_timing_each_unless_their_change_is_taken_as_1():
-    settings = {"easing": np.zeros(2, np.int32), "easing_settings": ((0, 0), (1.5, 1.5), (7, 7))}
-    curves = [keys_of((1, 5), (0, value), "ELASTIC", **settings) for value in (1.0, 2.0)]
-    for unit_elastic, count in ((False, 2), (True, 1)):
-        spans = Spans.of(curves, unit_elastic)
-        assert len(list(group_by_timing(curves, [np.arange(9.0)] * 2, spans))) == count
-
-
-def test_a_group_tells_how_many_frames_each_span_has():
-    (group,) = groups_of([keys_of((1, 5, 9), (0, 1, 2))], [np.arange(12.0)])
-    assert dict(zip(group.spans.tolist(), group.counts.tolist(), strict=True)) == {0: 1, 1: 4, 2: 4, 3: 3}
-
-
-def test_blocks_hold_every_group_once_and_those_of_equally_many_curves_together():
-    frames = np.arange(BLOCK / 4)
-    curves = [channels_with((1, last)) for last in range(5, 14)] + [keys_of((1, last), (0, 1)) for last in (20, 21, 22)]
-    groups = groups_of(curves, [frames] * len(curves))
-    worked_on = list(blocks(groups))
-    assert [len(block) for block in worked_on] == [3, 4, 4, 1]
-    assert all(len({len(group.curves) for group in block}) == 1 for block in worked_on)
-    assert {id(group) for block in worked_on for group in block} == {id(group) for group in groups}
-
-
-@pytest.mark.parametrize("size", [1, 7, 10, 1000])
-def test_chunks_are_the_curves_of_a_group_in_their_order(size):
-    cycles = Cycles("NONE", "REPEAT_OFFSET", 0, 0)
-    (group,) = groups_of([channels_with((1, 5, 9), cycles=cycles) for _ in range(5)], [np.arange(20.0)] * 5)
-    chunks = list(group.chunks(size))
-    assert [row for chunk, _ in chunks for row in range(chunk.start, chunk.stop)] == list(range(35))
-    assert [member for _, part in chunks for member in part.members] == group.members
-    np.testing.assert_array_equal(np.concatenate([part.curves for _, part in chunks]), group.curves)
-    np.testing.assert_array_equal(np.concatenate([part.offsets for _, part in chunks]), group.offsets)

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation.curves import BEZIER, CONSTANT, EASINGS, ELASTIC, INTERPOLATIONS, LINEAR, Cycles, evaluate
+from rigid_motion.animation.curves import EASINGS, INTERPOLATIONS, evaluate
 from tests.animation.curves.examples import as_fcurve, evaluate_one, joined, keys_of, read_one
 
 EDITS: dict[str, Callable[[bpy.types.FCurve], None]] = {
@@ -35,20 +35,6 @@ def test_every_edit_shows_in_the_raw_bytes(edit):
         assert read_one(fcurve).raw == before
         EDITS[edit](fcurve)
         assert read_one(fcurve).raw != before
-
-
-def test_an_edit_of_a_cycles_modifier_shows_in_the_raw_bytes():
-    with as_fcurve(keys_of((1, 5), (2, 3), cycles=Cycles("REPEAT", "REPEAT", 0, 0))) as fcurve:
-        before = read_one(fcurve).raw
-        fcurve.modifiers[0].cycles_after = 3
-        assert read_one(fcurve).raw != before
-
-
-def test_the_codes_are_those_of_this_blender():
-    kind = bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items
-    for name, code in (("CONSTANT", CONSTANT), ("LINEAR", LINEAR), ("BEZIER", BEZIER), ("ELASTIC", ELASTIC)):
-        assert kind[name].value == code
-    assert set(INTERPOLATIONS.values()) == set(kind.keys())
 
 
 def test_the_keys_of_some_channels_have_the_values_that_those_had():

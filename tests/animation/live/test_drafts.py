@@ -71,16 +71,6 @@ def is_exact_by_itself(rig: bpy.types.Object) -> bool:
     return max(shown_unfollowed(rig).values()) < PROMISE
 
 
-def test_a_rig_that_is_edited_has_one_sample_a_frame_and_is_right_on_whole_frames(rig):
-    assert is_draft(rig)
-    assert rates(rig) == {1}
-    assert not is_exact_by_itself(rig), "or nothing is tested here"
-    assert_exact(rig, WHOLE)
-    edit(rig)
-    assert is_draft(rig)
-    assert_exact(rig, WHOLE)
-
-
 def test_who_goes_between_frames_finds_it_exact_and_an_edit_on_a_whole_frame_begins_a_draft_again(rig):
     for _ in range(3):
         assert_exact(rig)
@@ -90,13 +80,6 @@ def test_who_goes_between_frames_finds_it_exact_and_an_edit_on_a_whole_frame_beg
         assert is_draft(rig)
         assert rates(rig) == {1}
         assert_exact(rig, WHOLE)
-
-
-def test_edits_between_frames_are_exact_at_once(rig):
-    bpy.context.scene.frame_set(17, subframe=0.25)
-    edit(rig)
-    assert not is_draft(rig)
-    assert is_exact_by_itself(rig)
 
 
 def test_what_is_taken_out_is_what_is_computed_on_whole_frames(rig):
@@ -148,40 +131,6 @@ def test_a_render_is_exact(rig):
     assert is_exact_by_itself(rig)
 
 
-def test_undo_and_redo_go_through_drafts_and_what_was_finished(window, tmp_path):
-    name = moving_rig().name
-    bpy.context.view_layer.update()
-
-    def rig() -> bpy.types.Object:
-        return bpy.data.objects[name]
-
-    def value() -> float:
-        return curves_of(rig().pose.bones["Hand"])["location", 0].keyframe_points[1].co.y
-
-    def push() -> float:
-        bpy.ops.ed.undo_push(message="Edit")
-        return value()
-
-    values = [push()]
-    for number, finish in enumerate((False, True, False, True)):
-        edit(rig(), 0.1 * (number + 1))
-        values.append(push())
-        if finish:
-            bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
-            assert not is_draft(rig())
-    for step, order in ((bpy.ops.ed.undo, values[-2::-1]), (bpy.ops.ed.redo, values[1:])):
-        for number, expected in enumerate(order):
-            assert step() == {"FINISHED"}
-            assert value() == pytest.approx(expected)
-            assert_exact(rig(), WHOLE)
-            if number % 2:
-                assert_exact(rig())
-    edit(rig())
-    assert_exact(rig(), WHOLE)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
-    assert is_exact_by_itself(rig())
-
-
 def test_strips_are_exact(rig):
     edit(rig)
     action = rig.animation_data.action
@@ -227,13 +176,6 @@ def test_an_action_in_draft_that_nothing_had_for_a_while_is_exact(rig):
     data.action, data.action_slot = action, slot
     bpy.context.view_layer.update()
     assert is_exact_by_itself(rig)
-
-
-def test_what_has_no_modes_any_more_is_no_draft(rig):
-    edit(rig)
-    animation.set_mode(list(rig.pose.bones), "BLENDER")
-    assert not is_draft(rig)
-    assert not rig.animation_data.action.use_frame_range
 
 
 def test_the_error_that_is_told_is_not_that_of_a_draft(rig):

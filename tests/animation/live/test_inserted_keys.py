@@ -11,7 +11,6 @@ from mathutils import Euler, Matrix
 
 from rigid_motion.animation import key_frames, set_mode, write_channel
 from rigid_motion.animation.compute.source_cache import MOST_BYTES, known, size_of
-from tests.animation.bones.rigs import key_all, new_rig
 from tests.animation.oracle import curves_of, expected_bases, rotation_path
 from tests.animation.scenes import key, new_object, push_down, random_values, tweak
 
@@ -82,22 +81,6 @@ def test_the_same_key_of_another_pose_is_another_key(tool):
     assert_key_has(wanted)
 
 
-def test_keys_of_the_other_channels_ease_as_the_keys_before_them(tool):
-    for (path, _), fcurve in curves_of(tool).items():
-        if path in ("location", "rotation_quaternion"):
-            fcurve.keyframe_points[1].interpolation, fcurve.keyframe_points[1].easing = "BACK", "EASE_IN_OUT"
-            fcurve.update()
-    bpy.context.view_layer.update()
-    insert("location")
-    easings = [
-        (point.interpolation, point.easing)
-        for (path, _), fcurve in curves_of(tool).items()
-        for point in fcurve.keyframe_points
-        if path == "rotation_quaternion" and point.co.x == 15.0
-    ]
-    assert easings == [("BACK", "EASE_IN_OUT")] * 4
-
-
 ORDERS = ("QUATERNION", "XYZ", "ZXY")
 
 
@@ -131,9 +114,8 @@ TARGETS = {
 }
 
 
-@pytest.mark.parametrize("every", [True, False], ids=["all keyed", "location keyed"])
+@pytest.mark.parametrize(("every", "then"), [(True, "update"), (False, "frame")])
 @pytest.mark.parametrize("target", TARGETS)
-@pytest.mark.parametrize("then", ["update", "frame"])
 def test_a_matrix_that_is_set_and_keyed_in_one_go_is_where_it_lands(shown, target, every, then):
     matrix = TARGETS[target](shown)
     shown.matrix_world = matrix
@@ -276,31 +258,3 @@ def test_a_key_keeps_the_pose_of_its_segment_where_the_mode_has_ended(live_file,
     before = seen()
     obj.keyframe_insert("location")
     assert np.abs(seen() - before).max() < 2e-5 * max(1.0, np.abs(before).max())
-
-
-def test_a_key_of_a_bone_outside_of_the_keys_keeps_the_pose(live_file):
-    live_file.scene.frame_end = 60
-    rig = key_all(new_rig())
-    set_mode(list(rig.pose.bones), "dq_sclerp")
-    for bone in rig.pose.bones:
-        goes_on(bone, "LINEAR")
-    bpy.context.view_layer.update()
-    live_file.scene.frame_set(50)
-
-    def hand() -> np.ndarray:
-        bpy.context.view_layer.update()
-        return np.array(rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones["Hand"].matrix)
-
-    before = hand()
-    for path in ("location", "rotation_quaternion"):
-        rig.pose.bones["Hand"].keyframe_insert(path)
-    assert np.abs(hand() - before).max() < 5e-5
-
-
-def test_a_key_behind_all_others_keeps_its_value_where_they_hold(live_file):
-    obj = key(new_object())
-    set_mode(obj, "dq_sclerp")
-    live_file.scene.frame_set(50)
-    before = seen()
-    obj.keyframe_insert("location")
-    assert np.abs(seen() - before).max() < 2e-5

@@ -13,7 +13,7 @@ from rigid_motion.animation.actions.reading import keyed_in
 from rigid_motion.animation.actions.slots import slot_transforms_of
 from rigid_motion.animation.compute.differences import in_betweens
 from rigid_motion.animation.transforms import transform_of
-from tests.animation.bones.rigs import new_rig
+from tests.animation.bones.rigs import in_turn, new_rig
 from tests.animation.oracle import MODE_IDS, curves_of, matrices, shown_worlds, snapshot
 from tests.animation.scenes import new_object, push_down, tweak
 
@@ -142,8 +142,7 @@ def key_on(carrier, frame: int) -> None:
     bpy.context.view_layer.update()
 
 
-@pytest.mark.parametrize("handles", HANDLES)
-@pytest.mark.parametrize("mode", [mode for mode in MODE_IDS if mode != "BLENDER"])
+@pytest.mark.parametrize(("handles", "mode"), in_turn(HANDLES, [mode for mode in MODE_IDS if mode != "BLENDER"]))
 def test_a_key_in_between_leaves_the_motion_as_it_was(live_file, mode, handles):
     obj = keyed(new_object())
     HANDLES[handles](obj)
@@ -216,22 +215,6 @@ def test_so_it_does_in_a_strip_that_is_edited(live_file, mode):
     assert largest(after[:, :3], before[:, :3]) < MILLIMETRE
 
 
-def test_undo_takes_it_back_and_redo_brings_the_motion_again(live_file):
-    obj = keyed(new_object())
-    set_mode(obj, "motor_spline")
-    before, keys = shown(obj), snapshot(obj)
-    bpy.context.scene.frame_set(31)
-    bpy.ops.ed.undo_push(message="Begin")
-    key_on(obj, 31)
-    bpy.ops.ed.undo_push(message="Key")
-    after = snapshot(bpy.data.objects["Tool"])
-    bpy.ops.ed.undo()
-    assert snapshot(bpy.data.objects["Tool"]) == keys
-    bpy.ops.ed.redo()
-    assert snapshot(bpy.data.objects["Tool"]) == after
-    assert largest(shown(bpy.data.objects["Tool"]), before) < MILLIMETRE
-
-
 def test_a_pose_by_hand_is_an_ordinary_key(live_file):
     obj = keyed(new_object())
     set_mode(obj, "motor_spline")
@@ -242,25 +225,6 @@ def test_a_pose_by_hand_is_an_ordinary_key(live_file):
     bpy.context.view_layer.update()
     assert {point.type for point in keys_of(obj)} == {"KEYFRAME"}
     assert {point.handle_left_type for point in keys_of(obj)} == {"AUTO_CLAMPED"}
-
-
-def test_so_it_is_where_only_another_channel_is_keyed_than_was_posed(live_file):
-    obj = keyed(new_object())
-    set_mode(obj, "motor_spline")
-    bpy.context.scene.frame_set(31)
-    obj.location.z += 1.0
-    bpy.context.view_layer.update()
-    obj.keyframe_insert("rotation_quaternion")
-    bpy.context.view_layer.update()
-    assert {point.type for point in keys_of(obj)} == {"KEYFRAME"}
-
-
-def test_with_blenders_own_in_betweens_it_is_blenders_own_key(live_file):
-    obj, other = keyed(new_object()), keyed(new_object("Other"))
-    set_mode(obj, "BLENDER")
-    for one in (obj, other):
-        key_on(one, 31)
-    assert snapshot(obj)["location", 0] == snapshot(other)["location", 0]
 
 
 # -- breakdowns -------------------------------------------------------------------------------------------------------

@@ -197,18 +197,6 @@ class EditingObjects(TakenAway, WithTools):
         """Whether its Action may be exchanged without losing a bake's way back, or leaving others behind."""
         return name not in self.before_bake and self._sharing(name) == {name}
 
-    @staticmethod
-    def _linked(obj: bpy.types.Object) -> tuple:
-        data = obj.animation_data
-        return (None, None) if data is None or data.action is None else (data.action, data.action_slot)
-
-    @staticmethod
-    def _link(obj: bpy.types.Object, action: bpy.types.Action | None, slot: bpy.types.ActionSlot | None) -> None:
-        data = obj.animation_data_create()
-        data.action = action
-        if action is not None:
-            data.action_slot = slot
-
     @precondition(lambda self: self.on)
     @rule(who=shares, updated=st.booleans(), there=frames_in)
     def unlink_the_action_and_choose_it_again(self, who, updated, there):

@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import set_mode
-from rigid_motion.animation.actions import slots
 from rigid_motion.animation.live import refreshing
-from tests.animation.bones.rigs import moving_rig
 from tests.animation.oracle import assert_shown
-from tests.animation.scenes import key, new_object, push_down
+from tests.animation.scenes import key, new_object
 
 
 @pytest.fixture
@@ -67,13 +65,6 @@ DEEDS = [key_on_the_way, pose_on_the_way, change_the_range, save, undo]
 
 
 @pytest.mark.parametrize("deed", DEEDS, ids=lambda deed: deed.__name__)
-def test_where_nothing_has_a_mode_no_channels_are_read(read, deed: Callable[[Path], None], tmp_path):
-    deed(tmp_path)
-    bpy.context.view_layer.update()
-    assert read == []
-
-
-@pytest.mark.parametrize("deed", DEEDS, ids=lambda deed: deed.__name__)
 def test_beside_an_object_with_a_mode_others_are_not_read(read, deed: Callable[[Path], None], tmp_path):
     set_mode(bpy.data.objects["A"], "dq_sclerp")
     read.clear()
@@ -91,16 +82,3 @@ def test_a_key_set_on_the_way_from_frame_to_frame_shows_on_the_next_one(read):
         fcurve.keyframe_points[1].co_ui.y += x
     bpy.context.scene.frame_set(7)
     assert_shown([obj], np.arange(-3.0, 46.0))
-
-
-def test_a_rig_in_the_nla_is_not_gone_through_for_each_of_its_bones(live_file, monkeypatch: pytest.MonkeyPatch):
-    rig = moving_rig()
-    push_down(rig)
-    strip = rig.animation_data.nla_tracks[0].strips[0]
-    bpy.context.scene.frame_set(5)
-    looks = []
-    transforms_in = slots.transforms_in
-    monkeypatch.setattr(slots, "transforms_in", lambda *asked: looks.append(asked) or transforms_in(*asked))
-    strip.frame_start_ui += 1
-    bpy.context.view_layer.update()
-    assert 0 < len(looks) <= 3

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import pytest
 
-from rigid_motion.animation.transforms import KINDS, BoneTransform, ObjectTransform, is_part, kind_of, transform_of
+from rigid_motion.animation.transforms import KINDS, BoneTransform, kind_of, transform_of
 from rigid_motion.animation.writers.table import WRITERS
 from rigid_motion.ui.overlay.kinds import PATH_KINDS
 from tests.animation.bones.rigs import new_rig
@@ -14,21 +14,6 @@ from tests.animation.bones.rigs import new_rig
 @pytest.mark.parametrize("table", [WRITERS, PATH_KINDS], ids=["writers", "paths"])
 def test_every_kind_has_a_row_in_every_table(table):
     assert table.keys() == set(KINDS)
-
-
-@pytest.mark.parametrize(
-    ("prefix", "kind", "part"),
-    [
-        ("", ObjectTransform, False),
-        ('pose.bones["Upper"].', BoneTransform, True),
-        ('pose.bones["a \\"quoted\\" name"].', BoneTransform, True),
-        ('key_blocks["Smile"].', None, False),
-        ("pose.bones[", None, False),
-    ],
-)
-def test_a_data_path_tells_the_kind_that_it_leads_to(prefix, kind, part):
-    assert kind_of(prefix) is kind
-    assert is_part(prefix) is part
 
 
 def test_what_blender_has_is_found_again_by_its_prefix(live_file):

@@ -66,32 +66,6 @@ def test_the_path_of_a_bone_that_only_turns_is_that_of_its_tail(scene, connected
     assert place(path.wanted[on]) == pytest.approx(shown(bone, WHOLE, "tail"), abs=1e-5)
 
 
-def _no_local_location(bone):
-    bone.use_local_location = False
-
-
-def _no_inherited_rotation(bone):
-    bone.use_inherit_rotation = False
-
-
-def _no_inherited_scale(bone):
-    bone.inherit_scale = "NONE"
-
-
-@pytest.mark.parametrize("setting", [_no_local_location, _no_inherited_rotation, _no_inherited_scale])
-@pytest.mark.parametrize("moves", [False, True])
-def test_a_bone_that_is_apart_from_its_parent_leads_there_too(scene, setting, moves):
-    rig = new_rig()
-    setting(rig.data.bones["Hand"])
-    rig.pose.bones["Arm"].rotation_quaternion = (0.8, 0.0, 0.0, 0.6)
-    paths = ("location", "rotation_quaternion") if moves else ("rotation_quaternion",)
-    bone = key_bone(rig.pose.bones["Hand"], paths=paths)
-    set_mode(bone, SCREW)
-    path, place = path_and_place(bone)
-    on = np.searchsorted(path.frames, WHOLE)
-    assert place(path.wanted[on]) == pytest.approx(shown(bone, WHOLE, "head" if moves else "tail"), abs=2e-5)
-
-
 def test_axes_of_a_bone_are_as_it_is_turned(scene):
     rig = new_rig()
     rig.data.bones["Hand"].use_local_location = False
@@ -105,17 +79,6 @@ def test_axes_of_a_bone_are_as_it_is_turned(scene):
         assert ends[:, 0] == pytest.approx(np.tile(matrix[:3, 3], (3, 1)), abs=1e-5)
         strokes = (ends[:, 1] - ends[:, 0]) / (0.5 * bone.bone.length)
         assert strokes == pytest.approx(matrix[:3, :3].T, abs=1e-5)
-
-
-def test_a_parent_that_is_posed_costs_no_new_path(scene):
-    rig = keyed_rig()
-    before, place = path_and_place(rig.pose.bones["Hand"])
-    first = place(before.keys)
-    rig.pose.bones["Arm"].location.x += 1.0
-    bpy.context.view_layer.update()
-    after, place = path_and_place(rig.pose.bones["Hand"])
-    assert after is before
-    assert np.abs(place(after.keys) - first).max() > 0.5
 
 
 def test_selecting_keys_of_a_bone_is_noticed(scene):

@@ -23,31 +23,6 @@ def updated() -> None:
     bpy.context.view_layer.update()
 
 
-def test_a_path_that_nothing_happened_to_is_not_worked_out_again(scene, obj, monkeypatch):
-    path = path_of(obj, scene)
-    updated()
-    assert path_of(obj, scene) is path
-    monkeypatch.setattr(cache, "_read", None)
-    assert path_of(obj, scene) is path
-
-
-def test_another_frame_is_no_edit(scene, obj):
-    path = path_of(obj, scene)
-    scene.frame_set(20)
-    assert path_of(obj, scene) is path
-
-
-def test_an_edit_elsewhere_is_not_looked_into(scene, obj, monkeypatch):
-    other = key(new_object("Other"))
-    updated()
-    path = path_of(obj, scene)
-    monkeypatch.setattr(cache, "_read", None)
-    curves_of(other)["location", 0].keyframe_points[0].co.y += 1
-    other.empty_display_size = 5
-    updated()
-    assert path_of(obj, scene) is path
-
-
 def test_an_edit_that_does_not_matter_leaves_the_path(scene, obj):
     path = path_of(obj, scene)
     obj.color = (1, 0, 0, 1)
@@ -144,13 +119,6 @@ def test_keys_selected_without_a_word_from_blender_are_noticed_when_asked_for(sc
     assert not notice_selection([obj])
 
 
-def test_a_selection_matters_only_to_paths_that_are_there(scene, obj):
-    without_path = new_object("None")
-    path_of(without_path, scene)
-    without_path.keyframe_insert("location", frame=1)
-    assert not notice_selection([obj, without_path])
-
-
 def test_undo_shows_the_path_from_before(scene, obj):
     updated()
     bpy.ops.ed.undo_push(message="keyed")
@@ -164,38 +132,6 @@ def test_undo_shows_the_path_from_before(scene, obj):
     assert (path_of(obj, scene).keys == before).all()
 
 
-def test_a_moving_parent_costs_no_new_path(scene, obj):
-    obj.parent = new_object("Table")
-    updated()
-    path = path_of(obj, scene)
-    obj.parent.location.x = 4
-    updated()
-    assert path_of(obj, scene) is path
-
-
-def test_an_edit_of_a_shared_action_changes_both_paths(scene, obj):
-    other = new_object("Other")
-    data = other.animation_data_create()
-    data.action, data.action_slot = obj.animation_data.action, obj.animation_data.action_slot
-    updated()
-    paths = [path_of(one, scene) for one in (obj, other)]
-    move_key(obj, scene)
-    updated()
-    assert [path_of(one, scene) for one in (obj, other)] != paths
-    assert (path_of(obj, scene).native == path_of(other, scene).native).all()
-
-
-def test_a_path_appears_with_the_second_key(scene):
-    obj = new_object()
-    obj.keyframe_insert("location", frame=1)
-    updated()
-    assert path_of(obj, scene) is None
-    obj.location.x = 3
-    obj.keyframe_insert("location", frame=10)
-    updated()
-    assert len(path_of(obj, scene).keys) == 2
-
-
 def test_paths_that_were_not_drawn_for_long_are_dropped(scene):
     objects = [new_object(f"Tool {number}") for number in range(SPARE + 20)]
     for obj in objects:
@@ -205,9 +141,3 @@ def test_paths_that_were_not_drawn_for_long_are_dropped(scene):
     assert len(cache._entries) == SPARE + 1
     assert (objects[0].session_uid, "") in cache._entries
     assert (objects[1].session_uid, "") not in cache._entries
-
-
-def test_another_file_starts_without_paths(scene, obj):
-    path_of(obj, scene)
-    bpy.ops.wm.read_homefile(use_empty=True)
-    assert not cache._entries

@@ -83,24 +83,9 @@ def test_ghosts_are_in_the_mode_that_is_looked_at(ghostly):
     assert path_of(obj, ghostly).ghosts.matrices == pytest.approx(looked_at, abs=1e-9)
 
 
-def test_there_are_none_until_someone_asks_for_them(scene):
-    assert not scene.rigid_motion_overlay.show_ghosts
-    assert path_of(key(new_object(), FRAMES), scene).ghosts is None
-
-
 def test_of_a_long_motion_there_are_no_more_than_can_be_drawn():
     assert ghost_frames(1, 41, 5).tolist() == [5, 10, 15, 20, 25, 30, 35, 40]
     assert len(ghost_frames(0, 100000, 1)) <= MOST_GHOSTS + 1
-
-
-def test_what_does_not_change_by_an_edit_that_does_not_matter_is_not_worked_out_again(ghostly):
-    obj = key(new_object(), FRAMES)
-    path = path_of(obj, ghostly)
-    ghostly.frame_set(20)
-    assert path_of(obj, ghostly) is path
-    obj.scale = (2.0, 2.0, 2.0)
-    bpy.context.view_layer.update()
-    assert path_of(obj, ghostly) is not path
 
 
 def test_an_object_looks_like_its_evaluated_geometry(scene):

@@ -61,14 +61,6 @@ def test_an_object_under_objects_that_move(scene, table):
     assert_in_world(path_of(obj, scene), shown(obj))
 
 
-def test_blenders_own_path_is_in_the_world_as_well(scene, table):
-    obj = key(new_object(), FRAMES)
-    obj.parent = table
-    path = path_of(obj, scene)
-    assert path.wanted is None
-    assert path.native[np.searchsorted(path.frames, WHOLE)] == pytest.approx(shown(obj), abs=3e-5)
-
-
 @pytest.mark.parametrize("connected", [False, True])
 def test_an_object_on_a_bone_that_moves(scene, table, connected):
     rig = new_rig()
@@ -147,13 +139,6 @@ def test_parents_that_do_not_move_by_keys_alone_are_as_they_are_now(scene, table
     assert path_of(obj, scene).in_world
     other(table)
     bpy.context.view_layer.update()
-    assert not path_of(obj, scene).in_world
-
-
-def test_a_parent_that_stands_needs_no_path_in_the_world(scene):
-    obj, table = key(new_object(), FRAMES), new_object("Table")
-    table.location = (1.0, 2.0, 3.0)
-    obj.parent = table
     assert not path_of(obj, scene).in_world
 
 

@@ -8,10 +8,10 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import MODE_IDS, set_mode
+from rigid_motion.animation import set_mode
 from rigid_motion.animation.compute.components import ROWS
 from rigid_motion.animation.queries.keyed import source_of
-from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
+from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion.ui.overlay.cache import path_of
 from rigid_motion.ui.overlay.points import (
     AXES,
@@ -24,7 +24,6 @@ from rigid_motion.ui.overlay.points import (
     space_of,
     thinned,
     tick_frames,
-    trace,
 )
 from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object
@@ -102,16 +101,6 @@ def test_looking_at_a_mode_changes_nothing(scene):
     assert (shown_origins(obj, WHOLE) == shown).all()
 
 
-@pytest.mark.parametrize("mode", KEYFRAME_MODES)
-def test_between_linear_keys_a_path_is_that_of_interpolate(scene, mode):
-    obj = key(new_object(), interpolation="LINEAR")
-    scene.rigid_motion_overlay.mode = mode
-    path = path_of(obj, scene)
-    keyed = source_of(obj).values_at(np.array(FRAMES))
-    keys = Poses(keyed[ROWS["location"]].T, keyed[ROWS["rotation"]].T)
-    assert path.wanted == pytest.approx(interpolate(FRAMES, keys, path.frames, mode).positions, abs=1e-5)
-
-
 def test_each_segment_runs_in_its_own_mode(scene):
     obj = key(new_object())
     set_mode(obj, "lerp_slerp", [FRAMES[1]])
@@ -173,20 +162,6 @@ def test_selected_keys_are_told_apart(scene):
     assert path_of(obj, scene).selected.tolist() == [False, False, True, False]
 
 
-def test_outside_of_its_path_an_object_stays_at_the_ends(scene):
-    obj = key(new_object())
-    path = path_of(obj, scene)
-    assert (path.at(-100)[0] == path.keys[0]).all()
-    assert path.at(1000)[0] == pytest.approx(path.keys[-1])
-
-
-def test_between_two_samples_it_is_on_the_line_between_them(scene):
-    path = path_of(key(new_object()), scene)
-    native, wanted = path.at(float(path.frames[20:22].mean()))
-    assert native == pytest.approx(path.native[20:22].mean(axis=0))
-    assert wanted is None
-
-
 @pytest.mark.parametrize("mode", ["CHOSEN", "dq_sclerp"])
 def test_axes_point_where_the_object_is_turned(scene, mode):
     obj = key(new_object())
@@ -201,25 +176,6 @@ def test_axes_point_where_the_object_is_turned(scene, mode):
     for axis in range(3):
         assert path.axes[:, axis, 0] == pytest.approx(shown[:, :3, 3], abs=1e-5)
         assert path.axes[:, axis, 1] - path.axes[:, axis, 0] == pytest.approx(1.5 * shown[:, :3, axis], abs=2e-5)
-
-
-def test_axes_grow_with_the_object(scene):
-    obj = key(new_object(), scale="even")
-    scene.rigid_motion_overlay.mode = "cga_slerp"
-    path = path_of(obj, scene)
-    set_mode(obj, "cga_slerp")
-    frames = axis_frames(tick_frames(int(FRAMES[0]), int(FRAMES[-1])))
-    scales = np.linalg.norm(shown_worlds([obj], frames)[0][:, :3, 0], axis=1)
-    assert np.linalg.norm(path.axes[:, 0, 1] - path.axes[:, 0, 0], axis=1) == pytest.approx(scales, rel=1e-4)
-    assert np.ptp(scales) > 0.1
-
-
-def test_axes_are_half_as_long_as_the_object(scene):
-    obj = key(mesh())
-    obj.scale = (1, 0.5, 1)
-    path = path_of(obj, scene)
-    lengths = np.linalg.norm(path.axes[..., 1, :] - path.axes[..., 0, :], axis=2)
-    assert lengths == pytest.approx(np.full(lengths.shape, 1.0))
 
 
 def test_ticks_are_on_the_same_frames_in_all_paths(scene):
@@ -239,15 +195,6 @@ def test_as_many_ticks_as_can_be_read(length, step):
     assert len(ticks) <= TICKS + 1
     assert (np.diff(ticks) == step).all()
     assert (ticks % step == 0).all()
-
-
-def test_a_step_of_ticks_that_nobody_could_see_is_widened():
-    assert len(tick_frames(0, 200_000, 1)) <= MOST + 1
-
-
-def test_ticks_may_be_further_apart_than_the_path_is_long():
-    assert tick_frames(3, 8, 50).tolist() == []
-    assert len(axis_frames(tick_frames(3, 8, 50))) == 0
 
 
 @pytest.mark.parametrize("length", [1, 2, 39, 300, 7000, 200_000])
@@ -291,22 +238,6 @@ def test_what_rigid_motion_refuses_or_a_driver_moves_has_no_path(scene):
     assert path_of(driven, scene) is None
 
 
-def test_other_objects_paths_are_none_of_an_objects_business(scene):
-    objects = [key(new_object(f"Tool {seed}"), seed=seed) for seed in range(3)]
-    for obj, mode in zip(objects, MODE_IDS[1:], strict=False):
-        set_mode(obj, mode)
-    for obj in objects:
-        path = path_of(obj, scene)
-        assert on(path, path.wanted, WHOLE) == pytest.approx(shown_origins(obj, WHOLE), abs=1e-5)
-
-
-def test_a_path_needs_no_more_than_a_source(scene):
-    source = source_of(key(new_object()))
-    path = trace(source, "lerp_slerp", tick_step=10)
-    assert len(path.wanted_ticks) == 4
-    assert not path.selected.any()
-
-
 def test_a_thinned_line_looks_the_same():
     turns = np.linspace(0, 3 * math.pi, 4001)
     line = np.stack((np.cos(turns), np.sin(turns), 0.1 * turns), axis=1)
@@ -318,12 +249,3 @@ def test_a_thinned_line_looks_the_same():
     share = np.clip((offset * chord).sum(axis=2) / (chord * chord).sum(axis=1), 0, 1)
     away = np.linalg.norm(offset - share[..., None] * chord, axis=2).min(axis=1)
     assert away.max() < 2 * 2.0 / FINENESS
-
-
-def test_a_line_with_corners_keeps_them():
-    corners = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 1)], dtype=float)
-    assert (thinned(corners) == corners).all()
-
-
-def test_of_a_line_that_stays_where_it_is_two_points_are_left():
-    assert len(thinned(np.ones((100, 3)))) <= 3

@@ -40,11 +40,6 @@ def ticks(path: Path, width: float, **options: object) -> np.ndarray:
     return path.tick_frames[readable(path, view(width), SIZE, **options).native_ticks]
 
 
-def test_the_middle_of_a_view_is_where_nothing_is_moved_to():
-    assert on_screen(np.zeros((1, 3)), view(100.0), SIZE).tolist() == [[500.0, 250.0]]
-    assert on_screen(np.array([[1.0, 1.0, 0.0]]), view(100.0), SIZE).tolist() == [[600.0, 350.0]]
-
-
 def test_behind_the_viewer_there_is_no_place_on_the_screen():
     projection = np.eye(4)[[0, 1, 2, 2]]
     assert np.isnan(on_screen(np.array([[0.0, 0.0, -1.0]]), projection, SIZE)).all()
@@ -77,24 +72,6 @@ def test_no_tick_touches_another_or_a_key_where_the_object_slows_down():
     assert drawn.max() <= 900.0 - CLEAR
     # In the middle, where it is fast, there is one on every frame.
     assert chosen[20:40].all()
-
-
-def test_a_rest_takes_no_ticks_from_what_moves():
-    rests = np.concatenate((np.zeros(50), np.linspace(0.0, 1.0, 11)))
-    found = ticks(straight(61, rests), 10 * TICK_GAP)
-    assert found.tolist() == list(range(52, 61))
-
-
-def test_both_paths_have_ticks_on_the_same_frames():
-    path = straight(41, mode=True)
-    found = readable(path, view(20 * TICK_GAP), SIZE)
-    assert (found.native_ticks == found.wanted_ticks).all()
-    assert found.native_ticks.any()
-
-
-def test_axes_are_further_apart_than_ticks():
-    found = readable(straight(41), view(40 * TICK_GAP), SIZE)
-    assert 2 < found.axes.sum() < found.native_ticks.sum() / 2
 
 
 def test_on_a_screen_of_twice_the_resolution_it_is_the_same():
