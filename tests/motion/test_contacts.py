@@ -45,7 +45,7 @@ def test_a_hand_that_is_held_still_does_not_stand():
 
 def test_what_only_turns_back_does_not_stand():
     foot = stepping(np.full(90, False))
-    foot[:, 0] = 0.1 * np.sin(6.0 * TIMES)
+    foot[:, 0] = 0.1 * np.sin(5.0 * TIMES)
     assert not standing(TIMES, body(foot))[2].any()
 
 

@@ -1,11 +1,7 @@
-"""Damaged BVH files of whole bodies, thousands of them: each is refused in one line, or read, measured and shown.
-
-RIGID_MOTION_FUZZ says how many, as in `test_fuzz`, and RIGID_MOTION_FUZZ_FROM with which one to begin.
-"""
+"""BVH files of whole bodies with several limbs and roots: they are read, measured and shown in every mode."""
 
 from __future__ import annotations
 
-import os
 import re
 from dataclasses import astuple
 from pathlib import Path
@@ -19,12 +15,6 @@ from rigid_motion_batch.analysis.radii import Radii
 from rigid_motion_batch.analysis.results import clip_result, compare_clip
 from rigid_motion_batch.recordings.clip_reading import read_source
 from rigid_motion_batch.recordings.clips import Clip
-from tests.thoroughness import THOROUGH
-
-ALL = 20_000
-
-CASES = int(os.environ.get("RIGID_MOTION_FUZZ", ALL if THOROUGH else ALL // 50))
-FIRST = int(os.environ.get("RIGID_MOTION_FUZZ_FROM", "0"))
 
 
 def hierarchy(name: str, depth: int, channels: str, children: int = 1) -> str:
@@ -73,7 +63,7 @@ def assert_can_be_shown(clip: Clip, choice: Choice, mode: str) -> None:
 
 
 @pytest.mark.parametrize("text", SEEDS)
-def test_what_is_damaged_here_is_sound_before(tmp_path: Path, text: str) -> None:
+def test_bodies_of_every_kind_are_read_whole_and_shown(tmp_path: Path, text: str) -> None:
     path = tmp_path / "walk.bvh"
     path.write_text(text, encoding="utf-8", newline="")
     (clip,), note = read_source(str(path), None)
