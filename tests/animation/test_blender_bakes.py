@@ -9,7 +9,7 @@ import pytest
 from rigid_motion.animation import set_exact, set_mode
 from tests.animation.bones.poses import shown_poses
 from tests.animation.bones.rig_editing import own_constraints
-from tests.animation.bones.rigs import key_all, new_rig, select_only
+from tests.animation.bones.rigs import key_all, new_rig, pose_mode, select_only
 from tests.animation.oracle import curves_of, shown_worlds
 from tests.animation.scenes import give_own_deltas, key, new_object, push_down, tweak
 
@@ -98,10 +98,7 @@ def moving_rig(order: str = "QUATERNION") -> bpy.types.Object:
 
 
 def bake_rig(rig: bpy.types.Object, *selected: str, **settings: object) -> None:
-    select_only(rig)
-    bpy.ops.object.mode_set(mode="POSE")
-    for bone in rig.pose.bones:
-        (bone if bpy.app.version >= (5, 0) else bone.bone).select = bone.name in selected or not selected
+    pose_mode(rig, *selected)
     bpy.context.scene.frame_set(ELSEWHERE)
     assert bpy.ops.nla.bake(**DEFAULTS | {"bake_types": {"POSE"}} | settings) == {"FINISHED"}
 

@@ -12,7 +12,7 @@ from mathutils import Euler
 
 from rigid_motion.animation import key_frames, set_mode
 from rigid_motion.ui.parent_switches import Switch, switches_in, switches_of
-from tests.animation.bones.rigs import select_only
+from tests.animation.bones.rigs import pose_mode, select_bones
 
 HAND, TORSO, POLE = "hand_ik.L", "torso", "upper_arm_ik_target.L"
 PARENTS = {"None": 0, "Root": 1, "Torso": 2, "Hips": 3, "Chest": 4, "Head": 5}
@@ -25,8 +25,7 @@ STAYS = 1e-5
 def rig(human, extension) -> Iterator[bpy.types.Object]:
     """The human in Pose Mode with its own operators, a screw on the left hand, on its pole and on the torso."""
     script = human["rig_ui"].as_module()
-    select_only(human)
-    bpy.ops.object.mode_set(mode="POSE")
+    pose_mode(human)
     key(human, HAND, (0.3, -0.2, 0.4), (0.9, 0.7, 1.2))
     key(human, POLE, (0.1, 0.2, -0.2), (0.4, 0.2, 0.0))
     key(human, TORSO, (0.2, 0.3, 0.1), (0.2, 0.5, 1.4))
@@ -43,13 +42,7 @@ def key(rig: bpy.types.Object, name: str, location: tuple, angles: tuple) -> Non
         for path in ("location", "rotation_quaternion", "scale"):
             bone.keyframe_insert(path, frame=frame)
     set_mode(bone, "dq_sclerp")
-    choose(rig, name)
-
-
-def choose(rig: bpy.types.Object, *names: str) -> None:
-    for bone in rig.pose.bones:
-        (bone if bpy.app.version >= (5, 0) else bone.bone).select = bone.name in names
-    rig.data.bones.active = rig.data.bones[names[0]]
+    select_bones(rig, name)
 
 
 def seen(rig: bpy.types.Object, name: str = HAND) -> np.ndarray:
@@ -90,7 +83,7 @@ def keyed_switch(request, rig) -> None:
 
 
 def test_between_keys_the_hand_stays_when_parents_are_switched(rig, auto_key, keyed_switch):
-    choose(rig, HAND)
+    select_bones(rig, HAND)
     for frame in (6, 11, 16):
         go(frame)
         for parent in ("Torso", "Head", "None"):
@@ -107,7 +100,7 @@ def test_between_keys_the_hand_stays_when_parents_are_switched(rig, auto_key, ke
 
 def test_rigify_s_own_operator_moves_the_hand(rig):
     """If this fails, ours is not needed any more."""
-    choose(rig, HAND)
+    select_bones(rig, HAND)
     go(11)
     (one,) = switches_of(bpy.context)
     switch("Root")  # Rigify's has the names of the parents from then on
@@ -120,7 +113,7 @@ def test_rigify_s_own_operator_moves_the_hand(rig):
 
 
 def test_what_was_moved_by_hand_stays_there(rig, auto_key):
-    choose(rig, HAND)
+    select_bones(rig, HAND)
     go(11)
     bpy.ops.transform.translate("EXEC_DEFAULT", True, value=(0.1, 0.2, 0.0))
     before = seen(rig)
@@ -131,7 +124,7 @@ def test_what_was_moved_by_hand_stays_there(rig, auto_key):
 def test_of_a_pole_the_place_stays(rig, auto_key):
     rig.pose.bones["upper_arm_parent.L"]["pole_vector"] = True  # it is hidden otherwise
     bpy.context.view_layer.update()
-    choose(rig, POLE)
+    select_bones(rig, POLE)
     go(11)
     before = seen(rig, POLE)
     for parent in ("Torso", "None", "hand_ik.L"):
@@ -140,7 +133,7 @@ def test_of_a_pole_the_place_stays(rig, auto_key):
 
 
 def test_the_torso_stays_with_all_that_hangs_on_it(rig, auto_key):
-    choose(rig, TORSO)
+    select_bones(rig, TORSO)
     go(11)
     rig.pose.bones["root"].location.x = 0.5
     torso, head = seen(rig, TORSO), seen(rig, "head")
@@ -150,7 +143,7 @@ def test_the_torso_stays_with_all_that_hangs_on_it(rig, auto_key):
 
 
 def test_a_switch_is_one_step_back_and_forth(rig, auto_key):
-    choose(rig, HAND)
+    select_bones(rig, HAND)
     go(11)
     bpy.ops.ed.undo_push(message="Begin")
     before = seen(rig)
@@ -170,7 +163,7 @@ def test_a_switch_is_one_step_back_and_forth(rig, auto_key):
 
 
 def test_the_visual_transform_applied_after_switches_leaves_the_hand_where_it_is(rig, auto_key):
-    choose(rig, HAND)
+    select_bones(rig, HAND)
     for frame, parent in ((16, "Head"), (6, "Torso")):
         go(frame)
         switch(parent)
@@ -183,20 +176,20 @@ def test_the_visual_transform_applied_after_switches_leaves_the_hand_where_it_is
 def test_switches_are_offered_of_selected_bones_with_a_mode(rig):
     offered = bpy.ops.rigid_motion.switch_parent.poll
     for names in ((HAND,), ("upper_arm_parent.L", "head"), (TORSO,)):
-        choose(rig, *names)
+        select_bones(rig, *names)
         assert offered()
-    choose(rig, "hand_ik.R")
+    select_bones(rig, "hand_ik.R")
     assert not offered()
-    choose(rig, HAND)
+    select_bones(rig, HAND)
     set_mode(rig.pose.bones[HAND], "BLENDER")
     assert not offered()
-    choose(rig, TORSO)
+    select_bones(rig, TORSO)
     bpy.ops.object.mode_set(mode="OBJECT")
     assert not offered()
 
 
 def test_without_rigify_s_operator_the_hand_stays_as_it_is_and_one_line_says_what_to_do(rig, extension):
-    choose(rig, HAND)
+    select_bones(rig, HAND)
     go(11)
     (one,) = switches_of(extension)
     before = seen(rig)

@@ -9,7 +9,7 @@ import pytest
 from rigid_motion.animation import key_frames, set_mode
 from rigid_motion.animation.live.follower import show_seen_in_channels
 from rigid_motion.animation.transforms import transform_of
-from tests.animation.bones.rigs import Rest, key_all, new_rig, select_only
+from tests.animation.bones.rigs import Rest, key_all, new_rig, pose_mode, select_bones
 from tests.animation.oracle import rotation_path
 
 BETWEEN, OTHER = 15, 33
@@ -23,17 +23,9 @@ def rig(request, extension) -> bpy.types.Object:
     """A rig with a hand on each side and modes on both, on an in-between of the left one, which is selected."""
     rig = key_all(new_rig("Rig", SIDES, request.param))
     set_mode(list(rig.pose.bones), "dq_sclerp")
-    select_only(rig)
-    bpy.ops.object.mode_set(mode="POSE")
-    choose(rig, "Hand.L")
+    pose_mode(rig, "Hand.L")
     extension.scene.frame_set(BETWEEN)
     return rig
-
-
-def choose(rig: bpy.types.Object, *names: str) -> None:
-    for bone in rig.pose.bones:
-        (bone if bpy.app.version >= (5, 0) else bone.bone).select = bone.name in names
-    rig.data.bones.active = rig.data.bones[names[0]]
 
 
 def seen(rig: bpy.types.Object, name: str = "Hand.L") -> np.ndarray:
@@ -98,7 +90,7 @@ def test_on_a_key_and_without_a_mode_blender_s_own_operator_acts(rig, extension,
     set_mode(rig.pose.bones["Hand.L"], "BLENDER")
     extension.view_layer.update()
     assert not operator.poll()
-    choose(rig, "Hand.R")
+    select_bones(rig, "Hand.R")
     assert operator.poll()
     bpy.ops.object.mode_set(mode="OBJECT")
     assert not operator.poll()

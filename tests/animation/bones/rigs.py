@@ -94,6 +94,21 @@ def select_only(*objects: bpy.types.Object) -> None:
     bpy.context.view_layer.objects.active = objects[0]
 
 
+def select_bones(rig: bpy.types.Object, *names: str) -> None:
+    """Select these bones of a rig in Pose Mode, the first of them the active one."""
+    for bone in rig.pose.bones:
+        (bone if bpy.app.version >= (5, 0) else bone.bone).select = bone.name in names
+    rig.data.bones.active = rig.data.bones[names[0]] if names else None
+
+
+def pose_mode(rig: bpy.types.Object, *selected: str) -> bpy.types.Object:
+    """Go into Pose Mode with this rig alone, with these bones selected or all."""
+    select_only(rig)
+    bpy.ops.object.mode_set(mode="POSE")
+    select_bones(rig, *(selected or rig.pose.bones.keys()))
+    return rig
+
+
 def key_bone(
     pose_bone: bpy.types.PoseBone,
     frames: Sequence[float] = FRAMES,

@@ -25,7 +25,7 @@ from tests.animation.bones.rig_editing import (
     has_live_segments,
     own_constraints,
 )
-from tests.animation.bones.rigs import new_rig, select_only, with_edit_bones, write_bone
+from tests.animation.bones.rigs import new_rig, pose_mode, with_edit_bones, write_bone
 from tests.animation.editing import LAST, ORDERS, frames_in, goes_on, mode_channel, seeds, shares
 from tests.animation.oracle import (
     MODE_IDS,
@@ -180,12 +180,7 @@ class EditingBones(RigEditing):
                 self._assert_seen(rig, seen)
 
     def _in_pose_mode(self, name: Name, act: Callable[[], set[str]]) -> None:
-        rig = bpy.data.objects[name[0]]
-        select_only(rig)
-        bpy.ops.object.mode_set(mode="POSE")
-        for bone in rig.pose.bones:
-            (bone if bpy.app.version >= (5, 0) else bone.bone).select = bone.name == name[1]
-        rig.data.bones.active = rig.data.bones[name[1]]
+        pose_mode(bpy.data.objects[name[0]], name[1])
         assert act() == {"FINISHED"}
         bpy.ops.object.mode_set(mode="OBJECT")
 

@@ -11,7 +11,7 @@ import pytest
 from mathutils import Matrix
 
 from rigid_motion.animation import key_frames, set_mode
-from tests.animation.bones.rigs import key_all, new_rig, select_only
+from tests.animation.bones.rigs import key_all, new_rig, pose_mode
 from tests.animation.oracle import curves_of, rotation_path
 
 BETWEEN = 15
@@ -25,22 +25,13 @@ def placed(rig: bpy.types.Object) -> np.ndarray:
     return np.array([bone.matrix for bone in bones])
 
 
-def posing(rig: bpy.types.Object, *selected: str) -> bpy.types.Object:
-    """Go into Pose Mode, with these bones selected or all."""
-    select_only(rig)
-    bpy.ops.object.mode_set(mode="POSE")
-    for bone in rig.pose.bones:
-        (bone if bpy.app.version >= (5, 0) else bone.bone).select = bone.name in selected or not selected
-    return rig
-
-
 @pytest.fixture(params=ORDERS)
 def rig(request, live_file) -> bpy.types.Object:
     """A rig in Pose Mode with a mode on each of its bones, in the middle of a segment."""
     rig = key_all(new_rig(rotation_mode=request.param))
     set_mode(list(rig.pose.bones), "dq_sclerp")
     live_file.scene.frame_set(BETWEEN)
-    return posing(rig)
+    return pose_mode(rig)
 
 
 def insert_keys(rig: bpy.types.Object) -> None:

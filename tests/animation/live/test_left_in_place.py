@@ -12,7 +12,7 @@ from mathutils import Euler, Matrix
 from rigid_motion import animation
 from rigid_motion.animation import set_exact, set_mode
 from tests.animation.bones.rig_editing import own_constraints
-from tests.animation.bones.rigs import in_turn, key_all, new_rig, select_only
+from tests.animation.bones.rigs import in_turn, key_all, new_rig, pose_mode, select_only
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import editor, give_own_deltas, key, new_object, own_deltas
 
@@ -105,11 +105,7 @@ def test_keyframes_cleared_of_the_selected_bones_leave_these_in_place(live_file)
     rig = key_all(new_rig())
     set_mode(list(rig.pose.bones), "dq_sclerp")
     live_file.scene.frame_set(BETWEEN)
-    select_only(rig)
-    bpy.ops.object.mode_set(mode="POSE")
-    for bone in rig.pose.bones:
-        select = bone if bpy.app.version >= (5, 0) else bone.bone
-        select.select = bone.name in ("Upper", "Hand")
+    pose_mode(rig, "Upper", "Hand")
     seen = placed(rig)
     with editor("VIEW_3D"):
         assert bpy.ops.anim.keyframe_clear_v3d() == {"FINISHED"}
