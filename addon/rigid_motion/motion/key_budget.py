@@ -1,10 +1,11 @@
 """The search for so many keys that are as near to a recording as can be.
 
 Keys are taken out until so many are left. For the largest error they are laid out anew and moved together, a few times,
-or, where there are few samples for each, some are taken out and put in elsewhere; then the best is put together of all
-that this has led to. Where a segment depends on its two keys alone and there are few samples for each key, all of them
-are candidates, and the first layout is the best there is but for a few hundredths. For the mean square some more keys
-are put in, moved, and as many taken out.
+or, where there are few samples for each, some are taken out and put in elsewhere. From the best of them some more are
+found that keep to a twentieth less, and as many taken out as are too many; then the best is put together of all that
+this has led to. Where a segment depends on its two keys alone and there are few samples for each key, all of them are
+candidates, and the first layout is the best there is but for a few hundredths. For the mean square some more keys are
+put in, moved, and as many taken out.
 """
 
 from __future__ import annotations
@@ -34,6 +35,9 @@ Where there are fewer, what is done for each key takes longer than looking at sa
 at samples takes so long that another try is worth more.
 """
 
+TAKEN = 15
+"""Samples for each key up to which all of them are candidates, where a segment depends on its two keys alone."""
+
 ENOUGH = 10.0, 15.0
 """Times the poses that the first keys have taken, after which no try begins: in the middle and above."""
 
@@ -44,10 +48,13 @@ STEPS = slice(1, 2), slice(2), slice(None), slice(2)
 """Which of these are done, by the lengths."""
 
 AGAIN = slice(1)
-"""The same once some keys have been put in elsewhere."""
+"""The same once some keys have been put in elsewhere, or taken out."""
 
 KEPT = 0.9
 """Of the keys: what is left of them when some are taken out, for others to be put in elsewhere."""
+
+LESS = 1.05
+"""How many times as small an error as that of the best keys the last ones are made for, whatever their number."""
 
 SWAPPED = 1.15
 """How many times the budget keys may be in between, for the mean square, to find better places."""
@@ -62,7 +69,7 @@ class BudgetSearch(Search):
         self._length = int(np.searchsorted(LENGTHS, len(recording.times) / budget, side="right"))
         self._is_short = self._length < 2
         """Whether there are few samples for each key."""
-        self._takes_all = self._is_short and self.reach == 0
+        self._takes_all = self.reach == 0 and len(recording.times) < TAKEN * budget
         """Whether all samples are candidates."""
 
     def least(self, tries: int) -> np.ndarray:
@@ -91,20 +98,32 @@ class BudgetSearch(Search):
                 samples, steps = self.thinned(self.measured(best), math.inf, fewest).indices, AGAIN
             else:
                 samples, is_complete = spread_keys(self.costs, candidates, samples, self.budget)
-            samples = self._filled(self.measured(samples)).indices
-            found.append(samples)
-            for ways, part in TOGETHER[self.reach][steps]:
-                samples = moved_together(self.costs, samples, ways, part)
-                found.append(samples)
-                best = min(best, samples, key=self.costs.peak)
+            moved = self._moved_together(samples, steps)
+            found += moved
+            samples, best = moved[-1], min(best, *moved, key=self.costs.peak)
             if self._takes_all and is_complete:
+                if not number:
+                    return best
                 break
             candidates = candidates[::SPARSER] if self.reach else beside(self.costs, found, BESIDE)
         # Without neighbours there is little left to gain, and in long recordings it takes long.
         is_long = len(self.recording.times) > SHORT and not self.reach
-        if self._takes_all or is_long or not self.is_linkable:
+        if is_long or not self.is_linkable or self.costs.peak(best) == 0.0:
             return best
+        if tries > 2 and self._length < 3:
+            # Keys that keep to a little less have better places, also when they are too many.
+            aim = self.costs.peak(best) / LESS
+            keys = self.refined(self.densified(self.measured(best), aim), aim)
+            found.append(keys.indices)
+            found += self._moved_together(self.thinned(keys, math.inf, self.budget).indices, AGAIN)
         return joined_keys(self.costs, found, self.budget)
+
+    def _moved_together(self, samples: np.ndarray, steps: slice) -> list[np.ndarray]:
+        """As many keys as the budget, these among them, and what moving them together makes of them step by step."""
+        found = [self._filled(self.measured(samples)).indices]
+        for ways, part in TOGETHER[self.reach][steps]:
+            found.append(moved_together(self.costs, found[-1], ways, part))
+        return found
 
     def _least_squares(self, best: Keys, tries: int) -> np.ndarray:
         """The same for the mean square, from keys that are many enough."""

@@ -39,8 +39,11 @@ BESIDE = {0: 2, 1: 0}
 NEAR = 1.2, 1.4
 """How many times the least error so far a segment may be off by for these, and for a longer one to be looked at."""
 
-JOINED = 150
+JOINED = 300
 """Times that every sample may be looked at, on average, for these."""
+
+FEWER = 4
+"""Of the best keys, where all that were found have too many links for that."""
 
 WITHIN = 1.0 + 1e-12
 """Tolerances that a link may be off by: those of the keys that were found are among them, whatever the rounding."""
@@ -128,10 +131,14 @@ def joined_keys(costs: Costs, found: list[np.ndarray], budget: int) -> np.ndarra
         Keys within the budget, each from the first sample to the last.
     budget : int
     """
-    best = min(found, key=costs.peak)
-    high, candidates = costs.peak(best), beside(costs, found, BESIDE[costs.reach])
-    links = _links(costs, candidates, found, *(high * times for times in NEAR), JOINED)
-    if links is None:
+    within = sorted((keys for keys in found if len(keys) <= budget), key=costs.peak)
+    best, high = within[0], costs.peak(within[0])
+    for some in (found, within[:FEWER]):
+        candidates = beside(costs, some, BESIDE[costs.reach])
+        links = _links(costs, candidates, some, *(high * times for times in NEAR), JOINED)
+        if links is not None:
+            break
+    else:
         return best
     _, peak = costs.of(links)
     better = peak < high

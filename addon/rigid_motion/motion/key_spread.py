@@ -31,7 +31,7 @@ RAISED = 1.15
 HALVINGS = 3
 """Of the last step up, by its logarithm."""
 
-ALIVE = 1.5, 1.2
+ALIVE = 2.0, 1.2
 """Times the error that a segment may be off by, for longer ones from its first key to be looked at.
 
 Where it depends on its two keys alone, and where on more."""
