@@ -58,8 +58,6 @@ from . import terminal
 
 PROGRAM = program_of(SCRIPT)
 
-TABLES = (METRICS, JOINT_METRICS, DECIMATED, KEYS_NEEDED)
-
 SAYING = ("--explain", "--json", "--open", "--quiet")
 """Options that are about what is printed, and are no part of the command that a report names."""
 
@@ -263,7 +261,6 @@ class _Run:
     ) -> None:
         self.options, self.plan, self.store = options, plan, plan.store
         self.executor, self.progress = executor, progress
-        self.on_farm = os.environ.get(FARM) == "openjd"
         self.notes: list[str] = []
         self.outcome = Outcome()
         self.page = False
@@ -295,7 +292,8 @@ class _Run:
         self._require_tolerances()
         digests = _digests(self.options.inputs, self.store)
         self.store.note(RECORD, dict(zip(_places([*digests], self.store.output), digests.values(), strict=True)))
-        self.store.withdraw({*TABLES} - self.plan.tables)  # What an earlier run found is no finding of this.
+        # What an earlier run found is no finding of this.
+        self.store.withdraw({METRICS, JOINT_METRICS, DECIMATED, KEYS_NEEDED} - self.plan.tables)
         if self.plan.comparison.stage and Survey.of(self.plan.tasks, self.store).amounts["frame"]:
             # The numbers take seconds, and films minutes: nobody has to wait for the one to see the other.
             self._do("Measuring", lambda: self.plan.tasks(films=False))
@@ -322,7 +320,7 @@ class _Run:
             blender=self.options.blender or "",
             before=self.outcome,
         )
-        self.page = bool(self.plan.studies) and not self.outcome.interrupted
+        self.page |= bool(self.plan.studies) and not self.outcome.interrupted
 
     def _note(self, text: str, style: str = "") -> None:
         self.notes.append(text)
@@ -407,7 +405,7 @@ class _Run:
             holds = "The report holds what was ready" if there else "There is no new report yet"
             print(f"Stopped. {holds}; the same command goes on from here.", file=sys.stderr)
         # After a failure a farm would not begin the stages behind it: what is missing is the report's to say.
-        failed = outcome.failures and not (self.on_farm and self.options.only != "report")
+        failed = outcome.failures and not (os.environ.get(FARM) == "openjd" and self.options.only != "report")
         code = 130 if outcome.interrupted else 2 if outcome.problem else int(bool(failed))
         if self.options.json:
             print(json.dumps(self._as_data(page if there else None, code), indent=1, ensure_ascii=False), flush=True)
