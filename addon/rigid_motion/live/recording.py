@@ -12,6 +12,7 @@ import numpy as np
 from ..animation import set_mode, write_channel
 from ..motion import Poses, reduce_skeleton_keys
 from ..motion.eulers import ORDERS, extrinsic_eulers_from_quaternions
+from ..motion.poses import joined
 from ..motion.quaternions import align_signs
 from ..streams.bodies import RADIUS
 from ..streams.paths import transposed
@@ -57,7 +58,7 @@ class Take:
         frames, poses = frames[later], transposed(poses[later])
         self._last = float(frames[-1])
         self._frames = np.concatenate((self._frames, frames))
-        self._poses = poses if self._poses is None else _joined(self._poses, poses)
+        self._poses = poses if self._poses is None else joined((self._poses, poses), axis=1)
         while self._tolerance is not None and len(self._frames) > STRETCH:
             self._take(STRETCH + 1)
 
@@ -107,8 +108,8 @@ class Take:
 def _of_all(keys: list[tuple[np.ndarray, Poses]]) -> tuple[np.ndarray, Poses]:
     """The keys of stretches as one; a single one where nothing moves. Where stretches meet both have the same."""
     frames, once = np.unique(np.concatenate([frames for frames, _ in keys]), return_index=True)
-    positions = np.concatenate([poses.positions for _, poses in keys])[once]
-    quaternions = align_signs(np.concatenate([poses.quaternions for _, poses in keys])[once])
+    poses = joined([poses for _, poses in keys])[once]
+    positions, quaternions = poses.positions, align_signs(poses.quaternions)
     if np.ptp(positions, axis=0).max() < STILL and np.ptp(quaternions, axis=0).max() < STILL:
         once = slice(1)
         frames, positions, quaternions = frames[once], positions[once], quaternions[once]
@@ -132,10 +133,3 @@ def _write(
     for name, values in channels.items():
         write_channel(obj, prefix + name, frames, values, group=group)
     return len(frames)
-
-
-def _joined(first: Poses, second: Poses) -> Poses:
-    return Poses(
-        np.concatenate((first.positions, second.positions), axis=1),
-        np.concatenate((first.quaternions, second.quaternions), axis=1),
-    )

@@ -8,7 +8,7 @@ one object has arrays of shape (n, 3) and (n, 4), and many objects have (objects
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -278,6 +278,13 @@ def reshaped(poses: Poses, *shape: int) -> Poses:
         poses.quaternions.reshape(*shape, 4),
         None if poses.scales is None else poses.scales.reshape(shape),
     )
+
+
+def joined(parts: Sequence[Poses], axis: int = 0) -> Poses:
+    """Poses one after another along an axis; all of them have scales, or none."""
+    scales = None if parts[0].scales is None else np.concatenate([part.scales for part in parts], axis=axis)
+    positions = np.concatenate([part.positions for part in parts], axis=axis)
+    return Poses(positions, np.concatenate([part.quaternions for part in parts], axis=axis), scales)
 
 
 def placed(above: Poses, poses: Poses) -> Poses:

@@ -16,7 +16,7 @@ import numpy as np
 
 from .bodies import Body
 from .measures import shell_error
-from .poses import Poses
+from .poses import Poses, joined
 from .quaternions import align_signs
 from .skeleton_channels import NO_TURN, Channels, SeparateKeys, changes
 from .skeleton_search import TINY, ChannelKeys, OwnKeys
@@ -140,11 +140,8 @@ def _farthest(task: tuple[Stretch, bool, np.ndarray, Poses]) -> np.ndarray:
 
 def _joined(parts: Sequence[Poses]) -> Poses:
     """Poses (joints, n) one after the other."""
-    positions, quaternions = (
-        np.concatenate([getattr(some, name) for some in parts], axis=1) for name in ("positions", "quaternions")
-    )
-    scales = None if parts[0].scales is None else np.concatenate([some.scales for some in parts], axis=1)
-    return Poses(positions, align_signs(quaternions), scales)
+    poses = joined(parts, axis=1)
+    return Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
 
 
 def _channels(poses: Poses, separate: bool) -> tuple[Poses, ...]:

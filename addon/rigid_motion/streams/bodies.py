@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from ..motion import Poses, Skeleton
+from ..motion.poses import joined
 
 RADIUS = 0.03
 """Of the ball at every joint, in metres, unless it is given."""
@@ -96,10 +97,7 @@ class Forest:
         self.parents = np.concatenate(
             [np.where(body.parents < 0, -1, body.parents + start) for body, start in zip(bodies, starts, strict=True)]
         )
-        self.rest = Poses(
-            np.concatenate([body.rest.positions for body in bodies]),
-            np.concatenate([body.rest.quaternions for body in bodies]),
-        )
+        self.rest = joined([body.rest for body in bodies])
         self.radii = np.repeat([body.radius for body in bodies], counts)
         self.sliding = np.concatenate([body.sliding for body in bodies])
         self.skeleton = Skeleton(self.parents)
@@ -109,10 +107,7 @@ class Forest:
 
     def joined(self, poses: Mapping[str, Poses]) -> Poses:
         """The poses of all joints (joints,), of those of each body by its name."""
-        parts = [poses[body.name] for body in self.bodies]
-        return Poses(
-            np.concatenate([part.positions for part in parts]), np.concatenate([part.quaternions for part in parts])
-        )
+        return joined([poses[body.name] for body in self.bodies])
 
     def parted(self, poses: Poses) -> dict[str, Poses]:
         """The poses of each body by its name, of those of all joints (joints, ...)."""

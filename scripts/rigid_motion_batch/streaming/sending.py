@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from rigid_motion.motion import Poses
+from rigid_motion.motion.poses import joined
 from rigid_motion.motion.quaternions import conjugate, multiply
 from rigid_motion.streams import Body, Sender
 from rigid_motion.streams.bodies import RADIUS
@@ -79,8 +80,7 @@ def together(clips: Sequence[Clip], rate: float | None = None) -> tuple[list[Bod
         straight(times, poses).at(np.clip(moments - first[0] + times[0], times[0], times[-1]))
         for times, poses in samples
     ]
-    positions = np.concatenate([part.positions for part in shown])
-    return bodies, moments, Poses(positions, np.concatenate([part.quaternions for part in shown]))
+    return bodies, moments, joined(shown)
 
 
 def sender_of(bodies: list[Body], moments: np.ndarray, tolerance: float, delay: float, rate: float | None) -> Sender:

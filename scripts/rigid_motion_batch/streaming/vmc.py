@@ -17,6 +17,7 @@ from typing import Self
 import numpy as np
 
 from rigid_motion.motion import Poses, Skeleton
+from rigid_motion.motion.poses import joined
 from rigid_motion.streams import Body, Receiver, Shown
 from rigid_motion.streams.paths import transposed
 from rigid_motion.streams.receiver import Stream
@@ -144,9 +145,8 @@ class Performers:
                 continue
             self._heard = now
             bodies = self._receiver.bodies(keys.stream)
-            positions = np.concatenate([keys.poses[body.name].positions for body in bodies], axis=1)
-            quaternions = np.concatenate([keys.poses[body.name].quaternions for body in bodies], axis=1)
-            found.append((bodies, keys.moments, transposed(Poses(positions, quaternions))))
+            poses = joined([keys.poses[body.name] for body in bodies], axis=1)
+            found.append((bodies, keys.moments, transposed(poses)))
         return found
 
 

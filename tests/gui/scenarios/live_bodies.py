@@ -26,6 +26,10 @@ WITHIN = 0.005
 """Metres: the live picture goes straight from sample to sample, of which a busy machine leaves some out."""
 
 
+MOVED = 0.01
+"""Metres by which a performer that dances soon has moved."""
+
+
 class Program:
     """Another program, that sends a performer in real time."""
 
@@ -112,6 +116,18 @@ def scenario(hand: Hand) -> Steps[None]:
     origin = heard.origin
     bpy.ops.rigid_motion.live_finish("EXEC_DEFAULT", True)
     yield from hand.wait_until(lambda: rig().animation_data and rig().animation_data.action, "there are keys")
+    # Undone and done again by keys, while the performer goes on.
+    yield from hand.hover(places.centre(places.region(view)))
+    yield from hand.press("Z", ctrl=True)
+    yield from hand.wait_until(
+        lambda: not (rig().animation_data and rig().animation_data.action), "the keys are undone"
+    )
+    before = heads_of(rig())
+    yield from hand.wait_until(
+        lambda: np.abs(heads_of(rig()) - before).max() > MOVED, "the performer still moves the rig"
+    )
+    yield from hand.press("Z", ctrl=True, shift=True)
+    yield from hand.wait_until(lambda: rig().animation_data and rig().animation_data.action, "the keys are there again")
     yield from hand.click(header)
     yield from hand.wait_until(lambda: receiving.listening() is None, "the button of the header closes the port")
     program.close()
