@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import csv
-import json
 import subprocess
 import sys
 import tempfile
@@ -28,6 +27,7 @@ import numpy as np
 DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("addon", "scripts")]
 
+from research.pages import ROOT, write_figures
 from research.paper.motions import read_motion, recordings_in
 from research.paper.study import read_all
 from research.paper.table import RADIUS, SAMPLES_AN_UPDATE
@@ -38,12 +38,9 @@ from rigid_motion_batch.analysis.metrics import geometric_mean, measure_reconstr
 from rigid_motion_batch.analysis.modes import BEST_OF, REFERENCE
 from rigid_motion_batch.analysis.needed import TABLE_RATES, KeysNeeded, OfRigidBody, keys_needed, overall
 from rigid_motion_batch.analysis.reconstructions import reconstruct
-from rigid_motion_batch.files import write_text
 from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
-
-OUTPUT = DOCS / "figures" / "recordings.json"
 
 RATES = ("5", "10", "15", "20", "30")
 """Evenly spaced keys a second."""
@@ -59,9 +56,6 @@ CHOICES = {"all": "all,best_of", "without_spline": "lerp_slerp,dq_sclerp,pga_ler
 
 BUDGETS = ("5", "10", "20")
 """Adaptive keys a second, of which `best_of` chooses the modes as well."""
-
-DIGITS = 4
-"""Significant ones that are kept of a figure."""
 
 
 def parabola(before: np.ndarray, after: np.ndarray) -> np.ndarray:
@@ -105,12 +99,11 @@ def main(arguments: list[str] | None = None) -> int:
     """Measure, and write the file."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--recordings", type=Path, metavar="FOLDER", required=True)
-    parser.add_argument("--output", type=Path, default=OUTPUT, help="(docs/figures/recordings.json)")
+    parser.add_argument("--root", type=Path, default=ROOT, help="write ROOT/docs/figures (this checkout)")
     options = parser.parse_args(arguments)
     chosen = dict(_counting(recordings_in(options.recordings)))
     clips, paths = list(chosen.values()), list(chosen)
     figures = {
-        "made_by": "python docs/measure_recordings.py --recordings FOLDER",
         "recordings": {clip.name: len(clip.times) for clip in clips},
         "errors": _errors(paths),
         "causal_errors": {name: _errors_of_clips(clips, part) for name, part in PARTS.items()},
@@ -120,8 +113,7 @@ def main(arguments: list[str] | None = None) -> int:
         "best_of_adaptive": _best_of_adaptive(paths),
         "assets": _assets(),
     }
-    options.output.parent.mkdir(parents=True, exist_ok=True)
-    write_text(options.output, json.dumps(_rounded(figures), indent=1) + "\n")
+    write_figures("recordings", figures, "python docs/measure_recordings.py --recordings FOLDER", options.root)
     return 0
 
 
@@ -318,14 +310,6 @@ def _compared(paths: Sequence[Path], *options: str) -> Iterator[Path]:
 def _rows(path: Path) -> list[dict[str, str]]:
     with path.open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
-
-
-def _rounded(value: object) -> object:
-    if isinstance(value, dict):
-        return {key: _rounded(one) for key, one in value.items()}
-    if isinstance(value, list):
-        return [_rounded(one) for one in value]
-    return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
 
 
 def _say(what: str) -> None:

@@ -4,7 +4,7 @@
     python scripts/research benchmark --rounds 30
 
 All ways of computing take turns, round by round, and the fastest round counts. It needs the packages of the extra
-`benchmark`; pypose (its SE(3) B-spline) is measured where it is installed.
+`benchmark`.
 """
 
 from __future__ import annotations
@@ -24,12 +24,6 @@ from pytransform3d.trajectories import (
 )
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import RigidTransform, Rotation, RotationSpline, Slerp
-
-try:
-    import pypose
-    import torch
-except ImportError:
-    pypose = None
 
 from research.publishing import publish, say, study_parser
 from rigid_motion.motion import MODES, Poses, interpolate, reduce_keys, shell_error, twists
@@ -179,17 +173,6 @@ def scipy_spline(case: Case) -> Callable[[], object]:
     return run
 
 
-def pypose_spline(case: Case) -> Callable[[], object]:
-    """`pypose.bspline`: a cumulative B-spline of SE(3), at even steps in every segment."""
-    step = float(case.times[1] - case.times[0])
-
-    def run() -> object:
-        rows = np.concatenate((case.keys.positions[0], np.roll(case.keys.quaternions[0], -1, axis=1)), axis=1)
-        return pypose.bspline(pypose.SE3(torch.from_numpy(rows)), interval=step, extrapolate=True).numpy()
-
-    return run
-
-
 def ways(case: Case) -> dict[tuple[str, str], Callable[[], object]]:
     """(mode, who computes it) to what computes it."""
     result: dict[tuple[str, str], Callable[[], object]] = {}
@@ -204,8 +187,6 @@ def ways(case: Case) -> dict[tuple[str, str], Callable[[], object]]:
     if case.times.ndim == 1 and case.keys.shape[0] == 1:
         result["lerp_slerp", "SciPy"] = scipy_slerp(case)
         result["motor_spline", "SciPy, RotationSpline and CubicSpline"] = scipy_spline(case)
-        if pypose and np.allclose(np.diff(case.times), case.times[1] - case.times[0]):
-            result["motor_spline", "pypose, B-spline"] = pypose_spline(case)
     return result
 
 

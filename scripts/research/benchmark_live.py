@@ -225,8 +225,8 @@ def rigs(size: Size, rounds: int) -> list[dict[str, Any]]:
     """
     rig, few = rig_of(size), max(5, rounds // 8)
     bones = list(rig.pose.bones)
-    points = [animation.channelbag_of(rig).fcurves.find(bone.path_from_id("location")) for bone in bones]
-    keys = [fcurve.keyframe_points[size.keys // 2] for fcurve in points]
+    curves = [animation.channelbag_of(rig).fcurves.find(bone.path_from_id("location")) for bone in bones]
+    keys = [fcurve.keyframe_points[size.keys // 2] for fcurve in curves]
     animation.follower.set_drafts(True)
     try:
         without, native = with_and_without(partial(edit, keys[len(keys) // 2 :][:1]), rounds).values()

@@ -14,9 +14,8 @@ from rigid_motion import animation
 from rigid_motion.animation.actions.channels import replace_keys
 from rigid_motion.animation.transforms.bones import prefix_of
 from rigid_motion.motion import Poses, Skeleton, interpolate, shell_error
-from rigid_motion.motion.eulers import quaternions_from_extrinsic_eulers
-from rigid_motion.motion.poses import placed
-from rigid_motion.motion.quaternions import align_signs, normalise
+from rigid_motion.motion.poses import inverse, placed
+from rigid_motion.motion.quaternions import align_signs
 from rigid_motion_batch.hushing import hushed
 from rigid_motion_batch.scenes.decimated_bodies import Curve, key_frames_of, values_of, varying
 
@@ -27,8 +26,6 @@ IMPORTERS = {".bvh", ".fbx"}
 
 MOST_FRAMES = 1200
 """Longer recordings are cut off."""
-
-CHANNELS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3}
 
 
 Keys = Sequence[np.ndarray]
@@ -107,32 +104,8 @@ class UnusableRigError(ValueError):
     """A file without a body that can be measured."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Joint:
-    """A bone; or the armature itself, where it carries the body along."""
-
-    name: str
-    carrier: bpy.types.Object | bpy.types.PoseBone
-    parent: int
-    rest: Poses
-    """What its channels are put on top of, in the parent's space, shape (1,)."""
-
-    @property
-    def prefix(self) -> str:
-        return "" if isinstance(self.carrier, bpy.types.Object) else prefix_of(self.carrier.name)
-
-    @property
-    def location(self) -> str:
-        return f"{self.prefix}location"
-
-    @property
-    def rotation(self) -> str:
-        by_quaternion = self.carrier.rotation_mode == "QUATERNION"
-        return f"{self.prefix}rotation_{'quaternion' if by_quaternion else 'euler'}"
-
-
 class Rig:
-    """An armature in the open file, with F-curves of its own and its bones'."""
+    """An armature in the open file; it is a joint itself where it carries the body along."""
 
     def __init__(self, name: str, obj: bpy.types.Object, frames: np.ndarray) -> None:
         self.name, self.obj, self.frames = name, obj, frames
@@ -140,69 +113,39 @@ class Rig:
         """The F-curves that change, and count."""
         if any(path.endswith("scale") for path, _ in self.varying):
             raise UnusableRigError(f"{name}: its joints grow or shrink, which is not measured here")
-        self.joints = self._joints()
+        bones = list(obj.pose.bones)  # Parents before their children.
+        carries = int(any(not path.startswith("pose.bones") for path, _ in self.varying))
+        self.joints = [*[obj][:carries], *bones]
+        above = [bones.index(bone.parent) + carries if bone.parent else carries - 1 for bone in bones]
+        self.parents = np.array([*[-1][:carries], *above])
 
     def body(self) -> Body:
         """As it was imported, in metres."""
-        scene = bpy.context.scene
+        prefixes = ["" if joint == self.obj else prefix_of(joint.name) for joint in self.joints]
         moving, turning = (
-            np.array([self._count(path) for path in paths])
-            for paths in ([j.location for j in self.joints], [j.rotation for j in self.joints])
+            np.array([sum(path.startswith(prefix + channel) for path, _ in self.varying) for prefix in prefixes])
+            for channel in ("location", "rotation")
         )
-        return Body(
-            self.name,
-            scene.render.fps / scene.render.fps_base,
-            tuple(joint.name for joint in self.joints),
-            np.array([joint.parent for joint in self.joints]),
-            self.poses(),
-            moving,
-            turning,
-        )
+        names, render = tuple(joint.name for joint in self.joints), bpy.context.scene.render
+        return Body(self.name, render.fps / render.fps_base, names, self.parents, self.poses(), moving, turning)
 
     def poses(self) -> Poses:
-        """What the F-curves show now, shape (joints, n), each joint in its parent's space."""
-        values, of_size = values_of(self.obj, self.frames), float(np.mean(self.obj.scale))
-        rows = [placed(joint.rest, self._local(joint, values)) for joint in self.joints]
-        positions = np.stack([row.positions for row in rows])
-        in_bones = np.array([isinstance(joint.carrier, bpy.types.PoseBone) for joint in self.joints])
-        positions[in_bones] *= of_size
-        return Poses(positions, align_signs(np.stack([row.quaternions for row in rows])))
+        """What Blender shows now, shape (joints, n), each joint in its parent's space."""
+        shown = np.empty((len(self.joints), len(self.frames), 4, 4))
+        for number, frame in enumerate(self.frames.tolist()):
+            bpy.context.scene.frame_set(int(frame))
+            world = self.obj.matrix_world
+            shown[:, number] = [world if joint == self.obj else world @ joint.matrix for joint in self.joints]
+        worlds = Poses.from_matrices(shown)
+        poses = Poses(worlds.positions, worlds.quaternions)
+        for joint, parent in reversed(list(enumerate(self.parents))):  # Children before their parents.
+            if parent >= 0:
+                poses[joint] = placed(inverse(poses[parent]), poses[joint])
+        return Poses(poses.positions, align_signs(poses.quaternions))
 
     def keys(self) -> dict[Curve, list[float]]:
         """The frames of the keys of all F-curves that vary in the recording."""
         return key_frames_of(self.obj, self.varying)
-
-    def _local(self, joint: _Joint, values: dict[Curve, np.ndarray]) -> Poses:
-        """What a joint's channels say, shape (n,)."""
-
-        def channels(path: str, property_value: bpy.types.bpy_prop_array) -> np.ndarray:
-            constant = [np.full(len(self.frames), value) for value in property_value]
-            return np.stack([values.get((path, i), column) for i, column in enumerate(constant)], axis=-1)
-
-        kind = joint.rotation.removeprefix(joint.prefix)
-        turns = channels(joint.rotation, getattr(joint.carrier, kind))
-        if kind == "rotation_euler":
-            turns = quaternions_from_extrinsic_eulers(turns, joint.carrier.rotation_mode)
-        return Poses(channels(joint.location, joint.carrier.location), normalise(turns))
-
-    def _count(self, path: str) -> int:
-        return sum((path, i) in self.varying for i in range(4))
-
-    def _joints(self) -> list[_Joint]:
-        still = Poses(np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0, 0.0]]))
-        carries = any(path in CHANNELS for path, _ in self.varying)
-        joints = [_Joint(self.obj.name, self.obj, -1, still)] if carries else []
-        under = still if carries else Poses(still.positions, _pose(self.obj.matrix_basis).quaternions)
-        numbers: dict[str, int] = {}
-        for bone in self.obj.pose.bones:  # Parents before their children.
-            numbers[bone.name] = len(joints)
-            if bone.parent:
-                parent = numbers[bone.parent.name]
-                rest = _pose(bone.parent.bone.matrix_local.inverted() @ bone.bone.matrix_local)
-            else:
-                parent, rest = 0 if carries else -1, placed(under, _pose(bone.bone.matrix_local))
-            joints.append(_Joint(bone.name, bone, parent, rest))
-        return joints
 
 
 def import_rig(path: Path, most_frames: int = MOST_FRAMES) -> Rig:
@@ -242,8 +185,3 @@ def body_files(paths: list[Path]) -> list[Path]:
     """The bodies among files and in folders."""
     found = [inside for path in paths for inside in (sorted(path.iterdir()) if path.is_dir() else [path])]
     return [path for path in found if path.suffix.lower() in IMPORTERS]
-
-
-def _pose(matrix: object) -> Poses:
-    position, quaternion, _ = matrix.decompose()
-    return Poses(np.array([position]), np.array([quaternion]))

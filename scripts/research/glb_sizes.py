@@ -14,7 +14,6 @@ import shutil
 import struct
 import subprocess
 import tempfile
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -33,6 +32,13 @@ RADIUS = 0.03
 
 TOLERANCES = (1e-4, 1e-3, 5e-3)
 """Metres."""
+
+TOOLS = {
+    "gltf-transform `resample`": ("gltf-transform", "resample", "{0}", "{1}"),
+    "gltfpack `-noq`": ("gltfpack", "-i", "{0}", "-o", "{1}", "-kn", "-noq"),
+    "gltfpack, its defaults": ("gltfpack", "-i", "{0}", "-o", "{1}", "-kn"),
+}
+"""Programs beside, with the arguments that make one file another."""
 
 NUMBERS = {5120: "i1", 5121: "u1", 5122: "i2", 5123: "u2", 5125: "u4", 5126: "f4"}
 SIZES = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
@@ -185,39 +191,20 @@ def export(path: Path, output: Path) -> None:
     bpy.ops.export_scene.gltf(filepath=str(output), export_format="GLB")
 
 
-def tools_in(folder: Path | None) -> dict[str, Callable[[Path, Path], None]]:
-    """Return what makes a file smaller, by its name."""
-
-    def reduced(tolerance: float) -> Callable[[Path, Path], None]:
-        return lambda path, output: reduce_file(path, output, Options(tolerance, RADIUS)) and None
-
-    def program(name: str, arguments: Callable[[Path, Path], Sequence[object]]) -> Callable[[Path, Path], None] | None:
-        found = shutil.which(name, path=str(folder)) if folder else None
-        if found is None:
-            return None
-        return lambda path, output: (
-            subprocess.run([found, *map(str, arguments(path, output))], check=True, capture_output=True) and None
-        )
-
-    others = {
-        "gltf-transform `resample`": program("gltf-transform", lambda one, other: ("resample", one, other)),
-        "gltfpack `-noq`": program("gltfpack", lambda one, other: ("-i", one, "-o", other, "-kn", "-noq")),
-        "gltfpack, its defaults": program("gltfpack", lambda one, other: ("-i", one, "-o", other, "-kn")),
-    }
-    ours = {f"`reduce --tolerance {1e3 * tolerance:g}mm`": reduced(tolerance) for tolerance in TOLERANCES}
-    return ours | {name: run for name, run in others.items() if run}
-
-
-def measure(path: Path, tools: dict[str, Callable[[Path, Path], None]], folder: Path) -> list[dict[str, Any]]:
+def measure(path: Path, tools: Path | None, folder: Path) -> list[dict[str, Any]]:
     """Return what the exporter and each tool make of a body."""
-    exported = folder / f"{path.stem}.glb"
+    exported, output = folder / f"{path.stem}.glb", folder / f"{path.stem}-smaller.glb"
     export(path, exported)
     original = read(exported)
     found = [beside(original, original, "exported by Blender")]
-    for number, (name, run) in enumerate(tools.items()):
-        output = folder / f"{path.stem}-{number}.glb"
-        run(exported, output)
-        found.append(beside(original, read(output), name))
+    for tolerance in TOLERANCES:
+        reduce_file(exported, output, Options(tolerance, RADIUS))
+        found.append(beside(original, read(output), f"`reduce --tolerance {1e3 * tolerance:g}mm`"))
+    for name, (program, *given) in TOOLS.items():
+        if tools and (program := shutil.which(program, path=str(tools))):
+            arguments = [one.format(exported, output) for one in given]
+            subprocess.run([program, *arguments], check=True, capture_output=True)
+            found.append(beside(original, read(output), name))
     return found
 
 
@@ -227,11 +214,11 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("bodies", type=Path, nargs="+", metavar="PATH", help="FBX and BVH files")
     parser.add_argument("--tools", type=Path, metavar="FOLDER", help="where gltfpack and gltf-transform are")
     options = parser.parse_args(arguments)
-    tools, clips = tools_in(options.tools), []
+    clips = []
     with tempfile.TemporaryDirectory() as folder:
         for path in options.bodies:
             say(path.name)
-            clips.append({"name": path.stem, "tools": measure(path, tools, Path(folder))})
+            clips.append({"name": path.stem, "tools": measure(path, options.tools, Path(folder))})
     shares = {one["tool"]: [] for one in clips[0]["tools"]}
     for clip in clips:
         for one in clip["tools"]:

@@ -1,12 +1,17 @@
-"""Models of game engines, on a link that does nothing but take its time."""
+"""Models of game engines, on a link that does nothing but take its time; and the study that has them."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from research import live_costs
 from research.live_streams.engines import ENGINES, FPS, Way, by_engine, seen, truth_of
+from research.live_streams.room import Room
 from rigid_motion.motion import Poses
+from rigid_motion_batch.places import ASSETS
+from tests.scripts.recordings.test_damaged_bvh_bodies import seed
+from tests.scripts.research.keeping import written
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -29,3 +34,18 @@ def test_nobody_is_shown_what_has_not_come(engine: str) -> None:
     shown = by_engine(engine, truth, Way(0.25, 0.25, 0.0), frames)[0].positions[:, 0]
     assert np.abs(shown[frames < 5.25]).max() < 1e-9
     assert shown[-1] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_the_study_writes_what_the_page_reads(tmp_path, monkeypatch):
+    (tmp_path / "walk.bvh").write_text(seed("ZXY", 20), encoding="utf-8")
+    monkeypatch.setattr(live_costs, "HAND", "pivot")
+    monkeypatch.setattr(live_costs, "WAYS", {"20 ms": live_costs.WAYS["20 ms"]})
+    monkeypatch.setattr(live_costs, "figures", lambda users, seconds: Room(22.0, 9, 10, 0.5, 1.0, 2.0, 0.1, users))
+    given = [str(tmp_path / "walk.bvh"), str(ASSETS / "pivot.csv")]
+    assert live_costs.main([*given, "--users", "3", "--seconds", "2", "--root", str(tmp_path)]) == 0
+    found = written(tmp_path, "live_costs")
+    assert [row["by"] for row in found["engines"]] == [*ENGINES, "sent when needed"]
+    single = found["single"]["rows"][0]["ways"]
+    assert found["single"]["median"] == single
+    saved = 1.0 - single["when needed, 100 ms"]["bytes"] / single[live_costs.FLOATS]["bytes"]
+    assert found["single"]["saved"]["100 ms"] == pytest.approx(saved, abs=1e-5)
