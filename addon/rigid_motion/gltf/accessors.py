@@ -148,7 +148,7 @@ def _with_sparse(document: Document, accessor: Json, found: np.ndarray, what: st
     count, kind = whole(sparse, "count", least=1), _kind(sparse["indices"])
     indices = _in_view(document, sparse["indices"], kind, 1, count, what)[:, 0].astype(np.int64)
     values = _in_view(document, sparse["values"], found.dtype, found.shape[1], count, what)
-    if kind.kind != "u" or indices.max() >= whole(accessor, "count") or np.any(np.diff(indices) <= 0):
+    if kind.kind != "u" or np.max(indices) >= whole(accessor, "count") or np.any(np.diff(indices) <= 0):
         raise GltfError(f"{what} is sparse, and its indices do not rise to its last element")
     first, end, _ = rows.indices(whole(accessor, "count"))
     here = (indices >= first) & (indices < end)

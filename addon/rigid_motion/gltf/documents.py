@@ -222,11 +222,11 @@ def objects(parent: Json, name: str) -> list[Json]:
     return found
 
 
-def entry(parent: Json, name: str, number: object) -> Json:
+def entry(parent: Json, name: str, number: Any) -> Json:
     """The object of a number in a list of the document."""
     found = parent.get(name, [])
-    is_there = isinstance(found, list) and isinstance(number, int) and not isinstance(number, bool)
-    if not is_there or not 0 <= number < len(found):
+    is_number = isinstance(number, int) and not isinstance(number, bool)
+    if not isinstance(found, list) or not is_number or not 0 <= number < len(found):
         objects(parent, name)
         raise GltfError(f"{name} has no entry {shown(number)}, which something in the file names")
     return found[number] if isinstance(found[number], dict) else objects(parent, name)[number]

@@ -197,7 +197,7 @@ class World:
                 if bounds.flat[some[0]] <= min(largest, tolerance):
                     break
                 errors.flat[some] = self._displacements(there, truth, some)
-                largest = max(largest, float(errors.flat[some].max()))
+                largest = max(largest, float(np.max(errors.flat[some])))
             padded = np.pad(errors, ((0, 0), (1, 1)))
             peaks = (errors > tolerance) & (errors >= padded[:, :-2]) & (errors >= padded[:, 2:])
             place, number = np.nonzero(peaks)

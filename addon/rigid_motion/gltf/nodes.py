@@ -115,7 +115,7 @@ def steadied(tracks: tuple[Track, ...]) -> Tracks:
         for track in tracks
         if track.is_constant
     ]
-    return by_target(tracks) | by_target(tuple(kept))
+    return {**by_target(tracks), **by_target(tuple(kept))}
 
 
 def _parents(nodes: list[Json]) -> np.ndarray:

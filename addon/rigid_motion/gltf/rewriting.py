@@ -148,7 +148,8 @@ class _Rewriting:
 
     def _buffers(self, removed: set[int]) -> Document:
         """The document with its bytes: without those of views that were removed, and with the new ones."""
-        json, contents = self.json, list(self.before.buffers)
+        json = self.json
+        contents: list[Any] = list(self.before.buffers)
         ranges: dict[int, list[Range]] = {}
         for number in sorted(removed):
             view = self.views[number]
@@ -215,8 +216,8 @@ def _other_slots(json: Json) -> Iterator[tuple[Json, str]]:
         for primitive in objects(mesh, "primitives"):
             if "indices" in primitive:
                 yield primitive, "indices"
-            for attributes in (primitive.get("attributes"), *objects(primitive, "targets")):
-                yield from ((attributes, name) for name in attributes or {})
+            for attributes in (primitive.get("attributes") or {}, *objects(primitive, "targets")):
+                yield from ((attributes, name) for name in attributes)
     for skin in objects(json, "skins"):
         if "inverseBindMatrices" in skin:
             yield skin, "inverseBindMatrices"

@@ -42,7 +42,7 @@ def moments(world: World, clip: Clip, tolerance: float) -> np.ndarray:
             values = track.at(times)
             if track.path == ROTATION:
                 halved |= np.abs(np.einsum("ij,ij->i", values[1:], values[:-1])) < np.cos(WIDE / 2)
-            if track.interpolation == CUBICSPLINE:
+            if track.interpolation == CUBICSPLINE and reaches is not None:
                 reach = 1.0 if track.path not in (ROTATION, SCALE) else 2.0 * reaches[world.places[track.node]]
                 halved |= _bows(track, times, values) * reach > BOW * tolerance
         middles = ((times[:-1] + times[1:]) / 2)[halved].astype(np.float32).astype(np.float64)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -52,8 +53,11 @@ class Track:
     times: np.ndarray
     """Of the keys in seconds, shape (n,), strictly rising."""
 
-    values: np.ndarray | Rows
-    """Shape (n, width); of a cubic spline (n, 3, width): tangent before the key, its value, tangent after it."""
+    values: Any
+    """An array, or what is read where it is sliced like one, shape (n, width).
+
+    Of a cubic spline (n, 3, width): tangent before the key, its value, tangent after it.
+    """
 
     @property
     def points(self) -> np.ndarray:
@@ -153,7 +157,8 @@ def _clip(document: Document, number: int) -> Clip:
     animation = document.json["animations"][number]
     name = animation.get("name")
     name = name if isinstance(name, str) and name else f"animation {number}"
-    tracks, targets, times = [], set(), {}
+    tracks, targets = [], set()
+    times: dict[int, np.ndarray] = {}
     for place, channel in enumerate(objects(animation, "channels")):
         target = channel.get("target")
         if not isinstance(target, dict):
@@ -181,18 +186,18 @@ def _track(document: Document, animation: Json, place: int, channel: Json, known
     interpolation = sampler.get("interpolation", LINEAR)
     if interpolation not in INTERPOLATIONS:
         raise GltfError(f"the interpolation {shown(interpolation)} is none of {', '.join(INTERPOLATIONS)}")
-    if (given := sampler.get("input")) not in known:
+    given: Any = sampler.get("input")
+    if given not in known:
         known[given] = _times(document, given)
     times, values = known[given], numbers(document, sampler.get("output"))
-    rows = len(times) * (3 if interpolation == CUBICSPLINE else 1)
-    width, uneven = divmod(values.size, rows)
+    width, uneven = divmod(values.size, len(times) * (3 if interpolation == CUBICSPLINE else 1))
     if uneven or not width or width != WIDTHS.get(path, width) or (path == WEIGHTS) != (values.shape[1] == 1):
         raise GltfError(f"{len(values)} values do not fit {len(times)} keys of {path}")
     if interpolation == CUBICSPLINE and len(times) < 2:
         raise GltfError("a spline needs two keys at least")
     if np.abs(values).max() > FARTHEST:
         raise GltfError("it has numbers that are too large")
-    shape = (3, width) if interpolation == CUBICSPLINE else (width,)
+    shape: tuple[int, ...] = (3, width) if interpolation == CUBICSPLINE else (width,)
     rows = Rows(document, sampler["output"], len(times), shape, TO_WXYZ if path == ROTATION else EVERY)
     track = Track(place, node, path, interpolation, times, rows)
     if path == ROTATION and not np.linalg.norm(track.points, axis=1).all():

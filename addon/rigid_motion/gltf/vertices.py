@@ -70,7 +70,7 @@ def _largest(differences: np.ndarray, skin: Skin, least: float) -> float:
         for carriers, shares in zip(skin.carriers.T, skin.shares.T, strict=True):
             own = differences[carriers[None], moments[:, None]]
             moved += shares[:, None] * np.einsum("mvab,vb->mva", own, skin.vertices)
-        least = max(least, float(np.linalg.norm(moved, axis=-1).max()))
+        least = max(least, float(np.max(np.linalg.norm(moved, axis=-1))))
     return least
 
 

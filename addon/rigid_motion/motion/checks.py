@@ -133,7 +133,7 @@ def check_radius(radius: float) -> None:
 def check_radii(radii: ArrayLike) -> np.ndarray:
     """The same of one radius or many, in an array of any shape, which is returned."""
     if not isinstance(radii, np.ndarray | list | tuple):
-        check_radius(radii)  # type: ignore[arg-type] - refused there where it is no number
+        check_radius(radii)  # type: ignore[arg-type]  # refused there where it is no number
     checked = numbers(radii, "radii")
     for radius in np.unique(checked):
         check_radius(radius)

@@ -148,6 +148,6 @@ class BudgetSearch(Search):
             picked = order[between[order]]
             errors = self.costs.errors(segments[np.sort(picked)])
             ends = zip(keys.indices[picked] + 1, keys.indices[picked + 1], strict=True)
-            worst = [first + errors[first:second].argmax() for first, second in ends]
+            worst = [first + np.argmax(errors[first:second]) for first, second in ends]
             keys = self.measured(np.union1d(keys.indices, worst))
         return keys

@@ -185,8 +185,8 @@ class Costs:
         within = prepare_within(MODES[recording.mode].curves, key_times, keys, slice(before, before + 1))
         if not together:
             return samples, np.minimum(recording.errors(samples, within(counts, progress, slice(None))), WORST)
-        of_all = (np.concatenate([numbers] * math.prod(together)) for numbers in (counts, progress))
-        shown = within(*of_all, slice(None))
+        counts, progress = (np.concatenate([numbers] * math.prod(together)) for numbers in (counts, progress))
+        shown = within(counts, progress, slice(None))
         return samples, np.minimum(recording.errors(samples, reshaped(shown, *together, -1)), WORST)
 
 
@@ -236,10 +236,10 @@ def _with_ends(recording: Recording, rows: np.ndarray, reach: int) -> tuple[np.n
     key_times, keys = recording.times[rows], recording.truth[rows]
     if rows.min() >= 0:
         return key_times, keys
-    missing = [np.count_nonzero(columns < 0, axis=1) for columns in (rows[:, :reach], rows[:, reach + 2 :])]
-    where = [np.flatnonzero(count) for count in missing]
+    absent = [np.count_nonzero(columns < 0, axis=1) for columns in (rows[:, :reach], rows[:, reach + 2 :])]
+    where = [np.flatnonzero(count) for count in absent]
     inwards = np.repeat((1, -1), [len(some) for some in where])
-    (before, after), row = (count[some] for count, some in zip(missing, where, strict=True)), np.concatenate(where)
+    (before, after), row = (count[some] for count, some in zip(absent, where, strict=True)), np.concatenate(where)
     missing, outermost = np.concatenate((before, after)), np.concatenate((before, rows.shape[1] - 1 - after))
     duration = key_times[row, outermost + inwards] - key_times[row, outermost]
     for step in range(1, 1 + missing.max()):

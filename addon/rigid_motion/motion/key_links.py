@@ -74,7 +74,9 @@ def linked_keys(costs: Costs, found: list[np.ndarray]) -> np.ndarray:
         if links is not None:
             _, peak = costs.of(links)
             links = links[peak <= WITHIN]
-            return _Ways(links, candidates).shortest()
+            keys = _Ways(links, candidates).shortest()
+            assert keys is not None  # what was found is a way
+            return keys
     return min(found, key=len)
 
 
@@ -107,6 +109,7 @@ def traded_keys(costs: Costs, found: list[np.ndarray], *, budget: int | None = N
     for _ in range(PRICE_STEPS):
         middle = 0.5 * (low + high)
         keys = ways.shortest(cost + price * math.exp(middle))
+        assert keys is not None  # what was found is a way
         total = costs.total(keys)
         worth = (len(keys), total) if budget is None else (total, len(keys))
         fits = total <= allowed if budget is None else len(keys) <= budget
@@ -130,7 +133,8 @@ def joined_keys(costs: Costs, found: list[np.ndarray], budget: int) -> np.ndarra
     """
     best = min(found, key=costs.peak)
     high, candidates = costs.peak(best), beside(costs, found, BESIDE[costs.reach])
-    links = _links(costs, candidates, found, *(high * times for times in NEAR), JOINED)
+    good, alive = (high * times for times in NEAR)
+    links = _links(costs, candidates, found, good, alive, JOINED)
     if links is None:
         return best
     _, peak = costs.of(links)

@@ -192,7 +192,12 @@ class Search:
         first, end = np.searchsorted(indices, recording.starts), np.searchsorted(indices, recording.ends)
         counts = end - first + 1
         return Keys(
-            indices, np.repeat(first, counts), np.repeat(end, counts), *np.zeros((2, len(indices))), indices >= 0
+            indices,
+            np.repeat(first, counts),
+            np.repeat(end, counts),
+            np.zeros(len(indices)),
+            np.zeros(len(indices)),
+            indices >= 0,
         )
 
     def segments(self, keys: Keys) -> tuple[np.ndarray, np.ndarray]:

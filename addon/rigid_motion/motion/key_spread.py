@@ -233,11 +233,10 @@ def moved_together(costs: Costs, keys: np.ndarray, ways: int, part: int) -> np.n
             total = least[..., None] + of_segment
             backs.append(total.argmin(axis=0).astype(np.int8))
             least = total.min(axis=0)
-    chosen = [int(number) for number in np.unravel_index(least.argmin(), least.shape)][::-1]
+    chosen = [int(number) for number in np.unravel_index(np.argmin(least), least.shape)][::-1]
     for back in reversed(backs):
         chosen.append(int(back[tuple(chosen[:-count:-1])]))
-    chosen = np.array(chosen[::-1])
-    return choices[np.arange(len(choices)), chosen][reach : len(choices) - reach]
+    return choices[np.arange(len(choices)), chosen[::-1]][reach : len(choices) - reach]
 
 
 def _of_choices(costs: Costs, choices: np.ndarray, worst: float) -> np.ndarray:

@@ -68,7 +68,7 @@ class Channels:
 
     def budget(self, budget: int) -> int:
         """What a budget of keys leaves for nodes, or a ValueError where that is too little for what may move."""
-        free, apart = np.count_nonzero(self.whole.free), len(self.apart)
+        free, apart = int(np.count_nonzero(self.whole.free)), len(self.apart)
         moving = np.count_nonzero(self.turns & self.whole.free) + np.count_nonzero(self.moves & self.whole.free)
         if budget < 2 * free + moving:
             raise ValueError(

@@ -151,6 +151,7 @@ class Fitting:
 
     def _smaller(self, task: Task, truth: Poses, found: Fitted, most: np.ndarray) -> Fitted:
         """A message with smaller numbers, with which no joint is off by more than `most` (n,)."""
+        assert found.path is not None
         there = self.skeleton.in_root_space(found.path.at(task.moments))
         places, d = (_apart(part) for part in (there.positions, there.positions - truth.positions))
         turn = multiply(there.quaternions, conjugate(truth.quaternions))

@@ -221,7 +221,7 @@ class Retargeting:
         self.scale = float(np.median(arms[1][both] / arms[0][both])) if both.any() else 1.0
         if legs:
             # Then feet are on the same ground.
-            self.scale = float(arms[1][legs].sum() / arms[0][legs].sum())
+            self.scale = float(np.sum(arms[1][legs]) / np.sum(arms[0][legs]))
         hips = [row for bone, row in bones.items() if bone.endswith("UpperLeg")]
         aligned = alignments(bones, target.positions, source.positions) if self.has_places else {}
         turns = target.quaternions.copy()
@@ -234,7 +234,8 @@ class Retargeting:
         for pair in np.flatnonzero(sliding):
             children = np.flatnonzero(parents == pair)
             if len(children):
-                children = [child for child in children if child in hips] or children
+                of_hips = [child for child in children.tolist() if child in hips]
+                children = np.array(of_hips) if of_hips else children
                 theirs = (source.positions[children] - source.positions[pair]).mean(axis=0)
                 ours = (target.positions[children] - target.positions[pair]).mean(axis=0)
                 self._beside[pair] = rotate(conjugate(source.quaternions[pair]), self.scale * theirs - ours)

@@ -41,7 +41,9 @@ class Codec:
     def write(self, said: Said, kind: int, state: State, is_late: bool) -> tuple[bytes, tuple[int, ...]]:
         """The payload, and what the next message remembers."""
         coder = Writing(TABLES)
-        _, memory = self.through(coder, said, kind, state, is_late)
+        through = self.through(coder, said, kind, state, is_late)
+        assert through is not None  # what is written can be read
+        _, memory = through
         return coder.encoder.finish(), memory
 
     def read(self, payload: bytes, kind: int, state: State, is_late: bool) -> tuple[Said, tuple[int, ...]] | None:

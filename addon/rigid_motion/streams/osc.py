@@ -121,7 +121,7 @@ def _message(data: bytes) -> Message:
 def _parts(tags: str) -> list[str | struct.Struct]:
     """Types one by one, but for numbers, which are read together where they are side by side."""
     runs = re.findall(f"[{''.join(NUMBERS)}]+|.", tags, re.DOTALL)
-    return [struct.Struct(">" + "".join(map(NUMBERS.get, run))) if run[0] in NUMBERS else run for run in runs]
+    return [struct.Struct(">" + "".join(NUMBERS[kind] for kind in run)) if run[0] in NUMBERS else run for run in runs]
 
 
 def _string(data: bytes, at: int) -> tuple[str, int]:

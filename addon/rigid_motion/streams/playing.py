@@ -114,7 +114,7 @@ class Fading:
 
     def show(self, poses: Poses, now: float) -> Poses:
         """Poses (joints,) of the path, with what is left of differences."""
-        if self._slides is not None:
+        if self._slides is not None and self._turns is not None:
             left = max(1.0 - max(now - self._began, 0.0) / FADE, 0.0) ** 2
             poses = Poses(poses.positions + left * self._slides, turned(poses.quaternions, left * self._turns))
             if left == 0.0:

@@ -124,8 +124,8 @@ class Walk:
                 if number == 0:
                     history = bucket(memory[group] >> 2, HISTORIES)
                 else:
-                    coarser = groups[number - 1][group]
-                    coarser = abs(coarser[0]) + abs(coarser[1]) + abs(coarser[2])
+                    x, y, z = groups[number - 1][group]
+                    coarser = abs(x) + abs(y) + abs(z)
                     ends = last[group]
                     history = bucket(2 * coarser + abs(ends[0]) + abs(ends[1]) + abs(ends[2]), HISTORIES)
                 neighbour = (sums[above[group]] if above[group] >= 0 else 0) + before

@@ -305,7 +305,7 @@ class Sender:
 
     def _is_shown_until(self, now: float) -> float | None:
         """The moment before one that is shown further off than the tolerance; None where there is none until now."""
-        if self._good is None and self._shown < self._times[-1]:
+        if self._good is None and self._path is not None and self._shown < self._times[-1]:
             first = max(int(np.searchsorted(self._times, self._shown, side="right")) - 1, 0)
             moments = closely(np.array(self._times[first:]))
             moments = moments[moments > max(self._shown, now - self._terms.delay / TICKS)]
@@ -359,7 +359,9 @@ class Sender:
         said = Said(fitted.finer, inner, np.array(fitted.numbers).tolist(), late)
         payload, memory = self.codec.write(said, kind, state, is_late)
         datagram = motion(self.identity, self._sequence, end, back, payload, is_late)
-        path = self.codec.window(said, state, kind, end).path()
+        window = self.codec.window(said, state, kind, end)
+        assert window is not None  # which receivers read, too
+        path = window.path()
         self._states[self._sequence] = State(path, memory, end)
         kept = {*range(self._sequence - MOST_BACK, self._sequence + 1), self._base}
         self._states = {number: old for number, old in self._states.items() if number in kept}
@@ -396,7 +398,8 @@ def closely(moments: np.ndarray) -> np.ndarray:
 def _as_read(identity: bytes, forest: Forest, terms: Terms) -> Forest:
     """A forest as receivers read it, in single precision. Raises ValueError for what cannot be described."""
     pieces = [read_piece(datagram) for datagram in describe(identity, 0, forest, terms)]
-    read = None if None in pieces else read_description(b"".join(piece.data for piece in pieces))
+    sound = [piece.data for piece in pieces if piece is not None]
+    read = read_description(b"".join(sound)) if len(sound) == len(pieces) else None
     if read is None:
         raise ValueError("the delay, the tolerance or the bodies are too large to be described")
     return read[0]

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Hashable, Mapping
+from typing import Any, cast
 
 import numpy as np
 
@@ -193,9 +194,9 @@ class _Source:
             self._place(0, arguments[1:], arrival)
         elif message.address == "/VMC/Ext/T" and len(arguments) == 1 and _is_finite(arguments[0]):
             self._has_time = True
-            self._sample(float(arguments[0]), arrival)
+            self._sample(float(cast(float, arguments[0])), arrival)
 
-    def _place(self, joint: int, numbers: tuple[object, ...], arrival: float) -> None:
+    def _place(self, joint: int, numbers: tuple[Any, ...], arrival: float) -> None:
         try:
             x, y, z, w = numbers[3:7]
             length = math.sqrt(x * x + y * y + z * z + w * w)
@@ -246,6 +247,7 @@ class _Source:
 
     def _poses(self, positions: np.ndarray, quaternions: np.ndarray) -> dict[str, Poses]:
         """Of the body, of arrays (n, all joints, ...)."""
+        assert self.body is not None
         known = sorted(self._known)
         return {self.body.name: Poses(positions[..., known, :], quaternions[..., known, :])}
 

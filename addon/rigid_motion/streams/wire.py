@@ -140,8 +140,8 @@ def read_motion(datagram: bytes) -> Motion | None:
     """A message, or None."""
     if len(datagram) < MOTION_HEAD.size:
         return None
-    _, *head = MOTION_HEAD.unpack_from(datagram)
-    return Motion(*head, datagram[MOTION_HEAD.size :], datagram[0] & 15 == LATE)
+    _, identity, sequence, ticks, back = MOTION_HEAD.unpack_from(datagram)
+    return Motion(identity, sequence, ticks, back, datagram[MOTION_HEAD.size :], datagram[0] & 15 == LATE)
 
 
 def answer(receiver: bytes, entries: Sequence[Entry]) -> bytes:
@@ -164,6 +164,7 @@ def describe(identity: bytes, ticks: int, forest: Forest, terms: Terms) -> list[
     """The datagrams of a description."""
     parts = [TERMS.pack(terms.tolerance, terms.delay, terms.grid, len(forest.bodies))]
     for body in forest.bodies:
+        assert body.sliding is not None
         parts += [_named(body.name), struct.pack("<IH", round(body.radius * 1e6), len(body.joints))]
         for joint, parent in enumerate(body.parents.tolist()):
             parts += [_named(body.joints[joint]), struct.pack("<hB", parent, int(body.sliding[joint]))]
@@ -220,11 +221,11 @@ def _described(data: bytes) -> tuple[Forest, Terms] | None:
             names.append(own)
             parents.append(parent)
             sliding.append(bool(slides))
-        poses = np.array(rest, dtype=np.float64).reshape(-1, 7)
-        lengths = np.linalg.norm(poses[:, 3:], axis=1)
-        if not (np.abs(poses) < 1e6).all() or not (lengths > 0.5).all():
+        rows = np.array(rest, dtype=np.float64).reshape(-1, 7)
+        lengths = np.linalg.norm(rows[:, 3:], axis=1)
+        if not (np.abs(rows) < 1e6).all() or not (lengths > 0.5).all():
             return None
-        poses = Poses(poses[:, :3], poses[:, 3:] / lengths[:, None])
+        poses = Poses(rows[:, :3], rows[:, 3:] / lengths[:, None])
         bodies.append(Body(name, tuple(names), np.array(parents), poses, radius / 1e6, np.array(sliding)))
     return (Forest(bodies), terms) if at == len(data) else None
 

@@ -63,7 +63,7 @@ class BodyReconstruction:
 
     @cached_property
     def skeleton(self) -> Skeleton:
-        return self.clip.figure.skeleton
+        return self.clip.whole_body.skeleton
 
     @property
     def best_mode(self) -> str:
@@ -79,6 +79,7 @@ class BodyReconstruction:
         """
         clip = self.clip
         if not len(self.keys[mode][0]):
+            assert clip.against is not None  # it alone has no keys
             return clip.against.at(times)
         poses = Poses(np.empty((len(self.skeleton), len(times), 3)), np.empty((len(self.skeleton), len(times), 4)))
         for joints, own in self._alike(mode):
@@ -126,7 +127,7 @@ class BodyErrors:
     @property
     def worst(self) -> tuple[int, int]:
         """The joint and the sample of the largest error."""
-        joint, sample = np.unravel_index(int(self.shell.argmax()), self.shell.shape)
+        joint, sample = np.unravel_index(np.argmax(self.shell), self.shell.shape)
         return int(joint), int(sample)
 
 

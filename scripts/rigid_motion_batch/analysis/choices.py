@@ -12,7 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
@@ -258,20 +258,21 @@ class Tolerance(Choice):
         return found[1], found[2] or ""
 
 
-def _reduced(clip: Clip, mode: str, radius: float, **wanted: float | bool) -> np.ndarray:
+def _reduced(clip: Clip, mode: str, radius: float, **wanted: Any) -> np.ndarray:
     return reduce_keys(clip.times, clip.poses, mode, radius=radius / clip.metres_per_unit, **wanted)
 
 
-def _reduced_body(clip: Clip, mode: str, radius: Radius, shared: bool, **wanted: float) -> tuple[np.ndarray, ...]:
-    return reduce_skeleton_keys(
+def _reduced_body(clip: Clip, mode: str, radius: Radius, shared: bool, **wanted: Any) -> tuple[np.ndarray, ...]:
+    keys = reduce_skeleton_keys(
         clip.times,
         clip.poses,
-        clip.figure.parents,
+        clip.whole_body.parents,
         mode,
         radius=radius / clip.metres_per_unit,
         shared=shared,
         **wanted,
     )
+    return cast(tuple[np.ndarray, ...], keys)
 
 
 def fewest_keys(choices: Iterable[Choice]) -> list[Choice]:

@@ -19,6 +19,7 @@ from rigid_motion_batch.files import replacing
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.rows import write_rows
 
+from .bodies import BodyErrors
 from .choices import Choice
 from .modes import BEST_OF, single_modes
 from .reconstructions import Reconstruction
@@ -130,7 +131,7 @@ def measure_reconstruction(reconstruction: Reconstruction) -> list[Metrics]:
     return rows
 
 
-def of_errors(clip: Clip, choice: Choice, errors: Errors) -> dict[str, Any]:
+def of_errors(clip: Clip, choice: Choice, errors: Errors | BodyErrors) -> dict[str, Any]:
     """The fields of a row that any motion has, of errors in metres and radians."""
     return {
         "clip": clip.name,

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -104,10 +104,12 @@ class KeysNeeded:
 class Ways(Protocol):
     """The ways to have fewer keys of a clip, and how good they are. All errors are RMS shell errors in metres."""
 
-    clip: Clip
+    @property
+    def clip(self) -> Clip: ...
 
-    decimations: tuple[str, ...]
-    """Those of `DECIMATIONS` that are tried."""
+    @property
+    def decimations(self) -> tuple[str, ...]:
+        """Those of `DECIMATIONS` that are tried."""
 
     def groups(self, modes: tuple[str, ...]) -> Groups:
         """The modes, those together that are one motion on the clip."""
@@ -330,7 +332,7 @@ def write_keys_needed(path: Path, clips: Iterable[KeysNeeded]) -> None:
 def _rows(clip: KeysNeeded) -> Iterator[NeededRow]:
     for group, decimation, rate in np.argwhere(~np.isnan(clip.keys)).tolist():
         at = group, decimation, rate
-        found = [None] * 4
+        found: list[Any] = [None] * 4
         if np.isfinite(clip.keys[at]):
             found = [
                 int(clip.keys[at]),

@@ -106,7 +106,9 @@ def _read_table(path: Path) -> dict[str, float]:
 
 def radius_in_metres(text: str) -> float:
     """A radius as it is written: 3cm, 30mm, 0.03m, or 0.03. Raises ValueError where it is none above 0."""
-    number, unit = re.fullmatch(rf"(.*?)\s*({'|'.join(METRES)})?\s*", text, re.DOTALL).groups()
+    parts = re.fullmatch(rf"(.*?)\s*({'|'.join(METRES)})?\s*", text, re.DOTALL)
+    assert parts is not None  # which any text fits
+    number, unit = parts.groups()
     return _above_zero(float(number) * METRES[unit or "m"])
 
 

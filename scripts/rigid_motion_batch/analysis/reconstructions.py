@@ -83,6 +83,7 @@ class Reconstruction:
     def filled_in(self, mode: str, times: np.ndarray) -> Poses:
         """What a mode makes of its keys at any times."""
         if not len(self.keys[mode]):
+            assert self.clip.against is not None  # it alone has no keys
             return self.clip.against.at(times)
         key_times, keys = self.clip.times[self.keys[mode]], self.clip.poses[self.keys[mode]]
         if mode == BEST_OF:

@@ -242,7 +242,7 @@ def _of_rigid_body(made: Reconstruction) -> ChoiceResult:
 
 
 def _of_body(made: BodyReconstruction, radii: Radii) -> ChoiceResult:
-    found = measure_modes(made, radii.of(made.clip.figure.joints))
+    found = measure_modes(made, radii.of(made.clip.whole_body.joints))
     rows = {row.mode: row for row in found.rows}
     motions = [
         Motion(

@@ -6,7 +6,7 @@ and its `chart(...)` in a template.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -49,7 +49,7 @@ def error_over_rate(numbers: Numbers, clip: int | None = None) -> Specification 
     if len(places) < 2:
         return None
     values = numbers.mean(clip)[ERROR]
-    rows = [
+    rows: list[Specification] = [
         {
             "rate": numbers.choices[place].size,
             "error": float(values[place, numbers.modes.index(group[0])]),
@@ -130,7 +130,10 @@ def _ticks(values: Sequence[float]) -> list[float]:
     return [value for value in found if low <= value <= high]
 
 
-CHARTS = {"error over rate": error_over_rate, "keys needed": keys_needed}
+CHARTS: dict[str, Callable[..., Specification | None]] = {
+    "error over rate": error_over_rate,
+    "keys needed": keys_needed,
+}
 
 
 def chart(name: str, *arguments: Any) -> Markup:

@@ -97,7 +97,7 @@ def clip_data(clip: ClipResult, label: Callable[[str], str], mesh: Mesh) -> dict
     return {
         "name": clip.facts.name,
         "joints": short_names(clip.facts.joint_names) if body else [],
-        "parents": _drawn_from(clip.parents) if body else [],
+        "parents": [] if clip.parents is None else _drawn_from(clip.parents),
         "size": size,
         "cell": cell,
         "grid": f"{1e3 * cell:g} mm" if cell < 0.01 else f"{100 * cell:g} cm" if cell < 1.0 else f"{cell:g} m",
@@ -245,7 +245,7 @@ def _extent(places: np.ndarray) -> float:
 def _about(result: ChoiceResult, keyed: bool, every: int, *, thinned: bool) -> str:
     row = result.motions[0].metrics[0]
     if keyed:
-        counts = sorted({motion.metrics[0].keys for motion in result.motions} - {None})
+        counts = sorted({count for motion in result.motions if (count := motion.metrics[0].keys) is not None})
         keys = f"{counts[0]} to {counts[-1]} keys" if len(counts) > 1 else f"{counts[0]} keys"
         keys += ", where each mode needs them"
     else:

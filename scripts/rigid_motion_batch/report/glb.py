@@ -97,14 +97,15 @@ def _document(clip: Clip, times: np.ndarray, lanes: list[Lane]) -> Document:
     key_times = writer.numbers(times[:, None], bounds=True)
     step = APART * _width(lanes[0], parents, meshes)
     nodes, materials, made_meshes = writer.json["nodes"], writer.json["materials"], writer.json["meshes"]
-    top = {"name": clip.name, "rotation": UPRIGHT, "children": []}
+    top: dict[str, Any] = {"name": clip.name, "rotation": UPRIGHT, "children": []}
     nodes.append(top)
-    samplers, channels = [], []
+    samplers: list[dict[str, Any]] = []
+    channels: list[dict[str, Any]] = []
     for number, lane in enumerate(lanes):
         factor = [*linear(lane.colour), 1.0]
         surface = {"baseColorFactor": factor, "metallicFactor": 0.0, "roughnessFactor": 0.6}
         materials.append({"name": lane.name, "pbrMetallicRoughness": surface})
-        root = {"name": lane.name, "translation": [number * step, 0.0, 0.0], "children": []}
+        root: dict[str, Any] = {"name": lane.name, "translation": [number * step, 0.0, 0.0], "children": []}
         top["children"].append(len(nodes))
         nodes.append(root)
         first = len(nodes)

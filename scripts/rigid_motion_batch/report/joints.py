@@ -53,8 +53,8 @@ def joints_of(place: int, clip: ClipResult, result: ChoiceResult, numbers: Numbe
     motions = [motion for motion in result.motions if motion.joint_errors is not None]
     if not motions:
         return None
-    errors = [1e3 * motion.joint_errors for motion in motions]
-    top = 1e3 * full_colour(motion.joint_errors for motion in motions)
+    in_metres = [motion.joint_errors for motion in motions if motion.joint_errors is not None]
+    errors, top = [1e3 * some for some in in_metres], 1e3 * full_colour(in_metres)
     pictures = [
         (numbers.joined(motion.modes), heat_map(some, top)) for motion, some in zip(motions, errors, strict=True)
     ]
@@ -64,7 +64,7 @@ def joints_of(place: int, clip: ClipResult, result: ChoiceResult, numbers: Numbe
         for of_joint in zip(*by_mode, strict=True)
     ]
     names = short_names(clip.facts.joint_names)
-    places = [int(motion.joint_errors.max(axis=1).argmax()) for motion in motions]
+    places = [int(np.argmax(some.max(axis=1))) for some in errors]
     worst = [f"{names[joint]} {digits(some[joint].max())} mm" for joint, some in zip(places, errors, strict=True)]
     slid = motions[0].metrics[0].recorded_slide_m
     slide = "" if slid is None else digits(1e3 * slid)

@@ -195,7 +195,7 @@ def _keys_needed(numbers: Numbers, needed: Sequence[KeysNeeded]) -> Text | None:
     at = together.rates.index(rate)
     whole = together.clips[..., at] == together.asked[at]
     shares = np.where(whole, together.shares[..., at], np.inf)
-    group, way = np.unravel_index(int(shares.argmin()), shares.shape)
+    group, way = np.unravel_index(np.argmin(shares), shares.shape)
     mode = together.groups[group][0]
     reference = Part(numbers.label(REFERENCE), "mode", REFERENCE)
     if shares[group, way] > 1.0 - TIE:
@@ -355,7 +355,7 @@ def _wins(contest: _Contest) -> Text | None:
     many = _number(f"{'Fewest keys' if contest.kind is Tolerance else 'Closest'} in {won} of {cases}")
     if not lost.any():
         return _say("{} cases", many)
-    clip, choice = np.unravel_index(int(np.where(lost, loss, -1.0).argmax()), loss.shape)
+    clip, choice = np.unravel_index(np.argmax(np.where(lost, loss, -1.0)), loss.shape)
     name, at = contest.numbers.clips[clip], contest.numbers.choices[contest.places[choice]]
     return _say(
         f"{{}} cases; {'not' if lost.sum() == 1 else 'farthest from it'} in {{}}: there {{}} is, "
