@@ -129,7 +129,7 @@ def _become(command: list, folder: Path | None, variables: Mapping[str, str]) ->
 
 
 def environment(environ: Mapping[str, str]) -> dict[str, str]:
-    """What programs run in: as here, but where Python is to leave no bytecode in folders, it goes into .venv/.
+    """Return what programs run in: as here, but where Python is to leave no bytecode in folders, it goes into .venv/.
 
     Without any, every process compiles all of the program again, and pytest all that it asserts with.
     """
@@ -146,7 +146,7 @@ def _is_program(arguments: list[str]) -> bool:
 
 
 def install(blender: str | None, requirements: list[str], folder: Path | None = None) -> Path | None:
-    """The Python of an environment with these requirements, made or completed where it has to be; None on failure.
+    """Return the Python of an environment with these requirements, made or completed where need be; None on failure.
 
     It is in `.venv/` unless a folder is given.
     """
@@ -190,7 +190,7 @@ def _project() -> dict:
 
 
 def _requirements(project: dict, blender: str | None, groups: tuple[str, ...]) -> list[str]:
-    """The pinned packages of pyproject.toml, with this Blender."""
+    """Return the pinned packages of pyproject.toml, with this Blender."""
     pins = project["tool"]["rigid-motion"]["numpy"]
     numpy = pins.get(PYTHON) or [*pins.values()][-1]
     listed = [*([f"bpy=={blender}"] if blender else []), f"numpy=={numpy}"]

@@ -136,7 +136,7 @@ class ClipReduction:
         self.feet = Feet(self.world, joints)
 
     def reduced(self) -> ReducedClip:
-        """The clip with fewer keys, or as it was."""
+        """Return the clip with fewer keys, or as it was."""
         count = self.options.count
         found = self._so_many(count) if self.dense and count else self._within_tolerance()
         if found is None:
@@ -186,7 +186,7 @@ class ClipReduction:
         return None
 
     def _search(self) -> Search:
-        """A search for the keys of nodes, but for those whose steps are kept."""
+        """Return a search for the keys of nodes, but for those whose steps are kept."""
         moved = [target for target, track in self.settled.items() if len(track.times) > 1]
         steps = [node for node, path in moved if path in (TRANSLATION, ROTATION)]
         return Search(self.world, self.settled | self.dense, np.isin(self.world.moving, steps), self.options.run)
@@ -225,7 +225,7 @@ class ClipReduction:
         return [own.rotation if path == ROTATION else own.location for path, own in of_nodes]
 
     def _proven(self, samples: list[np.ndarray]) -> tuple[list[StoredTrack], float] | None:
-        """Stored tracks with keys at these samples, and at more of them where the proof fails, and their largest error.
+        """Return stored tracks with keys at these samples, more where the proof fails, and their largest error.
 
         None where the proof fails with more and more of them.
         """
@@ -263,7 +263,7 @@ class ClipReduction:
         return all_places, all_numbers
 
     def _with_more(self, samples: list[np.ndarray], places: np.ndarray, eighths: np.ndarray) -> list[np.ndarray]:
-        """Samples with those around some of the eighths, for the nodes at these places and all that they hang on."""
+        """Return samples with those around some eighths, for the nodes at these places and all that they hang on."""
         wanted = np.zeros((len(self.world.moving), len(self.world.times)), dtype=bool)
         wanted[places, eighths // PARTS] = wanted[places, -(-eighths // PARTS)] = True
         for place in range(len(wanted) - 1, -1, -1):
@@ -298,7 +298,7 @@ class ClipReduction:
         return self._spanning(tracks + [self._stored_track(track) for track in self.settled.values()])
 
     def _spanning(self, tracks: list[StoredTrack]) -> list[StoredTrack]:
-        """The same with keys at both ends of the clip in one of them at least: it lasts as long as before."""
+        """Return the same with keys at both ends of the clip in one of them at least: it lasts as long as before."""
         ends = self.world.times[[0, -1]]
         seen = [time for track in tracks for time in track.times[[0, -1]].tolist()]
         if np.isin(ends.astype(np.float32), seen).all():

@@ -40,7 +40,7 @@ class Search:
         self.world, self.tracks, self.fixed, self.run = world, tracks, fixed, run
 
     def keys(self, tolerance: float) -> tuple[SeparateKeys, ...]:
-        """The samples that are keys of each node."""
+        """Return the samples that are keys of each node."""
         world = self.world
         if len(world.stretches) == 1:
             keys = self._reduced(EVERY, tolerance=tolerance, separate=True, fixed=self.fixed)
@@ -52,12 +52,12 @@ class Search:
         return cast(tuple[SeparateKeys, ...], keys)
 
     def key_poses(self, tolerance: float) -> np.ndarray:
-        """The samples that are keys of all nodes, those where stretches meet among them."""
+        """Return the samples that are keys of all nodes, those where stretches meet among them."""
         found = [some.start + self._shared(some, tolerance=tolerance) for some in self.world.stretches]
         return np.unique(np.concatenate(found))
 
     def so_many_key_poses(self, count: int, weights: np.ndarray) -> np.ndarray:
-        """The samples that are keys of all nodes, whose errors count so many times (n, m)."""
+        """Return the samples that are keys of all nodes, whose errors count so many times (n, m)."""
         return self._shared(EVERY, budget=min(count, len(self.world.times)), weights=weights)
 
     def _shared(self, samples: slice, **options: Any) -> np.ndarray:
@@ -79,7 +79,7 @@ class Search:
 
 
 def _pose(world: World, tracks: Tracks, node: int, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The translation and rotation of a node in its parent's space at these times, or where it always is."""
+    """Return the translation and rotation of a node in its parent's space at these times, or where it always is."""
     if node in world.nodes.matrices:
         matrix = world.nodes.matrices[node]
         left, _, right = np.linalg.svd(matrix[:3, :3])

@@ -29,7 +29,7 @@ HALVINGS = 8
 
 
 def moments(world: World, clip: Clip, tolerance: float) -> np.ndarray:
-    """The moments between which everything runs evenly, as close as turns and splines need it, shape (m,), rising."""
+    """Return the moments between which all runs evenly, as close as turns and splines need it, shape (m,), rising."""
     moved = [track for track in clip.tracks if track.path != WEIGHTS and not track.is_constant]
     different = {id(track.times): track.times for track in moved}
     times = np.unique(np.concatenate([world.times, *different.values()]))
@@ -54,7 +54,7 @@ def moments(world: World, clip: Clip, tolerance: float) -> np.ndarray:
 
 
 def settled(world: World, clip: Clip, tolerance: float) -> dict[tuple[int, str], Track | None]:
-    """The tracks that need no search, and what takes their places: None where the node rests."""
+    """Return the tracks that need no search, and what takes their places: None where the node rests."""
     found: dict[tuple[int, str], Track | None] = {}
     for track in clip.tracks:
         target = track.node, track.path

@@ -73,17 +73,17 @@ class Track:
         return not tangents and bool(np.all(points == points[0]))
 
     def near(self, first: float, last: float) -> Track:
-        """The keys that say what is shown from one time to another, which are read where they are not yet."""
+        """Return the keys that say what is shown from one time to another, which are read where they are not yet."""
         begin = max(int(np.searchsorted(self.times, first, side="right")) - 1, 0)
         some = slice(begin, max(int(np.searchsorted(self.times, last)) + 1, begin + 1))
         return replace(self, times=self.times[some], values=self.values[some])
 
     def keyed(self, times: np.ndarray) -> Track:
-        """What it shows at these times (m,), with lines in between."""
+        """Return what it shows at these times (m,), with lines in between."""
         return replace(self, interpolation=LINEAR, times=times, values=self.at(times))
 
     def at(self, times: np.ndarray) -> np.ndarray:
-        """What is shown at `times`, which rise, shape (m, width). Quaternions are normalised."""
+        """Return what is shown at `times`, which rise, shape (m, width). Quaternions are normalised."""
         first, last = np.searchsorted(self.times, times[[0, -1]]).tolist()
         if last - first > AT_ONCE and len(times) > 1:
             return np.concatenate([self.at(some) for some in np.array_split(times, 2)])
@@ -115,7 +115,7 @@ class Track:
 
 
 def turned_at(key_times: np.ndarray, keys: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Unit quaternions (m, 4) at times between keys (n, 4), each on the short way at an even speed."""
+    """Return unit quaternions (m, 4) at times between keys (n, 4), each on the short way at an even speed."""
     keys = normalise(keys)
     first, second = keys[:-1], keys[1:]
     second = np.where(np.einsum("ij,ij->i", first, second)[:, None] < 0.0, -second, second)
@@ -177,7 +177,7 @@ def _clip(document: Document, number: int) -> Clip:
 
 
 def _track(document: Document, animation: Json, place: int, channel: Json, known: dict[int, np.ndarray]) -> Track:
-    """A channel as a track, with the times that are known of the accessor, or that are so from now on."""
+    """Return a channel as a track, with the times that are known of the accessor, or that are so from now on."""
     node, path = channel["target"]["node"], channel["target"]["path"]
     moved = entry(document.json, "nodes", node)
     if "matrix" in moved and path != WEIGHTS:

@@ -29,7 +29,7 @@ def reduce_keys(
     rms: bool = False,
     tries: int = 3,
 ) -> np.ndarray:
-    """The fewest samples that keep the shell error of a mode within a tolerance, or the best ones within a budget.
+    """Return fewest samples that keep the shell error of a mode within a tolerance, or the best ones within a budget.
 
     Parameters
     ----------

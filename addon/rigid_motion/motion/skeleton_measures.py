@@ -29,7 +29,7 @@ def skeleton_errors(
     parts: int = 8,
     stored: Poses | None = None,
 ) -> np.ndarray:
-    """The largest shell error of each joint in the root's space from each sample to the next, between them as well.
+    """Return largest shell error of each joint in the root's space from each sample to the next, between them as well.
 
     Parameters
     ----------

@@ -66,7 +66,7 @@ def reduce_skeleton_keys(
     stretch: int | None = None,
     run: Run = map,
 ) -> tuple[np.ndarray, ...] | tuple[SeparateKeys, ...]:
-    """The fewest keys of a body's joints that keep every joint within a tolerance, or the best ones within a budget.
+    """Return fewest keys of a body's joints that keep every joint within a tolerance, or the best ones within a budget.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def reduce_skeleton_keys(
 
 
 def _check_stretch(stretch: int, mode: str, shared: bool, tolerance: float | None) -> None:
-    """A TypeError where a stretch is no number of samples, a ValueError where there can be none."""
+    """Raise a TypeError where a stretch is no number of samples, a ValueError where there can be none."""
     if whole_number(stretch, "stretch") < SHORTEST_STRETCH:
         raise ValueError(f"a stretch of {stretch} samples is too short: give {SHORTEST_STRETCH} or more")
     if shared or tolerance is None:
@@ -220,7 +220,7 @@ def _key_poses(body: Body, tolerance: float | None, budget: int | None, tries: i
 
 
 def _own_keys_within(search_for: Callable[[float], OwnKeys], budget: int) -> tuple[np.ndarray, ...]:
-    """The keys with the smallest error among those of several tolerances that so many can keep to, and what is left."""
+    """Return the keys with the smallest error among those of several tolerances that a budget can keep to."""
     best = search_for(math.inf)
     body = best.body
     free = np.flatnonzero(body.free).tolist()
@@ -245,7 +245,7 @@ def _own_keys_within(search_for: Callable[[float], OwnKeys], budget: int) -> tup
 
 
 def _between(low: tuple[float, float] | None, high: tuple[float, float], count: float) -> float:
-    """The logarithm of the tolerance to try next for the logarithm of a count of keys.
+    """Return the logarithm of the tolerance to try next for the logarithm of a count of keys.
 
     It is where a straight line between a tolerance that is too low and one that is not has it, and never near its ends:
     counts are no smooth function of tolerances.
@@ -284,7 +284,7 @@ def _mask(fixed: ArrayLike | None, joints: int) -> np.ndarray:
 
 
 def _one_for_each(given: ArrayLike, name: str, *shapes: tuple[int, ...]) -> np.ndarray:
-    """A number for each joint or sample, or one for all: no damage and not below zero."""
+    """Return a number for each joint or sample, or one for all: no damage and not below zero."""
     given = numbers(given, f"{name}s")
     if given.shape not in ((), *shapes):
         wanted = " or ".join(map(str, shapes))

@@ -77,7 +77,7 @@ def stretches(samples: int, stretch: int) -> list[slice]:
 def keys_in_stretches(
     recording: LongRecording, tolerance: float, separate: bool, bounds: list[slice], run: Run
 ) -> tuple[np.ndarray, ...] | tuple[SeparateKeys, ...]:
-    """The keys of all joints, or of their channels: all that moves has keys where the stretches meet."""
+    """Return the keys of all joints, or of their channels: all that moves has keys where the stretches meet."""
     rests, still = _rests(recording, bounds, tolerance, separate, run)
     tasks = ((recording.part(some), tolerance, separate, rests < 0, still) for some in bounds)
     moved: list[list[np.ndarray]] = [[] for _ in rests.flat]
@@ -94,7 +94,7 @@ def keys_in_stretches(
 def _rests(
     recording: LongRecording, bounds: list[slice], tolerance: float, separate: bool, run: Run
 ) -> tuple[np.ndarray, Poses]:
-    """The sample that each joint, or each of its channels, may stay at, and the poses of joints there (joints,).
+    """Return the sample that each joint, or each of its channels, may stay at, and the poses of joints there (joints,).
 
     Samples are of shape (joints, channels), -1 where one has to move. By the triangle inequality all of them together
     are not off by more than their part of the tolerance.
@@ -154,7 +154,7 @@ def _channels(poses: Poses, separate: bool) -> tuple[Poses, ...]:
 
 
 def _keys(task: tuple[Stretch, float, bool, np.ndarray, Poses]) -> list[np.ndarray]:
-    """The keys of each channel of a stretch, of which some move (joints, channels) and others are still (joints,)."""
+    """Return the keys of each channel of a stretch; some move (joints, channels), others are still (joints,)."""
     part, tolerance, separate, moves, still = task
     recorded, ends = part.body, np.array((0, len(part.times) - 1))
     turns, advances = moves[:, 0], moves[:, -1]

@@ -36,7 +36,7 @@ class Message(NamedTuple):
 
 
 def write_message(address: str, *arguments: float | str) -> bytes:
-    """A message of strings, whole numbers, and floats in single precision."""
+    """Return a message of strings, whole numbers, and floats in single precision."""
     tags, data = ",", b""
     for argument in arguments:
         if isinstance(argument, str):
@@ -125,6 +125,6 @@ def _parts(tags: str) -> list[str | struct.Struct]:
 
 
 def _string(data: bytes, at: int) -> tuple[str, int]:
-    """A text, and where what follows begins."""
+    """Return a text, and where what follows begins."""
     end = data.index(b"\0", at)
     return data[at:end].decode(), end + 4 - end % 4

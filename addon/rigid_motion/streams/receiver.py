@@ -131,7 +131,7 @@ class Receiver:
             self._begin(stream, read, arrival)
 
     def show(self, now: float) -> dict[Stream, Shown]:
-        """What every stream shows."""
+        """Return what every stream shows."""
         self._forget_silent(now)
         shown = {stream: playback.show(now) for stream, playback in self._streams.items()}
         return {stream: what for stream, what in shown.items() if what is not None}
@@ -147,7 +147,7 @@ class Receiver:
         return playback.due(moment) if playback else np.inf
 
     def body(self, stream: Stream, name: str) -> Body | None:
-        """A body of a stream, with its names, parents and rest poses."""
+        """Return a body of a stream, with its names, parents and rest poses."""
         playback = self._streams.get(stream)
         return next((body for body in playback.forest.bodies if body.name == name), None) if playback else None
 
@@ -157,7 +157,7 @@ class Receiver:
         return playback.forest.bodies if playback else ()
 
     def answers(self) -> list[tuple[Hashable, bytes]]:
-        """What came since the last call, to be sent to where it came from."""
+        """Return what came since the last call, to be sent to where it came from."""
         entries: dict[Hashable, list[Entry]] = {}
         streams: list[tuple[Stream, _Playback | _Begun]] = [*self._streams.items(), *self._begun.items()]
         for stream, known in streams:
@@ -171,7 +171,7 @@ class Receiver:
         ]
 
     def keys(self) -> list[Keys]:
-        """The knots that came since the last call and are not going to change any more."""
+        """Return the knots that came since the last call and are not going to change any more."""
         found = [playback.keys(stream) for stream, playback in self._streams.items()]
         return [keys for keys in found if len(keys.moments)]
 
@@ -321,7 +321,7 @@ class _Playback:
         return np.inf if self._playing.longest is None else moment + self._playing.longest + self._playing.delay
 
     def show(self, now: float) -> Shown | None:
-        """What is shown now."""
+        """Return what is shown now."""
         self._moment = self._playing.moment(now)
         if self._moment is None or self._path is None or self._moment < self._begins:
             return None
@@ -329,7 +329,7 @@ class _Playback:
         return Shown(self._moment, self.forest.parted(poses))
 
     def keys(self, stream: Stream) -> Keys:
-        """The knots until the start of the newest window that were not handed out yet."""
+        """Return the knots until the start of the newest window that were not handed out yet."""
         path = self._path
         if path is None:
             return Keys(stream, np.empty(0), {})
@@ -344,7 +344,7 @@ class _Playback:
         return Keys(stream, path.moments[rows], poses)
 
     def entry(self, identity: bytes) -> Entry:
-        """What is answered."""
+        """Return what is answered."""
         there = sum(1 << back for back in range(32) if self._newest - 1 - back in self._states)
         return Entry(identity, max(self._newest, 0), there, self._needs)
 

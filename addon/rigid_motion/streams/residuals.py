@@ -46,7 +46,7 @@ class Coder(Protocol):
 
 
 def flag_table(kind: int, slide: int, history: int, neighbour: int) -> int:
-    """The number of the table that says whether a group is anything but zeros."""
+    """Return the number of the table that says whether a group is anything but zeros."""
     return ((kind * 2 + slide) * HISTORIES + history) * NEIGHBOURS + neighbour
 
 
@@ -54,7 +54,7 @@ FLAGS = KINDS * 2 * HISTORIES * NEIGHBOURS
 
 
 def size_table(kind: int, slide: int, history: int, size: int) -> int:
-    """The number of the table of a magnitude."""
+    """Return the number of the table of a magnitude."""
     return FLAGS + ((kind * 2 + slide) * HISTORIES + history) * SIZES + size
 
 

@@ -67,7 +67,7 @@ def _mirrored(poses: Poses, change: np.ndarray) -> Poses:
 
 
 def write(time: float, poses: Mapping[str, Poses]) -> list[bytes]:
-    """The datagrams of a frame: the pose () of each bone in its parent's space, with that of `ROOT`."""
+    """Return the datagrams of a frame: the pose () of each bone in its parent's space, with that of `ROOT`."""
     there = [name for name in JOINTS if name in poses]
     both = Poses(
         np.array([poses[name].positions for name in there]), np.array([poses[name].quaternions for name in there])
@@ -83,7 +83,7 @@ def write(time: float, poses: Mapping[str, Poses]) -> list[bytes]:
 
 
 def write_trackers(poses: Mapping[str, Poses]) -> list[bytes]:
-    """The datagrams of the poses () of trackers in the world, by their names."""
+    """Return the datagrams of the poses () of trackers in the world, by their names."""
     messages = []
     for name, pose in poses.items():
         unity = to_unity(pose)
@@ -120,7 +120,7 @@ class Performer:
         return bone
 
     def __call__(self, poses: Poses) -> dict[str, Poses]:
-        """The pose () of each bone in its parent's space, of poses (joints,) in the space of the roots."""
+        """Return the pose () of each bone in its parent's space, of poses (joints,) in the space of the roots."""
         places = poses.positions[self._numbers]
         turns = multiply(poses.quaternions[self._numbers], self._from_rest)
         above = np.array(self._above)
@@ -151,13 +151,13 @@ class VmcReceiver:
             known.hear(message, arrival)
 
     def show(self, now: float) -> dict[Stream, Shown]:
-        """What every performer does now."""
+        """Return what every performer does now."""
         self._sources = {stream: it for stream, it in self._sources.items() if -SILENT < now - it.heard < SILENT}
         shown = {stream: it.show(now) for stream, it in self._sources.items()}
         return {stream: what for stream, what in shown.items() if what is not None}
 
     def bodies(self, stream: Stream) -> tuple[Body, ...]:
-        """The performer of a stream, at rest."""
+        """Return the performer of a stream, at rest."""
         known = self._sources.get(stream)
         return (known.body,) if known and known.body else ()
 
@@ -214,7 +214,7 @@ class _Source:
         self._quaternions[joint] = w / length, x / length, y / length, z / length
 
     def _sample(self, moment: float, arrival: float) -> None:
-        """A frame is complete."""
+        """Take the frame that is complete."""
         if not self._said - {0}:
             return
         if self._said - self._known or self.body is None:

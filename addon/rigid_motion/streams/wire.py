@@ -121,7 +121,7 @@ class Entry:
 
 
 def kind_of(datagram: bytes) -> int | None:
-    """The kind of a datagram of this version, or None."""
+    """Return the kind of a datagram of this version, or None."""
     if len(datagram) < HEAD.size or len(datagram) > LONGEST or datagram[0] >> 4 != VERSION:
         return None
     return datagram[0] & 15
@@ -132,12 +132,12 @@ def _first(kind: int) -> int:
 
 
 def motion(identity: bytes, sequence: int, ticks: int, back: int, payload: bytes, late: bool = False) -> bytes:
-    """The datagram of a message."""
+    """Return the datagram of a message."""
     return MOTION_HEAD.pack(_first(LATE if late else MOTION), identity, sequence, ticks & 0xFFFF, back) + payload
 
 
 def read_motion(datagram: bytes) -> Motion | None:
-    """A message, or None."""
+    """Return a message, or None."""
     if len(datagram) < MOTION_HEAD.size:
         return None
     _, identity, sequence, ticks, back = MOTION_HEAD.unpack_from(datagram)
@@ -145,7 +145,7 @@ def read_motion(datagram: bytes) -> Motion | None:
 
 
 def answer(receiver: bytes, entries: Sequence[Entry]) -> bytes:
-    """The datagram of an answer."""
+    """Return the datagram of an answer."""
     parts = [ENTRY.pack(entry.identity, entry.newest, entry.before, entry.needs) for entry in entries]
     return HEAD.pack(_first(ANSWER), receiver) + b"".join(parts)
 
@@ -161,7 +161,7 @@ def read_answer(datagram: bytes) -> tuple[bytes, list[Entry]] | None:
 
 
 def describe(identity: bytes, ticks: int, forest: Forest, terms: Terms) -> list[bytes]:
-    """The datagrams of a description."""
+    """Return the datagrams of a description."""
     parts = [TERMS.pack(terms.tolerance, terms.delay, terms.grid, len(forest.bodies))]
     for body in forest.bodies:
         assert body.sliding is not None
@@ -179,7 +179,7 @@ def describe(identity: bytes, ticks: int, forest: Forest, terms: Terms) -> list[
 
 
 def read_piece(datagram: bytes) -> Piece | None:
-    """A piece of a description, or None."""
+    """Return a piece of a description, or None."""
     if len(datagram) <= DESCRIPTION_HEAD.size:
         return None
     _, identity, number, pieces, ticks = DESCRIPTION_HEAD.unpack_from(datagram)
@@ -189,7 +189,7 @@ def read_piece(datagram: bytes) -> Piece | None:
 
 
 def read_description(packed: bytes) -> tuple[Forest, Terms] | None:
-    """The bodies and the terms of all pieces of a description, or None."""
+    """Return the bodies and the terms of all pieces of a description, or None."""
     try:
         unpacking = zlib.decompressobj()
         data = unpacking.decompress(packed, MOST_DESCRIBED)
@@ -243,6 +243,6 @@ def _read_name(data: bytes, at: int) -> tuple[str, int]:
 
 
 def expanded(ticks: int, near: float) -> int:
-    """The whole of a number of ticks, of which the lowest 16 bits are given, nearest to another number."""
+    """Return the whole of a number of ticks, of which the lowest 16 bits are given, nearest to another number."""
     nearest = math.floor(near)
     return nearest + ((ticks - nearest + 0x8000) & 0xFFFF) - 0x8000

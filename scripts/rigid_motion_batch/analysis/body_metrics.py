@@ -125,7 +125,7 @@ def _rows_of_joints(made: BodyReconstruction, mode: str, errors: BodyErrors) -> 
 
 
 def key_samples(keys: JointKeys) -> np.ndarray:
-    """The samples that are a key of any joint that moves."""
+    """Return the samples that are a key of any joint that moves."""
     moving_ones = [own for own in keys if len(own) > 1]
     return np.unique(np.concatenate(moving_ones)) if moving_ones else keys[0]
 

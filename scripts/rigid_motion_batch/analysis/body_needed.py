@@ -83,5 +83,5 @@ class OfBody:
 
 
 def ways_of(clip: Clip, radii: Radii, *, fit: bool) -> Ways:
-    """The ways to have fewer keys of a clip, whatever it is of; only those of a rigid body may be fitted."""
+    """Return the ways to have fewer keys of a clip, whatever it is of; only those of a rigid body may be fitted."""
     return OfBody(clip, radii.of(clip.figure.joints)) if clip.figure else OfRigidBody(clip, radii.rigid, fit=fit)

@@ -44,7 +44,7 @@ DASHES: Specification = {
 
 
 def error_over_rate(numbers: Numbers, clip: int | None = None) -> Specification | None:
-    """The RMS shell error over the keys a second, of a clip or the mean of all."""
+    """Return the RMS shell error over the keys a second, of a clip or the mean of all."""
     places = [place for place, choice in enumerate(numbers.choices) if not isinstance(choice, Tolerance)]
     if len(places) < 2:
         return None
@@ -63,7 +63,7 @@ def error_over_rate(numbers: Numbers, clip: int | None = None) -> Specification 
 
 
 def keys_needed(numbers: Numbers, needed: Sequence[KeysNeeded]) -> Specification | None:
-    """The error over the keys a second that each mode keeps, evenly spaced or where it needs them."""
+    """Return the error over the keys a second that each mode keeps, evenly spaced or where it needs them."""
     together = overall(needed)
     # Means over different clips do not make one curve.
     whole = together.asked == len(needed)
@@ -137,7 +137,7 @@ CHARTS: dict[str, Callable[..., Specification | None]] = {
 
 
 def chart(name: str, *arguments: Any) -> Markup:
-    """The SVG of a chart; empty where there is nothing to draw."""
+    """Return the SVG of a chart; empty where there is nothing to draw."""
     specification = CHARTS[name](*arguments)
     if specification is None:
         return Markup()

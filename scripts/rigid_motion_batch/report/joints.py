@@ -49,7 +49,7 @@ class Joints:
 
 
 def joints_of(place: int, clip: ClipResult, result: ChoiceResult, numbers: Numbers) -> Joints | None:
-    """The joints of a clip under a choice; None of a single rigid body."""
+    """Return the joints of a clip under a choice; None of a single rigid body."""
     motions = [motion for motion in result.motions if motion.joint_errors is not None]
     if not motions:
         return None
@@ -73,7 +73,7 @@ def joints_of(place: int, clip: ClipResult, result: ChoiceResult, numbers: Numbe
 
 
 def heat_map(errors: np.ndarray, top: float) -> str:
-    """The errors (joints, n) as the address of a picture, a row for each joint, the colours ending at `top`."""
+    """Return the errors (joints, n) as the address of a picture, a row for each joint, the colours ending at `top`."""
     count = errors.shape[1]
     begins = np.unique(np.arange(min(COLUMNS, count)) * count // min(COLUMNS, count))
     largest = np.maximum.reduceat(errors, begins, axis=1)
@@ -83,7 +83,7 @@ def heat_map(errors: np.ndarray, top: float) -> str:
 
 
 def png(pixels: np.ndarray, palette: bytes) -> bytes:
-    """A picture (rows, columns) of numbers of colours, three bytes each."""
+    """Return a picture (rows, columns) of numbers of colours, three bytes each."""
 
     def chunk(kind: bytes, content: bytes) -> bytes:
         return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
