@@ -17,6 +17,7 @@
     python scripts/bootstrap.py benchmark                   measure how fast the modes are
     python scripts/bootstrap.py build                       build the extension, dist/rigid_motion-VERSION.zip
     python scripts/bootstrap.py docs                        build the documentation as a site, dist/site
+    python scripts/bootstrap.py types                       check types, and that no package has more errors than before
     python scripts/bootstrap.py environment [DIR]           set up all but Blender, for compare.py inside a Blender
     python scripts/bootstrap.py completion bash             print what has a shell complete `rigid-motion`
 
@@ -56,6 +57,7 @@ COMMANDS = {
     "examples": ([ROOT / "examples" / "make_examples.py"], ()),
     "build": ([ROOT / "scripts" / "build_extension.py"], ()),
     "docs": ([ROOT / "scripts" / "build_site.py"], ("benchmark", "docs")),
+    "types": ([ROOT / ".ci" / "check_types.py"], ("types",)),
     "completion": (["-m", "rigid_motion_batch", "completion"], ()),
 }
 """Command to what Python runs for it, and the dependency groups of pyproject.toml that it needs."""
@@ -63,7 +65,7 @@ COMMANDS = {
 ENVIRONMENT = "environment"
 """Sets up all but Blender, and prints the folder."""
 
-WITHOUT_BLENDER = ("inspect", "stream", "tasks", "dask", "openjd", "completion")
+WITHOUT_BLENDER = ("inspect", "stream", "tasks", "dask", "openjd", "completion", "types")
 """Need no Blender."""
 
 FILMING = ("compare", "bundle")
@@ -103,7 +105,11 @@ def main(arguments: list[str]) -> int:
         fitting = " or ".join(known)
         return _fail(f"Blender has no wheel for Python {PYTHON}: run this with Python {fitting}{without}")
     run, groups = COMMANDS[command]
-    python = install(blender, _requirements(project, blender, groups))
+    if command == "types":
+        # The types of Blender's modules would be imported in place of those.
+        python = install(None, _requirements(project, None, groups), ROOT / ".venv" / f"types-python-{PYTHON}")
+    else:
+        python = install(blender, _requirements(project, blender, groups))
     if python is None or (needed and not _blender_starts(python)):
         return 1
     # Paths that a user gives count from where the user is; those of pytest from where its configuration is.
@@ -123,7 +129,7 @@ def _become(command: list, folder: Path | None, variables: Mapping[str, str]) ->
 
 
 def environment(environ: Mapping[str, str]) -> dict[str, str]:
-    """What programs run in: as here, but where Python is to leave no bytecode in folders, it goes into .venv/.
+    """Return what programs run in: as here, but where Python is to leave no bytecode in folders, it goes into .venv/.
 
     Without any, every process compiles all of the program again, and pytest all that it asserts with.
     """
@@ -140,7 +146,7 @@ def _is_program(arguments: list[str]) -> bool:
 
 
 def install(blender: str | None, requirements: list[str], folder: Path | None = None) -> Path | None:
-    """The Python of an environment with these requirements, made or completed where it has to be; None on failure.
+    """Return the Python of an environment with these requirements, made or completed where need be; None on failure.
 
     It is in `.venv/` unless a folder is given.
     """
@@ -184,7 +190,7 @@ def _project() -> dict:
 
 
 def _requirements(project: dict, blender: str | None, groups: tuple[str, ...]) -> list[str]:
-    """The pinned packages of pyproject.toml, with this Blender."""
+    """Return the pinned packages of pyproject.toml, with this Blender."""
     pins = project["tool"]["rigid-motion"]["numpy"]
     numpy = pins.get(PYTHON) or [*pins.values()][-1]
     listed = [*([f"bpy=={blender}"] if blender else []), f"numpy=={numpy}"]

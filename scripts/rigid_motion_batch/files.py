@@ -11,8 +11,9 @@ import secrets
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from io import TextIOWrapper
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from rigid_motion_batch.supervising import report
 
@@ -89,7 +90,7 @@ def _move_to_free(source: Path, target: Path) -> None:
 
 
 @contextmanager
-def replacing(path: Path, *, overwrite: bool = True) -> Iterator[TextIO]:
+def replacing(path: Path, *, overwrite: bool = True) -> Iterator[TextIOWrapper]:
     """Open a text file that takes the place of `path` when the block ends well: see `written_beside`."""
     with (
         written_beside(path, overwrite=overwrite) as beside,

@@ -51,7 +51,7 @@ class Rows:
 
 
 def raw_numbers(document: Document, number: object, rows: slice = EVERY) -> np.ndarray:
-    """The numbers of an accessor, or of some of its elements, as they are kept, shape (count, components).
+    """Return the numbers of an accessor, or of some of its elements, as they are kept, shape (count, components).
 
     Raises
     ------
@@ -70,7 +70,7 @@ def raw_numbers(document: Document, number: object, rows: slice = EVERY) -> np.n
 
 
 def numbers(document: Document, number: object, rows: slice = EVERY) -> np.ndarray:
-    """The numbers of an accessor, or of some of its elements, shape (count, components), float64.
+    """Return the numbers of an accessor, or of some of its elements, shape (count, components), float64.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def numbers(document: Document, number: object, rows: slice = EVERY) -> np.ndarr
 
 
 def denormalised(raw: np.ndarray) -> np.ndarray:
-    """What normalised whole numbers stand for."""
+    """Return what normalised whole numbers stand for."""
     return np.maximum(raw / np.iinfo(raw.dtype).max, -1.0)
 
 
@@ -118,7 +118,7 @@ def _columns(accessor: Json) -> int:
 def _in_view(
     document: Document, part: Json, kind: np.dtype, columns: int, count: int, what: str, rows: slice = EVERY
 ) -> np.ndarray:
-    """The elements, or some of them, that a part of the document names by its view and an offset in it."""
+    """Return the elements, or some of them, that a part of the document names by its view and an offset in it."""
     view = entry(document.json, "bufferViews", part.get("bufferView"))
     extensions = view.get("extensions")
     if isinstance(extensions, dict) and any(name in extensions for name in COMPRESSIONS):
@@ -141,14 +141,14 @@ def _in_view(
 
 
 def _with_sparse(document: Document, accessor: Json, found: np.ndarray, what: str, rows: slice) -> np.ndarray:
-    """Some of the elements with those put in that a sparse accessor keeps apart."""
+    """Return some of the elements with those put in that a sparse accessor keeps apart."""
     sparse = accessor["sparse"]
     if not all(isinstance(part, dict) for part in (sparse, sparse.get("indices"), sparse.get("values"))):
         raise GltfError(f"{what} is sparse, and does not say what is where")
     count, kind = whole(sparse, "count", least=1), _kind(sparse["indices"])
     indices = _in_view(document, sparse["indices"], kind, 1, count, what)[:, 0].astype(np.int64)
     values = _in_view(document, sparse["values"], found.dtype, found.shape[1], count, what)
-    if kind.kind != "u" or indices.max() >= whole(accessor, "count") or np.any(np.diff(indices) <= 0):
+    if kind.kind != "u" or np.max(indices) >= whole(accessor, "count") or np.any(np.diff(indices) <= 0):
         raise GltfError(f"{what} is sparse, and its indices do not rise to its last element")
     first, end, _ = rows.indices(whole(accessor, "count"))
     here = (indices >= first) & (indices < end)

@@ -123,19 +123,22 @@ class ClipReduction:
         options: Options,
     ) -> None:
         self.clip, self.options, self.size = clip, options, size
+        assert options.tolerance is not None
+        self.tolerance = options.tolerance
         self.before = amount_before(nodes.document, clip)
         span = np.unique([track.times[end] for track in clip.tracks for end in (0, -1)])[[0, -1]]
         world = World(nodes, moving, radii, steadied(clip.tracks), np.unique(span))
-        self.world = replace(world, times=moments(world, clip, options.tolerance))
-        found = settled(self.world, clip, options.tolerance)
+        self.world = replace(world, times=moments(world, clip, self.tolerance))
+        found = settled(self.world, clip, self.tolerance)
         self.settled = {target: track for target, track in found.items() if track is not None}
         self.dense = {target: track for target, track in by_target(clip.tracks).items() if target not in found}
         """The tracks that are to have fewer keys."""
         self.feet = Feet(self.world, joints)
 
     def reduced(self) -> ReducedClip:
-        """The clip with fewer keys, or as it was."""
-        found = self._so_many() if self.dense and self.options.count else self._within_tolerance()
+        """Return the clip with fewer keys, or as it was."""
+        count = self.options.count
+        found = self._so_many(count) if self.dense and count else self._within_tolerance()
         if found is None:
             return self._kept(NEEDED)
         tracks, error = found
@@ -150,14 +153,14 @@ class ClipReduction:
     def _kept(self, reason: str) -> ReducedClip:
         return ReducedClip(self.clip.number, self.clip.name, None, reason, self.before, self.before)
 
-    def _so_many(self) -> tuple[list[StoredTrack], float]:
+    def _so_many(self, count: int) -> tuple[list[StoredTrack], float]:
         """Tracks with so many key poses, those under which feet slide least, and the largest error."""
         search = self._search()
         best, farthest = [], np.inf
         for weight in FEET_WEIGH:
             weights = np.ones((len(self.world.moving), len(self.world.times)))
             weights[self.feet.places] += (weight - 1.0) * self.feet.stand
-            keys = search.so_many_key_poses(self.options.count, weights)
+            keys = search.so_many_key_poses(count, weights)
             tracks = self._stored([keys] * len(self.dense))
             farther = self.feet.farther(self._shown(tracks))
             if farther < farthest:
@@ -170,8 +173,8 @@ class ClipReduction:
         """Tracks with few keys that keep to the tolerance, and the largest error; None where none do."""
         if not self.dense:
             return self._proven([])
-        search, allowed = self._search(), self.options.tolerance - self.storing[1]
-        while allowed > LEAST * self.options.tolerance:
+        search, allowed = self._search(), self.tolerance - self.storing[1]
+        while allowed > LEAST * self.tolerance:
             if self.options.shared:
                 samples = [search.key_poses(allowed)] * len(self.dense)
             else:
@@ -183,7 +186,7 @@ class ClipReduction:
         return None
 
     def _search(self) -> Search:
-        """A search for the keys of nodes, but for those whose steps are kept."""
+        """Return a search for the keys of nodes, but for those whose steps are kept."""
         moved = [target for target, track in self.settled.items() if len(track.times) > 1]
         steps = [node for node, path in moved if path in (TRANSLATION, ROTATION)]
         return Search(self.world, self.settled | self.dense, np.isin(self.world.moving, steps), self.options.run)
@@ -205,9 +208,9 @@ class ClipReduction:
                 for target, track in self.dense.items()
             }
             held = [stored(track, integers=target in integers) for target, track in self.settled.items()]
-            return self.world.largest_error(self._shown(held) | dense, parts=1)
+            return self.world.largest_error({**self._shown(held), **dense}, parts=1)
 
-        count, allowed = len(turned), OF_INTEGERS * self.options.tolerance
+        count, allowed = len(turned), OF_INTEGERS * self.tolerance
         if (off := taken(count)) > allowed:
             count = max(bisect_right(range(count), allowed, key=taken) - 1, 0)
             off = taken(count)
@@ -222,7 +225,7 @@ class ClipReduction:
         return [own.rotation if path == ROTATION else own.location for path, own in of_nodes]
 
     def _proven(self, samples: list[np.ndarray]) -> tuple[list[StoredTrack], float] | None:
-        """Stored tracks with keys at these samples, and at more of them where the proof fails, and their largest error.
+        """Return stored tracks with keys at these samples, more where the proof fails, and their largest error.
 
         None where the proof fails with more and more of them.
         """
@@ -250,16 +253,17 @@ class ClipReduction:
             if number in sound and sound[number][0] == digest:
                 continue
             for parts in (1, PARTS):
-                error, places, numbers = world.worst(tracks, self.options.tolerance, parts=parts, among=(number,))
+                error, places, numbers = world.worst(tracks, self.tolerance, parts=parts, among=(number,))
                 if len(places):
                     failures.append((places, PARTS // parts * numbers))
                     break
             else:
                 sound[number] = digest, error
-        return tuple(map(np.concatenate, zip(*failures, strict=True)))
+        all_places, all_numbers = map(np.concatenate, zip(*failures, strict=True))
+        return all_places, all_numbers
 
     def _with_more(self, samples: list[np.ndarray], places: np.ndarray, eighths: np.ndarray) -> list[np.ndarray]:
-        """Samples with those around some of the eighths, for the nodes at these places and all that they hang on."""
+        """Return samples with those around some eighths, for the nodes at these places and all that they hang on."""
         wanted = np.zeros((len(self.world.moving), len(self.world.times)), dtype=bool)
         wanted[places, eighths // PARTS] = wanted[places, -(-eighths // PARTS)] = True
         for place in range(len(wanted) - 1, -1, -1):
@@ -294,7 +298,7 @@ class ClipReduction:
         return self._spanning(tracks + [self._stored_track(track) for track in self.settled.values()])
 
     def _spanning(self, tracks: list[StoredTrack]) -> list[StoredTrack]:
-        """The same with keys at both ends of the clip in one of them at least: it lasts as long as before."""
+        """Return the same with keys at both ends of the clip in one of them at least: it lasts as long as before."""
         ends = self.world.times[[0, -1]]
         seen = [time for track in tracks for time in track.times[[0, -1]].tolist()]
         if np.isin(ends.astype(np.float32), seen).all():

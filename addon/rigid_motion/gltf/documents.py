@@ -47,7 +47,7 @@ class GltfError(ValueError):
 
 @contextmanager
 def damage_refused() -> Iterator[None]:
-    """What is read of a document in the block may have any type: where that leads to, a `GltfError` says so."""
+    """Raise a `GltfError` where what the block reads of a document has a type that leads to another error."""
     try:
         yield
     except (AttributeError, IndexError, KeyError, OverflowError, TypeError) as error:
@@ -105,7 +105,7 @@ class Document:
     changed: frozenset[int] = frozenset()
 
     def files(self, name: str) -> dict[str, bytes]:
-        """What is to be written where the document is written as `name`: names of files, and what is in them.
+        """Return what is to be written where the document is written as `name`: names of files, and what is in them.
 
         Buffers that have changed get a file of their own, beside it and called as it is.
         """
@@ -173,7 +173,7 @@ def read_document(path: Path, *, in_memory: bool = False) -> Document:
 
 
 def chunks_of(content: bytes | FileBytes) -> tuple[tuple[bytes, bytes | FileBytes], ...]:
-    """The kinds and contents of all chunks of a GLB file, the JSON among them."""
+    """Return the kinds and contents of all chunks of a GLB file, the JSON among them."""
     found: list[tuple[bytes, bytes | FileBytes]] = []
     place, whole = 12, len(content)
     if whole >= place:
@@ -196,7 +196,7 @@ def chunks_of(content: bytes | FileBytes) -> tuple[tuple[bytes, bytes | FileByte
 
 
 def parsed(text: bytes) -> Json:
-    """The JSON of a document, which is an object."""
+    """Return the JSON of a document, which is an object."""
     values = sum(map(text.count, (b",", b"[", b"{")))
     if values > MOST_VALUES:
         raise GltfError(
@@ -213,7 +213,7 @@ def parsed(text: bytes) -> Json:
 
 
 def objects(parent: Json, name: str) -> list[Json]:
-    """The objects in a list of the document; empty where there is none."""
+    """Return the objects in a list of the document; empty where there is none."""
     found = parent.get(name)
     if found is None:
         return []
@@ -222,18 +222,18 @@ def objects(parent: Json, name: str) -> list[Json]:
     return found
 
 
-def entry(parent: Json, name: str, number: object) -> Json:
-    """The object of a number in a list of the document."""
+def entry(parent: Json, name: str, number: Any) -> Json:
+    """Return the object of a number in a list of the document."""
     found = parent.get(name, [])
-    is_there = isinstance(found, list) and isinstance(number, int) and not isinstance(number, bool)
-    if not is_there or not 0 <= number < len(found):
+    is_number = isinstance(number, int) and not isinstance(number, bool)
+    if not isinstance(found, list) or not is_number or not 0 <= number < len(found):
         objects(parent, name)
         raise GltfError(f"{name} has no entry {shown(number)}, which something in the file names")
     return found[number] if isinstance(found[number], dict) else objects(parent, name)[number]
 
 
 def whole(parent: Json, name: str, default: int | None = None, least: int = 0) -> int:
-    """A member that is a whole number, and not below the least."""
+    """Return a member that is a whole number, and not below the least."""
     number = parent.get(name, default)
     if isinstance(number, float) and number.is_integer():
         number = int(number)
@@ -243,7 +243,7 @@ def whole(parent: Json, name: str, default: int | None = None, least: int = 0) -
 
 
 def shown(value: object) -> str:
-    """A value of a file as a message has it: short, on one line."""
+    """Return a value of a file as a message has it: short, on one line."""
     return repr(value)[:60]
 
 
@@ -252,7 +252,7 @@ def is_data(uri: object) -> bool:
 
 
 def bytes_of_uri(uri: str) -> bytes:
-    """What a data URI holds. Raises ValueError where it is not in base64."""
+    """Return what a data URI holds. Raises ValueError where it is not in base64."""
     head, _, data = uri.partition(",")
     if not head.endswith(";base64"):
         raise ValueError("not in base64")
@@ -260,14 +260,14 @@ def bytes_of_uri(uri: str) -> bytes:
 
 
 def unquoted(uri: str) -> str:
-    """A path as it is on a disk, of a URI in which signs may be %20 and the like."""
+    """Return a path as it is on a disk, of a URI in which signs may be %20 and the like."""
     return re.sub(
         b"%([0-9A-Fa-f]{2})", lambda found: bytes.fromhex(found[1].decode()), uri.encode(errors="replace")
     ).decode(errors="replace")
 
 
 def quoted(path: str) -> str:
-    """The URI of a path."""
+    """Return the URI of a path."""
     return "".join(chr(byte) if chr(byte) in PLAIN else f"%{byte:02X}" for byte in path.encode())
 
 
@@ -284,7 +284,7 @@ def is_inside(uri: str) -> bool:
 
 
 def file_of(folder: Path, number: int, uri: object) -> Path:
-    """The file that a buffer is in.
+    """Return the file that a buffer is in.
 
     Raises
     ------

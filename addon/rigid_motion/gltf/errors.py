@@ -87,7 +87,7 @@ class World:
         return stretches(count, STRETCH) if count > LONG * STRETCH else [slice(0, count)]
 
     def seen(self, *tracks: Tracks, parts: int = 1, among: Collection[int] | None = None) -> Iterator[Block]:
-        """What the moments look like as each of these tracks move the nodes, and so many parts of the gaps between.
+        """Yield what moments look like as each of these tracks move the nodes, and so many parts of gaps between.
 
         Where that is asked for, among some of the stretches alone, by their numbers.
         """
@@ -103,7 +103,7 @@ class World:
                 yield Block(parts * first, times, tuple(self.worlds(some, times) for some in near))
 
     def digests(self, tracks: Tracks) -> list[int]:
-        """What tells apart, of each stretch, whether tracks have the same keys there."""
+        """Return what tells apart, of each stretch, whether tracks have the same keys there."""
         near = (self._near(tracks, stretch) for stretch in self.stretches)
         return [
             hash(tuple(part.tobytes() for track in some.values() for part in (track.times, track.values)))
@@ -111,12 +111,12 @@ class World:
         ]
 
     def _near(self, tracks: Tracks, stretch: slice) -> Tracks:
-        """The keys of tracks that say what is shown in a stretch."""
+        """Return the keys of tracks that say what is shown in a stretch."""
         ends = self.times[[stretch.start, stretch.stop - 1]].tolist()
         return {target: track.near(*ends) for target, track in tracks.items()}
 
     def parted(self, first: int, end: int, parts: int) -> np.ndarray:
-        """Some of the moments, and so many parts of the gaps behind them."""
+        """Return some of the moments, and so many parts of the gaps behind them."""
         times = self.times[first : end + 1]
         gaps = (times[:-1, None] + np.diff(times)[:, None] * np.arange(parts) / parts).ravel()
         return gaps if len(times) > end - first else np.append(gaps, times[-1])
@@ -177,7 +177,7 @@ class World:
         return found
 
     def largest_error(self, shown: Tracks, *, parts: int = PARTS) -> float:
-        """The largest displacement of any point of any ball at the moments, and so many parts of the gaps between."""
+        """Return the largest displacement of any point of any ball at the moments, and at parts of the gaps between."""
         return self.worst(shown, np.inf, parts=parts)[0]
 
     def worst(
@@ -203,7 +203,7 @@ class World:
                 if bounds.flat[some[0]] <= min(largest, tolerance):
                     break
                 errors.flat[some] = self._displacements(there, truth, some)
-                largest = max(largest, float(errors.flat[some].max()))
+                largest = max(largest, float(np.max(errors.flat[some])))
             padded = np.pad(errors, ((0, 0), (1, 1)))
             peaks = (errors > tolerance) & (errors >= padded[:, :-2]) & (errors >= padded[:, 2:])
             place, number = np.nonzero(peaks)

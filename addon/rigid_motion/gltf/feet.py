@@ -62,7 +62,7 @@ class Feet:
         return self._ways(self.world.truth)
 
     def slides(self, tracks: Tracks) -> tuple[float, float]:
-        """The farthest that any of them gets from where it stood at first, before and after."""
+        """Return the farthest that any of them gets from where it stood at first, before and after."""
         before, after = (max(map(np.max, ways), default=0.0) for ways in (self._before, self._ways(tracks)))
         return float(before), float(after)
 

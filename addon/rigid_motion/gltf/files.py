@@ -39,7 +39,7 @@ class Report:
 
 
 def reduced(document: Document, options: Options) -> Report:
-    """A document with fewer keys in all of its clips.
+    """Return a document with fewer keys in all of its clips.
 
     Raises
     ------
@@ -90,6 +90,6 @@ def reduce_file(path: Path, output: Path, options: Options) -> Report:
 
 
 def _moved(nodes: Nodes, clips: Iterable[Clip]) -> np.ndarray:
-    """The nodes that tracks move, and all that hang on them, parents before their children."""
+    """Return the nodes that tracks move, and all that hang on them, parents before their children."""
     targets = {track.node for clip in clips for track in clip.tracks if track.path != WEIGHTS}
     return nodes.below(np.array(sorted(targets), dtype=np.int64))

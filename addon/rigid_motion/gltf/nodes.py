@@ -52,7 +52,7 @@ class Nodes:
         return Skeleton(self.parents)
 
     def rest_of(self, node: int, path: str) -> np.ndarray:
-        """What a track of the node's takes the place of, shape (width,)."""
+        """Return what a track of the node's takes the place of, shape (width,)."""
         if path in self.rest:
             return self.rest[path][node]
         own = self.document.json["nodes"][node]
@@ -60,7 +60,7 @@ class Nodes:
         return np.array(own.get("weights", mesh.get("weights", ())), dtype=np.float64)
 
     def below(self, moved: np.ndarray) -> np.ndarray:
-        """The nodes that move where these (m,) do, parents before their children, shape (n,)."""
+        """Return the nodes that move where these (m,) do, parents before their children, shape (n,)."""
         moves = np.zeros(len(self), dtype=bool)
         moves[moved] = True
         for nodes in self.skeleton.levels[1:]:
@@ -109,13 +109,13 @@ def by_target(tracks: tuple[Track, ...]) -> Tracks:
 
 
 def steadied(tracks: tuple[Track, ...]) -> Tracks:
-    """The same by node and path, where what is constant has one key."""
+    """Return the same by node and path, where what is constant has one key."""
     kept = [
         replace(track, times=track.times[:1], values=track.points[:1], interpolation=LINEAR)
         for track in tracks
         if track.is_constant
     ]
-    return by_target(tracks) | by_target(tuple(kept))
+    return {**by_target(tracks), **by_target(tuple(kept))}
 
 
 def _parents(nodes: list[Json]) -> np.ndarray:

@@ -54,7 +54,7 @@ class StoredTrack:
 
 
 def rewritten(document: Document, tracks: Mapping[int, Sequence[StoredTrack]]) -> Document:
-    """The document with other tracks in animations, by their numbers.
+    """Return the document with other tracks in animations, by their numbers.
 
     Their channels that are not among the tracks go, but for those that move no node or that extensions define.
     """
@@ -118,7 +118,7 @@ class _Rewriting:
         accessor |= self.view.placed(content.tobytes())
 
     def _views_without(self, unused: set[int], of_animations: set[int]) -> set[int]:
-        """The views that animations alone use, and some of which they use no more."""
+        """Return the views that animations alone use, and some of which they use no more."""
         places = [(container, container[key]) for container, key in _view_slots(self.json)]
         owned = {view for number in of_animations for view in _views_of(self.accessors[number])}
         counted = dict.fromkeys(owned, 0)
@@ -147,8 +147,9 @@ class _Rewriting:
                 container[key] = numbers[container[key]]
 
     def _buffers(self, removed: set[int]) -> Document:
-        """The document with its bytes: without those of views that were removed, and with the new ones."""
-        json, contents = self.json, list(self.before.buffers)
+        """Return the document with its bytes: without those of views that were removed, and with the new ones."""
+        json = self.json
+        contents: list[Any] = list(self.before.buffers)
         ranges: dict[int, list[Range]] = {}
         for number in sorted(removed):
             view = self.views[number]
@@ -215,8 +216,8 @@ def _other_slots(json: Json) -> Iterator[tuple[Json, str]]:
         for primitive in objects(mesh, "primitives"):
             if "indices" in primitive:
                 yield primitive, "indices"
-            for attributes in (primitive.get("attributes"), *objects(primitive, "targets")):
-                yield from ((attributes, name) for name in attributes or {})
+            for attributes in (primitive.get("attributes") or {}, *objects(primitive, "targets")):
+                yield from ((attributes, name) for name in attributes)
     for skin in objects(json, "skins"):
         if "inverseBindMatrices" in skin:
             yield skin, "inverseBindMatrices"
@@ -239,12 +240,12 @@ def _view_slots(json: Json) -> Iterator[tuple[Json, str]]:
 
 
 def _views_of(accessor: Json) -> list[int]:
-    """The views that an accessor is in: its own, and those of what is sparse."""
+    """Return the views that an accessor is in: its own, and those of what is sparse."""
     return [container["bufferView"] for container, _ in _view_slots({"accessor": accessor})]
 
 
 def _spans(view: Json) -> Iterator[Json]:
-    """What names bytes of a buffer: a view, and the compressed form of it."""
+    """Yield what names bytes of a buffer: a view, and the compressed form of it."""
     yield view
     for extension in view.get("extensions", {}).values():
         if isinstance(extension, dict) and {"buffer", "byteLength"} <= extension.keys():
@@ -257,7 +258,7 @@ def _range(view: Json) -> Range:
 
 
 def _cuts(removed: list[Range], kept: list[Range]) -> list[Range]:
-    """What can go out of a buffer: ranges without those that stay, aligned, rising."""
+    """Return what can go out of a buffer: ranges without those that stay, aligned, rising."""
     edges = sorted({place for some in (removed, kept) for one in some for place in one})
     if not edges:
         return []

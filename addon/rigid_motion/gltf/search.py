@@ -7,6 +7,8 @@ and near to it otherwise: what is promised is proven afterwards, on the nodes th
 
 from __future__ import annotations
 
+from typing import Any, cast
+
 import numpy as np
 
 from ..motion import Poses, SeparateKeys, Skeleton, reduce_skeleton_keys
@@ -38,25 +40,30 @@ class Search:
         self.world, self.tracks, self.fixed, self.run = world, tracks, fixed, run
 
     def keys(self, tolerance: float) -> tuple[SeparateKeys, ...]:
-        """The samples that are keys of each node."""
+        """Return the samples that are keys of each node."""
         world = self.world
         if len(world.stretches) == 1:
-            return self._reduced(EVERY, tolerance=tolerance, separate=True, fixed=self.fixed)
+            keys = self._reduced(EVERY, tolerance=tolerance, separate=True, fixed=self.fixed)
+            return cast(tuple[SeparateKeys, ...], keys)
         weights = np.broadcast_to(1.0, (len(world.moving), len(world.times)))
         skeleton, free = Skeleton(world.parents), ~self.fixed
         recording = LongRecording(world.times, skeleton, MODE, world.radii, weights, free, self._poses)
-        return keys_in_stretches(recording, tolerance, True, world.stretches, self.run)
+        keys = keys_in_stretches(recording, tolerance, True, world.stretches, self.run)
+        return cast(tuple[SeparateKeys, ...], keys)
 
     def key_poses(self, tolerance: float) -> np.ndarray:
-        """The samples that are keys of all nodes, those where stretches meet among them."""
-        found = [some.start + self._reduced(some, tolerance=tolerance, shared=True)[0] for some in self.world.stretches]
+        """Return the samples that are keys of all nodes, those where stretches meet among them."""
+        found = [some.start + self._shared(some, tolerance=tolerance) for some in self.world.stretches]
         return np.unique(np.concatenate(found))
 
     def so_many_key_poses(self, count: int, weights: np.ndarray) -> np.ndarray:
-        """The samples that are keys of all nodes, whose errors count so many times (n, m)."""
-        return self._reduced(EVERY, budget=min(count, len(self.world.times)), shared=True, weights=weights)[0]
+        """Return the samples that are keys of all nodes, whose errors count so many times (n, m)."""
+        return self._shared(EVERY, budget=min(count, len(self.world.times)), weights=weights)
 
-    def _reduced(self, samples: slice, **options: object) -> tuple[np.ndarray, ...] | tuple[SeparateKeys, ...]:
+    def _shared(self, samples: slice, **options: Any) -> np.ndarray:
+        return cast(np.ndarray, self._reduced(samples, shared=True, **options)[0])
+
+    def _reduced(self, samples: slice, **options: Any) -> tuple[np.ndarray, ...] | tuple[SeparateKeys, ...]:
         world = self.world
         times, poses = world.times[samples], self._poses(samples)
         return reduce_skeleton_keys(times, poses, world.parents, MODE, radius=world.radii, **options)
@@ -72,7 +79,7 @@ class Search:
 
 
 def _pose(world: World, tracks: Tracks, node: int, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The translation and rotation of a node in its parent's space at these times, or where it always is."""
+    """Return the translation and rotation of a node in its parent's space at these times, or where it always is."""
     if node in world.nodes.matrices:
         matrix = world.nodes.matrices[node]
         left, _, right = np.linalg.svd(matrix[:3, :3])

@@ -29,7 +29,7 @@ HALVINGS = 8
 
 
 def moments(world: World, clip: Clip, tolerance: float) -> np.ndarray:
-    """The moments between which everything runs evenly, as close as turns and splines need it, shape (m,), rising."""
+    """Return the moments between which all runs evenly, as close as turns and splines need it, shape (m,), rising."""
     moved = [track for track in clip.tracks if track.path != WEIGHTS and not track.is_constant]
     different = {id(track.times): track.times for track in moved}
     times = np.unique(np.concatenate([world.times, *different.values()]))
@@ -44,7 +44,7 @@ def moments(world: World, clip: Clip, tolerance: float) -> np.ndarray:
                 cosines = np.einsum("ij,ij->i", values[1:], values[:-1])
                 # A spline that passes near 0 comes out on the other side: nearly a whole turn in no time.
                 halved |= (cosines if track.interpolation == CUBICSPLINE else np.abs(cosines)) < np.cos(WIDE / 2)
-            if track.interpolation == CUBICSPLINE:
+            if track.interpolation == CUBICSPLINE and reaches is not None:
                 reach = 1.0 if track.path not in (ROTATION, SCALE) else 2.0 * reaches[world.places[track.node]]
                 halved |= _bows(track, times, values) * reach > BOW * tolerance
         middles = ((times[:-1] + times[1:]) / 2)[halved].astype(np.float32).astype(np.float64)
@@ -56,7 +56,7 @@ def moments(world: World, clip: Clip, tolerance: float) -> np.ndarray:
 
 
 def settled(world: World, clip: Clip, tolerance: float) -> dict[tuple[int, str], Track | None]:
-    """The tracks that need no search, and what takes their places: None where the node rests."""
+    """Return the tracks that need no search, and what takes their places: None where the node rests."""
     found: dict[tuple[int, str], Track | None] = {}
     for track in clip.tracks:
         target = track.node, track.path

@@ -24,7 +24,7 @@ SHELL = 0.03 / 1.7
 
 
 def joints_of(document: Document) -> list[list[int]]:
-    """The nodes that are joints of each skin."""
+    """Return the nodes that are joints of each skin."""
     skins = [skin["joints"] for skin in objects(document.json, "skins") if isinstance(skin.get("joints"), list)]
     for joint in itertools.chain.from_iterable(skins):
         entry(document.json, "nodes", joint)
@@ -32,7 +32,7 @@ def joints_of(document: Document) -> list[list[int]]:
 
 
 def size_of(nodes: Nodes, moved: np.ndarray) -> float:
-    """The largest extent of what moves along any axis, at rest: of joints, of meshes, or of nodes that are neither."""
+    """Return the largest extent along any axis of what moves, at rest: joints, meshes, or nodes that are neither."""
     document, origins = nodes.document, nodes.resting.origins
     sizes = [float(np.ptp(origins[joints], axis=0).max()) for joints in joints_of(document) if joints]
     if max(sizes, default=0.0) > 0.0:
@@ -47,7 +47,7 @@ def size_of(nodes: Nodes, moved: np.ndarray) -> float:
 
 
 def radii_of(nodes: Nodes, moved: np.ndarray, size: float) -> np.ndarray:
-    """The radius of the ball around each of these nodes (n,) in which no point is to be off by more, shape (n,).
+    """Return the radius of the ball around each of these nodes (n,) in which no point is to be off by more, shape (n,).
 
     Of a mesh it is that of the mesh, of what looks or shines the size of the whole, and of all else a share of it.
     """
@@ -64,7 +64,7 @@ def radii_of(nodes: Nodes, moved: np.ndarray, size: float) -> np.ndarray:
 
 
 def corners_of(document: Document, node: int) -> np.ndarray | None:
-    """The corners of a node's mesh in its own space, shape (8, 3); None without one, or where a skin moves it."""
+    """Return corners of a node's mesh in its own space, shape (8, 3); None without one, or where a skin moves it."""
     own = document.json["nodes"][node]
     if "mesh" not in own or "skin" in own:
         return None

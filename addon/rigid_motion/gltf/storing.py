@@ -47,7 +47,7 @@ class Amount:
 
 
 def stored(track: Track, *, integers: bool) -> StoredTrack:
-    """A track without tangents as it is stored; rotations as normalised 16-bit integers where these are asked for."""
+    """Return a track without tangents as it is stored; rotations as 16-bit integers where these are asked for."""
     values = track.values[..., TO_XYZW] if track.path == ROTATION else track.values
     values = values.reshape(-1, 1 if track.path == WEIGHTS else values.shape[-1])
     if integers and is_integral(track):
@@ -63,7 +63,7 @@ def is_integral(track: Track) -> bool:
 
 
 def shown(track: Track, stored: StoredTrack) -> Track:
-    """What is shown by a track as it is stored."""
+    """Return what is shown by a track as it is stored."""
     values = denormalised(stored.values) if stored.values.dtype.kind == "i" else stored.values.astype(np.float64)
     values = values.reshape(len(stored.times), -1)
     if track.path == ROTATION:
@@ -72,7 +72,7 @@ def shown(track: Track, stored: StoredTrack) -> Track:
 
 
 def key_size(path: str, *, integers: bool) -> int:
-    """The bytes of the value of a key of rotation or translation."""
+    """Return the bytes of the value of a key of rotation or translation."""
     return (SHORT if integers and path == ROTATION else NUMBER) * WIDTHS[path]
 
 

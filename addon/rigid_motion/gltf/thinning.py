@@ -14,7 +14,7 @@ AT_ONCE = 2**13
 
 
 def on_lines(times: np.ndarray, values: np.ndarray, within: float) -> np.ndarray:
-    """The keys that straight lines need to stay within a distance of values (n, width), rising, shape (k,).
+    """Return the keys that straight lines need to stay within a distance of values (n, width), rising, shape (k,).
 
     From each key the line goes as far as it can. The distance is the largest of any column.
     """
@@ -35,7 +35,7 @@ def on_lines(times: np.ndarray, values: np.ndarray, within: float) -> np.ndarray
 
 
 def without_repeats(values: np.ndarray) -> np.ndarray:
-    """The keys of a stepped channel (n, width) that bring another value, and the first; rising, shape (k,)."""
+    """Return the keys of a stepped channel (n, width) that bring another value, and the first; rising, shape (k,)."""
     return np.flatnonzero(np.append(True, np.any(values[1:] != values[:-1], axis=1)))
 
 
@@ -72,7 +72,7 @@ def shared_times(keys: Sequence[np.ndarray], widths: Sequence[int], samples: int
     both = in_common(marked)
 
     def saved(first: int) -> np.ndarray:
-        """The bytes that each other group needs less together with this one."""
+        """Return the bytes that each other group needs less together with this one."""
         needed_by_first, needed_by_others = counts - both[first], counts[first] - both[first]
         found = TIME * both[first] - sizes[first] * needed_by_first - sizes * needed_by_others
         found[[number == first or not group for number, group in enumerate(groups)]] = -np.inf

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -52,8 +53,11 @@ class Track:
     times: np.ndarray
     """Of the keys in seconds, shape (n,), strictly rising."""
 
-    values: np.ndarray | Rows
-    """Shape (n, width); of a cubic spline (n, 3, width): tangent before the key, its value, tangent after it."""
+    values: Any
+    """An array, or what is read where it is sliced like one, shape (n, width).
+
+    Of a cubic spline (n, 3, width): tangent before the key, its value, tangent after it.
+    """
 
     @property
     def points(self) -> np.ndarray:
@@ -69,17 +73,17 @@ class Track:
         return not tangents and bool(np.all(points == points[0]))
 
     def near(self, first: float, last: float) -> Track:
-        """The keys that say what is shown from one time to another, which are read where they are not yet."""
+        """Return the keys that say what is shown from one time to another, which are read where they are not yet."""
         begin = max(int(np.searchsorted(self.times, first, side="right")) - 1, 0)
         some = slice(begin, max(int(np.searchsorted(self.times, last)) + 1, begin + 1))
         return replace(self, times=self.times[some], values=self.values[some])
 
     def keyed(self, times: np.ndarray) -> Track:
-        """What it shows at these times (m,), with lines in between."""
+        """Return what it shows at these times (m,), with lines in between."""
         return replace(self, interpolation=LINEAR, times=times, values=self.at(times))
 
     def at(self, times: np.ndarray) -> np.ndarray:
-        """What is shown at `times`, which rise, shape (m, width). Quaternions are normalised."""
+        """Return what is shown at `times`, which rise, shape (m, width). Quaternions are normalised."""
         first, last = np.searchsorted(self.times, times[[0, -1]]).tolist()
         if last - first > AT_ONCE and len(times) > 1:
             return np.concatenate([self.at(some) for some in np.array_split(times, 2)])
@@ -111,7 +115,7 @@ class Track:
 
 
 def turned_at(key_times: np.ndarray, keys: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Unit quaternions (m, 4) at times between keys (n, 4), each on the short way at an even speed."""
+    """Return unit quaternions (m, 4) at times between keys (n, 4), each on the short way at an even speed."""
     keys = normalise(keys)
     first, second = keys[:-1], keys[1:]
     second = np.where(np.einsum("ij,ij->i", first, second)[:, None] < 0.0, -second, second)
@@ -153,7 +157,8 @@ def _clip(document: Document, number: int) -> Clip:
     animation = document.json["animations"][number]
     name = animation.get("name")
     name = name if isinstance(name, str) and name else f"animation {number}"
-    tracks, targets, times = [], set(), {}
+    tracks, targets = [], set()
+    times: dict[int, np.ndarray] = {}
     for place, channel in enumerate(objects(animation, "channels")):
         target = channel.get("target")
         if not isinstance(target, dict):
@@ -172,7 +177,7 @@ def _clip(document: Document, number: int) -> Clip:
 
 
 def _track(document: Document, animation: Json, place: int, channel: Json, known: dict[int, np.ndarray]) -> Track:
-    """A channel as a track, with the times that are known of the accessor, or that are so from now on."""
+    """Return a channel as a track, with the times that are known of the accessor, or that are so from now on."""
     node, path = channel["target"]["node"], channel["target"]["path"]
     moved = entry(document.json, "nodes", node)
     if "matrix" in moved and path != WEIGHTS:
@@ -181,18 +186,18 @@ def _track(document: Document, animation: Json, place: int, channel: Json, known
     interpolation = sampler.get("interpolation", LINEAR)
     if interpolation not in INTERPOLATIONS:
         raise GltfError(f"the interpolation {shown(interpolation)} is none of {', '.join(INTERPOLATIONS)}")
-    if (given := sampler.get("input")) not in known:
+    given: Any = sampler.get("input")
+    if given not in known:
         known[given] = _times(document, given)
     times, values = known[given], numbers(document, sampler.get("output"))
-    rows = len(times) * (3 if interpolation == CUBICSPLINE else 1)
-    width, uneven = divmod(values.size, rows)
+    width, uneven = divmod(values.size, len(times) * (3 if interpolation == CUBICSPLINE else 1))
     if uneven or not width or width != WIDTHS.get(path, width) or (path == WEIGHTS) != (values.shape[1] == 1):
         raise GltfError(f"{len(values)} values do not fit {len(times)} keys of {path}")
     if interpolation == CUBICSPLINE and len(times) < 2:
         raise GltfError("a spline needs two keys at least")
     if np.abs(values).max() > FARTHEST:
         raise GltfError("it has numbers that are too large")
-    shape = (3, width) if interpolation == CUBICSPLINE else (width,)
+    shape: tuple[int, ...] = (3, width) if interpolation == CUBICSPLINE else (width,)
     rows = Rows(document, sampler["output"], len(times), shape, TO_WXYZ if path == ROTATION else EVERY)
     track = Track(place, node, path, interpolation, times, rows)
     if path == ROTATION and not np.linalg.norm(track.points, axis=1).all():

@@ -39,7 +39,7 @@ class Skin:
 
 
 def largest_displacement(world: World, shown: Tracks) -> float | None:
-    """The largest displacement of any vertex at the moments of a world; None without a skin that can be read."""
+    """Return the largest displacement of any vertex at the moments of a world; None without a skin that can be read."""
     found = None
     for skin in _skins(world.nodes.document):
         found = max(found or 0.0, _of_skin(world, shown, skin, found or 0.0))
@@ -59,7 +59,7 @@ def _of_skin(world: World, shown: Tracks, skin: Skin, least: float) -> float:
 
 
 def _largest(differences: np.ndarray, skin: Skin, least: float) -> float:
-    """The largest displacement of any vertex by joints that are so far off (j, m, 3, 4), or `least` if that is more."""
+    """Return the largest displacement of any vertex by joints so far off (j, m, 3, 4), or `least` if that is more."""
     bounds = _bounds(differences, skin)
     order, step = np.argsort(-bounds), max(1, AT_ONCE // len(skin.vertices))
     for first in range(0, len(order), step):
@@ -70,12 +70,12 @@ def _largest(differences: np.ndarray, skin: Skin, least: float) -> float:
         for carriers, shares in zip(skin.carriers.T, skin.shares.T, strict=True):
             own = differences[carriers[None], moments[:, None]]
             moved += shares[:, None] * np.einsum("mvab,vb->mva", own, skin.vertices)
-        least = max(least, float(np.linalg.norm(moved, axis=-1).max()))
+        least = max(least, float(np.max(np.linalg.norm(moved, axis=-1))))
     return least
 
 
 def _bounds(differences: np.ndarray, skin: Skin) -> np.ndarray:
-    """What no vertex is moved by more than at each moment (m,): of the box around those of each joint, the corners."""
+    """Return what no vertex is moved by more than at each moment (m,): corners of the box around those of a joint."""
     found = np.zeros(differences.shape[1])
     for joint, own in enumerate(differences):
         carried = skin.vertices[((skin.carriers == joint) & (skin.shares > 0.0)).any(axis=1)]
@@ -87,7 +87,7 @@ def _bounds(differences: np.ndarray, skin: Skin) -> np.ndarray:
 
 
 def _skins(document: Document) -> Iterator[Skin]:
-    """The primitives that skins carry, but for those that are compressed."""
+    """Yield the primitives that skins carry, but for those that are compressed."""
     for node in objects(document.json, "nodes"):
         if "mesh" in node and "skin" in node:
             given = entry(document.json, "skins", node["skin"])

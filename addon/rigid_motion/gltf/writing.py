@@ -37,7 +37,7 @@ class GrowingView:
         self._known: dict[tuple[str, int, bytes], int] = {}
 
     def add(self, numbers: np.ndarray, *, bounds: bool = False) -> int:
-        """The number of an accessor of these (count, columns), the same where there is one already.
+        """Return the number of an accessor of these (count, columns), the same where there is one already.
 
         Whole numbers with a sign are normalised ones.
         """
@@ -54,7 +54,7 @@ class GrowingView:
         return self._known[known]
 
     def placed(self, content: bytes) -> Json:
-        """What an accessor says of where these bytes are, which come behind the others."""
+        """Return what an accessor says of where these bytes are, which come behind the others."""
         self.data += bytes(-len(self.data) % ALIGNED)
         offset = len(self.data)
         self.data += content
@@ -62,7 +62,7 @@ class GrowingView:
 
 
 def in_one_buffer(views: Iterable[GrowingView]) -> bytes:
-    """The bytes of views one after the other, which know their places in them from then on."""
+    """Return the bytes of views one after the other, which know their places in them from then on."""
     data = bytearray()
     for view in views:
         data += bytes(-len(data) % ALIGNED)

@@ -25,7 +25,7 @@ class AffineMaps:
     """Shape (..., 3)."""
 
     def __getitem__(self, index: Any) -> AffineMaps:
-        """The maps at `index` of the leading axes, by NumPy's rules."""
+        """Return the maps at `index` of the leading axes, by NumPy's rules."""
         whole = index if isinstance(index, tuple) else (index,)
         return AffineMaps(self.axes[(*whole, slice(None), slice(None))], self.origins[(*whole, slice(None))])
 
@@ -33,7 +33,7 @@ class AffineMaps:
         self.axes[index], self.origins[index] = maps.axes, maps.origins
 
     def __matmul__(self, maps: AffineMaps) -> AffineMaps:
-        """The maps that apply `maps` first. Leading axes are broadcast."""
+        """Return the maps that apply `maps` first. Leading axes are broadcast."""
         return AffineMaps(self.axes @ maps.axes, self.at(maps.origins))
 
     def at(self, points: np.ndarray) -> np.ndarray:
@@ -50,7 +50,7 @@ def turned(axes: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 
 
 def displacement_bound(maps: AffineMaps, truth: AffineMaps, radii: np.ndarray) -> np.ndarray:
-    """An upper bound of `ball_displacement`, at most 1.8 times as large, that takes a tenth of the time."""
+    """Return an upper bound of `ball_displacement`, at most 1.8 times as large, that takes a tenth of the time."""
     offsets, turns = maps.origins - truth.origins, maps.axes - truth.axes
     return np.sqrt(np.einsum("...i,...i->...", offsets, offsets)) + radii * np.sqrt(
         np.einsum("...ij,...ij->...", turns, turns)
@@ -58,7 +58,7 @@ def displacement_bound(maps: AffineMaps, truth: AffineMaps, radii: np.ndarray) -
 
 
 def ball_displacement(maps: AffineMaps, truth: AffineMaps, radii: np.ndarray) -> np.ndarray:
-    """The largest displacement of any point of the ball around a body's origin: the shell error of affine maps.
+    """Return the largest displacement of any point of the ball around a body's origin: the shell error of affine maps.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ def best_modes(
     radius: float = 0.1,
     tolerance: float | None = None,
 ) -> tuple[str, ...]:
-    """The mode of each segment between keys that comes closest to a recording.
+    """Return the mode of each segment between keys that comes closest to a recording.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def _fewest_changes(acceptable: np.ndarray) -> np.ndarray:
 
 
 def interpolate_by_segments(key_times: ArrayLike, keys: Poses, times: ArrayLike, modes: Sequence[str]) -> Poses:
-    """The poses at `times` of one object whose segments have modes of their own.
+    """Return the poses at `times` of one object whose segments have modes of their own.
 
     Parameters
     ----------

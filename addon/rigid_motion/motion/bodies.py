@@ -43,7 +43,7 @@ class Body:
         self.truth = truth
 
     def with_poses(self, poses: Poses) -> Body:
-        """The same with others in the place of its poses, that are to be where those put it."""
+        """Return the same with others in the place of its poses, that are to be where those put it."""
         skeleton, radii, weights, free = self.skeleton, self.radii, self.weights, self.free
         return Body(self.times, poses, skeleton, self.mode, radii, weights, free, self.truth)
 
@@ -78,7 +78,7 @@ class Body:
         return PackedPoses(self.truth)
 
     def shown(self, joint: int, keys: np.ndarray) -> Poses:
-        """What a joint does between keys (k,), shape (n,)."""
+        """Return what a joint does between keys (k,), shape (n,)."""
         return interpolate(self.times[keys], self.poses[joint][keys], self.times, self.mode)
 
     @cached_property

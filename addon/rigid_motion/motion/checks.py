@@ -14,13 +14,13 @@ KEYS_WANTED = "give rising numbers of samples, as reduce_keys and decimate retur
 
 
 def check_poses(poses: Poses, name: str) -> None:
-    """A TypeError where an argument of this name is an array, a list or something else instead of poses."""
+    """Raise a TypeError where an argument of this name is an array, a list or something else instead of poses."""
     if not isinstance(poses, Poses):
         raise TypeError(f"{name} need to be Poses, not {type(poses).__name__}: Poses(positions, quaternions)")
 
 
 def check_times(times: np.ndarray, whose: str = "") -> None:
-    """A ValueError that names the first of some times (n,) that is not later than the one before it."""
+    """Raise a ValueError that names the first of some times (n,) that is not later than the one before it."""
     if times.ndim != 1:
         raise ValueError(f"times of shape {times.shape}: give one row of them, in seconds")
     if not (finite := np.abs(times) < LIMIT).all():
@@ -30,7 +30,7 @@ def check_times(times: np.ndarray, whose: str = "") -> None:
 
 
 def check_recording(times: np.ndarray, poses: Poses, whose: str = "") -> None:
-    """A ValueError that names the first sample (n,) that is wrong."""
+    """Raise a ValueError that names the first sample (n,) that is wrong."""
     check_poses(poses, "poses")
     if times.shape != poses.shape or times.ndim != 1:
         raise ValueError(f"{times.size} times do not fit poses of shape {poses.shape}: one object has a row of each")
@@ -105,7 +105,7 @@ def key_samples(keys: ArrayLike, samples: int) -> np.ndarray:
 
 
 def check_wishes(tolerance: float | None, budget: int | None, tries: int) -> None:
-    """A TypeError or ValueError that says what is wrong with what is asked of key reduction."""
+    """Raise a TypeError or ValueError that says what is wrong with what is asked of key reduction."""
     if tolerance is None and budget is None:
         raise ValueError("key reduction needs a tolerance or a budget of keys: give one of the two")
     if tolerance is not None and budget is not None:
@@ -119,21 +119,21 @@ def check_wishes(tolerance: float | None, budget: int | None, tries: int) -> Non
 
 
 def check_tolerance(tolerance: float) -> None:
-    """A TypeError where the tolerance is no number, a ValueError where it is no length."""
+    """Raise a TypeError where the tolerance is no number, a ValueError where it is no length."""
     if not 1.0 / LIMIT < number(tolerance, "tolerance") < LIMIT:
         raise ValueError(f"a tolerance of {tolerance} is not a positive number from {1.0 / LIMIT:g} to {LIMIT:g}")
 
 
 def check_radius(radius: float) -> None:
-    """A TypeError where the shell's radius is no number, a ValueError where it is no length: without turns it is 0."""
+    """Raise a TypeError where the shell's radius is no number, a ValueError where it is no length, nor 0."""
     if not (1.0 / LIMIT < (given := number(radius, "radius")) < LIMIT or given == 0.0):
         raise ValueError(f"a radius of {radius} is no length: give 0, or a number from {1.0 / LIMIT:g} to {LIMIT:g}")
 
 
 def check_radii(radii: ArrayLike) -> np.ndarray:
-    """The same of one radius or many, in an array of any shape, which is returned."""
+    """Return the same of one radius or many, in an array of any shape, which is returned."""
     if not isinstance(radii, np.ndarray | list | tuple):
-        check_radius(radii)  # type: ignore[arg-type] - refused there where it is no number
+        check_radius(radii)  # type: ignore[arg-type]  # refused there where it is no number
     checked = numbers(radii, "radii")
     for radius in np.unique(checked):
         check_radius(radius)
@@ -141,7 +141,7 @@ def check_radii(radii: ArrayLike) -> np.ndarray:
 
 
 def check_flag(flag: bool, name: str) -> None:
-    """A TypeError where an argument of this name is neither True nor False."""
+    """Raise a TypeError where an argument of this name is neither True nor False."""
     if not isinstance(flag, bool | np.bool_):
         raise TypeError(f"{name} is {flag!r}: give True or False")
 

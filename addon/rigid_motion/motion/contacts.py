@@ -78,7 +78,7 @@ def contacts(times: np.ndarray, low: np.ndarray, slow: np.ndarray) -> np.ndarray
 
 
 def slide(positions: np.ndarray, stands: np.ndarray) -> float:
-    """The farthest that anything (joints, n, 3) gets, while it stands (joints, n), from where it stood at first."""
+    """Return farthest that anything (joints, n, 3) gets, while it stands (joints, n), from where it stood at first."""
     farthest = 0.0
     for joint, first, last in spans(stands):
         away = positions[joint, first : last + 1] - positions[joint, first]

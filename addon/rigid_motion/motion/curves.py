@@ -43,7 +43,7 @@ def lerp_slerp(segments: Segments) -> Curves:
 
 
 def screw(segments: Segments) -> Curves:
-    """The screw motion from key to key: ScLERP, and the SLERP of motors."""
+    """Return the screw motion from key to key: ScLERP, and the SLERP of motors."""
 
     def basis(s: np.ndarray, parameters: list[np.ndarray], narrow: bool) -> Rows:
         rows = np.empty((6, s.size))
@@ -59,7 +59,7 @@ def screw(segments: Segments) -> Curves:
 
 
 def motor_lerp(segments: Segments) -> Curves:
-    """The normalised blend of two motors: of PGA, of CGA without scale, or of dual quaternions."""
+    """Return the normalised blend of two motors: of PGA, of CGA without scale, or of dual quaternions."""
 
     def basis(s: np.ndarray, parameters: list[np.ndarray], narrow: bool) -> Rows:
         rows = np.empty((5, s.size))
@@ -79,7 +79,7 @@ def motor_lerp(segments: Segments) -> Curves:
 
 
 def motor_spline(segments: Segments, tangents: np.ndarray | None = None, spins: np.ndarray | None = None) -> Curves:
-    """A screw from key to key, bent so that its twist goes on through every key.
+    """Return a screw from key to key, bent so that its twist goes on through every key.
 
     A key has a mean of the twists of the segments next to it, see `_shares`, the outermost ones have that of their
     segment, and none has any where the body rests before or after. `tangents` is how many times as long the twist at
@@ -101,7 +101,7 @@ def motor_spline(segments: Segments, tangents: np.ndarray | None = None, spins: 
 
 
 def motor_spline_causal(segments: Segments) -> Curves:
-    """The same for streams, from no key after the segment.
+    """Return the same for streams, from no key after the segment.
 
     A key has the twist of the screw that led to it, and half of what the same share of the screw before would add: all
     of it overshoots. A rest is kept, although nothing told of it when the body arrived there. Nor did anything tell
@@ -153,7 +153,7 @@ def _bent(
     tangents: np.ndarray | float = 1.0,
     spins: np.ndarray | None = None,
 ) -> Curves:
-    """A screw from key to key, bent so that the body has certain twists at the keys.
+    """Return a screw from key to key, bent so that the body has certain twists at the keys.
 
     Between the poses M and M exp(r), with twists of w and w' at either end, in the segment's own time from 0 to 1, runs
 
@@ -182,7 +182,7 @@ def _bent(
 
 
 def similarity_slerp(segments: Segments) -> Curves:
-    """The geodesic of similarities: an even rate of turning, of advance and of growth. A screw where nothing grows."""
+    """Return the geodesic of similarities: even rates of turning, advance and growth. A screw where nothing grows."""
     if segments.scales is None:
         return screw(segments)
 
@@ -219,7 +219,7 @@ def similarity_slerp(segments: Segments) -> Curves:
 
 
 def similarity_lerp(segments: Segments) -> Curves:
-    """The projected blend of two versors of CGA. A motor's where nothing grows.
+    """Return the projected blend of two versors of CGA. A motor's where nothing grows.
 
     With the roots k0 and k1 of the scales, the blend has no scale at |s| = (k0 + k1) / |k0 - k1|, where nothing turns,
     or later, and a negative one behind that: half-way from the key to there the motion stops.

@@ -10,7 +10,7 @@ from .poses import numbers
 
 
 def decimate(times: ArrayLike, rate: float) -> np.ndarray:
-    """The samples that a sender of `rate` poses a second would have sent: those nearest to its ticks.
+    """Return the samples that a sender of `rate` poses a second would have sent: those nearest to its ticks.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def decimate(times: ArrayLike, rate: float) -> np.ndarray:
 
 
 def nearest(times: np.ndarray, moments: np.ndarray) -> np.ndarray:
-    """The index of the time nearest to each moment, the earlier of two that are equally near."""
+    """Return the index of the time nearest to each moment, the earlier of two that are equally near."""
     if len(times) == 1:
         return np.zeros(np.shape(moments), dtype=np.int64)
     after = np.clip(np.searchsorted(times, moments), 1, len(times) - 1)

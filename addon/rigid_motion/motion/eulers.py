@@ -23,7 +23,7 @@ LOCKED = 1e-7
 
 
 def extrinsic_eulers_from_quaternions(quaternions: np.ndarray, order: str, starts: Sequence[int] = (0,)) -> np.ndarray:
-    """The angles of a motion's rotations, each set of angles the one nearest to the set before it.
+    """Return the angles of a motion's rotations, each set of angles the one nearest to the set before it.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def extrinsic_eulers_from_quaternions(quaternions: np.ndarray, order: str, start
 
 
 def quaternions_from_extrinsic_eulers(angles: np.ndarray, order: str) -> np.ndarray:
-    """The rotations (n, 4) of angles (n, 3) in radians about x, y and z, turned about in this order."""
+    """Return the rotations (n, 4) of angles (n, 3) in radians about x, y and z, turned about in this order."""
     i, j, k = ("XYZ".index(axis) for axis in order)
     sign = (i - j) * (j - k) * (k - i) // 2
     sines, cosines = np.empty((2, 3, len(angles)))
@@ -77,7 +77,7 @@ def quaternions_from_extrinsic_eulers(angles: np.ndarray, order: str) -> np.ndar
 
 
 def _direction(x: np.ndarray, y: np.ndarray, starts: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
-    """The angle of the line through each plane vector, without jumps, and the vector's signed length along it."""
+    """Return angle of the line through each plane vector, without jumps, and the vector's signed length along it."""
     length = np.sqrt(x * x + y * y)
     angle = np.arctan2(y, x)
     free = length < LOCKED

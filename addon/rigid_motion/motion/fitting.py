@@ -147,7 +147,7 @@ class _Fitting:
 
 
 def _moved(keys: Poses, chosen: np.ndarray, steps: np.ndarray) -> Poses:
-    """The keys, some of them (c,) moved by twists (6, c) along their own axes."""
+    """Return the keys, some of them (c,) moved by twists (6, c) along their own axes."""
     turns, advances = twists.exponential(steps)
     positions, quaternions = keys.positions.copy(), keys.quaternions.copy()
     positions[chosen] += rotate(quaternions[chosen], advances.T)

@@ -84,7 +84,7 @@ class BudgetSearch(Search):
         return self._least_peak(keys, candidates, tries) if tries else self._settled(keys).indices
 
     def _least_peak(self, keys: Keys, candidates: np.ndarray, tries: int) -> np.ndarray:
-        """The keys with the smallest largest error of all that tries lead to from some."""
+        """Return the keys with the smallest largest error of all that tries lead to from some."""
         enough = math.inf if self._is_short else ENOUGH[self._length - 2] * self.costs.looked
         best = samples = (self.moved(keys, math.inf) if self._length == 2 else keys).indices
         found = [best]
@@ -126,7 +126,7 @@ class BudgetSearch(Search):
         return found
 
     def _least_squares(self, best: Keys, tries: int) -> np.ndarray:
-        """The same for the mean square, from keys that are many enough."""
+        """Return the same for the mean square, from keys that are many enough."""
         found = [best.indices]
         links = tries and self.is_linkable  # The last try.
         for _ in range(tries - bool(links)):
@@ -167,6 +167,6 @@ class BudgetSearch(Search):
             picked = order[between[order]]
             errors = self.costs.errors(segments[np.sort(picked)])
             ends = zip(keys.indices[picked] + 1, keys.indices[picked + 1], strict=True)
-            worst = [first + errors[first:second].argmax() for first, second in ends]
+            worst = [first + np.argmax(errors[first:second]) for first, second in ends]
             keys = self.measured(np.union1d(keys.indices, worst))
         return keys

@@ -136,7 +136,7 @@ class Costs:
         return self.recording.poses_each * self._counts(segments.reshape(-1, self.keys)).sum()
 
     def errors(self, segments: np.ndarray) -> np.ndarray:
-        """The error at every sample between the keys of segments (s, keys), in tolerances, zero elsewhere, (n,)."""
+        """Return error at every sample between the keys of segments (s, keys), in tolerances, zero elsewhere, (n,)."""
         errors = np.zeros(len(self.recording.times))
         for batch, counts in self._batches(segments[self._counts(segments) > 0]):
             samples, errors_there = self._errors(batch, counts)
@@ -174,7 +174,7 @@ class Costs:
         return np.where((first >= 0) & (second >= 0), second - first - self._first, 0)
 
     def _errors(self, rows: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Samples (n,) and their errors (n,) in segments (s, keys) with so many of them in each, (s,)."""
+        """Return samples (n,) and their errors (n,) in segments (s, keys) with so many of them in each, (s,)."""
         recording, before = self.recording, self.reach
         begins = rows[:, before] + self._first - np.cumsum(counts) + counts
         samples = np.repeat(begins, counts) + np.arange(counts.sum())
@@ -185,8 +185,8 @@ class Costs:
         within = prepare_within(MODES[recording.mode].curves, key_times, keys, slice(before, before + 1))
         if not together:
             return samples, np.minimum(recording.errors(samples, within(counts, progress, slice(None))), WORST)
-        of_all = (np.concatenate([numbers] * math.prod(together)) for numbers in (counts, progress))
-        shown = within(*of_all, slice(None))
+        counts, progress = (np.concatenate([numbers] * math.prod(together)) for numbers in (counts, progress))
+        shown = within(counts, progress, slice(None))
         return samples, np.minimum(recording.errors(samples, reshaped(shown, *together, -1)), WORST)
 
 
@@ -227,19 +227,19 @@ class _Memory:
 
 
 def _at(numbers: np.ndarray, samples: np.ndarray) -> np.ndarray:
-    """The number of each of some samples (m,), or the one that all have."""
+    """Return the number of each of some samples (m,), or the one that all have."""
     return numbers[samples] if numbers.ndim else numbers
 
 
 def _with_ends(recording: Recording, rows: np.ndarray, reach: int) -> tuple[np.ndarray, Poses]:
-    """Times (s, keys) and poses (..., s, keys) of samples; where there are none, the motion of the ends goes on."""
+    """Return times (s, keys) and poses (..., s, keys) of samples; beyond them the motion of the ends goes on."""
     key_times, keys = recording.times[rows], recording.truth[rows]
     if rows.min() >= 0:
         return key_times, keys
-    missing = [np.count_nonzero(columns < 0, axis=1) for columns in (rows[:, :reach], rows[:, reach + 2 :])]
-    where = [np.flatnonzero(count) for count in missing]
+    absent = [np.count_nonzero(columns < 0, axis=1) for columns in (rows[:, :reach], rows[:, reach + 2 :])]
+    where = [np.flatnonzero(count) for count in absent]
     inwards = np.repeat((1, -1), [len(some) for some in where])
-    (before, after), row = (count[some] for count, some in zip(missing, where, strict=True)), np.concatenate(where)
+    (before, after), row = (count[some] for count, some in zip(absent, where, strict=True)), np.concatenate(where)
     missing, outermost = np.concatenate((before, after)), np.concatenate((before, rows.shape[1] - 1 - after))
     duration = key_times[row, outermost + inwards] - key_times[row, outermost]
     for step in range(1, 1 + missing.max()):

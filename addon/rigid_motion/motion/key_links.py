@@ -62,7 +62,7 @@ PRICE_STEPS = 10
 
 
 def linked_keys(costs: Costs, found: list[np.ndarray]) -> np.ndarray:
-    """The fewest keys that candidates allow, or the fewest that were found; at all costs that are too high.
+    """Return the fewest keys that candidates allow, or the fewest that were found; at all costs that are too high.
 
     Parameters
     ----------
@@ -77,12 +77,14 @@ def linked_keys(costs: Costs, found: list[np.ndarray]) -> np.ndarray:
         if links is not None:
             _, peak = costs.of(links)
             links = links[peak <= WITHIN]
-            return _Ways(links, candidates).shortest()
+            keys = _Ways(links, candidates).shortest()
+            assert keys is not None  # what was found is a way
+            return keys
     return min(found, key=len)
 
 
 def traded_keys(costs: Costs, found: list[np.ndarray], *, budget: int | None = None) -> np.ndarray:
-    """The fewest keys that prices allow, or the first that were found; at all costs that are too high.
+    """Return the fewest keys that prices allow, or the first that were found; at all costs that are too high.
 
     With a budget, those of them that cost least, as many as it at most.
 
@@ -110,6 +112,7 @@ def traded_keys(costs: Costs, found: list[np.ndarray], *, budget: int | None = N
     for _ in range(PRICE_STEPS):
         middle = 0.5 * (low + high)
         keys = ways.shortest(cost + price * math.exp(middle))
+        assert keys is not None  # what was found is a way
         total = costs.total(keys)
         worth = (len(keys), total) if budget is None else (total, len(keys))
         fits = total <= allowed if budget is None else len(keys) <= budget
@@ -121,7 +124,7 @@ def traded_keys(costs: Costs, found: list[np.ndarray], *, budget: int | None = N
 
 
 def joined_keys(costs: Costs, found: list[np.ndarray], budget: int) -> np.ndarray:
-    """The keys within a budget with the smallest largest error that candidates allow, or the best that were found.
+    """Return keys within a budget with the smallest largest error that candidates allow, or the best that were found.
 
     Parameters
     ----------
@@ -169,7 +172,7 @@ def _links(
     alive: float,
     effort: float = EFFORT,
 ) -> np.ndarray | None:
-    """The links that candidates allow: samples, -1 beyond the ends, (l, keys of a segment); None where there are many.
+    """Return the links that candidates allow: samples, -1 beyond the ends, (l, keys of a segment); None for many.
 
     Segments whose peak, or for the mean square whose cost, is above `good` are left out, and those above `alive` are
     made no longer; with neighbours as far away as they are long.

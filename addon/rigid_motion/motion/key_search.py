@@ -88,13 +88,13 @@ class Keys:
         return numbers[(numbers > self.first) & (numbers < self.last)]
 
     def around(self, numbers: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The keys in these columns from each of some keys, (c, m), and whether they belong to its track."""
+        """Return the keys in these columns from each of some keys, (c, m), and whether they belong to its track."""
         found = numbers[:, None] + columns
         inside = (found >= self.first[numbers][:, None]) & (found <= self.last[numbers][:, None])
         return np.clip(found, 0, len(self.indices) - 1), inside
 
     def windows(self, numbers: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """The samples of the keys in these columns from each of some keys, -1 where the track has none, (c, m)."""
+        """Return samples of the keys in these columns from each of some keys, -1 where the track has none, (c, m)."""
         found, inside = self.around(numbers, columns)
         return np.where(inside, self.indices[found], -1)
 
@@ -128,7 +128,7 @@ class Search:
         return best.indices
 
     def _first(self, tolerance: float) -> Keys:
-        """What is left of keys that are more than needed."""
+        """Return what is left of keys that are more than needed."""
         return self.refined(self.thinned(self.started(tolerance), tolerance), tolerance)
 
     def started(self, tolerance: float) -> Keys:
@@ -187,16 +187,21 @@ class Search:
         return keys
 
     def _at(self, indices: np.ndarray) -> Keys:
-        """The same, and nothing known of what is between them."""
+        """Return the same, and nothing known of what is between them."""
         recording = self.recording
         first, end = np.searchsorted(indices, recording.starts), np.searchsorted(indices, recording.ends)
         counts = end - first + 1
         return Keys(
-            indices, np.repeat(first, counts), np.repeat(end, counts), *np.zeros((2, len(indices))), indices >= 0
+            indices,
+            np.repeat(first, counts),
+            np.repeat(end, counts),
+            np.zeros(len(indices)),
+            np.zeros(len(indices)),
+            indices >= 0,
         )
 
     def segments(self, keys: Keys) -> tuple[np.ndarray, np.ndarray]:
-        """The numbers of the keys that segments begin at, (s,), and the samples of all keys with a say in each."""
+        """Return numbers of the keys that segments begin at, (s,), and the samples of all keys with a say in each."""
         numbers = np.flatnonzero(np.arange(len(keys.indices)) < keys.last)
         return numbers, keys.windows(numbers, np.arange(-self.reach, 2 + self.reach))
 
@@ -333,7 +338,7 @@ class Search:
         return np.where(refused, math.inf, cost.sum(axis=1) - around)
 
     def _cost_around(self, keys: Keys, numbers: np.ndarray) -> np.ndarray:
-        """The sum over the segments that each key influences."""
+        """Return the sum over the segments that each key influences."""
         segments, inside = keys.around(numbers, np.arange(-1 - self.reach, 1 + self.reach))
         return np.where(inside, keys.cost[segments], 0.0).sum(axis=1)
 

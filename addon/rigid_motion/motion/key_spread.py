@@ -126,7 +126,7 @@ class _Ways:
         return self._left >= 0.0
 
     def _windows(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """The samples of all keys with a say in segments between candidates (...), shape (..., keys)."""
+        """Return the samples of all keys with a say in segments between candidates (...), shape (..., keys)."""
         rows = (*self._before[:, first], self._candidates[first], self._candidates[second], *self._after[:, second])
         return np.stack(rows, axis=-1)
 
@@ -161,7 +161,7 @@ class _Ways:
         self._peaks.append(peak[rows, columns])
 
     def fewest(self, error: float, budget: int) -> np.ndarray | None:
-        """The samples of a way of segments that are off by an error at most, with as few keys as a budget.
+        """Return the samples of a way of segments that are off by an error at most, with as few keys as a budget.
 
         None where there is no such way.
         """
@@ -177,7 +177,7 @@ class _Ways:
         return self._candidates[way] if way else self._exactly(first, second, budget)
 
     def _exactly(self, first: np.ndarray, second: np.ndarray, budget: int) -> np.ndarray | None:
-        """The same over segments that join these candidates."""
+        """Return the same over segments that join these candidates."""
         order = np.argsort(first, kind="stable")
         bounds = np.searchsorted(first[order], np.arange(len(self._candidates) + 1)).tolist()
         onwards, back = second[order].tolist(), [0] * len(self._candidates)
@@ -233,15 +233,14 @@ def moved_together(costs: Costs, keys: np.ndarray, ways: int, part: int) -> np.n
             total = least[..., None] + of_segment
             backs.append(total.argmin(axis=0).astype(np.int8))
             least = total.min(axis=0)
-    chosen = [int(number) for number in np.unravel_index(least.argmin(), least.shape)][::-1]
+    chosen = [int(number) for number in np.unravel_index(np.argmin(least), least.shape)][::-1]
     for back in reversed(backs):
         chosen.append(int(back[tuple(chosen[:-count:-1])]))
-    chosen = np.array(chosen[::-1])
-    return choices[np.arange(len(choices)), chosen][reach : len(choices) - reach]
+    return choices[np.arange(len(choices)), chosen[::-1]][reach : len(choices) - reach]
 
 
 def _of_choices(costs: Costs, choices: np.ndarray, worst: float) -> np.ndarray:
-    """What segments cost for all choices of the keys that have a say in each, (s, ways, ways...), of keys (k, ways)."""
+    """Return the cost of segments for all choices of the keys with a say in each, (s, ways, ...), of keys (k, ways)."""
     ways, segments = choices.shape[1], len(choices) - costs.keys + 1
     windows = np.empty((segments, *(ways,) * costs.keys, costs.keys), dtype=np.int64)
     for column in range(costs.keys):

@@ -120,7 +120,7 @@ def measure(times: ArrayLike, poses: Poses, truth: Poses, radius: ArrayLike = 0.
 
 
 def _check_pair(poses: Poses, truth: Poses) -> None:
-    """An error where two motions cannot be compared."""
+    """Raise an error where two motions cannot be compared."""
     check_poses(poses, "poses")
     check_poses(truth, "the true poses")
     if poses.shape != truth.shape:
@@ -131,7 +131,7 @@ def _check_pair(poses: Poses, truth: Poses) -> None:
 
 
 def shell_error(poses: Poses, truth: Poses, radius: ArrayLike = 0.1) -> np.ndarray:
-    """The largest displacement of any point within `radius` of the body's origin: position and rotation in one number.
+    """Return the largest displacement of any point within `radius` of the origin: position and rotation in one.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def shell_error(poses: Poses, truth: Poses, radius: ArrayLike = 0.1) -> np.ndarr
 def largest_displacement(
     d: np.ndarray, v: np.ndarray, radius: np.ndarray, true_radius: np.ndarray | None = None
 ) -> np.ndarray:
-    """The shell error (..., n) of balls that are off by d (3, ..., n) and turned by v, which it may overwrite.
+    """Return the shell error (..., n) of balls that are off by d (3, ..., n) and turned by v, which it may overwrite.
 
     v (3, ..., n) is the vector part of the unit quaternion of the turn. Balls that should be of a size of their own
     have a `true_radius`.
@@ -207,7 +207,7 @@ def largest_displacement(
 
 
 def _displacement_of_growing(d: np.ndarray, v: np.ndarray, radius: np.ndarray, true_radius: np.ndarray) -> np.ndarray:
-    """The same of a ball of two sizes, shape (..., n), from d and v (3, ..., n).
+    """Return the same of a ball of two sizes, shape (..., n), from d and v (3, ..., n).
 
     It is the longest sum of d and a vector to an ellipsoid about the axis: the difference of the radii along the axis,
     and across it the third side of the triangle that they make with theta between them. Of the multiplier that belongs
@@ -234,7 +234,7 @@ def _displacement_of_growing(d: np.ndarray, v: np.ndarray, radius: np.ndarray, t
 
 
 def rms(errors: ArrayLike) -> float:
-    """The root of the mean square over all samples.
+    """Return the root of the mean square over all samples.
 
     Parameters
     ----------

@@ -160,7 +160,7 @@ KEYFRAME_MODES: dict[str, Mode] = {name: mode for name, mode in MODES.items() if
 
 
 def mode_named(name: str) -> Mode:
-    """The mode of a name in `MODES`. Raises ValueError for another, and says which there are, TypeError for no name."""
+    """Return the mode of a name in `MODES`. Raises ValueError for another, and says which there are."""
     if not isinstance(name, str):
         raise TypeError(f"mode is {name!r}: give the name of one, such as 'dq_sclerp'")
     if name not in MODES:
@@ -169,14 +169,14 @@ def mode_named(name: str) -> Mode:
 
 
 def no_such_mode(name: str, modes: Iterable[str]) -> str:
-    """What there is to say of a name that is none of these modes."""
+    """Return what there is to say of a name that is none of these modes."""
     return f"there is no mode {name!r}; the modes are {', '.join(modes)}"
 
 
 def interpolate(
     key_times: ArrayLike, keys: Poses, times: ArrayLike, mode: str = "dq_sclerp", *, extrapolate: bool = False
 ) -> Poses:
-    """The poses at `times` of objects that have the poses `keys` at `key_times`.
+    """Return the poses at `times` of objects that have the poses `keys` at `key_times`.
 
     Parameters
     ----------
@@ -258,7 +258,7 @@ def interpolate(
 def in_betweens(
     key_times: ArrayLike, keys: Poses, counts: ArrayLike, progress: ArrayLike, mode: str = "dq_sclerp"
 ) -> Poses:
-    """The poses of segments that are run through at a timing of their own, such as an easing.
+    """Return the poses of segments that are run through at a timing of their own, such as an easing.
 
     Parameters
     ----------
@@ -349,7 +349,7 @@ def prepare(key_times: ArrayLike, keys: Poses, mode: str = "dq_sclerp") -> Calla
     within = prepare_within(curves_of_mode, key_times, keys)
 
     def poses(counts: ArrayLike, progress: ArrayLike, selected: slice = slice(None)) -> Poses:
-        """The poses (m,) of the selected segments, by how many are wanted of each and how far each of them is."""
+        """Return poses (m,) of the selected segments, by how many are wanted of each and how far each of them is."""
         counts, progress = np.asarray(counts), numbers(progress, "progress")
         if counts.size and (not np.issubdtype(counts.dtype, np.integer) or counts.min() < 0):
             raise ValueError("counts of in-betweens need to be whole numbers from 0 on, one for each segment")
@@ -366,7 +366,7 @@ def prepare(key_times: ArrayLike, keys: Poses, mode: str = "dq_sclerp") -> Calla
 
 
 def _checked(key_times: np.ndarray, keys: Poses) -> Poses:
-    """The keys with unit quaternions, or a ValueError that names the first key that is wrong."""
+    """Return the keys with unit quaternions, or a ValueError that names the first key that is wrong."""
     check_poses(keys, "keys")
     if not keys.shape or keys.shape[-1] == 0:
         raise ValueError("interpolation needs at least one key")

@@ -70,7 +70,7 @@ def multiply_matrices(matrices: np.ndarray, functions: np.ndarray, counts: np.nd
 
 
 def _rounds(counts: np.ndarray) -> Iterator[tuple[int, list[tuple[int, int]]]]:
-    """Counts (S,) as runs of equal ones, (length, count), and how many times such runs come round one after another.
+    """Yield counts (S,) as runs of equal ones, (length, count), and how often such runs come one after another.
 
     Objects that are keyed alike repeat their counts: few large products take the place of many small ones.
     """
@@ -89,7 +89,7 @@ def _rounds(counts: np.ndarray) -> Iterator[tuple[int, list[tuple[int, int]]]]:
 
 
 def combine(coefficients: np.ndarray, functions: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
-    """The same as `multiply_matrices`, from coefficients (k, b, S), the quicker way for these counts."""
+    """Do the same as `multiply_matrices`, from coefficients (k, b, S), the quicker way for these counts."""
     nonempty = np.flatnonzero(counts)
     if len(nonempty) < len(counts):
         coefficients, counts = coefficients[..., nonempty], counts[nonempty]

@@ -191,7 +191,7 @@ class Poses:
         return self.shape[0]
 
     def __iter__(self) -> Iterator[Poses]:
-        """The poses along the first axis: single ones of one object, or those of each of many objects."""
+        """Return the poses along the first axis: single ones of one object, or those of each of many objects."""
         if not self.shape:
             raise TypeError("a single pose, of shape (), has nothing to go through")
         return (self[index] for index in range(len(self)))
@@ -208,7 +208,7 @@ class Poses:
         raise TypeError(f"np.{function.__name__} takes arrays: poses.positions and poses.quaternions are some")
 
     def __getitem__(self, index: Any) -> Poses:
-        """The poses at `index` of the leading axes, by NumPy's rules: `poses[3]`, `poses[mask]`, `poses[..., 1:]`."""
+        """Return the poses at `index` of the leading axes, as in NumPy: `poses[3]`, `poses[mask]`, `poses[..., 1:]`."""
         whole = (*(index if isinstance(index, tuple) else (index,)), slice(None))
         return Poses(
             self.positions[whole], self.quaternions[whole], None if self.scales is None else self.scales[index]
@@ -222,7 +222,7 @@ class Poses:
             self.scales[index] = poses.scales
 
     def copy(self) -> Poses:
-        """The same in arrays of their own."""
+        """Return the same in arrays of their own."""
         return Poses(
             self.positions.copy(), self.quaternions.copy(), None if self.scales is None else self.scales.copy()
         )
@@ -252,7 +252,7 @@ class PackedPoses:
         return _of_rows(self._rows[:, objects])
 
     def blocks(self, most: int) -> Iterator[PackedPoses]:
-        """The same poses (k, ..., n) by ranges of their last axis, so many poses in each. Views: `put` is seen here."""
+        """Yield the same poses (k, ..., n) by ranges of their last axis, so many in each. Views: `put` is seen here."""
         count = self._rows.shape[-1] if self._rows.ndim > 2 else 0
         step = max(1, most // max(1, math.prod(self._rows.shape[1:-1])))
         for first in range(0, count, step) if count > step else ():
@@ -272,7 +272,7 @@ def _of_rows(rows: np.ndarray) -> Poses:
 
 
 def reshaped(poses: Poses, *shape: int) -> Poses:
-    """The same in arrays of these leading axes."""
+    """Return the same in arrays of these leading axes."""
     return Poses(
         poses.positions.reshape(*shape, 3),
         poses.quaternions.reshape(*shape, 4),
@@ -302,7 +302,7 @@ def placed(above: Poses, poses: Poses) -> Poses:
 
 
 def inverse(poses: Poses) -> Poses:
-    """What takes poses (...) back to where they came from."""
+    """Return what takes poses (...) back to where they came from."""
     back = conjugate(poses.quaternions)
     arms = -rotate(back, poses.positions)
     if poses.scales is None:

@@ -61,7 +61,7 @@ def rotate(q: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def matrices(q: np.ndarray) -> np.ndarray:
-    """The rotation matrices (3, 3, ...) of unit quaternions (..., 4), components first."""
+    """Return the rotation matrices (3, 3, ...) of unit quaternions (..., 4), components first."""
     w, x, y, z = components(q)
     xx, yy, zz, xy, yz, xz = x * x, y * y, z * z, x * y, y * z, x * z
     wx, wy, wz = w * x, w * y, w * z
@@ -70,7 +70,7 @@ def matrices(q: np.ndarray) -> np.ndarray:
 
 
 def from_matrices(rotations: np.ndarray) -> np.ndarray:
-    """Unit quaternions (..., 4) of rotation matrices (..., 3, 3), of either sign.
+    """Return unit quaternions (..., 4) of rotation matrices (..., 3, 3), of either sign.
 
     Each of four formulas divides by one component of the quaternion: that of the largest is taken.
     """
@@ -89,7 +89,7 @@ def from_matrices(rotations: np.ndarray) -> np.ndarray:
 
 
 def cross(a: np.ndarray | Sequence[np.ndarray], b: np.ndarray | Sequence[np.ndarray]) -> np.ndarray:
-    """The vector product of vectors (3, ...), components first."""
+    """Return the vector product of vectors (3, ...), components first."""
     product = np.empty((3, *np.broadcast(a[0], b[0]).shape))
     for axis in range(3):
         after, last = (axis + 1) % 3, (axis + 2) % 3
@@ -98,12 +98,12 @@ def cross(a: np.ndarray | Sequence[np.ndarray], b: np.ndarray | Sequence[np.ndar
 
 
 def normalise(q: np.ndarray) -> np.ndarray:
-    """Unit quaternions of the same directions. Every quaternion needs a length above zero."""
+    """Return unit quaternions of the same directions. Every quaternion needs a length above zero."""
     return q / np.linalg.norm(q, axis=-1, keepdims=True)
 
 
 def align_signs(q: np.ndarray) -> np.ndarray:
-    """The same rotations, with signs such that each quaternion is in the hemisphere of the one before.
+    """Return the same rotations, with signs such that each quaternion is in the hemisphere of the one before.
 
     q and -q are one rotation, but an in-between of q and -r runs the long way round. Shape (..., n, 4); the first
     quaternion of each list keeps its sign, and so does one at exactly 180 degrees from its predecessor.
@@ -117,6 +117,6 @@ def align_signs(q: np.ndarray) -> np.ndarray:
 
 
 def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The angle in radians, 0 to pi, of the rotation that takes a to b. Accurate for tiny angles too."""
+    """Return the angle in radians, 0 to pi, of the rotation that takes a to b. Accurate for tiny angles too."""
     difference = multiply(conjugate(a), b)
     return 2.0 * np.arctan2(np.linalg.norm(difference[..., 1:], axis=-1), np.abs(difference[..., 0]))

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from .checks import check_flag, check_radius, check_recording, check_wishes
 from .key_budget import BudgetSearch
-from .key_search import Recording, Search
+from .key_costs import Recording
+from .key_search import Search
 from .modes import mode_named
 from .poses import Poses, numbers
 from .quaternions import align_signs
@@ -28,7 +29,7 @@ def reduce_keys(
     rms: bool = False,
     tries: int = 3,
 ) -> np.ndarray:
-    """The fewest samples that keep the shell error of a mode within a tolerance, or the best ones within a budget.
+    """Return fewest samples that keep the shell error of a mode within a tolerance, or the best ones within a budget.
 
     Parameters
     ----------
@@ -109,6 +110,6 @@ def reduce_keys(
         return np.arange(len(times))
     poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
     recording = Recording(times, poses, mode, radius, tolerance or 1.0)
-    if tolerance is not None:
+    if budget is None:
         return Search(recording, rms=rms).within(tries)
     return BudgetSearch(recording, budget, rms=rms).least(tries)

@@ -161,7 +161,7 @@ def repair(times: ArrayLike, poses: Poses, rate: float | None = None) -> tuple[n
 
 
 def _near(times: np.ndarray) -> np.ndarray:
-    """A mask of rising times without those few at either end that are far from all between."""
+    """Return a mask of rising times without those few at either end that are far from all between."""
     ends = int(MOST_STRAYS * len(times))
     first, last = (times[ends], times[-1 - ends]) if len(times) else (0.0, 0.0)
     reach = FAR * (last - first) if last > first else np.inf
@@ -169,7 +169,7 @@ def _near(times: np.ndarray) -> np.ndarray:
 
 
 def _first(times: np.ndarray, rows: np.ndarray) -> str:
-    """The first time in the rows of a mask, to be read; nothing where there is none."""
+    """Return the first time in the rows of a mask, to be read; nothing where there is none."""
     return f"{times[rows][0]:.6g} s" if rows.any() else ""
 
 
@@ -179,7 +179,7 @@ def _usable(numbers: np.ndarray) -> np.ndarray:
 
 
 def rising(times: np.ndarray) -> np.ndarray:
-    """A mask of the longest part of `times` that never falls: the whole, where the recording is sound."""
+    """Return a mask of the longest part of `times` that never falls: the whole, where the recording is sound."""
     if np.all(np.diff(times) >= 0.0):
         return np.ones(len(times), dtype=bool)
     # Longest non-decreasing subsequence by patience sorting: the smallest last time of each length, and who was before.

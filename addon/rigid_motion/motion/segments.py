@@ -98,7 +98,7 @@ class Segments:
 
     @classmethod
     def between(cls, key_times: np.ndarray, keys: Poses, wanted: slice = slice(None)) -> Segments:
-        """The n - 1 segments of each object: times of shape (..., n), keys of shape (..., n), signs aligned."""
+        """Return the n - 1 segments of each object: times of shape (..., n), keys of shape (..., n), signs aligned."""
         rates, scales = 2.0 / (key_times[..., 1:] - key_times[..., :-1]), keys.scales
         positions, quaternions = _ends(keys.positions), _ends(keys.quaternions)
         shape = positions[0][0, ..., wanted].shape
@@ -149,7 +149,7 @@ class Segments:
         return rows
 
     def decompose(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The chord's part along the axis n, its part across, and n x D, each of shape (3, S).
+        """Return the chord's part along the axis n, its part across, and n x D, each of shape (3, S).
 
         Where nothing turns there is no axis: n is zero, and the whole chord is across.
         """
@@ -273,7 +273,7 @@ def prepare_within(
     *,
     is_aligned: bool = False,
 ) -> Within:
-    """What makes poses between keys where each segment says how many there are in it, and each how far it has come.
+    """Return what makes poses between keys where each segment says how many are in it, and each how far it is.
 
     `key_times` and keys are (..., n), at least two a row and with unit quaternions; of each row, the `wanted` segments
     are counted throughout. Progress is 0 at a segment's first key and 1 at its second, and may pass both. Where
@@ -320,7 +320,7 @@ def _evaluate(
 
 
 def _filler(mode: Curves, reach: float) -> Fill:
-    """What a mode's curves are, worked out for every sample, where no |s| is larger than `reach`."""
+    """Return what a mode's curves are, worked out for every sample, where no |s| is larger than `reach`."""
 
     def fill(segment: slice, s: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
         parameters = np.repeat(mode.parameters[:, segment], counts, axis=1)

@@ -26,12 +26,12 @@ _POWERS = np.stack([np.pad(cheb2poly(np.eye(TERMS)[n, : n + 1]), (0, TERMS - 1 -
 
 
 def moments(pieces: int) -> np.ndarray:
-    """The nodes of so many equal pieces of -1 to 1, one piece after the other, shape (pieces * TERMS,)."""
+    """Return the nodes of so many equal pieces of -1 to 1, one piece after the other, shape (pieces * TERMS,)."""
     return ((2.0 * np.arange(pieces)[:, None] + 1.0 + NODES) / pieces - 1.0).ravel()
 
 
 def fit(values: np.ndarray) -> np.ndarray:
-    """The coefficients (pieces, k, TERMS) of k functions with these values (k, pieces * TERMS) at the nodes."""
+    """Return the coefficients (pieces, k, TERMS) of k functions with these values (k, pieces * TERMS) at the nodes."""
     # In two steps, not by one matrix: large powers have large coefficients of nearly opposite size, and only between
     # the two steps are those of the high polynomials small.
     # A product for each function, so that BLAS does not share it among threads: on a busy machine it waits for them far
@@ -41,7 +41,7 @@ def fit(values: np.ndarray) -> np.ndarray:
 
 
 def powers(s: np.ndarray) -> np.ndarray:
-    """What `fit`'s coefficients are to be multiplied by at s (n,), shape (TERMS, n)."""
+    """Return what `fit`'s coefficients are to be multiplied by at s (n,), shape (TERMS, n)."""
     rows = np.empty((TERMS, s.size))
     rows[0], rows[1] = 1.0, s
     for power in range(2, TERMS):

@@ -67,8 +67,8 @@ class Channels:
         """The joints that two nodes stand for: a joint's own number turns, and the others come behind all joints."""
 
     def budget(self, budget: int) -> int:
-        """What a budget of keys leaves for nodes, or a ValueError where that is too little for what may move."""
-        free, apart = np.count_nonzero(self.whole.free), len(self.apart)
+        """Return what a budget of keys leaves for nodes, or a ValueError where that is too little for what may move."""
+        free, apart = int(np.count_nonzero(self.whole.free)), len(self.apart)
         moving = np.count_nonzero(self.turns & self.whole.free) + np.count_nonzero(self.moves & self.whole.free)
         if budget < 2 * free + moving:
             raise ValueError(
@@ -109,11 +109,11 @@ class Channels:
         )
 
     def of_nodes(self, keys: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
-        """The keys of joints as those of nodes."""
+        """Return the keys of joints as those of nodes."""
         return (*keys, *(keys[joint] for joint in self.apart.tolist()))
 
     def of_joints(self, keys: tuple[np.ndarray, ...]) -> tuple[SeparateKeys, ...]:
-        """The keys of nodes as those of channels."""
+        """Return the keys of nodes as those of channels."""
         rotations = list(keys[: len(self.whole.skeleton)])
         locations = list(rotations)
         for node, joint in enumerate(self.apart.tolist(), len(rotations)):
@@ -131,7 +131,7 @@ def changes(rows: np.ndarray) -> np.ndarray:
 
 
 def check_separable(mode: str, poses: Poses) -> None:
-    """A ValueError where channels of joints (joints, n) cannot have keys of their own, or there are more than two."""
+    """Raise a ValueError where channels of joints (joints, n) cannot have keys of their own, or are more than two."""
     if not MODES[mode].is_separable:
         names = ", ".join(name for name, row in MODES.items() if row.is_separable)
         raise ValueError(

@@ -91,7 +91,7 @@ class _Carried:
         self.rows = np.stack(rows if there.scales is None else [*rows, there.scales, wanted.scales])
 
     def largest_errors(self, moments: np.ndarray, motions: np.ndarray) -> np.ndarray:
-        """The largest error of any of them at moments (m,), each moved on by a motion (.., m), shape (m,)."""
+        """Return the largest error of any of them at moments (m,), each moved on by a motion (.., m), shape (m,)."""
         found, step = np.empty(len(moments)), max(1, AT_ONCE // len(self.radii))
         for first in range(0, len(moments), step):
             some = slice(first, first + step)
@@ -102,7 +102,7 @@ class _Carried:
 
 
 def _errors(motions: np.ndarray, rows: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """The shell errors (j, m) of balls (.., j, m) as `_Carried` has them, all moved on by motions (.., 1, m)."""
+    """Return the shell errors (j, m) of balls (.., j, m) as `_Carried` has them, all moved on by motions (.., 1, m)."""
     turn, positions, quaternions = motions[:9], motions[9:12], motions[12:16]
     there, wanted, turned = rows[:3], rows[3:6], rows[6:10]
     d = turn[0::3] * there[0]

@@ -29,7 +29,7 @@ def skeleton_errors(
     parts: int = 8,
     stored: Poses | None = None,
 ) -> np.ndarray:
-    """The largest shell error of each joint in the root's space from each sample to the next, between them as well.
+    """Return largest shell error of each joint in the root's space from each sample to the next, between them as well.
 
     Parameters
     ----------
@@ -101,13 +101,12 @@ def skeleton_errors(
     if radii.shape not in ((), (len(skeleton),)):
         raise ValueError(f"radius of shape {radii.shape}: give one number, or one for each of {len(skeleton)} joints")
     radii, count, found = np.broadcast_to(radii, len(skeleton))[:, None], len(times), np.zeros(poses.shape)
-    separate = any(isinstance(own, SeparateKeys) for own in keys)
-    if separate:
+    if any(isinstance(own, SeparateKeys) for own in keys):
         check_separable(mode, poses)
     if not count:
         return found
     channels = [
-        tuple(_samples(some, count) for some in own) if separate else (_samples(own, count),) * 2 for own in keys
+        tuple(_samples(some, count) for some in (own if isinstance(own, SeparateKeys) else (own, own))) for own in keys
     ]
     step, last = max(1, AT_ONCE // (parts * len(skeleton))), count - 1
     for first in range(0, max(last, 1), step):

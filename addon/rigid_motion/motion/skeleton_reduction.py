@@ -66,7 +66,7 @@ def reduce_skeleton_keys(
     stretch: int | None = None,
     run: Run = map,
 ) -> tuple[np.ndarray, ...] | tuple[SeparateKeys, ...]:
-    """The fewest keys of a body's joints that keep every joint within a tolerance, or the best ones within a budget.
+    """Return fewest keys of a body's joints that keep every joint within a tolerance, or the best ones within a budget.
 
     Parameters
     ----------
@@ -169,12 +169,12 @@ def reduce_skeleton_keys(
     if stretch is not None:
         _check_stretch(stretch, mode, shared, tolerance)
     if not shared and len(times) > 1 and skeleton.depths.max() > DEEPEST:
-        joint = int(skeleton.depths.argmax())
+        joint = int(np.argmax(skeleton.depths))
         raise ValueError(
             f"joint {joint} hangs on {skeleton.depths[joint]} others, and keys of their own are searched for where it "
             f"is {DEEPEST} at most: shared=True finds key poses for longer chains"
         )
-    if stretch is not None and len(times) > stretch + 1:
+    if stretch is not None and tolerance is not None and len(times) > stretch + 1:
         recording = LongRecording(times, skeleton, mode, radii, weights, free, lambda some: poses[:, some])
         return keys_in_stretches(recording, tolerance, separate, stretches(len(times), stretch), run)
     poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
@@ -185,19 +185,22 @@ def reduce_skeleton_keys(
     elif budget is not None and not shared and budget < 2 * np.count_nonzero(free):
         raise ValueError(f"a budget of {budget} keys is too small for {np.count_nonzero(free)} joints: each may need 2")
     if len(times) <= 1:
-        keys = (np.arange(len(times)),) * len(skeleton)
-        return tuple(SeparateKeys(own, own) for own in keys) if separate else keys
-    if shared:
-        keys = _key_poses(body, tolerance, budget, tries)
         every = np.arange(len(times))
-        return tuple(keys if moves else every for moves in free.tolist())
+        return (SeparateKeys(every, every),) * len(skeleton) if separate else (every,) * len(skeleton)
+    if shared:
+        key_poses, every = _key_poses(body, tolerance, budget, tries), np.arange(len(times))
+        return tuple(key_poses if moves else every for moves in free.tolist())
     search = functools.partial(OwnKeys, body) if channels is None else functools.partial(ChannelKeys, channels)
-    keys = search(tolerance).found() if tolerance is not None else _own_keys_within(search, budget)
+    if tolerance is not None:
+        keys = search(tolerance).found()
+    else:
+        assert budget is not None  # one of them is there
+        keys = _own_keys_within(search, budget)
     return keys if channels is None else channels.of_joints(keys)
 
 
 def _check_stretch(stretch: int, mode: str, shared: bool, tolerance: float | None) -> None:
-    """A TypeError where a stretch is no number of samples, a ValueError where there can be none."""
+    """Raise a TypeError where a stretch is no number of samples, a ValueError where there can be none."""
     if whole_number(stretch, "stretch") < SHORTEST_STRETCH:
         raise ValueError(f"a stretch of {stretch} samples is too short: give {SHORTEST_STRETCH} or more")
     if shared or tolerance is None:
@@ -213,11 +216,11 @@ def _key_poses(body: Body, tolerance: float | None, budget: int | None, tries: i
     if len(body.times) <= 2:
         return np.arange(len(body.times))
     recording = _WholeBody(body, tolerance or 1.0)
-    return Search(recording).within(tries) if tolerance is not None else BudgetSearch(recording, budget).least(tries)
+    return Search(recording).within(tries) if budget is None else BudgetSearch(recording, budget).least(tries)
 
 
 def _own_keys_within(search_for: Callable[[float], OwnKeys], budget: int) -> tuple[np.ndarray, ...]:
-    """The keys with the smallest error among those of several tolerances that so many can keep to, and what is left."""
+    """Return the keys with the smallest error among those of several tolerances that a budget can keep to."""
     best = search_for(math.inf)
     body = best.body
     free = np.flatnonzero(body.free).tolist()
@@ -242,7 +245,7 @@ def _own_keys_within(search_for: Callable[[float], OwnKeys], budget: int) -> tup
 
 
 def _between(low: tuple[float, float] | None, high: tuple[float, float], count: float) -> float:
-    """The logarithm of the tolerance to try next for the logarithm of a count of keys.
+    """Return the logarithm of the tolerance to try next for the logarithm of a count of keys.
 
     It is where a straight line between a tolerance that is too low and one that is not has it, and never near its ends:
     counts are no smooth function of tolerances.
@@ -281,7 +284,7 @@ def _mask(fixed: ArrayLike | None, joints: int) -> np.ndarray:
 
 
 def _one_for_each(given: ArrayLike, name: str, *shapes: tuple[int, ...]) -> np.ndarray:
-    """A number for each joint or sample, or one for all: no damage and not below zero."""
+    """Return a number for each joint or sample, or one for all: no damage and not below zero."""
     given = numbers(given, f"{name}s")
     if given.shape not in ((), *shapes):
         wanted = " or ".join(map(str, shapes))

@@ -77,10 +77,10 @@ def stretches(samples: int, stretch: int) -> list[slice]:
 def keys_in_stretches(
     recording: LongRecording, tolerance: float, separate: bool, bounds: list[slice], run: Run
 ) -> tuple[np.ndarray, ...] | tuple[SeparateKeys, ...]:
-    """The keys of all joints, or of their channels: all that moves has keys where the stretches meet."""
+    """Return the keys of all joints, or of their channels: all that moves has keys where the stretches meet."""
     rests, still = _rests(recording, bounds, tolerance, separate, run)
     tasks = ((recording.part(some), tolerance, separate, rests < 0, still) for some in bounds)
-    moved = [[] for _ in rests.flat]
+    moved: list[list[np.ndarray]] = [[] for _ in rests.flat]
     for some, found in zip(bounds, run(_keys, tasks), strict=True):
         for channel, keys in zip(moved, found, strict=True):
             # The first key of a stretch is the last one of the stretch before.
@@ -94,28 +94,26 @@ def keys_in_stretches(
 def _rests(
     recording: LongRecording, bounds: list[slice], tolerance: float, separate: bool, run: Run
 ) -> tuple[np.ndarray, Poses]:
-    """The sample that each joint, or each of its channels, may stay at, and the poses of joints there (joints,).
+    """Return the sample that each joint, or each of its channels, may stay at, and the poses of joints there (joints,).
 
     Samples are of shape (joints, channels), -1 where one has to move. By the triangle inequality all of them together
     are not off by more than their part of the tolerance.
     """
     skeleton, joints = recording.skeleton, np.arange(len(recording.skeleton))
-    reaches, samples, poses, grows = zip(*run(_survey, map(recording.part, bounds)), strict=True)
+    reached, nearest, poses, grows = zip(*run(_survey, map(recording.part, bounds)), strict=True)
     # Of the middles of stretches that in the middle.
     candidates = _joined(poses)
     middles = replace(recording.part(slice(0, len(bounds))), poses=candidates).body.middles
     still = candidates[joints, middles]
-    reaches, samples = (
-        np.max(reaches, axis=0),
-        np.array([some.start for some in bounds])[middles] + np.array(samples)[middles, joints],
-    )
+    reaches = np.max(reached, axis=0)
+    samples = np.array([some.start for some in bounds])[middles] + np.array(nearest)[middles, joints]
     errors = np.max([*run(_farthest, ((recording.part(some), separate, reaches, still) for some in bounds))], axis=0)
     chains = skeleton.longest_chains(np.count_nonzero(errors > 0.0, axis=1) * recording.free)
     weights = skeleton.most_below(recording.weights.max(axis=1))
     allowed = AT_REST * tolerance / np.maximum(chains, 1) / np.maximum(weights, TINY)
-    if still.scales is not None:
-        above = skeleton.in_root_space(still).scales[skeleton.parents]
-        allowed /= np.where(skeleton.parents < 0, 1.0, above)
+    scales = skeleton.in_root_space(still).scales
+    if scales is not None and candidates.scales is not None:
+        allowed /= np.where(skeleton.parents < 0, 1.0, scales[skeleton.parents])
         allowed *= not (np.any(grows) or changes(candidates.scales).any())
     allowed[~recording.free] = 0.0 if separate else -1.0
     return np.where(errors <= allowed[:, None], samples[:, None], -1), still
@@ -153,7 +151,7 @@ def _channels(poses: Poses, separate: bool) -> tuple[Poses, ...]:
 
 
 def _keys(task: tuple[Stretch, float, bool, np.ndarray, Poses]) -> list[np.ndarray]:
-    """The keys of each channel of a stretch, of which some move (joints, channels) and others are still (joints,)."""
+    """Return the keys of each channel of a stretch; some move (joints, channels), others are still (joints,)."""
     part, tolerance, separate, moves, still = task
     recorded, ends = part.body, np.array((0, len(part.times) - 1))
     turns, advances = moves[:, 0], moves[:, -1]
@@ -162,7 +160,8 @@ def _keys(task: tuple[Stretch, float, bool, np.ndarray, Poses]) -> list[np.ndarr
     body = recorded.with_poses(Poses(positions, quaternions, recorded.poses.scales))
     if separate:
         channels = Channels(body, turns, advances)
-        keys = [own for joint in channels.of_joints(ChannelKeys(channels, tolerance, False).found()) for own in joint]
+        of_joints = channels.of_joints(ChannelKeys(channels, tolerance, False).found())
+        keys = tuple(own for joint in of_joints for own in joint)
     else:
         keys = OwnKeys(body, tolerance, False).found()
     # What is still here may move elsewhere.

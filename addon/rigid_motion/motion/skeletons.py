@@ -85,7 +85,7 @@ class Skeleton:
         if np.all(above < 0):
             return depths
         # So far up there is nothing but the circle.
-        raise ValueError(f"joint {int(above[above >= 0].min())} hangs on itself, through its parents")
+        raise ValueError(f"joint {np.min(above[above >= 0])} hangs on itself, through its parents")
 
     @cached_property
     def levels(self) -> list[np.ndarray]:

@@ -19,7 +19,7 @@ SMALLEST = 1e-200
 
 
 def exponential(twists: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The motions (n) of twists (6, n): unit quaternions (4, n) and translations (3, n)."""
+    """Return the motions (n) of twists (6, n): unit quaternions (4, n) and translations (3, n)."""
     turn, advance = twists[:3], twists[3:]
     squared = np.einsum("kn,kn->n", turn, turn)
     np.maximum(squared, SMALLEST, out=squared)
@@ -38,7 +38,7 @@ def exponential(twists: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def logarithm(quaternions: np.ndarray, translations: np.ndarray, *, shortest: bool = True) -> np.ndarray:
-    """The twists (6, n) of motions: unit quaternions (4, n) and translations (3, n).
+    """Return the twists (6, n) of motions: unit quaternions (4, n) and translations (3, n).
 
     They turn by the shorter way, or else by that which the sign of the quaternion says: more than half a turn where its
     first component is negative.
@@ -63,6 +63,6 @@ def between(
     *,
     shortest: bool = True,
 ) -> np.ndarray:
-    """The twists (6, n) from poses to others in a unit of time: positions (n, 3), quaternions (n, 4)."""
+    """Return the twists (6, n) from poses to others in a unit of time: positions (n, 3), quaternions (n, 4)."""
     back = conjugate(first)
     return logarithm(multiply(back, second).T, rotate(back, second_positions - first_positions).T, shortest=shortest)

@@ -74,7 +74,7 @@ class Body:
 
     @classmethod
     def rigid(cls, name: str, pose: Poses | None = None, radius: float = RADIUS) -> Body:
-        """A single rigid body, at rest at `pose` (1,), or in the middle of everything."""
+        """Return a single rigid body, at rest at `pose` (1,), or in the middle of everything."""
         return cls(name, (name,), np.array([-1]), pose or Poses([[0.0, 0.0, 0.0]], [[1.0, 0.0, 0.0, 0.0]]), radius)
 
 
@@ -106,11 +106,11 @@ class Forest:
         return len(self.parents)
 
     def joined(self, poses: Mapping[str, Poses]) -> Poses:
-        """The poses of all joints (joints,), of those of each body by its name."""
+        """Return the poses of all joints (joints,), of those of each body by its name."""
         return joined([poses[body.name] for body in self.bodies])
 
     def parted(self, poses: Poses) -> dict[str, Poses]:
-        """The poses of each body by its name, of those of all joints (joints, ...)."""
+        """Return the poses of each body by its name, of those of all joints (joints, ...)."""
         return {name: poses[joints] for name, joints in self.slices.items()}
 
     @cached_property

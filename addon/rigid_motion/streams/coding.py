@@ -31,7 +31,7 @@ class Encoder:
         """By how many bytes."""
 
     def write(self, symbol: int, table: Sequence[int]) -> None:
-        """A symbol, of a table of cumulative frequencies."""
+        """Write a symbol, of a table of cumulative frequencies."""
         part = self._size >> BITS
         self._low += part * table[symbol]
         self._size = part * (table[symbol + 1] - table[symbol])
@@ -41,7 +41,7 @@ class Encoder:
             self._shifted += 1
 
     def write_flat(self, value: int, count: int) -> None:
-        """A number below a count of at most 2^20, all of them as likely."""
+        """Write a number below a count of at most 2^20, all of them as likely."""
         part = self._size // count
         self._low += part * value
         self._size = part
@@ -51,7 +51,7 @@ class Encoder:
             self._shifted += 1
 
     def finish(self) -> bytes:
-        """The shortest bytes that are read as what was written: what is behind their end counts as zeros."""
+        """Return the shortest bytes that are read as what was written: what is behind their end counts as zeros."""
         length = self._shifted + 4
         for kept in range(length + 1):
             free = 8 * (length - kept)
@@ -71,7 +71,7 @@ class Decoder:
         """How far what was written is above the lower end of the interval."""
 
     def read(self, table: Sequence[int]) -> int:
-        """A symbol, of a table of cumulative frequencies."""
+        """Return a symbol, of a table of cumulative frequencies."""
         part = self._size >> BITS
         # Only bytes that no encoder wrote are beyond the last part.
         self._value = min(self._value, (part << BITS) - 1)
@@ -82,7 +82,7 @@ class Decoder:
         return symbol
 
     def read_flat(self, count: int) -> int:
-        """A number below a count, all of them as likely."""
+        """Return a number below a count, all of them as likely."""
         part = self._size // count
         self._value = min(self._value, part * count - 1)
         value = self._value // part

@@ -94,7 +94,7 @@ class Fitting:
         return shell_error(self.skeleton.in_root_space(shown), truth, self.radii[:, None])
 
     def fitted(self, task: Task) -> Fitted:
-        """The message for a task."""
+        """Return the message for a task."""
         truth = self.skeleton.in_root_space(task.samples.at(task.moments))
         knots: list[float] = []
         for finer in range(FINEST + 1):
@@ -110,7 +110,7 @@ class Fitting:
         return found
 
     def _near(self, task: Task, truth: Poses, knots: list[float], finer: int) -> Fitted:
-        """The numbers nearest to the truth, with knots and, where that is not enough, with more of them."""
+        """Return the numbers nearest to the truth, with knots and, where that is not enough, with more of them."""
         found = Fitted(finer, moments=knots)
         window = Window(self.scale, task.state, task.kind, task.start, task.end, finer)
         found.numbers.append(window.fit(_at(task.samples, task.end)))
@@ -130,7 +130,7 @@ class Fitting:
             found.numbers.append(window.fit(_at(task.samples, nearest), window.insert(nearest)))
 
     def _said(self, task: Task, truth: Poses, like: Fitted, numbers: np.ndarray) -> Fitted:
-        """A message with the knots of another, and other numbers (knots, groups, 3)."""
+        """Return a message with the knots of another, and other numbers (knots, groups, 3)."""
         said = Fitted(like.finer, like.moments, list(numbers))
         window = Window(self.scale, task.state, task.kind, task.start, task.end, like.finer)
         window.say(numbers[0])
@@ -150,7 +150,8 @@ class Fitting:
         return errors
 
     def _smaller(self, task: Task, truth: Poses, found: Fitted, most: np.ndarray) -> Fitted:
-        """A message with smaller numbers, with which no joint is off by more than `most` (n,)."""
+        """Return a message with smaller numbers, with which no joint is off by more than `most` (n,)."""
+        assert found.path is not None
         there = self.skeleton.in_root_space(found.path.at(task.moments))
         places, d = (_apart(part) for part in (there.positions, there.positions - truth.positions))
         turn = multiply(there.quaternions, conjugate(truth.quaternions))
@@ -171,7 +172,7 @@ class Fitting:
         return self._said(task, truth, found, numbers)
 
     def _does(self, group: int, places: np.ndarray, axes: np.ndarray, hat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What one step of each number of a group does to what hangs on its joint.
+        """Return what one step of each number of a group does to what hangs on its joint.
 
         Returns
         -------
@@ -241,7 +242,7 @@ def _hat(support: tuple[float, float, float], moments: np.ndarray, end: float, l
 
 
 def _at(samples: Path, moment: float) -> Poses:
-    """The poses (joints,) of a moment."""
+    """Return the poses (joints,) of a moment."""
     return transposed(samples.at(np.array([moment])))[0]
 
 

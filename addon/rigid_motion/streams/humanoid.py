@@ -82,7 +82,7 @@ _MECHANISM = ("def", "org", "mch", "vis", "wgt")
 
 
 def _plain(name: str) -> tuple[str, str]:
-    """A name in lower case without its namespace and side; and the side, L, R or nothing."""
+    """Return a name in lower case without its namespace and side; and the side, L, R or nothing."""
     name = name.rpartition(":")[2]
     for side in ("Left", "Right"):
         if side.lower() in name.lower():
@@ -139,7 +139,8 @@ def humanoid_bones(joints: Sequence[str]) -> dict[str, int]:
 
 def matched(sources: Sequence[str], targets: Sequence[str]) -> dict[str, str]:
     """Which target each source moves: of the same skeleton that of its name. Otherwise that which is the same humanoid
-    bone; or else of the same name, or the same but for case, namespace and how sides are written."""
+    bone; or else of the same name, or the same but for case, namespace and how sides are written.
+    """
     if set(sources) <= set(targets):
         return {name: name for name in sources}
     ours, theirs = humanoid_bones(sources), humanoid_bones(targets)
@@ -156,7 +157,7 @@ def matched(sources: Sequence[str], targets: Sequence[str]) -> dict[str, str]:
 
 
 def shortest_turns(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """The shortest rotations (..., 4) that turn directions (..., 3) to others; none where either has no length."""
+    """Return shortest rotations (..., 4) that turn directions (..., 3) to others; none where either has no length."""
     lengths = np.linalg.norm(first, axis=-1) * np.linalg.norm(second, axis=-1)
     w = lengths + np.einsum("...i,...i->...", first, second)
     turns = np.concatenate((w[..., None], np.cross(first, second)), axis=-1)
@@ -221,7 +222,7 @@ class Retargeting:
         self.scale = float(np.median(arms[1][both] / arms[0][both])) if both.any() else 1.0
         if legs:
             # Then feet are on the same ground.
-            self.scale = float(arms[1][legs].sum() / arms[0][legs].sum())
+            self.scale = float(np.sum(arms[1][legs]) / np.sum(arms[0][legs]))
         hips = [row for bone, row in bones.items() if bone.endswith("UpperLeg")]
         aligned = alignments(bones, target.positions, source.positions) if self.has_places else {}
         turns = target.quaternions.copy()
@@ -234,13 +235,14 @@ class Retargeting:
         for pair in np.flatnonzero(sliding):
             children = np.flatnonzero(parents == pair)
             if len(children):
-                children = [child for child in children if child in hips] or children
+                of_hips = [child for child in children.tolist() if child in hips]
+                children = np.array(of_hips) if of_hips else children
                 theirs = (source.positions[children] - source.positions[pair]).mean(axis=0)
                 ours = (target.positions[children] - target.positions[pair]).mean(axis=0)
                 self._beside[pair] = rotate(conjugate(source.quaternions[pair]), self.scale * theirs - ours)
 
     def __call__(self, poses: Poses) -> Poses:
-        """The poses (pairs, ...) of the target of those of the source (joints, ...)."""
+        """Return the poses (pairs, ...) of the target of those of the source (joints, ...)."""
         poses = poses[self.sources]
         extra = (slice(None), *(None,) * (poses.quaternions.ndim - 2))
         positions = self.scale * poses.positions + rotate(poses.quaternions, self._beside[extra])

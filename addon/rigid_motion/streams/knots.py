@@ -51,7 +51,7 @@ class Scale:
         return slides, turns
 
     def rounded(self, slides: np.ndarray, turns: np.ndarray, factor: float) -> np.ndarray:
-        """The whole numbers (groups, 3) nearest to slides and rotation vectors (joints, 3)."""
+        """Return the whole numbers (groups, 3) nearest to slides and rotation vectors (joints, 3)."""
         numbers = np.zeros((len(self.walk), 3), dtype=np.int64)
         numbers[self.slides] = np.rint(slides[self.sliding] / (self.slide_step * factor))
         numbers[self.turns] = np.rint(turns[self.turning] / (self.turn_steps * factor)[:, None])
@@ -87,7 +87,7 @@ class State:
         return NEAR if back == 1 else FAR
 
     def at(self, moments: np.ndarray, kind: int) -> Poses:
-        """What the motion would do at moments (n,) if nothing new came, shape (n, joints)."""
+        """Return what the motion would do at moments (n,) if nothing new came, shape (n, joints)."""
         if kind in (NEAR, FAR):
             return transposed(self.path.at(moments))
         rows = np.full(len(moments), -1)

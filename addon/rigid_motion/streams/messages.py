@@ -39,13 +39,15 @@ class Codec:
         self.scale, self.terms = scale, terms
 
     def write(self, said: Said, kind: int, state: State, is_late: bool) -> tuple[bytes, tuple[int, ...]]:
-        """The payload, and what the next message remembers."""
+        """Return the payload, and what the next message remembers."""
         coder = Writing(TABLES)
-        _, memory = self.through(coder, said, kind, state, is_late)
+        through = self.through(coder, said, kind, state, is_late)
+        assert through is not None  # what is written can be read
+        _, memory = through
         return coder.encoder.finish(), memory
 
     def read(self, payload: bytes, kind: int, state: State, is_late: bool) -> tuple[Said, tuple[int, ...]] | None:
-        """What a payload says, and what the next message remembers; None for what nobody can have written."""
+        """Return what a payload says, and what the next message remembers; None for what nobody can have written."""
         return self.through(Reading(payload, TABLES), Said(0, [], []), kind, state, is_late)
 
     def through(
@@ -67,7 +69,7 @@ class Codec:
         return Said(finer, cells, groups, late), tuple(memory)
 
     def window(self, said: Said, state: State, kind: int, end: int) -> Window | None:
-        """The window of a message that ends at some ticks; None where that is nowhere."""
+        """Return the window of a message that ends at some ticks; None where that is nowhere."""
         terms = self.terms
         window = Window(self.scale, state, kind, (end + said.late - terms.delay) / TICKS, end / TICKS, said.finer)
         numbers = np.array(said.groups, dtype=np.float64)

@@ -36,7 +36,7 @@ class Message(NamedTuple):
 
 
 def write_message(address: str, *arguments: float | str) -> bytes:
-    """A message of strings, whole numbers, and floats in single precision."""
+    """Return a message of strings, whole numbers, and floats in single precision."""
     tags, data = ",", b""
     for argument in arguments:
         if isinstance(argument, str):
@@ -121,10 +121,10 @@ def _message(data: bytes) -> Message:
 def _parts(tags: str) -> list[str | struct.Struct]:
     """Types one by one, but for numbers, which are read together where they are side by side."""
     runs = re.findall(f"[{''.join(NUMBERS)}]+|.", tags, re.DOTALL)
-    return [struct.Struct(">" + "".join(map(NUMBERS.get, run))) if run[0] in NUMBERS else run for run in runs]
+    return [struct.Struct(">" + "".join(NUMBERS[kind] for kind in run)) if run[0] in NUMBERS else run for run in runs]
 
 
 def _string(data: bytes, at: int) -> tuple[str, int]:
-    """A text, and where what follows begins."""
+    """Return a text, and where what follows begins."""
     end = data.index(b"\0", at)
     return data[at:end].decode(), end + 4 - end % 4

@@ -27,7 +27,7 @@ def carried(after: np.ndarray | float) -> np.ndarray | float:
 
 
 def turned(quaternions: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Unit quaternions (..., 4) turned by rotation vectors (..., 3) in their own axes."""
+    """Return unit quaternions (..., 4) turned by rotation vectors (..., 3) in their own axes."""
     half = 0.5 * np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
     share = 0.5 * np.sinc(half / np.pi)
     turns = np.concatenate((np.cos(half)[..., None], share[..., None] * vectors), axis=-1)
@@ -35,7 +35,7 @@ def turned(quaternions: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 
 
 def turns_between(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """The shortest rotation vectors (..., 3) from unit quaternions (..., 4) to others, in the axes of the first."""
+    """Return shortest rotation vectors (..., 3) from unit quaternions (..., 4) to others, in the axes of the first."""
     turns = multiply(conjugate(first), second)
     w = turns[..., 0]
     sine = np.sqrt(np.einsum("...i,...i->...", turns[..., 1:], turns[..., 1:]))
@@ -68,7 +68,7 @@ class Path:
     """Angular velocities at the last knot, shape (joints, 3)."""
 
     def at(self, moments: np.ndarray) -> Poses:
-        """The poses at moments (n,), shape (joints, n). Before the first knot those of the first."""
+        """Return the poses at moments (n,), shape (joints, n). Before the first knot those of the first."""
         moments = np.asarray(moments, dtype=np.float64)
         last = len(self.moments) - 1
         before = np.clip(np.searchsorted(self.moments, moments, side="right") - 1, 0, last)
@@ -83,7 +83,7 @@ class Path:
         return Poses(positions.swapaxes(0, 1), turned(first, vectors).swapaxes(0, 1))
 
     def followed(self, other: Path, lost: int = 0) -> Path:
-        """This path until the start of another, and from there straight to the knots of that.
+        """Return this path until the start of another, and from there straight to the knots of that.
 
         Where as many windows between them are lost, the motion went on as it was going until the first of these, and
         what it did then is not known: it goes straight from there.
@@ -101,11 +101,11 @@ class Path:
         )
 
     def since(self, moment: float) -> Path:
-        """The same without knots that nothing from this moment on depends on."""
+        """Return the same without knots that nothing from this moment on depends on."""
         kept = max(int(np.searchsorted(self.moments, moment, side="right")) - 1, 0)
         return Path(self.moments[kept:], self.positions[kept:], self.quaternions[kept:], self.velocities, self.spins)
 
 
 def speeds(span: float, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The velocities and angular velocities (joints, 3) from a knot to the next, so much later, of arrays of two."""
+    """Return velocities and angular velocities (joints, 3) from a knot to the next, so much later, of arrays of two."""
     return (positions[1] - positions[0]) / span, turns_between(quaternions[0], quaternions[1]) / span

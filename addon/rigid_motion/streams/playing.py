@@ -85,7 +85,7 @@ class Playing:
         self._heard, self._unsure = arrival, False
 
     def moment(self, now: float) -> float | None:
-        """The moment to be shown now; None before anything came."""
+        """Return the moment to be shown now; None before anything came."""
         if self.longest is None:
             return None
         wanted = now - self.longest - self.delay

@@ -131,7 +131,7 @@ class Receiver:
             self._begin(stream, read, arrival)
 
     def show(self, now: float) -> dict[Stream, Shown]:
-        """What every stream shows."""
+        """Return what every stream shows."""
         self._forget_silent(now)
         shown = {stream: playback.show(now) for stream, playback in self._streams.items()}
         return {stream: what for stream, what in shown.items() if what is not None}
@@ -147,7 +147,7 @@ class Receiver:
         return playback.due(moment) if playback else np.inf
 
     def body(self, stream: Stream, name: str) -> Body | None:
-        """A body of a stream, with its names, parents and rest poses."""
+        """Return a body of a stream, with its names, parents and rest poses."""
         playback = self._streams.get(stream)
         return next((body for body in playback.forest.bodies if body.name == name), None) if playback else None
 
@@ -157,9 +157,10 @@ class Receiver:
         return playback.forest.bodies if playback else ()
 
     def answers(self) -> list[tuple[Hashable, bytes]]:
-        """What came since the last call, to be sent to where it came from."""
+        """Return what came since the last call, to be sent to where it came from."""
         entries: dict[Hashable, list[Entry]] = {}
-        for stream, known in [*self._streams.items(), *self._begun.items()]:
+        streams: list[tuple[Stream, _Playback | _Begun]] = [*self._streams.items(), *self._begun.items()]
+        for stream, known in streams:
             if known.unanswered:
                 known.unanswered = False
                 entries.setdefault(stream.source, []).append(known.entry(stream.identity))
@@ -170,7 +171,7 @@ class Receiver:
         ]
 
     def keys(self) -> list[Keys]:
-        """The knots that came since the last call and are not going to change any more."""
+        """Return the knots that came since the last call and are not going to change any more."""
         found = [playback.keys(stream) for stream, playback in self._streams.items()]
         return [keys for keys in found if len(keys.moments)]
 
@@ -188,10 +189,11 @@ class Receiver:
             begun.pieces = []
         begun.pieces = begun.pieces or [None] * read.pieces
         begun.pieces[read.number] = read.data
-        if None in begun.pieces:
+        known = [piece for piece in begun.pieces if piece is not None]
+        if len(known) < read.pieces:
             return
         del self._begun[stream]
-        described = read_description(b"".join(begun.pieces))
+        described = read_description(b"".join(known))
         if described is None or not self._room_for(stream, described[0], arrival):
             self.refused += 1
             return
@@ -272,8 +274,8 @@ class _Playback:
         end = expanded(motion.ticks, self._ticks + elapsed)
         kind = state.kind(end, motion.back)
         read = self._codec.read(motion.payload, kind, state, motion.late)
-        window = read and self._codec.window(read[0], state, kind, end)
-        if not window:
+        window = self._codec.window(read[0], state, kind, end) if read else None
+        if read is None or window is None:
             return False
         path = window.path()
         self._states[motion.sequence] = State(path, read[1], end)
@@ -301,15 +303,16 @@ class _Playback:
             self._path = before.followed(path, lost)
             if path.moments[0] < self._begins:
                 self._begins = float(path.moments[1])
-            first = -min(max(MOST_JOINT_KNOTS // len(self.forest), MOST_KNOTS), len(self._path.moments))
+            count = min(max(MOST_JOINT_KNOTS // len(self.forest), MOST_KNOTS), len(self._path.moments))
             shown = path.moments[0] if self._moment is None else self._moment
-            self._path = self._path.since(max(min(self._kept, shown) - 1e-6, self._path.moments[first]))
+            self._path = self._path.since(max(min(self._kept, shown) - 1e-6, self._path.moments[-count]))
         else:
             numbers = sorted(self._windows)
             first = self._windows[numbers[0]]
-            self._path = before.followed(first) if before.moments[0] < first.moments[0] else first
+            joined = before.followed(first) if before.moments[0] < first.moments[0] else first
             for last, number in pairwise(numbers):
-                self._path = self._path.followed(self._windows[number], number - last - 1)
+                joined = joined.followed(self._windows[number], number - last - 1)
+            self._path = joined
         if self._moment is not None and (lost or path.moments[0] < self._moment):
             self._fading.changed(_only(self._path.at(np.array([self._moment]))))
 
@@ -318,15 +321,15 @@ class _Playback:
         return np.inf if self._playing.longest is None else moment + self._playing.longest + self._playing.delay
 
     def show(self, now: float) -> Shown | None:
-        """What is shown now."""
+        """Return what is shown now."""
         self._moment = self._playing.moment(now)
-        if self._moment is None or self._moment < self._begins:
+        if self._moment is None or self._path is None or self._moment < self._begins:
             return None
         poses = self._fading.show(_only(self._path.at(np.array([self._moment]))), now)
         return Shown(self._moment, self.forest.parted(poses))
 
     def keys(self, stream: Stream) -> Keys:
-        """The knots until the start of the newest window that were not handed out yet."""
+        """Return the knots until the start of the newest window that were not handed out yet."""
         path = self._path
         if path is None:
             return Keys(stream, np.empty(0), {})
@@ -341,7 +344,7 @@ class _Playback:
         return Keys(stream, path.moments[rows], poses)
 
     def entry(self, identity: bytes) -> Entry:
-        """What is answered."""
+        """Return what is answered."""
         there = sum(1 << back for back in range(32) if self._newest - 1 - back in self._states)
         return Entry(identity, max(self._newest, 0), there, self._needs)
 

@@ -46,7 +46,7 @@ class Coder(Protocol):
 
 
 def flag_table(kind: int, slide: int, history: int, neighbour: int) -> int:
-    """The number of the table that says whether a group is anything but zeros."""
+    """Return the number of the table that says whether a group is anything but zeros."""
     return ((kind * 2 + slide) * HISTORIES + history) * NEIGHBOURS + neighbour
 
 
@@ -54,7 +54,7 @@ FLAGS = KINDS * 2 * HISTORIES * NEIGHBOURS
 
 
 def size_table(kind: int, slide: int, history: int, size: int) -> int:
-    """The number of the table of a magnitude."""
+    """Return the number of the table of a magnitude."""
     return FLAGS + ((kind * 2 + slide) * HISTORIES + history) * SIZES + size
 
 
@@ -124,8 +124,8 @@ class Walk:
                 if number == 0:
                     history = bucket(memory[group] >> 2, HISTORIES)
                 else:
-                    coarser = groups[number - 1][group]
-                    coarser = abs(coarser[0]) + abs(coarser[1]) + abs(coarser[2])
+                    x, y, z = groups[number - 1][group]
+                    coarser = abs(x) + abs(y) + abs(z)
                     ends = last[group]
                     history = bucket(2 * coarser + abs(ends[0]) + abs(ends[1]) + abs(ends[2]), HISTORIES)
                 neighbour = (sums[above[group]] if above[group] >= 0 else 0) + before

@@ -210,7 +210,7 @@ class Sender:
         return self._due(now, self._interval)
 
     def poll(self, time: float) -> list[bytes]:
-        """What is to be sent at a time at which no sample came: worth asking at `next`, where one is overdue."""
+        """Return what is to be sent at a time at which no sample came: worth asking at `next`, where one is overdue."""
         now = time + self._slip
         if not self._times or now > self._times[-1] + STEP:
             return []  # Somebody set the clock, as the next sample will tell; or no sample is going to come.
@@ -222,7 +222,7 @@ class Sender:
         return self._next - self._slip
 
     def finish(self) -> list[bytes]:
-        """What is still needed where no more samples are to come."""
+        """Return what is still needed where no more samples are to come."""
         if self._path is None or self._is_shown_until(self._times[-1]) is None:
             return []
         return [self._message(self._times[-1])]
@@ -233,7 +233,7 @@ class Sender:
         return describe(self.identity, max(ticks, 0), self._forest, self._terms)
 
     def join(self) -> list[bytes]:
-        """What somebody who joins needs: the description. The next message then builds on nothing."""
+        """Return what somebody who joins needs: the description. The next message then builds on nothing."""
         self._wanted = True
         return self.describe()
 
@@ -281,14 +281,14 @@ class Sender:
         return now
 
     def _samples(self, first: int = 0) -> Path:
-        """The samples from one on, with the straight way between them."""
+        """Return the samples from one on, with the straight way between them."""
         still = np.zeros((len(self._forest), 3))
         return Path(np.array(self._times[first:]), self._positions[first:], self._quaternions[first:], still, still)
 
     # When
 
     def _due(self, now: float, interval: float) -> list[bytes]:
-        """What is to be sent now, where nobody asks again before the interval is over."""
+        """Return what is to be sent now, where nobody asks again before the interval is over."""
         due, self._next = [], math.inf
         if self._again and now >= self._again[0]:
             _, self._base, datagram = self._again
@@ -311,8 +311,8 @@ class Sender:
         return due * (1 + self._lossy)
 
     def _is_shown_until(self, now: float) -> float | None:
-        """The moment before one that is shown further off than the tolerance; None where there is none until now."""
-        if self._good is None and self._shown < self._times[-1]:
+        """Return moment before one that is shown further off than the tolerance; None where there is none until now."""
+        if self._good is None and self._path is not None and self._shown < self._times[-1]:
             first = max(int(np.searchsorted(self._times, self._shown, side="right")) - 1, 0)
             moments = closely(np.array(self._times[first:]))
             moments = moments[moments > max(self._shown, now - self._terms.delay / TICKS)]
@@ -369,7 +369,9 @@ class Sender:
         said = Said(fitted.finer, inner, np.array(fitted.numbers).tolist(), late)
         payload, memory = self.codec.write(said, kind, state, is_late)
         datagram = motion(self.identity, self._sequence, end, back, payload, is_late)
-        path = self.codec.window(said, state, kind, end).path()
+        window = self.codec.window(said, state, kind, end)
+        assert window is not None  # which receivers read, too
+        path = window.path()
         self._states[self._sequence] = State(path, memory, end)
         kept = {*range(self._sequence - MOST_BACK, self._sequence + 1), self._base}
         self._states = {number: old for number, old in self._states.items() if number in kept}
@@ -385,7 +387,7 @@ class Sender:
         return datagram
 
     def _usable(self, now: float) -> int | None:
-        """The message to build on, or None."""
+        """Return the message to build on, or None."""
         if self._answered(now):
             for number in range(self._sequence - 1, max(self._sequence - 1 - MOST_BACK, -1), -1):
                 state = self._states.get(number)
@@ -404,9 +406,10 @@ def closely(moments: np.ndarray) -> np.ndarray:
 
 
 def _as_read(identity: bytes, forest: Forest, terms: Terms) -> Forest:
-    """A forest as receivers read it, in single precision. Raises ValueError for what cannot be described."""
+    """Return a forest as receivers read it, in single precision. Raises ValueError for what cannot be described."""
     pieces = [read_piece(datagram) for datagram in describe(identity, 0, forest, terms)]
-    read = None if None in pieces else read_description(b"".join(piece.data for piece in pieces))
+    sound = [piece.data for piece in pieces if piece is not None]
+    read = read_description(b"".join(sound)) if len(sound) == len(pieces) else None
     if read is None:
         raise ValueError("the delay, the tolerance or the bodies are too large to be described")
     return read[0]

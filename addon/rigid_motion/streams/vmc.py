@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Hashable, Mapping
+from typing import Any, cast
 
 import numpy as np
 
@@ -72,7 +73,7 @@ def _mirrored(poses: Poses, change: np.ndarray) -> Poses:
 
 
 def write(time: float, poses: Mapping[str, Poses]) -> list[bytes]:
-    """The datagrams of a frame: the pose () of each bone in its parent's space, with that of `ROOT`."""
+    """Return the datagrams of a frame: the pose () of each bone in its parent's space, with that of `ROOT`."""
     there = [name for name in JOINTS if name in poses]
     both = Poses(
         np.array([poses[name].positions for name in there]), np.array([poses[name].quaternions for name in there])
@@ -88,7 +89,7 @@ def write(time: float, poses: Mapping[str, Poses]) -> list[bytes]:
 
 
 def write_trackers(poses: Mapping[str, Poses]) -> list[bytes]:
-    """The datagrams of the poses () of trackers in the world, by their names."""
+    """Return the datagrams of the poses () of trackers in the world, by their names."""
     messages = []
     for name, pose in poses.items():
         unity = to_unity(pose)
@@ -125,7 +126,7 @@ class Performer:
         return bone
 
     def __call__(self, poses: Poses) -> dict[str, Poses]:
-        """The pose () of each bone in its parent's space, of poses (joints,) in the space of the roots."""
+        """Return the pose () of each bone in its parent's space, of poses (joints,) in the space of the roots."""
         places = poses.positions[self._numbers]
         turns = multiply(poses.quaternions[self._numbers], self._from_rest)
         above = np.array(self._above)
@@ -156,13 +157,13 @@ class VmcReceiver:
             known.hear(message, arrival)
 
     def show(self, now: float) -> dict[Stream, Shown]:
-        """What every performer does now."""
+        """Return what every performer does now."""
         self._sources = {stream: it for stream, it in self._sources.items() if -SILENT < now - it.heard < SILENT}
         shown = {stream: it.show(now) for stream, it in self._sources.items()}
         return {stream: what for stream, what in shown.items() if what is not None}
 
     def bodies(self, stream: Stream) -> tuple[Body, ...]:
-        """The performer of a stream, at rest, and its devices."""
+        """Return the performer of a stream, at rest, and its devices."""
         known = self._sources.get(stream)
         return known.bodies if known else ()
 
@@ -204,10 +205,10 @@ class _Source:
             self._place(joint, arguments[1:], arrival)
         elif message.address == "/VMC/Ext/T" and len(arguments) == 1 and _is_finite(arguments[0]):
             self._has_time = True
-            self._sample(float(arguments[0]), arrival)
+            self._sample(float(cast(float, arguments[0])), arrival)
 
     def _device(self, serial: object) -> int | None:
-        """The joint of a device; None for what is no name, and for too many."""
+        """Return the joint of a device; None for what is no name, and for too many."""
         if serial not in self._devices:
             is_name = isinstance(serial, str) and serial != PERFORMER and 0 < len(serial.encode()) <= LONGEST_NAME
             if not is_name or len(self._devices) == MOST_DEVICES:
@@ -215,7 +216,7 @@ class _Source:
             self._devices[serial] = len(JOINTS) + len(self._devices)
         return self._devices[serial]
 
-    def _place(self, joint: int, numbers: tuple[object, ...], arrival: float) -> None:
+    def _place(self, joint: int, numbers: tuple[Any, ...], arrival: float) -> None:
         try:
             x, y, z, w = numbers[3:7]
             length = math.sqrt(x * x + y * y + z * z + w * w)
@@ -233,7 +234,7 @@ class _Source:
         self._quaternions[joint] = w / length, x / length, y / length, z / length
 
     def _sample(self, moment: float, arrival: float) -> None:
-        """A frame is complete."""
+        """Take the frame that is complete."""
         if not self._said - {0}:
             return
         if new := self._said - self._known:

@@ -121,7 +121,7 @@ class Entry:
 
 
 def kind_of(datagram: bytes) -> int | None:
-    """The kind of a datagram of this version, or None."""
+    """Return the kind of a datagram of this version, or None."""
     if len(datagram) < HEAD.size or len(datagram) > LONGEST or datagram[0] >> 4 != VERSION:
         return None
     return datagram[0] & 15
@@ -132,20 +132,20 @@ def _first(kind: int) -> int:
 
 
 def motion(identity: bytes, sequence: int, ticks: int, back: int, payload: bytes, late: bool = False) -> bytes:
-    """The datagram of a message."""
+    """Return the datagram of a message."""
     return MOTION_HEAD.pack(_first(LATE if late else MOTION), identity, sequence, ticks & 0xFFFF, back) + payload
 
 
 def read_motion(datagram: bytes) -> Motion | None:
-    """A message, or None."""
+    """Return a message, or None."""
     if len(datagram) < MOTION_HEAD.size:
         return None
-    _, *head = MOTION_HEAD.unpack_from(datagram)
-    return Motion(*head, datagram[MOTION_HEAD.size :], datagram[0] & 15 == LATE)
+    _, identity, sequence, ticks, back = MOTION_HEAD.unpack_from(datagram)
+    return Motion(identity, sequence, ticks, back, datagram[MOTION_HEAD.size :], datagram[0] & 15 == LATE)
 
 
 def answer(receiver: bytes, entries: Sequence[Entry]) -> bytes:
-    """The datagram of an answer."""
+    """Return the datagram of an answer."""
     parts = [ENTRY.pack(entry.identity, entry.newest, entry.before, entry.needs) for entry in entries]
     return HEAD.pack(_first(ANSWER), receiver) + b"".join(parts)
 
@@ -161,9 +161,10 @@ def read_answer(datagram: bytes) -> tuple[bytes, list[Entry]] | None:
 
 
 def describe(identity: bytes, ticks: int, forest: Forest, terms: Terms) -> list[bytes]:
-    """The datagrams of a description."""
+    """Return the datagrams of a description."""
     parts = [TERMS.pack(terms.tolerance, terms.delay, terms.grid, len(forest.bodies))]
     for body in forest.bodies:
+        assert body.sliding is not None
         parts += [_named(body.name), struct.pack("<IH", round(body.radius * 1e6), len(body.joints))]
         for joint, parent in enumerate(body.parents.tolist()):
             parts += [_named(body.joints[joint]), struct.pack("<hB", parent, int(body.sliding[joint]))]
@@ -178,7 +179,7 @@ def describe(identity: bytes, ticks: int, forest: Forest, terms: Terms) -> list[
 
 
 def read_piece(datagram: bytes) -> Piece | None:
-    """A piece of a description, or None."""
+    """Return a piece of a description, or None."""
     if len(datagram) <= DESCRIPTION_HEAD.size:
         return None
     _, identity, number, pieces, ticks = DESCRIPTION_HEAD.unpack_from(datagram)
@@ -188,7 +189,7 @@ def read_piece(datagram: bytes) -> Piece | None:
 
 
 def read_description(packed: bytes) -> tuple[Forest, Terms] | None:
-    """The bodies and the terms of all pieces of a description, or None."""
+    """Return the bodies and the terms of all pieces of a description, or None."""
     try:
         unpacking = zlib.decompressobj()
         data = unpacking.decompress(packed, MOST_DESCRIBED)
@@ -220,11 +221,11 @@ def _described(data: bytes) -> tuple[Forest, Terms] | None:
             names.append(own)
             parents.append(parent)
             sliding.append(bool(slides))
-        poses = np.array(rest, dtype=np.float64).reshape(-1, 7)
-        lengths = np.linalg.norm(poses[:, 3:], axis=1)
-        if not (np.abs(poses) < 1e6).all() or not (lengths > 0.5).all():
+        rows = np.array(rest, dtype=np.float64).reshape(-1, 7)
+        lengths = np.linalg.norm(rows[:, 3:], axis=1)
+        if not (np.abs(rows) < 1e6).all() or not (lengths > 0.5).all():
             return None
-        poses = Poses(poses[:, :3], poses[:, 3:] / lengths[:, None])
+        poses = Poses(rows[:, :3], rows[:, 3:] / lengths[:, None])
         bodies.append(Body(name, tuple(names), np.array(parents), poses, radius / 1e6, np.array(sliding)))
     return (Forest(bodies), terms) if at == len(data) else None
 
@@ -242,6 +243,6 @@ def _read_name(data: bytes, at: int) -> tuple[str, int]:
 
 
 def expanded(ticks: int, near: float) -> int:
-    """The whole of a number of ticks, of which the lowest 16 bits are given, nearest to another number."""
+    """Return the whole of a number of ticks, of which the lowest 16 bits are given, nearest to another number."""
     nearest = math.floor(near)
     return nearest + ((ticks - nearest + 0x8000) & 0xFFFF) - 0x8000

@@ -11,10 +11,12 @@ import re
 from importlib.resources import files
 
 import bpy
-from bpy.app.translations import contexts
 
-OWNER = __package__.rpartition(".")[0]
+OWNER = (__package__ or "").rpartition(".")[0]
 """Whose translations they are, as Blender keeps them: the extension's."""
+
+DEFAULT = "*"
+"""Blender's name of the context of texts without one."""
 
 _STRING = r'"(?:\\.|[^"\\\n])*"'
 _STRINGS = rf"((?:{_STRING}\s*)+)"
@@ -38,7 +40,7 @@ def read(po: str) -> Texts:
     for flags, *parts in _ENTRY.findall(po):
         context, english, translation = map(_joined, parts)
         if english and translation and "fuzzy" not in flags:
-            texts[context or contexts.default, english] = translation
+            texts[context or DEFAULT, english] = translation
     return texts
 
 

@@ -63,7 +63,7 @@ class BodyReconstruction:
 
     @cached_property
     def skeleton(self) -> Skeleton:
-        return self.clip.figure.skeleton
+        return self.clip.whole_body.skeleton
 
     @property
     def best_mode(self) -> str:
@@ -73,12 +73,13 @@ class BodyReconstruction:
         return REFERENCE if REFERENCE in fewest else fewest[0]
 
     def filled_in(self, mode: str, times: np.ndarray) -> Poses:
-        """What a mode makes of its keys: the joints in their parents' space, shape (joints, m), at any times (m,).
+        """Return what a mode makes of its keys: joints in their parents' space, shape (joints, m), at any times (m,).
 
         In the unit of the recording.
         """
         clip = self.clip
         if not len(self.keys[mode][0]):
+            assert clip.against is not None  # it alone has no keys
             return clip.against.at(times)
         poses = Poses(np.empty((len(self.skeleton), len(times), 3)), np.empty((len(self.skeleton), len(times), 4)))
         for joints, own in self._alike(mode):
@@ -94,7 +95,7 @@ class BodyReconstruction:
         return self.clip.in_metres(self.skeleton.in_root_space(self.clip.poses[:, samples]))
 
     def _alike(self, mode: str) -> list[tuple[np.ndarray, np.ndarray]]:
-        """The joints that have keys at the same samples, with these."""
+        """Return the joints that have keys at the same samples, with these."""
         groups: dict[bytes, tuple[list[int], np.ndarray]] = {}
         for joint, own in enumerate(self.keys[mode]):
             groups.setdefault(own.tobytes(), ([], own))[0].append(joint)
@@ -126,7 +127,7 @@ class BodyErrors:
     @property
     def worst(self) -> tuple[int, int]:
         """The joint and the sample of the largest error."""
-        joint, sample = np.unravel_index(int(self.shell.argmax()), self.shell.shape)
+        joint, sample = np.unravel_index(np.argmax(self.shell), self.shell.shape)
         return int(joint), int(sample)
 
 
@@ -223,7 +224,7 @@ def moving(clip: Clip) -> np.ndarray:
 
 
 def same_body_motions(clip: Clip, modes: Sequence[str]) -> Groups:
-    """The modes in groups that are one motion of a body, seen with about every `PROBE`th sample as a key pose.
+    """Return the modes in groups that are one motion of a body, seen with about every `PROBE`th sample as a key pose.
 
     Each is on its own where there are too few samples to see it.
     """
@@ -234,7 +235,7 @@ def same_body_motions(clip: Clip, modes: Sequence[str]) -> Groups:
 
 
 def identical_body_modes(made: BodyReconstruction) -> Groups:
-    """The modes in groups that put every joint at the same place, but for rounding: as `identical_modes`."""
+    """Return the modes in groups that put every joint at the same place, but for rounding: as `identical_modes`."""
     samples = np.unique(np.linspace(made.samples.start, made.samples.stop - 1, COMPARED).astype(int))
     truth = made.truth(samples)
     shown = {mode: made.shown(mode, made.clip.times[samples]) for mode in made.keys}
@@ -242,7 +243,7 @@ def identical_body_modes(made: BodyReconstruction) -> Groups:
 
 
 def rms_of_body(made: BodyReconstruction, mode: str, radii: np.ndarray) -> float:
-    """The RMS shell error over all joints and samples, in metres; of balls of these radii (joints,)."""
+    """Return the RMS shell error over all joints and samples, in metres; of balls of these radii (joints,)."""
     radius = radii[:, None]
     totals = [
         np.square(shell_error(made.shown(mode, made.clip.times[block]), made.truth(block), radius)).mean(axis=0)

@@ -49,7 +49,9 @@ class KeysOfBody:
 
 
 def ours(made: BodyReconstruction, row: Metrics) -> KeysOfBody:
-    """What was measured of a mode."""
+    """Return what was measured of a mode."""
+    assert row.key_frames is not None
+    assert row.keys is not None
     return KeysOfBody(
         clip=row.clip,
         mode=row.mode,

@@ -104,7 +104,7 @@ def _row_of(made: BodyReconstruction, mode: str, errors: BodyErrors, ground: Gro
         keys_per_s=sent / max(moving_joints, 1) / duration if count else None,
         joints=len(keys),
         key_frames=len(key_samples(keys)) or None,
-        worst_joint=clip.figure.joints[errors.worst[0]],
+        worst_joint=clip.whole_body.joints[errors.worst[0]],
         foot_slide_m=errors.slide if len(ground.joints) else None,
         recorded_slide_m=ground.slide if len(ground.joints) else None,
         **of_errors(clip, made.choice, errors),
@@ -114,18 +114,18 @@ def _row_of(made: BodyReconstruction, mode: str, errors: BodyErrors, ground: Gro
 def _rows_of_joints(made: BodyReconstruction, mode: str, errors: BodyErrors) -> Iterator[JointMetrics]:
     clip, times = made.clip, made.times
     of_joints = map(Errors, errors.shell, errors.position, errors.rotation, errors.velocity)
-    for name, keys, own in zip(clip.figure.joints, made.keys[mode], of_joints, strict=True):
+    for name, keys, own in zip(clip.whole_body.joints, made.keys[mode], of_joints, strict=True):
         yield JointMetrics(
             joint=name,
             mode=mode,
             keys=len(keys) or None,
-            worst_s=float(times[own.shell.argmax()] - times[0]),
+            worst_s=float(times[np.argmax(own.shell)] - times[0]),
             **of_errors(clip, made.choice, own),
         )
 
 
 def key_samples(keys: JointKeys) -> np.ndarray:
-    """The samples that are a key of any joint that moves."""
+    """Return the samples that are a key of any joint that moves."""
     moving_ones = [own for own in keys if len(own) > 1]
     return np.unique(np.concatenate(moving_ones)) if moving_ones else keys[0]
 
@@ -168,7 +168,7 @@ def write_key_tables(folder: Path, made: BodyReconstruction) -> None:
         with replacing(folder / ("keys.csv" if uniform else f"{mode}.keys.csv")) as stream:
             stream.write("joint,t,x,y,z,qw,qx,qy,qz\n")
             for joint, own in enumerate(keys):
-                name = line_of([made.clip.figure.joints[joint]])[:-1]
+                name = line_of([made.clip.whole_body.joints[joint]])[:-1]
                 poses = made.clip.poses[joint][own]
                 for _, lines in lines_of_poses([made.clip.times[own], *poses.positions.T, *poses.quaternions.T]):
                     stream.writelines(f"{name},{line}\n" for line in lines)

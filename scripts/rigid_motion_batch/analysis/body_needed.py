@@ -7,6 +7,7 @@ of so many that `reduce_skeleton_keys` finds, which keep the largest error small
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
@@ -71,16 +72,16 @@ class OfBody:
             found = reduce_skeleton_keys(
                 self.clip.times,
                 self.clip.poses,
-                self.clip.figure.parents,
+                self.clip.whole_body.parents,
                 mode,
                 radius=radii,
                 budget=max(budget, 2),
                 shared=True,
             )
-            keys = max(found, key=len)
+            keys = max(cast(tuple[np.ndarray, ...], found), key=len)
         return keys, self.error(keys, mode)
 
 
 def ways_of(clip: Clip, radii: Radii, *, fit: bool) -> Ways:
-    """The ways to have fewer keys of a clip, whatever it is of; only those of a rigid body may be fitted."""
+    """Return the ways to have fewer keys of a clip, whatever it is of; only those of a rigid body may be fitted."""
     return OfBody(clip, radii.of(clip.figure.joints)) if clip.figure else OfRigidBody(clip, radii.rigid, fit=fit)

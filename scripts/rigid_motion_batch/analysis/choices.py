@@ -12,7 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
@@ -54,14 +54,14 @@ class Choice(ABC):
 
     @abstractmethod
     def keys(self, clip: Clip, mode: str, radius: float) -> np.ndarray:
-        """The samples of the clip that are kept under a mode, rising, shape (k,).
+        """Return the samples of the clip that are kept under a mode, rising, shape (k,).
 
         The radius of the shell is in metres. Fewer than two keys where the clip is too short.
         """
 
     @abstractmethod
     def body_keys(self, clip: Clip, mode: str, radius: Radius, *, shared: bool) -> tuple[np.ndarray, ...]:
-        """The samples that are kept of each joint of a clip with a figure, the same for all where they are `shared`.
+        """Return samples that are kept of each joint of a clip with a figure, the same for all where they are `shared`.
 
         The radius is that of the balls at the joints in metres, one or shape (joints,).
         """
@@ -93,13 +93,13 @@ class Choice(ABC):
 
     @abstractmethod
     def ends(self, times: np.ndarray) -> tuple[int, int] | None:
-        """The samples of the first and the last key, which all modes keep, among a clip's times, shape (n,).
+        """Return the samples of the first and the last key, which all modes keep, among a clip's times, shape (n,).
 
         None where the clip is too short for two keys.
         """
 
     def tolerance(self, clip: Clip) -> float | None:
-        """The largest shell error that is allowed, in metres; None where nothing is said of it."""
+        """Return the largest shell error that is allowed, in metres; None where nothing is said of it."""
         return None
 
     @property
@@ -201,7 +201,7 @@ class Tolerance(Choice):
         return self.metres(clip.metres_per_unit)
 
     def metres(self, per_unit: float) -> float:
-        """The length in metres, given how many a unit of the recording has."""
+        """Return the length in metres, given how many a unit of the recording has."""
         number, unit = self._parts()
         return float(number) * (METRES[unit] if unit else per_unit)
 
@@ -248,7 +248,7 @@ class Tolerance(Choice):
         return Fraction(number) * MILLIMETRES.get(unit, 1), "mm" if unit else ""
 
     def _parts(self) -> tuple[str, str]:
-        """The number and the unit, which may be empty."""
+        """Return the number and the unit, which may be empty."""
         found = re.fullmatch(rf"({NUMBER})({'|'.join(METRES)})?", self.written, re.ASCII)
         if not found or float(found[1]) <= 0.0:
             raise ValueError(
@@ -258,20 +258,21 @@ class Tolerance(Choice):
         return found[1], found[2] or ""
 
 
-def _reduced(clip: Clip, mode: str, radius: float, **wanted: float | bool) -> np.ndarray:
+def _reduced(clip: Clip, mode: str, radius: float, **wanted: Any) -> np.ndarray:
     return reduce_keys(clip.times, clip.poses, mode, radius=radius / clip.metres_per_unit, **wanted)
 
 
-def _reduced_body(clip: Clip, mode: str, radius: Radius, shared: bool, **wanted: float) -> tuple[np.ndarray, ...]:
-    return reduce_skeleton_keys(
+def _reduced_body(clip: Clip, mode: str, radius: Radius, shared: bool, **wanted: Any) -> tuple[np.ndarray, ...]:
+    keys = reduce_skeleton_keys(
         clip.times,
         clip.poses,
-        clip.figure.parents,
+        clip.whole_body.parents,
         mode,
         radius=radius / clip.metres_per_unit,
         shared=shared,
         **wanted,
     )
+    return cast(tuple[np.ndarray, ...], keys)
 
 
 def fewest_keys(choices: Iterable[Choice]) -> list[Choice]:

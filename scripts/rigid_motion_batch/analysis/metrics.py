@@ -19,6 +19,7 @@ from rigid_motion_batch.files import replacing
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.rows import write_rows
 
+from .bodies import BodyErrors
 from .choices import Choice
 from .modes import BEST_OF, single_modes
 from .reconstructions import Reconstruction
@@ -94,7 +95,7 @@ class Metrics:
 
 
 def measure_reconstruction(reconstruction: Reconstruction) -> list[Metrics]:
-    """The metrics of every mode, in the order of the modes.
+    """Return the metrics of every mode, in the order of the modes.
 
     Notes
     -----
@@ -130,8 +131,8 @@ def measure_reconstruction(reconstruction: Reconstruction) -> list[Metrics]:
     return rows
 
 
-def of_errors(clip: Clip, choice: Choice, errors: Errors) -> dict[str, Any]:
-    """The fields of a row that any motion has, of errors in metres and radians."""
+def of_errors(clip: Clip, choice: Choice, errors: Errors | BodyErrors) -> dict[str, Any]:
+    """Return the fields of a row that any motion has, of errors in metres and radians."""
     return {
         "clip": clip.name,
         "rate_hz": choice.rate,
@@ -148,7 +149,7 @@ def of_errors(clip: Clip, choice: Choice, errors: Errors) -> dict[str, Any]:
 
 
 def geometric_mean(values: np.ndarray) -> np.ndarray:
-    """The geometric mean over the first axis of what is not NaN; NaN where nothing is left."""
+    """Return the geometric mean over the first axis of what is not NaN; NaN where nothing is left."""
     known = np.isfinite(values) & (values > 0.0)
     count = known.sum(axis=0)
     total = np.log(np.where(known, values, 1.0)).sum(axis=0)
@@ -205,7 +206,7 @@ def _write_tum(path: Path, times: np.ndarray, poses: Poses, overwrite: bool) -> 
 
 
 def lines_of_poses(columns: Sequence[np.ndarray]) -> Iterator[tuple[int, list[str]]]:
-    """The rows of a table of numbers, columns of shape (n,), some at a time with the number of the first.
+    """Yield the rows of a table of numbers, columns of shape (n,), some at a time with the number of the first.
 
     Numbers take many times their memory as text, and a recording may have hours of them.
     """
@@ -215,7 +216,7 @@ def lines_of_poses(columns: Sequence[np.ndarray]) -> Iterator[tuple[int, list[st
 
 
 def table_names(choice: Choice, modes: Iterable[str], form: str = "csv", other: str = "") -> list[str]:
-    """The files that `write_reconstruction` writes for a choice of keys; `other` is a motion whose keys are unknown."""
+    """Return the files that `write_reconstruction` writes for a choice; `other` is a motion whose keys are unknown."""
     modes = tuple(modes)
     single = [] if choice.decimation == "uniform" else [f"{mode}.keys.{form}" for mode in single_modes(modes)]
     best = [f"{BEST_OF}.keys.csv"] if BEST_OF in modes else []
@@ -223,7 +224,7 @@ def table_names(choice: Choice, modes: Iterable[str], form: str = "csv", other: 
 
 
 def body_table_names(choice: Choice, modes: Iterable[str]) -> list[str]:
-    """The files of the keys of a whole body: one for all modes where they have the same."""
+    """Return the files of the keys of a whole body: one for all modes where they have the same."""
     return ["keys.csv"] if choice.decimation == "uniform" else [f"{mode}.keys.csv" for mode in modes]
 
 

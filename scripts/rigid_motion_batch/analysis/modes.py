@@ -24,14 +24,14 @@ OTHER_DESCRIPTION = "A motion that was given with --against, as its own samples 
 
 
 def label_of(mode: str) -> str:
-    """What a mode is called."""
+    """Return what a mode is called."""
     if mode == BEST_OF:
         return BEST_OF_LABEL
     return MODES[mode].label if mode in MODES else mode
 
 
 def description_of(mode: str) -> str:
-    """What a mode does for the motion, in one sentence without a full stop."""
+    """Return what a mode does for the motion, in one sentence without a full stop."""
     if mode == BEST_OF:
         return BEST_OF_DESCRIPTION
     return MODES[mode].description if mode in MODES else OTHER_DESCRIPTION
@@ -43,5 +43,5 @@ def single_modes(modes: Iterable[str]) -> tuple[str, ...]:
 
 
 def name_of_other(stem: str) -> str:
-    """What somebody else's motion is called, by its file: safe as the name of a table, and unlike any other there."""
+    """Return the name of somebody else's motion, by its file: safe as that of a table, and unlike any other there."""
     return folder_names([*MODES, BEST_OF, "keys", stem.replace(".", "_")])[-1]

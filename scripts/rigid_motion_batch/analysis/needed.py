@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -104,22 +104,24 @@ class KeysNeeded:
 class Ways(Protocol):
     """The ways to have fewer keys of a clip, and how good they are. All errors are RMS shell errors in metres."""
 
-    clip: Clip
+    @property
+    def clip(self) -> Clip: ...
 
-    decimations: tuple[str, ...]
-    """Those of `DECIMATIONS` that are tried."""
+    @property
+    def decimations(self) -> tuple[str, ...]:
+        """Those of `DECIMATIONS` that are tried."""
 
     def groups(self, modes: tuple[str, ...]) -> Groups:
-        """The modes, those together that are one motion on the clip."""
+        """Return the modes, those together that are one motion on the clip."""
 
     def between(self, first: int, last: int) -> Ways:
-        """The same for the part of the clip from one sample to another."""
+        """Return the same for the part of the clip from one sample to another."""
 
     def error(self, keys: np.ndarray, mode: str) -> float:
         """Of a mode that has these samples for keys."""
 
     def by_motion(self, mode: str, target: float, evenly: int) -> list[tuple[np.ndarray, float]]:
-        """The keys, and their error, in each of the ways but for evenly spaced ones, of which it takes so many."""
+        """Return keys, and their error, in each of the ways but for evenly spaced ones, of which it takes so many."""
 
 
 def keys_needed(ways: Ways, modes: Iterable[str], *, advance: Callable[[], object] = lambda: None) -> KeysNeeded:
@@ -165,12 +167,12 @@ def keys_needed(ways: Ways, modes: Iterable[str], *, advance: Callable[[], objec
 
 
 def evenly_spaced(clip: Clip, segments: int) -> np.ndarray:
-    """The samples nearest to the ends of so many segments of equal duration, from the first sample to the last."""
+    """Return samples nearest to the ends of so many segments of equal duration, from the first sample to the last."""
     return decimate(clip.times, segments / float(clip.times[-1] - clip.times[0]))
 
 
 def _fewest_evenly(ways: Ways, mode: str, target: float, start: np.ndarray) -> np.ndarray:
-    """The fewest evenly spaced keys with which a mode is within the target, searched from as many as `start`."""
+    """Return the fewest evenly spaced keys with which a mode is within the target, searched from as many as `start`."""
 
     def good(segments: int) -> bool:
         return ways.error(evenly_spaced(ways.clip, segments), mode) <= target
@@ -191,7 +193,7 @@ def _fewest_evenly(ways: Ways, mode: str, target: float, start: np.ndarray) -> n
 
 
 def part_of(clip: Clip, first: int, last: int) -> Clip:
-    """A clip from one sample to another."""
+    """Return a clip from one sample to another."""
     part = slice(first, last + 1)
     return replace(clip, times=clip.times[part], poses=clip.poses[..., part])
 
@@ -236,7 +238,7 @@ class OfRigidBody:
     def _fewest_fitted(
         self, mode: str, target: float, adaptive: np.ndarray, reached: float
     ) -> tuple[np.ndarray, float]:
-        """The fewest keys, and their error, that are within the target when fitted.
+        """Return the fewest keys, and their error, that are within the target when fitted.
 
         They are searched from the adaptive ones on, which have reached this error without.
         """
@@ -289,7 +291,7 @@ class Overall:
 
 
 def overall(clips: Sequence[KeysNeeded]) -> Overall:
-    """The geometric means over some clips of one run, at least one."""
+    """Return the geometric means over some clips of one run, at least one."""
     modes = [mode for group in clips[0].groups for mode in group]
     places = {mode: tuple(_place(clip, mode) for clip in clips) for mode in modes}
     groups = tuple(tuple(mode for mode in modes if places[mode] == same) for same in dict.fromkeys(places.values()))
@@ -330,7 +332,7 @@ def write_keys_needed(path: Path, clips: Iterable[KeysNeeded]) -> None:
 def _rows(clip: KeysNeeded) -> Iterator[NeededRow]:
     for group, decimation, rate in np.argwhere(~np.isnan(clip.keys)).tolist():
         at = group, decimation, rate
-        found = [None] * 4
+        found: list[Any] = [None] * 4
         if np.isfinite(clip.keys[at]):
             found = [
                 int(clip.keys[at]),

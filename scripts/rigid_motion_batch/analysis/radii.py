@@ -39,12 +39,12 @@ class Radii:
     """Joints by name, without blanks around it, and their radii."""
 
     def of(self, joints: Sequence[str]) -> np.ndarray:
-        """The radii of these joints, shape (joints,)."""
+        """Return the radii of these joints, shape (joints,)."""
         named = dict(self.named)
         return np.array([named.get(joint.strip(), self.joint) for joint in joints])
 
     def unknown(self, joints: Iterable[str]) -> list[str]:
-        """The names that none of these joints has."""
+        """Return the names that none of these joints has."""
         known = {joint.strip() for joint in joints}
         return [name for name, _ in self.named if name not in known]
 
@@ -53,7 +53,7 @@ EVERYWHERE = Radii()
 
 
 def read_radii(text: str) -> Radii:
-    """A radius for everything, or a table with the columns `joint` and `radius_m`.
+    """Return a radius for everything, or a table with the columns `joint` and `radius_m`.
 
     Raises
     ------
@@ -105,8 +105,10 @@ def _read_table(path: Path) -> dict[str, float]:
 
 
 def radius_in_metres(text: str) -> float:
-    """A radius as it is written: 3cm, 30mm, 0.03m, or 0.03. Raises ValueError where it is none above 0."""
-    number, unit = re.fullmatch(rf"(.*?)\s*({'|'.join(METRES)})?\s*", text, re.DOTALL).groups()
+    """Return a radius as it is written: 3cm, 30mm, 0.03m, or 0.03. Raises ValueError where it is none above 0."""
+    parts = re.fullmatch(rf"(.*?)\s*({'|'.join(METRES)})?\s*", text, re.DOTALL)
+    assert parts is not None  # which any text fits
+    number, unit = parts.groups()
     return _above_zero(float(number) * METRES[unit or "m"])
 
 

@@ -81,8 +81,9 @@ class Reconstruction:
         return min(counts, key=lambda mode: (counts[mode], rms(self.errors[mode].shell)))
 
     def filled_in(self, mode: str, times: np.ndarray) -> Poses:
-        """What a mode makes of its keys at any times."""
+        """Return what a mode makes of its keys at any times."""
         if not len(self.keys[mode]):
+            assert self.clip.against is not None  # it alone has no keys
             return self.clip.against.at(times)
         key_times, keys = self.clip.times[self.keys[mode]], self.clip.poses[self.keys[mode]]
         if mode == BEST_OF:
@@ -126,7 +127,7 @@ def reconstruct(clip: Clip, choice: Choice, modes: Sequence[str], radius: float)
 
 
 def with_best_of(made: Reconstruction, radius: float) -> Reconstruction:
-    """The same with `BEST_OF` its modes, which has the keys of the best single one."""
+    """Return the same with `BEST_OF` its modes, which has the keys of the best single one."""
     clip, kept = made.clip, made.keys[made.best_mode]
     tolerance = made.choice.tolerance(clip)
     unit = clip.metres_per_unit
@@ -138,7 +139,7 @@ def with_best_of(made: Reconstruction, radius: float) -> Reconstruction:
 
 
 def with_other(made: Reconstruction, other: OtherMotion, radius: float) -> Reconstruction:
-    """The same with somebody else's motion behind its modes, at the samples that these are compared at."""
+    """Return the same with somebody else's motion behind its modes, at the samples that these are compared at."""
     clip, poses = made.clip, other.at(made.times)
     truth = clip.in_metres(clip.poses[made.samples])
     errors = measure(made.times, clip.in_metres(poses), truth, radius)
@@ -153,7 +154,7 @@ def with_other(made: Reconstruction, other: OtherMotion, radius: float) -> Recon
 def fill_in(
     clip: Clip, choice: Choice, keys: dict[str, np.ndarray], radius: float, segment_modes: tuple[str, ...] = ()
 ) -> Reconstruction:
-    """What each mode makes of its keys, at least two, which begin and end with the same samples.
+    """Return what each mode makes of its keys, at least two, which begin and end with the same samples.
 
     `BEST_OF` among them has the modes of its segments from `segment_modes`.
     """
@@ -165,7 +166,7 @@ def fill_in(
 
 
 def same_motions(clip: Clip, modes: tuple[str, ...], radius: float) -> tuple[tuple[str, ...], ...]:
-    """The modes in groups that are one motion on this clip, seen with about every `PROBE`th sample as a key.
+    """Return the modes in groups that are one motion on this clip, seen with about every `PROBE`th sample as a key.
 
     Each is on its own where there are too few samples to see it.
     """
@@ -182,7 +183,7 @@ def probing(clip: Clip) -> Uniform:
 
 
 def identical_modes(reconstructions: Sequence[Reconstruction]) -> Groups:
-    """The modes in groups that gave the same poses in all of these reconstructions.
+    """Return the modes in groups that gave the same poses in all of these reconstructions.
 
     The same means: apart by less than a millionth of their error, by the shell measure, or than what rounding does.
     Some modes are one curve by theory (ScLERP and the SLERP of motors); this looks whether they were.
@@ -191,7 +192,7 @@ def identical_modes(reconstructions: Sequence[Reconstruction]) -> Groups:
 
 
 def joint_groups(groupings: Iterable[Groups]) -> Groups:
-    """The modes in groups that are together in all of these groupings of the same modes."""
+    """Return the modes in groups that are together in all of these groupings of the same modes."""
     places: dict[str, list[int]] = {}
     for groups in groupings:
         for place, group in enumerate(groups):
@@ -210,7 +211,7 @@ def _groups(reconstruction: Reconstruction) -> Groups:
 
 
 def alike(poses: Mapping[str, Poses], largest: Mapping[str, float]) -> Groups:
-    """The modes whose poses are the same but for a millionth of their largest error and for rounding, in metres."""
+    """Return modes whose poses are the same but for a millionth of their largest error and for rounding, in metres."""
     groups: list[list[str]] = []
     for mode, own in poses.items():
         for group in groups:

@@ -172,14 +172,14 @@ def compare_clip(
 
 
 def made_of(clip: Clip, choice: Choice, modes: Sequence[str], radii: Radii, *, shared: bool) -> Made | None:
-    """What modes make of a clip: the first half of `compare_clip`."""
+    """Return what modes make of a clip: the first half of `compare_clip`."""
     if clip.figure is None:
         return reconstruct(clip, choice, modes, radii.rigid)
     return reconstruct_body(clip, choice, modes, radii.of(clip.figure.joints), shared=shared)
 
 
 def made_again(clip: Clip, found: ChoiceResult, radii: Radii, *, shared: bool) -> Made:
-    """The same by the keys that were chosen before."""
+    """Return the same by the keys that were chosen before."""
     if clip.figure is None:
         keys = {mode: keys[0] for mode, keys in found.keys.items()}
         return fill_in(clip, found.choice, keys, radii.rigid, found.mode_of_segments)
@@ -242,7 +242,7 @@ def _of_rigid_body(made: Reconstruction) -> ChoiceResult:
 
 
 def _of_body(made: BodyReconstruction, radii: Radii) -> ChoiceResult:
-    found = measure_modes(made, radii.of(made.clip.figure.joints))
+    found = measure_modes(made, radii.of(made.clip.whole_body.joints))
     rows = {row.mode: row for row in found.rows}
     motions = [
         Motion(

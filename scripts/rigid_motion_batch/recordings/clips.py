@@ -95,6 +95,12 @@ class Clip:
         """The rate of the recording, which tells it or has it between most samples."""
         return self.rate or 1.0 / float(np.median(np.diff(self.times)))
 
+    @property
+    def whole_body(self) -> Figure:
+        """The figure of a clip that has one."""
+        assert self.figure is not None
+        return self.figure
+
     def in_metres(self, poses: Poses) -> Poses:
         """Poses of this clip with positions in metres."""
         if self.metres_per_unit == 1.0:

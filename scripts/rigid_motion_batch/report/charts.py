@@ -6,7 +6,7 @@ and its `chart(...)` in a template.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -44,12 +44,12 @@ DASHES: Specification = {
 
 
 def error_over_rate(numbers: Numbers, clip: int | None = None) -> Specification | None:
-    """The RMS shell error over the keys a second, of a clip or the mean of all."""
+    """Return the RMS shell error over the keys a second, of a clip or the mean of all."""
     places = [place for place, choice in enumerate(numbers.choices) if not isinstance(choice, Tolerance)]
     if len(places) < 2:
         return None
     values = numbers.mean(clip)[ERROR]
-    rows = [
+    rows: list[Specification] = [
         {
             "rate": numbers.choices[place].size,
             "error": float(values[place, numbers.modes.index(group[0])]),
@@ -63,7 +63,7 @@ def error_over_rate(numbers: Numbers, clip: int | None = None) -> Specification 
 
 
 def keys_needed(numbers: Numbers, needed: Sequence[KeysNeeded]) -> Specification | None:
-    """The error over the keys a second that each mode keeps, evenly spaced or where it needs them."""
+    """Return the error over the keys a second that each mode keeps, evenly spaced or where it needs them."""
     together = overall(needed)
     # Means over different clips do not make one curve.
     whole = together.asked == len(needed)
@@ -130,11 +130,14 @@ def _ticks(values: Sequence[float]) -> list[float]:
     return [value for value in found if low <= value <= high]
 
 
-CHARTS = {"error over rate": error_over_rate, "keys needed": keys_needed}
+CHARTS: dict[str, Callable[..., Specification | None]] = {
+    "error over rate": error_over_rate,
+    "keys needed": keys_needed,
+}
 
 
 def chart(name: str, *arguments: Any) -> Markup:
-    """The SVG of a chart; empty where there is nothing to draw."""
+    """Return the SVG of a chart; empty where there is nothing to draw."""
     specification = CHARTS[name](*arguments)
     if specification is None:
         return Markup()

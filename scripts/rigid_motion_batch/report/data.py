@@ -73,7 +73,7 @@ class Block:
 
 
 def clip_data(clip: ClipResult, label: Callable[[str], str], mesh: Mesh) -> dict[str, Any]:
-    """What the page has of a clip: names, warnings, and a block of numbers for the recording and for each choice.
+    """Return what the page has of a clip: names, warnings, and numbers of the recording and of each choice.
 
     `label` gives the name of a mode; the mesh is what a single rigid body moves.
     """
@@ -97,7 +97,7 @@ def clip_data(clip: ClipResult, label: Callable[[str], str], mesh: Mesh) -> dict
     return {
         "name": clip.facts.name,
         "joints": short_names(clip.facts.joint_names) if body else [],
-        "parents": _drawn_from(clip.parents) if body else [],
+        "parents": [] if clip.parents is None else _drawn_from(clip.parents),
         "size": size,
         "cell": cell,
         "grid": f"{1e3 * cell:g} mm" if cell < 0.01 else f"{100 * cell:g} cm" if cell < 1.0 else f"{cell:g} m",
@@ -177,7 +177,7 @@ def _deviations(
 
 @lru_cache(maxsize=4)
 def mesh_data(mesh: Mesh) -> dict[str, Any]:
-    """A mesh as the viewer draws it."""
+    """Return a mesh as the viewer draws it."""
     block = Block()
     edges = mesh.edges()
     none = np.zeros((1, edges.shape[1]))
@@ -202,7 +202,7 @@ def _joints(poses: Poses) -> np.ndarray:
 
 
 def _seen(clip: ClipResult) -> np.ndarray:
-    """The samples of the clip that the view has."""
+    """Return the samples of the clip that the view has."""
     count, motions = len(clip.times), [motion for result in clip.choices for motion in result.motions]
     body = clip.parents is not None
     a_sample = (7 if body else 12) * len(_joints(clip.truth)) * max(len(motions), 1)
@@ -217,12 +217,12 @@ def _seen(clip: ClipResult) -> np.ndarray:
 
 
 def _peaks(errors: np.ndarray, every: int) -> np.ndarray:
-    """The largest of every few samples, shape (3, about n / every)."""
+    """Return the largest of every few samples, shape (3, about n / every)."""
     return np.maximum.reduceat(errors, np.arange(0, errors.shape[1], every), axis=1) if every > 1 else errors
 
 
 def _drawn_from(parents: np.ndarray) -> list[int]:
-    """The parents to draw lines from: none from a root that only carries the body about."""
+    """Return the parents to draw lines from: none from a root that only carries the body about."""
     return np.where((parents >= 0) & carrying(parents)[parents], -1, parents).tolist()
 
 
@@ -245,7 +245,7 @@ def _extent(places: np.ndarray) -> float:
 def _about(result: ChoiceResult, keyed: bool, every: int, *, thinned: bool) -> str:
     row = result.motions[0].metrics[0]
     if keyed:
-        counts = sorted({motion.metrics[0].keys for motion in result.motions} - {None})
+        counts = sorted({count for motion in result.motions if (count := motion.metrics[0].keys) is not None})
         keys = f"{counts[0]} to {counts[-1]} keys" if len(counts) > 1 else f"{counts[0]} keys"
         keys += ", where each mode needs them"
     else:

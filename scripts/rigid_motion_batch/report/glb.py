@@ -60,7 +60,7 @@ class Lane:
 
 
 def comparison_glb(made: Made, groups: Iterable[tuple[str, ...]]) -> bytes:
-    """What is in a GLB file of the recording and of these modes, those in one lane that are one motion.
+    """Return what is in a GLB file of the recording and of these modes, those in one lane that are one motion.
 
     Raises
     ------
@@ -90,21 +90,22 @@ def _shown(clip: Clip, poses: Poses) -> Poses:
 
 
 def _document(clip: Clip, times: np.ndarray, lanes: list[Lane]) -> Document:
-    """The lanes as they are sampled at times (n,), with a key for every sample."""
+    """Return the lanes as they are sampled at times (n,), with a key for every sample."""
     names, parents, meshes = _body(clip, lanes[0].poses)
     writer = _Writer()
     surfaces = [writer.surface(mesh) for mesh in meshes]
     key_times = writer.numbers(times[:, None], bounds=True)
     step = APART * _width(lanes[0], parents, meshes)
     nodes, materials, made_meshes = writer.json["nodes"], writer.json["materials"], writer.json["meshes"]
-    top = {"name": clip.name, "rotation": UPRIGHT, "children": []}
+    top: dict[str, Any] = {"name": clip.name, "rotation": UPRIGHT, "children": []}
     nodes.append(top)
-    samplers, channels = [], []
+    samplers: list[dict[str, Any]] = []
+    channels: list[dict[str, Any]] = []
     for number, lane in enumerate(lanes):
         factor = [*linear(lane.colour), 1.0]
         surface = {"baseColorFactor": factor, "metallicFactor": 0.0, "roughnessFactor": 0.6}
         materials.append({"name": lane.name, "pbrMetallicRoughness": surface})
-        root = {"name": lane.name, "translation": [number * step, 0.0, 0.0], "children": []}
+        root: dict[str, Any] = {"name": lane.name, "translation": [number * step, 0.0, 0.0], "children": []}
         top["children"].append(len(nodes))
         nodes.append(root)
         first = len(nodes)
@@ -127,7 +128,7 @@ def _document(clip: Clip, times: np.ndarray, lanes: list[Lane]) -> Document:
 
 
 def _body(clip: Clip, poses: Poses) -> tuple[tuple[str, ...], np.ndarray, list[Mesh]]:
-    """The names of what moves, their parents, and what they look like in their own space: boxes to their children."""
+    """Return the names of what moves, their parents, and their looks in their own space: boxes to their children."""
     figure = clip.figure
     if figure is None:
         return (clip.body or clip.name,), np.array([-1]), [drill()]
@@ -147,7 +148,7 @@ def _bones(ends: np.ndarray, least: float) -> Mesh:
 
 
 def _bone(end: np.ndarray) -> Mesh:
-    """A box from the origin to an end."""
+    """Return a box from the origin to an end."""
     length = float(np.linalg.norm(end))
     along = end / length
     side = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
@@ -181,7 +182,7 @@ class _Writer:
         self.triangles = GrowingView(self.json, target=34963)
 
     def numbers(self, values: np.ndarray, *, bounds: bool = False) -> int:
-        """The number of an accessor of keys (n, columns)."""
+        """Return the number of an accessor of keys (n, columns)."""
         return self.keys.add(values.astype("<f4"), bounds=bounds)
 
     def surface(self, mesh: Mesh) -> dict[str, Any]:

@@ -49,12 +49,12 @@ class Joints:
 
 
 def joints_of(place: int, clip: ClipResult, result: ChoiceResult, numbers: Numbers) -> Joints | None:
-    """The joints of a clip under a choice; None of a single rigid body."""
+    """Return the joints of a clip under a choice; None of a single rigid body."""
     motions = [motion for motion in result.motions if motion.joint_errors is not None]
     if not motions:
         return None
-    errors = [1e3 * motion.joint_errors for motion in motions]
-    top = 1e3 * full_colour(motion.joint_errors for motion in motions)
+    in_metres = [motion.joint_errors for motion in motions if motion.joint_errors is not None]
+    errors, top = [1e3 * some for some in in_metres], 1e3 * full_colour(in_metres)
     pictures = [
         (numbers.joined(motion.modes), heat_map(some, top)) for motion, some in zip(motions, errors, strict=True)
     ]
@@ -64,7 +64,7 @@ def joints_of(place: int, clip: ClipResult, result: ChoiceResult, numbers: Numbe
         for of_joint in zip(*by_mode, strict=True)
     ]
     names = short_names(clip.facts.joint_names)
-    places = [int(motion.joint_errors.max(axis=1).argmax()) for motion in motions]
+    places = [int(np.argmax(some.max(axis=1))) for some in errors]
     worst = [f"{names[joint]} {digits(some[joint].max())} mm" for joint, some in zip(places, errors, strict=True)]
     slid = motions[0].metrics[0].recorded_slide_m
     slide = "" if slid is None else digits(1e3 * slid)
@@ -73,7 +73,7 @@ def joints_of(place: int, clip: ClipResult, result: ChoiceResult, numbers: Numbe
 
 
 def heat_map(errors: np.ndarray, top: float) -> str:
-    """The errors (joints, n) as the address of a picture, a row for each joint, the colours ending at `top`."""
+    """Return the errors (joints, n) as the address of a picture, a row for each joint, the colours ending at `top`."""
     count = errors.shape[1]
     begins = np.unique(np.arange(min(COLUMNS, count)) * count // min(COLUMNS, count))
     largest = np.maximum.reduceat(errors, begins, axis=1)
@@ -83,7 +83,7 @@ def heat_map(errors: np.ndarray, top: float) -> str:
 
 
 def png(pixels: np.ndarray, palette: bytes) -> bytes:
-    """A picture (rows, columns) of numbers of colours, three bytes each."""
+    """Return a picture (rows, columns) of numbers of colours, three bytes each."""
 
     def chunk(kind: bytes, content: bytes) -> bytes:
         return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))

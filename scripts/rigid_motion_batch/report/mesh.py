@@ -50,7 +50,7 @@ class Mesh:
         return (used.min(axis=0) + used.max(axis=0)) / 2.0
 
     def corners(self) -> np.ndarray:
-        """What is drawn of every corner of every triangle, shape (7, 3 t): its place, its normal, its tint."""
+        """Return what is drawn of every corner of every triangle, shape (7, 3 t): its place, its normal, its tint."""
         places, faces, owners = self._faces()
         normals = np.zeros((len(owners), 3))
         order = np.argsort(owners, kind="stable")
@@ -89,7 +89,7 @@ class Mesh:
 
 @cache
 def drill() -> Mesh:
-    """A drill: lofts through rounded sections; the origin is in the hand, the tip of the bit at (0, 0.16, 0.062)."""
+    """Return a drill: lofts through rounded sections; the origin is in the hand, the tip at (0, 0.16, 0.062)."""
     vertices: list[np.ndarray] = []
     triangles: list[np.ndarray] = []
     tints: list[np.ndarray] = []

@@ -76,26 +76,26 @@ class Numbers:
         return REFERENCE if REFERENCE in self.modes else None
 
     def label(self, mode: str) -> str:
-        """The name of a mode, without its algebra."""
+        """Return the name of a mode, without its algebra."""
         return label_of(mode).partition(" (")[0]
 
     def joined(self, modes: Iterable[str]) -> str:
-        """The names of modes that are one motion."""
+        """Return the names of modes that are one motion."""
         return " = ".join(map(self.label, modes))
 
     def groups(self, clip: int | None = None) -> Groups:
-        """The modes, those together that are one motion on a clip, or on all of them, under every choice."""
+        """Return the modes, those together that are one motion on a clip, or on all of them, under every choice."""
         groupings = self.groupings if clip is None else self.groupings[clip : clip + 1]
         return joint_groups(sorted({groups for some in groupings for groups in some}))
 
     def mean(self, clip: int | None = None) -> np.ndarray:
-        """The numbers of a clip, or the geometric means over those that have them, shape (measures, choices, modes)."""
+        """Return the numbers of a clip, or geometric means over those with any, shape (measures, choices, modes)."""
         if clip is not None or len(self.clips) == 1:
             return self.values[:, clip or 0]
         return np.stack([geometric_mean(of_clips) for of_clips in self.values])
 
     def deciding(self, choice: int) -> int:
-        """The measure that decides under a choice."""
+        """Return the measure that decides under a choice."""
         return KEYS if isinstance(self.choices[choice], Tolerance) else ERROR
 
 
@@ -123,7 +123,7 @@ class Gathering:
         self._groupings.append(self._same(groupings))
 
     def _same(self, value: Any) -> Any:
-        """An equal value that was here before, so that thousands of clips share one."""
+        """Return an equal value that was here before, so that thousands of clips share one."""
         return self._known.setdefault(value, value)
 
     def numbers(self) -> Numbers:
@@ -141,7 +141,7 @@ class Gathering:
 
 
 def digits(value: float | None, places: int = 3) -> str:
-    """A number with so many significant digits, as tables show it."""
+    """Return a number with so many significant digits, as tables show it."""
     if value is None or not isfinite(value):
         return NONE
     if abs(value) < NOTHING * 1e3:
@@ -150,7 +150,7 @@ def digits(value: float | None, places: int = 3) -> str:
 
 
 def percent(share: float) -> str:
-    """A share as prose has it: "64 %"."""
+    """Return a share as prose has it: "64 %"."""
     return f"{100 * share:.0f}\u00a0%"
 
 

@@ -281,7 +281,7 @@ def _address(clip: str, choice: str, seconds: float | None = None) -> str:
 
 
 def _start(numbers: Numbers, choices: Sequence[tuple[str, tuple[Choice, ...]]]) -> tuple[str, str]:
-    """What the page opens with: of the first kind of choices the middle one, and the clip with the largest error."""
+    """Return what the page opens with: the middle choice of the first kind, and the clip with the largest error."""
     kind = next(kind for kind in KINDS for choice in numbers.choices if type(choice) is kind)
     places = [place for place, choice in enumerate(numbers.choices) if type(choice) is kind]
     at = places[(len(places) - 1) // 2]
@@ -385,7 +385,7 @@ def _csv(rows: Sequence[Metrics]) -> str:
 
 @cache
 def script_of(names: tuple[str, ...]) -> Markup:
-    """The modules as one: imports and exports are only there for each of them alone."""
+    """Return the modules as one: imports and exports are only there for each of them alone."""
     texts = []
     for name in names:
         text = (HERE / "viewer" / f"{name}.js").read_text(encoding="utf-8")
@@ -396,7 +396,7 @@ def script_of(names: tuple[str, ...]) -> Markup:
 
 @cache
 def _shaders() -> dict[str, list[str]]:
-    """The sources of each program: of its vertices, and of its fragments."""
+    """Return the sources of each program: of its vertices, and of its fragments."""
     text = (HERE / "viewer" / "shaders.glsl").read_text(encoding="utf-8")
     parts = re.split(r"^//// (\w+)\n", text, flags=re.MULTILINE)[1:]
     return {name: sources.split("----\n") for name, sources in zip(parts[::2], parts[1::2], strict=True)}

@@ -50,7 +50,7 @@ class Grid:
 
 
 def grids(numbers: Numbers, clip: int | None = None) -> list[Grid]:
-    """A grid for each measure that a clip has, or that the mean over all clips has."""
+    """Return a grid for each measure that a clip has, or that the mean over all clips has."""
     values = numbers.mean(clip)
     groups = numbers.groups(clip)
     where = (
@@ -91,13 +91,13 @@ def grids(numbers: Numbers, clip: int | None = None) -> list[Grid]:
 
 
 def _least(texts: Iterable[str]) -> str:
-    """The lowest as it is shown, so that ties are ties; nothing where all are."""
+    """Return the lowest as it is shown, so that ties are ties; nothing where all are."""
     different = set(texts) - {NONE}
     return min(different, key=float) if len(different) > 1 else ""
 
 
 def _change(value: float, reference: int | None, row: np.ndarray, group: Sequence[str], numbers: Numbers) -> str:
-    """A value beside the reference's, in per cent."""
+    """Return a value beside the reference's, in per cent."""
     if reference is None or not np.isfinite(value):
         return ""
     if numbers.reference in group:
@@ -167,7 +167,7 @@ def needed_rows(needed: Sequence[KeysNeeded]) -> tuple[list[str], list[tuple[tup
 
 
 def decimated_rows(result: ChoiceResult) -> list[tuple[tuple[str, ...] | None, list[Cell]]]:
-    """The keys of each motion of a body, and those of Blender's Decimate with no larger error, as multiples of them."""
+    """Return the keys of each motion of a body, and as multiples those of Blender's Decimate with no larger error."""
     ours = {row.mode: row for row in result.decimated if row.how != DECIMATE}
     theirs = {row.mode: row for row in result.decimated if row.how == DECIMATE}
     rows: list[tuple[tuple[str, ...] | None, list[Cell]]] = []

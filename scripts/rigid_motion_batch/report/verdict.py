@@ -52,7 +52,7 @@ Text = tuple[Part, ...]
 
 
 def _say(template: str, *values: Part) -> Text:
-    """A text with values in the places of its braces."""
+    """Return a text with values in the places of its braces."""
     words = map(Part, template.split("{}"))
     return tuple(part for both in zip_longest(words, values) for part in both if part and part.text)
 
@@ -73,7 +73,7 @@ class Verdict:
 
 
 def plain(text: Text) -> str:
-    """The words alone, as a terminal shows them."""
+    """Return the words alone, as a terminal shows them."""
     return "".join(part.text for part in text).replace("\u00a0", " ")
 
 
@@ -122,7 +122,7 @@ class _Contest:
 
 
 def verdict(numbers: Numbers, needed: Sequence[KeysNeeded] = ()) -> Verdict:
-    """What a run says, in one sentence and up to three facts.
+    """Return what a run says, in one sentence and up to three facts.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def _contests(numbers: Numbers) -> Iterable[_Contest]:
 
 
 def _best(contest: _Contest) -> tuple[int, int, np.ndarray] | None:
-    """The best group, what it is held against, and the ratios of the two, shape (choices,); None without a winner.
+    """Return best group, what it is held against, and the ratios of the two, shape (choices,); None without a winner.
 
     Held against the reference, or the next best in a run without it.
     """
@@ -195,7 +195,7 @@ def _keys_needed(numbers: Numbers, needed: Sequence[KeysNeeded]) -> Text | None:
     at = together.rates.index(rate)
     whole = together.clips[..., at] == together.asked[at]
     shares = np.where(whole, together.shares[..., at], np.inf)
-    group, way = np.unravel_index(int(shares.argmin()), shares.shape)
+    group, way = np.unravel_index(np.argmin(shares), shares.shape)
     mode = together.groups[group][0]
     reference = Part(numbers.label(REFERENCE), "mode", REFERENCE)
     if shares[group, way] > 1.0 - TIE:
@@ -330,7 +330,7 @@ def _nobody(contest: _Contest) -> Text:
 
 
 def _gain(contest: _Contest) -> Text | None:
-    """The largest gain with as many keys, beside a sentence that says something else."""
+    """Return the largest gain with as many keys, beside a sentence that says something else."""
     found = _best(contest)
     if not found:
         return None
@@ -355,7 +355,7 @@ def _wins(contest: _Contest) -> Text | None:
     many = _number(f"{'Fewest keys' if contest.kind is Tolerance else 'Closest'} in {won} of {cases}")
     if not lost.any():
         return _say("{} cases", many)
-    clip, choice = np.unravel_index(int(np.where(lost, loss, -1.0).argmax()), loss.shape)
+    clip, choice = np.unravel_index(np.argmax(np.where(lost, loss, -1.0)), loss.shape)
     name, at = contest.numbers.clips[clip], contest.numbers.choices[contest.places[choice]]
     return _say(
         f"{{}} cases; {'not' if lost.sum() == 1 else 'farthest from it'} in {{}}: there {{}} is, "
@@ -367,7 +367,7 @@ def _wins(contest: _Contest) -> Text | None:
 
 
 def _best_of(numbers: Numbers, contest: _Contest) -> Text | None:
-    """The best mode of each segment beside the best single one of each clip."""
+    """Return the best mode of each segment beside the best single one of each clip."""
     if BEST_OF not in numbers.modes or contest.kind is Tolerance:
         return None
     own = numbers.values[ERROR][:, contest.places][..., numbers.modes.index(BEST_OF)]
@@ -397,7 +397,7 @@ def _other(numbers: Numbers, contest: _Contest) -> Text | None:
 
 
 def _others(contest: _Contest) -> Text | None:
-    """What did not pay: the modes that are neither the best nor the reference, beside the reference."""
+    """Return what did not pay: the modes that are neither the best nor the reference, beside the reference."""
     found = _best(contest)
     if not found or contest.reference is None:
         return None

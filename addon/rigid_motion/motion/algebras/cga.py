@@ -46,7 +46,7 @@ def cga_slerp(first: Poses, second: Poses, u: np.ndarray) -> Poses:
 
 
 def encode(poses: Poses) -> np.ndarray:
-    """The versors T R S, shape (..., 32)."""
+    """Return the versors T R S, shape (..., 32)."""
     scales = np.ones(poses.shape) if poses.scales is None else poses.scales
     return CGA.product(_translator(poses.positions), _rotor(poses.quaternions), _dilator(np.log(scales)))
 
@@ -74,7 +74,7 @@ def extract(versor: np.ndarray, scaled: bool = True) -> Poses:
 
 
 def logarithm(versor: np.ndarray) -> np.ndarray:
-    """The bivector whose exponential is the versor of a similarity that turns by at most 180 degrees."""
+    """Return the bivector whose exponential is the versor of a similarity that turns by at most 180 degrees."""
     poses = extract(versor)
     w, vector = poses.quaternions[..., :1], poses.quaternions[..., 1:]
     half_angle = np.arctan2(np.linalg.norm(vector, axis=-1, keepdims=True), w)
@@ -84,7 +84,7 @@ def logarithm(versor: np.ndarray) -> np.ndarray:
 
 
 def exponential(bivector: np.ndarray) -> np.ndarray:
-    """The versor of a bivector: advance, turn and growth at once, for one unit of time."""
+    """Return the versor of a bivector: advance, turn and growth at once, for one unit of time."""
     velocity, turn, log_scales = _advance(bivector), _turn(bivector), _log_scale(bivector)
     half_turn = turn / 2.0
     h = np.linalg.norm(half_turn, axis=-1, keepdims=True)

@@ -23,19 +23,19 @@ def dq_sclerp(first: Poses, second: Poses, u: np.ndarray) -> Poses:
 
 
 def encode(poses: Poses) -> np.ndarray:
-    """A = r, B = t r / 2."""
+    """Return a = r, B = t r / 2."""
     pure = np.concatenate((np.zeros_like(poses.positions[..., :1]), poses.positions), axis=-1)
     return np.concatenate((poses.quaternions, 0.5 * multiply(pure, poses.quaternions)), axis=-1)
 
 
 def extract(d: np.ndarray, scales: np.ndarray | None = None) -> Poses:
-    """The rotation A and the translation, the vector part of 2 B A*."""
+    """Return the rotation A and the translation, the vector part of 2 B A*."""
     real, dual = d[..., :4], d[..., 4:]
     return Poses(2.0 * multiply(dual, conjugate(real))[..., 1:], real, scales)
 
 
 def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(A + eps B)(C + eps D) = A C + eps (A D + B C)."""
+    """Return (A + eps B)(C + eps D) = A C + eps (A D + B C)."""
     return np.concatenate(
         (
             multiply(a[..., :4], b[..., :4]),
@@ -46,12 +46,12 @@ def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def inverse(d: np.ndarray) -> np.ndarray:
-    """A* + eps B*: the inverse of a unit dual quaternion."""
+    """Return A* + eps B*: the inverse of a unit dual quaternion."""
     return np.concatenate((conjugate(d[..., :4]), conjugate(d[..., 4:])), axis=-1)
 
 
 def logarithm(d: np.ndarray) -> np.ndarray:
-    """The dual vector, shape (..., 6), whose exponential is d. Needs a non-negative w."""
+    """Return the dual vector, shape (..., 6), whose exponential is d. Needs a non-negative w."""
     w, v, dual_w, dual_v = np.split(d, (1, 4, 5), axis=-1)
     half_angle = np.arctan2(np.linalg.norm(v, axis=-1, keepdims=True), w)
     # log d = f(d) v(d) with f = h / sin h; its dual part is f v' + f' v.
@@ -61,7 +61,7 @@ def logarithm(d: np.ndarray) -> np.ndarray:
 
 
 def exponential(b: np.ndarray) -> np.ndarray:
-    """The unit dual quaternion of a dual vector of shape (..., 6)."""
+    """Return the unit dual quaternion of a dual vector of shape (..., 6)."""
     real, dual = b[..., :3], b[..., 3:]
     h = np.linalg.norm(real, axis=-1, keepdims=True)
     along = np.sum(real * dual, axis=-1, keepdims=True)

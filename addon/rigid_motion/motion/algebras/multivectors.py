@@ -51,7 +51,7 @@ class Algebra:
         return [self.index(blade) for blade in blades]
 
     def multivector(self, **coefficients: np.ndarray | float) -> np.ndarray:
-        """A multivector from its blades' coefficients, all of one shape (...,); the scalar is called `one`."""
+        """Return a multivector from its blades' coefficients, all of one shape (...,); the scalar is called `one`."""
         values = np.broadcast_arrays(*coefficients.values())
         result = np.zeros((*values[0].shape, self.size))
         for blade, value in zip(coefficients, values, strict=True):
@@ -59,12 +59,12 @@ class Algebra:
         return result
 
     def product(self, *factors: np.ndarray) -> np.ndarray:
-        """The geometric product of multivectors (..., size), from left to right."""
+        """Return the geometric product of multivectors (..., size), from left to right."""
         result = factors[0]
         for factor in factors[1:]:
             result = np.einsum("...i,...ik,ik->...k", result, factor[..., self._partner], self._sign)
         return result
 
     def reverse(self, a: np.ndarray) -> np.ndarray:
-        """The factors of each blade in reverse order; the inverse of a unit versor."""
+        """Return the factors of each blade in reverse order; the inverse of a unit versor."""
         return a * self._reversal

@@ -37,7 +37,7 @@ def pga_slerp(first: Poses, second: Poses, u: np.ndarray) -> Poses:
 
 
 def encode(poses: Poses) -> np.ndarray:
-    """The motors T R, shape (..., 16)."""
+    """Return the motors T R, shape (..., 16)."""
     t1, t2, t3 = np.moveaxis(poses.positions, -1, 0)
     w, x, y, z = np.moveaxis(poses.quaternions, -1, 0)
     translator = PGA.multivector(one=1.0, e01=-t1 / 2.0, e02=-t2 / 2.0, e03=-t3 / 2.0)
@@ -58,7 +58,7 @@ def extract(motor: np.ndarray, scales: np.ndarray | None = None) -> Poses:
 
 
 def logarithm(motor: np.ndarray) -> np.ndarray:
-    """The bivector whose exponential is a unit motor with non-negative scalar.
+    """Return the bivector whose exponential is a unit motor with non-negative scalar.
 
     A motor is s + b + p I with a bivector b whose square is a scalar plus a multiple of I; the function h / sin h of
     that "Study number" has the part f that scales b and the part f' that moves b's rotation over to its translation.
@@ -72,7 +72,7 @@ def logarithm(motor: np.ndarray) -> np.ndarray:
 
 
 def exponential(bivector: np.ndarray) -> np.ndarray:
-    """The unit motor of a bivector."""
+    """Return the unit motor of a bivector."""
     h = np.linalg.norm(bivector[..., _ROTATION], axis=-1, keepdims=True)
     motor = sinc(h) * bivector - sinc_slope(h) * _pitch(bivector) * _moment(bivector)
     motor[..., [_SCALAR]] = np.cos(h)
@@ -86,5 +86,5 @@ def _moment(bivector: np.ndarray) -> np.ndarray:
 
 
 def _pitch(bivector: np.ndarray) -> np.ndarray:
-    """The coefficient of I in b^2 / 2: the translation along the axis of the rotation, times the rotation."""
+    """Return the coefficient of I in b^2 / 2: the translation along the axis of the rotation, times the rotation."""
     return PGA.product(bivector, bivector)[..., [_PSEUDOSCALAR]] / 2.0
