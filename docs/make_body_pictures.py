@@ -27,7 +27,7 @@ from rigid_motion_batch.cli import compare
 from rigid_motion_batch.palette import ERROR_COLOURS, full_colour
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.recordings.figures import short_names
+from rigid_motion_batch.recordings.rest_bodies import short_names
 from rigid_motion_batch.scenes.film import render_still
 from rigid_motion_batch.scenes.materials import surface
 from tests.rigs import dancer, figure
@@ -74,7 +74,7 @@ def draw_errors(clip: Clip, result: ChoiceResult, path: Path) -> None:
         colours = LinearSegmentedColormap.from_list("errors", ERROR_COLOURS)
         place = (times[0], times[-1], joints - 0.5, -0.5)
         drawn = axes.imshow(errors, colours, vmin=0.0, vmax=top, aspect="auto", interpolation="nearest", extent=place)
-        axes.set_yticks(range(joints), short_names(clip.figure.joints))
+        axes.set_yticks(range(joints), short_names(clip.rest_body.joints))
         axes.set_xlabel("seconds")
         figure.colorbar(drawn, label="shell error, mm", pad=0.01)
         figure.savefig(path, transparent=True, metadata={"Date": None})

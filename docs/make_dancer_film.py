@@ -26,10 +26,10 @@ from rigid_motion_batch.scenes import captions
 from rigid_motion_batch.scenes.film import render_film, render_still
 from rigid_motion_batch.scenes.materials import ink, surface
 from rigid_motion_batch.scenes.scene import make_lights, set_up_render
-from rigid_motion_batch.scenes.settings import StageSettings
+from rigid_motion_batch.scenes.settings import SceneSettings
 from tests.rigs import dancer, figure
 
-SETTINGS = StageSettings(resolution=(960, 540), antialiasing="5", fps=dancer.FPS)
+SETTINGS = SceneSettings(resolution=(960, 540), antialiasing="5", fps=dancer.FPS)
 
 MODE = "motor_spline"
 TOLERANCE, RADIUS = 0.01, 0.03

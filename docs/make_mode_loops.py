@@ -30,10 +30,10 @@ from rigid_motion_batch.scenes import captions
 from rigid_motion_batch.scenes.film import render_film, render_still
 from rigid_motion_batch.scenes.materials import ink, surface
 from rigid_motion_batch.scenes.scene import make_lights, set_up_render
-from rigid_motion_batch.scenes.settings import StageSettings
+from rigid_motion_batch.scenes.settings import SceneSettings
 from tests.rigs import figure
 
-SETTINGS = StageSettings(resolution=(960, 540), antialiasing="5", fps=24)
+SETTINGS = SceneSettings(resolution=(960, 540), antialiasing="5", fps=24)
 THEME = palette.DARK
 
 HANDLE = Vector((0.0, 0.0, -0.8))
@@ -152,7 +152,7 @@ def by_mode(keyed: bpy.types.Object, mode: str) -> Poses:
     the share of the straight way that Vector + Quaternion has gone.
     """
     keys = key_poses()
-    straight = in_betweens(source_of(keyed), FRAMES, "lerp_slerp").wanted.positions
+    straight = in_betweens(source_of(keyed), FRAMES, "lerp_slerp").requested.positions
     key_frames = np.array([frame for frame, *_ in KEYS])
     segment = np.searchsorted(key_frames, FRAMES, side="right") - 1
     way = np.diff(keys.positions, axis=0)[segment]

@@ -22,7 +22,7 @@ from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.reconstructions import reconstruct
 from rigid_motion_batch.cli import compare
 from rigid_motion_batch.recordings.clip_reading import read_clips
-from rigid_motion_batch.scenes.scene import StageSettings, build_stage
+from rigid_motion_batch.scenes.scene import SceneSettings, build_scene
 
 SMOOTH = ("lerp_slerp", "dq_sclerp", "motor_spline")
 
@@ -48,9 +48,9 @@ STILLS = {
 def main() -> None:
     """Render everything anew."""
     for picture, still in STILLS.items():
-        settings = StageSettings(resolution=still.resolution, antialiasing="8", subject=still.subject, distinct=True)
+        settings = SceneSettings(resolution=still.resolution, antialiasing="8", subject=still.subject, distinct=True)
         (clip,), _ = read_clips([str(DOCS.parent / "assets" / f"{still.asset}.csv")], "blender")
-        scene = build_stage(reconstruct(clip, Uniform(still.rate), still.modes, radius=0.1), settings)
+        scene = build_scene(reconstruct(clip, Uniform(still.rate), still.modes, radius=0.1), settings)
         if hasattr(scene.render.image_settings, "media_type"):
             scene.render.image_settings.media_type = "IMAGE"
         scene.render.image_settings.file_format = "PNG"

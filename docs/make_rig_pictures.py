@@ -27,11 +27,11 @@ from rigid_motion_batch.scenes import captions
 from rigid_motion_batch.scenes.film import render_film, render_still
 from rigid_motion_batch.scenes.materials import ink, surface
 from rigid_motion_batch.scenes.scene import make_lights, set_up_render
-from rigid_motion_batch.scenes.settings import StageSettings
+from rigid_motion_batch.scenes.settings import SceneSettings
 from tests.rigs import figure, scenes
 from tests.rigs.human import human
 
-SETTINGS = StageSettings(resolution=(960, 540), antialiasing="8", fps=24)
+SETTINGS = SceneSettings(resolution=(960, 540), antialiasing="8", fps=24)
 
 SKIN, STEEL, WOOD, FLOOR = "#93A0B3", "#DDE3EA", "#C98B4A", "#2B313B"
 

@@ -158,9 +158,9 @@ def _errors_of_clips(clips: Sequence[Clip], part: float) -> dict[str, float]:
 
     def with_part(segments: Segments, at_keys: Callable[..., np.ndarray]) -> Curves:
         def changed(leaving: np.ndarray, arriving: np.ndarray, *others: np.ndarray) -> np.ndarray:
-            found, rests = at_keys(leaving, arriving, *others), others[-1]
-            added = np.where(rests[:, 1:], 0.0, found[..., 2:] - leaving[..., 1:])
-            return np.concatenate((found[..., :2], found[..., 2:] + (2.0 * part - 1.0) * added), axis=-1)
+            result, rests = at_keys(leaving, arriving, *others), others[-1]
+            added = np.where(rests[:, 1:], 0.0, result[..., 2:] - leaving[..., 1:])
+            return np.concatenate((result[..., :2], result[..., 2:] + (2.0 * part - 1.0) * added), axis=-1)
 
         return bent(segments, changed)
 
@@ -182,11 +182,11 @@ def _errors_of_clips(clips: Sequence[Clip], part: float) -> dict[str, float]:
 
 def _needed(clips: Sequence[Clip], modes: Sequence[str], *, fit: bool) -> dict[str, dict[str, dict[str, float]]]:
     """By mode, way to have keys and rate, the keys needed as a share of those of `lerp_slerp`."""
-    found = []
+    result = []
     for clip in clips:
         _say(f"keys needed, {clip.name} ...")
-        found.append(_apart(keys_needed(OfRigidBody(clip, RADIUS, fit), modes)))
-    means = overall(found)
+        result.append(_apart(keys_needed(OfRigidBody(clip, RADIUS, fit), modes)))
+    means = overall(result)
     decimations = OfRigidBody(clips[0], RADIUS, fit).decimations
     shares = {group[0]: means.shares[row] for row, group in enumerate(means.groups)}
     return {
@@ -198,20 +198,20 @@ def _needed(clips: Sequence[Clip], modes: Sequence[str], *, fit: bool) -> dict[s
     }
 
 
-def _apart(found: KeysNeeded) -> KeysNeeded:
+def _apart(result: KeysNeeded) -> KeysNeeded:
     """With a row for each mode, also where several are one motion."""
-    rows = [row for row, group in enumerate(found.groups) for _ in group]
-    groups = tuple((mode,) for group in found.groups for mode in group)
+    rows = [row for row, group in enumerate(result.groups) for _ in group]
+    groups = tuple((mode,) for group in result.groups for mode in group)
     return KeysNeeded(
-        found.clip,
+        result.clip,
         groups,
-        found.rates,
-        found.durations,
-        found.reference_keys,
-        found.targets,
-        found.keys[rows],
-        found.reached[rows],
-        found.uniform_errors[rows],
+        result.rates,
+        result.durations,
+        result.reference_keys,
+        result.targets,
+        result.keys[rows],
+        result.reached[rows],
+        result.uniform_errors[rows],
     )
 
 

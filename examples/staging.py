@@ -22,7 +22,7 @@ from rigid_motion_batch.scenes import captions
 from rigid_motion_batch.scenes.film import render_still, save_blend
 from rigid_motion_batch.scenes.materials import ink
 from rigid_motion_batch.scenes.scene import make_lights, set_up_render
-from rigid_motion_batch.scenes.settings import StageSettings
+from rigid_motion_batch.scenes.settings import SceneSettings
 from tests.rigs import figure
 
 RESOLUTION = 960, 540
@@ -68,7 +68,7 @@ def begin(frames: int, fps: int = 24) -> bpy.types.Scene:
         animation.register()
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
-    set_up_render(scene, StageSettings(resolution=RESOLUTION, antialiasing="8", fps=fps), frames)
+    set_up_render(scene, SceneSettings(resolution=RESOLUTION, antialiasing="8", fps=fps), frames)
     scene.render.dither_intensity = 0.0  # Its grain is most of a file.
     make_lights(scene)
     return scene
@@ -122,12 +122,12 @@ def key(obj: bpy.types.Object | bpy.types.PoseBone, frame: float, matrix: Matrix
 def on_frames(frames: Iterable[float], measure: Callable[[], Sequence[float]]) -> np.ndarray:
     """What is measured on each frame, shape (frames, n). The scene is left where it was."""
     scene = bpy.context.scene
-    before, found = scene.frame_current, []
+    before, result = scene.frame_current, []
     for frame in frames:
         scene.frame_set(int(frame), subframe=float(frame) % 1.0)
-        found.append(tuple(measure()))
+        result.append(tuple(measure()))
     scene.frame_set(before)
-    return np.array(found)
+    return np.array(result)
 
 
 def all_frames() -> range:

@@ -154,9 +154,9 @@ def install(blender: str | None, requirements: list[str], folder: Path | None = 
     folder = folder.absolute() if folder else ROOT / ".venv" / name
     python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     stamp = folder / "installed.json"
-    wanted = hashlib.sha256("\n".join([sys.version, *requirements]).encode()).hexdigest()
+    requested = hashlib.sha256("\n".join([sys.version, *requirements]).encode()).hexdigest()
     installed = json.loads(stamp.read_text()) if stamp.is_file() and python.exists() else []
-    if wanted in installed:
+    if requested in installed:
         return python
     what = f"Blender {blender}" if blender else "what is needed without Blender"
     print(f"Setting up {what} for Python {PYTHON} in {folder} ...", file=sys.stderr, flush=True)
@@ -178,7 +178,7 @@ def install(blender: str | None, requirements: list[str], folder: Path | None = 
     if subprocess.call(pip, cwd=ROOT, stdout=sys.stderr) != 0:
         _fail("the packages above could not be installed; with the network back, the same command goes on")
         return None
-    stamp.write_text(json.dumps([*installed, wanted]))
+    stamp.write_text(json.dumps([*installed, requested]))
     return python
 
 

@@ -27,7 +27,7 @@ def blank() -> bpy.types.Context:
 def _preferences() -> Settings:
     """Every preference that is one value or a list of values, but for colours; and which add-ons are on."""
     preferences = bpy.context.preferences
-    found: Settings = [("addons", entry.module, True) for entry in preferences.addons]
+    result: Settings = [("addons", entry.module, True) for entry in preferences.addons]
     for part in preferences.bl_rna.properties:
         if part.type == "POINTER" and part.identifier != "rna_type":
             owner = getattr(preferences, part.identifier)
@@ -35,5 +35,5 @@ def _preferences() -> Settings:
                 if setting.type not in ("POINTER", "COLLECTION"):
                     value = getattr(owner, setting.identifier)
                     listed = getattr(setting, "is_array", False)
-                    found.append((part.identifier, setting.identifier, tuple(value) if listed else value))
-    return found
+                    result.append((part.identifier, setting.identifier, tuple(value) if listed else value))
+    return result

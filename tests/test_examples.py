@@ -57,11 +57,11 @@ def measured(path: Path) -> list[dict[str, str]]:
 def play(blend: Path, look: Callable[[bpy.types.Depsgraph], Sequence]) -> np.ndarray:
     """What is seen on each frame of a file, without the extension, shape (frames, ...)."""
     bpy.ops.wm.open_mainfile(filepath=str(blend), use_scripts=False)
-    scene, found = bpy.context.scene, []
+    scene, result = bpy.context.scene, []
     for frame in range(scene.frame_start, scene.frame_end + 1):
         scene.frame_set(frame)
-        found.append(look(bpy.context.evaluated_depsgraph_get()))
-    return np.array(found)
+        result.append(look(bpy.context.evaluated_depsgraph_get()))
+    return np.array(result)
 
 
 def matrix(depsgraph: bpy.types.Depsgraph, name: str) -> object:
@@ -109,14 +109,14 @@ def test_a_sword_stays_in_the_hand_and_the_screw_keeps_the_arm_long(make: Callab
     assert all(line in printed for line in claims("sword"))
 
     def look(depsgraph: bpy.types.Depsgraph) -> list[list[float]]:
-        found = []
+        result = []
         for name in ("Blender", "Screw"):
             rig = bpy.data.objects[f"{name} rig"].evaluated_get(depsgraph)
             bones, world = rig.pose.bones, rig.matrix_world
             slip = matrix(depsgraph, f"{name} sword").translation - world @ bones["hand"].head
             reach = world @ bones["DEF-forearm"].tail - world @ sword.SHOULDER
-            found.append([slip.length, reach.length - (sword.WRIST - sword.SHOULDER).length])
-        return found
+            result.append([slip.length, reach.length - (sword.WRIST - sword.SHOULDER).length])
+        return result
 
     seen = np.abs(play(tmp_path / "examples" / "sword" / "sword.blend", look)).max(axis=0)
     assert seen[:, 0].max() < SINGLE

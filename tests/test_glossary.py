@@ -20,8 +20,8 @@ def anchors(page: str) -> list[str]:
 
 def links(page: str) -> list[str]:
     """Of a page to others of the checkout, or to places on it."""
-    found = re.findall(r"\]\(([^)\s]+)\)", page)
-    return [link for link in found if not re.match(r"[a-z]+:", link)]
+    result = re.findall(r"\]\(([^)\s]+)\)", page)
+    return [link for link in result if not re.match(r"[a-z]+:", link)]
 
 
 @pytest.mark.parametrize("path", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())

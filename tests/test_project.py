@@ -38,13 +38,13 @@ FLOORS = {
 
 def imported(path: Path) -> set[str]:
     """The top-level names of all modules that a file imports, "." for its own package."""
-    found = set()
+    result = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            found |= {alias.name.split(".")[0] for alias in node.names}
+            result |= {alias.name.split(".")[0] for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            found.add("." * node.level + (node.module or "").split(".")[0])
-    return found
+            result.add("." * node.level + (node.module or "").split(".")[0])
+    return result
 
 
 @pytest.mark.parametrize("command", [["check"], ["format", "--check"]], ids=["lint", "format"])

@@ -35,9 +35,9 @@ class Command(SphinxDirective):
         told = help_of(root, asked, *subcommands)
         name = "-".join([*([Path(asked).stem] if asked.endswith(".py") else []), *subcommands])
         usage = re.sub(r"\n\s+", "\n    ", told["usage"])
-        found = [*prose(told["description"]), nodes.literal_block(usage, usage, language="text")]
-        found += [option_list(name, group["options"]) for group in told["groups"]]
-        return found + epilog(told["epilog"])
+        result = [*prose(told["description"]), nodes.literal_block(usage, usage, language="text")]
+        result += [option_list(name, group["options"]) for group in told["groups"]]
+        return result + epilog(told["epilog"])
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
@@ -71,26 +71,26 @@ def option_list(name: str, options: list[dict[str, str]]) -> nodes.definition_li
 def epilog(text: str) -> list[nodes.Node]:
     """The parts of an epilog, with their titles: examples as they are typed, everything else as text."""
     first, *parts = TITLE.split(text.strip("\n"))
-    found = prose(first)
+    result = prose(first)
     for title, body in zip(parts[::2], parts[1::2], strict=True):
         indented = re.match(r"(?:  .*\n?|\n)*", body).group()
-        found.append(nodes.rubric(title, title[0].upper() + title[1:]))
-        found += prose(textwrap.dedent(indented)) + prose(body[len(indented) :])
-    return found
+        result.append(nodes.rubric(title, title[0].upper() + title[1:]))
+        result += prose(textwrap.dedent(indented)) + prose(body[len(indented) :])
+    return result
 
 
 def prose(text: str) -> list[nodes.Node]:
     """Paragraphs; what is indented, typed or set in columns stays line by line."""
-    found: list[nodes.Node] = []
+    result: list[nodes.Node] = []
     for block in re.split(r"\n\s*\n", text.strip("\n")):
         if not block.strip():
             continue
         if re.search(r"(?m)^(\s|python |blender )|\S   +\S", block):
             lines = textwrap.dedent(block)
-            found.append(nodes.literal_block(lines, lines, language="text"))
+            result.append(nodes.literal_block(lines, lines, language="text"))
         else:
-            found.append(nodes.paragraph("", "", *inline_code(block)))
-    return found
+            result.append(nodes.paragraph("", "", *inline_code(block)))
+    return result
 
 
 def inline_code(text: str) -> list[nodes.Node]:

@@ -48,8 +48,8 @@ def print_description(parser: argparse.ArgumentParser, file: object = None) -> N
 
 
 def subcommands_of(parser: argparse.ArgumentParser) -> list[str]:
-    found = (action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
-    return [name for action in found for name in action.choices]
+    result = (action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
+    return [name for action in result for name in action.choices]
 
 
 def of_option(formatter: argparse.HelpFormatter, action: argparse.Action) -> dict[str, str]:

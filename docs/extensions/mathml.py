@@ -38,11 +38,11 @@ def display(translator: nodes.NodeVisitor, node: nodes.math_block) -> None:
 def mathml(node: nodes.Element, *, display: bool) -> str:
     """The formula for browsers. One that cannot be set is a warning, and stays as it was written."""
     try:
-        found = tex2mathml(node.astext(), as_block=display)
+        result = tex2mathml(node.astext(), as_block=display)
     except MathError as error:
         logger.warning("formula %r: %s", node.astext(), error, location=node)
         return f"<code>{node.astext()}</code>"
-    formula = ElementTree.fromstring(found.replace("<mo>&ApplyFunction;</mo>", ""))
+    formula = ElementTree.fromstring(result.replace("<mo>&ApplyFunction;</mo>", ""))
     for element in formula.iter():
         element.tag = element.tag.rpartition("}")[2]
     for element in list(formula.iter()):

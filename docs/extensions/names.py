@@ -56,8 +56,8 @@ def document_data(app: Sphinx, what: str, name: str, obj: object, options: objec
     modules = [module for module in sys.modules if module.startswith(f"{package}.")] if what == "data" else []
     for module in modules:
         documented = ModuleAnalyzer.for_module(module).find_attr_docs()
-        if found := documented.get(("", attribute)):
-            lines[:] = found
+        if result := documented.get(("", attribute)):
+            lines[:] = result
             return
 
 

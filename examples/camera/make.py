@@ -128,8 +128,8 @@ def poses_on(obj: bpy.types.Object, frames: np.ndarray) -> Poses:
         location, rotation, _ = staging.evaluated(obj).matrix_world.decompose()
         return (*location, *rotation)
 
-    found = staging.on_frames(frames, pose)
-    return Poses(found[:, :3], found[:, 3:])
+    result = staging.on_frames(frames, pose)
+    return Poses(result[:, :3], result[:, 3:])
 
 
 def shake(poses: Poses, frames: np.ndarray) -> np.ndarray:

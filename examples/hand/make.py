@@ -19,7 +19,7 @@ from rigid_motion_batch.analysis.reconstructions import reconstruct
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.scenes.film import render_still
-from rigid_motion_batch.scenes.scene import StageSettings, build_stage
+from rigid_motion_batch.scenes.scene import SceneSettings, build_scene
 
 SEED = 7
 
@@ -63,9 +63,9 @@ def log() -> str:
 
 def picture(recording: Path, path: Path) -> None:
     """A moment of the comparison's own scene."""
-    settings = StageSettings(resolution=SIZE, antialiasing="8", subject="controller", distinct=True)
+    settings = SceneSettings(resolution=SIZE, antialiasing="8", subject="controller", distinct=True)
     (clip,), _ = read_clips([str(recording)], "unity")
-    scene = build_stage(reconstruct(clip, Uniform(RATE), MODES, radius=0.1), settings)
+    scene = build_scene(reconstruct(clip, Uniform(RATE), MODES, radius=0.1), settings)
     scene.frame_set(1 + round(MOMENT * settings.fps))
     render_still(scene, path)
 

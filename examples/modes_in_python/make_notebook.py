@@ -54,8 +54,8 @@ def main() -> None:
 
     notebook = nbformat.v4.new_notebook()
     new = {"markdown": nbformat.v4.new_markdown_cell, "code": nbformat.v4.new_code_cell}
-    found = cells(SOURCE.read_text(encoding="utf-8"))
-    notebook.cells = [new[kind](text, id=f"cell-{number}") for number, (kind, text) in enumerate(found)]
+    result = cells(SOURCE.read_text(encoding="utf-8"))
+    notebook.cells = [new[kind](text, id=f"cell-{number}") for number, (kind, text) in enumerate(result)]
     notebook.metadata.kernelspec = {"display_name": "Python 3", "language": "python", "name": "python3"}
     # The kernel is a process of its own: it takes the packages from this checkout too, whatever is installed.
     packages = [str(CHECKOUT / "addon"), str(CHECKOUT / "scripts")]

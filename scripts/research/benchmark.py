@@ -252,14 +252,14 @@ def reduction(count: int, tolerance: float = 0.005) -> dict[str, float]:
     """Key reduction of so many samples, beside greedy insertion: the faster of two runs."""
     times, poses = recording(count)
     seconds: dict[str, list[float]] = {"": [], "greedy_": []}
-    found: dict[str, float] = {"samples": count}
+    result: dict[str, float] = {"samples": count}
     for _ in range(2):
         for name, choose in (("", reduce_keys), ("greedy_", greedy)):
             start = time.perf_counter()
             keys = choose(times, poses, tolerance=tolerance)
             seconds[name].append(time.perf_counter() - start)
-            found |= {f"{name}seconds": min(seconds[name]), f"{name}key_count": len(keys)}
-    return found
+            result |= {f"{name}seconds": min(seconds[name]), f"{name}key_count": len(keys)}
+    return result
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -268,15 +268,15 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--count", type=int, default=100_000, help="in-betweens in a case (%(default)s)")
     parser.add_argument("--rounds", type=int, default=50, help="rounds of all against all (%(default)s)")
     options = parser.parse_args(arguments)
-    found = []
+    result = []
     for case in cases(options.count):
         say(case.title)
         about = {"title": case.title, "in_betweens": case.in_betweens, "key_count": int(np.prod(case.keys.shape))}
-        found.append({**about, "rates": rates(case, race(ways(case), options.rounds))})
+        result.append({**about, "rates": rates(case, race(ways(case), options.rounds))})
     say("key reduction")
     figures = {
         "vector_tangent": bool(VECTOR_TANGENT),
-        "cases": found,
+        "cases": result,
         "reductions": [reduction(count) for count in (900, 1000, options.count // 10, options.count)],
     }
     versions = {"SciPy": scipy.__version__, "pytransform3d": pytransform3d.__version__}

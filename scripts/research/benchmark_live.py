@@ -37,7 +37,7 @@ from research.live_scenes import (
 )
 from research.publishing import publish, say, study_parser
 from rigid_motion import animation
-from rigid_motion_batch.hushing import hushed
+from rigid_motion_batch.silencing import silenced
 
 EVERYDAY, CHOOSING, SHOT = Size(100, 10, 1000), Size(400, 10, 1000), Size(300, 20, 2000)
 """Scenes: one key of it is edited; all get a mode; all are edited, and saved."""
@@ -212,7 +212,7 @@ def file_sizes() -> dict[str, int]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "shot.blend")
         for kind in ("compressed", "uncompressed"):
-            with hushed():
+            with silenced():
                 bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=kind == "compressed")
             sizes[kind] = path.stat().st_size
     return sizes

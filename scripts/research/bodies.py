@@ -16,8 +16,8 @@ from rigid_motion.animation.transforms.bones import prefix_of
 from rigid_motion.motion import Poses, Skeleton, interpolate, shell_error
 from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.quaternions import align_signs
-from rigid_motion_batch.hushing import hushed
 from rigid_motion_batch.scenes.decimated_bodies import Curve, key_frames_of, values_of, varying
+from rigid_motion_batch.silencing import silenced
 
 RADIUS = 0.03
 """Of the ball at every joint, in metres."""
@@ -157,7 +157,7 @@ def import_rig(path: Path, most_frames: int = MOST_FRAMES) -> Rig:
         Where there is none that moves, or it does what is not measured here.
     """
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    with hushed():
+    with silenced():
         if path.suffix.lower() == ".fbx":
             bpy.ops.import_scene.fbx(filepath=str(path))
         else:
@@ -183,5 +183,5 @@ def rig_of(name: str, obj: bpy.types.Object, most_frames: int = MOST_FRAMES) -> 
 
 def body_files(paths: list[Path]) -> list[Path]:
     """The bodies among files and in folders."""
-    found = [inside for path in paths for inside in (sorted(path.iterdir()) if path.is_dir() else [path])]
-    return [path for path in found if path.suffix.lower() in IMPORTERS]
+    result = [inside for path in paths for inside in (sorted(path.iterdir()) if path.is_dir() else [path])]
+    return [path for path in result if path.suffix.lower() in IMPORTERS]

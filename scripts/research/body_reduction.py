@@ -52,7 +52,7 @@ BATCH = 2**11
 
 def figures(paths: Sequence[Path], recordings: list[tuple[str, float, Poses]]) -> dict[str, Any]:
     """All that is measured of the bodies in files; of recordings (names, frames a second, poses), the time."""
-    found: dict[str, Body] = {}
+    result: dict[str, Body] = {}
     decimate: list[tuple[str, list[Left]]] = []
     for path in paths:
         say(f"{path.name}, Decimate")
@@ -62,20 +62,20 @@ def figures(paths: Sequence[Path], recordings: list[tuple[str, float, Poses]]) -
             say(str(error))
             continue
         body = rig.body()
-        found[body.name] = body
+        result[body.name] = body
         decimate.append((body.name, beside_decimate(rig, body.of_size(HEIGHT))))
-    bodies = [body.of_size(HEIGHT) for body in found.values()]
+    bodies = [body.of_size(HEIGHT) for body in result.values()]
     uncut = [import_rig(path, sys.maxsize).body().of_size(HEIGHT) for path in paths if path.stem == LONG]
     return {
         "bodies": [
             {"name": it.name, "joints": len(it.joints), "frames": it.frames, "rate": it.rate, "extent": it.extent}
-            for it in found.values()
+            for it in result.values()
         ],
         "greedy": [row for body in bodies for row in beside_greedy(body)],
         "decimate": [row_of(body, left) for body, ways in decimate for left in ways],
         "decimate_means": means([ways for _, ways in decimate]),
         "ozz_keys": OZZ_KEYS,
-        "ozz": beside_ozz(found[OZZ_BODY]) if OZZ_BODY in found else [],
+        "ozz": beside_ozz(result[OZZ_BODY]) if OZZ_BODY in result else [],
         "feet": [row for body in bodies for row in slides(body)],
         "timing": [row for body in uncut or bodies for row in timing(body)],
         "timing_single": [timing_single(*recording) for recording in recordings],
@@ -99,8 +99,8 @@ def greedy(body: Body, mode: str = MODE, tolerance: float = TOLERANCE, radius: f
         return body.errors(body.shown_by_key_poses(keys, mode), radius).max(axis=0)
 
     keys = np.array((0, body.frames - 1))
-    while (found := errors(keys)).max() > tolerance:
-        keys = np.union1d(keys, [np.argmax(found)])
+    while (result := errors(keys)).max() > tolerance:
+        keys = np.union1d(keys, [np.argmax(result)])
     for key in keys[1:-1]:
         fewer = keys[keys != key]
         if errors(fewer).max() <= tolerance:
@@ -133,7 +133,7 @@ def optimum(body: Body, mode: str, tolerance: float = TOLERANCE) -> int:
 
 def errors_between(body: Body, mode: str, start: int, ends: np.ndarray, samples: np.ndarray) -> np.ndarray:
     """The largest error of any joint at a sample (m,) between two keys, of which the second is one of `ends` (m,)."""
-    found = np.empty(len(samples))
+    result = np.empty(len(samples))
     for first in range(0, len(samples), BATCH):
         some = slice(first, first + BATCH)
         keys = np.stack((np.full(len(ends[some]), start), ends[some]), axis=-1)
@@ -145,8 +145,8 @@ def errors_between(body: Body, mode: str, start: int, ends: np.ndarray, samples:
             mode,
         )
         shown = body.skeleton.in_root_space(Poses(between.positions[:, :, 0], between.quaternions[:, :, 0]))
-        found[some] = shell_error(shown, body.truth[:, samples[some]], RADIUS).max(axis=0)
-    return found
+        result[some] = shell_error(shown, body.truth[:, samples[some]], RADIUS).max(axis=0)
+    return result
 
 
 def beside_greedy(body: Body) -> list[dict[str, Any]]:
@@ -251,14 +251,14 @@ def track_keys(body: Body, keys: Keys) -> tuple[int, int]:
 
 def contacts(body: Body) -> list[tuple[int, int, int]]:
     """The joints of feet that stand, each from one sample to another."""
-    found = []
+    result = []
     for joint in np.flatnonzero(is_foot(body)).tolist():
         places = body.truth.positions[joint]
         speed = np.linalg.norm(np.gradient(places, 1.0 / body.rate, axis=0), axis=1)
         stands = (speed < STILL) & (places[:, 2] < places[:, 2].min() + LOW)
         bounds = np.flatnonzero(np.diff(np.concatenate(([False], stands, [False])).astype(np.int8)))
-        found += [(joint, a, b) for a, b in bounds.reshape(-1, 2).tolist() if (b - a) / body.rate >= SHORTEST]
-    return found
+        result += [(joint, a, b) for a, b in bounds.reshape(-1, 2).tolist() if (b - a) / body.rate >= SHORTEST]
+    return result
 
 
 def is_foot(body: Body) -> np.ndarray:
@@ -294,12 +294,12 @@ def slides(body: Body) -> list[dict[str, Any]]:
 
 def seconds(run: Callable[[], object]) -> float:
     """Of the faster of two runs."""
-    found = []
+    result = []
     for _ in range(2):
         start = time.perf_counter()
         run()
-        found.append(time.perf_counter() - start)
-    return min(found)
+        result.append(time.perf_counter() - start)
+    return min(result)
 
 
 def timing(body: Body) -> list[dict[str, Any]]:

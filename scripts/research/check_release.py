@@ -80,12 +80,12 @@ def commits(checkout: Path) -> Iterator[str]:
 
 def pictures(checkout: Path) -> Iterator[str]:
     """Icon and featured picture have the sizes that the site asks for."""
-    for name, wanted in PICTURES.items():
+    for name, requested in PICTURES.items():
         path = checkout / LISTING / name
         if not path.is_file():
             yield f"{LISTING}/{name} is missing: python assets/make_listing.py"
-        elif (size := size_of_png(path)) != wanted:
-            yield f"{LISTING}/{name} is {size[0]} x {size[1]} pixels, and has to be {wanted[0]} x {wanted[1]}"
+        elif (size := size_of_png(path)) != requested:
+            yield f"{LISTING}/{name} is {size[0]} x {size[1]} pixels, and has to be {requested[0]} x {requested[1]}"
 
 
 def text(checkout: Path) -> Iterator[str]:

@@ -81,10 +81,10 @@ def read(path: Path) -> File:
         kind, width = np.dtype(NUMBERS[accessor["componentType"]]), SIZES[accessor["type"]]
         start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
         step = view.get("byteStride", kind.itemsize * width)
-        found = np.ndarray((accessor["count"], width), kind, binary, start, (step, kind.itemsize))
+        result = np.ndarray((accessor["count"], width), kind, binary, start, (step, kind.itemsize))
         if not accessor.get("normalized"):
-            return found.astype(float)
-        return np.maximum(found / float(np.iinfo(kind).max), -1.0)
+            return result.astype(float)
+        return np.maximum(result / float(np.iinfo(kind).max), -1.0)
 
     nodes = document["nodes"]
     parents = [-1] * len(nodes)
@@ -143,14 +143,14 @@ def points(file: File, at: np.ndarray) -> dict[str, np.ndarray]:
             worlds[node] = own if file.parents[node] < 0 else world(file.parents[node]) @ own
         return worlds[node]
 
-    found = {}
+    result = {}
     for node, name in enumerate(file.names):
         matrix = world(node)
         axes = np.swapaxes(matrix[:, :3, :3], 1, 2)
         axes = RADIUS * axes / np.linalg.norm(axes, axis=2, keepdims=True)
         head = matrix[:, None, :3, 3]
-        found[name] = np.concatenate((head, head + axes, head - axes), axis=1)
-    return found
+        result[name] = np.concatenate((head, head + axes, head - axes), axis=1)
+    return result
 
 
 def beside(original: File, smaller: File, tool: str) -> dict[str, Any]:
@@ -196,16 +196,16 @@ def measure(path: Path, tools: Path | None, folder: Path) -> list[dict[str, Any]
     exported, output = folder / f"{path.stem}.glb", folder / f"{path.stem}-smaller.glb"
     export(path, exported)
     original = read(exported)
-    found = [beside(original, original, "exported by Blender")]
+    result = [beside(original, original, "exported by Blender")]
     for tolerance in TOLERANCES:
         reduce_file(exported, output, Options(tolerance, RADIUS))
-        found.append(beside(original, read(output), f"`reduce --tolerance {1e3 * tolerance:g}mm`"))
+        result.append(beside(original, read(output), f"`reduce --tolerance {1e3 * tolerance:g}mm`"))
     for name, (program, *given) in TOOLS.items():
         if tools and (program := shutil.which(program, path=str(tools))):
             arguments = [one.format(exported, output) for one in given]
             subprocess.run([program, *arguments], check=True, capture_output=True)
-            found.append(beside(original, read(output), name))
-    return found
+            result.append(beside(original, read(output), name))
+    return result
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -223,6 +223,6 @@ def main(arguments: list[str] | None = None) -> int:
     for clip in clips:
         for one in clip["tools"]:
             shares[one["tool"]].append(one["share"])
-    figures = {"clips": clips, "means": {tool: geometric_mean(np.array(found)) for tool, found in shares.items()}}
+    figures = {"clips": clips, "means": {tool: geometric_mean(np.array(result)) for tool, result in shares.items()}}
     given = f"...{' --tools ...' if options.tools else ''}"
     return publish("benchmark_glb", figures, options, given, Blender=bpy.app.version_string)

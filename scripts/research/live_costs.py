@@ -58,9 +58,9 @@ def costs_of(clip: Clip) -> tuple[int, Costs]:
     say(clip.name)
     times, poses = samples_of(clip)
     body = body_of(clip, poses, RADIUS)
-    found = {needed(delay): vars(measure(body, times, poses, TOLERANCE, delay).cost) for delay in DELAYS}
-    found |= packed(body, times, poses)
-    return len(body.joints), {way: {name: cost[key] for name, key in COST.items()} for way, cost in found.items()}
+    result = {needed(delay): vars(measure(body, times, poses, TOLERANCE, delay).cost) for delay in DELAYS}
+    result |= packed(body, times, poses)
+    return len(body.joints), {way: {name: cost[key] for name, key in COST.items()} for way, cost in result.items()}
 
 
 def needed(delay: float) -> str:
@@ -100,8 +100,8 @@ def engines(clip: Clip) -> list[dict[str, Any]]:
 def room(users: int, seconds: float) -> dict[str, float]:
     """A room of many on this machine."""
     say("a room")
-    found = asdict(figures(users, seconds))
-    return {"users": users, "seconds": seconds, "listeners": found.pop("users"), **found}
+    result = asdict(figures(users, seconds))
+    return {"users": users, "seconds": seconds, "listeners": result.pop("users"), **result}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -119,10 +119,10 @@ def main(arguments: list[str] | None = None) -> int:
     for clip in clips:
         joints, ways = costs_of(clip)
         rows["bodies" if joints > 1 else "single"].append({"name": clip.name, "joints": joints, "ways": ways})
-    found = {
+    result = {
         "tolerance_mm": 1e3 * TOLERANCE,
         **{kind: table(some) for kind, some in rows.items()},
         "engines": engines(next(clip for clip in clips if clip.name == HAND)),
         "room": room(options.users, options.seconds),
     }
-    return publish("live_costs", found, options, *options.folders)
+    return publish("live_costs", result, options, *options.folders)

@@ -110,20 +110,20 @@ def table(rows: Iterable[Sequence[object]], *head: str) -> str:
 
 def environment(root: Path = ROOT) -> jinja2.Environment:
     """Return what templates are rendered in, with all figures."""
-    found = jinja2.Environment(
+    result = jinja2.Environment(
         loader=jinja2.FileSystemLoader(root / TEMPLATES),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    found.filters |= {one.__name__: one for one in (alike, digits, each, less, listed, percent, rest, spread, table)}
-    found.globals |= {
+    result.filters |= {one.__name__: one for one in (alike, digits, each, less, listed, percent, rest, spread, table)}
+    result.globals |= {
         path.stem: json.loads(path.read_text(encoding="utf-8")) for path in (root / FIGURES).glob("*.json")
     }
     if (root / TEMPLATES / "quotes.md").exists():
-        found.globals["quotes"] = found.get_template("quotes.md").module
-    return found
+        result.globals["quotes"] = result.get_template("quotes.md").module
+    return result
 
 
 def pages(root: Path = ROOT) -> list[Path]:
@@ -138,7 +138,7 @@ def filled(path: Path, templates: jinja2.Environment) -> str:
         return templates.get_template(path.name).render()
     page = path.read_text(encoding="utf-8")
     return QUOTE.sub(
-        lambda found: f"{found[1]}{templates.from_string(f'{{{{ {found[2]} }}}}').render()}{found[4]}", page
+        lambda result: f"{result[1]}{templates.from_string(f'{{{{ {result[2]} }}}}').render()}{result[4]}", page
     )
 
 

@@ -136,7 +136,7 @@ def measure(
     return reduced, as_good, as_few
 
 
-def figures_of(one: Outcome | None) -> dict[str, float] | None:
+def rest_bodies_of(one: Outcome | None) -> dict[str, float] | None:
     """An outcome as figures; None where there is none."""
     if one is None:
         return None
@@ -148,8 +148,8 @@ def row(recording: Recording, reduced: Outcome, as_good: Outcome | None, as_few:
     return {
         "name": recording.name,
         "frames": len(recording.frames),
-        "reduced": figures_of(reduced),
-        "decimate": figures_of(as_good),
+        "reduced": rest_bodies_of(reduced),
+        "decimate": rest_bodies_of(as_good),
         "few_mm": as_few and 1e3 * as_few.largest,
     }
 
@@ -157,11 +157,11 @@ def row(recording: Recording, reduced: Outcome, as_good: Outcome | None, as_few:
 def means(rows: list[dict[str, Any]]) -> dict[str, float]:
     """What Decimate has in multiples of reduced poses: geometric means over the recordings."""
     both = [(row["reduced"], row["decimate"]) for row in rows if row["decimate"]]
-    found = {
+    result = {
         name: geometric_mean(np.array([theirs[name] / ours[name] for ours, theirs in both])) for name in both[0][0]
     }
     few = [row["few_mm"] / row["reduced"]["error_mm"] for row in rows if row["few_mm"]]
-    return {**found, "few_mm": geometric_mean(np.array(few))}
+    return {**result, "few_mm": geometric_mean(np.array(few))}
 
 
 def files(folder: Path | None) -> list[Path]:
@@ -194,7 +194,7 @@ def main(arguments: list[str] | None = None) -> int:
                 say(f"{recording.name}, {rotation}")
                 rows[rotation].append(row(recording, *measure(recording, rotation, options.tolerance, options.radius)))
         singles = [(one.name, options.fps, one.poses) for one in recordings]
-        found = {
+        result = {
             "tolerance_mm": 1e3 * options.tolerance,
             "radius": options.radius,
             "recordings": rows,
@@ -205,4 +205,4 @@ def main(arguments: list[str] | None = None) -> int:
         animation.unregister()
     given = f"--tolerance {options.tolerance:g} --radius {options.radius:g} --fps {options.fps:g}"
     more = [f"--{name} ..." for name in ("recordings", "bodies") if getattr(options, name)]
-    return publish("reduction", found, options, given, *more, Blender=bpy.app.version_string)
+    return publish("reduction", result, options, given, *more, Blender=bpy.app.version_string)

@@ -101,11 +101,13 @@ def between(motion: Motion, fractions: np.ndarray) -> np.ndarray:
     return (np.arange(first, last)[:, None] + fractions).ravel()
 
 
-def deviation(obj: bpy.types.Object, frames: np.ndarray, wanted: Poses, radius: float) -> Deviation:
+def deviation(obj: bpy.types.Object, frames: np.ndarray, requested: Poses, radius: float) -> Deviation:
     """How far Blender shows an object from where it should be."""
     shown = animation.read_poses(obj, frames)
-    shell = shell_error(shown, wanted, radius)
-    return Deviation(float(shell.max()), rms(shell), float(angle_between(shown.quaternions, wanted.quaternions).max()))
+    shell = shell_error(shown, requested, radius)
+    return Deviation(
+        float(shell.max()), rms(shell), float(angle_between(shown.quaternions, requested.quaternions).max())
+    )
 
 
 def measure(motion: Motion, mode: str, rotation_mode: str, radius: float) -> list[Deviation]:
@@ -115,11 +117,11 @@ def measure(motion: Motion, mode: str, rotation_mode: str, radius: float) -> lis
     animation.set_mode(obj, mode)
     source = source_of(obj)
     quarters, eighths = (between(motion, fractions) for fractions in (QUARTERS, EIGHTHS))
-    at_quarters, at_eighths = (in_betweens(source, frames).wanted for frames in (quarters, eighths))
+    at_quarters, at_eighths = (in_betweens(source, frames).requested for frames in (quarters, eighths))
     live = deviation(obj, quarters, at_quarters, radius)
     animation.set_exact(obj)
     finest = between(motion, THIRTY_SECONDS)
-    exact = deviation(obj, finest, in_betweens(source, finest).wanted, radius)
+    exact = deviation(obj, finest, in_betweens(source, finest).requested, radius)
     animation.set_exact(obj, False)
     animation.bake(obj, step=0.25)
     finely = deviation(obj, eighths, at_eighths, radius)
@@ -128,7 +130,7 @@ def measure(motion: Motion, mode: str, rotation_mode: str, radius: float) -> lis
     return [live, exact, finely, deviation(obj, quarters, at_quarters, radius)]
 
 
-def figures_of(motion: Motion, radius: float) -> dict[str, Any]:
+def rest_bodies_of(motion: Motion, radius: float) -> dict[str, Any]:
     """The figures of one motion, for every mode and rotation mode."""
     rows = []
     for mode in KEYFRAME_MODES:
@@ -153,13 +155,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser = study_parser("subframes", __doc__)
     parser.add_argument("--radius", type=float, default=0.1, help="of the shell, in metres (%(default)s)")
     options = parser.parse_args(arguments)
-    found = []
+    result = []
     animation.register()
     try:
         for motion in MOTIONS:
             say(motion.name)
-            found.append(figures_of(motion, options.radius))
+            result.append(rest_bodies_of(motion, options.radius))
     finally:
         animation.unregister()
-    figures = {"radius": options.radius, "motions": found}
+    figures = {"radius": options.radius, "motions": result}
     return publish("subframes", figures, options, f"--radius {options.radius:g}", Blender=bpy.app.version_string)

@@ -7,8 +7,8 @@ import re
 import sys
 
 from rigid_motion_batch.command_line import program_of
-from rigid_motion_batch.hushing import hushed
 from rigid_motion_batch.places import CHECKOUT
+from rigid_motion_batch.silencing import silenced
 from rigid_motion_batch.supervising import ended_at_once
 
 DEBIAN = "libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libsm6 libice6 libgl1 libegl1 libgl1-mesa-dri"
@@ -39,7 +39,7 @@ def missing_for_rendering() -> str | None:
 def require_blender(script: str) -> None:
     """Load Blender, or end the command of a script with code 2 and what to do about it."""
     try:
-        with ended_at_once(), hushed():  # Where OCIO is set, it says so.
+        with ended_at_once(), silenced():  # Where OCIO is set, it says so.
             import bpy  # noqa: F401
     except ImportError as error:
         print(f"{program_of(script)}: {error}\n{way_out(str(error), script)}", file=sys.stderr)

@@ -479,7 +479,7 @@ class Editing(RuleBasedStateMachine):
         if not len(keys):
             return
         chosen = sorted({float(keys[number % len(keys)]) for number in which})
-        wanted = [mode if frame in chosen else mode_at(obj, frame) for frame in keys]
+        expected = [mode if frame in chosen else mode_at(obj, frame) for frame in keys]
         transforms = {channel: kept for channel, kept in snapshot(obj).items() if channel[0] in WIDTHS}
 
         def change() -> None:
@@ -487,7 +487,7 @@ class Editing(RuleBasedStateMachine):
 
         self._edit(change)
         obj = self._found(name)
-        assert [mode_at(obj, frame) for frame in keys] == wanted == animation.modes_of(obj, keys)
+        assert [mode_at(obj, frame) for frame in keys] == expected == animation.modes_of(obj, keys)
         assert {channel: kept for channel, kept in snapshot(obj).items() if channel[0] in WIDTHS} == transforms
 
     @precondition(lambda self: self.on)

@@ -48,5 +48,5 @@ def played_on_a_farm(path: Path, names: Sequence[str], played: np.ndarray) -> tu
     frames = path.with_suffix(".npy")
     np.save(frames, played)
     on_a_farm(PLAY, path, frames, *names)
-    with np.load(frames.with_suffix(".npz")) as found:
-        return found["opened"], found["played"].swapaxes(0, 1)
+    with np.load(frames.with_suffix(".npz")) as result:
+        return result["opened"], result["played"].swapaxes(0, 1)

@@ -30,9 +30,9 @@ def led_to(settings: Iterable[dict[str, object]], frames: Sequence[float]) -> np
         modifier = fcurve.modifiers.new("STEPPED")
         for name, value in one.items():
             setattr(modifier, name, value)
-    found = np.array([fcurve.evaluate(frame) for frame in frames])
+    result = np.array([fcurve.evaluate(frame) for frame in frames])
     bpy.data.actions.remove(action)
-    return np.round(found, 3)
+    return np.round(result, 3)
 
 
 def held_frames(fcurves: FCurves, frames: Sequence[float]) -> np.ndarray:
@@ -47,11 +47,11 @@ def held_frames(fcurves: FCurves, frames: Sequence[float]) -> np.ndarray:
 @contextmanager
 def without_modifiers(fcurves: FCurves) -> Iterator[None]:
     """Modifiers but for Cycles are muted meanwhile; nothing is evaluated."""
-    found = acting(fcurves)
-    for one in found:
+    result = acting(fcurves)
+    for one in result:
         one.mute = True
     try:
         yield
     finally:
-        for one in found:
+        for one in result:
             one.mute = False

@@ -344,15 +344,15 @@ def _twists(poses: Poses, froms: Sequence[int], tos: Sequence[int]) -> np.ndarra
 
 def _codes(obj: Carrier, frame: float) -> set[str]:
     """The interpolations of all channels in the segment that begins on this frame."""
-    found = set()
+    result = set()
     for path in transform_paths(obj):
         for index in range(WIDTHS[path]):
             fcurve = curve_of(obj, path, index)
             if fcurve is not None and len(fcurve.keyframe_points) and not fcurve.mute:
                 points = fcurve.keyframe_points
                 earlier = [point for point in points if point.co[0] < frame + 0.005]
-                found.add((earlier[-1] if earlier else points[0]).interpolation)
-    return found
+                result.add((earlier[-1] if earlier else points[0]).interpolation)
+    return result
 
 
 def expected_worlds(
@@ -425,8 +425,8 @@ def shown_worlds(objects: Iterable[bpy.types.Object], frames: Sequence[float]) -
         whole = int(np.floor(frame))
         scene.frame_set(whole, subframe=float(frame - whole))
         depsgraph = bpy.context.evaluated_depsgraph_get()
-        for found, obj in zip(shown, objects, strict=True):
-            found[row] = obj.evaluated_get(depsgraph).matrix_world
+        for result, obj in zip(shown, objects, strict=True):
+            result[row] = obj.evaluated_get(depsgraph).matrix_world
     scene.frame_set(before, subframe=subframe)
     return shown
 

@@ -62,9 +62,9 @@ def _nearest(path: Path, key: Poses) -> float:
 
 def _off(poses: Poses, keys: Poses) -> np.ndarray:
     """The twists from poses (n,) to keys, with the growth of log scale, shape (n, 7)."""
-    found = twists.between(poses.positions, poses.quaternions, keys.positions, keys.quaternions)
+    result = twists.between(poses.positions, poses.quaternions, keys.positions, keys.quaternions)
     growths = np.zeros(len(keys.positions)) if keys.scales is None else np.log(keys.scales / poses.scales)
-    return np.vstack((found, growths)).T
+    return np.vstack((result, growths)).T
 
 
 def _moved(rows: np.ndarray) -> Poses:

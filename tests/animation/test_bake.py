@@ -118,9 +118,9 @@ def test_a_part_is_baked_where_its_angles_are_not_all_keyed_outside_of_it(live_f
         set_mode(obj, "dq_sclerp")
         frames = np.arange(FRAMES[0], FRAMES[-1] + 1.0)
         assert_shown([obj], frames)
-        wanted = expected_worlds(obj, frames)
+        expected = expected_worlds(obj, frames)
         assert bake(obj, first=frames[0], last=frames[-1]) == (frames[0], frames[-1])
-        assert np.abs(shown_worlds([obj], frames)[0] - wanted).max() < 1e-5 * np.abs(wanted).max()
+        assert np.abs(shown_worlds([obj], frames)[0] - expected).max() < 1e-5 * np.abs(expected).max()
 
 
 def test_each_axis_of_a_scale_that_is_left_to_blender_is_baked_by_itself(live_file):
@@ -128,10 +128,10 @@ def test_each_axis_of_a_scale_that_is_left_to_blender_is_baked_by_itself(live_fi
     curves_of(obj)["scale", 1].keyframe_points[1].interpolation = "CONSTANT"
     set_mode(obj, "dq_sclerp", FRAMES[:1])
     frames = np.arange(FRAMES[0], FRAMES[-1] + 1.0)
-    wanted = expected_worlds(obj, frames)
+    expected = expected_worlds(obj, frames)
     assert_shown([obj], frames)
     bake(obj)
-    assert np.abs(shown_worlds([obj], frames)[0] - wanted).max() < 1e-5 * np.abs(wanted).max()
+    assert np.abs(shown_worlds([obj], frames)[0] - expected).max() < 1e-5 * np.abs(expected).max()
 
 
 @pytest.mark.parametrize("order", ["QUATERNION", "XYZ"])
@@ -143,9 +143,9 @@ def test_a_bake_on_twos_or_threes_holds_the_poses_of_the_mode(live_file, order, 
     grid = np.union1d(np.arange(FRAMES[0], FRAMES[-1] + 0.5, step), FRAMES)
     frames = np.arange(-3.0, 45.0, 0.25)
     held = grid[np.clip(np.searchsorted(grid, frames, side="right") - 1, 0, None)]
-    wanted = expected_worlds(obj, held)
+    expected = expected_worlds(obj, held)
     bake(obj, step=step, interpolation="CONSTANT")
-    np.testing.assert_allclose(shown_worlds([obj], frames)[0], wanted, rtol=0, atol=1e-5 * np.abs(wanted).max())
+    np.testing.assert_allclose(shown_worlds([obj], frames)[0], expected, rtol=0, atol=1e-5 * np.abs(expected).max())
     for fcurve in curves_of(obj).values():
         assert {point.interpolation for point in fcurve.keyframe_points} <= {"CONSTANT"}
     unbake(obj)

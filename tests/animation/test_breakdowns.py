@@ -74,12 +74,12 @@ def test_a_breakdown_is_on_the_path_of_the_mode(live_file, mode, order, scale):
         if KEYFRAME_MODES[mode].is_smooth and not 0.0 <= factor <= 1.0:
             continue
         tries.apply(factor)
-        wanted = as_matrix(on_path(keys, mode, factor), own.scale[0])
-        np.testing.assert_allclose(basis(obj), wanted, atol=2e-5 * np.abs(wanted).max())
+        expected = as_matrix(on_path(keys, mode, factor), own.scale[0])
+        np.testing.assert_allclose(basis(obj), expected, atol=2e-5 * np.abs(expected).max())
         assert key_frames(obj).tolist() == [FRAMES[0], BEFORE, NOW, AFTER, FRAMES[3]]
         # It is a key like any other: from frame to frame and back it stays.
         shown = shown_worlds([obj], [NOW])[0][0]
-        np.testing.assert_allclose(shown, wanted, atol=2e-5 * np.abs(wanted).max())
+        np.testing.assert_allclose(shown, expected, atol=2e-5 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("order", ["QUATERNION", "XYZ"])
@@ -100,9 +100,9 @@ def test_where_a_segment_is_blenders_a_breakdown_is_blenders_own(live_file, orde
         first, last = (unit(row) for row in random_values(obj, "rotation_quaternion", 4, 2)[1:3])
         half = np.arccos(np.clip(np.abs(np.dot(first, last)), 0.0, 1.0))
         last = np.multiply(last, np.sign(np.dot(first, last)))
-        wanted = (np.sin(0.75 * half) * np.array(first) + np.sin(0.25 * half) * last) / np.sin(half)
+        expected = (np.sin(0.75 * half) * np.array(first) + np.sin(0.25 * half) * last) / np.sin(half)
         turned = np.array(obj.rotation_quaternion.normalized())
-        np.testing.assert_allclose(turned * np.sign(turned @ wanted), wanted, atol=1e-5)
+        np.testing.assert_allclose(turned * np.sign(turned @ expected), expected, atol=1e-5)
 
 
 def test_a_key_on_the_frame_is_made_anew_and_the_others_stay(live_file):
@@ -112,8 +112,8 @@ def test_a_key_on_the_frame_is_made_anew_and_the_others_stay(live_file):
     bpy.context.scene.frame_set(int(BEFORE))
     breakdown(obj, 0.5)
     poses = key_poses(obj, 4, Own())
-    wanted = interpolate((0.0, 1.0), poses[np.array((0, 2))], np.array([0.5]), "cga_slerp")
-    np.testing.assert_allclose(basis(obj), as_matrix(wanted, 1.0), atol=2e-5)
+    expected = interpolate((0.0, 1.0), poses[np.array((0, 2))], np.array([0.5]), "cga_slerp")
+    np.testing.assert_allclose(basis(obj), as_matrix(expected, 1.0), atol=2e-5)
     after = snapshot(obj)
     assert set(after) == set(before)
     for channel, (*_, keys) in after.items():
@@ -171,8 +171,8 @@ def test_push_and_relax_go_from_the_pose_that_is_seen_along_the_mode(live_file, 
         np.concatenate((now.positions, between.positions)), np.concatenate((now.quaternions, between.quaternions))
     )
     factor = -0.3 if kind == "PUSH" else 0.3
-    wanted = interpolate((0.0, 1.0), ends, np.array([factor]), mode, extrapolate=True)
-    np.testing.assert_allclose(basis(obj), as_matrix(wanted, own.scale[0]), atol=3e-5 * max(1.0, np.abs(seen).max()))
+    expected = interpolate((0.0, 1.0), ends, np.array([factor]), mode, extrapolate=True)
+    np.testing.assert_allclose(basis(obj), as_matrix(expected, own.scale[0]), atol=3e-5 * max(1.0, np.abs(seen).max()))
 
 
 def bpy_quaternion(matrix: np.ndarray) -> np.ndarray:
@@ -198,10 +198,12 @@ def test_bones_of_a_rig_each_go_between_their_own_keys(live_file):
     breakdown([upper, hand], 0.4)
     bpy.context.view_layer.update()
     for bone in (upper, hand):
-        wanted = interpolate((0.0, 1.0), places[bone.name][1:3], np.array([0.4]), "dq_sclerp")
-        np.testing.assert_allclose(bone.location, wanted.positions[0], atol=1e-5)
+        expected = interpolate((0.0, 1.0), places[bone.name][1:3], np.array([0.4]), "dq_sclerp")
+        np.testing.assert_allclose(bone.location, expected.positions[0], atol=1e-5)
         turned = np.array(bone.rotation_quaternion.normalized())
-        np.testing.assert_allclose(turned * np.sign(turned @ wanted.quaternions[0]), wanted.quaternions[0], atol=1e-5)
+        np.testing.assert_allclose(
+            turned * np.sign(turned @ expected.quaternions[0]), expected.quaternions[0], atol=1e-5
+        )
     # The constraint adds nothing on a key.
     for bone in (upper, hand):
         assert bone.constraints[0].name == "Rigid Motion"

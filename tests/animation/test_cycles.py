@@ -46,7 +46,7 @@ def unrolled(obj: bpy.types.Object, before: str, after: str, before_count: int, 
     On the seams, and where the rounds are used up, there is nothing but Blender's own.
     """
     first, last = key_frames(obj)[[0, -1]]
-    found = native(obj)
+    result = native(obj)
     for number in range(-4, 5):
         kind, count = (after, after_count) if number > 0 else (before, before_count)
         if number and (kind == "NONE" or (count and abs(number) > count)):
@@ -54,9 +54,9 @@ def unrolled(obj: bpy.types.Object, before: str, after: str, before_count: int, 
         since = AROUND - first - number * (last - first)
         inside = (since > 0.0) & (since < last - first)
         spare = one_round(obj, kind if number else "NONE", number)
-        found[inside] = expected_bases(spare, AROUND[inside])
+        result[inside] = expected_bases(spare, AROUND[inside])
         discard(spare)
-    return found
+    return result
 
 
 def native(obj: bpy.types.Object) -> np.ndarray:
@@ -94,8 +94,8 @@ def one_round(obj: bpy.types.Object, kind: str, number: int) -> bpy.types.Object
 
 
 def assert_unrolled(obj: bpy.types.Object, *cycles: object) -> None:
-    shown, wanted = shown_worlds([obj], AROUND)[0], unrolled(obj, *cycles)
-    error = np.abs(shown - wanted).max(axis=(1, 2)) / np.abs(wanted).max()
+    shown, expected = shown_worlds([obj], AROUND)[0], unrolled(obj, *cycles)
+    error = np.abs(shown - expected).max(axis=(1, 2)) / np.abs(expected).max()
     assert error.max() < 1e-5, f"off by {error.max():.3g} on frame {AROUND[error.argmax()]}"
 
 
@@ -140,8 +140,8 @@ def test_a_smooth_mode_flows_on_from_round_to_round(live_file, kind):
         values += [[fcurve.evaluate(frame) for fcurve in channels] for frame in key_frames(spare)[:-1]]
         discard(spare)
     positions, quaternions = np.split(np.array(values), (3,), axis=1)
-    wanted = interpolate(times, Poses(positions, quaternions), AROUND, "motor_spline")
-    placed = matrices(wanted.positions, wanted.quaternions, np.ones((len(AROUND), 3)))
+    expected = interpolate(times, Poses(positions, quaternions), AROUND, "motor_spline")
+    placed = matrices(expected.positions, expected.quaternions, np.ones((len(AROUND), 3)))
     assert np.abs(shown - placed).max() < 1e-5 * np.abs(placed).max()
 
 
@@ -170,5 +170,5 @@ def test_channels_with_cycles_of_different_lengths_share_the_copies_of_all_keys(
     set_mode(obj, "dq_sclerp")
     copies = {time + 8 * number for time in (31.0, 35.0) for number in range(-9, 10)}
     copies |= {time + 12 * number for time in (32.0, 37.0) for number in range(-6, 7)}
-    shown, wanted = shown_worlds([obj], AROUND)[0], expected_bases(obj, AROUND, keys=np.array(sorted(copies)))
-    assert np.abs(shown - wanted).max() < 1e-5 * np.abs(wanted).max()
+    shown, expected = shown_worlds([obj], AROUND)[0], expected_bases(obj, AROUND, keys=np.array(sorted(copies)))
+    assert np.abs(shown - expected).max() < 1e-5 * np.abs(expected).max()

@@ -64,11 +64,11 @@ def _locals(document: dict, path: Path, place: int) -> np.ndarray:
             if channel["target"]["node"] == place:
                 sampler = animation["samplers"][channel["sampler"]]
                 frames = _accessor(document, path, sampler["input"])[:, 0] * bpy.context.scene.render.fps
-                found = np.abs(frames[:, None] - PLAYED)
+                result = np.abs(frames[:, None] - PLAYED)
                 if len(frames) > 1:
-                    assert found.min(axis=0).max() < 1e-3, f"{node['name']} has samples on {frames}"
+                    assert result.min(axis=0).max() < 1e-3, f"{node['name']} has samples on {frames}"
                 values = _accessor(document, path, sampler["output"])
-                at[channel["target"]["path"]] = values[found.argmin(axis=0)]
+                at[channel["target"]["path"]] = values[result.argmin(axis=0)]
     x, y, z, w = at["rotation"].T
     return matrices(at["translation"], np.stack((w, x, y, z), axis=1), at["scale"])
 
@@ -83,9 +83,9 @@ def _accessor(document: dict, path: Path, index: int) -> np.ndarray:
     return np.frombuffer(data, "<f4", accessor["count"] * width, start).reshape(-1, width).astype(float)
 
 
-def assert_near(found: np.ndarray, wanted: np.ndarray) -> None:
+def assert_near(result: np.ndarray, expected: np.ndarray) -> None:
     """To 1e-4 of the size."""
-    assert np.abs(found - wanted).max() < 1e-4 * max(1.0, np.abs(wanted).max())
+    assert np.abs(result - expected).max() < 1e-4 * max(1.0, np.abs(expected).max())
 
 
 @pytest.mark.parametrize("animation_mode", ["ACTIONS", "ACTIVE_ACTIONS", "SCENE"])
@@ -101,10 +101,10 @@ def test_a_sampled_gltf_file_has_every_mode_on_every_frame(exporter, tmp_path, a
             objects.append(key(obj, seed=seed, scale="even" if seed % 2 else None, interpolation="SINE"))
             set_mode(obj, mode)
     set_mode(parent, "dq_sclerp", [11.0])
-    wanted = {obj.name: expected_worlds(obj, PLAYED, owns) for obj in objects}
+    expected = {obj.name: expected_worlds(obj, PLAYED, owns) for obj in objects}
     keys, shown = [snapshot(obj) for obj in objects], shown_worlds(objects, PLAYED)
     path = export(tmp_path / "shot.gltf", export_animation_mode=animation_mode)
-    for name, worlds in wanted.items():
+    for name, worlds in expected.items():
         assert_near(worlds_in(path, name), worlds)
     assert [snapshot(obj) for obj in objects] == keys
     assert refresh() == 0, "exporting left the in-betweens alone"
@@ -138,13 +138,13 @@ def test_what_is_exact_between_frames_is_exported_as_it_is_seen(exporter, tmp_pa
 def test_an_action_in_a_strip_is_exported_with_its_in_betweens(exporter, tmp_path):
     obj = key(new_object())
     set_mode(obj, "dq_sclerp")
-    wanted = expected_worlds(obj, PLAYED)
+    expected = expected_worlds(obj, PLAYED)
     data = obj.animation_data
     strip = data.nla_tracks.new().strips.new("Move", int(FRAMES[0]), data.action)
     strip.action_slot = data.action_slot
     data.action = None
     bpy.context.view_layer.update()
-    assert_near(worlds_in(export(tmp_path / "shot.gltf", export_animation_mode="NLA_TRACKS"), "Tool"), wanted)
+    assert_near(worlds_in(export(tmp_path / "shot.gltf", export_animation_mode="NLA_TRACKS"), "Tool"), expected)
 
 
 def test_what_is_exported_and_imported_again_moves_alike_without_a_mode(exporter, tmp_path):
@@ -152,15 +152,15 @@ def test_what_is_exported_and_imported_again_moves_alike_without_a_mode(exporter
     for obj in objects:
         set_mode(obj, "pga_slerp")
     assert_shown(objects, PLAYED)
-    wanted = shown_worlds(objects, PLAYED)
+    expected = shown_worlds(objects, PLAYED)
     # One animation for both: the importer plays the first that it finds.
     options = {"export_animation_mode": "SCENE", "export_anim_scene_split_object": False}
     path = export(tmp_path / "shot.gltf", **options)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.ops.import_scene.gltf(filepath=str(path))
-    found = [bpy.data.objects[name] for name in ("Quaternion", "Euler")]
-    assert {obj.rigid_motion.mode for obj in found} == {"BLENDER"}
-    for worlds, own in zip(shown_worlds(found, PLAYED), wanted, strict=True):
+    result = [bpy.data.objects[name] for name in ("Quaternion", "Euler")]
+    assert {obj.rigid_motion.mode for obj in result} == {"BLENDER"}
+    for worlds, own in zip(shown_worlds(result, PLAYED), expected, strict=True):
         assert_near(worlds, own)
 
 
@@ -171,7 +171,7 @@ def test_what_is_exported_to_a_cache_and_imported_again_moves_alike(exporter, tm
     obj = new_object("Tool", "XZY", triangle)
     give_own_deltas(obj)
     set_mode(key(obj, scale="even"), "cga_slerp")
-    wanted = shown_worlds([obj], PLAYED)[0]
+    expected = shown_worlds([obj], PLAYED)[0]
     path = str(tmp_path / {"alembic": "shot.abc", "usd": "shot.usdc"}[kind])
     if kind == "alembic":
         bpy.ops.wm.alembic_export(filepath=path)
@@ -183,5 +183,5 @@ def test_what_is_exported_to_a_cache_and_imported_again_moves_alike(exporter, tm
         bpy.ops.wm.alembic_import(filepath=path, as_background_job=False)
     else:
         bpy.ops.wm.usd_import(filepath=path)
-    (found,) = bpy.data.objects
-    assert_near(shown_worlds([found], PLAYED)[0], wanted)
+    (result,) = bpy.data.objects
+    assert_near(shown_worlds([result], PLAYED)[0], expected)

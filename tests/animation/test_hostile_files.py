@@ -111,10 +111,10 @@ def numbers(channel: tuple[str, int], field: str, value: float, *at: int) -> Dam
     def damage(obj: bpy.types.Object) -> None:
         points = curves_of(obj)[channel].keyframe_points
         width, dtype = (2, np.float32) if axis else (1, np.int32 if name in ("interpolation", "easing") else np.float32)
-        found = np.empty(width * len(points), dtype)
-        points.foreach_get(name, found)
-        found.reshape(-1, width)[list(at) or slice(None), int(axis == "y")] = value
-        points.foreach_set(name, found)
+        result = np.empty(width * len(points), dtype)
+        points.foreach_get(name, result)
+        result.reshape(-1, width)[list(at) or slice(None), int(axis == "y")] = value
+        points.foreach_set(name, result)
 
     return damage
 

@@ -47,9 +47,9 @@ BROKEN = {"frame_step": 2.5, "frame_offset": 0.5}
 
 def channels(carrier: Carrier) -> list[bpy.types.FCurve]:
     """The animator's F-curves of location, rotation and scale."""
-    found = curves_of(carrier)
+    result = curves_of(carrier)
     paths = ("location", rotation_path(carrier), "scale")
-    return [fcurve for (path, _), fcurve in found.items() if path in paths and len(fcurve.keyframe_points)]
+    return [fcurve for (path, _), fcurve in result.items() if path in paths and len(fcurve.keyframe_points)]
 
 
 def modify(fcurves: Sequence[bpy.types.FCurve], kind: str, **settings: object) -> list[bpy.types.FModifier]:
@@ -68,8 +68,8 @@ def expected(carrier: Carrier, frames: np.ndarray, own=None) -> np.ndarray:
         return expected_bases(carrier, frames, own)
 
 
-def assert_same(shown: np.ndarray, wanted: np.ndarray) -> None:
-    np.testing.assert_allclose(shown, wanted, rtol=0, atol=2e-5 * max(1.0, np.abs(wanted).max()))
+def assert_same(shown: np.ndarray, reference: np.ndarray) -> None:
+    np.testing.assert_allclose(shown, reference, rtol=0, atol=2e-5 * max(1.0, np.abs(reference).max()))
 
 
 def played(settings: dict[str, object]) -> np.ndarray:
@@ -92,9 +92,9 @@ def test_the_poses_of_every_mode_are_held(live_file, mode):
     key(obj, seed=2, scale="even")
     set_mode(obj, mode)
     modify(channels(obj), "STEPPED", **STEPS["threes, from zero"])
-    wanted = expected(obj, led_to([STEPS["threes, from zero"]], PLAYED), own)
+    reference = expected(obj, led_to([STEPS["threes, from zero"]], PLAYED), own)
     assert problem_of(obj) == ""
-    assert_same(shown_worlds([obj], PLAYED)[0], wanted)
+    assert_same(shown_worlds([obj], PLAYED)[0], reference)
 
 
 @pytest.mark.parametrize("order", ["QUATERNION", "ZXY"])
@@ -157,28 +157,28 @@ def test_bones_hold_their_poses_before_zero_and_in_cycles(live_file, cycles):
 @pytest.mark.parametrize("kind", ["object", "bone"])
 def test_in_a_strip_and_after_saving_holds_and_noise_are_there(live_file, tmp_path, kind):
     if kind == "object":
-        found = key(new_object("Carrier"), seed=3)
+        result = key(new_object("Carrier"), seed=3)
     else:
-        found = key_bone(new_rig("Carrier").pose.bones["Body"], seed=3)
-    set_mode(found, "motor_spline")
-    modify(channels(found), "STEPPED", frame_step=4.0, frame_offset=1.0)
-    modify([curves_of(found)["location", 2]], "NOISE", **NOISE)
-    obj, frames = found.id_data, np.arange(0.0, 44.0)
+        result = key_bone(new_rig("Carrier").pose.bones["Body"], seed=3)
+    set_mode(result, "motor_spline")
+    modify(channels(result), "STEPPED", frame_step=4.0, frame_offset=1.0)
+    modify([curves_of(result)["location", 2]], "NOISE", **NOISE)
+    obj, frames = result.id_data, np.arange(0.0, 44.0)
 
     def seen(obj: bpy.types.Object, frames: np.ndarray) -> np.ndarray:
         return shown_worlds([obj], frames)[0] if kind == "object" else shown_poses([obj], frames)[0]["Body"]
 
-    wanted = seen(obj, frames)
-    assert np.ptp(wanted[:, 0, 3]) > 0.1
+    reference = seen(obj, frames)
+    assert np.ptp(reference[:, 0, 3]) > 0.1
     path = str(tmp_path / "held.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
     obj = bpy.data.objects["Carrier"]
     assert refresh() == 0, "what was saved is complete"
-    assert_same(seen(obj, frames), wanted)
+    assert_same(seen(obj, frames), reference)
     push_down(obj, 101, action_frame_end=44.0)
     inside = slice(1, -1)
-    assert_same(seen(obj, frames[inside] + 100.0), wanted[inside])
+    assert_same(seen(obj, frames[inside] + 100.0), reference[inside])
 
 
 def test_one_behind_another_and_a_channel_with_a_single_key(live_file):
@@ -246,10 +246,10 @@ def test_what_is_added_to_a_location_is_on_top_of_the_mode(live_file, kind, mode
     modify([curves_of(obj)["location", axis] for axis in (0, 2)], name, **settings)
     added = difference(obj, "location", PLAYED)
     assert np.ptp(added[:, 0]) > 0.1
-    wanted = expected(obj, PLAYED, own)
-    wanted[:, :3, 3] += added
+    reference = expected(obj, PLAYED, own)
+    reference[:, :3, 3] += added
     assert problem_of(obj) == ""
-    assert_same(shown_worlds([obj], PLAYED)[0], wanted)
+    assert_same(shown_worlds([obj], PLAYED)[0], reference)
 
 
 @pytest.mark.parametrize("order", ["QUATERNION", "XYZ"])
@@ -258,7 +258,7 @@ def test_what_is_added_to_a_rotation_turns_the_mode_by_what_it_turns_blenders(li
     set_mode(obj, "dq_sclerp")
     path = rotation_path(obj)
     modify([curves_of(obj)[path, 1]], "NOISE", strength=0.8, scale=5.0)
-    wanted = expected(obj, PLAYED)
+    reference = expected(obj, PLAYED)
     curves = [curves_of(obj)[path, index] for index in range(len(getattr(obj, path)))]
 
     def turned() -> list[Matrix]:
@@ -270,8 +270,8 @@ def test_what_is_added_to_a_rotation_turns_the_mode_by_what_it_turns_blenders(li
     noisy = turned()
     with without_modifiers(channels(obj)):
         for number, (with_noise, without) in enumerate(zip(noisy, turned(), strict=True)):
-            wanted[number, :3, :3] = wanted[number, :3, :3] @ np.array(without.inverted() @ with_noise)
-    assert_same(shown_worlds([obj], PLAYED)[0], wanted)
+            reference[number, :3, :3] = reference[number, :3, :3] @ np.array(without.inverted() @ with_noise)
+    assert_same(shown_worlds([obj], PLAYED)[0], reference)
 
 
 def test_a_scale_with_noise_is_blenders_own(live_file):
@@ -288,46 +288,46 @@ def test_a_scale_with_noise_is_blenders_own(live_file):
 def test_a_bake_has_what_was_seen_and_comes_undone(live_file, carrier, kind):
     if carrier == "bone":
         rig = new_rig()
-        found = key_bone(rig.pose.bones["Upper"], seed=3)
+        result = key_bone(rig.pose.bones["Upper"], seed=3)
     else:
-        found = key(new_object(rotation_mode="XYZ" if carrier == "Euler object" else "QUATERNION"), seed=3)
-    set_mode(found, "dq_sclerp")
+        result = key(new_object(rotation_mode="XYZ" if carrier == "Euler object" else "QUATERNION"), seed=3)
+    set_mode(result, "dq_sclerp")
     if kind != "noise":
-        modify(channels(found), "STEPPED", frame_step=3.0)
+        modify(channels(result), "STEPPED", frame_step=3.0)
     if kind != "stepped":
-        rotation = curves_of(found)[rotation_path(found), 2]
-        modify([curves_of(found)["location", 0], rotation], "NOISE", strength=0.5, scale=6.0)
+        rotation = curves_of(result)[rotation_path(result), 2]
+        modify([curves_of(result)["location", 0], rotation], "NOISE", strength=0.5, scale=6.0)
     frames = np.arange(1.0, 47.0) if kind == "stepped" else np.arange(1.0, 41.0)
 
     def seen() -> np.ndarray:
-        return shown_poses([rig], frames)[0]["Upper"] if carrier == "bone" else shown_worlds([found], frames)[0]
+        return shown_poses([rig], frames)[0]["Upper"] if carrier == "bone" else shown_worlds([result], frames)[0]
 
-    before, keyed = seen(), snapshot(found)
-    bake(found, first=12.0, last=15.0)
-    assert not any(fcurve.modifiers for fcurve in channels(found))
+    before, keyed = seen(), snapshot(result)
+    bake(result, first=12.0, last=15.0)
+    assert not any(fcurve.modifiers for fcurve in channels(result))
     assert_same(seen(), before)
-    unbake(found)
-    assert snapshot(found) == keyed
+    unbake(result)
+    assert snapshot(result) == keyed
     assert_same(seen(), before)
 
 
 @pytest.mark.parametrize("kind", ["object", "bone"])
 def test_a_key_in_between_keeps_the_pose_that_is_seen_with_its_noise(live_file, kind):
-    found = key(new_object(), seed=5) if kind == "object" else key_bone(new_rig().pose.bones["Body"], seed=5)
-    set_mode(found, "dq_sclerp")
-    modify([curves_of(found)["location", 1], curves_of(found)["rotation_quaternion", 3]], "NOISE", **NOISE)
+    result = key(new_object(), seed=5) if kind == "object" else key_bone(new_rig().pose.bones["Body"], seed=5)
+    set_mode(result, "dq_sclerp")
+    modify([curves_of(result)["location", 1], curves_of(result)["rotation_quaternion", 3]], "NOISE", **NOISE)
     bpy.context.scene.frame_set(17)
 
     def seen() -> np.ndarray:
         bpy.context.view_layer.update()
-        obj = found.id_data.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        obj = result.id_data.evaluated_get(bpy.context.evaluated_depsgraph_get())
         return np.array(obj.matrix_basis if kind == "object" else obj.pose.bones["Body"].matrix)
 
     before = seen()
-    found.keyframe_insert("location", frame=17)
-    found.keyframe_insert("rotation_quaternion", frame=17)
+    result.keyframe_insert("location", frame=17)
+    result.keyframe_insert("rotation_quaternion", frame=17)
     assert_same(seen(), before)
-    assert 17.0 in key_frames(found).tolist()
+    assert 17.0 in key_frames(result).tolist()
     bpy.context.scene.frame_set(18)
     bpy.context.scene.frame_set(17)
     assert_same(seen(), before)

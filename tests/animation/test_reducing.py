@@ -122,7 +122,7 @@ def test_the_best_mode_of_each_segment_is_keyed_and_blender_shows_it(live_file, 
     frames = key_frames(obj)
     truth = read_poses(obj, frames)
     reduce_keys_of(obj, mode, TOLERANCE, RADIUS)
-    single, wanted = key_frames(obj), shell_error(read_poses(obj, frames), truth, RADIUS)
+    single, expected = key_frames(obj), shell_error(read_poses(obj, frames), truth, RADIUS)
     restore_keys(obj)
     kept, modes = best_of(obj, mode)
     assert kept.tolist() == single.tolist() == keys_of(obj, "rigid_motion.mode")
@@ -131,7 +131,7 @@ def test_the_best_mode_of_each_segment_is_keyed_and_blender_shows_it(live_file, 
     keys = truth[np.isin(frames, kept)]
     assert shell_error(shown, interpolate_by_segments(kept, keys, frames, modes), RADIUS).max() < 5e-6
     error = shell_error(shown, truth, RADIUS)
-    assert np.mean(error**2) < np.mean(wanted**2)
+    assert np.mean(error**2) < np.mean(expected**2)
     assert error.max() <= TOLERANCE * (1.0 + 1e-5)
     assert reduction_of(obj).largest_error == pytest.approx(error.max(), abs=1e-6)
     for first, last, chosen in zip(kept[:-1], kept[1:], modes, strict=True):
@@ -278,13 +278,13 @@ def test_what_has_no_keys_gets_none(live_file, keyed):
     for name, fcurve in list(curves_of(obj).items()):
         if name[0] == path or name == ("location", 1):
             channelbag.fcurves.remove(fcurve)
-    wanted = set(curves_of(obj))
+    expected = set(curves_of(obj))
     frames = np.arange(1.0, key_frames(obj)[-1] + 1.0)
     truth = read_poses(obj, frames)
     reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
     assert off(obj, frames, truth) <= TOLERANCE * (1.0 + 1e-5)
-    found = {name for name in curves_of(obj) if not name[0].startswith("delta_")}
-    assert found == wanted
+    result = {name for name in curves_of(obj) if not name[0].startswith("delta_")}
+    assert result == expected
 
 
 @pytest.mark.parametrize("scale", [(1.0, 1.0, 1.0), (2.0, 2.0, 2.0), (1.0, 2.0, 0.5), (-1.0, 1.0, 1.0)], ids=str)

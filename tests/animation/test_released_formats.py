@@ -37,10 +37,10 @@ EASED = "Keyed"
 
 def assert_moves_as_it_did(known: np.lib.npyio.NpzFile) -> None:
     objects = [bpy.data.objects[name] for name in known["names"]]
-    for obj, shown, wanted in zip(objects, shown_worlds(objects, known["frames"]), known["worlds"], strict=True):
+    for obj, shown, expected in zip(objects, shown_worlds(objects, known["frames"]), known["worlds"], strict=True):
         if obj.name == EASED:
-            wanted = expected_worlds(obj, known["frames"])[:, :3]
-        assert np.abs(shown[:, :3] - wanted).max() < 2e-5 * max(1.0, np.abs(wanted).max()), obj.name
+            expected = expected_worlds(obj, known["frames"])[:, :3]
+        assert np.abs(shown[:, :3] - expected).max() < 2e-5 * max(1.0, np.abs(expected).max()), obj.name
 
 
 def test_a_file_moves_as_it_did(opened):
@@ -76,10 +76,10 @@ def test_what_was_baked_can_be_un_baked(opened):
     assert is_baked(obj)
     unbake(obj)
     assert modes_of(obj, np.array((1.0, 11.0))) == ["lerp_slerp"] * 2
-    wanted = opened["worlds"][list(opened["names"]).index("Baked")]
+    expected = opened["worlds"][list(opened["names"]).index("Baked")]
     shown = shown_worlds([obj], opened["frames"])[0][:, :3]
     # It was baked on every second frame.
-    assert np.abs(shown - wanted)[::2].max() < 2e-5 * np.abs(wanted).max()
+    assert np.abs(shown - expected)[::2].max() < 2e-5 * np.abs(expected).max()
 
 
 def test_the_numbers_of_modes_in_files_stay_what_they_are(live_file):

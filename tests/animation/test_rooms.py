@@ -50,11 +50,11 @@ def listed(folder: Path) -> list[str]:
 
 def imports_of(path: Path, level: int) -> set[str]:
     """What a file imports from so many folders up, by the first name below that folder."""
-    found = set()
+    result = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.level == level:
-            found |= {node.module.split(".")[0]} if node.module else {alias.name for alias in node.names}
-    return found
+            result |= {node.module.split(".")[0]} if node.module else {alias.name for alias in node.names}
+    return result
 
 
 FOLDERS = [HOUSE, *sorted(path.parent for path in HOUSE.glob("*/__init__.py"))]
@@ -96,7 +96,7 @@ def test_other_rooms_need_blender():
 
 def guesses(path: Path) -> list[int]:
     """The lines where a file guesses a kind: it tests a prefix for being there, or asks for the class of a kind."""
-    found = []
+    result = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.If | ast.IfExp):
             tested = [node.test]
@@ -108,12 +108,12 @@ def guesses(path: Path) -> list[int]:
             tested = [node.operand]
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "isinstance":
             names = {name.id for name in ast.walk(node.args[1]) if isinstance(name, ast.Name)}
-            found += [node.lineno] if names & {kind.__name__ for kind in KINDS} else []
+            result += [node.lineno] if names & {kind.__name__ for kind in KINDS} else []
             continue
         else:
             continue
-        found += [test.lineno for test in tested if isinstance(test, ast.Attribute) and test.attr == "prefix"]
-    return sorted(set(found))
+        result += [test.lineno for test in tested if isinstance(test, ast.Attribute) and test.attr == "prefix"]
+    return sorted(set(result))
 
 
 @pytest.mark.parametrize("path", [*FILES, *sorted((HOUSE.parent / "ui").rglob("*.py"))], ids=lambda path: path.stem)

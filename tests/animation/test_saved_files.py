@@ -31,9 +31,9 @@ def save(path: Path) -> Path:
     return path
 
 
-def assert_same(worlds: Sequence[np.ndarray], wanted: Sequence[np.ndarray], tolerance: float = 1e-6) -> None:
+def assert_same(worlds: Sequence[np.ndarray], expected: Sequence[np.ndarray], tolerance: float = 1e-6) -> None:
     """To this share of the size."""
-    for one, other in zip(worlds, wanted, strict=True):
+    for one, other in zip(worlds, expected, strict=True):
         assert np.abs(one - other).max() <= tolerance * max(1.0, np.abs(other).max())
 
 
@@ -140,10 +140,10 @@ def test_what_was_not_followed_before_saving_is_caught_up_with_after_loading(liv
 def test_a_baked_object_plays_alike_on_a_farm_and_can_be_un_baked_after_it_saved_the_file(live_file, tmp_path):
     obj = key(new_object())
     set_mode(obj, "dq_sclerp")
-    keys, wanted = snapshot(obj), expected_worlds(obj, PLAYED)
+    keys, expected = snapshot(obj), expected_worlds(obj, PLAYED)
     animation.bake(obj)
     path = save(tmp_path / "shot.blend")
-    assert_same(played_on_a_farm(path, ["Tool"], PLAYED)[1], [wanted], 1e-5)
+    assert_same(played_on_a_farm(path, ["Tool"], PLAYED)[1], [expected], 1e-5)
     on_a_farm("bpy.ops.wm.save_as_mainfile(filepath=found)", path, tmp_path / "farm.blend")
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "farm.blend"))
     obj = bpy.data.objects["Tool"]

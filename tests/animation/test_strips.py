@@ -17,9 +17,9 @@ KEYS = (1.0, 11.0, 21.0, 41.0)
 ACTION_FRAMES = np.arange(1.0, 42.0)
 
 
-def assert_at(obj: bpy.types.Object, scene_frames: np.ndarray, wanted: np.ndarray) -> None:
+def assert_at(obj: bpy.types.Object, scene_frames: np.ndarray, expected: np.ndarray) -> None:
     shown = shown_worlds([obj], scene_frames)[0]
-    error = np.abs(shown - wanted).max(axis=(1, 2)) / max(1.0, np.abs(wanted).max())
+    error = np.abs(shown - expected).max(axis=(1, 2)) / max(1.0, np.abs(expected).max())
     assert error.max() < 1e-5, f"off by {error.max():.3g} on frame {scene_frames[error.argmax()]}"
 
 
@@ -39,7 +39,7 @@ def filled(name: str = "Tool", order: str = "QUATERNION", mode: str = "dq_sclerp
     ],
 )
 def test_a_strip_shows_the_in_betweens_of_its_action(live_file, order, start, scale, repeat, reverse):
-    obj, wanted = filled(order=order)
+    obj, expected = filled(order=order)
     strip = push_down(obj, start, scale=scale, repeat=repeat, use_reverse=reverse)
     frames = np.arange(strip.frame_start, strip.frame_end)
     place = ((frames - start) / scale) % 40.0
@@ -47,7 +47,7 @@ def test_a_strip_shows_the_in_betweens_of_its_action(live_file, order, start, sc
     whole = (place % 1.0 == 0.0) & ((place > 0.0) | (not reverse))
     assert whole.sum() >= 19
     action_frames = place[whole].astype(int)
-    assert_at(obj, frames[whole], wanted[::-1][action_frames] if reverse else wanted[action_frames])
+    assert_at(obj, frames[whole], expected[::-1][action_frames] if reverse else expected[action_frames])
     outside = np.array((strip.frame_start - 5.0, strip.frame_end + 5.0))
     held = shown_worlds([obj], np.array((strip.frame_start, strip.frame_end)))[0]
     assert_at(obj, outside, held)
@@ -60,9 +60,9 @@ def test_a_mode_is_chosen_for_an_action_that_is_in_a_strip_already(live_file):
     set_mode(obj, "pga_slerp")
     assert problem_of(obj) == ""
     obj.animation_data.action = action
-    wanted = expected_bases(obj, ACTION_FRAMES)
+    expected = expected_bases(obj, ACTION_FRAMES)
     obj.animation_data.action = None
-    assert_at(obj, np.arange(101.0, 142.0), wanted)
+    assert_at(obj, np.arange(101.0, 142.0), expected)
 
 
 @pytest.mark.parametrize("one_track", [True, False], ids=["one track", "two tracks"])
@@ -80,13 +80,13 @@ def test_a_mode_is_chosen_for_an_action_that_is_in_a_strip_already(live_file):
 def test_two_strips_each_have_the_mode_that_is_keyed_in_their_action(live_file, modes, own, one_track):
     obj = new_object()
     deltas = give_own_deltas(obj) if own else Own()
-    data, actions, wanted = obj.animation_data_create(), [], []
+    data, actions, expected = obj.animation_data_create(), [], []
     for seed, mode in enumerate(modes):
         data.action = None
         key(obj, KEYS, seed=seed)
         set_mode(obj, mode, KEYS)
         actions.append((data.action, data.action_slot))
-        wanted.append(expected_bases(obj, ACTION_FRAMES, deltas))
+        expected.append(expected_bases(obj, ACTION_FRAMES, deltas))
     data.action = None
     track = data.nla_tracks.new()
     for start, (action, slot) in zip((1, 101), actions, strict=True):
@@ -94,9 +94,9 @@ def test_two_strips_each_have_the_mode_that_is_keyed_in_their_action(live_file, 
         strip.action_slot, strip.extrapolation = slot, "HOLD_FORWARD" if start > 1 else "HOLD"
     bpy.context.view_layer.update()
     assert refresh() == 0
-    for start, worlds in zip((1, 101), wanted, strict=True):
+    for start, worlds in zip((1, 101), expected, strict=True):
         assert_at(obj, ACTION_FRAMES + start - 1, worlds)
-    assert_at(obj, np.array((60.0, 90.0)), wanted[0][[-1, -1]])
+    assert_at(obj, np.array((60.0, 90.0)), expected[0][[-1, -1]])
 
 
 def two_strips(
@@ -104,20 +104,20 @@ def two_strips(
 ) -> tuple[bpy.types.Object, Own, list[bpy.types.Action], list[np.ndarray]]:
     """An object, its own delta transforms, the Actions of a strip with a mode and one without, its place in each."""
     obj = new_object("Tool", order)
-    deltas, actions, wanted = give_own_deltas(obj) if own else Own(), [], []
+    deltas, actions, expected = give_own_deltas(obj) if own else Own(), [], []
     data = obj.animation_data_create()
     for seed, mode in enumerate(("dq_sclerp", "BLENDER")):
         data.action = None
         key(obj, KEYS, seed=seed)
         set_mode(obj, mode, KEYS)
         actions.append(data.action)
-        wanted.append(expected_bases(obj, ACTION_FRAMES, deltas))
+        expected.append(expected_bases(obj, ACTION_FRAMES, deltas))
     slots, data.action = [action.slots[0] for action in actions], None
     for start, action, slot in zip((1, 101), actions, slots, strict=True):
         strip = data.nla_tracks.new().strips.new("Strip", start, action)
         strip.action_slot, strip.extrapolation = slot, "NOTHING"
     bpy.context.view_layer.update()
-    return obj, deltas, actions, wanted
+    return obj, deltas, actions, expected
 
 
 def fcurves_of(action: bpy.types.Action) -> bpy.types.ActionChannelbagFCurves:
@@ -131,8 +131,8 @@ def held_in(action: bpy.types.Action) -> set[str]:
 
 @pytest.mark.parametrize("order", ["QUATERNION", "ZYX"])
 def test_a_strip_without_a_mode_keeps_the_own_delta_transforms_beside_one_with_a_mode(live_file, order):
-    obj, _, actions, wanted = two_strips(order)
-    for start, worlds in zip((1, 101), wanted, strict=True):
+    obj, _, actions, expected = two_strips(order)
+    for start, worlds in zip((1, 101), expected, strict=True):
         assert_at(obj, ACTION_FRAMES + start - 1, worlds)
     rotation = "delta_rotation_quaternion" if order == "QUATERNION" else "delta_rotation_euler"
     assert held_in(actions[1]) == {"delta_location", rotation}, "and no other"
@@ -140,7 +140,7 @@ def test_a_strip_without_a_mode_keeps_the_own_delta_transforms_beside_one_with_a
 
 
 def test_what_a_strip_holds_goes_and_comes_with_the_mode_of_the_other(live_file):
-    obj, own, actions, wanted = two_strips()
+    obj, own, actions, expected = two_strips()
     tweak(obj, obj.animation_data.nla_tracks[0].strips[0])
     set_mode(obj, "BLENDER", KEYS)
     assert held_in(actions[0]) == held_in(actions[1]) == set()
@@ -149,19 +149,19 @@ def test_what_a_strip_holds_goes_and_comes_with_the_mode_of_the_other(live_file)
     assert held_in(actions[0]) == held_in(actions[1]) != set()
     obj.animation_data.use_tweak_mode = False
     bpy.context.view_layer.update()
-    assert_at(obj, ACTION_FRAMES + 100, wanted[1])
+    assert_at(obj, ACTION_FRAMES + 100, expected[1])
     tweak(obj, obj.animation_data.nla_tracks[1].strips[0])
     set_mode(obj, "cga_slerp", KEYS)
     assert_at(obj, ACTION_FRAMES + 100, expected_bases(obj, ACTION_FRAMES, own))
 
 
 def test_baking_the_other_strip_and_back_keeps_the_own_delta_transforms(live_file):
-    obj, _, actions, wanted = two_strips()
+    obj, _, actions, expected = two_strips()
     strips = [track.strips[0] for track in obj.animation_data.nla_tracks]
     for act in (bake, unbake):
         act(obj)
         bpy.context.view_layer.update()
-        for start, worlds in zip((1, 101), wanted, strict=True):
+        for start, worlds in zip((1, 101), expected, strict=True):
             assert_at(obj, ACTION_FRAMES + start - 1, worlds)
         assert (held_in(actions[1]) == set()) == (act is bake)
         assert (strips[0].action == actions[0]) == (act is unbake)
@@ -195,7 +195,7 @@ def test_a_strip_with_damaged_keys_holds_them_too(live_file, frame):
 
 
 def test_above_a_strip_with_a_mode_one_that_keys_something_else_leaves_it_its_in_betweens(live_file):
-    obj, _, actions, wanted = two_strips()
+    obj, _, actions, expected = two_strips()
     fcurves = fcurves_of(actions[1])
     fcurves.clear()
     fcurves.new("color", index=1).keyframe_points.insert(KEYS[0], 0.5)
@@ -203,7 +203,7 @@ def test_above_a_strip_with_a_mode_one_that_keys_something_else_leaves_it_its_in
     bpy.context.view_layer.update()
     refresh()
     assert held_in(actions[1]) == set()
-    assert_at(obj, ACTION_FRAMES, wanted[0])
+    assert_at(obj, ACTION_FRAMES, expected[0])
 
 
 def test_a_strip_that_adds_holds_nothing(live_file):
@@ -221,13 +221,13 @@ def test_where_there_are_no_own_delta_transforms_the_other_strip_holds_none(live
 
 
 def test_an_action_of_two_objects_holds_what_both_have(live_file):
-    obj, _, actions, wanted = two_strips()
+    obj, _, actions, expected = two_strips()
     twin = obj.copy()
     live_file.collection.objects.link(twin)
     bpy.context.view_layer.update()
     refresh()
     assert held_in(actions[1]) != set()
-    for start, worlds in zip((1, 101), wanted, strict=True):
+    for start, worlds in zip((1, 101), expected, strict=True):
         assert_at(twin, ACTION_FRAMES + start - 1, worlds)
 
 
@@ -246,7 +246,7 @@ def test_an_action_that_is_in_two_strips_and_cycles_is_filled_in_as_far_as_eithe
     for fcurve in curves_of(obj).values():
         fcurve.modifiers.new("CYCLES")
     set_mode(obj, "dq_sclerp")
-    wanted = expected_bases(obj, ACTION_FRAMES)[:-1]
+    expected = expected_bases(obj, ACTION_FRAMES)[:-1]
     push_down(obj, 1)
     data = obj.animation_data
     first = data.nla_tracks[0].strips[0]
@@ -256,23 +256,23 @@ def test_an_action_that_is_in_two_strips_and_cycles_is_filled_in_as_far_as_eithe
     second.action_frame_end = 121.0
     bpy.context.view_layer.update()
     refresh()
-    assert_at(obj, ACTION_FRAMES[:-1], wanted)
+    assert_at(obj, ACTION_FRAMES[:-1], expected)
     for start in (201.0, 241.0, 281.0):
-        assert_at(obj, start + np.arange(1.0, 40.0), wanted[1:])
+        assert_at(obj, start + np.arange(1.0, 40.0), expected[1:])
 
 
 @pytest.mark.parametrize(("start", "scale"), [(101, 1.0), (31, 2.0)])
 def test_in_tweak_mode_a_key_inserted_in_between_keeps_the_pose_on_the_screen(live_file, start, scale):
-    obj, wanted = filled()
+    obj, expected = filled()
     strip = push_down(obj, start, scale=scale)
     tweak(obj, strip)
     scene_frame = start + int(15 * scale)
     live_file.scene.frame_set(scene_frame)
-    assert_at(obj, np.array((float(scene_frame),)), wanted[[15]])
+    assert_at(obj, np.array((float(scene_frame),)), expected[[15]])
     obj.keyframe_insert("location")
     bpy.context.view_layer.update()
     assert 16.0 in key_frames(obj)
-    assert_at(obj, np.array((float(scene_frame),)), wanted[[15]])
+    assert_at(obj, np.array((float(scene_frame),)), expected[[15]])
 
 
 def test_a_strip_without_an_action_to_set_keys_on_is_explained(live_file):
@@ -296,7 +296,7 @@ def test_an_own_delta_transform_is_held_in_an_action_that_an_object_without_stri
     data.action, data.action_slot = plays[0]
     bpy.context.view_layer.update()
     frames = np.arange(1.0, 40.0)
-    wanted = shown_worlds([obj], frames)[0]
+    expected = shown_worlds([obj], frames)[0]
     data.action = None
     other = new_object("A")
     give_own_deltas(other, 3)
@@ -304,5 +304,5 @@ def test_an_own_delta_transform_is_held_in_an_action_that_an_object_without_stri
     for start, (action, slot) in zip((1, 50), plays, strict=True):
         new_strip(obj, start, action, slot).extrapolation = "NOTHING"
     bpy.context.view_layer.update()
-    assert np.abs(shown_worlds([obj], frames)[0] - wanted).max() < 1e-5
+    assert np.abs(shown_worlds([obj], frames)[0] - expected).max() < 1e-5
     assert own_deltas(other) == own

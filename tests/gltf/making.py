@@ -50,10 +50,10 @@ class Making:
 
     def described(self, numbers: np.ndarray) -> dict[str, Any]:
         kind = KINDS[numbers.dtype.str[1:]]
-        found = {"componentType": kind, "count": len(numbers), "type": TYPES[numbers.shape[1]]}
+        result = {"componentType": kind, "count": len(numbers), "type": TYPES[numbers.shape[1]]}
         if numbers.shape[1] == 1:
-            found |= {"min": [float(numbers.min())], "max": [float(numbers.max())]}
-        return found
+            result |= {"min": [float(numbers.min())], "max": [float(numbers.max())]}
+        return result
 
     def times(self, times: Sequence[float] | np.ndarray, buffer: int = 0) -> int:
         return self.accessor(np.asarray(times, dtype="<f4"), buffer)

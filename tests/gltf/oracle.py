@@ -53,12 +53,12 @@ class File:
     def numbers(self, accessor: int) -> np.ndarray:
         given = self.json["accessors"][accessor]
         kind, width = np.dtype(SIZES[given["componentType"]]), WIDTHS[given["type"]]
-        found = np.zeros((given["count"], width), kind)
+        result = np.zeros((given["count"], width), kind)
         if "bufferView" in given:
             data, first = self.bytes_of(given["bufferView"]), given.get("byteOffset", 0)
             step = self.json["bufferViews"][given["bufferView"]].get("byteStride", kind.itemsize * width)
             for row in range(given["count"]):
-                found[row] = np.frombuffer(data, kind, width, first + row * step)
+                result[row] = np.frombuffer(data, kind, width, first + row * step)
         if "sparse" in given:
             sparse = given["sparse"]
             places = np.frombuffer(
@@ -67,33 +67,33 @@ class File:
                 sparse["count"],
             )
             values = np.frombuffer(self.bytes_of(sparse["values"]["bufferView"]), kind, sparse["count"] * width)
-            found[places] = values.reshape(-1, width)
-        return np.maximum(found / np.iinfo(kind).max, -1.0) if given.get("normalized") else found.astype(np.float64)
+            result[places] = values.reshape(-1, width)
+        return np.maximum(result / np.iinfo(kind).max, -1.0) if given.get("normalized") else result.astype(np.float64)
 
     def tracks(self, clip: int) -> dict[tuple[int, str], tuple[str, np.ndarray, np.ndarray]]:
         """Interpolation, times and values by node and path."""
-        animation, found = self.json["animations"][clip], {}
+        animation, result = self.json["animations"][clip], {}
         for channel in animation["channels"]:
             sampler = animation["samplers"][channel["sampler"]]
             times, values = self.numbers(sampler["input"])[:, 0], self.numbers(sampler["output"])
-            found[channel["target"]["node"], channel["target"]["path"]] = (
+            result[channel["target"]["node"], channel["target"]["path"]] = (
                 sampler.get("interpolation", "LINEAR"),
                 times,
                 values.reshape(len(times) * (3 if sampler.get("interpolation") == "CUBICSPLINE" else 1), -1),
             )
-        return found
+        return result
 
     def worlds(self, clip: int, times: np.ndarray) -> np.ndarray:
         """Matrices of all nodes, shape (nodes, times, 4, 4)."""
         nodes, tracks = self.json["nodes"], self.tracks(clip)
         parents = {child: number for number, node in enumerate(nodes) for child in node.get("children", [])}
-        found: dict[int, np.ndarray] = {}
+        result: dict[int, np.ndarray] = {}
 
         def world(node: int) -> np.ndarray:
-            if node not in found:
+            if node not in result:
                 local = self._local(nodes[node], node, tracks, times)
-                found[node] = world(parents[node]) @ local if node in parents else local
-            return found[node]
+                result[node] = world(parents[node]) @ local if node in parents else local
+            return result[node]
 
         return np.array([world(node) for node in range(len(nodes))])
 
@@ -163,7 +163,7 @@ def off(before: File, after: File, clip: int, radius: float) -> float:
     """The largest displacement of any node or of points around it, at eighths of the densest keys of both files."""
     keys = np.union1d(before.moments(clip), after.moments(clip))
     times = np.append((keys[:-1, None] + np.diff(keys)[:, None] * np.arange(8) / 8).ravel(), keys[-1])
-    truth, found = (file.worlds(clip, times) for file in (before, after))
+    truth, result = (file.worlds(clip, times) for file in (before, after))
     random = np.random.default_rng(5)
     ball = random.normal(size=(40, 3))
     ball = np.append(radius * ball / np.linalg.norm(ball, axis=1, keepdims=True), np.zeros((1, 3)), axis=0)
@@ -173,6 +173,6 @@ def off(before: File, after: File, clip: int, radius: float) -> float:
         sizes = np.linalg.norm(axes, axis=(1, 2))
         biggest = axes[np.argmax(sizes >= (1.0 - 1e-9) * sizes.max())]
         points = np.column_stack((ball @ np.linalg.pinv(biggest).T, np.ones(len(ball))))
-        moved = (found[node] - truth[node]) @ points.T
+        moved = (result[node] - truth[node]) @ points.T
         largest = max(largest, float(np.linalg.norm(moved[:, :3], axis=1).max()))
     return largest

@@ -147,8 +147,8 @@ def test_weights_of_morph_targets_keep_to_half_a_percent(tmp_path):
     _, after, _ = both(made, tmp_path, 5e-3)
     kind, key_times, values = after.tracks(0)[0, "weights"]
     assert (kind, len(key_times) < 40) == ("LINEAR", True)
-    found = [np.interp(times, key_times, column) for column in values.reshape(-1, 2).T]
-    assert np.abs(np.transpose(found) - weights).max() <= 0.005 + ROUNDING
+    result = [np.interp(times, key_times, column) for column in values.reshape(-1, 2).T]
+    assert np.abs(np.transpose(result) - weights).max() <= 0.005 + ROUNDING
 
 
 def test_a_clip_of_weights_alone_is_reduced(tmp_path):
@@ -259,8 +259,8 @@ def test_channels_of_extensions_stay(tmp_path):
     reduce_file(path, tmp_path / "made.glb", Options(2e-3))
     after = File(tmp_path / "made.glb")
     animation = after.json["animations"][0]
-    (found,) = [some for some in animation["channels"] if some["target"] == channel["target"]]
-    assert after.numbers(animation["samplers"][found["sampler"]]["output"]).ravel().tolist() == [0.0, np.float32(0.7)]
+    (result,) = [some for some in animation["channels"] if some["target"] == channel["target"]]
+    assert after.numbers(animation["samplers"][result["sampler"]]["output"]).ravel().tolist() == [0.0, np.float32(0.7)]
 
 
 def test_key_poses_are_so_many_times_of_all_nodes(tmp_path):

@@ -61,12 +61,12 @@ def test_no_point_is_off_by_more_anywhere_across_the_borders(tmp_path_factory, s
 
 def test_all_that_moves_has_keys_where_stretches_meet_and_few_more_elsewhere(tmp_path, monkeypatch):
     document = read_document(walk(seconds=20.0).write(tmp_path / "walk.glb"))
-    (found,) = reduced(document, Options(TOLERANCE, RADIUS)).clips
+    (result,) = reduced(document, Options(TOLERANCE, RADIUS)).clips
     meeting = np.float32(np.linspace(0, 600, 16).round() / 30.0)
-    assert all(np.isin(meeting, track.times).all() for track in found.tracks if len(track.times) > 1)
+    assert all(np.isin(meeting, track.times).all() for track in result.tracks if len(track.times) > 1)
     monkeypatch.setattr(errors, "STRETCH", 10**6)
     (whole,) = reduced(document, Options(TOLERANCE, RADIUS)).clips
-    assert found.after.keys <= 1.15 * whole.after.keys
+    assert result.after.keys <= 1.15 * whole.after.keys
 
 
 def test_what_hardly_moves_has_one_key_throughout(tmp_path):
@@ -138,9 +138,9 @@ def test_memory_hardly_grows_with_the_length(tmp_path, monkeypatch):
         path = walk(4, seconds).write(tmp_path / f"{seconds}.glb")
         tracemalloc.start()
         reduce_file(path, tmp_path / "out.glb", Options(2e-2, RADIUS))
-        found = tracemalloc.get_traced_memory()[1]
+        result = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
-        return found
+        return result
 
     # The 31 numbers that a frame has in the file, in double precision: not even they are all there at once.
     assert peak(140.0) - peak(30.0) < 110 * 30 * 31 * 8

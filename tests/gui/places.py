@@ -24,18 +24,18 @@ REDO_ROW = 22
 
 def area(window: bpy.types.Window, kind: str) -> bpy.types.Area:
     """The largest area of this type, for instance "VIEW_3D"."""
-    found = [one for one in window.screen.areas if one.type == kind]
-    if not found:
+    result = [one for one in window.screen.areas if one.type == kind]
+    if not result:
         raise LookupError(f"no {kind} in the window, only {', '.join(one.type for one in window.screen.areas)}")
-    return max(found, key=lambda one: one.width * one.height)
+    return max(result, key=lambda one: one.width * one.height)
 
 
 def region(area: bpy.types.Area, kind: str = "WINDOW") -> bpy.types.Region:
     """The region of this type in an area; it has to be open."""
-    found = next((one for one in area.regions if one.type == kind), None)
-    if found is None or min(found.width, found.height) <= 1:
+    result = next((one for one in area.regions if one.type == kind), None)
+    if result is None or min(result.width, result.height) <= 1:
         raise LookupError(f"the {kind} region of the {area.type} is not open")
-    return found
+    return result
 
 
 def centre(part: bpy.types.Area | bpy.types.Region) -> Place:

@@ -27,9 +27,9 @@ def blender() -> str:
     named = os.environ.get("BLENDER")
     if not named:
         pytest.skip("needs a Blender with a window: set BLENDER to its path, or to .ci/blender-window")
-    found = shutil.which(named) or shutil.which(str(ROOT / named))
-    assert found, f"BLENDER is {named}, which is no program"
-    return str(Path(found).absolute())
+    result = shutil.which(named) or shutil.which(str(ROOT / named))
+    assert result, f"BLENDER is {named}, which is no program"
+    return str(Path(result).absolute())
 
 
 @pytest.fixture(scope="module")

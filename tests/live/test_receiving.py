@@ -122,8 +122,8 @@ def test_a_rig_of_rigify_follows_by_its_controls(live, sent):
         row = JOINTS.index(joint)
         points = world.positions[row, 7] - world.positions[row - 1, 7]
         bone = rig.pose.bones[control]
-        found = np.array(bone.tail - bone.head)
-        assert found / np.linalg.norm(found) == pytest.approx(points / np.linalg.norm(points), abs=0.02)
+        result = np.array(bone.tail - bone.head)
+        assert result / np.linalg.norm(result) == pytest.approx(points / np.linalg.norm(points), abs=0.02)
 
 
 def test_a_corrected_table_is_what_moves(live, sent):
@@ -192,10 +192,10 @@ def test_linked_rigs_are_left_alone(live, sent, tmp_path):
     new_rig()
     bpy.data.libraries.write(str(tmp_path / "rig.blend"), {bpy.data.objects["Rig"]})
     bpy.data.objects.remove(bpy.data.objects["Rig"])
-    with bpy.data.libraries.load(str(tmp_path / "rig.blend"), link=True) as (_, wanted):
-        wanted.objects = ["Rig"]
-    bpy.context.scene.collection.objects.link(wanted.objects[0])
-    live.armature = wanted.objects[0]
+    with bpy.data.libraries.load(str(tmp_path / "rig.blend"), link=True) as (_, expected):
+        expected.objects = ["Rig"]
+    bpy.context.scene.collection.objects.link(expected.objects[0])
+    live.armature = expected.objects[0]
     for row, datagrams in enumerate(frames_of_vmc(TIMES)[:5]):
         sent.send(datagrams, 50.0 + TIMES[row])
     assert receiving.running.trouble == ""

@@ -27,12 +27,12 @@ def listener(extension):
 
 
 def received(other: socket.socket) -> list[bytes]:
-    found = []
+    result = []
     try:
         while True:
-            found.append(other.recv(4096))
+            result.append(other.recv(4096))
     except BlockingIOError:
-        return found
+        return result
 
 
 @pytest.mark.parametrize(("prefix", "turned_by"), [("", 0.0), ("mixamorig:", 0.8)])
@@ -53,9 +53,9 @@ def test_a_rig_is_a_performer(listener, prefix, turned_by):
         (keys,) = receiver.keys()
         (body,) = receiver.bodies(keys.stream)
         assert body.joints == (ROOT, *(name for name in body.joints[1:] if name in JOINTS))
-        found = dict(zip(body.joints, Skeleton(body.parents).in_root_space(shown.poses["VMC"]).positions, strict=True))
+        result = dict(zip(body.joints, Skeleton(body.parents).in_root_space(shown.poses["VMC"]).positions, strict=True))
         for name, head in zip(JOINTS, heads, strict=True):
-            assert found[name] == pytest.approx(head, abs=1e-5)
+            assert result[name] == pytest.approx(head, abs=1e-5)
 
 
 def test_other_objects_are_trackers_with_their_constraints(listener):

@@ -40,24 +40,24 @@ def wandering_body(
 def matrices(poses: Poses) -> np.ndarray:
     """Poses (...) as matrices (..., 4, 4)."""
     turns = Rotation.from_quat(poses.quaternions.reshape(-1, 4), scalar_first=True).as_matrix()
-    found = np.zeros((*poses.shape, 4, 4))
-    found[..., :3, :3] = turns.reshape(*poses.shape, 3, 3)
+    result = np.zeros((*poses.shape, 4, 4))
+    result[..., :3, :3] = turns.reshape(*poses.shape, 3, 3)
     if poses.scales is not None:
-        found[..., :3, :3] *= poses.scales[..., None, None]
-    found[..., :3, 3], found[..., 3, 3] = poses.positions, 1.0
-    return found
+        result[..., :3, :3] *= poses.scales[..., None, None]
+    result[..., :3, 3], result[..., 3, 3] = poses.positions, 1.0
+    return result
 
 
 def in_root_space(poses: Poses, parents: np.ndarray) -> np.ndarray:
     """The matrices (joints, n, 4, 4) of joints in the root's space, each by going up its own chain."""
     own = matrices(poses)
-    found = own.copy()
+    result = own.copy()
     for joint in range(len(parents)):
         above = parents[joint]
         while above >= 0:
-            found[joint] = own[above] @ found[joint]
+            result[joint] = own[above] @ result[joint]
             above = parents[above]
-    return found
+    return result
 
 
 def largest_displacements(a: np.ndarray, b: np.ndarray, radii: np.ndarray) -> np.ndarray:

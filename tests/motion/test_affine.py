@@ -38,11 +38,11 @@ def test_no_point_of_a_ball_is_off_by_more_and_some_point_is_off_by_as_much(kind
     none, radii = AffineMaps(np.zeros_like(turns), np.zeros_like(offsets)), np.full(COUNT, RADIUS)
     largest = ball_displacement(AffineMaps(turns, offsets), none, radii)
     points = RADIUS * normalise(np.random.default_rng(8).normal(size=(20000, 3)))
-    found = np.array(
+    result = np.array(
         [np.linalg.norm(points @ turn.T + off, axis=1).max() for off, turn in zip(offsets, turns, strict=True)]
     )
-    assert np.all(found <= largest * (1.0 + 1e-9))
-    assert np.all(found >= largest * 0.999)
+    assert np.all(result <= largest * (1.0 + 1e-9))
+    assert np.all(result >= largest * 0.999)
     bound = displacement_bound(AffineMaps(turns, offsets), none, radii)
     assert np.all(bound >= largest * (1.0 - 1e-12))
     assert np.all(bound <= 1.8 * largest + 1e-12)

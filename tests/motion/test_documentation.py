@@ -43,10 +43,10 @@ def entries(text: str) -> list[str]:
 def test_the_examples_of_what_is_public_are_true(name):
     documented = getattr(motion, name)
     # In a namespace of its own, as whoever copies an example has it.
-    found = doctest.DocTestFinder(recurse=inspect.isclass(documented)).find(documented, name, globs={})
+    result = doctest.DocTestFinder(recurse=inspect.isclass(documented)).find(documented, name, globs={})
     runner = doctest.DocTestRunner(verbose=False)
     report: list[str] = []
-    for example in found:
+    for example in result:
         runner.run(example, out=report.append)
     assert runner.tries > 0, f"{name} has no example"
     assert runner.failures == 0, "".join(report)

@@ -71,9 +71,9 @@ def test_straight_through_gimbal_lock(order):
     angles = np.full((201, 3), 0.3)
     angles[:, middle] = np.linspace(1.0, np.pi - 1.0, 201)  # The middle one of these is a right angle exactly.
     quaternions = rotations(angles, order).as_quat(scalar_first=True)
-    found = extrinsic_eulers_from_quaternions(quaternions, order)
-    assert_same_rotations(found, order, quaternions, 1e-7)
-    assert np.abs(np.diff(found, axis=0)).max() < 0.02
+    result = extrinsic_eulers_from_quaternions(quaternions, order)
+    assert_same_rotations(result, order, quaternions, 1e-7)
+    assert np.abs(np.diff(result, axis=0)).max() < 0.02
 
 
 def test_resting_in_gimbal_lock_is_a_rest():

@@ -55,10 +55,10 @@ def test_smooth_keys_are_as_few_as_any_that_keep_to_the_tolerance():
     as_few = 0
     for seed in range(6):
         times, poses = wandering(9, seed, 0.02, 60.0)
-        found = len(reduce_keys(times, poses, "motor_spline", TOLERANCES[seed % 3], RADIUS))
+        result = len(reduce_keys(times, poses, "motor_spline", TOLERANCES[seed % 3], RADIUS))
         fewest = fewest_of_all_sets(times, poses, "motor_spline", TOLERANCES[seed % 3])
-        assert fewest <= found <= fewest + 1
-        as_few += found == fewest
+        assert fewest <= result <= fewest + 1
+        as_few += result == fewest
     assert as_few >= 5
 
 

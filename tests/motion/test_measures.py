@@ -61,9 +61,9 @@ def test_no_point_of_the_ball_is_off_by_more_and_one_is_off_by_as_much(growing):
     directions = random.normal(size=(20000, 3))
     points = 0.7 * directions / np.linalg.norm(directions, axis=1, keepdims=True)
     error = shell_error(poses, truth, radius=0.7)
-    found = displacements(poses, truth, points)
-    assert np.all(found.max(axis=1) <= error * (1.0 + 1e-12) + 1e-15)
-    assert np.all(found.max(axis=1) >= 0.999 * error)
+    result = displacements(poses, truth, points)
+    assert np.all(result.max(axis=1) <= error * (1.0 + 1e-12) + 1e-15)
+    assert np.all(result.max(axis=1) >= 0.999 * error)
     inside = displacements(poses, truth, points * random.uniform(size=(20000, 1)))
     assert np.all(inside.max(axis=1) <= error * (1.0 + 1e-12) + 1e-15)
 

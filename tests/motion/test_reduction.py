@@ -180,13 +180,13 @@ def test_bad_samples_are_named():
 
 @pytest.fixture(scope="module")
 def recordings() -> dict[str, tuple[np.ndarray, Poses]]:
-    found = {}
+    result = {}
     for path in sorted(RECORDINGS.glob("*")):
         if path.suffix != ".md":
             trajectory = read_trajectories(str(path)).trajectories[0]
             times, poses, _ = repair(trajectory.times, trajectory.rigid)
-            found[path.name] = times, poses
-    return found
+            result[path.name] = times, poses
+    return result
 
 
 @pytest.mark.recordings

@@ -39,8 +39,8 @@ def test_errors_of_channels_between_samples(count, joints, seed, scaled, parts):
     shown, truth = (in_root_space(channels_shown(times, poses, some, moments), parents) for some in (keys, every))
     radii = random.choice((0.0, 0.03, 0.5), joints)
     errors = with_gaps(largest_displacements(shown, truth, radii), parts)
-    found = skeleton_errors(times, poses, parents, keys, radius=radii, parts=parts)
-    np.testing.assert_allclose(found, errors, rtol=1e-6, atol=1e-9 * max(1.0, np.abs(truth).max()))
+    result = skeleton_errors(times, poses, parents, keys, radius=radii, parts=parts)
+    np.testing.assert_allclose(result, errors, rtol=1e-6, atol=1e-9 * max(1.0, np.abs(truth).max()))
 
 
 @settings(max_examples=tried(20))
@@ -62,8 +62,8 @@ def test_errors_of_joints_in_every_mode(count, joints, seed, mode):
     shown = [interpolate(times[own], poses[joint][own], middles, mode) for joint, own in enumerate(keys)]
     shown = Poses([joint.positions for joint in shown], [joint.quaternions for joint in shown])
     errors = largest_displacements(in_root_space(shown, parents), in_root_space(finer, parents), radii)
-    found = skeleton_errors(times, poses, parents, keys, mode, parts=2)
-    np.testing.assert_allclose(found, with_gaps(errors, 2), rtol=1e-6, atol=1e-9)
+    result = skeleton_errors(times, poses, parents, keys, mode, parts=2)
+    np.testing.assert_allclose(result, with_gaps(errors, 2), rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize("mode", ["lerp_slerp", "motor_spline", "motor_spline_causal"])

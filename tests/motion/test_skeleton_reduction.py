@@ -174,10 +174,10 @@ def test_a_body_at_rest_has_one_key_each_or_two_key_poses(count, mode):
 
 @TWO_WAYS
 @pytest.mark.parametrize("wanted", [{"tolerance": 1e-4}, {"budget": 10}])
-def test_few_samples_are_their_own_keys(wanted, shared):
+def test_few_samples_are_their_own_keys(expected, shared):
     times, poses, parents = wandering_body(40, 5, 2, resting=0.0)
     for samples in (np.arange(0), np.arange(1), np.array((0, 39))):
-        keys = reduce_skeleton_keys(times[samples], poses[:, samples], parents, shared=shared, **wanted)
+        keys = reduce_skeleton_keys(times[samples], poses[:, samples], parents, shared=shared, **expected)
         assert [own.tolist() for own in keys] == [list(range(len(samples)))] * 5
 
 
@@ -245,7 +245,7 @@ def recorded_body(name: str, most: int = 80) -> tuple[np.ndarray, Poses, np.ndar
     """Times, joints in their parents' space and parents of a real body, 1.7 m tall, at a few of its samples."""
     (body,) = read_trajectories(str(BODIES[name])).trajectories
     samples = np.arange(0, len(body.times), max(1, round(1.0 / 30.0 / body.times[1])))[:most]
-    poses, parents = body.poses[:, samples], body.figure.parents
+    poses, parents = body.poses[:, samples], body.rest_body.parents
     spots = in_root_space(poses, parents)[..., :3, 3]
     world = [alone.poses.positions[samples] for alone in read_trajectories(f"{BODIES[name]}:*").trajectories]
     assert np.abs(spots - world).max() <= 1e-9 * np.abs(spots).max()

@@ -47,9 +47,9 @@ def test_every_joint_stays_within_the_tolerance_everywhere(count, joints, seed, 
     fixed = random.random(joints) < 0.2
     options = {"tolerance": tolerance, "radius": radii, "weights": weights, "stretch": stretch, "fixed": fixed}
     if mode is None:
-        found = reduce_skeleton_keys(times, poses, parents, "lerp_slerp", separate=True, **options)
-        errors = channel_errors(times, poses, parents, found, radii)
-        keys = [own for channels in found for own in channels]
+        result = reduce_skeleton_keys(times, poses, parents, "lerp_slerp", separate=True, **options)
+        errors = channel_errors(times, poses, parents, result, radii)
+        keys = [own for channels in result for own in channels]
     else:
         keys = reduce_skeleton_keys(times, poses, parents, mode, **options)
         errors = body_errors(times, poses, parents, keys, mode, radii)

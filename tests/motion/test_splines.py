@@ -156,7 +156,7 @@ def slow_spline(times: np.ndarray, keys: Poses, moments: np.ndarray, mode: str) 
             last, here = ways[i - 2] / h[i - 2], ways[i - 1] / h[i - 1]
             bend = (here - last) * min(1.0 / (h[i - 2] + h[i - 1]), h[i - 2] / h[i - 1] ** 2)
             speeds.append(0.5 * ((here + bend * h[i - 1]) + here))
-    found = []
+    result = []
     for moment in moments:
         i = int(np.clip(np.searchsorted(times, moment, side="right") - 1, 0, len(h) - 1))
         u = (moment - times[i]) / h[i]
@@ -164,8 +164,8 @@ def slow_spline(times: np.ndarray, keys: Poses, moments: np.ndarray, mode: str) 
         # A stream leaves a key at a twist from before it knew how late the next one is.
         part = min(1.0, 2.0 * h[i - 1] / h[i]) if mode == CAUSAL and i else 1.0
         left = u * (1 - u / part) ** 2 if u < part else 0.0
-        found.append(poses[i] @ expm(u * ways[i]) @ expm(left * leave - u**2 * (1 - u) * arrive))
-    return np.array(found)
+        result.append(poses[i] @ expm(u * ways[i]) @ expm(left * leave - u**2 * (1 - u) * arrive))
+    return np.array(result)
 
 
 @every_spline

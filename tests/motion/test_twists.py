@@ -51,16 +51,16 @@ def test_exponentials_are_those_of_matrices(angle):
 def test_a_logarithm_leads_back(angle, sign):
     given = some_twists(angle)
     quaternions, translations = twists.exponential(given)
-    found = twists.logarithm(sign * quaternions, translations)
+    result = twists.logarithm(sign * quaternions, translations)
     # Near half a turn the axis is known to the rounding of w, and counts twice.
-    np.testing.assert_allclose(found, given, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(result, given, rtol=0, atol=1e-12)
 
 
 def test_logarithms_are_those_of_matrices():
     random = np.random.default_rng(4)
     quaternions = random_quaternions(random, 30)
     translations = random.normal(size=(30, 3))
-    found = twists.logarithm(quaternions.T, translations.T)
-    for twist, quaternion, translation in zip(found.T, quaternions, translations, strict=True):
+    result = twists.logarithm(quaternions.T, translations.T)
+    for twist, quaternion, translation in zip(result.T, quaternions, translations, strict=True):
         matrix = logm(pose_matrix(quaternion, translation)).real
         np.testing.assert_allclose(matrix_of(twist), matrix, rtol=0, atol=1e-8)

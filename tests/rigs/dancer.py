@@ -65,12 +65,12 @@ LIMBS = {
 
 
 def _bones() -> dict[str, tuple[str | None, np.ndarray, np.ndarray]]:
-    found = {name: (parent, np.array(head), np.array(tail)) for name, (parent, head, tail) in TRUNK.items()}
+    result = {name: (parent, np.array(head), np.array(tail)) for name, (parent, head, tail) in TRUNK.items()}
     for side, out in (("L", 1.0), ("R", -1.0)):
         for name, (parent, head, tail) in LIMBS.items():
             of = parent if parent in TRUNK else f"{parent}.{side}"
-            found[f"{name}.{side}"] = of, np.array(head) * (out, 1.0, 1.0), np.array(tail) * (out, 1.0, 1.0)
-    return found
+            result[f"{name}.{side}"] = of, np.array(head) * (out, 1.0, 1.0), np.array(tail) * (out, 1.0, 1.0)
+    return result
 
 
 BONES = _bones()

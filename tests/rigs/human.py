@@ -32,9 +32,9 @@ def human() -> bpy.types.Object:
     NoRigify
         Where this Blender has no Rigify, or it will not generate.
     """
-    with bpy.data.libraries.load(str(_library()), link=False) as (_, wanted):
-        wanted.objects = ["rig"]
-    rig = wanted.objects[0]
+    with bpy.data.libraries.load(str(_library()), link=False) as (_, expected):
+        expected.objects = ["rig"]
+    rig = expected.objects[0]
     bpy.context.scene.collection.objects.link(rig)
     bpy.context.view_layer.update()
     return rig

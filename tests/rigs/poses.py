@@ -31,8 +31,8 @@ def key_at_random(bones: Iterable[bpy.types.PoseBone]) -> None:
 
 def ends_of_bones(rig: bpy.types.Object) -> np.ndarray:
     """Where all bones begin and end on some frames, in armature space."""
-    found = []
+    result = []
     for frame in range(KEYS[0], KEYS[-1] + 1, 4):
         bpy.context.scene.frame_set(frame)
-        found.append([(*bone.head, *bone.tail) for bone in rig.pose.bones])
-    return np.array(found)
+        result.append([(*bone.head, *bone.tail) for bone in rig.pose.bones])
+    return np.array(result)

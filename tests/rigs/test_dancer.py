@@ -25,11 +25,11 @@ def followed(empty_file: bpy.types.Context) -> Iterator[None]:
 
 def ends_of_bones(rig: bpy.types.Object, frames: np.ndarray) -> np.ndarray:
     """Where all bones begin and end, shape (frames, bones, 2, 3)."""
-    found = []
+    result = []
     for frame in frames:
         bpy.context.scene.frame_set(int(frame))
-        found.append([(bone.head.copy(), bone.tail.copy()) for bone in rig.pose.bones])
-    return np.array(found)
+        result.append([(bone.head.copy(), bone.tail.copy()) for bone in rig.pose.bones])
+    return np.array(result)
 
 
 def test_key_poses_keep_to_the_tolerance(followed):

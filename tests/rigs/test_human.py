@@ -11,10 +11,10 @@ from tests.rigs.human import human as another_human
 
 def test_the_hand_goes_where_its_control_goes(human):
     hand = human.pose.bones["hand_ik.L"]
-    wanted = hand.head + Vector((-0.1, -0.2, 0.1))
-    hand.matrix = hand.matrix.Translation(wanted - hand.head) @ hand.matrix
+    expected = hand.head + Vector((-0.1, -0.2, 0.1))
+    hand.matrix = hand.matrix.Translation(expected - hand.head) @ hand.matrix
     bpy.context.view_layer.update()
-    assert (human.pose.bones["DEF-hand.L"].head - wanted).length < 1e-4
+    assert (human.pose.bones["DEF-hand.L"].head - expected).length < 1e-4
 
 
 def test_every_one_is_a_rig_of_its_own(human):

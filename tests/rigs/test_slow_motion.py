@@ -39,12 +39,12 @@ def swung(rig: bpy.types.Object, thing: bpy.types.Object) -> bpy.types.PoseBone:
 
 def shown(rig: bpy.types.Object, thing: bpy.types.Object) -> np.ndarray:
     """Where points of the hand's control, its deforming bone and the thing are at every eighth of a frame."""
-    found = []
+    result = []
     for frame in EIGHTHS:
         bpy.context.scene.frame_set(int(frame), subframe=frame % 1.0)
         matrices = [rig.pose.bones["hand_ik.L"].matrix, rig.pose.bones["DEF-hand.L"].matrix, thing.matrix_world]
-        found.append([POINTS @ np.array(matrix)[:3].T for matrix in matrices])
-    return np.array(found)
+        result.append([POINTS @ np.array(matrix)[:3].T for matrix in matrices])
+    return np.array(result)
 
 
 def test_slowed_down_it_is_where_a_bake_at_eighths_is(rig):

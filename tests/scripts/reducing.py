@@ -199,7 +199,7 @@ np.save(found, np.array(rows))
 
 def heads_at(made: Path, times: np.ndarray) -> np.ndarray:
     """Where the bones of a reduced recording begin at some seconds of it, by their names, shape (bones, times, 3)."""
-    found = made.with_suffix(".npy")
-    np.save(found, times)
-    on_a_farm(HEADS_AT, made, found)
-    return np.load(found).swapaxes(0, 1)
+    result = made.with_suffix(".npy")
+    np.save(result, times)
+    on_a_farm(HEADS_AT, made, result)
+    return np.load(result).swapaxes(0, 1)

@@ -86,7 +86,7 @@ def descendants(process: int) -> Sequence[int]:
         children = Path(f"/proc/{process}/task/{process}/children").read_text().split()
     except FileNotFoundError:
         return []
-    return [found for child in map(int, children) for found in (child, *descendants(child))]
+    return [result for child in map(int, children) for result in (child, *descendants(child))]
 
 
 def alive(process: int) -> bool:

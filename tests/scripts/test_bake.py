@@ -115,8 +115,8 @@ def baked(shot: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "shot-baked.blend"
 
 
-def assert_same(worlds: np.ndarray, wanted: list[np.ndarray]) -> None:
-    for one, other in zip(worlds, wanted, strict=True):
+def assert_same(worlds: np.ndarray, expected: list[np.ndarray]) -> None:
+    for one, other in zip(worlds, expected, strict=True):
         assert np.abs(one - other).max() <= 1e-5 * max(1.0, np.abs(other).max())
 
 
@@ -155,15 +155,15 @@ def test_a_baked_file_has_keys_on_every_frame_and_no_delta_transforms(baked):
 def test_un_baking_gives_back_exactly_the_keys_and_the_motion(shot, baked, tmp_path):
     assert run(baked, "--unbake", "--output", tmp_path) == 0
     names = (*BAKED, "Still", "Plain")
-    found = []
+    result = []
     for path in (shot, tmp_path / "shot-baked-unbaked.blend"):
         with extension():
             open_again(path)
             objects = [bpy.data.objects[name] for name in names]
             modes = [obj.rigid_motion.mode for obj in objects]
-            found.append(([snapshot(obj) for obj in objects], modes, shown_worlds(objects, PLAYED)))
-    assert found[0][:2] == found[1][:2]
-    assert_same(found[1][2], found[0][2])
+            result.append(([snapshot(obj) for obj in objects], modes, shown_worlds(objects, PLAYED)))
+    assert result[0][:2] == result[1][:2]
+    assert_same(result[1][2], result[0][2])
 
 
 @pytest.mark.parametrize(
@@ -174,11 +174,11 @@ def test_un_baking_gives_back_exactly_the_keys_and_the_motion(shot, baked, tmp_p
         (("--first", "12", "--last", "20"), [1.0, *np.arange(11.0, 25.0), 40.0]),
     ],
 )
-def test_steps_and_ranges(tmp_path, options, wanted):
+def test_steps_and_ranges(tmp_path, options, expected):
     path = one_object_file(tmp_path / "shot.blend")
     assert run(path, *options) == 0
     open_again(baked_name(path))
-    assert frames_of_keys(bpy.data.objects["Tool"]) == wanted
+    assert frames_of_keys(bpy.data.objects["Tool"]) == expected
 
 
 def test_objects_can_be_chosen_by_names_and_patterns(shot, tmp_path, capsys):
@@ -426,19 +426,19 @@ def test_keys_count_as_they_are_where_live_update_was_off(tmp_path):
         animation.set_enabled(True)
     with extension():
         open_again(path)
-        wanted = expected_worlds(bpy.data.objects["Tool"], PLAYED[:43])
+        expected = expected_worlds(bpy.data.objects["Tool"], PLAYED[:43])
     assert run(path) == 0
     open_again(baked_name(path))
-    assert_same(shown_worlds([bpy.data.objects["Tool"]], PLAYED[:43]), [wanted])
+    assert_same(shown_worlds([bpy.data.objects["Tool"]], PLAYED[:43]), [expected])
 
 
 @pytest.mark.parametrize(("options", "wanted"), [((), "LINEAR"), (("--hold",), "CONSTANT")])
-def test_poses_are_held_where_that_is_asked_for(tmp_path, options, wanted):
+def test_poses_are_held_where_that_is_asked_for(tmp_path, options, expected):
     path = one_object_file(tmp_path / "shot.blend")
     assert run(path, "--step", "2", *options) == 0
     open_again(baked_name(path))
     curves = curves_of(bpy.data.objects["Tool"])
-    assert {key.interpolation for curve in curves.values() for key in curve.keyframe_points[:-1]} == {wanted}
+    assert {key.interpolation for curve in curves.values() for key in curve.keyframe_points[:-1]} == {expected}
 
 
 @pytest.mark.parametrize("compress", [False, True])

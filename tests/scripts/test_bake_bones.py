@@ -77,9 +77,9 @@ def test_a_baked_rig_plays_in_any_blender_as_the_live_one_does_with_the_extensio
     assert run(path) == 0
     with extension():
         open_again(path)
-        wanted = shown_worlds([bpy.data.objects[name] for name in ("Rig", *probes())], PLAYED)
+        expected = shown_worlds([bpy.data.objects[name] for name in ("Rig", *probes())], PLAYED)
     _, played = played_on_a_farm(baked_name(path), ("Rig", *probes()), PLAYED)
-    np.testing.assert_allclose(played, wanted, atol=1e-4)
+    np.testing.assert_allclose(played, expected, atol=1e-4)
 
 
 def test_every_bone_with_a_mode_has_keys_on_every_frame_and_the_others_their_own(tmp_path):
@@ -101,15 +101,15 @@ def test_un_baking_gives_back_exactly_the_keys_the_modes_and_the_motion(tmp_path
     path = rig_file(tmp_path / "shot.blend")
     assert run(path, "--output", tmp_path / "farm") == 0
     assert run(tmp_path / "farm" / "shot-baked.blend", "--unbake") == 0
-    found = []
+    result = []
     for one in (path, tmp_path / "farm" / "shot-baked-unbaked.blend"):
         with extension():
             open_again(one)
             rig = bpy.data.objects["Rig"]
             modes = [animation.modes_of(bone, np.array(FRAMES)) for bone in rig.pose.bones]
             shown = shown_worlds([bpy.data.objects[name] for name in probes()], PLAYED)
-            found.append((snapshot(rig), modes, shown, [action.name for action in bpy.data.actions]))
-    (keys, modes, shown, actions), (keys_back, modes_back, shown_back, actions_back) = found
+            result.append((snapshot(rig), modes, shown, [action.name for action in bpy.data.actions]))
+    (keys, modes, shown, actions), (keys_back, modes_back, shown_back, actions_back) = result
     assert (keys_back, modes_back, actions_back) == (keys, modes, actions)
     np.testing.assert_allclose(shown_back, shown, atol=1e-6)
 
@@ -199,7 +199,7 @@ def test_the_bones_of_a_library_override_are_baked_and_given_back(tmp_path):
         rig = here.objects[0].override_create(remap_local_usages=True)
         rig.animation_data.action = rig.animation_data.action.copy()
         set_mode(list(rig.pose.bones), "dq_sclerp")
-        wanted, keys = shown_bones(rig), snapshot(rig)
+        expected, keys = shown_bones(rig), snapshot(rig)
         path = save(tmp_path / "shot.blend")
     assert run(path, "--output", tmp_path / "farm") == 0
     assert run(tmp_path / "farm" / "shot-baked.blend", "--unbake") == 0
@@ -208,14 +208,14 @@ def test_the_bones_of_a_library_override_are_baked_and_given_back(tmp_path):
             open_again(tmp_path / "farm" / f"{name}.blend")
             rig = next(obj for obj in bpy.data.objects if obj.override_library)
             assert baked_bones(rig) == baked
-            np.testing.assert_allclose(shown_bones(rig), wanted, atol=1e-4)
+            np.testing.assert_allclose(shown_bones(rig), expected, atol=1e-4)
     assert snapshot(rig) == keys
 
 
 def shown_bones(rig: bpy.types.Object) -> np.ndarray:
     """Where the bones of a rig are on all frames, in its own space (frames, bones, 4, 4)."""
-    found = []
+    result = []
     for frame in PLAYED:
         bpy.context.scene.frame_set(int(frame))
-        found.append([np.array(bone.matrix) for bone in rig.pose.bones])
-    return np.array(found)
+        result.append([np.array(bone.matrix) for bone in rig.pose.bones])
+    return np.array(result)

@@ -93,7 +93,9 @@ def shot_with(path: Path, link: Callable[[Path], object], library: Path) -> Path
         (link_collection, "Collection Props", "incomplete, for there may be objects to be baked in what is missing"),
     ],
 )
-def test_a_missing_library_that_may_hold_motion_is_named_and_fails_what_needs_it(tmp_path, capsys, link, wanted, told):
+def test_a_missing_library_that_may_hold_motion_is_named_and_fails_what_needs_it(
+    tmp_path, capsys, link, expected, told
+):
     library = make_library(tmp_path / "library.blend")
     shot = shot_with(tmp_path / "shot.blend", link, library)
     library.unlink()
@@ -102,7 +104,7 @@ def test_a_missing_library_that_may_hold_motion_is_named_and_fails_what_needs_it
     said = capsys.readouterr().err
     (line,) = (line for line in said.splitlines() if " was not found" in line)
     assert line.startswith(f"{shot}: library {library} was not found (")
-    assert wanted in line
+    assert expected in line
     assert line.endswith(WAY_OUT)
     assert said.count(told) == 1
     assert f"{shot}: Tool: baked" in said, "what is there is done"
@@ -128,11 +130,11 @@ def test_a_library_that_is_back_is_found_by_what_was_baked_without_it(tmp_path, 
     aside.rename(library)
     with extension():
         open_again(tmp_path / "farm" / "shot-baked.blend")
-        (found,) = bpy.data.libraries
+        (result,) = bpy.data.libraries
         assert is_baked(bpy.data.objects["Tool"])
-        assert Path(bpy.path.abspath(found.filepath)).resolve() == library
-        assert found.users_id
-        assert not any(block.is_missing for block in found.users_id)
+        assert Path(bpy.path.abspath(result.filepath)).resolve() == library
+        assert result.users_id
+        assert not any(block.is_missing for block in result.users_id)
 
 
 def test_spaces_and_umlauts_in_paths_and_names_are_kept(tmp_path, capsys):

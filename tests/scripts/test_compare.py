@@ -113,9 +113,9 @@ def test_there_is_a_row_for_every_clip_rate_and_mode(measured):
     assert (measured / "metrics.csv").read_text().splitlines()[0] == COLUMNS
     rows = rows_of(measured / "metrics.csv")
     clips = [path.stem for path in sorted((ROOT / "assets").glob("*.csv"))]
-    wanted = {(clip, rate, mode) for clip in clips for rate in ("5", "7.5", "20") for mode in KEYFRAME_MODES}
-    assert {(row["clip"], row["rate_hz"], row["mode"]) for row in rows} == wanted
-    assert len(rows) == len(wanted)
+    expected = {(clip, rate, mode) for clip in clips for rate in ("5", "7.5", "20") for mode in KEYFRAME_MODES}
+    assert {(row["clip"], row["rate_hz"], row["mode"]) for row in rows} == expected
+    assert len(rows) == len(expected)
 
 
 def test_every_number_can_be_had_again_from_the_tables_and_the_recording(measured):
@@ -424,14 +424,14 @@ def test_one_bad_recording_is_said_and_the_others_go_on(short_clip, tmp_path, ca
     said = capsys.readouterr()
     complaints = [line.split(": ")[1] for line in said.err.splitlines() if line.startswith("compare.py:")]
     assert complaints == [f"{bad}:1", str(tmp_path / "nowhere.csv"), "2 failed, as said above"]
-    found = json.loads(said.out)
-    assert found["tasks"] == {"done": 5, "failed": 2}
-    assert found["report"] == str(tmp_path / "out" / "report.html")
-    assert [*found["failures"]] == [f"read {bad}", f"read {tmp_path / 'nowhere.csv'}"]
-    assert found["exit_code"] == 1
+    result = json.loads(said.out)
+    assert result["tasks"] == {"done": 5, "failed": 2}
+    assert result["report"] == str(tmp_path / "out" / "report.html")
+    assert [*result["failures"]] == [f"read {bad}", f"read {tmp_path / 'nowhere.csv'}"]
+    assert result["exit_code"] == 1
     assert {row["clip"] for row in rows_of(tmp_path / "out" / "metrics.csv")} == {"toss"}
     assert tasks.main(["list", str(tmp_path / "out"), "--failed"]) == 1
-    assert [line.split(": failed")[0] for line in capsys.readouterr().out.splitlines()] == [*found["failures"]]
+    assert [line.split(": failed")[0] for line in capsys.readouterr().out.splitlines()] == [*result["failures"]]
 
 
 def test_the_terminal_ends_with_a_table_a_sentence_and_the_path(short_clip, tmp_path, capsys):

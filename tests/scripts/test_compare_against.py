@@ -164,10 +164,10 @@ def test_a_body_is_compared_joint_by_joint_by_name_and_in_metres(tmp_path):
     assert run(walk, "--against", mine, *FAST, "--modes", "lerp_slerp", "--output", output, "--radius", "0.05") == 0
 
     def placed(hips: np.ndarray, turns: dict[str, Rotation]) -> dict[str, tuple[np.ndarray, Rotation]]:
-        found = {"Hips": (hips, turns["Hips"])}
+        result = {"Hips": (hips, turns["Hips"])}
         for name in ("LeftHand", "Head"):
-            found[name] = hips + turns["Hips"].apply(PLACES[name]), turns["Hips"] * turns[name]
-        return found
+            result[name] = hips + turns["Hips"].apply(PLACES[name]), turns["Hips"] * turns[name]
+        return result
 
     truth = placed(
         hips_at(times), {n: Rotation.from_euler("ZXY", a, degrees=True) for n, a in angles_at(times).items()}

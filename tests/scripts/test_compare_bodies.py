@@ -39,7 +39,7 @@ def write_body(folder: Path, name: str = "walk") -> Path:
 
 
 def joints_in(path: Path) -> tuple[str, ...]:
-    return read_trajectories(str(path)).trajectories[0].figure.joints
+    return read_trajectories(str(path)).trajectories[0].rest_body.joints
 
 
 def run(*arguments: object, jobs: int = 0) -> int:
@@ -72,10 +72,10 @@ def test_the_table_has_a_row_for_every_body_choice_and_mode(written: tuple[Path,
     rows = rows_of(output / "metrics.csv")
     choices = [("5", "uniform", ""), ("10", "uniform", ""), ("", "adaptive", "0.01")]
     for clip in ("walk", "toss"):
-        found = [
+        result = [
             (row["rate_hz"], row["decimation"], row["tolerance_m"], row["mode"]) for row in rows if row["clip"] == clip
         ]
-        assert found == [(*choice, mode) for choice in choices for mode in MODES]
+        assert result == [(*choice, mode) for choice in choices for mode in MODES]
     for row in rows:
         if row["clip"] == "toss":
             assert {row[name] for name in COLUMNS.split(",")[-5:]} == {""}

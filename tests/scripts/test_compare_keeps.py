@@ -23,8 +23,8 @@ def run(*arguments: object) -> int:
 
 def files(folder: Path) -> dict[str, bytes]:
     """All files but the program's own."""
-    found = (path for path in folder.rglob("*") if path.is_file() and OWN not in path.parts)
-    return {str(path.relative_to(folder)): path.read_bytes() for path in found}
+    result = (path for path in folder.rglob("*") if path.is_file() and OWN not in path.parts)
+    return {str(path.relative_to(folder)): path.read_bytes() for path in result}
 
 
 @pytest.fixture(scope="module")

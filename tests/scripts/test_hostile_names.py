@@ -128,8 +128,8 @@ def test_a_comparison_stays_in_its_folder_and_names_do_not_change_its_report(tmp
         cells = [row["clip"] for row in csv.DictReader(stream)]
     assert set(cells) == set(folders)
 
-    found = (path.relative_to(output) for path in output.rglob("report.html"))
-    pages = sorted(path.as_posix() for path in found if not path.parts[0].startswith("."))
+    result = (path.relative_to(output) for path in output.rglob("report.html"))
+    pages = sorted(path.as_posix() for path in result if not path.parts[0].startswith("."))
     assert len(pages) == (1 if len(names) <= ON_ONE_PAGE else len(names) + 1)
     whole, as_plain = (Structure((root / "report.html").read_text(encoding="utf-8")) for root in (output, plain))
     assert whole.tags == as_plain.tags

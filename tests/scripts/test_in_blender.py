@@ -33,8 +33,8 @@ def test_a_python_that_has_the_libraries_does_the_work_itself() -> None:
 @pytest.mark.parametrize("given", [["--environment", str(HERE)], [f"--environment={HERE}"]])
 def test_it_runs_in_the_environment_that_is_named_and_films_with_this_blender(lacking: None, given: list[str]) -> None:
     python = str(HERE / "bin" / "python")
-    wanted = [python, "compare.py", "hand.csv", "--no-video", "--blender", "/opt/blender"]
-    assert elsewhere("compare.py", ["hand.csv", *given, "--no-video"]) == wanted
+    expected = [python, "compare.py", "hand.csv", "--no-video", "--blender", "/opt/blender"]
+    assert elsewhere("compare.py", ["hand.csv", *given, "--no-video"]) == expected
 
 
 def test_an_environment_of_the_checkout_is_found(lacking, tmp_path, monkeypatch):

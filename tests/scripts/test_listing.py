@@ -73,25 +73,25 @@ def may_be_imported(module: str) -> bool:
 
 def complaints(content: str) -> list[str]:
     """What a reviewer would send back of a module."""
-    tree, found = ast.parse(content), []
+    tree, result = ast.parse(content), []
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            found += [f"imports {alias.name}" for alias in node.names if not may_be_imported(alias.name)]
+            result += [f"imports {alias.name}" for alias in node.names if not may_be_imported(alias.name)]
         elif isinstance(node, ast.ImportFrom) and not node.level and not may_be_imported(node.module):
-            found.append(f"imports {node.module}")
+            result.append(f"imports {node.module}")
         elif isinstance(node, ast.Constant) and isinstance(node.value, str):
             node.value = ""
         elif isinstance(node, ast.ClassDef):
             kinds = re.findall(r"bpy\.types\.(Operator|Menu|Panel|UIList)\b", ast.unparse(node).partition(":")[0])
             starts = [f"RIGID_MOTION_{KINDS[kind]}_" for kind in kinds]
-            found += [f"names {node.name}" for start in starts if not node.name.startswith(start)]
+            result += [f"names {node.name}" for start in starts if not node.name.startswith(start)]
     for node in tree.body:
         if not isinstance(node, ast.FunctionDef | ast.ClassDef) and "bpy.context" in ast.unparse(node):
-            found.append("uses the context while it is imported")
+            result.append("uses the context while it is imported")
     code = ast.unparse(tree)
-    found += [what for what, pattern in FORBIDDEN.items() if re.search(pattern, code)]
-    found += [f"{there} is never taken back" for there, back in PAIRS.items() if there in code and back not in code]
-    return found
+    result += [what for what, pattern in FORBIDDEN.items() if re.search(pattern, code)]
+    result += [f"{there} is never taken back" for there, back in PAIRS.items() if there in code and back not in code]
+    return result
 
 
 def test_no_module_would_be_sent_back(files):

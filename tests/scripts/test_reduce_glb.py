@@ -38,24 +38,24 @@ def exported(monkeypatch, tmp_path) -> Path:
 
 
 def node_of(file: File, name: str) -> int:
-    (found,) = (number for number, node in enumerate(file.json["nodes"]) if node.get("name") == name)
-    return found
+    (result,) = (number for number, node in enumerate(file.json["nodes"]) if node.get("name") == name)
+    return result
 
 
 def joints_in_metres(clip: Clip) -> np.ndarray:
     """Where the joints of a whole body are, shape (joints, n, 3), by matrices."""
-    found: list[np.ndarray] = []
-    for joint, parent in enumerate(clip.figure.parents):
+    result: list[np.ndarray] = []
+    for joint, parent in enumerate(clip.rest_body.parents):
         local = worlds_of(clip.poses[joint])
-        found.append(local if parent < 0 else found[parent] @ local)
-    return clip.metres_per_unit * np.array(found)[..., :3, 3]
+        result.append(local if parent < 0 else result[parent] @ local)
+    return clip.metres_per_unit * np.array(result)[..., :3, 3]
 
 
 def require_joints(source: Path, made: Path, tolerance: float, *, fps: float) -> None:
     """The joints are where the reader of recordings has them; glTF has the axes of BVH, and frame 1 is first."""
     ((clip,), _), file = read_source(str(source), None), File(made)
     worlds = file.worlds(0, clip.times - clip.times[0] + 1.0 / fps)
-    nodes = [node_of(file, joint) for joint in clip.figure.joints]
+    nodes = [node_of(file, joint) for joint in clip.rest_body.joints]
     errors = np.linalg.norm(worlds[nodes][..., :3, 3] - joints_in_metres(clip), axis=-1)
     assert 0.0 < errors.max() <= tolerance + SINGLE
 

@@ -127,8 +127,8 @@ def test_the_tolerance_holds_at_every_key_of_every_curve_and_between_them(tmp_pa
     order = [names.index(name) for name in sorted(names)]
     keys = np.unique(np.concatenate([track.times for track in body.tracks]))
     for times, more in ((keys, 0.0), (body.moments, 1e-3)):
-        found = heads_at(tmp_path / "walk-keys.blend", times)
-        off = np.linalg.norm(found - body.places(times)[order], axis=-1).max()
+        result = heads_at(tmp_path / "walk-keys.blend", times)
+        off = np.linalg.norm(result - body.places(times)[order], axis=-1).max()
         assert off <= 1e-3 * float(told[1]) + more + ROUNDING
 
 

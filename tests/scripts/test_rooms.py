@@ -25,8 +25,8 @@ def imported(room: str) -> tuple[set[str], set[str]]:
     """The packages, beside those of Python, that all modules of a room bring, and the parts of the batch half."""
     bpy = "" if room == "analysis" else "import bpy"
     code = IMPORTING.format(room=room, bpy=bpy)
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
-    packages, parts = (set(line.split()) for line in found.stdout.strip().splitlines()[-2:])
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
+    packages, parts = (set(line.split()) for line in result.stdout.strip().splitlines()[-2:])
     return packages - set(sys.stdlib_module_names), parts
 
 

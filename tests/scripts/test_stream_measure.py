@@ -12,7 +12,7 @@ from rigid_motion.streams.bodies import Forest
 from rigid_motion_batch.cli.stream import main
 from rigid_motion_batch.cli.stream_measure import body_of, samples_of
 from rigid_motion_batch.recordings.clip_reading import read_clips
-from rigid_motion_batch.recordings.figures import Figure
+from rigid_motion_batch.recordings.rest_bodies import RestBody
 from rigid_motion_batch.streaming.measuring import straight
 from rigid_motion_batch.streaming.packed import WAYS, errors, smallest_three
 from rigid_motion_batch.streaming.written import write_bvh
@@ -24,9 +24,9 @@ def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     own = body(6)
     times, poses = dance(own, 1.5, 30.0)
     path = tmp_path_factory.mktemp("walk") / "walk.bvh"
-    figure = Figure(own.joints, own.parents, own.rest, own.rest.positions)
+    rest_body = RestBody(own.joints, own.parents, own.rest, own.rest.positions)
     with path.open("w", encoding="utf-8") as file:
-        write_bvh(file, figure, own.sliding, times, poses)
+        write_bvh(file, rest_body, own.sliding, times, poses)
     return path
 
 
@@ -34,16 +34,16 @@ def test_a_body(walk: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -
     shown = tmp_path / "shown.bvh"
     options = ["--axes", "blender", "--scale", "1", "--start", "0"]
     assert main(["measure", str(walk), "--json", "--output", str(shown), *options]) == 0
-    found = json.loads(capfd.readouterr().out)
-    assert found["largest_mm"] <= 5.05
-    assert found["share_within_tolerance"] > 0.99
-    assert found["bytes_a_second_with_headers"] == pytest.approx(
-        found["bytes_a_second"] + 28 * (found["datagrams"] - 1) / found["seconds"]
+    result = json.loads(capfd.readouterr().out)
+    assert result["largest_mm"] <= 5.05
+    assert result["share_within_tolerance"] > 0.99
+    assert result["bytes_a_second_with_headers"] == pytest.approx(
+        result["bytes_a_second"] + 28 * (result["datagrams"] - 1) / result["seconds"]
     )
-    assert found["bytes_a_second"] < found["beside"]["float32 at 30 Hz"]["bytes_a_second"]
+    assert result["bytes_a_second"] < result["beside"]["float32 at 30 Hz"]["bytes_a_second"]
     # Anybody can check it by the file.
     (before, after) = (read_clips([str(path)])[0][0] for path in (walk, shown))
-    true, there = (clip.figure.skeleton.in_root_space(clip.poses).positions for clip in (before, after))
+    true, there = (clip.rest_body.skeleton.in_root_space(clip.poses).positions for clip in (before, after))
     assert true.shape == there.shape
     assert 0.0005 < np.linalg.norm(true - there, axis=-1).max() * before.metres_per_unit < 0.0051
 
@@ -52,8 +52,8 @@ def test_a_single_body_with_loss(tmp_path: Path, capfd: pytest.CaptureFixture[st
     source, shown = Path(__file__).parents[2] / "assets/reach.csv", tmp_path / "shown.csv"
     options = ["--radius", "0.1", "--loss", "0.05", "--latency", "0.02", "--json"]
     assert main(["measure", str(source), "--output", str(shown), *options]) == 0
-    found = json.loads(capfd.readouterr().out)
-    assert found["share_within_20_mm"] > 0.95
+    result = json.loads(capfd.readouterr().out)
+    assert result["share_within_20_mm"] > 0.95
     assert len(read_clips([str(shown)])[0][0].times) == len(read_clips([str(source)])[0][0].times)
 
 

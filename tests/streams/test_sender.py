@@ -81,7 +81,7 @@ def test_a_sample_that_is_overdue_is_not_waited_for() -> None:
     assert outcome.errors.max() <= 0.005 * SLACK
 
 
-def test_a_body_at_rest_costs_heartbeats() -> None:
+def test_a_body_at_rest_costs_keepalives() -> None:
     own = body()
     times, poses = dance(own, 10.0)
     still = poses[:, np.zeros(len(times), dtype=int)]
@@ -137,7 +137,7 @@ def test_poses_that_are_none_are_refused() -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_source_that_leaps_and_then_stops_leaves_heartbeats(seed: int) -> None:
+def test_a_source_that_leaps_and_then_stops_leaves_keepalives(seed: int) -> None:
     rng = np.random.default_rng(seed)
     times = np.arange(60) / 120.0 + rng.uniform(0.0, 0.003, 60)
     places = np.cumsum(rng.normal(0.0, 0.2, (60, 3)), axis=0)

@@ -48,13 +48,13 @@ CLASSES = (*ui.CLASSES, *properties.CLASSES, RigidMotionOverlay, ShownTransform)
 
 def messages() -> set[Message]:
     """All of them. The extension has to be registered."""
-    found = {message for path in sources() for message in marked_or_drawn(parsed(path))}
+    result = {message for path in sources() for message in marked_or_drawn(parsed(path))}
     for cls in CLASSES:
-        found |= set(of_class(cls))
-        found |= set(of_properties(cls))
-    found |= {(DEFAULT, spoken_of(text, "bones")) for text in DESCRIPTIONS.values()}
-    found |= {(OWN_WORDS, label) for label in SHORT_LABELS.values()}
-    return {(context, text) for context, text in found if text}
+        result |= set(of_class(cls))
+        result |= set(of_properties(cls))
+    result |= {(DEFAULT, spoken_of(text, "bones")) for text in DESCRIPTIONS.values()}
+    result |= {(OWN_WORDS, label) for label in SHORT_LABELS.values()}
+    return {(context, text) for context, text in result if text}
 
 
 def sources() -> list[Path]:
@@ -135,5 +135,5 @@ def has_words(text: str) -> bool:
     return " " in text and any(character.isalpha() for character in text)
 
 
-def texts_of(found: Iterable[Message]) -> set[str]:
-    return {text for _, text in found}
+def texts_of(result: Iterable[Message]) -> set[str]:
+    return {text for _, text in result}

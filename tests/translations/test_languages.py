@@ -91,10 +91,10 @@ def test_every_translation_is_of_a_text_that_is_shown(shown, language):
 
 
 def test_a_text_that_is_new_would_be_missed(shown):
-    (found,) = marked_or_drawn(ast.parse('layout.label(text="New in this version")'))
-    assert found not in GERMAN
-    (found,) = marked_or_drawn(ast.parse('raise Refused(rpt_("{name} is new").format(name=name))'))
-    assert found not in GERMAN
+    (result,) = marked_or_drawn(ast.parse('layout.label(text="New in this version")'))
+    assert result not in GERMAN
+    (result,) = marked_or_drawn(ast.parse('raise Refused(rpt_("{name} is new").format(name=name))'))
+    assert result not in GERMAN
 
 
 def test_no_literal_goes_around_the_translation(shown):

@@ -30,8 +30,8 @@ def test_a_breakdown_is_keyed_by_its_factor(tool):
     keys = Poses(
         [[2.0, 0.0, 0.0], [4.0, 0.0, 0.0]], [[np.cos(a), 0.0, 0.0, np.sin(a)] for a in np.pi * np.arange(1, 3) / 4]
     )
-    wanted = interpolate((0.0, 1.0), keys, np.array([0.25]), "dq_sclerp")
-    np.testing.assert_allclose(tool.location, wanted.positions[0], atol=1e-5)
+    expected = interpolate((0.0, 1.0), keys, np.array([0.25]), "dq_sclerp")
+    np.testing.assert_allclose(tool.location, expected.positions[0], atol=1e-5)
     assert animation.key_frames(tool).tolist() == sorted([*FRAMES.tolist(), 14.0])
 
 

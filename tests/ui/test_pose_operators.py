@@ -66,7 +66,7 @@ def test_a_copied_pose_is_pasted_flipped_as_it_was_seen(rig, extension):
 
 
 def test_an_asset_has_the_pose_that_was_seen(rig, extension):
-    wanted = seen(rig)
+    expected = seen(rig)
     made = set(bpy.data.actions)
     # What the operator does, whose dialog asks for a name and a library.
     show_seen_in_channels([transform_of(rig.pose.bones["Hand.L"])])
@@ -74,10 +74,10 @@ def test_an_asset_has_the_pose_that_was_seen(rig, extension):
     assert bpy.ops.poselib.create_pose_asset("EXEC_DEFAULT", True, **settings) == {"FINISHED"}
     (asset,) = set(bpy.data.actions) - made
     assert asset.asset_data is not None
-    assert np.abs(seen(rig) - wanted).max() < 1e-5
+    assert np.abs(seen(rig) - expected).max() < 1e-5
     extension.scene.frame_set(OTHER)
     rig.pose.apply_pose_from_action(asset)
-    assert np.abs(seen(rig) - wanted).max() < 2e-5
+    assert np.abs(seen(rig) - expected).max() < 2e-5
 
 
 @pytest.mark.parametrize("name", ["copy_pose", "create_pose_asset"])

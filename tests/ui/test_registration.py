@@ -13,7 +13,7 @@ def footprint():
     """Whatever of Blender the extension adds to: classes, properties, menus, keymaps, handlers."""
     keymaps = bpy.context.window_manager.keyconfigs.addon.keymaps
     places = dict.fromkeys((shortcut.keymap, shortcut.space) for shortcut in keymap.SHORTCUTS)
-    found = [keymaps.find(name, space_type=space) for name, space in places]
+    result = [keymaps.find(name, space_type=space) for name, space in places]
     lists = (getattr(bpy.app.handlers, name) for name in dir(bpy.app.handlers) if not name.startswith("_"))
     return {
         "classes": {name for name in dir(bpy.types) if "rigid_motion" in name.lower() or "RigidMotion" in name},
@@ -21,7 +21,7 @@ def footprint():
         "of scenes": hasattr(bpy.types.Scene, "rigid_motion_overlay"),
         "operators": dir(bpy.ops.rigid_motion),
         "menus": [len(getattr(bpy.types, menu)._dyn_ui_initialize()) for menu in menus.ENTRIES],
-        "keymaps": sum(len(one.keymap_items) if one else 0 for one in found),
+        "keymaps": sum(len(one.keymap_items) if one else 0 for one in result),
         "handlers": [list(one) for one in lists if isinstance(one, list)],
     }
 

@@ -93,7 +93,7 @@ class BoneSlot(bpy.types.PropertyGroup):
 class ActionMotion(bpy.types.PropertyGroup):
     slots: CollectionProperty(type=SlotRecord)
     bone_slots: CollectionProperty(type=BoneSlot)
-    range_is_ours: BoolProperty(
+    range_is_set_here: BoolProperty(
         description="Whether the manual frame range was set for samples that lie behind the keys",
         options={"HIDDEN"},
     )
@@ -268,7 +268,7 @@ class ObjectMotion(_Motion, bpy.types.PropertyGroup):
         options={"HIDDEN"},
         override={"LIBRARY_OVERRIDABLE"},
     )
-    laid_aside: BoolProperty(
+    detached: BoolProperty(
         description="Whether the constraints of bones show nothing, for as long as the rig is in Edit Mode",
         options={"HIDDEN"},
         override={"LIBRARY_OVERRIDABLE"},

@@ -46,8 +46,8 @@ class Rows:
     def __getitem__(self, rows: slice) -> np.ndarray:
         first, end, _ = rows.indices(self.count)
         each = whole(entry(self.document.json, "accessors", self.number), "count") // self.count
-        found = numbers(self.document, self.number, slice(first * each, end * each))
-        return found.reshape(end - first, *self.shape)[..., self.order]
+        result = numbers(self.document, self.number, slice(first * each, end * each))
+        return result.reshape(end - first, *self.shape)[..., self.order]
 
 
 def raw_numbers(document: Document, number: object, rows: slice = EVERY) -> np.ndarray:
@@ -63,10 +63,10 @@ def raw_numbers(document: Document, number: object, rows: slice = EVERY) -> np.n
     if count * columns > MOST_NUMBERS:
         raise GltfError(f"accessor {number} has {count} elements, more than are read")
     if "bufferView" in accessor:
-        found = _in_view(document, accessor, kind, columns, count, f"accessor {number}", rows)
+        result = _in_view(document, accessor, kind, columns, count, f"accessor {number}", rows)
     else:
-        found = np.zeros((len(range(*rows.indices(count))), columns), kind)
-    return _with_sparse(document, accessor, found, f"accessor {number}", rows) if "sparse" in accessor else found
+        result = np.zeros((len(range(*rows.indices(count))), columns), kind)
+    return _with_sparse(document, accessor, result, f"accessor {number}", rows) if "sparse" in accessor else result
 
 
 def numbers(document: Document, number: object, rows: slice = EVERY) -> np.ndarray:
@@ -140,18 +140,18 @@ def _in_view(
     return np.ndarray((len(some), columns), kind, content, 0, (stride, kind.itemsize))
 
 
-def _with_sparse(document: Document, accessor: Json, found: np.ndarray, what: str, rows: slice) -> np.ndarray:
+def _with_sparse(document: Document, accessor: Json, result: np.ndarray, what: str, rows: slice) -> np.ndarray:
     """Return some of the elements with those put in that a sparse accessor keeps apart."""
     sparse = accessor["sparse"]
     if not all(isinstance(part, dict) for part in (sparse, sparse.get("indices"), sparse.get("values"))):
         raise GltfError(f"{what} is sparse, and does not say what is where")
     count, kind = whole(sparse, "count", least=1), _kind(sparse["indices"])
     indices = _in_view(document, sparse["indices"], kind, 1, count, what)[:, 0].astype(np.int64)
-    values = _in_view(document, sparse["values"], found.dtype, found.shape[1], count, what)
+    values = _in_view(document, sparse["values"], result.dtype, result.shape[1], count, what)
     if kind.kind != "u" or np.max(indices) >= whole(accessor, "count") or np.any(np.diff(indices) <= 0):
         raise GltfError(f"{what} is sparse, and its indices do not rise to its last element")
     first, end, _ = rows.indices(whole(accessor, "count"))
     here = (indices >= first) & (indices < end)
-    found = found.copy()
-    found[indices[here] - first] = values[here]
-    return found
+    result = result.copy()
+    result[indices[here] - first] = values[here]
+    return result

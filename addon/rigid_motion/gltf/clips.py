@@ -129,19 +129,19 @@ class ClipReduction:
         span = np.unique([track.times[end] for track in clip.tracks for end in (0, -1)])[[0, -1]]
         world = World(nodes, moving, radii, steadied(clip.tracks), np.unique(span))
         self.world = replace(world, times=moments(world, clip, self.tolerance))
-        found = settled(self.world, clip, self.tolerance)
-        self.settled = {target: track for target, track in found.items() if track is not None}
-        self.dense = {target: track for target, track in by_target(clip.tracks).items() if target not in found}
+        result = settled(self.world, clip, self.tolerance)
+        self.settled = {target: track for target, track in result.items() if track is not None}
+        self.dense = {target: track for target, track in by_target(clip.tracks).items() if target not in result}
         """The tracks that are to have fewer keys."""
         self.feet = Feet(self.world, joints)
 
     def reduced(self) -> ReducedClip:
         """Return the clip with fewer keys, or as it was."""
         count = self.options.count
-        found = self._so_many(count) if self.dense and count else self._within_tolerance()
-        if found is None:
+        result = self._so_many(count) if self.dense and count else self._within_tolerance()
+        if result is None:
             return self._kept(NEEDED)
-        tracks, error = found
+        tracks, error = result
         after = amount(tracks)
         if after.size >= self.before.size:
             return self._kept(LARGER)
@@ -179,9 +179,9 @@ class ClipReduction:
                 samples = [search.key_poses(allowed)] * len(self.dense)
             else:
                 samples = self._samples(search.keys(allowed))
-            found = self._proven(samples)
-            if found is not None:
-                return found
+            result = self._proven(samples)
+            if result is not None:
+                return result
             allowed *= TIGHTER
         return None
 
@@ -264,15 +264,15 @@ class ClipReduction:
 
     def _with_more(self, samples: list[np.ndarray], places: np.ndarray, eighths: np.ndarray) -> list[np.ndarray]:
         """Return samples with those around some eighths, for the nodes at these places and all that they hang on."""
-        wanted = np.zeros((len(self.world.moving), len(self.world.times)), dtype=bool)
-        wanted[places, eighths // PARTS] = wanted[places, -(-eighths // PARTS)] = True
-        for place in range(len(wanted) - 1, -1, -1):
+        desired = np.zeros((len(self.world.moving), len(self.world.times)), dtype=bool)
+        desired[places, eighths // PARTS] = desired[places, -(-eighths // PARTS)] = True
+        for place in range(len(desired) - 1, -1, -1):
             if (parent := self.world.parents[place]) >= 0:
-                wanted[parent] |= wanted[place]
+                desired[parent] |= desired[place]
         if self.options.shared:
-            wanted[:] = wanted.any(axis=0)
+            desired[:] = desired.any(axis=0)
         ends = (0, len(self.world.times) - 1)
-        more = [np.flatnonzero(wanted[self.world.places[node]]) for node, _ in self.dense]
+        more = [np.flatnonzero(desired[self.world.places[node]]) for node, _ in self.dense]
         return [
             np.union1d(own, (*ends, *new)).astype(np.int64) if len(new) else own
             for own, new in zip(samples, more, strict=True)

@@ -174,7 +174,7 @@ def read_document(path: Path, *, in_memory: bool = False) -> Document:
 
 def chunks_of(content: bytes | FileBytes) -> tuple[tuple[bytes, bytes | FileBytes], ...]:
     """Return the kinds and contents of all chunks of a GLB file, the JSON among them."""
-    found: list[tuple[bytes, bytes | FileBytes]] = []
+    result: list[tuple[bytes, bytes | FileBytes]] = []
     place, whole = 12, len(content)
     if whole >= place:
         version, length = struct.unpack("<II", bytes(content[4:12]))
@@ -188,11 +188,11 @@ def chunks_of(content: bytes | FileBytes) -> tuple[tuple[bytes, bytes | FileByte
         place += 8
         if place + length > whole:
             raise GltfError("a part of this file is longer than the whole")
-        found.append((kind, content[place : place + length]))
+        result.append((kind, content[place : place + length]))
         place += length
-    if JSON_CHUNK not in [kind for kind, _ in found]:
+    if JSON_CHUNK not in [kind for kind, _ in result]:
         raise GltfError("this GLB holds no JSON")
-    return tuple(found)
+    return tuple(result)
 
 
 def parsed(text: bytes) -> Json:
@@ -214,22 +214,22 @@ def parsed(text: bytes) -> Json:
 
 def objects(parent: Json, name: str) -> list[Json]:
     """Return the objects in a list of the document; empty where there is none."""
-    found = parent.get(name)
-    if found is None:
+    result = parent.get(name)
+    if result is None:
         return []
-    if not isinstance(found, list) or not all(isinstance(entry, dict) for entry in found):
+    if not isinstance(result, list) or not all(isinstance(entry, dict) for entry in result):
         raise GltfError(f"{name} is no list of objects")
-    return found
+    return result
 
 
 def entry(parent: Json, name: str, number: Any) -> Json:
     """Return the object of a number in a list of the document."""
-    found = parent.get(name, [])
+    result = parent.get(name, [])
     is_number = isinstance(number, int) and not isinstance(number, bool)
-    if not isinstance(found, list) or not is_number or not 0 <= number < len(found):
+    if not isinstance(result, list) or not is_number or not 0 <= number < len(result):
         objects(parent, name)
         raise GltfError(f"{name} has no entry {shown(number)}, which something in the file names")
-    return found[number] if isinstance(found[number], dict) else objects(parent, name)[number]
+    return result[number] if isinstance(result[number], dict) else objects(parent, name)[number]
 
 
 def whole(parent: Json, name: str, default: int | None = None, least: int = 0) -> int:
@@ -262,7 +262,7 @@ def bytes_of_uri(uri: str) -> bytes:
 def unquoted(uri: str) -> str:
     """Return a path as it is on a disk, of a URI in which signs may be %20 and the like."""
     return re.sub(
-        b"%([0-9A-Fa-f]{2})", lambda found: bytes.fromhex(found[1].decode()), uri.encode(errors="replace")
+        b"%([0-9A-Fa-f]{2})", lambda result: bytes.fromhex(result[1].decode()), uri.encode(errors="replace")
     ).decode(errors="replace")
 
 

@@ -133,11 +133,11 @@ class World:
 
     def _above(self, lengths: np.ndarray) -> np.ndarray:
         """Those of nodes' parents, where these are of the nodes, shape (n, ..., 3)."""
-        found = lengths[self.parents]
+        result = lengths[self.parents]
         for place in np.flatnonzero(self.parents < 0).tolist():
             parent = self.nodes.parents[self.moving[place]]
-            found[place] = np.linalg.norm(self.nodes.resting.axes[parent], axis=-2) if parent >= 0 else 1.0
-        return found
+            result[place] = np.linalg.norm(self.nodes.resting.axes[parent], axis=-2) if parent >= 0 else 1.0
+        return result
 
     @cached_property
     def _extremes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -170,11 +170,11 @@ class World:
     @cached_property
     def reaches(self) -> np.ndarray:
         """How far what hangs on each node is from it at most, with the balls around it, shape (n,); an upper bound."""
-        found, away = self.radii.copy(), self._extremes[2]
-        for place in range(len(found) - 1, -1, -1):
+        result, away = self.radii.copy(), self._extremes[2]
+        for place in range(len(result) - 1, -1, -1):
             if (parent := self.parents[place]) >= 0:
-                found[parent] = max(found[parent], away[place] + found[place])
-        return found
+                result[parent] = max(result[parent], away[place] + result[place])
+        return result
 
     def largest_error(self, shown: Tracks, *, parts: int = PARTS) -> float:
         """Return the largest displacement of any point of any ball at the moments, and at parts of the gaps between."""

@@ -53,9 +53,9 @@ class Feet:
     @cached_property
     def spans(self) -> np.ndarray:
         """The place of a joint, and the first and the last sample of a time in which it stands, shape (s, 3)."""
-        found = np.array(spans(self.stand), dtype=np.int64).reshape(-1, 3)
-        found[:, 0] = self.places[found[:, 0]]
-        return found
+        result = np.array(spans(self.stand), dtype=np.int64).reshape(-1, 3)
+        result[:, 0] = self.places[result[:, 0]]
+        return result
 
     @cached_property
     def _before(self) -> list[np.ndarray]:
@@ -87,7 +87,7 @@ class Feet:
         if not len(self.spans):
             return []
         places, firsts, lasts = self.spans.T
-        found, starts = [np.empty(length) for length in lasts - firsts + 1], np.empty((len(places), 3))
+        result, starts = [np.empty(length) for length in lasts - firsts + 1], np.empty((len(places), 3))
         for block in self.world.seen(tracks):
             origins, samples = block.maps[0].origins, block.samples
             for number in np.flatnonzero((firsts < samples.stop) & (lasts >= samples.start)).tolist():
@@ -96,5 +96,5 @@ class Feet:
                 if begin == firsts[number]:
                     starts[number] = positions[0]
                 ways = np.linalg.norm(positions - starts[number], axis=1)
-                found[number][begin - firsts[number] : end - firsts[number]] = ways
-        return found
+                result[number][begin - firsts[number] : end - firsts[number]] = ways
+        return result

@@ -63,14 +63,14 @@ def reduced(document: Document, options: Options) -> Report:
             f"give one below {MOST * size:.2g} m",
         )
     options = replace(options, tolerance=tolerance)
-    found = []
+    result = []
     for clip in clips:
         if clip.tracks:
             own = np.isin(moved, _moved(nodes, (clip,)))
-            found.append(ClipReduction(nodes, clip, moved[own], radii[own], joints, size, options).reduced())
-    tracks = {clip.number: clip.tracks for clip in found if clip.tracks is not None}
+            result.append(ClipReduction(nodes, clip, moved[own], radii[own], joints, size, options).reduced())
+    tracks = {clip.number: clip.tracks for clip in result if clip.tracks is not None}
     with damage_refused():
-        return Report(size, tolerance, tuple(found), rewritten(document, tracks) if tracks else document)
+        return Report(size, tolerance, tuple(result), rewritten(document, tracks) if tracks else document)
 
 
 def reduce_file(path: Path, output: Path, options: Options) -> Report:

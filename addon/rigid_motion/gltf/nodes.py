@@ -70,26 +70,26 @@ class Nodes:
     @cached_property
     def resting(self) -> AffineMaps:
         """Where all nodes are without tracks, shape (nodes,)."""
-        found = self.worlds(np.concatenate(self.skeleton.levels), {}, np.zeros(1))
+        result = self.worlds(np.concatenate(self.skeleton.levels), {}, np.zeros(1))
         order = np.argsort(np.concatenate(self.skeleton.levels))
-        return found[order, 0]
+        return result[order, 0]
 
     def worlds(self, nodes: np.ndarray, tracks: Tracks, times: np.ndarray) -> AffineMaps:
         """Where nodes are at times (m,) as tracks move them, shape (nodes, m).
 
         `nodes` (n,) has parents before their children; a parent that is not among them rests.
         """
-        found: dict[int, AffineMaps] = {}
+        result: dict[int, AffineMaps] = {}
         for node in nodes.tolist():
             parent, local = int(self.parents[node]), self._local(node, tracks, times)
-            above = found.get(parent)
+            above = result.get(parent)
             if above is None and parent >= 0:
                 above = self.resting[parent]
-            found[node] = local if above is None else above @ local
+            result[node] = local if above is None else above @ local
         shape = (len(nodes), len(times))
         axes, origins = np.empty((*shape, 3, 3)), np.empty((*shape, 3))
         for place, node in enumerate(nodes.tolist()):
-            axes[place], origins[place] = found[node].axes, found[node].origins
+            axes[place], origins[place] = result[node].axes, result[node].origins
         return AffineMaps(axes, origins)
 
     def _local(self, node: int, tracks: Tracks, times: np.ndarray) -> AffineMaps:
@@ -139,14 +139,14 @@ def _parents(nodes: list[Json]) -> np.ndarray:
 
 
 def _rest(nodes: list[Json], path: str) -> np.ndarray:
-    found = np.array([_vector(node.get(path, REST[path]), number, path) for number, node in enumerate(nodes)])
-    found = found.reshape(len(nodes), WIDTHS[path])
+    result = np.array([_vector(node.get(path, REST[path]), number, path) for number, node in enumerate(nodes)])
+    result = result.reshape(len(nodes), WIDTHS[path])
     if path != ROTATION:
-        return found
-    lengths = np.linalg.norm(found, axis=1)
+        return result
+    lengths = np.linalg.norm(result, axis=1)
     if not lengths.all():
         raise GltfError(f"the rotation of node {int(np.argmin(lengths))} is of length zero")
-    return normalise(found[:, TO_WXYZ])
+    return normalise(result[:, TO_WXYZ])
 
 
 def _vector(given: object, node: int, name: str, width: int | None = None) -> list[float]:

@@ -272,12 +272,12 @@ def _cuts(removed: list[Range], kept: list[Range]) -> list[Range]:
     free = goes & ~stays
     # Padding between two ranges that go, which nothing names, goes with them.
     free[1:-1] |= ~stays[1:-1] & free[:-2] & free[2:] & (np.diff(places)[1:] < ALIGNED)
-    found: list[Range] = []
+    result: list[Range] = []
     for first, end in zip(places[:-1][free[:-1]].tolist(), places[1:][free[:-1]].tolist(), strict=True):
-        if found and found[-1][1] == first:
-            first = found.pop()[0]
-        found.append((first, end))
-    aligned = [(-(-first // ALIGNED) * ALIGNED, end // ALIGNED * ALIGNED) for first, end in found]
+        if result and result[-1][1] == first:
+            first = result.pop()[0]
+        result.append((first, end))
+    aligned = [(-(-first // ALIGNED) * ALIGNED, end // ALIGNED * ALIGNED) for first, end in result]
     return [(first, end) for first, end in aligned if first < end]
 
 

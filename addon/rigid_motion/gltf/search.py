@@ -53,8 +53,8 @@ class Search:
 
     def key_poses(self, tolerance: float) -> np.ndarray:
         """Return the samples that are keys of all nodes, those where stretches meet among them."""
-        found = [some.start + self._shared(some, tolerance=tolerance) for some in self.world.stretches]
-        return np.unique(np.concatenate(found))
+        result = [some.start + self._shared(some, tolerance=tolerance) for some in self.world.stretches]
+        return np.unique(np.concatenate(result))
 
     def so_many_key_poses(self, count: int, weights: np.ndarray) -> np.ndarray:
         """Return the samples that are keys of all nodes, whose errors count so many times (n, m)."""

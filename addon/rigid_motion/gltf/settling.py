@@ -57,22 +57,22 @@ def moments(world: World, clip: Clip, tolerance: float) -> np.ndarray:
 
 def settled(world: World, clip: Clip, tolerance: float) -> dict[tuple[int, str], Track | None]:
     """Return the tracks that need no search, and what takes their places: None where the node rests."""
-    found: dict[tuple[int, str], Track | None] = {}
+    result: dict[tuple[int, str], Track | None] = {}
     for track in clip.tracks:
         target = track.node, track.path
         settling = _Settling(world, track, tolerance)
         if settling.rests:
-            found[target] = None
+            result[target] = None
         elif settling.is_constant:
-            found[target] = replace(track, interpolation=LINEAR, times=world.times[:1], values=settling.values[:1])
+            result[target] = replace(track, interpolation=LINEAR, times=world.times[:1], values=settling.values[:1])
         elif track.interpolation == STEP:
             keys = without_repeats(track.points)
-            found[target] = replace(track, times=track.times[keys], values=track.points[keys])
+            result[target] = replace(track, times=track.times[keys], values=track.points[keys])
         elif track.path in (SCALE, WEIGHTS):
             keys = on_lines(settling.times, settling.values, settling.within)
             times, values = settling.times[keys], settling.values[keys]
-            found[target] = replace(track, interpolation=LINEAR, times=times, values=values)
-    return found
+            result[target] = replace(track, interpolation=LINEAR, times=times, values=values)
+    return result
 
 
 class _Settling:
@@ -122,11 +122,11 @@ class _Settling:
 
 def _bows(track: Track, times: np.ndarray, values: np.ndarray) -> np.ndarray:
     """How far a spline leaves the straight way between its values at moments (m,), in each gap, shape (m - 1,)."""
-    found = np.zeros(len(times) - 1)
+    result = np.zeros(len(times) - 1)
     for share in (0.25, 0.5, 0.75):
         line = (1.0 - share) * values[:-1] + share * values[1:]
         if track.path == ROTATION:
             line /= np.linalg.norm(line, axis=1, keepdims=True)
         there = track.at((1.0 - share) * times[:-1] + share * times[1:])
-        found = np.maximum(found, np.linalg.norm(there - line, axis=1))
-    return found
+        result = np.maximum(result, np.linalg.norm(there - line, axis=1))
+    return result

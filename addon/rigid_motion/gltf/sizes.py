@@ -51,16 +51,16 @@ def radii_of(nodes: Nodes, moved: np.ndarray, size: float) -> np.ndarray:
 
     Of a mesh it is that of the mesh, of what looks or shines the size of the whole, and of all else a share of it.
     """
-    document, found = nodes.document, np.full(len(moved), SHELL * size)
+    document, result = nodes.document, np.full(len(moved), SHELL * size)
     for place, node in enumerate(moved.tolist()):
         own = document.json["nodes"][node]
         corners = corners_of(document, node)
         if corners is not None:
             away = nodes.resting[node].at(corners) - nodes.resting.origins[node]
-            found[place] = np.linalg.norm(away, axis=1).max()
+            result[place] = np.linalg.norm(away, axis=1).max()
         elif "camera" in own or "KHR_lights_punctual" in own.get("extensions", {}):
-            found[place] = size
-    return found
+            result[place] = size
+    return result
 
 
 def corners_of(document: Document, node: int) -> np.ndarray | None:

@@ -63,20 +63,20 @@ def shared_times(keys: Sequence[np.ndarray], widths: Sequence[int], samples: int
 
     def in_common(rows: np.ndarray) -> np.ndarray:
         """How many keys each channel has that are among those of the rows."""
-        found = np.zeros((len(marked), *rows.shape[:-1]))
+        result = np.zeros((len(marked), *rows.shape[:-1]))
         for first in range(0, samples, AT_ONCE):
             some = slice(first, first + AT_ONCE)
-            found += marked[:, some].astype(np.float32) @ rows[..., some].astype(np.float32).T
-        return found
+            result += marked[:, some].astype(np.float32) @ rows[..., some].astype(np.float32).T
+        return result
 
     both = in_common(marked)
 
     def saved(first: int) -> np.ndarray:
         """Return the bytes that each other group needs less together with this one."""
         needed_by_first, needed_by_others = counts - both[first], counts[first] - both[first]
-        found = TIME * both[first] - sizes[first] * needed_by_first - sizes * needed_by_others
-        found[[number == first or not group for number, group in enumerate(groups)]] = -np.inf
-        return found
+        result = TIME * both[first] - sizes[first] * needed_by_first - sizes * needed_by_others
+        result[[number == first or not group for number, group in enumerate(groups)]] = -np.inf
+        return result
 
     savings = np.array([saved(first) for first in range(len(groups))])
     while savings.size and savings.max() > 0.0:
@@ -88,11 +88,11 @@ def shared_times(keys: Sequence[np.ndarray], widths: Sequence[int], samples: int
         both[first] = both[:, first] = in_common(marked[first])
         savings[second] = savings[:, second] = -np.inf
         savings[first] = savings[:, first] = saved(first)
-    found = list(keys)
+    result = list(keys)
     for row, group in zip(marked, groups, strict=True):
         for channel in group:
-            found[channel] = np.flatnonzero(row)
-    return found
+            result[channel] = np.flatnonzero(row)
+    return result
 
 
 def _is_line(times: np.ndarray, values: np.ndarray, first: int, last: int, within: float) -> bool:

@@ -92,26 +92,26 @@ class Track:
     def _at(self, times: np.ndarray) -> np.ndarray:
         times = np.clip(times, self.times[0], self.times[-1])
         if len(self.times) == 1:
-            found = np.repeat(self.points, len(times), axis=0)
+            result = np.repeat(self.points, len(times), axis=0)
         elif np.array_equal(times, self.times):
-            found = self.points
+            result = self.points
         elif self.interpolation == STEP:
-            found = self.values[np.searchsorted(self.times, times, side="right") - 1]
+            result = self.values[np.searchsorted(self.times, times, side="right") - 1]
         elif self.interpolation == CUBICSPLINE:
-            found = self._on_spline(times)
+            result = self._on_spline(times)
         elif self.path == ROTATION:
             return turned_at(self.times, self.values, times)
         else:
-            found = np.stack([np.interp(times, self.times, column) for column in self.values.T], axis=1)
-        return normalise(found) if self.path == ROTATION else found
+            result = np.stack([np.interp(times, self.times, column) for column in self.values.T], axis=1)
+        return normalise(result) if self.path == ROTATION else result
 
     def _on_spline(self, times: np.ndarray) -> np.ndarray:
         keys = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 2)
         length = (self.times[keys + 1] - self.times[keys])[:, None]
         s = (times - self.times[keys])[:, None] / length
         out, into = length * self.values[keys, 2], length * self.values[keys + 1, 0]
-        found = (2 * s**3 - 3 * s**2 + 1) * self.values[keys, 1] + (s**3 - 2 * s**2 + s) * out
-        return found + (3 * s**2 - 2 * s**3) * self.values[keys + 1, 1] + (s**3 - s**2) * into
+        result = (2 * s**3 - 3 * s**2 + 1) * self.values[keys, 1] + (s**3 - 2 * s**2 + s) * out
+        return result + (3 * s**2 - 2 * s**3) * self.values[keys + 1, 1] + (s**3 - s**2) * into
 
 
 def turned_at(key_times: np.ndarray, keys: np.ndarray, times: np.ndarray) -> np.ndarray:

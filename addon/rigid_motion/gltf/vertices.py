@@ -40,10 +40,10 @@ class Skin:
 
 def largest_displacement(world: World, shown: Tracks) -> float | None:
     """Return the largest displacement of any vertex at the moments of a world; None without a skin that can be read."""
-    found = None
+    result = None
     for skin in _skins(world.nodes.document):
-        found = max(found or 0.0, _of_skin(world, shown, skin, found or 0.0))
-    return found
+        result = max(result or 0.0, _of_skin(world, shown, skin, result or 0.0))
+    return result
 
 
 def _of_skin(world: World, shown: Tracks, skin: Skin, least: float) -> float:
@@ -76,14 +76,14 @@ def _largest(differences: np.ndarray, skin: Skin, least: float) -> float:
 
 def _bounds(differences: np.ndarray, skin: Skin) -> np.ndarray:
     """Return what no vertex is moved by more than at each moment (m,): corners of the box around those of a joint."""
-    found = np.zeros(differences.shape[1])
+    result = np.zeros(differences.shape[1])
     for joint, own in enumerate(differences):
         carried = skin.vertices[((skin.carriers == joint) & (skin.shares > 0.0)).any(axis=1)]
         if len(carried) and own.any():
             ends = np.stack((carried.min(axis=0), carried.max(axis=0)))
             corners = np.stack([ends[list(pick), [0, 1, 2, 3]] for pick in np.ndindex(2, 2, 2, 1)])
-            found = np.maximum(found, np.linalg.norm(np.einsum("mab,cb->mca", own, corners), axis=-1).max(axis=1))
-    return found
+            result = np.maximum(result, np.linalg.norm(np.einsum("mab,cb->mca", own, corners), axis=-1).max(axis=1))
+    return result
 
 
 def _skins(document: Document) -> Iterator[Skin]:

@@ -75,16 +75,16 @@ class Port:
 
     def received(self) -> list[tuple[bytes, Address]]:
         """What came since the last look, and from where."""
-        found = []
-        while len(found) < MOST_AT_ONCE:
+        result = []
+        while len(result) < MOST_AT_ONCE:
             try:
                 data, (host, port, *_) = self._socket.recvfrom(LONGEST)
             except BlockingIOError:
                 break
             except OSError:
                 continue  # what Windows says of somebody who is not there any more
-            found.append((data, (host, port)))
-        return found
+            result.append((data, (host, port)))
+        return result
 
     def send(self, data: bytes, to: Address) -> None:
         """Send a datagram; as if it had been lost where that cannot be."""

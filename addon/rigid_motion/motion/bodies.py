@@ -56,11 +56,11 @@ class Body:
 
     def shell_errors(self, shown: Poses, truth: Poses, sizes: np.ndarray) -> np.ndarray:
         """Those of balls of some sizes where poses are shown, both (joints, 1) or (joints, n), shape (joints, n)."""
-        found = np.empty(truth.shape)
+        result = np.empty(truth.shape)
         for some in self._blocks:
             balls = sizes if sizes.shape[1] == 1 else sizes[:, some]
-            found[:, some] = shell_error(shown if shown.shape[1] == 1 else shown[:, some], truth[:, some], balls)
-        return found
+            result[:, some] = shell_error(shown if shown.shape[1] == 1 else shown[:, some], truth[:, some], balls)
+        return result
 
     @cached_property
     def _blocks(self) -> list[slice]:
@@ -102,7 +102,7 @@ class Body:
         """How far everything that hangs on a joint is from it, with the balls around it, shape (joints, n)."""
         balls = np.broadcast_to(self.radii[:, None], self.poses.shape)
         balls = balls if self.truth.scales is None else balls * self.truth.scales
-        found = balls.copy()
+        result = balls.copy()
         with_more = [(joint, self.skeleton.below(joint)) for joint in np.flatnonzero(self.skeleton.sizes > 1).tolist()]
         for some in self._blocks:
             places = components(self.truth.positions[:, some])
@@ -110,5 +110,5 @@ class Body:
                 away = places[:, below] - places[:, [joint]]
                 away *= away
                 reached = np.sqrt(away[0] + away[1] + away[2]) + balls[below, some]
-                found[joint, some] = reached.max(axis=0)
-        return found
+                result[joint, some] = reached.max(axis=0)
+        return result

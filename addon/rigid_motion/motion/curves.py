@@ -121,7 +121,7 @@ def motor_spline_causal(segments: Segments) -> Curves:
     duration = segments.durations
     before = np.concatenate((duration[..., :1], duration[..., :-1]), axis=-1)
     fades = np.minimum(LATE * before / duration, 1.0)
-    fades = np.broadcast_to(fades, segments.keys[..., 1:].shape)[..., segments.wanted].ravel()
+    fades = np.broadcast_to(fades, segments.keys[..., 1:].shape)[..., segments.desired].ravel()
     return replace(_bent(segments, at_keys), fades=None if np.all(fades == 1.0) else fades)
 
 
@@ -166,7 +166,7 @@ def _bent(
     keys and arrive at their second ones, from how long the segments but the last and those but the first take, and
     from where the body rests (..., n). Those are the twists of the screws, with the `spins` of `motor_spline` on top.
     """
-    duration, rests, wanted = segments.durations, segments.are_still, segments.wanted
+    duration, rests, desired = segments.durations, segments.are_still, segments.desired
     ways = segments.screws[:, None]
     if spins is not None:
         ways = np.concatenate((ways[:3] + spins, ways[3:].repeat(2, axis=1)))
@@ -174,10 +174,10 @@ def _bent(
     rates = ways / duration
     leaving, arriving = rates[:, 0], rates[:, -1]
     twists = at_keys(leaving, arriving, duration[..., :-1], duration[..., 1:], rests)
-    ends = np.stack([twists[..., keys][..., wanted] for keys in (slice(None, -1), slice(1, None))], axis=1)
-    ends = ends * (duration[..., wanted] * tangents) - ways[..., wanted]
+    ends = np.stack([twists[..., keys][..., desired] for keys in (slice(None, -1), slice(1, None))], axis=1)
+    ends = ends * (duration[..., desired] * tangents) - ways[..., desired]
     if rests.any():
-        ends[..., rests[..., wanted]] = 0.0
+        ends[..., rests[..., desired]] = 0.0
     return replace(screw(segments), bends=ends.reshape(7, 2, -1))
 
 

@@ -79,7 +79,7 @@ def fit_keys(times: ArrayLike, poses: Poses, keys: ArrayLike, mode: str = "motor
     >>> keys.positions[:, 0].round(2).tolist()
     [-0.03, 0.06, -0.03]
     """
-    found = mode_named(mode)
+    result = mode_named(mode)
     check_radius(radius)
     if radius == 0.0:
         raise ValueError(f"a radius of {radius} is not above zero: turns would not count")
@@ -87,7 +87,7 @@ def fit_keys(times: ArrayLike, poses: Poses, keys: ArrayLike, mode: str = "motor
     check_recording(times, poses)
     keys = key_samples(keys, len(times))
     fitting = _Fitting(times, Poses(poses.positions, align_signs(poses.quaternions), poses.scales), keys, mode, radius)
-    apart = found.behind + found.ahead + 2
+    apart = result.behind + result.ahead + 2
     for _ in range(SWEEPS):
         for first in range(min(apart, len(keys))):
             fitting.improve(np.arange(first, len(keys), apart))

@@ -87,7 +87,7 @@ class BudgetSearch(Search):
         """Return the keys with the smallest largest error of all that tries lead to from some."""
         enough = math.inf if self._is_short else ENOUGH[self._length - 2] * self.costs.looked
         best = samples = (self.moved(keys, math.inf) if self._length == 2 else keys).indices
-        found = [best]
+        result = [best]
         for number in range(min(tries, 2) if self._is_short else tries):
             if self.costs.peak(best) == 0.0 or self.costs.looked > enough:
                 break
@@ -99,13 +99,13 @@ class BudgetSearch(Search):
             else:
                 samples, is_complete = spread_keys(self.costs, candidates, samples, self.budget)
             moved = self._moved_together(samples, steps)
-            found += moved
+            result += moved
             samples, best = moved[-1], min(best, *moved, key=self.costs.peak)
             if self._takes_all and is_complete:
                 if not number:
                     return best
                 break
-            candidates = candidates[::SPARSER] if self.reach else beside(self.costs, found, BESIDE)
+            candidates = candidates[::SPARSER] if self.reach else beside(self.costs, result, BESIDE)
         # Without neighbours there is little left to gain, and in long recordings it takes long.
         is_long = len(self.recording.times) > SHORT and not self.reach
         if is_long or not self.is_linkable or self.costs.peak(best) == 0.0:
@@ -114,29 +114,29 @@ class BudgetSearch(Search):
             # Keys that keep to a little less have better places, also when they are too many.
             aim = self.costs.peak(best) / LESS
             keys = self.refined(self.densified(self.measured(best), aim), aim)
-            found.append(keys.indices)
-            found += self._moved_together(self.thinned(keys, math.inf, self.budget).indices, AGAIN)
-        return joined_keys(self.costs, found, self.budget)
+            result.append(keys.indices)
+            result += self._moved_together(self.thinned(keys, math.inf, self.budget).indices, AGAIN)
+        return joined_keys(self.costs, result, self.budget)
 
     def _moved_together(self, samples: np.ndarray, steps: slice) -> list[np.ndarray]:
         """As many keys as the budget, these among them, and what moving them together makes of them step by step."""
-        found = [self._filled(self.measured(samples)).indices]
+        result = [self._filled(self.measured(samples)).indices]
         for ways, part in TOGETHER[self.reach][steps]:
-            found.append(moved_together(self.costs, found[-1], ways, part))
-        return found
+            result.append(moved_together(self.costs, result[-1], ways, part))
+        return result
 
     def _least_squares(self, best: Keys, tries: int) -> np.ndarray:
         """Return the same for the mean square, from keys that are many enough."""
-        found = [best.indices]
+        result = [best.indices]
         links = tries and self.is_linkable  # The last try.
         for _ in range(tries - bool(links)):
             # Some more where the motion is off most, moved together.
             more = self._filled(self.measured(best.indices), math.ceil(SWAPPED * self.budget))
             more = self.moved(more, math.inf)
-            found.append(more.indices)
+            result.append(more.indices)
             best = self._better_of(best, more)
         if links:
-            traded = traded_keys(self.costs, found, budget=self.budget)
+            traded = traded_keys(self.costs, result, budget=self.budget)
             best = self._better_of(best, self.measured(traded))
         return best.indices
 

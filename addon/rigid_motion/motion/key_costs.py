@@ -112,11 +112,11 @@ class Costs:
         """Costs and peaks (...) of segments (..., keys), zero where no sample counts."""
         rows = segments.reshape(-1, self.keys)
         filled = np.flatnonzero(self._counts(rows) > 0)
-        found = np.zeros((len(rows), 2))
+        result = np.zeros((len(rows), 2))
         for first in range(0, len(filled), LOOKED_UP):
             some = filled[first : first + LOOKED_UP]
-            found[some] = self._memory.find(rows[some], len(self.recording.times), self._work_out)
-        return found[:, 0].reshape(segments.shape[:-1]), found[:, 1].reshape(segments.shape[:-1])
+            result[some] = self._memory.find(rows[some], len(self.recording.times), self._work_out)
+        return result[:, 0].reshape(segments.shape[:-1]), result[:, 1].reshape(segments.shape[:-1])
 
     def total(self, keys: np.ndarray) -> float:
         """Return the cost of all segments between keys (k,) of a recording of one track."""
@@ -149,9 +149,9 @@ class Costs:
         self.looked += self.effort(rows)
         for batch, counts in self._batches(rows):
             _, errors = self._errors(batch, counts)
-            found, begins = out[done : done + len(batch)], np.cumsum(counts) - counts
-            found[:, 0] = np.add.reduceat(self._powers(errors), begins)
-            found[:, 1] = np.maximum.reduceat(errors, begins)
+            result, begins = out[done : done + len(batch)], np.cumsum(counts) - counts
+            result[:, 0] = np.add.reduceat(self._powers(errors), begins)
+            result[:, 1] = np.maximum.reduceat(errors, begins)
             done += len(batch)
         return out
 
@@ -210,7 +210,7 @@ class _Memory:
             numbers *= np.uint64(samples + 1)
             numbers += (rows[:, column] + 1).astype(np.uint64)
         places = ((numbers * FACTOR) >> self._shift).astype(np.int64)
-        found = self._found.take(places, axis=0)
+        result = self._found.take(places, axis=0)
         new = np.flatnonzero(self._numbers.take(places) != numbers)
         if len(new):
             numbers, places, order = numbers[new], places[new], np.arange(len(new))
@@ -221,9 +221,9 @@ class _Memory:
             stays = last == order
             needed = stays | differs
             of_needed = work_out(rows[new[needed]])
-            found[new] = of_needed[(np.cumsum(needed) - 1)[np.where(differs, order, last)]]
+            result[new] = of_needed[(np.cumsum(needed) - 1)[np.where(differs, order, last)]]
             self._numbers[places[stays]], self._found[places[stays]] = numbers[stays], of_needed[stays[needed]]
-        return found
+        return result
 
 
 def _at(numbers: np.ndarray, samples: np.ndarray) -> np.ndarray:

@@ -61,7 +61,7 @@ PRICE_STEPS = 10
 """Of bisection for the price."""
 
 
-def linked_keys(costs: Costs, found: list[np.ndarray]) -> np.ndarray:
+def linked_keys(costs: Costs, result: list[np.ndarray]) -> np.ndarray:
     """Return the fewest keys that candidates allow, or the fewest that were found; at all costs that are too high.
 
     Parameters
@@ -72,18 +72,18 @@ def linked_keys(costs: Costs, found: list[np.ndarray]) -> np.ndarray:
         Keys that keep to the tolerance, each from the first sample to the last.
     """
     for width in WIDTHS[costs.reach]:
-        candidates = beside(costs, found, width)
-        links = _links(costs, candidates, found, 1.0 if costs.reach == 0 else ALIVE, ALIVE**2)
+        candidates = beside(costs, result, width)
+        links = _links(costs, candidates, result, 1.0 if costs.reach == 0 else ALIVE, ALIVE**2)
         if links is not None:
             _, peak = costs.of(links)
             links = links[peak <= WITHIN]
             keys = _Ways(links, candidates).shortest()
             assert keys is not None  # what was found is a way
             return keys
-    return min(found, key=len)
+    return min(result, key=len)
 
 
-def traded_keys(costs: Costs, found: list[np.ndarray], *, budget: int | None = None) -> np.ndarray:
+def traded_keys(costs: Costs, result: list[np.ndarray], *, budget: int | None = None) -> np.ndarray:
     """Return the fewest keys that prices allow, or the first that were found; at all costs that are too high.
 
     With a budget, those of them that cost least, as many as it at most.
@@ -97,14 +97,14 @@ def traded_keys(costs: Costs, found: list[np.ndarray], *, budget: int | None = N
     budget : int, optional
         The most keys, instead of a tolerance.
     """
-    counts, totals = [len(keys) for keys in found], [costs.total(keys) for keys in found]
+    counts, totals = [len(keys) for keys in result], [costs.total(keys) for keys in result]
     allowed = float(len(costs.recording.times))
-    best, least = found[0], (counts[0], totals[0]) if budget is None else (totals[0], counts[0])
+    best, least = result[0], (counts[0], totals[0]) if budget is None else (totals[0], counts[0])
     if max(counts) == min(counts) or max(totals) == min(totals):
         return best
     price = (max(totals) - min(totals)) / (max(counts) - min(counts))
-    candidates = beside(costs, found, 0)
-    links = _links(costs, candidates, found, DEAR * price, DEAR**2 * price)
+    candidates = beside(costs, result, 0)
+    links = _links(costs, candidates, result, DEAR * price, DEAR**2 * price)
     if links is None:
         return best
     (cost, _), ways = costs.of(links), _Ways(links, candidates)
@@ -123,7 +123,7 @@ def traded_keys(costs: Costs, found: list[np.ndarray], *, budget: int | None = N
     return best
 
 
-def joined_keys(costs: Costs, found: list[np.ndarray], budget: int) -> np.ndarray:
+def joined_keys(costs: Costs, result: list[np.ndarray], budget: int) -> np.ndarray:
     """Return keys within a budget with the smallest largest error that candidates allow, or the best that were found.
 
     Parameters
@@ -134,9 +134,9 @@ def joined_keys(costs: Costs, found: list[np.ndarray], budget: int) -> np.ndarra
         Keys within the budget, each from the first sample to the last.
     budget : int
     """
-    within = sorted((keys for keys in found if len(keys) <= budget), key=costs.peak)
+    within = sorted((keys for keys in result if len(keys) <= budget), key=costs.peak)
     best, high = within[0], costs.peak(within[0])
-    for some in (found, within[:FEWER]):
+    for some in (result, within[:FEWER]):
         candidates = beside(costs, some, BESIDE[costs.reach])
         links = _links(costs, candidates, some, *(high * times for times in NEAR), JOINED)
         if links is not None:
@@ -158,16 +158,16 @@ def joined_keys(costs: Costs, found: list[np.ndarray], budget: int) -> np.ndarra
     return best
 
 
-def beside(costs: Costs, found: list[np.ndarray], width: int) -> np.ndarray:
+def beside(costs: Costs, result: list[np.ndarray], width: int) -> np.ndarray:
     """Return the samples that are keys in what was found, and so many on either side of each."""
-    beside = np.concatenate(found)[:, None] + np.arange(-width, width + 1)
+    beside = np.concatenate(result)[:, None] + np.arange(-width, width + 1)
     return _rising(np.clip(beside, 0, len(costs.recording.times) - 1).ravel())
 
 
 def _links(
     costs: Costs,
     candidates: np.ndarray,
-    found: list[np.ndarray],
+    result: list[np.ndarray],
     good: float,
     alive: float,
     effort: float = EFFORT,
@@ -177,7 +177,7 @@ def _links(
     Segments whose peak, or for the mean square whose cost, is above `good` are left out, and those above `alive` are
     made no longer; with neighbours as far away as they are long.
     """
-    pairs = _pairs(costs, candidates, found, good, alive)
+    pairs = _pairs(costs, candidates, result, good, alive)
     if costs.reach == 0:
         return candidates[pairs]
     before, after = _neighbours(pairs, len(candidates))
@@ -189,10 +189,10 @@ def _links(
     return np.where(numbers >= 0, candidates[np.maximum(numbers, 0)], -1)
 
 
-def _pairs(costs: Costs, candidates: np.ndarray, found: list[np.ndarray], good: float, alive: float) -> np.ndarray:
+def _pairs(costs: Costs, candidates: np.ndarray, result: list[np.ndarray], good: float, alive: float) -> np.ndarray:
     """Candidates that a segment may join, (p, 2), by the first and then the second."""
     last, reach = len(candidates) - 1, costs.reach
-    pairs = [np.searchsorted(candidates, np.stack((keys[:-1], keys[1:]), axis=1)) for keys in found]
+    pairs = [np.searchsorted(candidates, np.stack((keys[:-1], keys[1:]), axis=1)) for keys in result]
     first, gap = np.arange(last), 1
     while len(first):
         gaps = gap + np.arange(TOGETHER if costs.recording.poses_each == 1.0 else 1)
@@ -262,8 +262,8 @@ class _Ways:
             shared = shared * (self._end + 2) + links[:, column : column + 2].T + 1
         shared[0, self._begins == candidates[0]] = -2
         shared[1, links[:, second] == self._end] = -1
-        found, numbers = np.unique(np.append(shared, (-2, -1)), return_inverse=True)
-        self._from, self._to, self._count = *numbers[:-2].reshape(2, -1), len(found)
+        result, numbers = np.unique(np.append(shared, (-2, -1)), return_inverse=True)
+        self._from, self._to, self._count = *numbers[:-2].reshape(2, -1), len(result)
 
     def shortest(self, lengths: np.ndarray | None = None, among: np.ndarray | None = None) -> np.ndarray | None:
         """All samples on the way that is shortest by the length of each link (l,), or has the fewest of them.

@@ -89,14 +89,14 @@ class Keys:
 
     def around(self, numbers: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the keys in these columns from each of some keys, (c, m), and whether they belong to its track."""
-        found = numbers[:, None] + columns
-        inside = (found >= self.first[numbers][:, None]) & (found <= self.last[numbers][:, None])
-        return np.clip(found, 0, len(self.indices) - 1), inside
+        result = numbers[:, None] + columns
+        inside = (result >= self.first[numbers][:, None]) & (result <= self.last[numbers][:, None])
+        return np.clip(result, 0, len(self.indices) - 1), inside
 
     def windows(self, numbers: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Return samples of the keys in these columns from each of some keys, -1 where the track has none, (c, m)."""
-        found, inside = self.around(numbers, columns)
-        return np.where(inside, self.indices[found], -1)
+        result, inside = self.around(numbers, columns)
+        return np.where(inside, self.indices[result], -1)
 
 
 class Search:
@@ -114,15 +114,15 @@ class Search:
         best = self._first(1.0)
         if self.power == 2:
             return self._traded(best, tries).indices
-        found = [best.indices]
+        result = [best.indices]
         for looser in LOOSER[:tries]:
             # Keys that are too few find better places, also when some are put back between them.
             fewer = self.moved(self.thinned(self.measured(best.indices), looser), looser)
             keys = self.refined(self.densified(fewer, 1.0))
             best = self._better(best, keys)
-            found.append(keys.indices)
+            result.append(keys.indices)
         if self.is_linkable and tries:
-            linked = linked_keys(self.costs, found)
+            linked = linked_keys(self.costs, result)
             if len(linked) < len(best.indices):
                 best = self.refined(self.measured(linked))
         return best.indices
@@ -170,8 +170,8 @@ class Search:
         """Keys put together from those of several tolerances, where they are fewer than the best of this one."""
         if not (self.is_linkable and tries):
             return best
-        found = [best.indices, *(self._first(other).indices for other in OTHERS[:tries])]
-        traded = traded_keys(self.costs, found)
+        result = [best.indices, *(self._first(other).indices for other in OTHERS[:tries])]
+        traded = traded_keys(self.costs, result)
         return self.refined(self.measured(traded)) if len(traded) < len(best.indices) else best
 
     @property
@@ -311,7 +311,7 @@ class Search:
             windows[:, 1 + 2 * reach] += steps[ways]
             around, enough = self._cost_around(keys, inner[rows]), -GAIN * keys.cost.sum() / len(keys.cost)
             rises = functools.partial(self._rises, around=around, tolerance=tolerance)
-            cost, peak = self.evaluate(windows, lambda *found, rises=rises, enough=enough: rises(*found) < enough)
+            cost, peak = self.evaluate(windows, lambda *result, rises=rises, enough=enough: rises(*result) < enough)
             rise = rises(cost, peak)
             order = np.lexsort((rise, rows))
             best = order[np.flatnonzero(np.diff(rows[order], prepend=-1))]
@@ -380,7 +380,7 @@ def _spaced(order: np.ndarray, distance: int, count: int) -> np.ndarray:
         if rank[number + distance] < len(order):
             picked.append(np.array([number]))
             rank[number + 1 : number + 2 * distance] = len(order)
-    found = np.concatenate(picked) if picked else np.empty(0, dtype=np.int64)
+    result = np.concatenate(picked) if picked else np.empty(0, dtype=np.int64)
     ranks = np.empty(count, dtype=np.int64)
     ranks[order] = np.arange(len(order))
-    return found[np.argsort(ranks[found])]
+    return result[np.argsort(ranks[result])]

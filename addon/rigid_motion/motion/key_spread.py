@@ -248,6 +248,6 @@ def _of_choices(costs: Costs, choices: np.ndarray, worst: float) -> np.ndarray:
         windows[..., column] = choices[column : column + segments].reshape(segments, *shape)
     # Keys must not pass one another.
     rises = ((np.diff(windows, axis=-1) > 0) | (windows[..., 1:] < 0)).all(axis=-1)
-    found = np.full(rises.shape, math.inf)
-    found[rises] = np.minimum(costs.of(windows[rises])[1] / worst, 1.0 / np.finfo(float).eps) ** SHARPNESS
-    return found
+    result = np.full(rises.shape, math.inf)
+    result[rises] = np.minimum(costs.of(windows[rises])[1] / worst, 1.0 / np.finfo(float).eps) ** SHARPNESS
+    return result

@@ -93,22 +93,24 @@ class Segments:
     durations: np.ndarray
     """From each key to the next in seconds, shape (..., n - 1), or without leading axes that objects share."""
 
-    wanted: slice
+    desired: slice
     """Which of the n - 1 of each object the S segments are."""
 
     @classmethod
-    def between(cls, key_times: np.ndarray, keys: Poses, wanted: slice = slice(None)) -> Segments:
+    def between(cls, key_times: np.ndarray, keys: Poses, desired: slice = slice(None)) -> Segments:
         """Return the n - 1 segments of each object: times of shape (..., n), keys of shape (..., n), signs aligned."""
         rates, scales = 2.0 / (key_times[..., 1:] - key_times[..., :-1]), keys.scales
         positions, quaternions = _ends(keys.positions), _ends(keys.quaternions)
-        shape = positions[0][0, ..., wanted].shape
-        (begin, end), (first, second) = ([_flat(rows[..., wanted]) for rows in two] for two in (positions, quaternions))
+        shape = positions[0][0, ..., desired].shape
+        (begin, end), (first, second) = (
+            [_flat(rows[..., desired]) for rows in two] for two in (positions, quaternions)
+        )
         total, change = first + second, second - first
         total_length, change_length = _length(total), _length(change)
         middle, difference = total / total_length, change / np.maximum(change_length, SMALLEST_ANGLE)
         return cls(
-            start=np.broadcast_to(key_times[..., :-1][..., wanted], shape).ravel(),
-            rate=np.broadcast_to(rates[..., wanted], shape).ravel(),
+            start=np.broadcast_to(key_times[..., :-1][..., desired], shape).ravel(),
+            rate=np.broadcast_to(rates[..., desired], shape).ravel(),
             centre=0.5 * (begin + end),
             chord=end - begin,
             middle=middle,
@@ -116,12 +118,12 @@ class Segments:
             quarter_angle=np.maximum(np.arctan2(change_length, total_length), SMALLEST_ANGLE),
             scales=None
             if scales is None
-            else np.stack((scales[..., :-1][..., wanted].ravel(), scales[..., 1:][..., wanted].ravel())),
+            else np.stack((scales[..., :-1][..., desired].ravel(), scales[..., 1:][..., desired].ravel())),
             keys=keys,
             positions=positions,
             quaternions=quaternions,
             durations=2.0 / rates,
-            wanted=wanted,
+            desired=desired,
         )
 
     @property
@@ -269,7 +271,7 @@ def prepare_within(
     curves: Callable[[Segments], Curves],
     key_times: np.ndarray,
     keys: Poses,
-    wanted: slice = slice(None),
+    desired: slice = slice(None),
     *,
     is_aligned: bool = False,
 ) -> Within:
@@ -280,7 +282,7 @@ def prepare_within(
     `is_aligned`, the signs of the quaternions say which way round a segment turns, which matters at half a turn.
     """
     quaternions = keys.quaternions if is_aligned else align_signs(keys.quaternions)
-    segments = Segments.between(key_times, Poses(keys.positions, quaternions, keys.scales), wanted)
+    segments = Segments.between(key_times, Poses(keys.positions, quaternions, keys.scales), desired)
     mode, no_numbers = curves(segments), np.empty((0, segments.start.size))
 
     def within(counts: np.ndarray, progress: np.ndarray, selected: slice) -> Poses:
@@ -371,8 +373,8 @@ def _sample_bounds(key_times: np.ndarray, times: np.ndarray, objects: int) -> np
     if inner_keys.size:
         # One search where all objects share their times, else one for each.
         for row in range(max(len(inner_keys), len(times))):
-            found = np.searchsorted(times[row % len(times)], inner_keys[row % len(inner_keys)], side="right")
-            starts[row if len(inner_keys) > 1 or len(times) > 1 else slice(None), 1:] = found
+            result = np.searchsorted(times[row % len(times)], inner_keys[row % len(inner_keys)], side="right")
+            starts[row if len(inner_keys) > 1 or len(times) > 1 else slice(None), 1:] = result
     starts += times.shape[-1] * np.arange(objects)[:, None]
     return np.append(starts.ravel(), objects * times.shape[-1])
 

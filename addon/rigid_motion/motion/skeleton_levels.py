@@ -84,34 +84,34 @@ class Level(Recording):
 class _Carried:
     """Balls on joints (j,) that are carried along: where they are and where they should be, poses (j, n)."""
 
-    def __init__(self, there: Poses, wanted: Poses, radii: np.ndarray, weights: np.ndarray) -> None:
+    def __init__(self, there: Poses, desired: Poses, radii: np.ndarray, weights: np.ndarray) -> None:
         self.radii = radii[:, None]
-        turned = multiply(there.quaternions, conjugate(wanted.quaternions))
-        rows = [weights, *components(there.positions), *components(wanted.positions), *components(turned)]
-        self.rows = np.stack(rows if there.scales is None else [*rows, there.scales, wanted.scales])
+        turned = multiply(there.quaternions, conjugate(desired.quaternions))
+        rows = [weights, *components(there.positions), *components(desired.positions), *components(turned)]
+        self.rows = np.stack(rows if there.scales is None else [*rows, there.scales, desired.scales])
 
     def largest_errors(self, moments: np.ndarray, motions: np.ndarray) -> np.ndarray:
         """Return the largest error of any of them at moments (m,), each moved on by a motion (.., m), shape (m,)."""
-        found, step = np.empty(len(moments)), max(1, AT_ONCE // len(self.radii))
+        result, step = np.empty(len(moments)), max(1, AT_ONCE // len(self.radii))
         for first in range(0, len(moments), step):
             some = slice(first, first + step)
             rows = self.rows.take(moments[some], axis=2)
             errors = rows[0] * _errors(motions[:, None, some], rows[1:], self.radii)
-            errors.max(axis=0, out=found[some])
-        return found
+            errors.max(axis=0, out=result[some])
+        return result
 
 
 def _errors(motions: np.ndarray, rows: np.ndarray, radius: np.ndarray) -> np.ndarray:
     """Return the shell errors (j, m) of balls (.., j, m) as `_Carried` has them, all moved on by motions (.., 1, m)."""
     turn, positions, quaternions = motions[:9], motions[9:12], motions[12:16]
-    there, wanted, turned = rows[:3], rows[3:6], rows[6:10]
+    there, desired, turned = rows[:3], rows[3:6], rows[6:10]
     d = turn[0::3] * there[0]
     d += turn[1::3] * there[1]
     d += turn[2::3] * there[2]
     if len(motions) > 16:
         d *= motions[16]
     d += positions
-    d -= wanted
+    d -= desired
     v = cross(quaternions[1:], turned[1:])
     v += quaternions[0] * turned[1:]
     v += turned[0] * quaternions[1:]

@@ -100,11 +100,11 @@ def skeleton_errors(
     radii = check_radii(radius)
     if radii.shape not in ((), (len(skeleton),)):
         raise ValueError(f"radius of shape {radii.shape}: give one number, or one for each of {len(skeleton)} joints")
-    radii, count, found = np.broadcast_to(radii, len(skeleton))[:, None], len(times), np.zeros(poses.shape)
+    radii, count, result = np.broadcast_to(radii, len(skeleton))[:, None], len(times), np.zeros(poses.shape)
     if any(isinstance(own, SeparateKeys) for own in keys):
         check_separable(mode, poses)
     if not count:
-        return found
+        return result
     channels = [
         tuple(_samples(some, count) for some in (own if isinstance(own, SeparateKeys) else (own, own))) for own in keys
     ]
@@ -128,8 +128,8 @@ def skeleton_errors(
                 moving = _around(location, *reach)
                 shown.positions[joint] = interpolate(times[moving], stored[joint][moving], moments, mode).positions
         errors = shell_error(skeleton.in_root_space(shown), skeleton.in_root_space(truth), radii)
-        found[:, first : end + 1] = np.maximum.reduceat(errors, np.arange(0, len(moments), parts), axis=1)
-    return found
+        result[:, first : end + 1] = np.maximum.reduceat(errors, np.arange(0, len(moments), parts), axis=1)
+    return result
 
 
 def _samples(keys: ArrayLike, count: int) -> np.ndarray:

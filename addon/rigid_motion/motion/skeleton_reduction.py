@@ -287,8 +287,8 @@ def _one_for_each(given: ArrayLike, name: str, *shapes: tuple[int, ...]) -> np.n
     """Return a number for each joint or sample, or one for all: no damage and not below zero."""
     given = numbers(given, f"{name}s")
     if given.shape not in ((), *shapes):
-        wanted = " or ".join(map(str, shapes))
-        raise ValueError(f"{name} of shape {given.shape}: give one number, or an array of shape {wanted}")
+        desired = " or ".join(map(str, shapes))
+        raise ValueError(f"{name} of shape {given.shape}: give one number, or an array of shape {desired}")
     given = np.broadcast_to(given, shapes[0]) if given.ndim == 0 else given
     if not (valid := (given == 0.0) | ((given > 1.0 / LIMIT) & (given < LIMIT))).all():
         joint = np.argwhere(~valid)[0]

@@ -144,12 +144,12 @@ class OwnKeys:
 
     def _put_back(self, numbers: np.ndarray) -> None:
         """Keys at these of all joints' samples (joints * n,), also for what the joints hang on."""
-        wanted = np.zeros(self.body.poses.shape, dtype=bool)
-        wanted.flat[numbers] = True
+        desired = np.zeros(self.body.poses.shape, dtype=bool)
+        desired.flat[numbers] = True
         for joints in self.body.skeleton.levels[:0:-1]:
-            np.logical_or.at(wanted, self.body.skeleton.parents[joints], wanted[joints])
-        for joint in np.flatnonzero(wanted.any(axis=1) & self.body.free).tolist():
-            more = np.concatenate((self._ends, np.flatnonzero(wanted[joint])))
+            np.logical_or.at(desired, self.body.skeleton.parents[joints], desired[joints])
+        for joint in np.flatnonzero(desired.any(axis=1) & self.body.free).tolist():
+            more = np.concatenate((self._ends, np.flatnonzero(desired[joint])))
             self._show(joint, np.union1d(self.keys[joint], more))
 
 

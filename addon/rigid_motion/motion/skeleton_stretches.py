@@ -81,8 +81,8 @@ def keys_in_stretches(
     rests, still = _rests(recording, bounds, tolerance, separate, run)
     tasks = ((recording.part(some), tolerance, separate, rests < 0, still) for some in bounds)
     moved: list[list[np.ndarray]] = [[] for _ in rests.flat]
-    for some, found in zip(bounds, run(_keys, tasks), strict=True):
-        for channel, keys in zip(moved, found, strict=True):
+    for some, result in zip(bounds, run(_keys, tasks), strict=True):
+        for channel, keys in zip(moved, result, strict=True):
             # The first key of a stretch is the last one of the stretch before.
             channel.append(some.start + keys[1 if some.start else 0 :])
     joined = [

@@ -29,8 +29,8 @@ def _has_vector_tangent() -> bool:
     introspect = getattr(np.lib, "introspect", None)
     if introspect is None:
         return False
-    found = introspect.opt_func_info(func_name="^tan$", signature="float64")
-    return not all(loop["current"].startswith("baseline") for loops in found.values() for loop in loops.values())
+    result = introspect.opt_func_info(func_name="^tan$", signature="float64")
+    return not all(loop["current"].startswith("baseline") for loops in result.values() for loop in loops.values())
 
 
 VECTOR_TANGENT = _has_vector_tangent()

@@ -98,36 +98,36 @@ class Fitting:
         truth = self.skeleton.in_root_space(task.samples.at(task.moments))
         knots: list[float] = []
         for finer in range(FINEST + 1):
-            found = self._near(task, truth, knots, finer)
-            if found.error <= NEAR * self.scale.tolerance:
+            result = self._near(task, truth, knots, finer)
+            if result.error <= NEAR * self.scale.tolerance:
                 break
         left = np.maximum(task.end - task.moments, 0.0) / (task.end - task.start)
         most = self.scale.tolerance * np.minimum(AT_END + (1.0 - AT_END) * left / TAPER, 1.0)
         for margin in MARGINS:
-            smaller = self._smaller(task, truth, found, margin * most)
-            if smaller.error <= max(self.scale.tolerance, found.error):
+            smaller = self._smaller(task, truth, result, margin * most)
+            if smaller.error <= max(self.scale.tolerance, result.error):
                 return smaller
-        return found
+        return result
 
     def _near(self, task: Task, truth: Poses, knots: list[float], finer: int) -> Fitted:
         """Return the numbers nearest to the truth, with knots and, where that is not enough, with more of them."""
-        found = Fitted(finer, moments=knots)
+        result = Fitted(finer, moments=knots)
         window = Window(self.scale, task.state, task.kind, task.start, task.end, finer)
-        found.numbers.append(window.fit(_at(task.samples, task.end)))
+        result.numbers.append(window.fit(_at(task.samples, task.end)))
         for moment in knots:
-            found.numbers.append(window.fit(_at(task.samples, moment), window.insert(moment)))
+            result.numbers.append(window.fit(_at(task.samples, moment), window.insert(moment)))
         while True:
-            errors = self._look(task, truth, found, window)
+            errors = self._look(task, truth, result, window)
             worst = task.moments[np.argmax(errors)]
             free = task.grid[~np.isin(task.grid, window.moments)]
-            if found.error <= NEAR * self.scale.tolerance or not len(free) or len(knots) + 1 == self._most_knots:
-                return found
+            if result.error <= NEAR * self.scale.tolerance or not len(free) or len(knots) + 1 == self._most_knots:
+                return result
             nearest = float(free[np.argmin(np.abs(free - worst))])
-            good = finer < FINEST or found.error <= self.scale.tolerance
+            good = finer < FINEST or result.error <= self.scale.tolerance
             if good and np.abs(np.array(window.moments[1:]) - worst).min() < abs(nearest - worst):
-                return found
+                return result
             knots.append(nearest)
-            found.numbers.append(window.fit(_at(task.samples, nearest), window.insert(nearest)))
+            result.numbers.append(window.fit(_at(task.samples, nearest), window.insert(nearest)))
 
     def _said(self, task: Task, truth: Poses, like: Fitted, numbers: np.ndarray) -> Fitted:
         """Return a message with the knots of another, and other numbers (knots, groups, 3)."""
@@ -139,26 +139,26 @@ class Fitting:
         self._look(task, truth, said, window)
         return said
 
-    def _look(self, task: Task, truth: Poses, found: Fitted, window: Window) -> np.ndarray:
+    def _look(self, task: Task, truth: Poses, result: Fitted, window: Window) -> np.ndarray:
         """Note what a window shows, and return the largest error of each moment (n,)."""
         path = window.path()
-        found.path = path if task.path is None else task.path.followed(path)
-        found.supports = window.supports
+        result.path = path if task.path is None else task.path.followed(path)
+        result.supports = window.supports
         inside = task.moments <= task.end
-        errors = self.errors(found.path.at(task.moments[inside]), truth[:, inside]).max(axis=0)
-        found.error = float(errors.max())
+        errors = self.errors(result.path.at(task.moments[inside]), truth[:, inside]).max(axis=0)
+        result.error = float(errors.max())
         return errors
 
-    def _smaller(self, task: Task, truth: Poses, found: Fitted, most: np.ndarray) -> Fitted:
+    def _smaller(self, task: Task, truth: Poses, result: Fitted, most: np.ndarray) -> Fitted:
         """Return a message with smaller numbers, with which no joint is off by more than `most` (n,)."""
-        assert found.path is not None
-        there = self.skeleton.in_root_space(found.path.at(task.moments))
+        assert result.path is not None
+        there = self.skeleton.in_root_space(result.path.at(task.moments))
         places, d = (_apart(part) for part in (there.positions, there.positions - truth.positions))
         turn = multiply(there.quaternions, conjugate(truth.quaternions))
         v = _apart(2.0 * turn[..., 1:] * np.where(turn[..., :1] < 0.0, -1.0, 1.0)) * self.radii[:, None]
-        axes, numbers, walk = matrices(there.quaternions), np.array(found.numbers), self.scale.walk
+        axes, numbers, walk = matrices(there.quaternions), np.array(result.numbers), self.scale.walk
         for number in range(len(numbers) - 1, -1, -1):
-            hat = _hat(found.supports[number], task.moments, task.end, max([task.start, *found.moments]))
+            hat = _hat(result.supports[number], task.moments, task.end, max([task.start, *result.moments]))
             seen = np.flatnonzero(hat)
             if not len(seen):
                 numbers[number] = 0
@@ -166,10 +166,10 @@ class Fitting:
             near = [part[..., seen] for part in (d, v, places, axes)]
             for group in range(len(walk) - 1, -1, -1):
                 if numbers[number, group].any():
-                    does = self._does(group, near[2], near[3], 0.5**found.finer * hat[seen])
+                    does = self._does(group, near[2], near[3], 0.5**result.finer * hat[seen])
                     self._reduce(numbers[number, group], walk.joints[group], near, does, most[seen] ** 2)
             d[..., seen], v[..., seen] = near[:2]
-        return self._said(task, truth, found, numbers)
+        return self._said(task, truth, result, numbers)
 
     def _does(self, group: int, places: np.ndarray, axes: np.ndarray, hat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return what one step of each number of a group does to what hangs on its joint.
@@ -218,9 +218,9 @@ def smaller_than(values: np.ndarray) -> np.ndarray:
     """Numbers (c, 3) that cost less than three, the least first."""
     towards = values - np.sign(values)
     taken = CHOICES & (values != 0)
-    found = np.where(taken, towards, values)
-    found = np.concatenate((np.zeros((1, 3), dtype=values.dtype), found))
-    return found[(found != values).any(axis=1)]
+    result = np.where(taken, towards, values)
+    result = np.concatenate((np.zeros((1, 3), dtype=values.dtype), result))
+    return result[(result != values).any(axis=1)]
 
 
 CHOICES = np.array([[1, 1, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=bool)

@@ -103,7 +103,7 @@ def _letters(name: str) -> str:
 
 def humanoid_bones(joints: Sequence[str]) -> dict[str, int]:
     """Which joint each humanoid bone is, as far as names tell; joints are given parents first."""
-    found: dict[str, tuple[int, int]] = {}
+    result: dict[str, tuple[int, int]] = {}
     trunk: list[int] = []
     is_rigify = any(name.startswith("ORG-") for name in joints)
     for number, joint in enumerate(joints):
@@ -123,9 +123,9 @@ def humanoid_bones(joints: Sequence[str]) -> dict[str, int]:
             continue
         if bool(side) == (bone in _OF_A_SIDE):
             bone = {"L": "Left", "R": "Right", "": ""}[side] + bone
-            if bone not in found or rank < found[bone][1]:
-                found[bone] = (number, rank)
-    bones = {bone: number for bone, (number, _) in found.items()}
+            if bone not in result or rank < result[bone][1]:
+                result[bone] = (number, rank)
+    bones = {bone: number for bone, (number, _) in result.items()}
     if is_rigify:
         # The lower half of its spine hangs upside down on the middle, and carries the legs.
         trunk = sorted(trunk, key=lambda number: joints[number])[len(trunk) // 2 :]
@@ -170,7 +170,7 @@ def alignments(bones: dict[str, int], first: np.ndarray, second: np.ndarray | No
 
     `bones` are numbers of places (n, 3) at rest; without the second places the other is a T-pose.
     """
-    found: dict[str, np.ndarray] = {}
+    result: dict[str, np.ndarray] = {}
     for bone in HUMANOID:
         side = bone[: 4 if bone.startswith("Left") else 5 if bone.startswith("Right") else 0]
         part = bone[len(side) :]
@@ -181,10 +181,10 @@ def alignments(bones: dict[str, int], first: np.ndarray, second: np.ndarray | No
                 to = np.array(HELD_OUT[part[-3:]]) * (1.0 if side == "Left" else -1.0 if part.endswith("Arm") else 1.0)
             else:
                 to = second[tip] - second[own]
-            found[bone] = shortest_turns(first[tip] - first[own], to)
-        elif side and HUMANOID[bone] in found and part not in ("Foot", "Toes"):
-            found[bone] = found[HUMANOID[bone]]
-    return {bone: turn for bone, turn in found.items() if bone in bones}
+            result[bone] = shortest_turns(first[tip] - first[own], to)
+        elif side and HUMANOID[bone] in result and part not in ("Foot", "Toes"):
+            result[bone] = result[HUMANOID[bone]]
+    return {bone: turn for bone, turn in result.items() if bone in bones}
 
 
 class Retargeting:

@@ -133,10 +133,10 @@ class Window:
         """Move a knot by whole numbers (groups, 3)."""
         self.put(*self.scale.residuals(numbers, self.factor), at)
 
-    def fit(self, wanted: Poses, at: int = 1) -> np.ndarray:
+    def fit(self, desired: Poses, at: int = 1) -> np.ndarray:
         """Move a knot as near to poses (joints,) as whole numbers (groups, 3) bring it, and return those."""
-        turns = turns_between(self.quaternions[at], wanted.quaternions)
-        numbers = self.scale.rounded(wanted.positions - self.positions[at], turns, self.factor)
+        turns = turns_between(self.quaternions[at], desired.quaternions)
+        numbers = self.scale.rounded(desired.positions - self.positions[at], turns, self.factor)
         self.say(numbers, at)
         return numbers
 

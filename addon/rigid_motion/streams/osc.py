@@ -60,15 +60,15 @@ def is_osc(datagram: bytes) -> bool:
 
 def read(datagram: bytes) -> list[Message]:
     """All messages of a datagram, until the first thing that is none."""
-    found: list[Message] = []
+    result: list[Message] = []
     try:
         for message in _messages(datagram, DEEPEST):
-            found.append(message)
-            if len(found) == MOST_MESSAGES:
+            result.append(message)
+            if len(result) == MOST_MESSAGES:
                 break
     except (ValueError, struct.error):
         pass  # as if it ended here
-    return found
+    return result
 
 
 def _padded(text: str) -> bytes:

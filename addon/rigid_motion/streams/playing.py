@@ -88,17 +88,17 @@ class Playing:
         """Return the moment to be shown now; None before anything came."""
         if self.longest is None:
             return None
-        wanted = now - self.longest - self.delay
+        desired = now - self.longest - self.delay
         passed, self._last = now - self._last, now
         if self._moment is None:
-            self._moment, passed = wanted, 0.0
+            self._moment, passed = desired, 0.0
         if abs(passed) > SET and not 0.0 <= now - self._heard <= SET:
             self._unsure = True
         if self._unsure or passed <= 0.0:
             return self._moment
-        gap = wanted - self._moment - passed
+        gap = desired - self._moment - passed
         if abs(gap) > SET:
-            self._moment = wanted
+            self._moment = desired
         else:
             # Somebody who seldom looks is not to overshoot.
             self._moment += passed + min(max(gap / max(SETTLING, passed), -1.0), HURRY) * passed

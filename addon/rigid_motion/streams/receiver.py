@@ -172,8 +172,8 @@ class Receiver:
 
     def keys(self) -> list[Keys]:
         """Return the knots that came since the last call and are not going to change any more."""
-        found = [playback.keys(stream) for stream, playback in self._streams.items()]
-        return [keys for keys in found if len(keys.moments)]
+        result = [playback.keys(stream) for stream, playback in self._streams.items()]
+        return [keys for keys in result if len(keys.moments)]
 
     def _begin(self, stream: Stream, read: Motion | Piece, arrival: float) -> None:
         """Collect what a stream needs before it can be shown."""

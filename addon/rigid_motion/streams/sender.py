@@ -2,7 +2,7 @@
 
 What is shown is a delay behind. When it gets to where a joint's ball would leave the tolerance, all of the window since
 then is known here, and is said at once. Until then nothing is sent, for the motion goes on at the receivers as it was
-going, and a body at rest costs a heartbeat.
+going, and a body at rest costs a keepalive.
 
 A message builds on one that is there: the newest that all receivers who answer have; where nobody answers, the last
 refresh, a message that builds on nothing and is sent twice.
@@ -39,7 +39,7 @@ from .wire import (
     read_piece,
 )
 
-HEARTBEAT = 0.5
+KEEPALIVE = 0.5
 """Seconds of silence after which something is said in any case."""
 
 REFRESH = 1.0
@@ -120,7 +120,7 @@ class Sender:
         Seconds by which what is shown is behind, beside what the network takes.
     rate : float, optional
         Samples a second, where they are even.
-    refresh, heartbeat : float
+    refresh, keepalive : float
         Seconds between them.
 
     Raises
@@ -136,16 +136,16 @@ class Sender:
         delay: float = 0.1,
         rate: float | None = None,
         refresh: float = REFRESH,
-        heartbeat: float = HEARTBEAT,
+        keepalive: float = KEEPALIVE,
     ) -> None:
-        for name, value in (("tolerance", tolerance), ("delay", delay), ("refresh", refresh), ("heartbeat", heartbeat)):
+        for name, value in (("tolerance", tolerance), ("delay", delay), ("refresh", refresh), ("keepalive", keepalive)):
             if not (math.isfinite(value) and value > 0.0):
                 raise ValueError(f"a {name} of {value} is not a positive number")
         even = TICKS / rate if rate else GRID
         grid = round(even) if abs(even - round(even)) < 0.01 and even >= 1.0 else GRID
         self._terms = Terms(math.floor(tolerance * 1e6), round(delay * TICKS), grid)
         self._given = Forest(bodies)
-        self.refresh, self.heartbeat = refresh, heartbeat
+        self.refresh, self.keepalive = refresh, keepalive
         self._slip = 0.0
         """What is added to the times of samples, so that a clock that was set makes no difference."""
         self._times: list[float] = []
@@ -179,7 +179,7 @@ class Sender:
         self._again: tuple[float, int, bytes] | None = None
         self._base: int | None = None
         """The last refresh that was sent twice."""
-        self._wanted = False
+        self._desired = False
         """Whether somebody cannot read what is sent."""
         self._lossy = False
         """Whether so much is lost that all is sent twice."""
@@ -234,7 +234,7 @@ class Sender:
 
     def join(self) -> list[bytes]:
         """Return what somebody who joins needs: the description. The next message then builds on nothing."""
-        self._wanted = True
+        self._desired = True
         return self.describe()
 
     def hear(self, datagram: bytes, now: float) -> list[bytes]:
@@ -253,7 +253,7 @@ class Sender:
         missing = entry.before.bit_length() - entry.before.bit_count()
         self._missed = heard if missing >= LOSSY or (self._lossy and missing) else self._missed
         self._lossy = heard - self._missed < CALM
-        self._wanted |= bool(entry.needs & NEEDS_REFRESH) and heard - self._refreshed > PATIENCE
+        self._desired |= bool(entry.needs & NEEDS_REFRESH) and heard - self._refreshed > PATIENCE
         return self.describe() if entry.needs & NEEDS_DESCRIPTION else []
 
     # Samples
@@ -297,9 +297,9 @@ class Sender:
                 due.append(datagram)
         if not self._answered(now) and now - self._refreshed >= self.refresh:
             due += [*self.describe(), self._message(now, refresh=True)]
-        elif self._wanted:
+        elif self._desired:
             due.append(self._message(now, refresh=True))
-        elif now - self._sent >= self.heartbeat:
+        elif now - self._sent >= self.keepalive:
             due.append(self._message(now))
         else:
             good = self._is_shown_until(now)
@@ -379,7 +379,7 @@ class Sender:
         self._shown, self._good = end / TICKS if fitted.error <= self._scale.tolerance else start, None
         self._sent = now
         if base is None:
-            self._refreshed, self._wanted = now, False
+            self._refreshed, self._desired = now, False
             payload, _ = self.codec.write(said, kind, state, True)
             again = motion(self.identity, self._sequence, end, back, payload, late=True)
             self._again = (now + AGAIN, self._sequence, again)

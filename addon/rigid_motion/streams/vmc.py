@@ -169,8 +169,8 @@ class VmcReceiver:
 
     def keys(self) -> list[Keys]:
         """All samples that came since the last call."""
-        found = [it.keys(stream) for stream, it in self._sources.items()]
-        return [keys for keys in found if len(keys.moments)]
+        result = [it.keys(stream) for stream, it in self._sources.items()]
+        return [keys for keys in result if len(keys.moments)]
 
 
 class _Source:

@@ -104,8 +104,8 @@ def _last_options(context: bpy.types.Context) -> dict[str, Any]:
         return {}
     return {
         name: getattr(last, name)
-        for name, found in last.bl_rna.properties.items()
-        if found.type in {"BOOLEAN", "INT", "FLOAT", "STRING", "ENUM"}
+        for name, result in last.bl_rna.properties.items()
+        if result.type in {"BOOLEAN", "INT", "FLOAT", "STRING", "ENUM"}
         and name not in NOT_PASSED_ON
         and last.is_property_set(name)
     }

@@ -110,13 +110,13 @@ def _pairs(body: Body, rig: bpy.types.Object) -> Mapping[str, str]:
 
 def _match(live: LiveSettings, joints: tuple[str, ...], rig: bpy.types.Object) -> None:
     global _is_matching
-    found = matched(joints, [bone.name for bone in rig.data.bones])
+    result = matched(joints, [bone.name for bone in rig.data.bones])
     live.bones.clear()
     live.bones_of = rig.name
     _is_matching = True
     for joint in joints:
         item = live.bones.add()
-        item.name, item.bone = joint, found.get(joint, "")
+        item.name, item.bone = joint, result.get(joint, "")
     _is_matching = False
 
 

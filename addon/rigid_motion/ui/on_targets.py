@@ -128,11 +128,11 @@ class OnChanged(OnTargets):
     @classmethod
     def last_changes(cls, targets: Iterable[Transform]) -> dict[Transform, str]:
         """What was done last to the keys of each target that something was done to."""
-        found = {}
+        result = {}
         for target, entries in entries_of(targets):
             if kind := next((entry.kind for entry in entries if entry.original is not None), None):
-                found[target] = kind
-        return found
+                result[target] = kind
+        return result
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -60,7 +60,7 @@ class Switch(NamedTuple):
 @lru_cache(maxsize=8)
 def switches_in(script: str) -> tuple[Switch, ...]:
     """The buttons in the script of a rig, without those that are written in another way than expected."""
-    found = []
+    result = []
     for button in BUTTON.findall(script):
         with suppress(SyntaxError, ValueError, TypeError, AttributeError, StopIteration, RecursionError, MemoryError):
             first, *lines = ast.parse(dedent(button)).body
@@ -69,8 +69,8 @@ def switches_in(script: str) -> tuple[Switch, ...]:
             operator = ast.literal_eval(first.value.args[0]).removeprefix("pose.")
             switch = Switch(label, operator, **settings)
             if all(isinstance(text, str) for text in (*switch[:-1], *switch.parents)) and len(switch.locks) == 3:
-                found.append(switch)
-    return tuple(found)
+                result.append(switch)
+    return tuple(result)
 
 
 def switches_of(context: bpy.types.Context) -> Iterator[Switch]:

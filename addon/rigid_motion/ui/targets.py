@@ -87,8 +87,8 @@ def with_keyed_bones(target: Transform) -> list[Transform]:
 
 def selected(context: bpy.types.Context) -> list[bpy.types.Object] | list[bpy.types.PoseBone]:
     """The selected objects, without any the active one; or the selected bones alone, as Blender's operators have it."""
-    found = selected_in_view(context)
-    return found if found or is_posing(context) or context.object is None else [context.object]
+    result = selected_in_view(context)
+    return result if result or is_posing(context) or context.object is None else [context.object]
 
 
 def selected_in_view(context: bpy.types.Context) -> list[bpy.types.Object] | list[bpy.types.PoseBone]:
@@ -160,11 +160,11 @@ def _shown_in_editor(context: bpy.types.Context) -> Iterator[Transform]:
     """The objects and the bones of which location, rotation, scale or the mode is shown in a key editor."""
     shown = {fcurve.as_pointer() for fcurve in context.visible_fcurves or ()}
     for obj in _animated_in_editor(context) if shown else ():
-        found = set()
+        result = set()
         for fcurve in fcurves_of(obj):
             prefix, prop = split_path(fcurve.data_path)
-            if prefix not in found and (prop in WIDTHS or prop in SEGMENT_PROPERTIES) and fcurve.as_pointer() in shown:
-                found.add(prefix)
+            if prefix not in result and (prop in WIDTHS or prop in SEGMENT_PROPERTIES) and fcurve.as_pointer() in shown:
+                result.add(prefix)
                 if (carrier := _carrier(obj, prefix)) is not None:
                     yield transform_of(carrier)
 

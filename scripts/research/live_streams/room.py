@@ -52,10 +52,10 @@ def figures(users: int, seconds: float) -> Room:
     start = time.time() + 1.0
     for here, _ in ends:
         here.send(start)
-    found = [here.recv() for here, _ in ends]
+    result = [here.recv() for here, _ in ends]
     for _, process in ends:
         process.join()
-    (router, _), *people = found
+    (router, _), *people = result
     latencies = np.concatenate([own[1] for own in people])
     return Room(
         bytes=float(np.mean([len(datagram) for datagram in datagrams])),
@@ -75,10 +75,10 @@ def _datagrams() -> list[bytes]:
     from rigid_motion.streams import Body, Sender
 
     times = np.arange(400) / RATE
-    sender, found = Sender([Body.rigid("hand")], 0.002, 0.1, RATE, heartbeat=0.9 / RATE), []
+    sender, result = Sender([Body.rigid("hand")], 0.002, 0.1, RATE, keepalive=0.9 / RATE), []
     for time_, place in zip(times.tolist(), np.sin(times[:, None] * (3.0, 4.1, 2.3)), strict=True):
-        found += sender.add(time_, Poses(place[None], np.array(((1.0, 0.0, 0.0, 0.0),))))
-    return [datagram for datagram in found if len(datagram) < 200]
+        result += sender.add(time_, Poses(place[None], np.array(((1.0, 0.0, 0.0, 0.0),))))
+    return [datagram for datagram in result if len(datagram) < 200]
 
 
 def _run(pipe: Connection, user: int | None, place: str, datagrams: list[bytes], seconds: float) -> None:

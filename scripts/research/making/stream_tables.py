@@ -72,18 +72,18 @@ def samples(folder: Path) -> Iterator[Sample]:
         for clip in read_clips([str(path)])[0]:
             times, poses = samples_of(clip)
             kept = times <= times[0] + MOST_SECONDS
-            radius = RADII[clip.figure is not None]
+            radius = RADII[clip.rest_body is not None]
             yield Sample(clip.name, body_of(clip, poses, radius), times[kept], poses[:, kept])
 
 
 def messages(sample: Sample, delay: float, latency: float | None) -> list[Message]:
     """What a sender says of a motion."""
-    found: list[Message] = []
+    result: list[Message] = []
     sender, receiver = Sender([sample.body], 0.005, delay, even_rate(sample.times)), Receiver()
     write = sender.codec.write
 
     def noted(said: Said, kind: int, state: State, is_late: bool) -> tuple:
-        found.append((sender.codec, said, kind, state, is_late))
+        result.append((sender.codec, said, kind, state, is_late))
         return write(said, kind, state, is_late)
 
     sender.codec.write = noted
@@ -95,7 +95,7 @@ def messages(sample: Sample, delay: float, latency: float | None) -> list[Messag
             receiver.take(datagram, moment)
         if latency is not None:
             on_the_way += [(moment + 2.0 * latency, answer) for _, answer in receiver.answers()]
-    return found
+    return result
 
 
 def counted(all_messages: list[Message]) -> list[np.ndarray]:
@@ -109,7 +109,7 @@ def counted(all_messages: list[Message]) -> list[np.ndarray]:
 
 def probabilities(counts: list[np.ndarray]) -> list[np.ndarray]:
     """Of each symbol of each table: what was counted, and beside it what was counted for all kinds of knots."""
-    found = []
+    result = []
     for table, own in enumerate(counts):
         if table < FLAGS:
             alike = range(table % (HISTORIES * NEIGHBOURS), FLAGS, HISTORIES * NEIGHBOURS)
@@ -118,8 +118,8 @@ def probabilities(counts: list[np.ndarray]) -> list[np.ndarray]:
         else:
             alike = [table]
         mean = sum(counts[other] for other in alike) + falling(len(own))
-        found.append((own + PRIOR * mean / mean.sum()) / (own.sum() + PRIOR))
-    return found
+        result.append((own + PRIOR * mean / mean.sum()) / (own.sum() + PRIOR))
+    return result
 
 
 def falling(count: int) -> np.ndarray:

@@ -78,7 +78,7 @@ def body_files(paths: Iterable[Path]) -> list[Path]:
         Where there is no such file, or no such recording in a folder.
     """
     extensions = {extension for known in FORMATS if known.label in MAY_HOLD_BODIES for extension in known.extensions}
-    found: dict[Path, None] = {}
+    result: dict[Path, None] = {}
     for path in paths:
         if not path.exists():
             raise TrajectoryError(str(path), "no such file or folder", "check the path")
@@ -87,8 +87,8 @@ def body_files(paths: Iterable[Path]) -> list[Path]:
         if not files:
             known = ", ".join(sorted(extensions))
             raise TrajectoryError(str(path), "no recording in this folder that may hold a body", f"known are {known}")
-        found |= dict.fromkeys(files)
-    return list(found)
+        result |= dict.fromkeys(files)
+    return list(result)
 
 
 def read_body(path: Path) -> tuple[Clip, int]:
@@ -99,13 +99,13 @@ def read_body(path: Path) -> tuple[Clip, int]:
     TrajectoryError
         Where there is none, or nothing of it moves.
     """
-    whole = [clip for clip in read_clips([str(path)], None, WHOLE)[0] if clip.figure is not None]
+    whole = [clip for clip in read_clips([str(path)], None, WHOLE)[0] if clip.rest_body is not None]
     if not whole:
         raise TrajectoryError(path, "it is no whole body", "leave it out")
     clip = replace(whole[0], name=path.stem)
     if not moving(clip).any():
         raise TrajectoryError(path, "at rest: none of its joints moves", "leave it out")
-    places = clip.figure.skeleton.in_root_space(clip.poses).positions
+    places = clip.rest_body.skeleton.in_root_space(clip.poses).positions
     speeds = np.linalg.norm(np.diff(places, axis=1), axis=-1).max(axis=0) / np.diff(clip.times)
     if len(speeds) < 2 or speeds[0] <= JUMP * speeds[1:].max():
         return clip, 0
@@ -130,17 +130,17 @@ def limbs_of(clip: Clip) -> list[Limb]:
 
     Of several it is the one of the plainest name, and of such the first.
     """
-    words = [_words(joint) for joint in clip.figure.joints]
+    words = [_words(joint) for joint in clip.rest_body.joints]
     moves = moving(clip)
-    found = []
+    result = []
     for kind, (part, sided) in LIMBS.items():
         for side in SIDES if sided else ("",):
             named = [number for number, own in enumerate(words) if _is(own, part, side)]
             if named:
                 joint = min(named, key=lambda number: len(words[number]))
-                chain = int(sum(moves[one] for one in _chain(clip.figure.parents, joint)))
-                found += [Limb(kind, joint, chain)] if chain else []
-    return found
+                chain = int(sum(moves[one] for one in _chain(clip.rest_body.parents, joint)))
+                result += [Limb(kind, joint, chain)] if chain else []
+    return result
 
 
 def _words(name: str) -> list[str]:
@@ -151,8 +151,8 @@ def _words(name: str) -> list[str]:
 
 def _is(words: Sequence[str], part: str, side: str) -> bool:
     """Return whether these words end in a limb: "left hand", "lefthand", "hand l" and, without sides, "head"."""
-    wanted = {f"{a}{b}" for one in ((side, side[0]) if side else ("",)) for a, b in ((one, part), (part, one))}
-    return "".join(words[-1:]) in wanted or (len(words) > 1 and bool(side) and "".join(words[-2:]) in wanted)
+    requested = {f"{a}{b}" for one in ((side, side[0]) if side else ("",)) for a, b in ((one, part), (part, one))}
+    return "".join(words[-1:]) in requested or (len(words) > 1 and bool(side) and "".join(words[-2:]) in requested)
 
 
 def _chain(parents: np.ndarray, joint: int) -> list[int]:
@@ -165,7 +165,7 @@ def _chain(parents: np.ndarray, joint: int) -> list[int]:
 
 def alone(clip: Clip, joint: int) -> Clip:
     """Return a joint as a single rigid body in the space of the roots, as a tracker on it would have it."""
-    return replace(clip, poses=clip.figure.skeleton.in_root_space(clip.poses)[joint], figure=None)
+    return replace(clip, poses=clip.rest_body.skeleton.in_root_space(clip.poses)[joint], rest_body=None)
 
 
 # -- what comes of it --------------------------------------------------------------------------------------------------
@@ -182,19 +182,19 @@ def has_samples_for(clip: Clip, rate: float) -> bool:
 
 def needed_of(clip: Clip, limbs: Iterable[Limb]) -> list[tuple[str, dict[str, dict[str, list[float]]]]]:
     """Return the keys that every mode needs, of the whole body and of each limb alone: what it is of, and shares."""
-    radii = np.full(len(clip.figure.joints), JOINT)
+    radii = np.full(len(clip.rest_body.joints), JOINT)
     searched = part_of(clip, 0, int(np.searchsorted(clip.times, clip.times[0] + SEARCHED, side="right")) - 1)
-    found = [(BODY, keys_needed(OfBody(searched, radii), MODES))]
-    found += [(limb.kind, keys_needed(OfRigidBody(alone(clip, limb.joint), RADIUS), MODES)) for limb in limbs]
-    return [(of, _shares(clip, keys)) for of, keys in found]
+    result = [(BODY, keys_needed(OfBody(searched, radii), MODES))]
+    result += [(limb.kind, keys_needed(OfRigidBody(alone(clip, limb.joint), RADIUS), MODES)) for limb in limbs]
+    return [(of, _shares(clip, keys)) for of, keys in result]
 
 
-def _shares(clip: Clip, found: KeysNeeded) -> dict[str, dict[str, list[float]]]:
-    counted = [has_samples_for(clip, float(rate)) for rate in found.rates]
-    shares = np.where(counted, found.shares, np.nan)
+def _shares(clip: Clip, result: KeysNeeded) -> dict[str, dict[str, list[float]]]:
+    counted = [has_samples_for(clip, float(rate)) for rate in result.rates]
+    shares = np.where(counted, result.shares, np.nan)
     return {
         mode: {DECIMATIONS[way]: shares[row, way].tolist() for way in range(shares.shape[1])}
-        for row, group in enumerate(found.groups)
+        for row, group in enumerate(result.groups)
         for mode in group
     }
 
@@ -231,7 +231,7 @@ def apart_of(clip: Clip) -> dict[int, dict[str, float]]:
     where these are held still: what adds up along a chain; "roots" of the roots; "all" of all joints in that space;
     "error" is how far `lerp_slerp` is from the recording there.
     """
-    found, roots, skeleton = {}, clip.figure.parents < 0, clip.figure.skeleton
+    result, roots, skeleton = {}, clip.rest_body.parents < 0, clip.rest_body.skeleton
     for rate in ERROR_RATES:
         if not (made := _with_key_poses(clip, rate)):
             continue
@@ -241,14 +241,14 @@ def apart_of(clip: Clip) -> dict[int, dict[str, float]]:
         shown, carried, whole = (skeleton.in_root_space(poses) for poses in (straight, held, screw))
         truth = skeleton.in_root_space(clip.poses[:, made.samples])
         own = _distances(clip, straight, screw)
-        found[rate] = {
+        result[rate] = {
             "parents": own[~roots].max(initial=0.0),
             "carried": _distances(clip, shown, carried)[~roots].max(initial=0.0),
             "roots": own[roots].max(),
             "all": _distances(clip, shown, whole).max(),
             "error": _distances(clip, shown, truth).max(),
         }
-    return found
+    return result
 
 
 def _with_key_poses(clip: Clip, rate: int) -> BodyReconstruction | None:
@@ -311,14 +311,14 @@ def _told(clip: Clip, skipped: int, limbs: Iterable[Limb]) -> dict[str, Any]:
 
     That is from corner to corner of what it fills.
     """
-    widths = np.ptp(clip.poses.positions, axis=1)[clip.figure.parents >= 0] * clip.metres_per_unit
+    widths = np.ptp(clip.poses.positions, axis=1)[clip.rest_body.parents >= 0] * clip.metres_per_unit
     return {
-        "joints": len(clip.figure.joints),
+        "joints": len(clip.rest_body.joints),
         "seconds": float(clip.times[-1] - clip.times[0]),
         "samples_per_s": clip.samples_a_second,
         "skipped": skipped,
         "moved": np.linalg.norm(widths, axis=-1).max(initial=0.0),
-        "limbs": [clip.figure.joints[limb.joint] for limb in limbs],
+        "limbs": [clip.rest_body.joints[limb.joint] for limb in limbs],
     }
 
 

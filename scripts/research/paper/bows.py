@@ -33,15 +33,15 @@ def bows_of(clip: Clip) -> dict[int, tuple[float, float]]:
 
     Of `RATES` those that have in-betweens, over the senders of `table`.
     """
-    found = {}
+    result = {}
     for rate in RATES:
         pairs = [_from_the_straight(clip, keys) for keys in senders(clip, rate)]
         if pairs:
             a, b = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
             across, bow, missed, left = (float(np.sum(product)) for product in (a * b, b * b, a * a, (a - b) ** 2))
             if min(bow, missed) > len(a) * NOTHING**2:
-                found[rate] = across / bow, float(np.sqrt(left / missed))
-    return found
+                result[rate] = across / bow, float(np.sqrt(left / missed))
+    return result
 
 
 def _from_the_straight(clip: Clip, keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -118,11 +118,11 @@ def view(times: np.ndarray, poses: Mapping[str, Poses], rate: int, mode: str) ->
     at all of which it is held; "gap" is between the tool and where the catching hand would hold it when it is caught,
     as the figure shows it, and "mean_gap" on average over senders that begin one after the other, as are the others.
     """
-    found = []
+    result = []
     for phase in range(PHASES):
         late = times >= times[0] + phase / (PHASES * rate)
-        found.append(_looked_at(times[late], {body: of_body[late] for body, of_body in poses.items()}, rate, mode))
-    errors, slips, gaps = zip(*found, strict=True)
+        result.append(_looked_at(times[late], {body: of_body[late] for body, of_body in poses.items()}, rate, mode))
+    errors, slips, gaps = zip(*result, strict=True)
     return {
         "error": rms(np.concatenate(errors)),
         "slip": float(np.concatenate(slips).max(initial=0.0)),
@@ -180,7 +180,7 @@ def _recorded(times: np.ndarray) -> tuple[float, float]:
 def build(clip: Clip, *, film: bool) -> bpy.types.Scene:
     """The scene of the film, or of the picture at the catch, with its gaps."""
     times, poses = bodies(clip)
-    found = figures(clip)
+    result = figures(clip)
     moments = frame_moments(_recorded(times)[1])
     sheet = Sheet(1400, 5.6, frames=len(moments) if film else 1)
     sheet.scene.render.fps = FPS
@@ -197,7 +197,7 @@ def build(clip: Clip, *, film: bool) -> bpy.types.Scene:
         sheet.words(label_of(mode), sheet.left, top - 0.025, 6.5)
         for rate, x in zip(RATES, columns, strict=True):
             cast.perform(mode, rate, shown_of(times, poses, rate, mode, moments), sheet.place(x, top - 0.118))
-            sheet.words(f"{1e3 * found[mode][rate]['gap']:.0f} mm", x + 0.06, top - 0.055, 6.5, INK, "CENTER")
+            sheet.words(f"{1e3 * result[mode][rate]['gap']:.0f} mm", x + 0.06, top - 0.055, 6.5, INK, "CENTER")
     _write_legend(sheet, moments)
     sheet.scene.frame_set(1 + int(np.argmax(moments >= CATCH)))
     return sheet.scene

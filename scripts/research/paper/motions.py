@@ -38,10 +38,10 @@ def recordings_in(folder: Path) -> list[Path]:
     if not folder.is_dir():
         raise TrajectoryError(str(folder), "no such folder", "check the path")
     extensions = {extension for known in FORMATS for extension in known.extensions}
-    found = sorted(path for path in folder.iterdir() if path.is_file() and path.suffix.lower() in extensions)
-    if not found:
+    result = sorted(path for path in folder.iterdir() if path.is_file() and path.suffix.lower() in extensions)
+    if not result:
         raise TrajectoryError(str(folder), "no recording in this folder", f"known are {', '.join(sorted(extensions))}")
-    return found
+    return result
 
 
 def read_motion(path: Path) -> Clip:
@@ -55,8 +55,8 @@ def read_motion(path: Path) -> Clip:
         Where it cannot be read, or is at rest.
     """
     clip = replace(read_clips([str(path)], "blender")[0][0], name=path.stem)
-    if clip.figure:
-        clip = replace(clip, poses=clip.poses[0], figure=None)
+    if clip.rest_body:
+        clip = replace(clip, poses=clip.poses[0], rest_body=None)
     moved = spread(clip.in_metres(clip.poses))
     if moved < REST:
         raise TrajectoryError(path, f"at rest: it stays within {moved * 1e3:.1f} mm of its mean pose", "leave it out")

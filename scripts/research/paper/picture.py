@@ -17,7 +17,7 @@ from rigid_motion.motion import Poses
 from rigid_motion_batch.scenes import captions, layout
 from rigid_motion_batch.scenes.materials import ink
 from rigid_motion_batch.scenes.scene import make_camera, make_frame, make_lights, set_up_render
-from rigid_motion_batch.scenes.settings import StageSettings
+from rigid_motion_batch.scenes.settings import SceneSettings
 from rigid_motion_batch.scenes.subject import tinted_slots
 
 WIDTH = 1004
@@ -61,7 +61,7 @@ class Sheet:
         make_camera(self.scene, metres, depth=2.0 * metres)
         self.scene.camera.data.clip_end = 20.0 * metres
         make_lights(self.scene)
-        settings = StageSettings(resolution=(width, height), antialiasing="16" if frames == 1 else "FXAA")
+        settings = SceneSettings(resolution=(width, height), antialiasing="16" if frames == 1 else "FXAA")
         set_up_render(self.scene, settings, frames, PAPER)
         self._inks: dict[str, bpy.types.Material] = {}
 

@@ -83,16 +83,16 @@ def sent(clip: Clip, tolerance: float, delay: float) -> tuple[float, float, floa
 def costs_of(clip: Clip) -> dict[float, dict[int, tuple[float, float]]]:
     """Return by delay and rate of the state of the art the datagrams and the bytes a second that are as good."""
     clip = part_of(clip, 0, int(np.searchsorted(clip.times, clip.times[0] + SECONDS, side="right")) - 1)
-    wanted = {rate: row[1] for rate, row in even_points(clip).items()}
+    requested = {rate: row[1] for rate, row in even_points(clip).items()}
     low, high, count = TOLERANCES
-    tolerances = np.geomspace(low * min(wanted.values()), high * max(wanted.values()), count)
-    found: dict[float, dict[int, tuple[float, float]]] = {}
+    tolerances = np.geomspace(low * min(requested.values()), high * max(requested.values()), count)
+    result: dict[float, dict[int, tuple[float, float]]] = {}
     for delay in DELAYS:
         datagrams, size, errors = np.array([sent(clip, float(tolerance), delay) for tolerance in tolerances]).T
-        found[delay] = {
-            rate: (lowest(datagrams, errors, error), lowest(size, errors, error)) for rate, error in wanted.items()
+        result[delay] = {
+            rate: (lowest(datagrams, errors, error), lowest(size, errors, error)) for rate, error in requested.items()
         }
-    return found
+    return result
 
 
 def costs(clips: list[Clip]) -> dict[str, Any]:

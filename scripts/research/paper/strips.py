@@ -56,12 +56,12 @@ def shown() -> dict[str, Poses]:
 
 def instants() -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Return by mode, at `MOMENTS`, degrees turned and how far the tip has left the point that it rests on, (7,)."""
-    start, found = keys().quaternions[:1], {}
+    start, result = keys().quaternions[:1], {}
     for mode, poses in shown().items():
         turned = np.degrees(angle_between(np.broadcast_to(start, poses.quaternions.shape), poses.quaternions))
         tips = poses.positions + rotate(poses.quaternions, np.broadcast_to(TIP, (len(poses), 3)))
-        found[mode] = turned, np.linalg.norm(tips, axis=-1)
-    return found
+        result[mode] = turned, np.linalg.norm(tips, axis=-1)
+    return result
 
 
 def figures() -> dict[str, float]:

@@ -57,9 +57,9 @@ def main(arguments: list[str]) -> int:
     try:
         for part in options.only:
             print(f"{PROGRAM}: {part}", file=sys.stderr, flush=True)
-            found = PARTS[part](options)
-            if found:
-                write_figures(f"paper_{part}", found, command, options.root, Blender=bpy.app.version_string)
+            result = PARTS[part](options)
+            if result:
+                write_figures(f"paper_{part}", result, command, options.root, Blender=bpy.app.version_string)
     except (TrajectoryError, ValueError, OSError) as error:
         complain(PROGRAM, error)
         return 2
@@ -90,13 +90,13 @@ def clips_of(options: argparse.Namespace) -> tuple[dict[str, list[Clip]], dict[s
 
 def read_all(paths: Sequence[Path], read: Callable[[Path], Any]) -> tuple[list[Any], dict[str, str]]:
     """Return what could be read, and of the other files why not."""
-    found, left_out = [], {}
+    result, left_out = [], {}
     for path in paths:
         try:
-            found.append(read(path))
+            result.append(read(path))
         except TrajectoryError as error:
             left_out[path.stem] = error.problem
-    return found, left_out
+    return result, left_out
 
 
 # -- parts -------------------------------------------------------------------------------------------------------------
@@ -149,8 +149,8 @@ def study_bodies(options: argparse.Namespace) -> dict[str, Any]:
 
 def race(options: argparse.Namespace) -> dict[str, Any]:
     """The running time of a frame, at the rates of Table 1 among others."""
-    found = json.loads((options.root / FIGURES / "paper_table.json").read_text(encoding="utf-8"))
-    needed = next(iter(found["needed"].values()))[next(iter(table.YARDSTICKS))]
+    result = json.loads((options.root / FIGURES / "paper_table.json").read_text(encoding="utf-8"))
+    needed = next(iter(result["needed"].values()))[next(iter(table.YARDSTICKS))]
     return timing.races(_asset("reach"), needed, options.rounds)
 
 
@@ -177,10 +177,10 @@ def render(options: argparse.Namespace) -> None:
 
 def _asset(name: str) -> Clip:
     """Return a clip of ours."""
-    found = next((clip for clip in motions.assets() if clip.name == name), None)
-    if found is None:
+    result = next((clip for clip in motions.assets() if clip.name == name), None)
+    if result is None:
         raise ValueError(f"{name}.csv is not among the assets; python assets/make_assets.py makes it")
-    return found
+    return result
 
 
 PARTS: dict[str, Callable[[argparse.Namespace], dict[str, Any] | None]] = {

@@ -76,9 +76,9 @@ def senders(clip: Clip, rate: float) -> list[np.ndarray]:
 
 def point(clip: Clip, mode: str, senders_keys: Sequence[np.ndarray]) -> tuple[float, float, float, float]:
     """Return keys a second, and the errors of a mode over all of these keys, pooled: a row of a `Curve`."""
-    found = [errors_of(clip, mode, keys) for keys in senders_keys]
-    shell = np.concatenate([errors.shell for errors in found])
-    velocity = np.concatenate([errors.velocity for errors in found])
+    result = [errors_of(clip, mode, keys) for keys in senders_keys]
+    shell = np.concatenate([errors.shell for errors in result])
+    velocity = np.concatenate([errors.velocity for errors in result])
     segments = sum(len(keys) - 1 for keys in senders_keys)
     seconds = sum(float(clip.times[keys[-1]] - clip.times[keys[0]]) for keys in senders_keys)
     return segments / seconds, rms(shell), float(np.percentile(shell, 95.0)), rms(velocity)
@@ -105,9 +105,9 @@ def curves_of(clip: Clip) -> dict[str, Curve]:
         if keys := senders(clip, rate):
             for mode in MODES:
                 curves[mode].append(point(clip, mode, keys))
-    wanted = [row[1] for row in even_points(clip).values()]
+    requested = [row[1] for row in even_points(clip).values()]
     low, high, count = TOLERANCES
-    for tolerance in np.geomspace(low * min(wanted), high * max(wanted), count) if wanted else ():
+    for tolerance in np.geomspace(low * min(requested), high * max(requested), count) if requested else ():
         for mode in ADAPTIVE:
             lengths = float(tolerance / clip.metres_per_unit), RADIUS / clip.metres_per_unit
             keys = reduce_keys(clip.times, clip.poses, mode, *lengths, rms=True)
@@ -121,31 +121,31 @@ def needed(clip: Clip, curves: Mapping[str, Curve]) -> dict[str, dict[str, dict[
     Infinite where none of the rates tried was as good; there is none where the recording has too few samples for the
     rate, or nothing moves.
     """
-    found: dict[str, dict[str, dict[int, float]]] = {}
+    result: dict[str, dict[str, dict[int, float]]] = {}
     for column, yardstick in enumerate(YARDSTICKS, start=1):
-        own = found[yardstick] = {name: {} for name in curves}
+        own = result[yardstick] = {name: {} for name in curves}
         for rate, reference in even_points(clip).items():
             if reference[column] > NOTHING:
                 for name, curve in curves.items():
                     own[name][rate] = lowest(curve[:, 0], curve[:, column], reference[column]) / reference[0]
-    return found
+    return result
 
 
-def lowest(cost: np.ndarray, errors: np.ndarray, wanted: float) -> float:
+def lowest(cost: np.ndarray, errors: np.ndarray, requested: float) -> float:
     """Return the lowest cost (n,) at which a curve is down to the error wanted; infinite where it never is.
 
     Between two points, error and cost are taken to be lines on a double logarithmic scale.
     """
     order = np.argsort(cost, kind="stable")
     cost, errors = cost[order], errors[order]
-    good = np.flatnonzero(errors <= wanted)
+    good = np.flatnonzero(errors <= requested)
     if not len(good):
         return float("inf")
     first = int(good[0])
-    if first == 0 or errors[first] == wanted:
+    if first == 0 or errors[first] == requested:
         return float(cost[first])
     before, after = np.log(np.maximum(errors[[first - 1, first]], NOTHING))
-    part = (before - np.log(wanted)) / (before - after)
+    part = (before - np.log(requested)) / (before - after)
     return float(cost[first - 1] * (cost[first] / cost[first - 1]) ** part)
 
 
@@ -159,12 +159,12 @@ def mean_over(shares: Iterable[Mapping[int, float]]) -> dict[str, list[Any]]:
         "reached"; NaN where it was on none.
     """
     shares = list(shares)
-    found: dict[str, list[Any]] = {"updates": [], "saved": [], "reached": [], "asked": []}
+    result: dict[str, list[Any]] = {"updates": [], "saved": [], "reached": [], "asked": []}
     for rate in UPDATES:
         known = np.array([of_clip[rate] for of_clip in shares if rate in of_clip])
         mean = float(geometric_mean(known)) if len(known) else float("nan")
-        found["updates"].append(rate * mean)
-        found["saved"].append(1.0 - mean)
-        found["reached"].append(int(np.isfinite(known).sum()))
-        found["asked"].append(len(known))
-    return found
+        result["updates"].append(rate * mean)
+        result["saved"].append(1.0 - mean)
+        result["reached"].append(int(np.isfinite(known).sum()))
+        result["asked"].append(len(known))
+    return result

@@ -82,7 +82,7 @@ def races(clip: Clip, needed: Mapping[str, Mapping[str, list[float]]], rounds: i
     """
     others = [mode for mode in MODES if mode != REFERENCE]
     exact = [mode for mode in others if not MODES[mode].is_smooth]
-    found: dict[str, Any] = {pace: {mode: {} for mode in MODES} for pace in ("equal", "as good", "paper")}
+    result: dict[str, Any] = {pace: {mode: {} for mode in MODES} for pace in ("equal", "as good", "paper")}
     for place, rate in enumerate(UPDATES):
         paces = {
             "equal": dict.fromkeys(others, float(rate)),
@@ -91,10 +91,10 @@ def races(clip: Clip, needed: Mapping[str, Mapping[str, list[float]]], rounds: i
         }
         for pace, updates in paces.items():
             for mode, timed in race(clip, fast, {REFERENCE: float(rate)} | updates, rounds).items():
-                found[pace][mode][rate] = timed
+                result[pace][mode][rate] = timed
     for name, engine in (("algebra", in_the_algebra), ("single", one_by_one)):
-        found[name] = race(clip, engine, dict.fromkeys((REFERENCE, *exact), float(UPDATES[0])), rounds)
-    return {pace: {mode: own for mode, own in of_modes.items() if own} for pace, of_modes in found.items()}
+        result[name] = race(clip, engine, dict.fromkeys((REFERENCE, *exact), float(UPDATES[0])), rounds)
+    return {pace: {mode: own for mode, own in of_modes.items() if own} for pace, of_modes in result.items()}
 
 
 def race(clip: Clip, engine: Engine, updates: Mapping[str, float], rounds: int) -> dict[str, dict[str, float]]:

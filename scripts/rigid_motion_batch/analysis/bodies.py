@@ -181,8 +181,8 @@ def reconstruct_body(
     still = ~moving(clip)
     keys: dict[str, JointKeys] = {}
     for group in [modes] if uniform else same_body_motions(clip, modes):
-        found = choice.body_keys(clip, group[0], radius, shared=shared)
-        keys |= dict.fromkeys(group, tuple(own[:1] if rests else own for own, rests in zip(found, still, strict=True)))
+        result = choice.body_keys(clip, group[0], radius, shared=shared)
+        keys |= dict.fromkeys(group, tuple(own[:1] if rests else own for own, rests in zip(result, still, strict=True)))
     keys = {mode: keys[mode] for mode in modes}
     if clip.against:
         keys[clip.against.name] = (NO_KEYS,) * len(still)

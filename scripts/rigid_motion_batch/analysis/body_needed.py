@@ -56,9 +56,9 @@ class OfBody:
             keys, error = self._best_of(enough, mode)
         while enough - too_few > max(1, NEAR * enough):
             middle = (enough + too_few) // 2
-            tried, found = self._best_of(middle, mode)
-            if found <= target:
-                enough, keys, error = middle, tried, found
+            tried, result = self._best_of(middle, mode)
+            if result <= target:
+                enough, keys, error = middle, tried, result
             else:
                 too_few = middle
         return [(keys, error)]
@@ -69,7 +69,7 @@ class OfBody:
             keys = np.arange(len(self.clip.times))
         else:
             radii = self.radii / self.clip.metres_per_unit
-            found = reduce_skeleton_keys(
+            result = reduce_skeleton_keys(
                 self.clip.times,
                 self.clip.poses,
                 self.clip.whole_body.parents,
@@ -78,10 +78,10 @@ class OfBody:
                 budget=max(budget, 2),
                 shared=True,
             )
-            keys = max(cast(tuple[np.ndarray, ...], found), key=len)
+            keys = max(cast(tuple[np.ndarray, ...], result), key=len)
         return keys, self.error(keys, mode)
 
 
 def ways_of(clip: Clip, radii: Radii, *, fit: bool) -> Ways:
     """Return the ways to have fewer keys of a clip, whatever it is of; only those of a rigid body may be fitted."""
-    return OfBody(clip, radii.of(clip.figure.joints)) if clip.figure else OfRigidBody(clip, radii.rigid, fit=fit)
+    return OfBody(clip, radii.of(clip.rest_body.joints)) if clip.rest_body else OfRigidBody(clip, radii.rigid, fit=fit)

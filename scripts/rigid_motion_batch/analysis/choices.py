@@ -108,7 +108,7 @@ class Choice(ABC):
         return float(self.written)
 
     @property
-    def wanted(self) -> tuple[Fraction, str]:
+    def requested(self) -> tuple[Fraction, str]:
         """The amount exactly, and what it is counted in: the same for "5" and "5.0", for "5mm" and "0.5cm"."""
         return Fraction(self.written), self.unit
 
@@ -210,11 +210,11 @@ class Tolerance(Choice):
 
         The radius of the shell is in metres; of a body the places of its joints count.
         """
-        if clip.figure is None:
+        if clip.rest_body is None:
             poses = clip.in_metres(clip.poses)
             size = float(shell_error(poses, poses[:1], radius).max())
         else:
-            places = clip.in_metres(clip.figure.skeleton.in_root_space(clip.poses)).positions
+            places = clip.in_metres(clip.rest_body.skeleton.in_root_space(clip.poses)).positions
             size = float(np.linalg.norm(places - places[:, :1], axis=-1).max())
         allowed = self.tolerance(clip)
         if 0.0 < size < allowed:
@@ -243,26 +243,26 @@ class Tolerance(Choice):
         return float(number) * METRES.get(unit, 1.0)
 
     @property
-    def wanted(self) -> tuple[Fraction, str]:
+    def requested(self) -> tuple[Fraction, str]:
         number, unit = self._parts()
         return Fraction(number) * MILLIMETRES.get(unit, 1), "mm" if unit else ""
 
     def _parts(self) -> tuple[str, str]:
         """Return the number and the unit, which may be empty."""
-        found = re.fullmatch(rf"({NUMBER})({'|'.join(METRES)})?", self.written, re.ASCII)
-        if not found or float(found[1]) <= 0.0:
+        result = re.fullmatch(rf"({NUMBER})({'|'.join(METRES)})?", self.written, re.ASCII)
+        if not result or float(result[1]) <= 0.0:
             raise ValueError(
                 f"{self.written!r} is no tolerance; give a length such as 5mm, 0.5cm or 0.005m, or a plain number in "
                 "the unit of the recording"
             )
-        return found[1], found[2] or ""
+        return result[1], result[2] or ""
 
 
-def _reduced(clip: Clip, mode: str, radius: float, **wanted: Any) -> np.ndarray:
-    return reduce_keys(clip.times, clip.poses, mode, radius=radius / clip.metres_per_unit, **wanted)
+def _reduced(clip: Clip, mode: str, radius: float, **requested: Any) -> np.ndarray:
+    return reduce_keys(clip.times, clip.poses, mode, radius=radius / clip.metres_per_unit, **requested)
 
 
-def _reduced_body(clip: Clip, mode: str, radius: Radius, shared: bool, **wanted: Any) -> tuple[np.ndarray, ...]:
+def _reduced_body(clip: Clip, mode: str, radius: Radius, shared: bool, **requested: Any) -> tuple[np.ndarray, ...]:
     keys = reduce_skeleton_keys(
         clip.times,
         clip.poses,
@@ -270,7 +270,7 @@ def _reduced_body(clip: Clip, mode: str, radius: Radius, shared: bool, **wanted:
         mode,
         radius=radius / clip.metres_per_unit,
         shared=shared,
-        **wanted,
+        **requested,
     )
     return cast(tuple[np.ndarray, ...], keys)
 
@@ -287,5 +287,5 @@ def distinct(choices: Iterable[Choice]) -> list[Choice]:
     """Choices of one kind without those that want the same as one before them, however it is written."""
     first: dict[tuple[Fraction, str], Choice] = {}
     for choice in choices:
-        first.setdefault(choice.wanted, choice)
+        first.setdefault(choice.requested, choice)
     return list(first.values())

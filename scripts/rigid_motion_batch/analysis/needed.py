@@ -157,9 +157,9 @@ def keys_needed(ways: Ways, modes: Iterable[str], *, advance: Callable[[], objec
         if targets[place] > NOTHING:
             for row, group in enumerate(groups):
                 evenly = kept if REFERENCE in group else _fewest_evenly(stretch, group[0], targets[place], kept)
-                found = [(evenly, stretch.error(evenly, group[0]))]
-                found += stretch.by_motion(group[0], targets[place], len(evenly))
-                for column, (own, error) in enumerate(found):
+                result = [(evenly, stretch.error(evenly, group[0]))]
+                result += stretch.by_motion(group[0], targets[place], len(evenly))
+                for column, (own, error) in enumerate(result):
                     keys[row, column, place] = np.inf if len(own) == len(times) else len(own)
                     reached[row, column, place] = error
         advance()
@@ -228,8 +228,8 @@ class OfRigidBody:
 
     def by_motion(self, mode: str, target: float, evenly: int) -> list[tuple[np.ndarray, float]]:
         adaptive = self._reduced(mode, target)
-        found = [(adaptive, self.error(adaptive, mode))]
-        return [*found, self._fewest_fitted(mode, target, *found[0])] if self.fit else found
+        result = [(adaptive, self.error(adaptive, mode))]
+        return [*result, self._fewest_fitted(mode, target, *result[0])] if self.fit else result
 
     def _reduced(self, mode: str, target: float) -> np.ndarray:
         clip, scale = self.clip, self.clip.metres_per_unit
@@ -332,13 +332,13 @@ def write_keys_needed(path: Path, clips: Iterable[KeysNeeded]) -> None:
 def _rows(clip: KeysNeeded) -> Iterator[NeededRow]:
     for group, decimation, rate in np.argwhere(~np.isnan(clip.keys)).tolist():
         at = group, decimation, rate
-        found: list[Any] = [None] * 4
+        result: list[Any] = [None] * 4
         if np.isfinite(clip.keys[at]):
-            found = [
+            result = [
                 int(clip.keys[at]),
                 *(float(values[at]) for values in (clip.keys_per_s, clip.shares, clip.reached)),
             ]
         for mode in clip.groups[group]:
             yield NeededRow(
-                clip.clip, mode, DECIMATIONS[decimation], clip.rates[rate], float(clip.targets[rate]), *found
+                clip.clip, mode, DECIMATIONS[decimation], clip.rates[rate], float(clip.targets[rate]), *result
             )

@@ -85,8 +85,8 @@ def _read_table(path: Path) -> dict[str, float]:
         raise ValueError(f"{path}: this is no CSV in UTF-8; it needs the columns joint,radius_m") from None
     header = [name.strip().lower() for name in lines[0][1]] if lines else []
     if not {"joint", "radius_m"} <= set(header):
-        found = printable(",".join(header))[:80] or "none"
-        raise ValueError(f"{path}:1: the columns joint and radius_m are needed, and it has {found}")
+        result = printable(",".join(header))[:80] or "none"
+        raise ValueError(f"{path}:1: the columns joint and radius_m are needed, and it has {result}")
     columns = header.index("joint"), header.index("radius_m")
     radii: dict[str, float] = {}
     for number, cells in lines[1:]:

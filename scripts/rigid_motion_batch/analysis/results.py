@@ -173,17 +173,17 @@ def compare_clip(
 
 def made_of(clip: Clip, choice: Choice, modes: Sequence[str], radii: Radii, *, shared: bool) -> Made | None:
     """Return what modes make of a clip: the first half of `compare_clip`."""
-    if clip.figure is None:
+    if clip.rest_body is None:
         return reconstruct(clip, choice, modes, radii.rigid)
-    return reconstruct_body(clip, choice, modes, radii.of(clip.figure.joints), shared=shared)
+    return reconstruct_body(clip, choice, modes, radii.of(clip.rest_body.joints), shared=shared)
 
 
-def made_again(clip: Clip, found: ChoiceResult, radii: Radii, *, shared: bool) -> Made:
+def made_again(clip: Clip, result: ChoiceResult, radii: Radii, *, shared: bool) -> Made:
     """Return the same by the keys that were chosen before."""
-    if clip.figure is None:
-        keys = {mode: keys[0] for mode, keys in found.keys.items()}
-        return fill_in(clip, found.choice, keys, radii.rigid, found.mode_of_segments)
-    return BodyReconstruction(clip, found.choice, dict(found.keys), shared)
+    if clip.rest_body is None:
+        keys = {mode: keys[0] for mode, keys in result.keys.items()}
+        return fill_in(clip, result.choice, keys, radii.rigid, result.mode_of_segments)
+    return BodyReconstruction(clip, result.choice, dict(result.keys), shared)
 
 
 def measured(made: Made, radii: Radii) -> ChoiceResult:
@@ -201,16 +201,16 @@ def write_tables(folder: Path, made: Made, form: str) -> None:
 
 def clip_result(clip: Clip, choices: Sequence[ChoiceResult], needed: KeysNeeded | None = None) -> ClipResult:
     """Gather what was found of a clip."""
-    figure = clip.figure
-    if figure is None:
+    rest_body = clip.rest_body
+    if rest_body is None:
         truth = to_blender(clip.in_metres(clip.poses), clip.axes)
     else:
-        truth = _places(to_blender(clip.in_metres(figure.skeleton.in_root_space(clip.poses)), clip.axes).positions)
+        truth = _places(to_blender(clip.in_metres(rest_body.skeleton.in_root_space(clip.poses)), clip.axes).positions)
     return ClipResult(
         ClipFacts.of(clip),
         clip.times,
         truth,
-        figure.parents if figure else None,
+        rest_body.parents if rest_body else None,
         tuple(choices),
         needed,
     )
@@ -242,8 +242,8 @@ def _of_rigid_body(made: Reconstruction) -> ChoiceResult:
 
 
 def _of_body(made: BodyReconstruction, radii: Radii) -> ChoiceResult:
-    found = measure_modes(made, radii.of(made.clip.whole_body.joints))
-    rows = {row.mode: row for row in found.rows}
+    result = measure_modes(made, radii.of(made.clip.whole_body.joints))
+    rows = {row.mode: row for row in result.rows}
     motions = [
         Motion(
             group,
@@ -253,9 +253,9 @@ def _of_body(made: BodyReconstruction, radii: Radii) -> ChoiceResult:
             np.stack([errors.shell.max(axis=0), *errors.largest]),
             errors.shell,
         )
-        for group, errors in zip(found.groups, found.errors.values(), strict=True)
+        for group, errors in zip(result.groups, result.errors.values(), strict=True)
     ]
-    return ChoiceResult(made.choice, made.samples.start, tuple(motions), made.keys, joints=found.joints)
+    return ChoiceResult(made.choice, made.samples.start, tuple(motions), made.keys, joints=result.joints)
 
 
 def _places(positions: np.ndarray) -> Poses:

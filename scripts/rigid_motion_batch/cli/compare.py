@@ -188,11 +188,11 @@ def _short(path: Path) -> str:
 
 def _digests(sources: list[str], store: Store) -> dict[str, str]:
     """Source to the digest of its file, of those that are there."""
-    found = {}
+    result = {}
     for source in sources:
         with suppress(TrajectoryError):
-            found[source] = store.input(split_source(source)[0]).sha256
-    return found
+            result[source] = store.input(split_source(source)[0]).sha256
+    return result
 
 
 # -- what it needs ----------------------------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ from rigid_motion_batch.pipeline.bundle import STAGES
 from rigid_motion_batch.places import ASSETS, from_here
 from rigid_motion_batch.recordings import files_of
 from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
-from rigid_motion_batch.scenes.settings import ANTIALIASING, ENGINES, StageSettings
+from rigid_motion_batch.scenes.settings import ANTIALIASING, ENGINES, SceneSettings
 
 DESCRIPTION = """Compare interpolation modes on recorded trajectories.
 
@@ -262,7 +262,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     options = parser.parse_args(arguments)
     try:
         options.distinct = options.modes.distinct
-        stage = StageSettings(**{one.name: getattr(options, one.name) for one in fields(StageSettings)})
+        stage = SceneSettings(**{one.name: getattr(options, one.name) for one in fields(SceneSettings)})
         options.stage = None if options.no_video else stage
         if options.part != (1, 1) and not options.only:
             raise ValueError("--part is a share of one stage: add --only STAGE")
@@ -359,8 +359,8 @@ def _whole(pattern: str, what: str, fits: Callable[..., bool] = lambda *numbers:
     """How whole numbers are read: those in the groups of a pattern, or the single one."""
 
     def parse_whole(text: str) -> int | tuple[int, ...]:
-        found = re.fullmatch(pattern, text, re.ASCII)
-        numbers = tuple(map(int, found.groups())) if found else ()
+        result = re.fullmatch(pattern, text, re.ASCII)
+        numbers = tuple(map(int, result.groups())) if result else ()
         if not (numbers and fits(*numbers)):
             raise argparse.ArgumentTypeError(f"{text!r} is no {what}")
         return numbers if len(numbers) > 1 else numbers[0]

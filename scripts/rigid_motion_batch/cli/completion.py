@@ -41,9 +41,9 @@ def whole_parser() -> argparse.ArgumentParser:
     whole = argparse.ArgumentParser(INSTALLED)
     commands = whole.add_subparsers()
     for name, command in COMMANDS.items():
-        found = parser_of_module(command.module)
-        parser = commands.add_parser(name, help=command.about, parents=[found] if found else [], add_help=False)
-        if not found:
+        result = parser_of_module(command.module)
+        parser = commands.add_parser(name, help=command.about, parents=[result] if result else [], add_help=False)
+        if not result:
             parser.add_argument("files", nargs="*")
         for action in parser._actions:
             if not action.choices and action.nargs != 0:

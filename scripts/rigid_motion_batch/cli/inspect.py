@@ -43,21 +43,21 @@ Exit code: 0 all could be read, 1 some could not, 2 none could, or a wrong optio
 def main(arguments: list[str]) -> int:
     """Look into the recordings, and return the exit code."""
     options = _parse(arguments)
-    found, failures = [], 0
+    result, failures = [], 0
     for source in (file for given in options.inputs for file in files_of(given)):
         try:
             inspection = inspect(source, options.axes, options.reading)
         except TrajectoryError as error:
             failures += 1
-            found.append({"source": source, "error": str(error)})
+            result.append({"source": source, "error": str(error)})
             complain(PROGRAM, error)
             continue
-        found.append(asdict(inspection))
+        result.append(asdict(inspection))
         if not options.json:
             print(*_lines(inspection), sep="\n", flush=True)
     if options.json:
-        print(json.dumps(found, indent=1, ensure_ascii=False))
-    return 0 if not failures else 1 if failures < len(found) else 2
+        print(json.dumps(result, indent=1, ensure_ascii=False))
+    return 0 if not failures else 1 if failures < len(result) else 2
 
 
 def _parse(arguments: list[str]) -> argparse.Namespace:
@@ -80,23 +80,23 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     return options
 
 
-def _lines(found: Inspection) -> Iterator[str]:
+def _lines(result: Inspection) -> Iterator[str]:
     """What is in a recording, as text."""
-    size = f"{found.bytes / 1e6:.1f} MB" if found.bytes >= 1e6 else f"{found.bytes / 1e3:.1f} KB"
-    yield printable(f"{found.source}: {found.format}, {size}")
-    if len(found.bodies) > 1:
-        yield from _row("bodies", f"{listed(found.bodies, LISTED)} ({len(found.bodies)})")
-    axes = f"{found.axes.name}, {found.axes.known_from}"
-    if found.axes.others:
-        axes += f"; {found.contents[0].up} seems to be up, as in {' and '.join(found.axes.others)}: --axes"
+    size = f"{result.bytes / 1e6:.1f} MB" if result.bytes >= 1e6 else f"{result.bytes / 1e3:.1f} KB"
+    yield printable(f"{result.source}: {result.format}, {size}")
+    if len(result.bodies) > 1:
+        yield from _row("bodies", f"{listed(result.bodies, LISTED)} ({len(result.bodies)})")
+    axes = f"{result.axes.name}, {result.axes.known_from}"
+    if result.axes.others:
+        axes += f"; {result.contents[0].up} seems to be up, as in {' and '.join(result.axes.others)}: --axes"
     yield from _row("axes", axes)
-    for body in found.contents:
+    for body in result.contents:
         yield from _row("body", printable(body.name))
         yield from _body(body)
-    for name, problem in found.unreadable:
+    for name, problem in result.unreadable:
         yield from _row("body", f"{printable(name)}: {problem}")
-    if found.note:
-        yield from _row("note", found.note)
+    if result.note:
+        yield from _row("note", result.note)
 
 
 def _body(body: Contents) -> Iterator[str]:

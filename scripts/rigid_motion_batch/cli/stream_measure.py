@@ -71,17 +71,17 @@ def run(options: argparse.Namespace) -> None:
     clip, tolerance = clips[0], Tolerance(options.tolerance).tolerance(clips[0])
     times, poses = samples_of(clip)
     body = body_of(clip, poses, options.radius)
-    if options.output and (options.output.suffix.lower() == ".bvh") != (clip.figure is not None):
+    if options.output and (options.output.suffix.lower() == ".bvh") != (clip.rest_body is not None):
         raise ValueError(f"{options.output}: a body is written as .bvh, a single rigid body as .csv")
     link = Link(options.latency, options.jitter, options.loss)
-    found = measure(body, times, poses, tolerance, options.delay, link, not options.no_answers)
+    result = measure(body, times, poses, tolerance, options.delay, link, not options.no_answers)
     beside = packed(body, times, poses)
     if options.output:
-        write(options.output, clip, body, times, found.shown)
+        write(options.output, clip, body, times, result.shown)
     if options.json:
-        print(json.dumps({"recording": clip.name, **asdict(found.cost), "beside": beside}, indent=2))
+        print(json.dumps({"recording": clip.name, **asdict(result.cost), "beside": beside}, indent=2))
         return
-    for line in lines(found, beside, tolerance):
+    for line in lines(result, beside, tolerance):
         print(line)
     if options.output:
         print(path_line(options.output))
@@ -89,34 +89,34 @@ def run(options: argparse.Namespace) -> None:
 
 def packed(body: Body, times: np.ndarray, poses: Poses) -> dict[str, dict[str, float]]:
     """What even streams of packed joints cost, and how far off they are."""
-    forest, found = Forest([body]), {}
+    forest, result = Forest([body]), {}
     samples = straight(times, Poses(poses.positions, align_signs(poses.quaternions)))
     for way in WAYS:
         worst = errors(way, forest, samples).max(axis=0)
         alone, with_headers = bytes_a_second(way, forest)
-        found[way.label] = {
+        result[way.label] = {
             "bytes_a_second": alone,
             "bytes_a_second_with_headers": with_headers,
             "rms_mm": 1000.0 * rms(worst),
             "largest_mm": 1000.0 * float(worst.max()),
         }
-    return found
+    return result
 
 
 def write(path: Path, clip: Clip, body: Body, times: np.ndarray, shown: Poses) -> None:
     """Write what was shown in the units and axes of the recording."""
     there = from_blender(shown, clip.axes)
     there = Poses(there.positions / clip.metres_per_unit, there.quaternions)
-    if clip.figure is None:
+    if clip.rest_body is None:
         write_poses(path, times, there[0])
     else:
         with replacing(path) as file:
-            write_bvh(file, clip.figure, body.sliding, times, there)
+            write_bvh(file, clip.rest_body, body.sliding, times, there)
 
 
-def lines(found: Measured, beside: dict[str, dict[str, float]], tolerance: float) -> list[str]:
+def lines(result: Measured, beside: dict[str, dict[str, float]], tolerance: float) -> list[str]:
     """The numbers as text."""
-    cost = found.cost
+    cost = result.cost
     rows = [
         f"datagrams: {cost.datagrams}, of which {cost.lost} were lost, in {cost.seconds:.2f} s",
         f"to join: {cost.joining_bytes} bytes",

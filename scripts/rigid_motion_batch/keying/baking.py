@@ -57,17 +57,17 @@ def _result(
 ) -> Result:
     done = {target: modes[target] for target in targets if target not in problems}
     refused = {target: text.removeprefix(f"{target.name}: ") for target, text in problems.items()}
-    return Result(list(done), refused, told=f"{span}{described(done)}")
+    return Result(list(done), refused, summary=f"{span}{described(done)}")
 
 
 def _by_target(refusals: Iterable[Refused], targets: Sequence[Transform]) -> dict[Transform, str]:
     """Which target each refusal is about: it begins with the name, and of names that begin alike with the longest."""
     longest_first = sorted(targets, key=lambda target: -len(target.name))
-    found = {}
+    result = {}
     for text in map(str, refusals):
-        target = next(one for one in longest_first if one not in found and text.startswith(one.name))
-        found[target] = text
-    return found
+        target = next(one for one in longest_first if one not in result and text.startswith(one.name))
+        result[target] = text
+    return result
 
 
 def with_rigid_segments(targets: Sequence[Transform]) -> list[Transform]:
@@ -108,8 +108,8 @@ def modes_of(targets: Sequence[Transform]) -> dict[Transform, str]:
             if user in modes:
                 modes[user] |= dict.fromkeys(segment_modes(place))
     return {
-        target: ", ".join(KEYFRAME_MODES[mode].label if mode in KEYFRAME_MODES else "Blender" for mode in found)
-        for target, found in modes.items()
+        target: ", ".join(KEYFRAME_MODES[mode].label if mode in KEYFRAME_MODES else "Blender" for mode in result)
+        for target, result in modes.items()
     }
 
 

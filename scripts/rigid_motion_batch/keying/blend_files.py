@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 
 from rigid_motion_batch.files import written_beside
-from rigid_motion_batch.hushing import hushed
+from rigid_motion_batch.silencing import silenced
 
 from .output_files import FileProblem, Unreadable, changed_at
 from .records import Record
@@ -49,7 +49,7 @@ def open_file(path: Path) -> None:
     if os.path.exists(path) and not os.path.isfile(path):
         raise Unreadable("this is no file on a disk: save it as one first")
     try:
-        with hushed(errors=True):
+        with silenced(errors=True):
             bpy.ops.wm.open_mainfile(filepath=str(path.absolute()), load_ui=True, use_scripts=False)
     except RuntimeError as error:
         said = " ".join(str(error).split()).removeprefix("Error: ")
@@ -74,23 +74,24 @@ def open_file(path: Path) -> None:
 
 def missing_data() -> Missing:
     """What the open file wants of libraries and cannot have, which Blender puts nothing but names in the place of."""
-    found = Missing()
+    result = Missing()
     for library in bpy.data.libraries:
         blocks = [block for block in library.users_id if block.is_missing]
         if not blocks:
             continue
         path = os.path.normpath(bpy.path.abspath(library.filepath))
         is_there = os.path.exists(path)
-        wanted = ", ".join(f"{block.bl_rna.name} {block.name}" for block in blocks[:NAMED])
+        missing = ", ".join(f"{block.bl_rna.name} {block.name}" for block in blocks[:NAMED])
         more = f" and {len(blocks) - NAMED} more" if len(blocks) > NAMED else ""
-        found.libraries.append(
-            f"library {path} {'cannot be read, or lacks something' if is_there else 'was not found'} ({wanted}{more}): "
+        result.libraries.append(
+            f"library {path} {'cannot be read, or lacks something' if is_there else 'was not found'} "
+            f"({missing}{more}): "
             f"bring {'that' if is_there else 'it'} back, or tell the file where it is now (Outliner, Blender File, "
             "right-click: Relocate)"
         )
-        found.reasons |= _reasons(blocks, path)
-        found.hides_objects |= any(isinstance(block, MAY_HOLD_OBJECTS) for block in blocks)
-    return found
+        result.reasons |= _reasons(blocks, path)
+        result.hides_objects |= any(isinstance(block, MAY_HOLD_OBJECTS) for block in blocks)
+    return result
 
 
 def _reasons(blocks: list[bpy.types.ID], path: str) -> dict[bpy.types.Object, str]:
@@ -135,7 +136,7 @@ def write_file(output: Path, record: Record | None, opened: int | None = None) -
         Where it cannot be written, or was changed meanwhile.
     """
     try:
-        with hushed(errors=True), record.writing(output) if record else written_beside(output) as beside:
+        with silenced(errors=True), record.writing(output) if record else written_beside(output) as beside:
             # Blender 4.5 takes a relative one to be one of $PWD, wherever it runs.
             bpy.ops.wm.save_as_mainfile(
                 filepath=str(beside.absolute()), copy=True, check_existing=False, relative_remap=True

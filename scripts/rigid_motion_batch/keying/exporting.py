@@ -9,11 +9,11 @@ from pathlib import Path
 import bpy
 
 import rigid_motion
-from rigid_motion_batch.hushing import hushed
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.fbx import ADDON as FBX_ADDON
 from rigid_motion_batch.recordings.fbx_records import refuse_damaged
 from rigid_motion_batch.recordings.importing import enabled, refuse_too_large
+from rigid_motion_batch.silencing import silenced
 
 from .blend_files import missing_data, open_file
 from .gltf_files import GltfRun
@@ -27,7 +27,7 @@ GLTF_ADDON = "io_scene_gltf2"
 def export_glb(path: Path) -> None:
     """Write the open file as GLB, every animation sampled on every frame, a clip for an Action. Raises FileProblem."""
     try:
-        with enabled(path, GLTF_ADDON), _asking_extension(), hushed():
+        with enabled(path, GLTF_ADDON), _asking_extension(), silenced():
             bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB")
     except TrajectoryError as error:
         raise FileProblem(error.problem) from None
@@ -76,7 +76,7 @@ def _import_fbx(path: Path) -> None:
     try:
         refuse_too_large(path)
         refuse_damaged(path)
-        with hushed():
+        with silenced():
             bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
             with enabled(path, FBX_ADDON):
                 bpy.ops.import_scene.fbx(filepath=str(path.absolute()))

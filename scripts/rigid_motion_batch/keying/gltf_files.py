@@ -73,8 +73,8 @@ class GltfRun:
         length = wishes.tolerance or Tolerance(f"{MILLIMETRES * report.tolerance:.6f}mm")
         by_number = wishes.count is not None
         for clip in report.clips:
-            told = _told(clip, length, per_unit, self._would, by_number=by_number)
-            self._note(f"{job.source}: {printable(clip.name)}: {told}")
+            summary = _summary(clip, length, per_unit, self._would, by_number=by_number)
+            self._note(f"{job.source}: {printable(clip.name)}: {summary}")
         if report.size:
             size = f"{report.size:.3g} m large"
             self._note(f"{job.source}: {size}{doubt(report.size, wishes.tolerance, per_unit)}")
@@ -136,15 +136,15 @@ def _exported(export: Callable[[Path], None]) -> Document:
         return read_document(path, in_memory=True)
 
 
-def _told(clip: ReducedClip, tolerance: Tolerance, per_unit: float, would: str, *, by_number: bool) -> str:
+def _summary(clip: ReducedClip, tolerance: Tolerance, per_unit: float, would: str, *, by_number: bool) -> str:
     """What became of a clip."""
     if clip.tracks is None:
         return f"stays as it was, {clip.before.keys} keys in {clip.before.size} bytes: {clip.reason}"
-    told = f"{would}reduced{fewer(clip.before.keys, clip.after.keys)}, {clip.before.size} -> {clip.after.size} bytes"
-    told += off(tolerance, clip.error, per_unit, by_number=by_number)
+    summary = f"{would}reduced{fewer(clip.before.keys, clip.after.keys)}, {clip.before.size} -> {clip.after.size} bytes"
+    summary += off(tolerance, clip.error, per_unit, by_number=by_number)
     if clip.vertices is not None:
-        told += f"; vertices {tolerance.alike(clip.vertices, per_unit)} at most"
+        summary += f"; vertices {tolerance.alike(clip.vertices, per_unit)} at most"
     if clip.slides[0] > 0.0:
         before, after = (tolerance.alike(slide, per_unit) for slide in clip.slides)
-        told += f"; feet slide {after}, and {before} before"
-    return told
+        summary += f"; feet slide {after}, and {before} before"
+    return summary

@@ -113,7 +113,7 @@ class BlendRun:
         if result.done:
             self._tell_done(job, outcome, result)
         if result.left:
-            self._note(f"{job.source}: {result.told_of_left()}")
+            self._note(f"{job.source}: {result.describe_kept()}")
 
     def _refuse(self, job: Job, outcome: Outcome, name: str, reason: str, count: int = 1) -> None:
         outcome.refused += count
@@ -124,8 +124,8 @@ class BlendRun:
         bones = sum(isinstance(target, BoneTransform) for target in targets)
         outcome.bones += bones
         outcome.objects += len(targets) - bones
-        told = f"{self._would}{self.action.done}{result.told}"
-        self._note(f"{job.source}: {title_of(targets)}{' ' if len(targets) > 1 else ': '}{told}")
+        summary = f"{self._would}{self.action.done}{result.summary}"
+        self._note(f"{job.source}: {title_of(targets)}{' ' if len(targets) > 1 else ': '}{summary}")
 
     def _finish(self, job: Job, outcome: Outcome) -> None:
         if not outcome.done:

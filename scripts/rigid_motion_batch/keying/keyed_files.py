@@ -13,7 +13,6 @@ import numpy as np
 from rigid_motion import animation
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion_batch.axes import to_blender
-from rigid_motion_batch.hushing import hushed
 from rigid_motion_batch.keying.output_files import FileProblem
 from rigid_motion_batch.keying.recorded import RATES
 from rigid_motion_batch.keying.reducing import reduced
@@ -22,6 +21,7 @@ from rigid_motion_batch.keying.wishes import Wishes
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.rigs import LAST_FRAME
 from rigid_motion_batch.scenes.armature import Rest, Rig
+from rigid_motion_batch.silencing import silenced
 
 CLOSEST = 0.01
 """Frames between keys that Blender takes for two."""
@@ -73,7 +73,7 @@ def new_file(clip: Clip, tolerance: float, fps: int | None) -> np.ndarray:
             f"this is up to {farthest:.3g} m from its origin, where Blender's numbers are coarser than the tolerance: "
             "move the origin nearer in the recording"
         )
-    with hushed():
+    with silenced():
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     scene = bpy.context.scene
     scene.render.fps = max(round(rate), 1)
@@ -84,7 +84,7 @@ def new_file(clip: Clip, tolerance: float, fps: int | None) -> np.ndarray:
 
 def key_densely(clip: Clip, frames: np.ndarray, name: str) -> None:
     """Put axes or a rig into the open file that move as a recording did, with a key for every sample, frames (n,)."""
-    if clip.figure is None:
+    if clip.rest_body is None:
         poses = to_blender(clip.in_metres(clip.poses), clip.axes)
         animation.bake_poses(_axes(name), frames, poses, key_type="KEYFRAME")
     else:
@@ -125,8 +125,8 @@ def _axes(name: str) -> bpy.types.Object:
 
 def _rig(clip: Clip, frames: np.ndarray, name: str) -> Rig:
     """A rig in the open file with a key for every sample of a whole body, on frames (n,)."""
-    rest = Rest.of(clip.figure, clip.metres_per_unit, clip.axes)
-    rig = Rig(name, rest, clip.figure.joints, bpy.context.scene.collection)
+    rest = Rest.of(clip.rest_body, clip.metres_per_unit, clip.axes)
+    rig = Rig(name, rest, clip.rest_body.joints, bpy.context.scene.collection)
     channels = rig.channels_of(to_blender(clip.in_metres(clip.poses), clip.axes))
     for bone in range(len(rig.bones)):
         rig.key(bone, frames, channels[bone])

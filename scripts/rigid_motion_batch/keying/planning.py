@@ -69,7 +69,7 @@ def file_and_body(source: str) -> tuple[Path, str | None]:
         return Path(source), None
 
 
-def found_below(
+def results_below(
     folder: Path, endings: tuple[str, ...], made: Callable[[Path], bool], problems: list[OSError]
 ) -> Iterator[Path]:
     """The files of a folder and of those below it, but for hidden ones, results, and links that lead out.
@@ -113,7 +113,7 @@ def planned(
             jobs.setdefault(_identity(job), job)
             continue
         closed: list[OSError] = []
-        paths = sorted(found_below(Path(given), endings, made, closed))
+        paths = sorted(results_below(Path(given), endings, made, closed))
         for path in paths:
             folder = output / path.parent.relative_to(given) if output else path.parent
             job = replace(job_of(os.fspath(path), folder), is_found=True)

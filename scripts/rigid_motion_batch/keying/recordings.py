@@ -92,7 +92,7 @@ class RecordingRun:
         table, scene, glb = (output.with_name(f"{output.name}{end}") for end in (ending or ".csv", ".blend", ".glb"))
         if self.writing.glb:
             self._do_glb(title, clip, name, glb, outcome)
-        elif clip.figure is not None:
+        elif clip.rest_body is not None:
             if ending not in ("", ".blend"):
                 raise FileProblem(f"a whole body becomes a .blend file: name that with --output, and not {ending}")
             self._do_body(title, clip, name, scene, outcome)
@@ -117,10 +117,10 @@ class RecordingRun:
         stop_if_asked()
         if frames is not None:
             key_object(clip, keys, frames, mode, name)
-        told = fewer(len(clip.times), len(keys)) + off(
+        summary = fewer(len(clip.times), len(keys)) + off(
             tolerance, largest, clip.metres_per_unit, by_number=count is not None
         )
-        self._note(f"{title}: {self._would}reduced{told}")
+        self._note(f"{title}: {self._would}reduced{summary}")
         if not self.dry_run:
             try:
                 with self._record.writing(table) as beside:
@@ -142,9 +142,9 @@ class RecordingRun:
             outcome.refused += count
             self._note(f"{title}: {bones}: not reduced: {reason}")
         if result.left:
-            self._note(f"{title}: {result.told_of_left()}")
+            self._note(f"{title}: {result.describe_kept()}")
         if result.done:
-            self._note(f"{title}: {counted(len(result.done), 'bone')} {self._would}reduced{result.told}")
+            self._note(f"{title}: {counted(len(result.done), 'bone')} {self._would}reduced{result.summary}")
         if not (result.done or result.left):
             why = "nothing could be reduced" if result.refused else "nothing of this body moves"
             self._note(f"{title}: {why}; left alone")
@@ -158,7 +158,7 @@ class RecordingRun:
         frames = new_file(clip, (self.wishes.tolerance or TOLERANCE).tolerance(clip), self.writing.fps)
         key_densely(clip, frames, name)
         stop_if_asked()
-        wishes = self._wishes if clip.figure else replace(self._wishes, radius=self.wishes.radius or RIGID)
+        wishes = self._wishes if clip.rest_body else replace(self._wishes, radius=self.wishes.radius or RIGID)
         gltf = GltfRun(wishes, self._record, self._note, dry_run=self.dry_run)
         gltf.reduce(Job(title, path.parent, path), outcome, export_glb, clip.metres_per_unit)
 

@@ -60,30 +60,32 @@ def reduced(targets: Sequence[Transform], wishes: Wishes) -> Result:
     left = {target for target, refusal in problems.items() if isinstance(refusal, NeedsItsKeys)}
     reasons = {target: _reason(target, refusal) for target, refusal in problems.items()}
     by_number = wishes.count is not None
-    told = f"{_described(animation.total_reduction(done), tolerance, unit, by_number=by_number)}{doubt}" if done else ""
+    summary = (
+        f"{_described(animation.total_reduction(done), tolerance, unit, by_number=by_number)}{doubt}" if done else ""
+    )
     if wishes.discard and done:
         animation.discard_dense_keys(done)
     return Result(
         done,
         {target: reason for target, reason in reasons.items() if target not in left},
         {target: f"{reason}{doubt}" for target, reason in reasons.items() if target in left},
-        told,
+        summary,
     )
 
 
 def _described(reduction: Reduction, tolerance: Tolerance, unit: float, *, by_number: bool) -> str:
     """How many keys there were and are, and how far off they are; lengths of the reduction are of `unit` metres."""
     rig = reduction.rig
-    told = fewer(reduction.before, reduction.after)
-    told += f" on {counted(rig.frames, 'frame')}" if rig else ""
-    told += off(tolerance, reduction.largest_error * unit, unit, by_number=by_number)
+    summary = fewer(reduction.before, reduction.after)
+    summary += f" on {counted(rig.frames, 'frame')}" if rig else ""
+    summary += off(tolerance, reduction.largest_error * unit, unit, by_number=by_number)
     before, after = reduction.channel_keys
     if after > before:
-        told += f"; channels have {after} keys together, and had {before}"
+        summary += f"; channels have {after} keys together, and had {before}"
     if rig and rig.slide_before > 0.0:
         before, after = (tolerance.alike(slide * unit, unit) for slide in (rig.slide_before, rig.slide_after))
-        told += f"; feet slide {after}, and {before} before"
-    return told + not_promised(rig) if rig else told
+        summary += f"; feet slide {after}, and {before} before"
+    return summary + not_promised(rig) if rig else summary
 
 
 def not_promised(rig: WholeRig) -> str:

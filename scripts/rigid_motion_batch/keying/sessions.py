@@ -271,8 +271,8 @@ class _Session:
             return
         task = self._work.task(job)
         key = task.key if task.inputs else ""
-        if key and (found := _record_of(self._work, job).done(key)):
-            written, facts = found
+        if key and (result := _record_of(self._work, job).done(key)):
+            written, facts = result
             self._note(f"{job.source}: already {self._work.done}: {', '.join(map(str, written))}")
             self._outcomes[place] = outcome = Outcome(job.source, is_old=True, matched=set(facts.get("matched", ())))
             for path in written:
@@ -283,7 +283,7 @@ class _Session:
             parameters=(self._work, job),
             before=(),
             inputs=task.inputs,
-            wanted={},
+            requested={},
             output=os.fspath(job.folder),
             folder=os.fspath(self._scratch / str(place)),
         )
@@ -318,8 +318,8 @@ def _inputs(job: Job) -> tuple[steps.Input, ...]:
     try:
         if job.in_place or not job.file.is_file():
             return ()
-        found = os.stat(job.file)
-        return (steps.Input(os.fspath(job.file), steps.sha256_of(job.file), found.st_size, found.st_mtime_ns),)
+        result = os.stat(job.file)
+        return (steps.Input(os.fspath(job.file), steps.sha256_of(job.file), result.st_size, result.st_mtime_ns),)
     except (OSError, ValueError):
         return ()
 
@@ -356,8 +356,8 @@ def _summary(outcomes: Sequence[Outcome], count: int, work: Work, *, interrupted
     done = [counted(objects, "object")] if objects or not (bones or clips) else []
     done += [counted(bones, "bone")] if bones else []
     done += [counted(clips, "clip")] if clips else []
-    told = f"{' and '.join(done)} {would}{work.done}" + (f", {refused} not" if refused else "")
-    return f"{'Stopped. ' if interrupted else ''}{told}; {counted(count, 'file')}: {', '.join(parts)}."
+    summary = f"{' and '.join(done)} {would}{work.done}" + (f", {refused} not" if refused else "")
+    return f"{'Stopped. ' if interrupted else ''}{summary}; {counted(count, 'file')}: {', '.join(parts)}."
 
 
 def counted(count: int, what: str) -> str:

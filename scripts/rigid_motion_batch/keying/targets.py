@@ -23,7 +23,7 @@ class Result:
     left: dict[Transform, str] = field(default_factory=dict)
     """Why there was nothing to do to each after all."""
 
-    told: str = ""
+    summary: str = ""
     """What there is to say of those that were done; begins with a comma or a semicolon."""
 
     def refusals(self) -> Iterator[tuple[str, str, int]]:
@@ -34,7 +34,7 @@ class Result:
         else:
             yield from ((target.name, reason, 1) for target, reason in self.refused.items())
 
-    def told_of_left(self) -> str:
+    def describe_kept(self) -> str:
         """Which targets were left as they are, and why; of several bones the reason of one."""
         (first, reason), *others = self.left.items()
         example = f", such as {first.name}" if any(other != reason for _, other in others) else ""

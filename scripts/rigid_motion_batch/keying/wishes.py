@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rigid_motion_batch.analysis.choices import Tolerance
-from rigid_motion_batch.recordings.figures import unit_of
+from rigid_motion_batch.recordings.rest_bodies import unit_of
 
 
 @dataclass(frozen=True)

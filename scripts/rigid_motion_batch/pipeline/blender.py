@@ -37,10 +37,10 @@ def version_of(blender: str) -> str:
     except (OSError, ValueError, subprocess.TimeoutExpired) as error:
         said = getattr(error, "strerror", None) or str(error)
         raise ExecutorError(f"{blender}: {said}; give the path of a Blender program") from None
-    found = re.search(r"^Blender (\d+\.\d+\.\d+)", ended.stdout, re.MULTILINE)
-    if found is None:
+    result = re.search(r"^Blender (\d+\.\d+\.\d+)", ended.stdout, re.MULTILINE)
+    if result is None:
         raise ExecutorError(f"{blender}: this does not say that it is Blender; give the path of a Blender program")
-    return found[1]
+    return result[1]
 
 
 def perform_in_blender(order: Order, tell: Tell | None) -> Answer:

@@ -83,16 +83,17 @@ def below_inputs(arguments: Sequence[str]) -> tuple[list[str], Path]:
     """
     programs = {place + 1 for place, one in enumerate(arguments) if one == "--blender"}
     is_input = [place not in programs and not one.startswith("--blender=") for place, one in enumerate(arguments)]
-    found = [
-        (one, *(_file_in(one) if wanted else ("", "", one))) for one, wanted in zip(arguments, is_input, strict=True)
+    result = [
+        (one, *(_file_in(one) if requested else ("", "", one)))
+        for one, requested in zip(arguments, is_input, strict=True)
     ]
-    files = [os.path.abspath(file) for _, _, file, _ in found if file]
+    files = [os.path.abspath(file) for _, _, file, _ in result if file]
     inputs = Path(os.path.commonpath([os.path.dirname(file) for file in files])) if files else Path.cwd()
 
     def moved(option: str, file: str, rest: str) -> str:
         return f"{option}{{{{Param.Inputs}}}}/{Path(os.path.abspath(file)).relative_to(inputs).as_posix()}{rest}"
 
-    return [moved(*parts) if parts[1] else one for one, *parts in found], inputs
+    return [moved(*parts) if parts[1] else one for one, *parts in result], inputs
 
 
 def _file_in(argument: str) -> tuple[str, str, str]:
@@ -153,11 +154,11 @@ def _json(content: Any) -> str:
     return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
 
 
-def main(wanted: str) -> int:
+def main(requested: str) -> int:
     """Make sure that this is the version of the program that wrote a bundle."""
-    if (found := version_here()) != wanted:
-        print(f"openjd_fail: this machine has {found}, and the bundle is of {wanted}", flush=True)
-    return int(found != wanted)
+    if (result := version_here()) != requested:
+        print(f"openjd_fail: this machine has {result}, and the bundle is of {requested}", flush=True)
+    return int(result != requested)
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ from rigid_motion_batch.recordings.options import AS_THE_FILE_SAYS, ReadingOptio
 from rigid_motion_batch.recordings.reading import split_source
 from rigid_motion_batch.recordings.recordings import listed
 from rigid_motion_batch.report.settings import Settings
-from rigid_motion_batch.scenes.settings import MODELS, StageSettings, place_of_subject
+from rigid_motion_batch.scenes.settings import MODELS, SceneSettings, place_of_subject
 from rigid_motion_batch.scenes.timeline import Timeline
 
 from . import comparison_steps as steps
@@ -97,7 +97,7 @@ class Comparison:
     fit: bool = False
     """And how many where they may be fitted."""
 
-    stage: StageSettings | None = None
+    stage: SceneSettings | None = None
     """How to make the films; None for a run without."""
 
     every_film: bool = False
@@ -137,7 +137,7 @@ class Study:
     def most_frames(self) -> int:
         return min(MOST_FRAMES, MOST_POSES // max(self.facts.joints, 1))
 
-    def frames(self, choice: Choice, stage: StageSettings) -> float:
+    def frames(self, choice: Choice, stage: SceneSettings) -> float:
         start, end = self.choices[choice]
         return (end - start) * stage.fps * stage.slow_motion + 1.0
 
@@ -215,12 +215,14 @@ class ComparisonPlan:
             ends = {choice: choice.ends(times) for choice in comparison.choices}
             of_clips += [
                 f"{name}: too short for two keys at {choice.rate} a second; left out"
-                for choice, found in ends.items()
-                if found is None
+                for choice, matches in ends.items()
+                if matches is None
             ]
             of_clips += [f"{name}: {note}" for note in rates_above(times, comparison.choices)]
             enough = {
-                choice: (float(times[found[0]]), float(times[found[1]])) for choice, found in ends.items() if found
+                choice: (float(times[matches[0]]), float(times[matches[1]]))
+                for choice, matches in ends.items()
+                if matches
             }
             if enough:
                 self.studies.append(Study(ClipOf(name, body), key, one, enough, bool(comparison.blender)))
@@ -305,7 +307,7 @@ class ComparisonPlan:
             JOINT_METRICS: any(study.facts.joints for study in self.studies),
             DECIMATED: any(study.decimated for study in self.studies),
         }
-        return {table for table, wanted in there.items() if wanted}
+        return {table for table, requested in there.items() if requested}
 
     def filmed(self, study: Study) -> list[Choice]:
         """The choices that there are films of."""

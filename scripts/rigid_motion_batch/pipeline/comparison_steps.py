@@ -18,7 +18,7 @@ from rigid_motion_batch.analysis.radii import Radii
 from rigid_motion_batch.recordings.clips import Clip, ClipFacts
 from rigid_motion_batch.recordings.options import ReadingOptions
 from rigid_motion_batch.report.settings import Settings
-from rigid_motion_batch.scenes.settings import StageSettings, SubjectError
+from rigid_motion_batch.scenes.settings import SceneSettings, SubjectError
 
 from . import values
 from .steps import Job, TaskError, step
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 RECORDINGS = ("rigid_motion/motion", "recordings", "axes.py", "command_line.py", "files.py", "rows.py")
 ANALYSIS = (*RECORDINGS, "analysis")
-SCENES = (*ANALYSIS, "rigid_motion/animation", "scenes", "palette.py", "hushing.py")
+SCENES = (*ANALYSIS, "rigid_motion/animation", "scenes", "palette.py", "silencing.py")
 REPORT = (*ANALYSIS, "report", "palette.py")
 MODEL = (*ANALYSIS, "rigid_motion/gltf", "report/glb.py", "report/mesh.py", "palette.py")
 
@@ -136,13 +136,13 @@ def measure(job: Job, parameters: Measure) -> None:
     made = results.made_of(clip, choice, parameters.modes, radii, shared=parameters.shared)
     if made is None:
         raise TaskError(f"{clip.name}: too short for two keys {choice.phrase}")
-    found = results.measured(made, radii)
+    result = results.measured(made, radii)
     results.write_tables(job.folder, made, parameters.form)
-    metrics.write_metrics(job.folder / ROWS, found.rows)
-    if found.joints:
-        body_metrics.write_joint_metrics(job.folder / JOINT_ROWS, found.joints)
-    values.write(job.folder / "result", found)
-    values.write(job.folder / "numbers", found.numbers)
+    metrics.write_metrics(job.folder / ROWS, result.rows)
+    if result.joints:
+        body_metrics.write_joint_metrics(job.folder / JOINT_ROWS, result.joints)
+    values.write(job.folder / "result", result)
+    values.write(job.folder / "numbers", result.numbers)
 
 
 @dataclass(frozen=True)
@@ -163,9 +163,9 @@ def count_keys(job: Job, parameters: CountKeys) -> None:
     done = iter(range(1, len(needed.RATES) + 1))
     ways = ways_of(parameters.clip.read(job.before[0]), parameters.radii, fit=parameters.fit)
     modes = single_modes(parameters.modes)
-    found = needed.keys_needed(ways, modes, advance=lambda: job.progress(next(done), len(needed.RATES)))
-    needed.write_keys_needed(job.folder / ROWS, [found])
-    values.write(job.folder / "needed", found)
+    result = needed.keys_needed(ways, modes, advance=lambda: job.progress(next(done), len(needed.RATES)))
+    needed.write_keys_needed(job.folder / ROWS, [result])
+    values.write(job.folder / "needed", result)
 
 
 @step(rooms=SCENES, stage="measure", blender=True)
@@ -175,11 +175,11 @@ def decimate(job: Job, parameters: Measure) -> None:
     from rigid_motion_batch.analysis.results import made_again
     from rigid_motion_batch.scenes.decimating import beside_decimate
 
-    clip, found = parameters.clip.read(job.before[0]), result_in(job.before[1])
-    made = made_again(clip, found, parameters.radii, shared=parameters.shared)
-    known = [row for row in found.rows if row.keys]
-    with _told(f"{clip.name} {found.choice.phrase}: not compared with Blender's Decimate"):
-        rows = beside_decimate(made, parameters.radii.of(clip.figure.joints), known)
+    clip, result = parameters.clip.read(job.before[0]), result_in(job.before[1])
+    made = made_again(clip, result, parameters.radii, shared=parameters.shared)
+    known = [row for row in result.rows if row.keys]
+    with _told(f"{clip.name} {result.choice.phrase}: not compared with Blender's Decimate"):
+        rows = beside_decimate(made, parameters.radii.of(clip.rest_body.joints), known)
     write_keys_of_bodies(job.folder / ROWS, rows)
     values.write(job.folder / "decimated", tuple(rows))
 
@@ -198,12 +198,12 @@ def model(job: Job, parameters: Model) -> None:
     from rigid_motion_batch.analysis.results import made_again
     from rigid_motion_batch.report.glb import comparison_glb
 
-    clip, found = parameters.clip.read(job.before[0]), result_in(job.before[1])
-    made = made_again(clip, found, parameters.radii, shared=parameters.shared)
+    clip, result = parameters.clip.read(job.before[0]), result_in(job.before[1])
+    made = made_again(clip, result, parameters.radii, shared=parameters.shared)
     try:
-        content = comparison_glb(made, [motion.modes for motion in found.motions])
+        content = comparison_glb(made, [motion.modes for motion in result.motions])
     except GltfError as error:
-        raise TaskError(f"{clip.name} {found.choice.phrase}: no {GLB}: {error}") from None
+        raise TaskError(f"{clip.name} {result.choice.phrase}: no {GLB}: {error}") from None
     (job.folder / GLB).write_bytes(content)
 
 
@@ -235,7 +235,7 @@ class Build:
     clip: ClipOf
     radii: Radii
     shared: bool
-    stage: StageSettings
+    stage: SceneSettings
     blender: str
     """The version of Blender."""
 
@@ -244,17 +244,17 @@ class Build:
 def build(job: Job, parameters: Build) -> None:
     """Build the scene of a film, and save it. Before: the recording, and what was measured."""
     from rigid_motion_batch.analysis.results import made_again
-    from rigid_motion_batch.scenes.body_scene import build_body_stage
+    from rigid_motion_batch.scenes.body_scene import build_body_scene
     from rigid_motion_batch.scenes.film import save_blend
-    from rigid_motion_batch.scenes.scene import build_stage
+    from rigid_motion_batch.scenes.scene import build_scene
 
-    clip, found, radii = parameters.clip.read(job.before[0]), result_in(job.before[1]), parameters.radii
-    with _told(f"{clip.name} {found.choice.phrase}: no video"):
-        made = made_again(clip, found, radii, shared=parameters.shared)
-        if clip.figure is None:
-            build_stage(made, parameters.stage)
+    clip, result, radii = parameters.clip.read(job.before[0]), result_in(job.before[1]), parameters.radii
+    with _told(f"{clip.name} {result.choice.phrase}: no video"):
+        made = made_again(clip, result, radii, shared=parameters.shared)
+        if clip.rest_body is None:
+            build_scene(made, parameters.stage)
         else:
-            build_body_stage(made, parameters.stage, radii.of(clip.figure.joints))
+            build_body_scene(made, parameters.stage, radii.of(clip.rest_body.joints))
         save_blend(job.folder / BLEND)
 
 
@@ -291,7 +291,7 @@ def encode(job: Job, parameters: Frames) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Subject:
-    wanted: str
+    requested: str
     blender: str
     """The version of Blender."""
 
@@ -304,7 +304,7 @@ def subject(job: Job, parameters: Subject) -> None:
     from rigid_motion_batch.scenes.simplified import simplified
 
     with _told("the report shows a drill"):
-        np.savez(job.folder / MESH, **simplified(parameters.wanted))
+        np.savez(job.folder / MESH, **simplified(parameters.requested))
 
 
 @dataclass(frozen=True, slots=True)
@@ -348,16 +348,16 @@ def _clips(job: Job, parameters: Page) -> Iterator[ClipResult]:
     before = zip(parameters.parts, job.before, strict=False)
     for clip, parts in groupby(before, key=lambda each: each[0].clip):
         made = {(part.what, part.choice): folder for part, folder in parts if folder}
-        found = []
+        result = []
         for what, choice in made:
             if what == "measure":
                 rows = made.get(("decimate", choice))
                 decimated = values.read(tuple[KeysOfBody, ...], rows / "decimated") if rows else ()
-                found.append(replace(result_in(made[what, choice]), decimated=decimated))
+                result.append(replace(result_in(made[what, choice]), decimated=decimated))
         needed, recording = made.get(("count_keys", "")), made.get(("read", ""))
-        if recording and found:
+        if recording and result:
             keys = values.read(KeysNeeded, needed / "needed") if needed else None
-            yield clip_result(clip.read(recording), found, keys)
+            yield clip_result(clip.read(recording), result, keys)
 
 
 @step(rooms=REPORT, stage="report", partial=True)

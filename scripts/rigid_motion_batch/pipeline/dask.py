@@ -169,8 +169,8 @@ class DaskExecutor(Executor):
         """The workers that the scheduler knows, and how many threads each has."""
         with suppress(*UNREACHABLE):
             if self._client.status == "running":
-                found = self._client.sync(self._client.scheduler.identity, n_workers=-1, callback_timeout=BUSY)
-                return {address: worker["nthreads"] for address, worker in found["workers"].items()}
+                result = self._client.sync(self._client.scheduler.identity, n_workers=-1, callback_timeout=BUSY)
+                return {address: worker["nthreads"] for address, worker in result["workers"].items()}
         raise ExecutorError(f"{self._address}: the Dask scheduler is gone")
 
 
@@ -181,7 +181,7 @@ async def _knock(address: str) -> None:
     comm.abort()
 
 
-def _asker(wanted: str, folder: str) -> Callable[[], str]:
+def _asker(requested: str, folder: str) -> Callable[[], str]:
     """What a worker answers where it does not fit, in a function that is sent whole: it may not have this program."""
 
     def ask() -> str:
@@ -191,7 +191,9 @@ def _asker(wanted: str, folder: str) -> Callable[[], str]:
             from rigid_motion_batch.pipeline.steps import version_here
         except ImportError as error:
             return str(error)
-        found = version_here()
-        return "" if found == wanted else f"it has {found}, and this run is of {wanted}; start it anew with that"
+        result = version_here()
+        return (
+            "" if result == requested else f"it has {result}, and this run is of {requested}; start it anew with that"
+        )
 
     return ask

@@ -18,12 +18,12 @@ def explain(plan: Plan, store: Store, share: Share = EVERYTHING) -> Iterator[tup
     latest = store.latest()
     changed: dict[str, str] = {}
     """Key to name, of tasks that would be done."""
-    for found in look_through(plan, store, share):
-        task = found.task
-        if found.result and not found.done:
+    for result in look_through(plan, store, share):
+        task = result.task
+        if result.result and not result.done:
             yield task, _unpublished(task, store)
-        if not found.result:
-            if found.chosen:
+        if not result.result:
+            if result.chosen:
                 is_damaged = store.folder_of(task.key).exists()
                 yield task, "its result is damaged" if is_damaged else _reason(task, latest.get(task.name), changed)
             changed[task.key] = task.shown
@@ -38,7 +38,7 @@ def _reason(task: Task, earlier: Result | None, changed: Mapping[str, str]) -> s
         what: _differences(before.get(part), now[part], values=part == "parameters")
         for what, part in (("program", "versions"), ("parameters", "parameters"), ("input file", "inputs"))
     }
-    reasons = [f"{what} changed ({_few(found)})" for what, found in changes.items() if found]
+    reasons = [f"{what} changed ({_few(result)})" for what, result in changes.items() if result]
     if before.get("after") != now["after"]:
         anew = [changed[key] for key in task.after if key in changed]
         reasons.append(f"an earlier step changed ({_few(anew)})" if anew else "earlier steps are others")

@@ -47,7 +47,7 @@ class Order:
     """The folders of the results of the tasks before it."""
 
     inputs: tuple[Input, ...]
-    wanted: Mapping[str, str]
+    requested: Mapping[str, str]
     """Files that the result must have, and where they will be for the user."""
 
     output: str
@@ -74,7 +74,7 @@ class Answer:
     details: str = ""
     """Where in the program, for an error that nobody foresaw."""
 
-    hopeless: bool = False
+    fatal: bool = False
     """Whether the others will fail for the same reason: the disk is full."""
 
     lost: bool = False
@@ -166,7 +166,7 @@ def perform(order: Order, tell: Tell | None = None) -> Answer:
                 raise TaskError(f"{one.path}: this file changed while it was read; run the same command again")
         paths = [path for path in sorted(job.folder.rglob("*")) if not path.is_dir()]
         files = {path.relative_to(job.folder).as_posix(): _state_of(path) for path in paths}
-        for name, shown in order.wanted.items():
+        for name, shown in order.requested.items():
             if not name.endswith("/") and name not in files:
                 raise TaskError(f"{shown}: this was to be made, and was not")
         answer = Answer({"files": files, "seconds": time.perf_counter() - started, "facts": dict(facts or {})})
@@ -175,8 +175,8 @@ def perform(order: Order, tell: Tell | None = None) -> Answer:
     except OSError as error:
         where = f"{_shown(error.filename, order)}: " if error.filename else ""
         is_own = str(error.filename or "").startswith(order.output)
-        hopeless = error.errno in FULL_OR_FORBIDDEN and (is_own or error.errno == errno.ENOSPC)
-        answer = Answer(None, f"{where}{error.strerror or error}", traceback.format_exc(), hopeless)
+        fatal = error.errno in FULL_OR_FORBIDDEN and (is_own or error.errno == errno.ENOSPC)
+        answer = Answer(None, f"{where}{error.strerror or error}", traceback.format_exc(), fatal)
     except Exception as error:
         answer = Answer(None, f"{type(error).__name__}: {error}", traceback.format_exc())
     finally:
@@ -184,8 +184,8 @@ def perform(order: Order, tell: Tell | None = None) -> Answer:
             os.remove(f"{order.folder}.progress")
         if answer.index is None:
             shutil.rmtree(order.folder, ignore_errors=True)
-    if answer.problem and not answer.hopeless and _is_full(order.output):
-        answer = replace(answer, problem=f"{os.strerror(errno.ENOSPC)} ({answer.problem})", hopeless=True)
+    if answer.problem and not answer.fatal and _is_full(order.output):
+        answer = replace(answer, problem=f"{os.strerror(errno.ENOSPC)} ({answer.problem})", fatal=True)
     return replace(answer, notes=job.notes)
 
 
@@ -214,28 +214,32 @@ def _writing(order: Order) -> Tell:
 
 def _changed(one: Input) -> bool:
     try:
-        found = os.stat(one.path)
+        result = os.stat(one.path)
     except (OSError, ValueError):
         return one.size >= 0
-    return (found.st_size, found.st_mtime_ns) != (one.size, one.mtime_ns)
+    return (result.st_size, result.st_mtime_ns) != (one.size, one.mtime_ns)
 
 
 def _state_of(path: Path) -> tuple[int, int, str]:
     """Size, time of change and digest of a file."""
-    found = path.lstat()
-    if not stat.S_ISREG(found.st_mode):
+    result = path.lstat()
+    if not stat.S_ISREG(result.st_mode):
         raise TaskError(f"{path.name}: this was to be a file")
-    return found.st_size, found.st_mtime_ns, sha256_of(path)
+    return result.st_size, result.st_mtime_ns, sha256_of(path)
 
 
-def _shown(found: str | bytes | int, order: Order) -> str:
+def _shown(result: str | bytes | int, order: Order) -> str:
     """A path as the user knows it: the folder of a task at work is nobody's business."""
-    path = str(found)
+    path = str(result)
     name = Path(path).relative_to(order.folder).as_posix() if path.startswith(order.folder + os.sep) else ""
     # What takes a file's place when it is whole has a name that ends in the file's.
-    known = [wanted for wanted in order.wanted if name and (name == wanted or name.endswith(wanted.rpartition("/")[2]))]
+    known = [
+        requested
+        for requested in order.requested
+        if name and (name == requested or name.endswith(requested.rpartition("/")[2]))
+    ]
     if known:
-        return order.wanted[max(known, key=len)]
+        return order.requested[max(known, key=len)]
     return path.replace(order.folder, order.output)
 
 

@@ -122,8 +122,8 @@ def look_through(plan: Plan, store: Store, share: Share = EVERYTHING) -> Iterato
     """All tasks of a plan."""
     chosen = share.chooser()
     for task in plan():
-        wanted, result = chosen(task), store.result(task.key)
-        yield Found(task, wanted, result, bool(result) and (not wanted or store.is_published(task, result)))
+        requested, result = chosen(task), store.result(task.key)
+        yield Found(task, requested, result, bool(result) and (not requested or store.is_published(task, result)))
 
 
 @dataclass
@@ -146,19 +146,19 @@ class Survey:
         """
         survey, strangers = cls(), []
         places: set[int] = set()
-        for found in look_through(plan, store, share):
-            for path in found.task.publish.values():
+        for result in look_through(plan, store, share):
+            for path in result.task.publish.values():
                 if (place := hash(path.casefold())) in places:
                     raise OutputError(f"{path}: two results would go here; choose other names")
                 places.add(place)
-            if found.done:
-                survey.up_to_date += found.chosen
+            if result.done:
+                survey.up_to_date += result.chosen
                 continue
-            if found.chosen:
-                strangers += store.strangers(found.task, found.result)
-                survey.weight += found.task.weight
+            if result.chosen:
+                strangers += store.strangers(result.task, result.result)
+                survey.weight += result.task.weight
                 survey.tasks += 1
-                survey.amounts[found.task.unit] += found.task.amount
+                survey.amounts[result.task.unit] += result.task.amount
         if strangers and not store.overwrite:
             raise OutputError(not_written([os.fspath(store.output / path) for path in strangers]))
         return survey
@@ -276,9 +276,9 @@ class _Run:
             capacity = self.executor.capacity
             ready = [one for one in self.waiting if self._is_ready(one)]
             while more and len(ready) < capacity:
-                found = next(rest, None)
-                if more := found is not None:
-                    ready += filter(self._is_ready, self._meet(found))
+                result = next(rest, None)
+                if more := result is not None:
+                    ready += filter(self._is_ready, self._meet(result))
             for opened in ready[: max(0, capacity - len(self.at_work))]:
                 self.waiting.remove(opened)
                 self._begin(opened)
@@ -297,13 +297,13 @@ class _Run:
             opened.pending.pop()
         return not opened.pending
 
-    def _meet(self, found: Found) -> list[_Open]:
+    def _meet(self, result: Found) -> list[_Open]:
         """Take a task from the plan: it is up to date, or waits from now on, and is returned."""
-        task = found.task
-        if found.done and task.key not in self.open:
+        task = result.task
+        if result.done and task.key not in self.open:
             self.settled[task.key] = task.key
-            self.outcome.counts[State.UP_TO_DATE] += found.chosen
-        elif found.chosen:
+            self.outcome.counts[State.UP_TO_DATE] += result.chosen
+        elif result.chosen:
             # A task that is there twice waits for itself.
             pending = [key for key in (task.key, *task.after) if key in self.open]
             self.waiting.append(_Open(task, pending))
@@ -334,7 +334,7 @@ class _Run:
                 parameters=task.parameters,
                 before=tuple(os.fspath(self.store.folder_of(key)) if key else None for key in before),
                 inputs=task.inputs,
-                wanted={name: os.fspath(self.store.output / path) for name, path in task.publish.items()},
+                requested={name: os.fspath(self.store.output / path) for name, path in task.publish.items()},
                 output=os.fspath(self.store.output),
                 folder=os.fspath(self.store.new_scratch()),
                 blender=self.blender,
@@ -361,7 +361,7 @@ class _Run:
         else:
             # An error that nobody foresaw does not say by itself what it is about.
             said = f"{shown}: {answer.problem}" if answer.details else answer.problem
-            self._fail(opened, said, answer.details, hopeless=answer.hopeless)
+            self._fail(opened, said, answer.details, fatal=answer.fatal)
 
     def _settle(self, opened: _Open, made: str = "", index: Mapping[str, Any] | None = None) -> None:
         """Keep what was made, unless it is there, and put its files in place."""
@@ -377,20 +377,20 @@ class _Run:
             self._fail(opened, str(error))
         except OSError as error:
             said = f"{error.filename2 or error.filename}: {error.strerror or error}"
-            self._fail(opened, said, hopeless=error.errno in FULL_OR_FORBIDDEN)
+            self._fail(opened, said, fatal=error.errno in FULL_OR_FORBIDDEN)
         else:
             for key in task.spends:
                 self.store.discard(key)
             self._close(opened, State.DONE if is_new else State.UP_TO_DATE)
 
-    def _fail(self, opened: _Open, said: str, details: str = "", *, hopeless: bool = False) -> None:
+    def _fail(self, opened: _Open, said: str, details: str = "", *, fatal: bool = False) -> None:
         task = opened.task
-        if not hopeless and self.store.discard_damaged(key for key in self._before(task) if key):
+        if not fatal and self.store.discard_damaged(key for key in self._before(task) if key):
             said = f"{task.shown}: what it reads was damaged; run the same command again"
         self.outcome.failures[task.name], self.outcome.details[task.name] = said, details
         self.progress.error(said)
         self._close(opened, State.FAILED)
-        if hopeless:
+        if fatal:
             raise ExecutorError(said)
         # What is there under its name was made of something else.
         self.store.withdraw(task.publish.values())

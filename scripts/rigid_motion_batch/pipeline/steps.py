@@ -93,12 +93,12 @@ class Step:
     @cached_property
     def versions(self) -> Mapping[str, str]:
         """Of the program, and in a checkout of every room and of the function's own module."""
-        found = {"program": places.manifest()["version"]}
+        result = {"program": places.manifest()["version"]}
         if places.CHECKOUT:
             module = importlib.import_module(self.function.__module__)
-            found |= {room: digest_of(place_of_room(room)) for room in self.rooms}
-            found[self.function.__module__] = digest_of(Path(module.__file__))
-        return found
+            result |= {room: digest_of(place_of_room(room)) for room in self.rooms}
+            result[self.function.__module__] = digest_of(Path(module.__file__))
+        return result
 
     @cached_property
     def digest(self) -> str:
@@ -117,10 +117,10 @@ def step(**options: Any) -> Callable[[Callable[[Job, Any], Mapping[str, Any] | N
 def step_named(name: str) -> Step:
     """The step of a name. Raises ValueError where there is none."""
     module, _, function = name.partition(":")
-    found = getattr(importlib.import_module(module), function, None)
-    if not isinstance(found, Step):
+    result = getattr(importlib.import_module(module), function, None)
+    if not isinstance(result, Step):
         raise ValueError(f"{name}: no such step")
-    return found
+    return result
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,11 +235,11 @@ def digest_of(place: Path) -> str:
 
 def version_here() -> str:
     """What all who work at one plan must have, as it was when this process asked first."""
-    found = [f"program {places.manifest()['version']} {digest_of(places.PACKAGE)} {digest_of(places.EXTENSION)}"]
+    result = [f"program {places.manifest()['version']} {digest_of(places.PACKAGE)} {digest_of(places.EXTENSION)}"]
     for module in ("numpy", "bpy"):
         with suppress(importlib.metadata.PackageNotFoundError):
-            found.append(f"{module} {importlib.metadata.version(module)}")
-    return ", ".join(found)
+            result.append(f"{module} {importlib.metadata.version(module)}")
+    return ", ".join(result)
 
 
 def sha256_of(path: Path | str) -> str:

@@ -159,15 +159,15 @@ class Store:
         """
         shown = os.fspath(path)
         try:
-            found, link = os.stat(path), os.lstat(path)
+            result, link = os.stat(path), os.lstat(path)
         except (OSError, ValueError):
             return Input(shown, "")
         place = os.path.abspath(path)
         self._require_no_output(shown, place, is_link=stat.S_ISLNK(link.st_mode))
-        if not stat.S_ISREG(found.st_mode):
+        if not stat.S_ISREG(result.st_mode):
             return Input(shown, "")
-        self._identities[found.st_dev, found.st_ino] = self._identities[link.st_dev, link.st_ino] = place
-        seen = [found.st_size, found.st_mtime_ns, found.st_ctime_ns, found.st_ino]
+        self._identities[result.st_dev, result.st_ino] = self._identities[link.st_dev, link.st_ino] = place
+        seen = [result.st_size, result.st_mtime_ns, result.st_ctime_ns, result.st_ino]
         known = self._cache.get(place)
         if known and known[:-1] == seen:
             digest = known[-1]
@@ -175,10 +175,10 @@ class Store:
             try:
                 digest = sha256_of(path)
             except OSError:
-                return Input(shown, "", found.st_size, found.st_mtime_ns)
-            settled = time.time() - max(found.st_mtime, found.st_ctime) > UNSETTLED
+                return Input(shown, "", result.st_size, result.st_mtime_ns)
+            settled = time.time() - max(result.st_mtime, result.st_ctime) > UNSETTLED
             self._cache[place] = [*(seen if settled else [0, 0, 0, 0]), digest]
-        return Input(shown, digest, found.st_size, found.st_mtime_ns)
+        return Input(shown, digest, result.st_size, result.st_mtime_ns)
 
     def _require_no_output(self, path: str, place: str, *, is_link: bool) -> None:
         folder, name = os.path.split(os.path.realpath(place) if is_link else place)
@@ -202,10 +202,10 @@ class Store:
         try:
             index = json.loads(Path(folder, INDEX).read_bytes())
             for name, (size, mtime, digest) in index["files"].items():
-                found = os.lstat(f"{folder}/{name}")
-                if not stat.S_ISREG(found.st_mode) or found.st_size != size:
+                matches = os.lstat(f"{folder}/{name}")
+                if not stat.S_ISREG(matches.st_mode) or matches.st_size != size:
                     return None
-                if (found.st_mtime_ns != mtime or thoroughly) and sha256_of(f"{folder}/{name}") != digest:
+                if (matches.st_mtime_ns != mtime or thoroughly) and sha256_of(f"{folder}/{name}") != digest:
                     return None
         except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
             return None
@@ -250,18 +250,18 @@ class Store:
             self.discard(key)
         return bool(damaged)
 
-    def sweep(self, wanted: Iterable[str]) -> None:
+    def sweep(self, requested: Iterable[str]) -> None:
         """Delete results that are not among these, and older than a week."""
-        wanted = frozenset(wanted)
+        requested = frozenset(requested)
         for entry in os.scandir(self._results):
-            if entry.name not in wanted and time.time() - entry.stat(follow_symlinks=False).st_mtime > KEPT:
+            if entry.name not in requested and time.time() - entry.stat(follow_symlinks=False).st_mtime > KEPT:
                 self.discard(entry.name)
 
     def latest(self) -> dict[str, Result]:
         """Task to its last result, of all that are kept."""
         results = sorted(self._results.glob("*"), key=lambda folder: folder.stat().st_mtime)
-        found = (self.result(folder.name) for folder in results)
-        return {result.index["name"]: result for result in found if result}
+        matches = (self.result(folder.name) for folder in results)
+        return {result.index["name"]: result for result in matches if result}
 
     # -- published files ----------------------------------------------------------------------------------------------
 
@@ -281,7 +281,7 @@ class Store:
         return [
             path
             for name, path in task.published(result.index["files"] if result else ())
-            if not (result and self._is_same(f"{result.folder}/{name}", path)) and not self._is_ours(path)
+            if not (result and self._is_same(f"{result.folder}/{name}", path)) and not self._is_set_here(path)
         ]
 
     def publish(self, task: Task, result: Result) -> None:
@@ -293,18 +293,18 @@ class Store:
             Where something is there that must not be replaced; what was put in place before that stays.
         OSError
         """
-        if not self.overwrite and (found := self.strangers(task, result)):
-            raise OutputError(not_written([os.fspath(self.output / path) for path in found]))
+        if not self.overwrite and (matches := self.strangers(task, result)):
+            raise OutputError(not_written([os.fspath(self.output / path) for path in matches]))
         for name, path in task.published(result.index["files"]):
             original, target = result.folder / name, self.output / path
             if self._is_same(os.fspath(original), path):
                 continue
-            self._is_ours(path)  # Raises OutputError for inputs and folders.
+            self._is_set_here(path)  # Raises OutputError for inputs and folders.
             target.parent.mkdir(parents=True, exist_ok=True)
             if not Path(os.path.realpath(target.parent)).is_relative_to(os.path.realpath(self.output)):
                 raise OutputError(f"{target.parent}: this leads out of the output folder; choose another with --output")
-            found, (_, _, digest) = os.lstat(original), result.index["files"][name]
-            line = {"path": path, "size": found.st_size, "mtime_ns": found.st_mtime_ns, "sha256": digest}
+            matches, (_, _, digest) = os.lstat(original), result.index["files"][name]
+            line = {"path": path, "size": matches.st_size, "mtime_ns": matches.st_mtime_ns, "sha256": digest}
             # Killed from here on, what was moved is known to be the program's own.
             append_lines(self._record_of(path), [line])
             beside = self.new_scratch()
@@ -322,7 +322,7 @@ class Store:
         """Delete files of this program that nobody wants any more, and folders that are empty then."""
         for path in paths:
             with suppress(OSError, OutputError):
-                if not self._is_ours(path) or not (self.output / path).is_file():
+                if not self._is_set_here(path) or not (self.output / path).is_file():
                     continue
                 (self.output / path).unlink()
                 for folder in (self.output / path).parents:
@@ -332,31 +332,31 @@ class Store:
     def _is_same(self, original: str, path: str) -> bool:
         """Whether a published file is that of a result: the same, or a copy."""
         try:
-            wanted, found = os.lstat(original), os.lstat(f"{self.output}/{path}")
+            requested, result = os.lstat(original), os.lstat(f"{self.output}/{path}")
         except OSError:
             return False
-        return stat.S_ISREG(found.st_mode) and (
-            (wanted.st_size, wanted.st_mtime_ns) == (found.st_size, found.st_mtime_ns)
+        return stat.S_ISREG(result.st_mode) and (
+            (requested.st_size, requested.st_mtime_ns) == (result.st_size, result.st_mtime_ns)
         )
 
-    def _is_ours(self, path: str) -> bool:
+    def _is_set_here(self, path: str) -> bool:
         """Whether at a path there is nothing, or what this program wrote. Raises OutputError for what always stays."""
         target = f"{self.output}/{path}"
         try:
-            found = os.lstat(target)
+            result = os.lstat(target)
         except FileNotFoundError:
             return True
         except NotADirectoryError:
-            found = None
-        if found is None or stat.S_ISDIR(found.st_mode):
-            kind = "a folder where a file" if found else "a file where a folder"
+            result = None
+        if result is None or stat.S_ISDIR(result.st_mode):
+            kind = "a folder where a file" if result else "a file where a folder"
             raise OutputError(f"{target}: there is {kind} goes; move it, or choose another folder with --output")
-        if source := self._identities.get((found.st_dev, found.st_ino)):
+        if source := self._identities.get((result.st_dev, result.st_ino)):
             raise OutputError(f"{source}: this input lies where {target} goes; choose another folder with --output")
-        if not stat.S_ISREG(found.st_mode):
+        if not stat.S_ISREG(result.st_mode):
             return False
-        lines = [line for line in self._published(path) if line["size"] == found.st_size]
-        if any(line["mtime_ns"] == found.st_mtime_ns for line in lines):
+        lines = [line for line in self._published(path) if line["size"] == result.st_size]
+        if any(line["mtime_ns"] == result.st_mtime_ns for line in lines):
             return True
         return bool(lines) and sha256_of(target) in {line["sha256"] for line in lines}
 
@@ -367,9 +367,9 @@ class Store:
 
     def _published(self, path: str) -> Iterator[dict[str, Any]]:
         """What was ever published at a path, on file systems that ignore case under names that differ in it alone."""
-        wanted = {"path": str, "size": int, "mtime_ns": int, "sha256": str}
+        requested = {"path": str, "size": int, "mtime_ns": int, "sha256": str}
         for line in lines_of(self._record_of(path)):
-            is_whole = all(isinstance(line.get(name), kind) for name, kind in wanted.items())
+            is_whole = all(isinstance(line.get(name), kind) for name, kind in requested.items())
             if is_whole and line["path"].casefold() == path.casefold():
                 yield line
 

@@ -93,7 +93,7 @@ def _names(kind: type) -> tuple[str, ...]:
 def _class_named(name: str) -> type:
     """A class by its module and name. What asks for a value has loaded its class, so a file makes nothing load."""
     module, _, kind = name.partition(":")
-    found = getattr(sys.modules.get(module), kind, None)
-    if not is_dataclass(found):
+    result = getattr(sys.modules.get(module), kind, None)
+    if not is_dataclass(result):
         raise ValueError(f"{name} is no class of values")
-    return found
+    return result

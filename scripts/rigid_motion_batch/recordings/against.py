@@ -46,7 +46,7 @@ def with_against(clip: Clip, source: str, name: str, axes: str | None, options: 
     if len(others) > 1:
         raise TrajectoryError(source, f"{len(others)} bodies", "name the one that moves as the recording does")
     other = others[0]
-    found = OtherMotion(name, other.times, _as_in(clip, other, source))
+    result = OtherMotion(name, other.times, _as_in(clip, other, source))
     first, last = np.searchsorted(clip.times, other.times[[0, -1]] + (-ROUNDED, ROUNDED))
     if last - first < 2:
         problem = f"it lasts from {_span(other.times)}, and {clip.source} from {_span(clip.times)}"
@@ -56,7 +56,7 @@ def with_against(clip: Clip, source: str, name: str, axes: str | None, options: 
         part = slice(int(first), int(last))
         said = f"compared from {_span(clip.times[part])} alone, where {name} has a motion too"
         clip = replace(clip, times=clip.times[part], poses=clip.poses[..., part], repairs=(*clip.repairs, said))
-    return replace(clip, against=found), "; ".join(filter(None, notes))
+    return replace(clip, against=result), "; ".join(filter(None, notes))
 
 
 def _span(times: np.ndarray) -> str:
@@ -65,20 +65,20 @@ def _span(times: np.ndarray) -> str:
 
 def _as_in(clip: Clip, other: Clip, source: str) -> Poses:
     """The poses of another clip in the axes, the unit and, of a whole body, the joints of a clip."""
-    figures = clip.figure, other.figure
+    rest_bodies = clip.rest_body, other.rest_body
     poses = from_blender(to_blender(other.in_metres(other.poses), other.axes), clip.axes)
     poses = Poses(poses.positions / clip.metres_per_unit, poses.quaternions, poses.scales)
-    if figures == (None, None):
+    if rest_bodies == (None, None):
         return poses
-    kinds = [f"a body of {len(one.joints)} joints" if one else "a single rigid body" for one in figures]
-    if None in figures:
+    kinds = [f"a body of {len(one.joints)} joints" if one else "a single rigid body" for one in rest_bodies]
+    if None in rest_bodies:
         raise TrajectoryError(source, f"this is {kinds[1]}, and {clip.source} {kinds[0]}", "give the same of both")
-    places = {name: place for place, name in enumerate(other.figure.joints)}
-    if missing := [name for name in clip.figure.joints if name not in places]:
+    places = {name: place for place, name in enumerate(other.rest_body.joints)}
+    if missing := [name for name in clip.rest_body.joints if name not in places]:
         has = f"{clip.source} has {'it' if len(missing) == 1 else 'them'}"
         raise TrajectoryError(source, f"it has no joint {listed(missing, 5)}", has)
-    world = other.figure.skeleton.in_root_space(poses)[[places[name] for name in clip.figure.joints]]
-    parents = clip.figure.parents
+    world = other.rest_body.skeleton.in_root_space(poses)[[places[name] for name in clip.rest_body.joints]]
+    parents = clip.rest_body.parents
     hanging = parents >= 0
     world[hanging] = placed(inverse(world[parents[hanging]]), world[hanging])
     return world

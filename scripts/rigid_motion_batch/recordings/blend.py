@@ -21,10 +21,10 @@ from rigid_motion.motion import Poses
 
 from .key_moments import BONE_CHANNEL, curves_that_move, fcurves_of, moments_of
 from .options import AS_THE_FILE_SAYS, ReadingOptions
+from .probe_scene import probe
 from .recordings import ALL, Selection, Trajectory, TrajectoryError, listed, shown
 from .rigs import LAST_FRAME, whole_body
 from .sampling import LEAD, OF_OBJECTS, Moments, merged, sampled
-from .stages import probe
 
 if TYPE_CHECKING:
     import bpy
@@ -85,14 +85,14 @@ def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE
             animated = [name for name, body in bodies.items() if body.frames_of_keys() is not None]
             still = [name for name in objects if name not in animated]
             selection.match([*objects, *_bones_of(objects)])
-            wanted = selection.wanted or ""
-            if wanted not in bodies and (body := _bone_called(path, wanted, objects)):
-                selection.of(animated, unlisted=[wanted])
+            requested = selection.requested or ""
+            if requested not in bodies and (body := _bone_called(path, requested, objects)):
+                selection.of(animated, unlisted=[requested])
                 return [_sample(path, body, scenes, options.scale)]
             with_keys = {name: _bones_with_keys(obj) for name, obj in objects.items()}
             few = [f"{name}/{bone}" for name, bones in with_keys.items() for bone in bones[:FEW]]
             more = sum(map(len, with_keys.values())) - len(few)
-            if selection.wanted == ALL:
+            if selection.requested == ALL:
                 taken = selection.of(animated, unlisted=[*few, *still], more=more)
                 return [_sample(path, bodies[name], scenes, options.scale) for name in taken]
             moving = [name for name in objects if name in animated or with_keys[name]]
@@ -113,7 +113,7 @@ def _bones_of(objects: dict[str, bpy.types.Object]) -> Iterator[str]:
             yield from (f"{name}/{bone}" for bone in obj.data.bones.keys())  # noqa: SIM118 - it runs over bones
 
 
-def _bone_called(path: Path, wanted: str, objects: dict[str, bpy.types.Object]) -> Body | None:
+def _bone_called(path: Path, requested: str, objects: dict[str, bpy.types.Object]) -> Body | None:
     """The bone called OBJECT/BONE, of which either may have slashes in its name. None where there is no such object.
 
     Raises
@@ -121,8 +121,10 @@ def _bone_called(path: Path, wanted: str, objects: dict[str, bpy.types.Object]) 
     TrajectoryError
         Where there is the object and not the bone, or the bone alone was named.
     """
-    ends = [index for index, character in enumerate(wanted) if character == "/"]
-    split = [Body(objects[wanted[:end]], wanted[end + 1 :]) for end in reversed(ends) if wanted[:end] in objects]
+    ends = [index for index, character in enumerate(requested) if character == "/"]
+    split = [
+        Body(objects[requested[:end]], requested[end + 1 :]) for end in reversed(ends) if requested[:end] in objects
+    ]
     rigs = [body for body in split if body.obj.type == "ARMATURE"]
     for body in rigs:
         if body.bone in body.obj.data.bones:
@@ -140,15 +142,15 @@ def _bone_called(path: Path, wanted: str, objects: dict[str, bpy.types.Object]) 
         kind = obj.bl_rna.properties["type"].enum_items[obj.type].name
         problem = f"{shown(obj.name)} has no bones, for it is no armature (its type is {kind})"
         raise TrajectoryError(path, problem, f"name the object alone with {path}:{obj.name}")
-    if alone := [rig for rig, obj in objects.items() if obj.type == "ARMATURE" and wanted in obj.data.bones]:
-        problem = f"no body named {shown(wanted)}, only a bone of {listed(alone, FEW)}"
-        raise TrajectoryError(path, problem, f"name it with {path}:{alone[0]}/{wanted}")
+    if alone := [rig for rig, obj in objects.items() if obj.type == "ARMATURE" and requested in obj.data.bones]:
+        problem = f"no body named {shown(requested)}, only a bone of {listed(alone, FEW)}"
+        raise TrajectoryError(path, problem, f"name it with {path}:{alone[0]}/{requested}")
     return None
 
 
-def _nearest(wanted: str, names: list[str]) -> list[str]:
+def _nearest(requested: str, names: list[str]) -> list[str]:
     """A few of the names: those that are most like the one that was wanted, whatever their case."""
-    likeness = SequenceMatcher(b=wanted.casefold(), autojunk=False)
+    likeness = SequenceMatcher(b=requested.casefold(), autojunk=False)
 
     def unlike(name: str) -> float:
         likeness.set_seq1(name.casefold())
@@ -230,13 +232,13 @@ def _bones_with_keys(obj: bpy.types.Object) -> list[str]:
     if obj.type != "ARMATURE" or data is None:
         return []
     actions = [(strip.action, strip.action_slot) for track in data.nla_tracks for strip in track.strips]
-    found = {
+    result = {
         unescape_identifier(channel["name"])
         for action, slot in [(data.action, data.action_slot), *actions]
         for fcurve in fcurves_of(action, slot)
         if (channel := BONE_CHANNEL.match(fcurve.data_path))
     }
-    return [bone.name for bone in obj.data.bones if bone.name in found]
+    return [bone.name for bone in obj.data.bones if bone.name in result]
 
 
 @contextmanager

@@ -13,8 +13,8 @@ import numpy as np
 from rigid_motion.motion import Poses
 
 from .clips import ClipWarning
-from .figures import Figure, size_of
 from .recordings import shown
+from .rest_bodies import RestBody, size_of
 from .sense import FEWEST, HIGHEST_SPEED
 
 IDENTICAL = 5
@@ -62,7 +62,9 @@ BLOCK = 4096
 LEAVE_OUT = "take a part without it: --start and --end"
 
 
-def calibration_pose(times: np.ndarray, poses: Poses, figure: Figure, metres: float) -> tuple[int, ClipWarning | None]:
+def calibration_pose(
+    times: np.ndarray, poses: Poses, rest_body: RestBody, metres: float
+) -> tuple[int, ClipWarning | None]:
     """Tell a pose in front of a whole body's motion that is no part of it.
 
     Returns
@@ -74,19 +76,19 @@ def calibration_pose(times: np.ndarray, poses: Poses, figure: Figure, metres: fl
     """
     if len(times) < FEWEST:
         return 0, None
-    places = figure.skeleton.in_root_space(poses[:, : IDENTICAL + SOON]).positions
-    size = max(size_of(figure.parents, places[:, 0]), size_of(figure.parents, figure.rest.positions))
+    places = rest_body.skeleton.in_root_space(poses[:, : IDENTICAL + SOON]).positions
+    size = max(size_of(rest_body.parents, places[:, 0]), size_of(rest_body.parents, rest_body.rest.positions))
     steps = np.linalg.norm(np.diff(places, axis=1), axis=-1)
     held = int(np.argmax(steps.max(axis=0) > SAME * size)) + 1
     joint = int(steps[:, held - 1].argmax())
     jump, others = steps[joint, held - 1], steps[:, held:].max(initial=0.0)
     speed = jump * metres / (times[held] - times[held - 1])
     described = (
-        f"from there to the next {shown(figure.joints[joint])} jumps {jump * metres:.2g} m, and none jumps more than "
-        f"{others * metres:.2g} m afterwards"
+        f"from there to the next {shown(rest_body.joints[joint])} jumps {jump * metres:.2g} m, and none jumps more "
+        f"than {others * metres:.2g} m afterwards"
     )
     where = float(times[0]), float(times[held])
-    kind = _kind(places[:, 0], figure, size)
+    kind = _kind(places[:, 0], rest_body, size)
     if kind and held <= IDENTICAL and jump > max(JUMPS * size, FASTER * others):
         frames = "its first frame is" if held == 1 else f"its first {held} frames are"
         return held, ClipWarning(f"{frames} {kind} and left out: {described}", "--start 0 keeps it", *where)
@@ -97,25 +99,27 @@ def calibration_pose(times: np.ndarray, poses: Poses, figure: Figure, metres: fl
     return 0, None
 
 
-def _kind(places: np.ndarray, figure: Figure, size: float) -> str:
+def _kind(places: np.ndarray, rest_body: RestBody, size: float) -> str:
     """What pose these places (joints, 3) are: a T-pose in any axes, or that at rest; empty for any other."""
     smallest, middle, largest = np.sort(np.ptp(places, axis=0))
     if middle > BROAD * largest and smallest < FLAT * largest:
         return "a T-pose"
-    away = places - figure.rest.positions
+    away = places - rest_body.rest.positions
     return "the pose at rest" if np.abs(away - away[0]).max() < AT_REST * size else ""
 
 
-def breaks(times: np.ndarray, poses: Poses, figure: Figure | None, metres: float, begin: float) -> list[ClipWarning]:
+def breaks(
+    times: np.ndarray, poses: Poses, rest_body: RestBody | None, metres: float, begin: float
+) -> list[ClipWarning]:
     """Find the gaps of a recording that are longer than the time between keys, and its jumps, in their order.
 
     `metres` is the length of the unit of the poses, `begin` the time of the first sample of the recording.
     """
     steps = np.diff(times)
-    found = [*_gaps(times, steps, begin)]
+    result = [*_gaps(times, steps, begin)]
     if len(times) >= FEWEST:
-        found += _jumps(times, steps, np.concatenate(list(_lengths(poses, figure))) * metres, begin)
-    return sorted(found, key=lambda warning: warning.start_s)
+        result += _jumps(times, steps, np.concatenate(list(_lengths(poses, rest_body))) * metres, begin)
+    return sorted(result, key=lambda warning: warning.start_s)
 
 
 def _gaps(times: np.ndarray, steps: np.ndarray, begin: float) -> Iterator[ClipWarning]:
@@ -140,12 +144,12 @@ def _jumps(times: np.ndarray, steps: np.ndarray, lengths: np.ndarray, begin: flo
         yield ClipWarning(text, LEAVE_OUT, first, last)
 
 
-def _lengths(poses: Poses, figure: Figure | None) -> Iterator[np.ndarray]:
+def _lengths(poses: Poses, rest_body: RestBody | None) -> Iterator[np.ndarray]:
     """How far a body, or any joint of it, gets from each sample to the next, block by block."""
     count = poses.shape[-1]
     for first in range(0, count - 1, BLOCK):
         part = poses[..., first : first + BLOCK + 1]
-        places = part.positions[None] if figure is None else figure.skeleton.in_root_space(part).positions
+        places = part.positions[None] if rest_body is None else rest_body.skeleton.in_root_space(part).positions
         yield np.linalg.norm(np.diff(places, axis=1), axis=-1).max(axis=0)
 
 

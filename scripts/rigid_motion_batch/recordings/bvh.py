@@ -26,8 +26,8 @@ from rigid_motion.motion.quaternions import align_signs
 
 from .clips import ClipWarning
 from .euler import quaternions_from_intrinsic_eulers
-from .figures import Figure
 from .recordings import Selection, Trajectory, TrajectoryError, shown, unique
+from .rest_bodies import RestBody
 from .tables import lines_of, parse_rows
 from .vector_cells import is_number
 
@@ -66,7 +66,7 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
     """The whole body; or joints that are named, or all, in the order of the file. A single joint is no body."""
     joints, motion = _read_hierarchy(path)
     names = [joint.name for joint in joints]
-    as_body = selection.wanted is None and len(joints) > 1
+    as_body = selection.requested is None and len(joints) > 1
     taken = names if as_body else selection.of(names)
     values, frame_time, warnings = _read_motion(path, motion, joints)
     if len(taken) * len(values) > MOST_POSES:
@@ -76,14 +76,14 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
     with np.errstate(invalid="ignore", over="ignore"):
         times = np.arange(len(values)) * frame_time
         if as_body:
-            body = Trajectory(path.stem, times, _local_poses(joints, values), figure=figure_of(joints))
+            body = Trajectory(path.stem, times, _local_poses(joints, values), rest_body=rest_body_of(joints))
             return [replace(body, warnings=warnings)]
         poses = world_poses(joints, values, taken)
     first, *others = (Trajectory(name, times, poses[name]) for name in taken)
     return [replace(first, warnings=warnings), *others]
 
 
-def figure_of(joints: list[Joint]) -> Figure:
+def rest_body_of(joints: list[Joint]) -> RestBody:
     """The body of a hierarchy at rest, where no joint is turned: every bone ends in the middle of its children."""
     parents = np.array([-1 if joint.parent is None else joint.parent for joint in joints])
     offsets = np.array([joint.offset for joint in joints])
@@ -98,10 +98,10 @@ def figure_of(joints: list[Joint]) -> Figure:
             ends[index] += 1
     tails /= np.maximum(ends, 1.0)[:, None]
     unturned = np.tile((1.0, 0.0, 0.0, 0.0), (len(joints), 1))
-    return Figure(tuple(joint.name for joint in joints), parents, Poses(places, unturned), tails)
+    return RestBody(tuple(joint.name for joint in joints), parents, Poses(places, unturned), tails)
 
 
-def world_poses(joints: list[Joint], values: np.ndarray, wanted: Iterable[str]) -> dict[str, Poses]:
+def world_poses(joints: list[Joint], values: np.ndarray, requested: Iterable[str]) -> dict[str, Poses]:
     """Forward kinematics: the world poses of some joints.
 
     Parameters
@@ -117,25 +117,25 @@ def world_poses(joints: list[Joint], values: np.ndarray, wanted: Iterable[str]) 
     dict of Poses, each of shape (n,)
         By name, in the order of `joints`.
     """
-    wanted = set(wanted)
+    requested = set(requested)
     begins = _begins(joints)
-    children = Counter(_needed(joints, wanted))
+    children = Counter(_needed(joints, requested))
     world: dict[int, Poses] = {}
     for index, joint in enumerate(joints):
-        if joint.name not in wanted and not children[index]:
+        if joint.name not in requested and not children[index]:
             continue
         own = _local(joint, values[:, begins[index] : begins[index + 1]])
         world[index] = own if joint.parent is None else placed(world[joint.parent], own)
         # An hour of a whole skeleton is much: what nothing more hangs on is let go.
         children[joint.parent] -= 1
-        if joint.parent is not None and not children[joint.parent] and joints[joint.parent].name not in wanted:
+        if joint.parent is not None and not children[joint.parent] and joints[joint.parent].name not in requested:
             del world[joint.parent]
     return {joints[index].name: poses for index, poses in world.items()}
 
 
-def _needed(joints: list[Joint], wanted: set[str]) -> Iterator[int | None]:
+def _needed(joints: list[Joint], requested: set[str]) -> Iterator[int | None]:
     """The parent of each joint that is wanted or carries a wanted one, once for each such joint."""
-    carrying = [joint.name in wanted for joint in joints]
+    carrying = [joint.name in requested for joint in joints]
     for index in reversed(range(len(joints))):
         if carrying[index]:
             parent = joints[index].parent

@@ -16,10 +16,10 @@ from rigid_motion_batch.command_line import printable
 
 from .breaks import breaks, calibration_pose
 from .clips import Clip, ClipWarning
-from .figures import repaired
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .reading import read_trajectories
 from .recordings import Trajectory, TrajectoryError, shown
+from .rest_bodies import repaired
 
 LONGEST_NAME = 80
 """Characters of a clip's name: folders below folders have to fit what file systems allow."""
@@ -112,21 +112,21 @@ def make_clip(
     """
     times, poses, repairs = repair(trajectory.times, trajectory.poses, trajectory.rate)
     if len(times) < 2:
-        found = "; ".join(map(str, repairs))
-        raise TrajectoryError(source, f"{len(times)} usable poses are left: {found}", "record at least 2")
-    figure, drawn = repaired(trajectory.figure) if trajectory.figure else (None, ())
+        result = "; ".join(map(str, repairs))
+        raise TrajectoryError(source, f"{len(times)} usable poses are left: {result}", "record at least 2")
+    rest_body, drawn = repaired(trajectory.rest_body) if trajectory.rest_body else (None, ())
     metres = trajectory.metres_per_unit
     warnings, calibration, begin = list(trajectory.warnings), 0, float(times[0])
-    if axes == "unreal" and options.scale is None and metres == 1.0 and figure is None:
+    if axes == "unreal" and options.scale is None and metres == 1.0 and rest_body is None:
         warnings.append(ClipWarning("its lengths are read as metres, and Unreal has centimetres", "add --scale 0.01"))
     part = _part(source, times - begin, options)
-    if figure is not None and options.start is None:
-        calibration, warning = calibration_pose(times, poses, figure, metres)
+    if rest_body is not None and options.start is None:
+        calibration, warning = calibration_pose(times, poses, rest_body, metres)
         part = slice(max(part.start, calibration), part.stop)
         warnings += [warning] if warning else []
     times, poses = times[part], poses[..., part]
     if measured:
-        warnings += breaks(times, poses, figure, metres, begin)
+        warnings += breaks(times, poses, rest_body, metres, begin)
     notes = (*map(str, warnings), *map(str, repairs), *map(printable, drawn))
     return Clip(
         name,
@@ -136,7 +136,7 @@ def make_clip(
         poses,
         notes,
         metres,
-        figure=figure,
+        rest_body=rest_body,
         rate=trajectory.rate,
         warnings=tuple(warnings),
         calibration=calibration,
@@ -156,20 +156,20 @@ def _part(source: str, seconds: np.ndarray, options: ReadingOptions) -> slice:
     return part
 
 
-def clip_names(wanted: Sequence[tuple[str, str]]) -> list[str]:
+def clip_names(requested: Sequence[tuple[str, str]]) -> list[str]:
     """Names for clips, as `folder_names` gives them, of what each would like to be called and of its body.
 
     The body, empty where the user named none, is part of the name only where several would like to be called the same.
     """
-    folded = [_safe(name).casefold() for name, _ in wanted]
+    folded = [_safe(name).casefold() for name, _ in requested]
     alike = Counter(folded)
     return folder_names(
         f"{name}-{body}" if body and alike[same] > 1 else name
-        for (name, body), same in zip(wanted, folded, strict=True)
+        for (name, body), same in zip(requested, folded, strict=True)
     )
 
 
-def folder_names(wanted: Iterable[str]) -> list[str]:
+def folder_names(requested: Iterable[str]) -> list[str]:
     """Names like those wanted that are safe for folders on every system, each unlike all before it.
 
     Letters and digits of any script stay, and so do dots, dashes and underscores inside. Case makes no difference, nor
@@ -177,7 +177,7 @@ def folder_names(wanted: Iterable[str]) -> list[str]:
     """
     names: list[str] = []
     unavailable, numbers = set(NOT_FOLDERS), {}
-    for name in wanted:
+    for name in requested:
         safe = _safe(name)
         folded = safe.casefold()
         if folded in unavailable:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigid_motion.motion import Poses, interpolate
-from rigid_motion_batch.recordings.figures import Figure
+from rigid_motion_batch.recordings.rest_bodies import RestBody
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Clip:
     body: str = ""
     """The body that the user asked for by name. It becomes part of the clip's where another clip has the same."""
 
-    figure: Figure | None = None
+    rest_body: RestBody | None = None
     """What a whole body is made of; None for a single rigid body."""
 
     rate: float | None = None
@@ -96,10 +96,10 @@ class Clip:
         return self.rate or 1.0 / float(np.median(np.diff(self.times)))
 
     @property
-    def whole_body(self) -> Figure:
+    def whole_body(self) -> RestBody:
         """The figure of a clip that has one."""
-        assert self.figure is not None
-        return self.figure
+        assert self.rest_body is not None
+        return self.rest_body
 
     def in_metres(self, poses: Poses) -> Poses:
         """Poses of this clip with positions in metres."""
@@ -144,7 +144,7 @@ class ClipFacts:
             len(clip.times),
             float(clip.times[-1] - clip.times[0]),
             clip.repairs,
-            clip.figure.joints if clip.figure else (),
+            clip.rest_body.joints if clip.rest_body else (),
             clip.warnings,
             clip.body,
             clip.against.name if clip.against else "",

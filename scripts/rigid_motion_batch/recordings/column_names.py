@@ -128,8 +128,8 @@ def column_name(text: str) -> ColumnName | None:
     if words == ["s"]:
         return ColumnName("scale")
     taken = {len(words) - 1}
-    found = ColumnName("scale") if words[-1:] == ["scale"] else _pose(words, unit, taken)
-    return found and replace(found, body=_body(text, words, spans, taken))
+    result = ColumnName("scale") if words[-1:] == ["scale"] else _pose(words, unit, taken)
+    return result and replace(result, body=_body(text, words, spans, taken))
 
 
 def unit_in(text: str) -> str:

@@ -81,7 +81,7 @@ def layout_of(cells: Sequence[str], options: ReadingOptions) -> Layout:
     }
     bodies = _bodies(names, set(explicit.values()))
     needed = (*POSITION, *(EULER if options.euler else QUATERNION))
-    whole = {label: found for label, found in bodies.items() if {*found, *explicit} >= {*needed}}
+    whole = {label: result for label, result in bodies.items() if {*result, *explicit} >= {*needed}}
     if explicit.keys() >= set(needed):
         whole = {"": {}}
     # A date beside a count of seconds says the same again.
@@ -102,8 +102,8 @@ def layout_of(cells: Sequence[str], options: ReadingOptions) -> Layout:
         raise ColumnProblem(f"two columns mean {meaning} ({both})", way_out, known)
 
     where = {}
-    for label, found in whole.items():
-        columns = found | {meaning: [index] for meaning, index in explicit.items()}
+    for label, result in whole.items():
+        columns = result | {meaning: [index] for meaning, index in explicit.items()}
         where[label] = {one: only(one, columns[one]) for one in (*needed, "scale") if one in columns}
     units = {index: name.unit for index, name in enumerate(names) if name and name.unit}
     units |= {index: unit for index in explicit.values() if (unit := unit_in(cells[index]))}
@@ -118,14 +118,14 @@ def _explicit(cells: Sequence[str], options: ReadingOptions, known: int) -> dict
     written = [cell.lower() for cell in cells]
     explicit = {}
     for meaning, column in options.columns:
-        wanted = column.strip().lower()
-        if wanted not in written:
+        requested = column.strip().lower()
+        if requested not in written:
             raise ColumnProblem(
                 f"no column is named {shown(column)}",
                 f"--columns {meaning}=NAME takes one of {columns_found(cells)}",
                 known,
             )
-        explicit[meaning] = written.index(wanted)
+        explicit[meaning] = written.index(requested)
     return explicit
 
 

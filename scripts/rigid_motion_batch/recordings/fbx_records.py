@@ -105,26 +105,26 @@ class _Records:
                 self.fail("there are properties of no known kind" if kind else "it ends too soon")
         return place
 
-    def _refuse_false_size(self, place: int, wanted: int, size: int, packed: bool) -> None:
+    def _refuse_false_size(self, place: int, requested: int, size: int, packed: bool) -> None:
         """Whether so many bytes at a place can be what they are said to be, unpacked where they are packed."""
-        self.unpacked += wanted
+        self.unpacked += requested
         if self.unpacked > LARGEST_FILE:
             problem = f"its numbers are more than {LARGEST_FILE} bytes"
             raise TrajectoryError(self.path, problem, "export the skeleton without its meshes, or split the recording")
-        if wanted > size * DENSEST if packed else wanted != size:
+        if requested > size * DENSEST if packed else requested != size:
             self.fail("a list of numbers is not as long as it says")
         if not packed or size * DENSEST <= HARMLESS:
             return
-        inflater, found, last = zlib.decompressobj(), 0, place + size
+        inflater, result, last = zlib.decompressobj(), 0, place + size
         try:
             for first in range(place, last, PIECE):
                 data = self.content[first : min(first + PIECE, last)]
-                while data and found <= wanted:
-                    found += len(inflater.decompress(data, PIECE))
+                while data and result <= requested:
+                    result += len(inflater.decompress(data, PIECE))
                     data = inflater.unconsumed_tail
         except zlib.error:
-            found = -1
-        if found > wanted or found < 0:
+            result = -1
+        if result > requested or result < 0:
             self.fail("a list of numbers is not as long as it says")
 
     def fail(self, problem: str) -> NoReturn:

@@ -133,8 +133,8 @@ class _Made:
         data = self._bytes_of(view["buffer"])[first : first + view["byteLength"]][accessor.get("byteOffset", 0) :]
         if not 0 < count * stride <= len(data) + stride - kind.itemsize * width:
             raise ValueError("not as many as it says")
-        found = np.ndarray((count, width), kind, data, strides=(stride, kind.itemsize))
-        return found.astype(np.float64) if kind.kind == "f" else denormalised(found)
+        result = np.ndarray((count, width), kind, data, strides=(stride, kind.itemsize))
+        return result.astype(np.float64) if kind.kind == "f" else denormalised(result)
 
     def _add(self, numbers: np.ndarray, kind: str) -> int:
         numbers = numbers.astype("<f4")

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigid_motion_batch.hushing import hushed
+from rigid_motion_batch.silencing import silenced
 
 from .key_moments import BONE_CHANNEL, curves_that_move, fcurves_of, keys_of, moments_of, with_parents
 from .recordings import ALL, NoMotion, Selection, Trajectory, TrajectoryError, listed
@@ -132,16 +132,16 @@ def _read(
     bones = {name: rig.data.bones.keys() for name, rig in rigs.items()}
     selection.match([*rigs, *(bone for own in bones.values() for bone in own)])
     selection.match(f"{name}/{bone}" for name, own in bones.items() for bone in own)
-    name, bone = _wanted(rigs, moving, selection.wanted)
+    name, bone = _requested(rigs, moving, selection.requested)
     rig, fps = rigs[name], scene.render.fps / scene.render.fps_base
     first, last = moving.get(name) or next(iter(moving.values()))
     rate = rate_of(fps, _rate_of_keys(rig, fps, made))
     if not (abs(first) <= LAST_FRAME and abs(last) <= LAST_FRAME):
         refuse_too_many(path, name, 1, np.array([first, last]))
     moments = _moments(rig, first, last, fps, fps / rate, made)
-    remarks = _remarks(scene, rig, name, list(rigs), several=selection.wanted in (None, ALL))
-    if bone is None and selection.wanted != ALL:
-        called = path.stem if selection.wanted is None else name
+    remarks = _remarks(scene, rig, name, list(rigs), several=selection.requested in (None, ALL))
+    if bone is None and selection.requested != ALL:
+        called = path.stem if selection.requested is None else name
         body = whole_body(path, rig, called, moments, 1.0, scale, made_up=True)
         return [_with_remarks(body, *remarks)]
     joints = joints_of(rig)
@@ -150,26 +150,28 @@ def _read(
         several = single_joints(path, rig, taken, moments, scale)
         return [_with_remarks(several[0], joints.remark, *remarks), *several[1:]]
     known = bone in joints.names or bone in joints.left_out
-    selection.of(joints.names, unlisted=[*joints.left_out, *([selection.wanted] if known else [])])
+    selection.of(joints.names, unlisted=[*joints.left_out, *([selection.requested] if known else [])])
     (motion,) = single_joints(path, rig, [bone], moments, scale)
-    return [_with_remarks(replace(motion, name=selection.wanted), *remarks)]
+    return [_with_remarks(replace(motion, name=selection.requested), *remarks)]
 
 
-def _wanted(rigs: dict[str, bpy.types.Object], moving: dict[str, object], wanted: str | None) -> tuple[str, str | None]:
+def _requested(
+    rigs: dict[str, bpy.types.Object], moving: dict[str, object], requested: str | None
+) -> tuple[str, str | None]:
     """The armature that is meant and its bone, or None for the whole."""
     largest = max(moving, key=lambda name: len(rigs[name].data.bones))
-    if wanted in (None, ALL):
+    if requested in (None, ALL):
         return largest, None
     in_order = sorted(rigs, key=lambda name: name != largest)
     for name in in_order:
-        if wanted in rigs[name].data.bones:
-            return name, wanted
-    if wanted in rigs:
-        return wanted, None
+        if requested in rigs[name].data.bones:
+            return name, requested
+    if requested in rigs:
+        return requested, None
     for name in in_order:
-        if wanted.startswith(f"{name}/") and wanted[len(name) + 1 :] in rigs[name].data.bones:
-            return name, wanted[len(name) + 1 :]
-    return largest, wanted
+        if requested.startswith(f"{name}/") and requested[len(name) + 1 :] in rigs[name].data.bones:
+            return name, requested[len(name) + 1 :]
+    return largest, requested
 
 
 def _remarks(
@@ -245,14 +247,14 @@ def _other_takes(rig: bpy.types.Object, scene: bpy.types.Scene) -> list[str]:
     """Other Actions that move its bones, of those that the importer has made after the scene."""
     import bpy
 
-    own, bones, found = rig.animation_data.action, set(rig.data.bones.keys()), []
+    own, bones, result = rig.animation_data.action, set(rig.data.bones.keys()), []
     for action in bpy.data.actions:
         if action != own and action.session_uid > scene.session_uid:
             curves = (fcurve for slot in action.slots for fcurve in fcurves_of(action, slot))
             channels = (BONE_CHANNEL.match(fcurve.data_path) for fcurve in curves)
             if any(match["name"] in bones for match in channels if match):
-                found.append(action.name)
-    return found
+                result.append(action.name)
+    return result
 
 
 # -- Blender ----------------------------------------------------------------------------------------------------------
@@ -289,7 +291,7 @@ def _imported(
 
 def _import(path: Path, importer: Callable[[], None]) -> None:
     try:
-        with hushed(), redirect_stderr(io.StringIO()), warnings.catch_warnings():
+        with silenced(), redirect_stderr(io.StringIO()), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             importer()
     except TrajectoryError:
@@ -325,7 +327,7 @@ def enabled(path: Path, addon: str) -> Iterator[None]:
 
     _, loaded = addon_utils.check(addon)
     if not loaded:
-        with hushed():
+        with silenced():
             module = addon_utils.enable(addon, default_set=False)
         if module is None:
             raise TrajectoryError(path, f"this Blender has no add-on {addon}", "take a Blender that has it")

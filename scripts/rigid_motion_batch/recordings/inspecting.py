@@ -159,16 +159,16 @@ def inspect(source: str, axes: str | None = None, options: ReadingOptions = AS_T
     """
     recording = read_trajectories(source, options)
     path, body = split_source(source)
-    if body is None and recording.others and all(one.figure is None for one in recording.trajectories):
+    if body is None and recording.others and all(one.rest_body is None for one in recording.trajectories):
         recording = read_trajectories(f"{path}:{ALL}", options)
-    found = format_of(path)
+    result = format_of(path)
     contents, unreadable = [], []
     for trajectory in recording.trajectories:
         try:
             clip = make_clip(
-                trajectory, source, trajectory.name, axes or recording.axes, options, measured=found.measured
+                trajectory, source, trajectory.name, axes or recording.axes, options, measured=result.measured
             )
-            contents.append(_contents(clip, trajectory, _unit(clip, trajectory, found, options)))
+            contents.append(_contents(clip, trajectory, _unit(clip, trajectory, result, options)))
         except TrajectoryError as error:
             unreadable.append((trajectory.name, error.problem))
     if not contents:
@@ -177,7 +177,9 @@ def inspect(source: str, axes: str | None = None, options: ReadingOptions = AS_T
     ups = {one.up for one in contents if one.up}
     taken = _axes(recording, axes, next(iter(ups)) if len(ups) == 1 else "")
     size = path.stat().st_size
-    return Inspection(source, found.label, size, bodies, taken, tuple(contents), tuple(unreadable), _note_of(recording))
+    return Inspection(
+        source, result.label, size, bodies, taken, tuple(contents), tuple(unreadable), _note_of(recording)
+    )
 
 
 def _note_of(recording: Recording) -> str:
@@ -189,7 +191,7 @@ def _contents(clip: Clip, trajectory: Trajectory, unit: Unit) -> Contents:
     said = {str(warning) for warning in clip.warnings}
     return Contents(
         trajectory.name,
-        clip.figure.joints if clip.figure else (),
+        clip.rest_body.joints if clip.rest_body else (),
         unit,
         _timing(clip, len(trajectory.times)),
         _size(clip),
@@ -200,19 +202,19 @@ def _contents(clip: Clip, trajectory: Trajectory, unit: Unit) -> Contents:
     )
 
 
-def _unit(clip: Clip, trajectory: Trajectory, found: Format, options: ReadingOptions) -> Unit:
+def _unit(clip: Clip, trajectory: Trajectory, result: Format, options: ReadingOptions) -> Unit:
     metres = clip.metres_per_unit
     short = next((unit for unit, length in METRES.items() if length == metres), "")
     name = UNIT_NAMES.get(short, f"units of {metres:.4g} m")
     if options.scale is not None:
         return Unit(metres, name, "as --scale says")
-    if clip.figure is not None and not found.in_metres:
+    if clip.rest_body is not None and not result.in_metres:
         guessed = "taken for" in trajectory.remark
         return Unit(metres, name, "guessed from the size of the body" if guessed else "they make a body of usual size")
     if metres != 1.0:
         return Unit(metres, name, "as the file says")
     return Unit(
-        metres, name, "as the format has it" if found.says_unit else "assumed, where the file says nothing else"
+        metres, name, "as the format has it" if result.says_unit else "assumed, where the file says nothing else"
     )
 
 
@@ -234,12 +236,12 @@ def _timing(clip: Clip, recorded: int) -> Timing:
 
 
 def _size(clip: Clip) -> Size:
-    root = clip.poses if clip.figure is None else clip.poses[0]
+    root = clip.poses if clip.rest_body is None else clip.poses[0]
     places, steps = root.positions * clip.metres_per_unit, np.diff(clip.times)
     lengths = np.linalg.norm(np.diff(places, axis=0), axis=-1)
     turns = np.degrees(angle_between(root.quaternions[1:], root.quaternions[:-1]))
-    if clip.figure is not None:
-        places = clip.figure.skeleton.in_root_space(clip.poses).positions.reshape(-1, 3) * clip.metres_per_unit
+    if clip.rest_body is not None:
+        places = clip.rest_body.skeleton.in_root_space(clip.poses).positions.reshape(-1, 3) * clip.metres_per_unit
     return Size(
         tuple(places.min(axis=0).tolist()),
         tuple(places.max(axis=0).tolist()),
@@ -252,8 +254,8 @@ def _size(clip: Clip) -> Size:
 
 def _up(clip: Clip) -> str:
     """The axis that is up, by where people are above the floor, or how they stand; empty where nothing tells it."""
-    if clip.figure is not None:
-        places = clip.figure.skeleton.in_root_space(clip.poses[:, :1]).positions[:, 0]
+    if clip.rest_body is not None:
+        places = clip.rest_body.skeleton.in_root_space(clip.poses[:, :1]).positions[:, 0]
         extents = np.ptp(places, axis=0)
         largest = int(extents.argmax())
         return "xyz"[largest] if extents[largest] > 1.5 * np.delete(extents, largest).max() else ""

@@ -101,17 +101,17 @@ def moments_of(obj: bpy.types.Object, lead: float) -> tuple[np.ndarray, bool]:
     straight : bool
         Whether there is nothing but straight lines and steps between them.
     """
-    found, straight = [np.empty(0)], True
+    result, straight = [np.empty(0)], True
     for one in with_parents(obj):
         if data := one.animation_data:
             for fcurve in curves_that_move(data.action, data.action_slot, bones=True):
                 keys = keys_of(fcurve)
-                found += [keys.frames, keys.frames[keys.jumps] - lead]
+                result += [keys.frames, keys.frames[keys.jumps] - lead]
                 straight &= keys.straight and not fcurve.modifiers
             for track in data.nla_tracks:
-                found += _of_strips(track.strips, lead)
+                result += _of_strips(track.strips, lead)
                 straight = False
-    return np.concatenate(found), straight
+    return np.concatenate(result), straight
 
 
 def _of_strips(strips: bpy.types.NlaStrips, lead: float) -> Iterator[np.ndarray]:

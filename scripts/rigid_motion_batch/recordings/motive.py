@@ -56,12 +56,12 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
     metres = METRES[_setting(path, header, "Length Units", "Meters", METRES)]
     usual = "Quaternion" if "w" in header.axes else "XYZ"
     rotation = ROTATION_TYPES[_setting(path, header, "Rotation Type", usual, ROTATION_TYPES)]
-    wanted = [("position", axis) for axis in "xyz"] + [("rotation", axis) for axis in rotation]
-    bodies = _bodies(path, header, wanted)
+    requested = [("position", axis) for axis in "xyz"] + [("rotation", axis) for axis in rotation]
+    bodies = _bodies(path, header, requested)
     taken = selection.of(list(bodies))
     columns = {"time": next((index for index, axis in enumerate(header.axes) if axis.startswith("time")), 1)}
     for name in taken:
-        columns |= {f"{name} {content} {axis}": bodies[name][content, axis] for content, axis in wanted}
+        columns |= {f"{name} {content} {axis}": bodies[name][content, axis] for content, axis in requested}
     rows = ((number, line) for number, line in lines_of(path, after=header.line) if line.strip(", "))
     numbers = parse_rows(path, rows, ",", columns, max(len(header.axes), len(header.types)))
     trajectories = []
@@ -98,23 +98,23 @@ def _mentions_types(row: Iterable[str]) -> bool:
     return any(cell.startswith(("rigid body", "marker", "bone")) for cell in row)
 
 
-def _bodies(path: Path, header: _Header, wanted: list[tuple[str, str]]) -> dict[str, dict[tuple[str, str], int]]:
+def _bodies(path: Path, header: _Header, requested: list[tuple[str, str]]) -> dict[str, dict[tuple[str, str], int]]:
     """Each rigid body's columns: what it holds and the axis, to the index."""
-    found: dict[tuple[str, str], dict[tuple[str, str], int]] = {}
+    result: dict[tuple[str, str], dict[tuple[str, str], int]] = {}
     for index, (kind, name, identity, content, axis) in enumerate(
         zip(header.types, header.names, header.ids, header.contents, header.axes, strict=False)
     ):
         if kind == "rigid body":
-            found.setdefault((name, identity), {})[content, axis] = index
-    if not found:
+            result.setdefault((name, identity), {})[content, axis] = index
+    if not result:
         types = dict.fromkeys(cell.title() for cell in header.types if cell not in ("", "type"))
         raise TrajectoryError(path, f"no rigid body, only {listed(list(types))}", "export with Rigid Bodies on")
-    for (name, _), columns in found.items():
-        missing = [f"{content} {axis.upper()}" for content, axis in wanted if (content, axis) not in columns]
+    for (name, _), columns in result.items():
+        missing = [f"{content} {axis.upper()}" for content, axis in requested if (content, axis) not in columns]
         if missing:
             problem = f"{shown(name)} has no column {listed(missing)}"
             raise TrajectoryError(path, problem, "export all columns of the rigid bodies", header.line)
-    return dict(zip(unique([name for name, _ in found]), found.values(), strict=True))
+    return dict(zip(unique([name for name, _ in result]), result.values(), strict=True))
 
 
 def _setting(path: Path, header: _Header, name: str, usual: str, known: Iterable[str]) -> str:

@@ -79,8 +79,8 @@ def _read(
 ) -> list[Trajectory]:
     bodies = _bodies(path, header, layout, "device" in dict(options.columns))
     taken = set(selection.of([body.name for body in bodies]))
-    wanted = [body for body in bodies if body.name in taken]
-    columns = {"t": layout.time} | {body.label(one): index for body in wanted for one, index in body.columns.items()}
+    requested = [body for body in bodies if body.name in taken]
+    columns = {"t": layout.time} | {body.label(one): index for body in requested for one, index in body.columns.items()}
     table = header.table(path, columns)
     kind = kind_of_times(table)
     if kind and (options.time_unit or options.frame_rate):
@@ -95,11 +95,11 @@ def _read(
         times = numbers["t"] / options.frame_rate
     else:
         require_time_unit(layout)
-        for body in wanted:
+        for body in requested:
             require_seconds(table, numbers["t"][body.rows], layout.time_unit)
         times = seconds_of(table, numbers["t"], layout.time_unit)
     trajectories = []
-    for body in wanted:
+    for body in requested:
         held = {one: numbers[body.label(one)][body.rows] for one in body.columns}
         trajectory = replace(_trajectory(body, times[body.rows], held, layout, options), dated=kind is not None)
         require_one_body(trajectory, path, way_out, header.number)
@@ -112,23 +112,25 @@ def _find_header(path: Path, options: ReadingOptions) -> tuple[HeaderLine, Layou
 
     Where none does, TrajectoryError says what the nearest lacks.
     """
-    found: list[tuple[HeaderLine, Layout]] = []
+    result: list[tuple[HeaderLine, Layout]] = []
     problems: list[tuple[ColumnProblem, int]] = []
     first = (line.of_rows(path) for line in header_lines(path))
     for is_first, lines in ((True, first), (False, lines_above_numbers(path))):
         for line in lines:
             try:
-                found.append((line, layout_of(line.cells, options)))
+                result.append((line, layout_of(line.cells, options)))
             except ColumnProblem as problem:
                 problems.append((problem, line.number))
-            if found and is_first:
-                return found[0]
-    if len(found) == 1:
-        return found[0]
-    if found:
-        numbers = " and ".join(str(line.number) for line, _ in found[:2])
+            if result and is_first:
+                return result[0]
+    if len(result) == 1:
+        return result[0]
+    if result:
+        numbers = " and ".join(str(line.number) for line, _ in result[:2])
         problem = f"lines {numbers} both name columns, with others before them"
-        raise TrajectoryError(path, problem, "make a file of each table, without what is before it", found[0][0].number)
+        raise TrajectoryError(
+            path, problem, "make a file of each table, without what is before it", result[0][0].number
+        )
     problem, number = max(problems, key=lambda known: known[0].known)
     if not problem.known:
         problem, number = problems[-1]

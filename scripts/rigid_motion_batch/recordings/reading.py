@@ -15,9 +15,9 @@ from rigid_motion.motion.repair import LARGEST
 
 from . import aframe, blend, bvh, euroc, fbx, gltf, motive, named_csv, tum
 from .clips import ClipWarning
-from .figures import BELIEVED, NOTHING, size_of, sureness, unit_of
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .recordings import Recording, Selection, Trajectory, TrajectoryError, shown
+from .rest_bodies import BELIEVED, NOTHING, size_of, sureness, unit_of
 from .sense import doubts
 from .tables import encoding_of
 
@@ -110,41 +110,41 @@ def read_trajectories(source: str, options: ReadingOptions = AS_THE_FILE_SAYS) -
     path, body = split_source(source)
     selection = Selection(path, body)
     try:
-        found = format_of(path)
-        trajectories = _read(found, path, selection, options)
+        result = format_of(path)
+        trajectories = _read(result, path, selection, options)
     except OSError as error:
         problem = f"this file cannot be read ({error.strerror})"
         raise TrajectoryError(path, problem, "check its permissions") from None
     if all(len(trajectory.times) < 2 for trajectory in trajectories):
         problem = ", ".join(f"{shown(one.name)} has {len(one.times)} samples" for one in trajectories[:3])
         raise TrajectoryError(path, problem, "a trajectory needs at least 2")
-    return replace(selection.recording(trajectories), axes=found.axes, measured=found.measured)
+    return replace(selection.recording(trajectories), axes=result.axes, measured=result.measured)
 
 
-def _read(found: Format, path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
+def _read(result: Format, path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
     for name in options.given:
-        if name not in ("scale", "start", "end") and name not in found.honours:
+        if name not in ("scale", "start", "end") and name not in result.honours:
             labels = " and ".join(known.label for known in FORMATS if name in known.honours)
-            problem = f"--{name.replace('_', '-')} is for {labels}, and this is {found.label}"
+            problem = f"--{name.replace('_', '-')} is for {labels}, and this is {result.label}"
             raise TrajectoryError(path, problem, "leave it out; its files say that themselves")
-    trajectories = found.read(path, selection, options) if found.honours else found.read(path, selection)
+    trajectories = result.read(path, selection, options) if result.honours else result.read(path, selection)
     if options.scale is not None:
         trajectories = [replace(trajectory, metres_per_unit=options.scale) for trajectory in trajectories]
     else:
-        trajectories = [_sized(path, trajectory, told=found.in_metres) for trajectory in trajectories]
-    if found.measured:
-        trajectories = [_doubted(trajectory, "time_unit" in found.honours) for trajectory in trajectories]
+        trajectories = [_sized(path, trajectory, told=result.in_metres) for trajectory in trajectories]
+    if result.measured:
+        trajectories = [_doubted(trajectory, "time_unit" in result.honours) for trajectory in trajectories]
     return trajectories
 
 
 def _sized(path: Path, trajectory: Trajectory, *, told: bool) -> Trajectory:
     """A whole body in the unit that it is likely to be in by its size, where that is not told or cannot be."""
-    if trajectory.figure is None:
+    if trajectory.rest_body is None:
         return trajectory
     places = _first_whole(trajectory)
     if places is None:
         return trajectory
-    size = size_of(trajectory.figure.parents, places) * trajectory.metres_per_unit
+    size = size_of(trajectory.rest_body.parents, places) * trajectory.metres_per_unit
     unit, length = unit_of(size)
     metres = size * length
     if size < NOTHING or (told and length == 1.0):
@@ -162,7 +162,7 @@ def _sized(path: Path, trajectory: Trajectory, *, told: bool) -> Trajectory:
 
 def _first_whole(trajectory: Trajectory) -> np.ndarray | None:
     """Where the joints of a body are in the first sample without damage, shape (joints, 3)."""
-    skeleton = trajectory.figure.skeleton
+    skeleton = trajectory.rest_body.skeleton
     for first in range(0, len(trajectory.times), LOOKED_AT):
         # What is not finite, or far beyond all measure, is for the repair to say.
         with np.errstate(invalid="ignore", over="ignore"):
@@ -206,8 +206,8 @@ def split_source(source: str) -> tuple[Path, str | None]:
         if not drive and os.path.isfile(source[:end]):
             return Path(source[:end]), source[end + 1 :] if end < len(source) else None
     for end in [len(source), *reversed(colons)]:
-        if found := _what_is_no_file(source[:end]):
-            raise TrajectoryError(source[:end], *found)
+        if result := _what_is_no_file(source[:end]):
+            raise TrajectoryError(source[:end], *result)
     raise TrajectoryError(source, "no such file", "check the path")
 
 

@@ -15,7 +15,7 @@ from rigid_motion.motion import Poses
 from rigid_motion_batch.command_line import printable
 
 from .clips import ClipWarning
-from .figures import Figure
+from .rest_bodies import RestBody
 
 ALL = "*"
 """Asks for every body of a file."""
@@ -48,7 +48,7 @@ class Trajectory:
     dated: bool = False
     """Whether its times were dates or clock times, whose unit nobody can mistake."""
 
-    figure: Figure | None = None
+    rest_body: RestBody | None = None
     """Of a whole body, what it is made of."""
 
     rate: float | None = None
@@ -57,7 +57,7 @@ class Trajectory:
     @property
     def rigid(self) -> Poses:
         """A single rigid body of it, shape (n,): of a whole body its first root."""
-        return self.poses if self.figure is None else self.poses[0]
+        return self.poses if self.rest_body is None else self.poses[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,9 +102,9 @@ class NoMotion(TrajectoryError):
 class Selection:
     """Which bodies of a file are wanted: the first, all, or one by name."""
 
-    def __init__(self, path: Path, wanted: str | None) -> None:
+    def __init__(self, path: Path, requested: str | None) -> None:
         self.path = path
-        self.wanted = wanted
+        self.requested = requested
         self.names: tuple[str, ...] = ()
 
     def of(self, names: Sequence[str], unlisted: Sequence[str] = (), more: int = 0) -> list[str]:
@@ -125,7 +125,7 @@ class Selection:
             Where the file has no body of that name, whatever its case, or several, or none at all.
         """
         self.names = tuple(names)
-        if self.wanted in (None, ALL):
+        if self.requested in (None, ALL):
             if not names:
                 way_out = (
                     f"name one with {self.path}:NAME: {listed(unlisted, more=more)}"
@@ -133,12 +133,12 @@ class Selection:
                     else "record at least one"
                 )
                 raise TrajectoryError(self.path, "no moving body in this file", way_out)
-            return list(names) if self.wanted == ALL else [names[0]]
+            return list(names) if self.requested == ALL else [names[0]]
         self.match([*names, *unlisted])
-        if self.wanted not in names and self.wanted not in unlisted:
+        if self.requested not in names and self.requested not in unlisted:
             way_out = f"it holds {listed([*names, *unlisted], more=more)}"
-            raise TrajectoryError(self.path, f"no body named {shown(self.wanted)}", way_out)
-        return [self.wanted]
+            raise TrajectoryError(self.path, f"no body named {shown(self.requested)}", way_out)
+        return [self.requested]
 
     def match(self, names: Iterable[str]) -> None:
         """Take the name in the file for the one that is wanted, where they differ in their case alone.
@@ -148,26 +148,26 @@ class Selection:
         TrajectoryError
             Where several names in the file do.
         """
-        wanted, names = self.wanted or ALL, tuple(names)
-        if wanted == ALL or wanted in names:
+        requested, names = self.requested or ALL, tuple(names)
+        if requested == ALL or requested in names:
             return
-        alike = list(dict.fromkeys(name for name in names if name.casefold() == wanted.casefold()))
+        alike = list(dict.fromkeys(name for name in names if name.casefold() == requested.casefold()))
         if len(alike) > 1:
-            problem = f"no body named {shown(wanted)}, and {len(alike)} that differ from it in their case alone"
+            problem = f"no body named {shown(requested)}, and {len(alike)} that differ from it in their case alone"
             raise TrajectoryError(self.path, problem, f"name one of {listed(alike)}")
-        self.wanted = alike[0] if alike else wanted
+        self.requested = alike[0] if alike else requested
 
     def recording(self, trajectories: Sequence[Trajectory]) -> Recording:
         """The result, with what there is to say about the bodies that were taken, and those that were not."""
         taken = {trajectory.name for trajectory in trajectories}
         others = tuple(name for name in self.names if name not in taken)
         notes = [trajectory.remark for trajectory in trajectories if trajectory.remark]
-        if others and self.wanted is None:
+        if others and self.requested is None:
             notes.append(
                 f"{self.path} holds {len(self.names)} bodies; took {self.names[0]}; others: {listed(others)}; "
                 f"name one with {self.path}:NAME, all with {self.path}:{ALL}"
             )
-        named = "" if self.wanted in (None, ALL) else self.wanted
+        named = "" if self.requested in (None, ALL) else self.requested
         return Recording(self.path, tuple(trajectories), others, printable("; ".join(notes)), named)
 
 

@@ -17,13 +17,13 @@ import numpy as np
 from rigid_motion.motion import Poses
 from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.quaternions import align_signs, conjugate, from_matrices, rotate
-from rigid_motion_batch.recordings.figures import Figure, size_of, unit_of
+from rigid_motion_batch.recordings.rest_bodies import RestBody, size_of, unit_of
 
 from .bvh import MOST_POSES
+from .probe_scene import probe
 from .recordings import Trajectory, TrajectoryError, shown
 from .sampling import OF_JOINTS, Moments, sampled
 from .skins import carried_by, skin_of
-from .stages import probe
 
 if TYPE_CHECKING:
     import bpy
@@ -110,9 +110,9 @@ def whole_body(
         seen = sampled(moments, look, joints.parents, OF_JOINTS, metres)
     # What a damaged file has beyond all measure is for the repair to say.
     with np.errstate(invalid="ignore", over="ignore"):
-        figure = _figure(rig, joints, look.first, meshes, made_up=made_up)
+        rest_body = _rest_body(rig, joints, look.first, meshes, made_up=made_up)
         poses = _in_parents(_filled(seen.poses), joints.parents)
-    body = Trajectory(name, moments.times(seen.frames), poses, metres_per_unit, joints.remark, figure=figure)
+    body = Trajectory(name, moments.times(seen.frames), poses, metres_per_unit, joints.remark, rest_body=rest_body)
     return seen.told(body, moments, metres)
 
 
@@ -267,14 +267,14 @@ def _in_parents(world: Poses, parents: np.ndarray) -> Poses:
     return local
 
 
-def _figure(
+def _rest_body(
     rig: bpy.types.Object,
     joints: Joints,
     matrices: dict[bpy.types.Object, np.ndarray],
     meshes: Sequence[bpy.types.Object],
     *,
     made_up: bool,
-) -> Figure:
+) -> RestBody:
     bones, there = rig.data.bones, matrices[rig]
     rest = rigid(there @ np.array([bones[name].matrix_local for name in joints.names]))
     rest = _filled(Poses(rest.positions[:, None], rest.quaternions[:, None]))[:, 0]
@@ -283,7 +283,7 @@ def _figure(
     largest = 0.0 if made_up else float(np.ptp(rest.positions, axis=0).max())
     tails = _shortened(tails, rest.positions, joints.parents, largest)
     skin = skin_of(meshes, joints.names, matrices)
-    return Figure(joints.names, joints.parents, rest, np.ascontiguousarray(tails), skin)
+    return RestBody(joints.names, joints.parents, rest, np.ascontiguousarray(tails), skin)
 
 
 def _shortened(tails: np.ndarray, heads: np.ndarray, parents: np.ndarray, largest: float) -> np.ndarray:

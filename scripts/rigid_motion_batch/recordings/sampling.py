@@ -214,8 +214,8 @@ class _Gaps:
             for some, looks in ((eased, LOOKS), (~eased, HALF_WAY)):
                 if some.any():
                     places = frames[gaps[rows[some]]], frames[gaps[rows[some]] + 1]
-                    found = self._off(*places, begin[:, some], end[:, some], looks)
-                    errors[rows[some]], angles[rows[some]] = found
+                    result = self._off(*places, begin[:, some], end[:, some], looks)
+                    errors[rows[some]], angles[rows[some]] = result
         return errors, angles
 
     def _off(

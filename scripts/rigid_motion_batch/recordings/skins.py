@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigid_motion_batch.recordings.figures import Skin
+from rigid_motion_batch.recordings.rest_bodies import Skin
 
 if TYPE_CHECKING:
     import bpy

@@ -37,10 +37,10 @@ def expanded(names: Sequence[str], line: str, separator: str | None) -> list[str
     cells = CELL.sub(mark, line).split(separator)
     if max(sizes, default=0) < 3 or len(cells) > len(names):
         return None
-    found = [re.fullmatch(r"\s*<([34])>\s*", cell) for cell in cells] + [None] * (len(names) - len(cells))
+    result = [re.fullmatch(r"\s*<([34])>\s*", cell) for cell in cells] + [None] * (len(names) - len(cells))
     return [
         text
-        for name, size in zip(names, found, strict=True)
+        for name, size in zip(names, result, strict=True)
         for text in ([f"{name}.{axis}" for axis in AXES[: int(size[1])]] if size else [name])
     ]
 

@@ -126,8 +126,8 @@ def _ticks(values: Sequence[float]) -> list[float]:
     """1, 2 and 5 times powers of ten, among these values and once beyond."""
     low, high = min(values) / 2.0, max(values) * 2.0
     powers = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
-    found = [step * 10.0**power for power in powers for step in (1, 2, 5)]
-    return [value for value in found if low <= value <= high]
+    result = [step * 10.0**power for power in powers for step in (1, 2, 5)]
+    return [value for value in result if low <= value <= high]
 
 
 CHARTS: dict[str, Callable[..., Specification | None]] = {

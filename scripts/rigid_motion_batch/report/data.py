@@ -27,7 +27,7 @@ from rigid_motion.motion.quaternions import conjugate, multiply
 from rigid_motion_batch.analysis.metrics import NOTHING
 from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult, Motion
 from rigid_motion_batch.palette import full_colour
-from rigid_motion_batch.recordings.figures import carrying, short_names
+from rigid_motion_batch.recordings.rest_bodies import carrying, short_names
 
 from .mesh import Mesh
 
@@ -162,17 +162,17 @@ def _deviations(
     """How far a mode is from the recording at these samples of the clip."""
     at = within - first
     away = _joints(motion.poses)[:, at] - _joints(clip.truth)[:, within]
-    found = {"away": block.put(away.transpose(0, 2, 1).reshape(-1, len(at)))}
+    result = {"away": block.put(away.transpose(0, 2, 1).reshape(-1, len(at)))}
     if clip.parents is not None:
-        return found | ({} if motion.joint_errors is None else {"by_joint": block.put(motion.joint_errors[:, at], 1)})
+        return result | ({} if motion.joint_errors is None else {"by_joint": block.put(motion.joint_errors[:, at], 1)})
     turn = multiply(motion.poses.quaternions[at], conjugate(clip.truth.quaternions[within]))
     turn *= np.where(turn[:, :1] < 0.0, -1.0, 1.0)
     sine = np.linalg.norm(turn[:, 1:], axis=1, keepdims=True)
     angle = 2.0 * np.arctan2(sine, turn[:, :1])
-    found["turn"] = block.put((turn[:, 1:] * angle / np.maximum(sine, 1e-30)).T)
+    result["turn"] = block.put((turn[:, 1:] * angle / np.maximum(sine, 1e-30)).T)
     if motion.poses.scales is not None and clip.truth.scales is not None:
-        found["grown"] = block.put(np.log(motion.poses.scales[at] / clip.truth.scales[within]))
-    return found
+        result["grown"] = block.put(np.log(motion.poses.scales[at] / clip.truth.scales[within]))
+    return result
 
 
 @lru_cache(maxsize=4)

@@ -86,7 +86,7 @@ def _dense(times: np.ndarray) -> np.ndarray:
 
 def _shown(clip: Clip, poses: Poses) -> Poses:
     poses = to_blender(clip.in_metres(poses), clip.axes)
-    return poses if clip.figure else poses[None]
+    return poses if clip.rest_body else poses[None]
 
 
 def _document(clip: Clip, times: np.ndarray, lanes: list[Lane]) -> Document:
@@ -129,14 +129,14 @@ def _document(clip: Clip, times: np.ndarray, lanes: list[Lane]) -> Document:
 
 def _body(clip: Clip, poses: Poses) -> tuple[tuple[str, ...], np.ndarray, list[Mesh]]:
     """Return the names of what moves, their parents, and their looks in their own space: boxes to their children."""
-    figure = clip.figure
-    if figure is None:
+    rest_body = clip.rest_body
+    if rest_body is None:
         return (clip.body or clip.name,), np.array([-1]), [drill()]
     places = poses.positions[:, 0]
-    lengths = np.linalg.norm(places[figure.parents >= 0], axis=1)
+    lengths = np.linalg.norm(places[rest_body.parents >= 0], axis=1)
     least = 0.02 * max(float(lengths.max(initial=0.0)), 1e-3)
-    ends = [places[figure.parents == joint] for joint in range(len(places))]
-    return figure.joints, figure.parents, [_bones(of_joint, least) for of_joint in ends]
+    ends = [places[rest_body.parents == joint] for joint in range(len(places))]
+    return rest_body.joints, rest_body.parents, [_bones(of_joint, least) for of_joint in ends]
 
 
 def _bones(ends: np.ndarray, least: float) -> Mesh:

@@ -11,7 +11,7 @@ import numpy as np
 
 from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult
 from rigid_motion_batch.palette import error_hex, full_colour
-from rigid_motion_batch.recordings.figures import short_names
+from rigid_motion_batch.recordings.rest_bodies import short_names
 
 from .numbers import Numbers, digits
 

@@ -128,8 +128,8 @@ class Gathering:
 
     def numbers(self) -> Numbers:
         """All of them. Raises ValueError where no clip had a result."""
-        found = dict.fromkeys(choice for choices, _, _ in self._rows for choice in choices)
-        choices = tuple(sorted(found, key=lambda choice: (KINDS.index(type(choice)), choice.size)))
+        result = dict.fromkeys(choice for choices, _, _ in self._rows for choice in choices)
+        choices = tuple(sorted(result, key=lambda choice: (KINDS.index(type(choice)), choice.size)))
         modes = tuple(dict.fromkeys(mode for _, own, _ in self._rows for mode in own))
         if not choices:
             raise ValueError("no reconstruction to report: every clip is too short for two keys")

@@ -103,7 +103,7 @@ class _Contest:
         return next((place for place, group in enumerate(self.groups) if REFERENCE in group), None)
 
     @property
-    def told_apart(self) -> np.ndarray:
+    def distinguishable(self) -> np.ndarray:
         """Where all groups have a value and at least one of them has an error, shape (clips, choices)."""
         least = NOTHING * 1e3 if self.kind is not Tolerance else 0.0
         return np.isfinite(self.values).all(axis=2) & (self.values.max(axis=2) > least)
@@ -111,7 +111,7 @@ class _Contest:
     @property
     def means(self) -> np.ndarray:
         """Geometric means over the clips where groups can be told apart, shape (choices, groups)."""
-        return geometric_mean(np.where(self.told_apart[..., None], np.maximum(self.values, 1e-9), np.nan))
+        return geometric_mean(np.where(self.distinguishable[..., None], np.maximum(self.values, 1e-9), np.nan))
 
     def phrase(self, choice: int) -> str:
         return self.numbers.choices[self.places[choice]].phrase
@@ -161,7 +161,7 @@ def _contests(numbers: Numbers) -> Iterable[_Contest]:
         measure = numbers.deciding(places[0])
         values = numbers.values[measure][:, places][..., columns]
         contest = _Contest(numbers, places, groups, values)
-        if contest.told_apart.any():
+        if contest.distinguishable.any():
             yield contest
 
 
@@ -215,11 +215,11 @@ def _fewer_keys(contest: _Contest) -> Text | None:
 
     None where the curves of this run do not tell: rates that do not cross, or an error that does not fall with them.
     """
-    found = _best(contest)
-    if contest.kind is Tolerance or not found or contest.reference is None or len(contest.places) < 2:
+    result = _best(contest)
+    if contest.kind is Tolerance or not result or contest.reference is None or len(contest.places) < 2:
         return None
-    best, reference, _ = found
-    whole = contest.told_apart.all(axis=1)
+    best, reference, _ = result
+    whole = contest.distinguishable.all(axis=1)
     if not whole.any():
         return None
     curves = np.log(np.maximum(contest.values[whole], 1e-9)).mean(axis=0)
@@ -250,10 +250,10 @@ def _within(contest: _Contest) -> Text | None:
     """How many keys a mode needs within a tolerance."""
     if contest.kind is not Tolerance:
         return None
-    found = _best(contest)
-    if not found:
+    result = _best(contest)
+    if not result:
         return _nobody(contest)
-    best, rival, ratios = found
+    best, rival, ratios = result
     at = int(np.nanargmin(ratios))
     phrase = contest.phrase(at)
     return _say(
@@ -271,10 +271,10 @@ def _lower_error(contest: _Contest) -> Text | None:
     """How much closer the best mode is with as many keys."""
     if contest.kind is Tolerance:
         return None
-    found = _best(contest)
-    if not found:
+    result = _best(contest)
+    if not result:
         return _nobody(contest)
-    best, rival, ratios = found
+    best, rival, ratios = result
     at = int(np.nanargmin(ratios))
     return _say(
         f"{{}} has {{}} less error than {{}} with the same {{}} keys a second"
@@ -331,10 +331,10 @@ def _nobody(contest: _Contest) -> Text:
 
 def _gain(contest: _Contest) -> Text | None:
     """Return the largest gain with as many keys, beside a sentence that says something else."""
-    found = _best(contest)
-    if not found:
+    result = _best(contest)
+    if not result:
         return None
-    best, rival, ratios = found
+    best, rival, ratios = result
     at = int(np.nanargmin(ratios))
     less = f"{percent(1.0 - ratios[at])} {'fewer keys' if contest.kind is Tolerance else 'lower error'}"
     said = f"{{}} from {{}} than from {{}} {contest.phrase(at)}"
@@ -343,15 +343,15 @@ def _gain(contest: _Contest) -> Text | None:
 
 def _wins(contest: _Contest) -> Text | None:
     """In how many cases the best mode was, and where it was beaten by the most."""
-    found = _best(contest)
-    if not found or contest.told_apart.sum() < 2:
+    result = _best(contest)
+    if not result or contest.distinguishable.sum() < 2:
         return None
-    best = found[0]
-    values = np.where(contest.told_apart[..., None], contest.values, np.nan)
-    least = np.where(contest.told_apart, np.nanmin(np.where(np.isnan(values), np.inf, values), axis=2), np.nan)
+    best = result[0]
+    values = np.where(contest.distinguishable[..., None], contest.values, np.nan)
+    least = np.where(contest.distinguishable, np.nanmin(np.where(np.isnan(values), np.inf, values), axis=2), np.nan)
     loss = 1.0 - least / values[..., best]
-    lost = contest.told_apart & (loss > TIE)
-    cases, won = int(contest.told_apart.sum()), int((contest.told_apart & ~lost).sum())
+    lost = contest.distinguishable & (loss > TIE)
+    cases, won = int(contest.distinguishable.sum()), int((contest.distinguishable & ~lost).sum())
     many = _number(f"{'Fewest keys' if contest.kind is Tolerance else 'Closest'} in {won} of {cases}")
     if not lost.any():
         return _say("{} cases", many)
@@ -372,7 +372,7 @@ def _best_of(numbers: Numbers, contest: _Contest) -> Text | None:
         return None
     own = numbers.values[ERROR][:, contest.places][..., numbers.modes.index(BEST_OF)]
     single = contest.values.min(axis=2)
-    possible = contest.told_apart & (single > NOTHING * 1e3) & np.isfinite(own)
+    possible = contest.distinguishable & (single > NOTHING * 1e3) & np.isfinite(own)
     if not possible.any():
         return None
     ratio = float(np.exp(np.log(np.maximum(own[possible], 1e-9) / single[possible]).mean()))
@@ -398,10 +398,10 @@ def _other(numbers: Numbers, contest: _Contest) -> Text | None:
 
 def _others(contest: _Contest) -> Text | None:
     """Return what did not pay: the modes that are neither the best nor the reference, beside the reference."""
-    found = _best(contest)
-    if not found or contest.reference is None:
+    result = _best(contest)
+    if not result or contest.reference is None:
         return None
-    rest = [place for place in range(len(contest.groups)) if place not in (found[0], contest.reference)]
+    rest = [place for place in range(len(contest.groups)) if place not in (result[0], contest.reference)]
     if not rest:
         return None
     ratios = (contest.means[:, rest] / contest.means[:, [contest.reference]]) - 1.0

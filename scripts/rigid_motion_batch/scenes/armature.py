@@ -18,7 +18,7 @@ from rigid_motion.motion import KEYFRAME_MODES, Poses
 from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.quaternions import align_signs, conjugate, multiply, rotate
 from rigid_motion_batch.axes import to_blender
-from rigid_motion_batch.recordings.figures import Figure
+from rigid_motion_batch.recordings.rest_bodies import RestBody
 from rigid_motion_batch.recordings.rigs import rigid
 
 LEAST_BONE = 0.02
@@ -47,12 +47,12 @@ class Rest:
     """Where that space begins in the figure's world: below it, on the ground. Shape (3,)."""
 
     @classmethod
-    def of(cls, figure: Figure, metres_per_unit: float, axes: str) -> Rest:
+    def of(cls, rest_body: RestBody, metres_per_unit: float, axes: str) -> Rest:
         """The figure in metres; it may be in any unit and axes, and at rest anywhere."""
-        metres = Poses(figure.rest.positions * metres_per_unit, figure.rest.quaternions)
+        metres = Poses(rest_body.rest.positions * metres_per_unit, rest_body.rest.quaternions)
         joints = to_blender(metres, axes)
-        turned = np.tile(STILL, (len(figure.tails), 1))
-        arms = to_blender(Poses(figure.tails * metres_per_unit, turned), axes).positions
+        turned = np.tile(STILL, (len(rest_body.tails), 1))
+        arms = to_blender(Poses(rest_body.tails * metres_per_unit, turned), axes).positions
         lengths = np.linalg.norm(arms, axis=1)
         least = LEAST_BONE * max(float(np.ptp(joints.positions, axis=0).max(initial=0.0)), float(lengths.max()), 1e-3)
         short = lengths < least
@@ -60,7 +60,7 @@ class Rest:
         arms[short] = least * along[short]
         tails = joints.positions + rotate(joints.quaternions, arms)
         origin = np.append(joints.positions[:, :2].mean(axis=0), min(joints.positions[:, 2].min(), tails[:, 2].min()))
-        return cls(figure.parents, Poses(joints.positions - origin, joints.quaternions), tails - origin, origin)
+        return cls(rest_body.parents, Poses(joints.positions - origin, joints.quaternions), tails - origin, origin)
 
 
 class Rig:

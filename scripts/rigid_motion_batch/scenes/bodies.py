@@ -15,7 +15,7 @@ import numpy as np
 from rigid_motion.motion import KEYFRAME_MODES, Poses
 from rigid_motion.motion.quaternions import conjugate, rotate
 from rigid_motion_batch.palette import error_hex
-from rigid_motion_batch.recordings.figures import Figure
+from rigid_motion_batch.recordings.rest_bodies import RestBody
 
 from . import layout, physique, trails
 from .armature import Rest, Rig
@@ -56,7 +56,7 @@ MOST_CELLS = 120
 class BodyMotion:
     """What moves on the stage, in metres and Blender's axes, around the middle of the recording: n frames."""
 
-    figure: Figure
+    rest_body: RestBody
     rest: Rest
     recording: Poses
     """The joints in their parents' space at each frame, shape (joints, n)."""
@@ -76,7 +76,7 @@ class BodyMotion:
     def places(self, poses: Poses) -> np.ndarray:
         """Where the bones begin and end that are seen, of joints in their parents' space (joints, n): (n, m, 3)."""
         seen = physique.seen_bones(self.rest)
-        joints = self.figure.skeleton.in_root_space(poses)[seen]
+        joints = self.rest_body.skeleton.in_root_space(poses)[seen]
         back = conjugate(self.rest.joints.quaternions[seen])
         arms = rotate(back, self.rest.tails[seen] - self.rest.joints.positions[seen])
         tails = joints.positions + rotate(joints.quaternions, arms[:, None])
@@ -88,15 +88,15 @@ class Bodies:
 
     def __init__(self, cast: Cast, motion: BodyMotion, shape: physique.Physique, full: float) -> None:
         self.cast, self.motion = cast, motion
-        self.names = motion.figure.joints
-        self.size = physique.figure_size(motion.rest)
+        self.names = motion.rest_body.joints
+        self.size = physique.body_size(motion.rest)
         self.rig: Rig | None = None
         self.ghost_action: bpy.types.Action | None = None
-        self.figure = physique.Carried.figure("Figure", shape)
+        self.rest_body = physique.Carried.rest_body("Figure", shape)
         self.ghost = ghost(cast.theme)
         for shade in range(SHADES):
             name = f"Error {1e3 * full * shade / (SHADES - 1):.3g} mm"
-            self.figure.mesh.materials.append(surface(name, error_hex(shade / (SHADES - 1)), roughness=0.55))
+            self.rest_body.mesh.materials.append(surface(name, error_hex(shade / (SHADES - 1)), roughness=0.55))
         self.joints = physique.Carried.joints("Joints", motion.rest)
         self.full = full
         self.colours, self.flashes, self.rings = _colours_group(), _flashes_group(), _rings_group()
@@ -107,17 +107,17 @@ class Bodies:
     def enter(self, lane: Lane) -> None:
         """Add the figure of a mode, its ghost, and the ground."""
         mode, motion = lane.mode, self.motion
-        figure = self._rig(mode, lane)
+        rest_body = self._rig(mode, lane)
         if mode in KEYFRAME_MODES:
-            self._key(figure, motion.keys[mode])
-            figure.fill_in(mode)
+            self._key(rest_body, motion.keys[mode])
+            rest_body.fill_in(mode)
         else:
             frames = self.cast.timeline.frames
-            self._key(figure, [(frames, motion.modes[mode][joint]) for joint in range(len(self.names))])
-        if figure.obj.animation_data and figure.obj.animation_data.action:
-            figure.obj.animation_data.action.name = mode
+            self._key(rest_body, [(frames, motion.modes[mode][joint]) for joint in range(len(self.names))])
+        if rest_body.obj.animation_data and rest_body.obj.animation_data.action:
+            rest_body.obj.animation_data.action.name = mode
         self._add_ghost(lane)
-        self._dress(figure, lane)
+        self._dress(rest_body, lane)
         self._add_ground(lane)
 
     def _rig(self, name: str, lane: Lane) -> Rig:
@@ -148,10 +148,10 @@ class Bodies:
             rig.obj.animation_data.action_slot = self.ghost_action.slots[0]
             for bone, (place, turn) in zip(rig.obj.pose.bones, self.still, strict=True):
                 bone.location, bone.rotation_quaternion = place, turn
-        figure = self._carried(f"{lane.mode} recording figure", self.figure, rig, lane)
-        figure.location = rig.obj.location = self.cast.behind
-        figure.material_slots[0].link = "OBJECT"
-        figure.material_slots[0].material = self.ghost
+        rest_body = self._carried(f"{lane.mode} recording figure", self.rest_body, rig, lane)
+        rest_body.location = rig.obj.location = self.cast.behind
+        rest_body.material_slots[0].link = "OBJECT"
+        rest_body.material_slots[0].material = self.ghost
 
     @staticmethod
     def _carried(name: str, carried: physique.Carried, rig: Rig, lane: Lane) -> bpy.types.Object:
@@ -162,9 +162,9 @@ class Bodies:
     def _dress(self, rig: Rig, lane: Lane) -> None:
         mode, metres = lane.mode, self.cast.layout.metres
         errors = self._errors(lane)
-        figure = self._carried(f"{mode} figure", self.figure, rig, lane)
+        rest_body = self._carried(f"{mode} figure", self.rest_body, rig, lane)
         bones = float(len(self.names))
-        apply_group(figure, self.colours, Errors=errors, Bones=bones, Shades=SHADES / self.full)
+        apply_group(rest_body, self.colours, Errors=errors, Bones=bones, Shades=SHADES / self.full)
         # Square to the camera, and in front of the figure: of the lane's turn there is nothing else.
         turn = -self.cast.framing.yaw
         towards = rotate(layout.yaw_quaternion(turn), -layout.AWAY * IN_FRONT * metres).tolist()
@@ -206,7 +206,7 @@ class Bodies:
 
 def ground_grid(motion: BodyMotion, spacing: float) -> bpy.types.Mesh:
     """Lines on the ground around the way of a body, so many metres apart, as a mesh of edges."""
-    reach = 2.5 * physique.figure_size(motion.rest)
+    reach = 2.5 * physique.body_size(motion.rest)
     way = motion.places(motion.recording).mean(axis=1)[:, :2]
     low, high = way.min(axis=0) - reach, way.max(axis=0) + reach
     spacing = max(spacing, float((high - low).max()) / MOST_CELLS)
@@ -234,13 +234,13 @@ def flashes(key_frames: list[np.ndarray], frames: np.ndarray, fade: float) -> np
 
     Shape (joints, n). A joint with a single key does not.
     """
-    found = np.zeros((len(key_frames), len(frames)))
-    for own, flash in zip(key_frames, found, strict=True):
+    result = np.zeros((len(key_frames), len(frames)))
+    for own, flash in zip(key_frames, result, strict=True):
         if len(own) > 1:
             last = np.searchsorted(own, frames + 1e-3, side="right") - 1
             age = frames - own[np.maximum(last, 0)]
             flash[:] = np.where(last >= 0, np.clip(1.0 - age / fade, 0.0, 1.0), 0.0)
-    return found
+    return result
 
 
 def _looked_up(group: Group, name: str) -> Socket:

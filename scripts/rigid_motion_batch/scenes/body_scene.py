@@ -19,7 +19,7 @@ from rigid_motion_batch.analysis.bodies import BLOCK, BodyReconstruction, identi
 from rigid_motion_batch.analysis.body_metrics import key_samples
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.palette import error_hex, full_colour
-from rigid_motion_batch.recordings.figures import short_names
+from rigid_motion_batch.recordings.rest_bodies import short_names
 
 from . import captions, layout
 from .armature import Rest
@@ -27,9 +27,9 @@ from .bodies import SHADES, Bodies, BodyMotion, flashes
 from .framing import SMOOTHING, Framing, Jointed
 from .lanes import Cast
 from .materials import ink
-from .physique import Physique, figure_size
-from .scene import LEGEND, Header, begin, put_on_stage
-from .settings import StageSettings
+from .physique import Physique, body_size
+from .scene import LEGEND, Header, assemble_scene, begin
+from .settings import SceneSettings
 from .timeline import Timeline
 
 FADE, FADE_SHARE = 5.0, 0.6
@@ -47,7 +47,7 @@ GROUND = 0.05
 """What is seen of the ground below the feet, in units of the figure."""
 
 
-def build_body_stage(made: BodyReconstruction, settings: StageSettings, radii: np.ndarray) -> bpy.types.Scene:
+def build_body_scene(made: BodyReconstruction, settings: SceneSettings, radii: np.ndarray) -> bpy.types.Scene:
     """Make the scene of a comparison of whole bodies, in a file that is emptied for it.
 
     Parameters
@@ -60,12 +60,12 @@ def build_body_stage(made: BodyReconstruction, settings: StageSettings, radii: n
     """
     timeline = begin(made, settings)
     lanes_of = identical_body_modes(made) if settings.distinct else tuple((mode,) for mode in made.keys)
-    rest = Rest.of(made.clip.figure, made.clip.metres_per_unit, made.clip.axes)
+    rest = Rest.of(made.clip.rest_body, made.clip.metres_per_unit, made.clip.axes)
     motion, centre = shown_motion(made, [group[0] for group in lanes_of], timeline, rest, radii)
 
     recording, *others = (Jointed(motion.places(some)) for some in (motion.recording, *motion.modes.values()))
     framing = Framing.of(recording, SMOOTHING * settings.fps)
-    extent, size = framing.extent(recording, others), figure_size(rest)
+    extent, size = framing.extent(recording, others), body_size(rest)
     extent = replace(
         extent, low=extent.low - size * np.array((MARGIN, MARGIN + GROUND, MARGIN)), high=extent.high + MARGIN * size
     )
@@ -80,16 +80,16 @@ def build_body_stage(made: BodyReconstruction, settings: StageSettings, radii: n
         errors={mode: 1e3 * errors.max(axis=0) for mode, errors in motion.errors.items()},
         sampled={mode: 1e3 * _sampled_errors(made, mode, radii) for mode in motion.modes},
         sample_frames=timeline.frames_of(made.times),
-        joints=tuple(short_names(made.clip.figure.joints)),
+        joints=tuple(short_names(made.clip.rest_body.joints)),
         worst={mode: errors.argmax(axis=0) for mode, errors in motion.errors.items()},
     )
     full = full_colour(motion.errors.values())
-    shape = Physique.of(made.clip.figure, rest, made.clip.metres_per_unit, made.clip.axes)
+    shape = Physique.of(made.clip.rest_body, rest, made.clip.metres_per_unit, made.clip.axes)
     bar = _Bar.of(1e3 * full, cast.largest_error)
     header = Header(made.clip.name, made.choice.title, _legend(made, settings), bar.width + 2.0 * BAR_GAP)
     with _extension():
         actors = Bodies(cast, motion, shape, full)
-        scene = put_on_stage(settings, cast, lanes_of, actors, header, centre)
+        scene = assemble_scene(settings, cast, lanes_of, actors, header, centre)
     bar.put(cast)
     return scene
 
@@ -113,9 +113,9 @@ def shown_motion(
     def around(poses: Poses, joint: int | None = None) -> Poses:
         """With the roots, or the joint if it is one, moved by the centre."""
         if joint is not None:
-            return Poses(poses.positions - centre, poses.quaternions) if clip.figure.parents[joint] < 0 else poses
+            return Poses(poses.positions - centre, poses.quaternions) if clip.rest_body.parents[joint] < 0 else poses
         positions = poses.positions.copy()
-        positions[clip.figure.parents < 0] -= centre
+        positions[clip.rest_body.parents < 0] -= centre
         return Poses(positions, poses.quaternions)
 
     shown = {mode: in_blender(made.filled_in(mode, times)) for mode in modes}
@@ -131,7 +131,7 @@ def shown_motion(
     most = max(len(own) for some in moment.values() for own in some)
     fade = float(np.clip(FADE_SHARE * timeline.frames_per_key(most), 1.0, FADE))
     return BodyMotion(
-        figure=clip.figure,
+        rest_body=clip.rest_body,
         rest=rest,
         recording=around(recording),
         modes={mode: around(poses) for mode, poses in shown.items()},
@@ -160,7 +160,7 @@ def _notes(made: BodyReconstruction, modes: Iterable[str]) -> dict[str, str]:
     return {} if len(set(counts.values())) == 1 else {mode: f"{count} {kind}" for mode, count in counts.items()}
 
 
-def _legend(made: BodyReconstruction, settings: StageSettings) -> str:
+def _legend(made: BodyReconstruction, settings: SceneSettings) -> str:
     """How to read the picture, but for the colours."""
     parts = [
         "grey: recording",

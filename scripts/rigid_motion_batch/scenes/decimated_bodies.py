@@ -159,15 +159,15 @@ class Decimations:
         if not any(ends):
             return float(np.clip(np.log(max(largest, 1e-12)), low, high))
         below, above = (np.log(max(end.largest, 1e-12)) if end else None for end in ends)
-        wanted = np.log(0.5 * (NEAR + 1.0) * max(largest, 1e-12))
+        requested = np.log(0.5 * (NEAR + 1.0) * max(largest, 1e-12))
         if halving or (below is not None and above is not None and above - below < 1e-9):
             return 0.5 * (low + high)
         if below is None:
-            guess = high + wanted - above
+            guess = high + requested - above
         elif above is None:
-            guess = low + wanted - below
+            guess = low + requested - below
         else:
-            guess = low + (high - low) * (wanted - below) / (above - below)
+            guess = low + (high - low) * (requested - below) / (above - below)
         edge = EDGE * (high - low)
         return float(np.clip(guess, low + edge * bool(ends[0]), high - edge * bool(ends[1])))
 

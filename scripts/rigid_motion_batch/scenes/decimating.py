@@ -61,13 +61,13 @@ class DecimatedBody:
         self.frames = frames_of(made.times)
         self._skeleton, self._radius = made.skeleton, np.broadcast_to(radius, (len(made.skeleton),))[:, None]
         joints = to_blender(clip.in_metres(clip.poses[:, made.samples]), clip.axes)
-        roots = clip.figure.parents < 0
+        roots = clip.rest_body.parents < 0
         places = joints.positions[roots]
         # Single precision is best around the origin.
         joints.positions[roots] -= (places.min(axis=(0, 1)) + places.max(axis=(0, 1))) / 2.0
         self._truth = self._skeleton.in_root_space(joints)
-        rest = Rest.of(clip.figure, clip.metres_per_unit, clip.axes)
-        self.rig = Rig("Body", rest, clip.figure.joints, bpy.context.scene.collection)
+        rest = Rest.of(clip.rest_body, clip.metres_per_unit, clip.axes)
+        self.rig = Rig("Body", rest, clip.rest_body.joints, bpy.context.scene.collection)
         channels = self.rig.channels_of(joints)
         for bone in range(len(self.rig.bones)):
             self.rig.key(bone, self.frames, channels[bone])
@@ -92,10 +92,10 @@ class DecimatedBody:
 
         None where it is smaller than what Blender can keep in single precision, or no channel varies.
         """
-        found = [left for decimations in self.decimations if (left := decimations.within(largest))]
+        result = [left for decimations in self.decimations if (left := decimations.within(largest))]
         if self._counted and (everything := self.left()).largest <= largest:
-            found.append(everything)
-        return min(found, key=lambda left: left.keys, default=None)
+            result.append(everything)
+        return min(result, key=lambda left: left.keys, default=None)
 
     def _channels(self) -> Poses:
         """Of all bones at the samples, shape (joints, n)."""

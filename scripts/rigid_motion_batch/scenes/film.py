@@ -14,7 +14,7 @@ from pathlib import Path
 import bpy
 
 from rigid_motion_batch.files import written_beside
-from rigid_motion_batch.hushing import hushed
+from rigid_motion_batch.silencing import silenced
 
 LOSSLESS = "HUFFYUV", "MKV", ".mkv"
 """Codec, container and extension of pieces of a film: exact to the bit, and quicker than PNG or FFV1."""
@@ -51,7 +51,7 @@ def render_film(scene: bpy.types.Scene, path: Path, progress: Callable[[int, int
         kept, scene.render.filepath = scene.render.filepath, str(beside)
         started = time.perf_counter()
         try:
-            with hushed():
+            with silenced():
                 ended = bpy.ops.render.render(animation=True, scene=scene.name)
         finally:
             scene.render.filepath = kept
@@ -122,7 +122,7 @@ def join_pieces(
 
 def _open(blend: Path) -> bpy.types.Scene:
     """The scene of a saved stage, which is opened for it. Its scripts, if it has come by any, do not run."""
-    with hushed():
+    with silenced():
         bpy.ops.wm.open_mainfile(filepath=str(blend), use_scripts=False, load_ui=False)
     return bpy.context.scene
 
@@ -140,7 +140,7 @@ def render_still(scene: bpy.types.Scene, path: Path) -> None:
         image.media_type = "IMAGE"
     image.file_format = "PNG"
     image.compression = 90
-    with written_beside(path) as beside, hushed():
+    with written_beside(path) as beside, silenced():
         scene.render.filepath = str(beside)
         bpy.ops.render.render(write_still=True, scene=scene.name)
         if not beside.is_file():
@@ -149,7 +149,7 @@ def render_still(scene: bpy.types.Scene, path: Path) -> None:
 
 def save_blend(path: Path) -> None:
     """Save the open file as a compressed .blend. A file that is there is replaced."""
-    with written_beside(path) as beside, hushed():
+    with written_beside(path) as beside, silenced():
         bpy.ops.wm.save_as_mainfile(filepath=str(beside), compress=True, copy=True, check_existing=False)
 
 

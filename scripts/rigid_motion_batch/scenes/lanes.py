@@ -23,7 +23,7 @@ from . import captions, layout, trails
 from .framing import Extent, Framing
 from .materials import ink
 from .nodes import apply_group
-from .settings import StageSettings
+from .settings import SceneSettings
 from .timeline import Timeline, peaks
 
 TITLE, NAME, NUMBER, UNIT, SMALL = 0.044, 0.026, 0.05, 0.032, 0.028
@@ -73,7 +73,7 @@ class Cast:
 
     @classmethod
     def arranged(
-        cls, settings: StageSettings, lanes_of: Groups, extent: Extent, notes: Mapping[str, str], **own: Any
+        cls, settings: SceneSettings, lanes_of: Groups, extent: Extent, notes: Mapping[str, str], **own: Any
     ) -> Cast:
         """With lanes arranged for what is seen of the motion; `own` are the fields that are left."""
         theme, (width, height) = THEMES[settings.theme], settings.resolution

@@ -14,7 +14,7 @@ import numpy as np
 
 from rigid_motion.motion import Poses
 from rigid_motion_batch.axes import to_blender
-from rigid_motion_batch.recordings.figures import Figure, carrying
+from rigid_motion_batch.recordings.rest_bodies import RestBody, carrying
 
 from .armature import Rest, Rig
 
@@ -65,11 +65,11 @@ class Physique:
         return foremost[[face[0] for face in self.faces]]
 
     @classmethod
-    def of(cls, figure: Figure, rest: Rest, metres_per_unit: float, axes: str) -> Physique:
+    def of(cls, rest_body: RestBody, rest: Rest, metres_per_unit: float, axes: str) -> Physique:
         """The skin, or else solids."""
-        if figure.skin is None:
+        if rest_body.skin is None:
             return cls._of_solids(rest)
-        skin = figure.skin
+        skin = rest_body.skin
         unturned = np.tile((1.0, 0.0, 0.0, 0.0), (len(skin.vertices), 1))
         vertices = to_blender(Poses(skin.vertices * metres_per_unit, unturned), axes).positions - rest.origin
         faces = [*map(tuple, skin.triangles.tolist())]
@@ -77,7 +77,7 @@ class Physique:
 
     @classmethod
     def _of_solids(cls, rest: Rest) -> Physique:
-        size = figure_size(rest)
+        size = body_size(rest)
         vertices, faces, carriers = [], [], []
         for bone, head, tail, share in _parts(rest, size):
             corners, own = _solid(head, tail, share, size)
@@ -111,7 +111,7 @@ def _parts(rest: Rest, size: float) -> Iterator[tuple[int, np.ndarray, np.ndarra
                 yield joint, heads[joint], heads[child], 1.0 if is_next or alone else LINK
 
 
-def figure_size(rest: Rest) -> float:
+def body_size(rest: Rest) -> float:
     """The largest extent of the joints of a figure at rest, without what only carries it about.
 
     Where bones end is often made up by importers, and counts for a single joint alone.
@@ -162,7 +162,7 @@ class Carried:
     """Shape (v, k)."""
 
     @classmethod
-    def figure(cls, name: str, physique: Physique) -> Carried:
+    def rest_body(cls, name: str, physique: Physique) -> Carried:
         """A physique. Its faces know their bones."""
         mesh = bpy.data.meshes.new(name)
         mesh.from_pydata(physique.vertices.tolist(), [], physique.faces)

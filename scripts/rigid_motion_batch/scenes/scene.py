@@ -22,7 +22,7 @@ from . import captions, layout
 from .deviations import largest_deviation, magnification, magnified
 from .framing import SMOOTHING, Framing, Solid
 from .lanes import Actors, Cast, Lanes
-from .settings import MODELS, StageSettings
+from .settings import MODELS, SceneSettings
 from .solids import Shape, Solids
 from .subject import load_subject, vertices_of
 from .timeline import ShownMotion, Timeline
@@ -34,7 +34,7 @@ SOFTENED = 0.8
 """How much of a pixel is the mean of those around it, near ones more: edges are smooth, and small letters clear."""
 
 
-def build_stage(reconstruction: Reconstruction, settings: StageSettings) -> bpy.types.Scene:
+def build_scene(reconstruction: Reconstruction, settings: SceneSettings) -> bpy.types.Scene:
     """Make the scene of a comparison, in a file that is emptied for it.
 
     Raises
@@ -75,14 +75,14 @@ def build_stage(reconstruction: Reconstruction, settings: StageSettings) -> bpy.
     )
     shape = Shape(motion, deviated, mesh, layout.telling_point(motion.recording, outline))
     header = Header(reconstruction.clip.name, reconstruction.choice.title, _legend(cast, settings, deviation, enlarged))
-    scene = put_on_stage(settings, cast, lanes_of, Solids(cast, shape), header, motion.centre)
+    scene = assemble_scene(settings, cast, lanes_of, Solids(cast, shape), header, motion.centre)
     # Our own models are closed: what faces away costs time and is never seen.
     scene.display.shading.show_backface_culling = settings.subject in MODELS
     scene["deviation_shown_times"] = deviation
     return scene
 
 
-def begin(made: Reconstruction | BodyReconstruction, settings: StageSettings) -> Timeline:
+def begin(made: Reconstruction | BodyReconstruction, settings: SceneSettings) -> Timeline:
     """Empty the file, and name its scene after what is compared."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.scene.name = f"{made.clip.name} {made.choice.name}"
@@ -103,8 +103,8 @@ class Header:
     """What has to be left free to the right of that, in units of the frame's height."""
 
 
-def put_on_stage(
-    settings: StageSettings, cast: Cast, lanes_of: Groups, actors: Actors, header: Header, centre: np.ndarray
+def assemble_scene(
+    settings: SceneSettings, cast: Cast, lanes_of: Groups, actors: Actors, header: Header, centre: np.ndarray
 ) -> bpy.types.Scene:
     """Make the lanes, what is written around them, camera and lights; `centre` (3,) of the recording is the origin."""
     scene = bpy.context.scene
@@ -130,7 +130,7 @@ def _notes(reconstruction: Reconstruction) -> dict[str, str]:
     return {mode: f"{(count - 1) / duration:.1f} keys/s" for mode, count in counts.items()}
 
 
-def _legend(cast: Cast, settings: StageSettings, deviation: float, enlarged: float) -> str:
+def _legend(cast: Cast, settings: SceneSettings, deviation: float, enlarged: float) -> str:
     """How to read the picture."""
     full = f"{cast.largest_error:.{captions.decimals_for(cast.largest_error)}f}"
     drawn = f", deviation drawn {deviation:g} times as large" if deviation > 1.0 else ""
@@ -203,7 +203,7 @@ def make_lights(scene: bpy.types.Scene) -> None:
 
 
 def set_up_render(
-    scene: bpy.types.Scene, settings: StageSettings, frames: int, background: str = DARK.background
+    scene: bpy.types.Scene, settings: SceneSettings, frames: int, background: str = DARK.background
 ) -> None:
     """Engine, size, colours and encoder of a scene of so many frames."""
     scene.frame_start, scene.frame_end = 1, frames

@@ -17,7 +17,7 @@ MODELS = {"drill": "Drill", "controller": "Controller"}
 
 
 @dataclass(frozen=True)
-class StageSettings:
+class SceneSettings:
     """How a comparison is shown."""
 
     engine: str = "workbench"
@@ -76,7 +76,7 @@ class SubjectError(ValueError):
     """The object to show cannot be had. The message says why, in one line."""
 
 
-def place_of_subject(wanted: str) -> tuple[Path, str]:
+def place_of_subject(requested: str) -> tuple[Path, str]:
     """The file that an object is in, whether or not it is there, and its name in that.
 
     Parameters
@@ -89,9 +89,9 @@ def place_of_subject(wanted: str) -> tuple[Path, str]:
     SubjectError
         Where no object is named.
     """
-    if wanted in MODELS:
-        return MODELS_FILE, MODELS[wanted]
-    file, colon, name = wanted.rpartition(":")
+    if requested in MODELS:
+        return MODELS_FILE, MODELS[requested]
+    file, colon, name = requested.rpartition(":")
     if not colon or not file.lower().endswith(".blend"):
-        raise SubjectError(f"object {wanted!r}: give {', '.join(MODELS)} or file.blend:Name")
+        raise SubjectError(f"object {requested!r}: give {', '.join(MODELS)} or file.blend:Name")
     return Path(file), name

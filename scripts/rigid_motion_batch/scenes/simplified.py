@@ -13,25 +13,25 @@ MOST_TRIANGLES = 4000
 TRIES = 6
 
 
-def simplified(wanted: str) -> dict[str, np.ndarray]:
+def simplified(requested: str) -> dict[str, np.ndarray]:
     """The surface of an object in its own axes, in metres: `vertices` (v, 3), `triangles` (t, 3), `tints` (t,).
 
     Tints are 1 where a triangle has the colour of its mode, and 0 elsewhere. What is wanted is as in `load_subject`,
     whose errors it raises.
     """
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    mesh = load_subject(wanted)
+    mesh = load_subject(requested)
     obj = bpy.data.objects.new("Subject", mesh)
     bpy.context.scene.collection.objects.link(obj)
     modifier = obj.modifiers.new("Fewer", "DECIMATE")
     modifier.use_collapse_triangulate = True
     for _ in range(TRIES):
-        found = _surface(obj)
-        if len(found["triangles"]) <= MOST_TRIANGLES:
-            return found
+        result = _surface(obj)
+        if len(result["triangles"]) <= MOST_TRIANGLES:
+            return result
         # It may leave more than it is asked to, where much hangs on nothing.
-        modifier.ratio *= 0.95 * MOST_TRIANGLES / len(found["triangles"])
-    return _welded(found)
+        modifier.ratio *= 0.95 * MOST_TRIANGLES / len(result["triangles"])
+    return _welded(result)
 
 
 def _surface(obj: bpy.types.Object) -> dict[str, np.ndarray]:
@@ -43,22 +43,22 @@ def _surface(obj: bpy.types.Object) -> dict[str, np.ndarray]:
     slots = np.empty(len(mesh.loop_triangles), dtype=np.int32)
     mesh.loop_triangles.foreach_get("vertices", triangles)
     mesh.loop_triangles.foreach_get("material_index", slots)
-    found = {
+    result = {
         "vertices": vertices_of(mesh),
         "triangles": triangles.reshape(-1, 3),
         "tints": np.isin(slots, tinted_slots(mesh)).astype(float),
     }
     evaluated.to_mesh_clear()
-    return found
+    return result
 
 
-def _welded(found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _welded(result: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """With vertices that are close together as one, as coarsely as it has to be."""
-    places, triangles, tints = found.values()
+    places, triangles, tints = result.values()
     cell = np.ptp(places, axis=0).max() / 256.0
     while len(triangles) > MOST_TRIANGLES:
         _, first, same = np.unique(np.floor(places / cell), axis=0, return_index=True, return_inverse=True)
         corners = same.ravel()[triangles]
         left = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
         places, triangles, tints, cell = places[first], corners[left], tints[left], 2.0 * cell
-    return dict(zip(found, (places, triangles, tints), strict=True))
+    return dict(zip(result, (places, triangles, tints), strict=True))

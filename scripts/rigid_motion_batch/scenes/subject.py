@@ -18,7 +18,7 @@ TINTED = "Mode"
 """The material that gives way to the colour of the lane."""
 
 
-def load_subject(wanted: str) -> bpy.types.Mesh:
+def load_subject(requested: str) -> bpy.types.Mesh:
     """The mesh of an object, in its own axes and its size in the world of its file.
 
     Parameters
@@ -31,7 +31,7 @@ def load_subject(wanted: str) -> bpy.types.Mesh:
     SubjectError
         Where the file, the object or its faces are missing.
     """
-    return _read_mesh(*place_of_subject(wanted))
+    return _read_mesh(*place_of_subject(requested))
 
 
 def vertices_of(mesh: bpy.types.Mesh) -> np.ndarray:
@@ -127,8 +127,10 @@ def _discard_all_but(mesh: bpy.types.Mesh | None, before: set[bpy.types.ID]) -> 
             block.animation_data_clear()
     users = bpy.data.user_map(subset=arrived)
     needed: set[bpy.types.ID] = set()
-    found = arrived & {mesh}
-    while found:
-        needed |= found
-        found = {block for block in arrived - needed if users[block] & needed and not isinstance(block, bpy.types.Text)}
+    result = arrived & {mesh}
+    while result:
+        needed |= result
+        result = {
+            block for block in arrived - needed if users[block] & needed and not isinstance(block, bpy.types.Text)
+        }
     bpy.data.batch_remove(arrived - needed)

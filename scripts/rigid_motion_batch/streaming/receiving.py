@@ -88,12 +88,12 @@ class Handing:
 
     def answers(self) -> list[tuple[str, bytes]]:
         """What came back, and to whom it goes."""
-        found = []
+        result = []
         for user, own in self._sockets.items():
             with suppress(OSError):
                 while True:
-                    found.append((user, own.recv(LONGEST)))
-        return found
+                    result.append((user, own.recv(LONGEST)))
+        return result
 
     def forget(self, user: str) -> None:
         """Close the port of a user who has gone."""

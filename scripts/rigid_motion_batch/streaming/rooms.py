@@ -84,7 +84,7 @@ def settings(role: str, at: str | None, network: bool) -> dict[str, Any]:
     """
     everywhere = EVERYWHERE if network else HERE
     place = locator(at or (everywhere if role == "router" else HERE))
-    found: dict[str, Any] = {
+    result: dict[str, Any] = {
         "mode": role,
         "scouting/multicast/enabled": network,
         "connect/retry": RETRY,
@@ -92,12 +92,12 @@ def settings(role: str, at: str | None, network: bool) -> dict[str, Any]:
         "transport/link/tx/queue/size/data": BATCHES,
     }
     if role == "router":
-        return found | {"listen/endpoints": [place]}
-    found["connect/endpoints"] = [place]
+        return result | {"listen/endpoints": [place]}
+    result["connect/endpoints"] = [place]
     if is_loopback(place):
         listen = {"listen/endpoints": [place, f"tcp/{everywhere}:0"], "listen/exit_on_failure": False}
-        return found | listen | {"connect/timeout_ms": 0, "connect/exit_on_failure": False}
-    return found | {"mode": "client", "connect/timeout_ms": WAIT_MS, "connect/exit_on_failure": True}
+        return result | listen | {"connect/timeout_ms": 0, "connect/exit_on_failure": False}
+    return result | {"mode": "client", "connect/timeout_ms": WAIT_MS, "connect/exit_on_failure": True}
 
 
 def opened(role: str, at: str | None = None, network: bool = False, config: Path | None = None) -> zenoh.Session:
@@ -115,18 +115,18 @@ def opened(role: str, at: str | None = None, network: bool = False, config: Path
         raise RoomError(f"rooms need Zenoh, which is not installed; `{way}` brings it") from None
     chosen = settings(role, at, network)
     try:
-        told = zenoh.Config.from_file(config) if config else zenoh.Config()
+        text = zenoh.Config.from_file(config) if config else zenoh.Config()
         if config and not at:
             side = f"{'listen' if role == 'router' else 'connect'}/endpoints"
-            if told.get_json(side) != zenoh.Config().get_json(side):
+            if text.get_json(side) != zenoh.Config().get_json(side):
                 chosen = settings(role, "the file's", network)
                 del chosen[side]
         for key, value in chosen.items():
-            told.insert_json5(key, json.dumps(value))
+            text.insert_json5(key, json.dumps(value))
     except (zenoh.ZError, OSError) as error:
         raise RoomError(f"{config or at}: Zenoh does not take this: {_first_line(error)}") from None
     try:
-        return zenoh.open(told)
+        return zenoh.open(text)
     except zenoh.ZError as error:
         if role == "router":
             way = "another program may have this port, or a file is missing"
@@ -179,13 +179,13 @@ class Room:
 
     def come(self, seconds: float) -> list[Came]:
         """What came since the last call or, where that is nothing, the first thing within so many seconds."""
-        found = []
+        result = []
         try:
-            found.append(self._came.get(timeout=seconds) if seconds > 0.0 else self._came.get_nowait())
+            result.append(self._came.get(timeout=seconds) if seconds > 0.0 else self._came.get_nowait())
             while True:
-                found.append(self._came.get_nowait())
+                result.append(self._came.get_nowait())
         except queue.Empty:
-            return found
+            return result
 
     def wait(self, until: float) -> list[Came]:
         """The same until a moment of `time.monotonic`."""

@@ -52,13 +52,13 @@ def samples_of(clip: Clip) -> tuple[np.ndarray, Poses]:
 
 def body_of(clip: Clip, poses: Poses, radius: float = RADIUS) -> Body:
     """What is streamed of a clip. A rigid body is at rest as in its first sample."""
-    if clip.figure is None:
+    if clip.rest_body is None:
         return Body.rigid(clip.name, poses[:, 0], radius)
-    parents, turns = clip.figure.parents, to_blender(clip.figure.rest, clip.axes).quaternions
+    parents, turns = clip.rest_body.parents, to_blender(clip.rest_body.rest, clip.axes).quaternions
     turns = np.where((parents >= 0)[:, None], multiply(conjugate(turns[parents]), turns), turns)
     sliding = np.ptp(poses.positions, axis=1).max(axis=1) > SLIDES
     rest = Poses(poses.positions[:, 0], turns)
-    return Body(clip.name, clip.figure.joints, parents, rest, radius, sliding | (parents < 0))
+    return Body(clip.name, clip.rest_body.joints, parents, rest, radius, sliding | (parents < 0))
 
 
 def together(clips: Sequence[Clip], rate: float | None = None) -> tuple[list[Body], np.ndarray, Poses]:
@@ -86,7 +86,7 @@ def together(clips: Sequence[Clip], rate: float | None = None) -> tuple[list[Bod
 def sender_of(bodies: list[Body], moments: np.ndarray, tolerance: float, delay: float, rate: float | None) -> Sender:
     """A sender that says what is needed or, with a rate, a key at each of its ticks."""
     if rate:
-        return Sender(bodies, tolerance, delay, rate, heartbeat=ALMOST / rate)
+        return Sender(bodies, tolerance, delay, rate, keepalive=ALMOST / rate)
     return Sender(bodies, tolerance, delay, even_rate(moments) if len(moments) > 1 else None)
 
 

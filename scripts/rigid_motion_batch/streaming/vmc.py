@@ -38,9 +38,9 @@ Address = tuple[str, int]
 
 def performer_of(clip: Clip) -> Performer | None:
     """What a clip of a body is to VMC; None for a single rigid body. Raises ValueError where no bone is a person's."""
-    if clip.figure is None:
+    if clip.rest_body is None:
         return None
-    performer = Performer(clip.figure.joints, to_blender(clip.in_metres(clip.figure.rest), clip.axes))
+    performer = Performer(clip.rest_body.joints, to_blender(clip.in_metres(clip.rest_body.rest), clip.axes))
     if "Hips" not in performer.bones:
         raise ValueError(f"{clip.name}: none of its joints is named as the hips of a person, which VMC begins with")
     return performer
@@ -82,7 +82,7 @@ def play(
     performer = performer_of(clip)
     poses = to_blender(clip.in_metres(clip.poses), clip.axes)
     if performer is not None:
-        poses = Skeleton(clip.figure.parents).in_root_space(poses)
+        poses = Skeleton(clip.rest_body.parents).in_root_space(poses)
     moments = clip.times - clip.times[0]
     with Outlet(to) as outlet:
         began, last = time.monotonic(), -np.inf
@@ -136,7 +136,7 @@ class Performers:
                 continue  # What Windows says of somebody who is not there any more.
             self._receiver.take(datagram, now, source)
         self._receiver.show(now)
-        found = []
+        result = []
         came = self._receiver.keys()
         for keys in came:
             if now - self._heard > GONE:
@@ -146,8 +146,8 @@ class Performers:
             self._heard = now
             bodies = self._receiver.bodies(keys.stream)
             poses = joined([keys.poses[body.name] for body in bodies], axis=1)
-            found.append((bodies, keys.moments, transposed(poses)))
-        return found
+            result.append((bodies, keys.moments, transposed(poses)))
+        return result
 
 
 class ToVmc:

@@ -16,7 +16,7 @@ from rigid_motion_batch.analysis.metrics import lines_of_poses, write_poses
 from rigid_motion_batch.axes import from_blender
 from rigid_motion_batch.files import replacing
 from rigid_motion_batch.recordings.clip_reading import folder_names
-from rigid_motion_batch.recordings.figures import Figure
+from rigid_motion_batch.recordings.rest_bodies import RestBody
 
 TURNS = "Zrotation Xrotation Yrotation"
 PLACES = "Xposition Yposition Zposition"
@@ -62,9 +62,9 @@ def write_motions(path: Path, motions: Sequence[Motion], fps: float) -> list[Pat
         body, even = motion.body, motion.even("lerp_slerp", fps)
         poses = from_blender(even.poses, "opengl")
         # A bone ends as far behind its joint as that is behind its parent.
-        figure = Figure(body.joints, body.parents, body.rest, from_blender(body.rest, "opengl").positions)
+        rest_body = RestBody(body.joints, body.parents, body.rest, from_blender(body.rest, "opengl").positions)
         with replacing(place) as file:
-            write_bvh(file, figure, body.sliding, even.times, poses)
+            write_bvh(file, rest_body, body.sliding, even.times, poses)
     return paths
 
 
@@ -80,23 +80,23 @@ def _write_table(file: TextIO, motions: Sequence[Motion]) -> None:
                 file.write("".join(f"{device},{line}\n" for line in lines))
 
 
-def write_bvh(file: TextIO, figure: Figure, sliding: np.ndarray, times: np.ndarray, poses: Poses) -> None:
+def write_bvh(file: TextIO, rest_body: RestBody, sliding: np.ndarray, times: np.ndarray, poses: Poses) -> None:
     """The poses (joints, n) of a body, each joint in its parent's space, at an even rate.
 
     Joints that slide (joints,) have channels for their places, the others are where they are at rest. A body with
     several roots is written with as many hierarchies, which Blender and this program read.
     """
     places = poses.positions[:, 0]
-    children: list[list[int]] = [[] for _ in figure.joints]
-    for joint, parent in enumerate(figure.parents.tolist()):
+    children: list[list[int]] = [[] for _ in rest_body.joints]
+    for joint, parent in enumerate(rest_body.parents.tolist()):
         if parent >= 0:
             children[parent].append(joint)
     columns: list[np.ndarray] = []
 
     def joint_lines(joint: int, depth: int) -> None:
         tab = "\t" * depth
-        kind = "ROOT" if figure.parents[joint] < 0 else "JOINT"
-        name = "_".join(figure.joints[joint].split()) or "joint"
+        kind = "ROOT" if rest_body.parents[joint] < 0 else "JOINT"
+        name = "_".join(rest_body.joints[joint].split()) or "joint"
         offset = " ".join(f"{number:.9g}" for number in places[joint])
         file.write(f"{tab}{kind} {name}\n{tab}{{\n{tab}\tOFFSET {offset}\n")
         channels = f"6 {PLACES} {TURNS}" if sliding[joint] else f"3 {TURNS}"
@@ -108,12 +108,12 @@ def write_bvh(file: TextIO, figure: Figure, sliding: np.ndarray, times: np.ndarr
         for child in children[joint]:
             joint_lines(child, depth + 1)
         if not children[joint]:
-            end = " ".join(f"{number:.9g}" for number in figure.tails[joint])
+            end = " ".join(f"{number:.9g}" for number in rest_body.tails[joint])
             file.write(f"{tab}\tEnd Site\n{tab}\t{{\n{tab}\t\tOFFSET {end}\n{tab}\t}}\n")
         file.write(f"{tab}}}\n")
 
     file.write("HIERARCHY\n")
-    for root in np.flatnonzero(figure.parents < 0).tolist():
+    for root in np.flatnonzero(rest_body.parents < 0).tolist():
         joint_lines(root, 0)
     frame_time = float(times[-1] - times[0]) / max(len(times) - 1, 1)
     file.write(f"MOTION\nFrames: {len(times)}\nFrame Time: {frame_time:.9g}\n")

@@ -207,8 +207,8 @@ def library(live_file, tmp_path) -> Path:
 
 
 def linked(library: Path, name: str) -> bpy.types.Object:
-    with bpy.data.libraries.load(str(library), link=True) as (_, wanted):
-        wanted.objects = [name]
+    with bpy.data.libraries.load(str(library), link=True) as (_, expected):
+        expected.objects = [name]
     obj = bpy.data.objects[name]
     bpy.context.scene.collection.objects.link(obj)
     bpy.context.view_layer.update()
@@ -224,8 +224,8 @@ def assert_refused_unchanged(obj: bpy.types.Object, message: str) -> None:
 
 
 def assert_as_in_the_library(obj: bpy.types.Object, library: Path) -> None:
-    wanted = np.load(library.with_name("door.npy"))
-    assert np.abs(shown_worlds([obj], PLAYED)[0] - wanted).max() < 1e-5 * np.abs(wanted).max()
+    expected = np.load(library.with_name("door.npy"))
+    assert np.abs(shown_worlds([obj], PLAYED)[0] - expected).max() < 1e-5 * np.abs(expected).max()
 
 
 def test_a_linked_object_is_refused_and_keeps_the_in_betweens_of_its_library(library):

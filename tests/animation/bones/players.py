@@ -50,11 +50,11 @@ class Player:
 
     def play(self, path: Path, rig: str, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Where a rig (n, 4, 4) and its bones in the rig's space (n, bones, 4, 4) are on frames (n,) of a file."""
-        found = path.with_suffix(".npz")
-        wish = {"path": str(path), "rig": rig, "frames": frames.tolist(), "found": str(found)}
+        result = path.with_suffix(".npz")
+        wish = {"path": str(path), "rig": rig, "frames": frames.tolist(), "found": str(result)}
         self._process.stdin.write(json.dumps(wish) + "\n")
         self._process.stdin.flush()
         while (line := self._process.stdout.readline().strip()) != "played":
             assert line or self._process.poll() is None, "the player has ended"
-        with np.load(found) as arrays:
+        with np.load(result) as arrays:
             return arrays["worlds"], arrays["poses"]

@@ -31,9 +31,9 @@ def shown_poses(rigs: Iterable[bpy.types.Object], frames: Sequence[float]) -> li
         whole = int(np.floor(frame))
         scene.frame_set(whole, subframe=float(frame - whole))
         depsgraph = bpy.context.evaluated_depsgraph_get()
-        for found, rig in zip(shown, rigs, strict=True):
+        for result, rig in zip(shown, rigs, strict=True):
             evaluated = rig.evaluated_get(depsgraph).pose.bones
-            for name, matrices in found.items():
+            for name, matrices in result.items():
                 matrices[row] = evaluated[name].matrix
     scene.frame_set(before, subframe=subframe)
     return shown
@@ -53,15 +53,15 @@ def expected_poses(
 
     `bases` are what moves bones in the space of their channels, where that is known already.
     """
-    frames, found = np.asarray(frames, dtype=np.float64), {}
+    frames, result = np.asarray(frames, dtype=np.float64), {}
     bases = bases or {}
     asked = [rig.pose.bones[name] for name in (names_of(rig) if bones is None else bones)]
     needed = {one.name for bone in asked for one in (bone, *bone.parent_recursive)}
     for pose_bone in (bone for bone in rig.pose.bones if bone.name in needed):
         basis = bases[pose_bone.name] if pose_bone.name in bases else expected_bases(pose_bone, frames)
-        parent = None if pose_bone.parent is None else found[pose_bone.parent.name]
-        found[pose_bone.name] = _placed(pose_bone.bone, basis, parent)
-    return found
+        parent = None if pose_bone.parent is None else result[pose_bone.parent.name]
+        result[pose_bone.name] = _placed(pose_bone.bone, basis, parent)
+    return result
 
 
 def _placed(bone: bpy.types.Bone, basis: np.ndarray, parent: np.ndarray | None) -> np.ndarray:
@@ -103,7 +103,7 @@ def assert_same_poses(
     rig: bpy.types.Object,
     frames: Sequence[float],
     shown: dict[str, np.ndarray],
-    wanted: dict[str, np.ndarray],
+    expected: dict[str, np.ndarray],
     bones: Iterable[str] | None = None,
     tolerance: float = TOLERANCE,
 ) -> None:
@@ -113,24 +113,24 @@ def assert_same_poses(
     and no difference can mend that: the tolerance grows by the same factor.
     """
     away = _distance_from_world(rig, frames)
-    for name in wanted if bones is None else bones:
+    for name in expected if bones is None else bones:
         pose_bone = rig.pose.bones[name]
-        error = deviation(shown[name], wanted[name], pose_bone.bone.length, away)
+        error = deviation(shown[name], expected[name], pose_bone.bone.length, away)
         error = error * shortest_quaternion(pose_bone, frames)
         worst = int(np.argmax(error))
         assert error[worst] < tolerance, (
             f"{rig.name}, {name} ({pose_bone.rotation_mode}) is off by {error[worst]:.3g} of its reach on frame "
             f"{frames[worst]} (keys on {key_frames(pose_bone)[:20]}):\n{shown[name][worst]}\ninstead of\n"
-            f"{wanted[name][worst]}"
+            f"{expected[name][worst]}"
         )
 
 
-def deviation(shown: np.ndarray, wanted: np.ndarray, length: float, away: float = 0.0) -> np.ndarray:
+def deviation(shown: np.ndarray, expected: np.ndarray, length: float, away: float = 0.0) -> np.ndarray:
     """How far a bone of this length is off on each frame, in parts of its reach."""
-    reach = max(length, np.linalg.norm(wanted[:, :3, 3], axis=1).max(initial=0.0)) + away
-    moved = np.linalg.norm(shown[:, :3, 3] - wanted[:, :3, 3], axis=1) / reach
-    size = max(1.0, np.abs(wanted[:, :3, :3]).max(initial=0.0))
-    turned = np.abs(shown[:, :3, :3] - wanted[:, :3, :3]).max(axis=(1, 2), initial=0.0) / size
+    reach = max(length, np.linalg.norm(expected[:, :3, 3], axis=1).max(initial=0.0)) + away
+    moved = np.linalg.norm(shown[:, :3, 3] - expected[:, :3, 3], axis=1) / reach
+    size = max(1.0, np.abs(expected[:, :3, :3]).max(initial=0.0))
+    turned = np.abs(shown[:, :3, :3] - expected[:, :3, :3]).max(axis=(1, 2), initial=0.0) / size
     return np.maximum(moved, turned)
 
 

@@ -81,7 +81,7 @@ def carried_by(bone: bpy.types.PoseBone, parent: np.ndarray) -> np.ndarray:
 class Motion(NamedTuple):
     """What moves a bone in the space of its channels on m frames."""
 
-    wanted: np.ndarray
+    expected: np.ndarray
     """Matrices (m, 4, 4)."""
 
     native: np.ndarray
@@ -193,7 +193,7 @@ class RigEditing(TakenAway, Editing):
         shown = shown or shown_poses([rig], frames)[0]
         for name, motion in motions.items():
             bone = rig.pose.bones[name]
-            placed, native = (self._placed(bone, shown, bases) for bases in (motion.wanted, motion.native))
+            placed, native = (self._placed(bone, shown, bases) for bases in (motion.desired, motion.native))
             size = max(1.0, np.abs(placed).max(initial=0.0), np.abs(native).max(initial=0.0))
             error = np.abs(shown[name] - placed).max(axis=(1, 2), initial=0.0) / size * motion.precision
             worst = int(np.argmax(error))
@@ -234,9 +234,9 @@ class RigEditing(TakenAway, Editing):
         for rig in self._rigs():
             action, _ = self._linked(rig)
             for bone in rig.pose.bones:
-                found = own_constraints(bone)
-                assert len(found) <= int(has_live_segments(bone)), f"{bone.name} of {rig.name}"
-                for constraint in found:
+                result = own_constraints(bone)
+                assert len(result) <= int(has_live_segments(bone)), f"{bone.name} of {rig.name}"
+                for constraint in result:
                     assert constraint.action == action
                     assert constraint.action_slot in slots_of_differences(action)
 

@@ -184,7 +184,7 @@ def _targets(constraint: bpy.types.Constraint) -> Iterable[bpy.types.ConstraintT
     return constraint.targets if constraint.type == "ARMATURE" else ()
 
 
-def key_wanted(
+def key_desired(
     twin: bpy.types.Object, rig: bpy.types.Object, frames: np.ndarray, bases: dict[str, np.ndarray] | None = None
 ) -> None:
     """Give a twin real keys on all frames, of where each bone of the rig has to be in the space of its channels."""

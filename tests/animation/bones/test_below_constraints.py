@@ -10,7 +10,7 @@ import pytest
 
 from rigid_motion.animation import problem_of, set_mode, write_channel
 from tests.animation.bones.poses import assert_same_poses, shown_poses
-from tests.animation.bones.rigs import FRAMES, ORDERS, PLAYED, in_turn, key_all, key_wanted, new_rig, twin_of
+from tests.animation.bones.rigs import FRAMES, ORDERS, PLAYED, in_turn, key_all, key_desired, new_rig, twin_of
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import key, new_object
 
@@ -139,7 +139,7 @@ def two_alike(order: str, constrain: Constrain, mode: str) -> tuple[bpy.types.Ob
         constraint.pole_target = rig if constraint.pole_subtarget else None
     set_mode(list(rig.pose.bones), mode)
     twin = twin_of(rig)
-    key_wanted(twin, rig, PLAYED)
+    key_desired(twin, rig, PLAYED)
     return rig, twin
 
 
@@ -148,8 +148,8 @@ def test_other_constraints_follow_the_mode_as_they_follow_real_keys(live_file, n
     rig, twin = two_alike(order, CONSTRAINTS[name], "dq_sclerp")
     assert [bone.constraints[0].name for bone in rig.pose.bones] == ["Rigid Motion"] * 4, "at the top of every stack"
     assert {problem_of(pose_bone) for pose_bone in rig.pose.bones} == {""}
-    shown, wanted = shown_poses([rig, twin], PLAYED)
-    assert_same_poses(rig, PLAYED, shown, wanted)
+    shown, expected = shown_poses([rig, twin], PLAYED)
+    assert_same_poses(rig, PLAYED, shown, expected)
 
 
 def test_a_stack_of_many_is_followed(live_file):
@@ -158,8 +158,8 @@ def test_a_stack_of_many_is_followed(live_file):
             CONSTRAINTS[name](rig, target)
 
     rig, twin = two_alike("QUATERNION", all_of_them, "dq_sclerp")
-    shown, wanted = shown_poses([rig, twin], PLAYED)
-    assert_same_poses(rig, PLAYED, shown, wanted)
+    shown, expected = shown_poses([rig, twin], PLAYED)
+    assert_same_poses(rig, PLAYED, shown, expected)
 
 
 @pytest.mark.parametrize("later", ["Copy Rotation before", "Child Of", "IK"])
@@ -172,9 +172,9 @@ def test_a_constraint_that_comes_later_is_followed_too(live_file, later):
         within_reach(target)
     bpy.context.view_layer.update()
     twin = twin_of(rig)
-    key_wanted(twin, rig, PLAYED)
-    shown, wanted = shown_poses([rig, twin], PLAYED)
-    assert_same_poses(rig, PLAYED, shown, wanted)
+    key_desired(twin, rig, PLAYED)
+    shown, expected = shown_poses([rig, twin], PLAYED)
+    assert_same_poses(rig, PLAYED, shown, expected)
 
 
 def test_a_rig_that_is_scaled_unevenly_and_moves_has_its_constraints_follow(live_file):
@@ -185,6 +185,6 @@ def test_a_rig_that_is_scaled_unevenly_and_moves_has_its_constraints_follow(live
         CONSTRAINTS[name](rig, target)
     set_mode(list(rig.pose.bones), "dq_sclerp")
     twin = twin_of(rig)
-    key_wanted(twin, rig, PLAYED)
-    shown, wanted = shown_poses([rig, twin], PLAYED)
-    assert_same_poses(rig, PLAYED, shown, wanted)
+    key_desired(twin, rig, PLAYED)
+    shown, expected = shown_poses([rig, twin], PLAYED)
+    assert_same_poses(rig, PLAYED, shown, expected)

@@ -23,13 +23,15 @@ EIGHTHS = np.arange(8 * 1.0, 8 * 40.0 + 1.0) / 8.0
 def largest_error(rig: bpy.types.Object, frames: np.ndarray, reach: float = 0.15) -> dict[str, float]:
     """How far any bone's head, or a point so far from it along its axes, is off."""
     (shown,) = shown_poses([rig], frames)
-    wanted = expected_poses(rig, frames)
-    found = {}
-    for name in wanted:
+    expected = expected_poses(rig, frames)
+    result = {}
+    for name in expected:
         points = np.concatenate((np.zeros((1, 3)), reach * np.eye(3)))
-        one, other = (m[name][:, None, :3, :3] @ points[:, :, None] + m[name][:, None, :3, 3:] for m in (shown, wanted))
-        found[name] = float(np.linalg.norm(one - other, axis=2).max())
-    return found
+        one, other = (
+            m[name][:, None, :3, :3] @ points[:, :, None] + m[name][:, None, :3, 3:] for m in (shown, expected)
+        )
+        result[name] = float(np.linalg.norm(one - other, axis=2).max())
+    return result
 
 
 @pytest.mark.parametrize(("mode", "order"), in_turn(KEYFRAME_MODES, ORDERS))
@@ -143,9 +145,9 @@ def test_a_swing_is_slowed_down_fourfold(live_file, mode, order):
     set_mode(list(rig.pose.bones), mode)
     bpy.context.view_layer.update()
     at = np.arange(1.0, 25.0, 1.0 / 32.0)
-    wanted = expected_poses(rig, at)["Hand"]
+    expected = expected_poses(rig, at)["Hand"]
     push_down(rig, scale=4.0)
     (shown,) = shown_poses([rig], 1.0 + 4.0 * (at - 1.0))
     points = np.concatenate((np.zeros((1, 3)), 0.5 * np.eye(3)))
-    one, other = (m[:, None, :3, :3] @ points[:, :, None] + m[:, None, :3, 3:] for m in (shown["Hand"], wanted))
+    one, other = (m[:, None, :3, :3] @ points[:, :, None] + m[:, None, :3, 3:] for m in (shown["Hand"], expected))
     assert np.linalg.norm(one - other, axis=2).max() < PROMISE

@@ -81,16 +81,16 @@ def test_a_mode_is_to_be_seen_on_the_frame_that_is_shown_when_it_is_chosen(live_
 def test_un_baking_one_bone_leaves_the_others_alone(live_file):
     rig = moving_rig()
     keys = {bone.name: snapshot(bone) for bone in rig.pose.bones}
-    wanted = expected_poses(rig, PLAYED)
+    expected = expected_poses(rig, PLAYED)
     bake(list(rig.pose.bones))
     baked = {bone.name: snapshot(bone) for bone in rig.pose.bones}
-    assert_same_poses(rig, PLAYED, shown_poses([rig], PLAYED)[0], wanted)
+    assert_same_poses(rig, PLAYED, shown_poses([rig], PLAYED)[0], expected)
     assert not any(own_constraints(rig).values())
     unbake(rig.pose.bones["Lower"])
     assert {bone.name: is_baked(bone) for bone in rig.pose.bones} == {rest.name: rest.name != "Lower" for rest in ARM}
     assert snapshot(rig.pose.bones["Lower"]) == keys["Lower"]
     assert all(snapshot(rig.pose.bones[name]) == baked[name] for name in ("Body", "Upper", "Hand"))
-    assert_same_poses(rig, PLAYED, shown_poses([rig], PLAYED)[0], wanted)
+    assert_same_poses(rig, PLAYED, shown_poses([rig], PLAYED)[0], expected)
     unbake([rig.pose.bones[name] for name in ("Body", "Upper", "Hand")])
     assert {bone.name: snapshot(bone) for bone in rig.pose.bones} == keys
     assert_posed(rig, PLAYED)

@@ -15,7 +15,7 @@ import rigid_motion
 from rigid_motion.animation import bake, reduce_keys_of, refresh, set_mode
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
-from tests.animation.bones.rigs import ARM, FRAMES, PLAYED, Rest, key_all, key_wanted, new_rig, wanted_bases
+from tests.animation.bones.rigs import ARM, FRAMES, PLAYED, Rest, key_all, key_desired, new_rig, wanted_bases
 from tests.animation.oracle import snapshot
 from tests.animation.scenes import enabled, push_down
 
@@ -63,9 +63,9 @@ def every_mode(order: str) -> bpy.types.Object:
     return rig
 
 
-def moved(found: bpy.types.Object) -> dict[str, np.ndarray]:
+def moved(result: bpy.types.Object) -> dict[str, np.ndarray]:
     """How the bones of an imported rig move in the world."""
-    return relative(in_world(found, shown_poses([found], EXPORTED)[0]))
+    return relative(in_world(result, shown_poses([result], EXPORTED)[0]))
 
 
 EXACT = {"glb": {}, "fbx": {"bake_anim_simplify_factor": 0.0}}
@@ -77,41 +77,41 @@ EXACT = {"glb": {}, "fbx": {"bake_anim_simplify_factor": 0.0}}
 def test_an_export_has_every_mode_in_one_animation_of_the_actions_own_range(exporter, tmp_path, kind, order):
     rig = every_mode(order)
     keys = snapshot(rig)
-    wanted = relative(expected_poses(rig, EXPORTED))
+    expected = relative(expected_poses(rig, EXPORTED))
     path = export(kind, tmp_path / f"rig.{kind}", **EXACT[kind])
     assert snapshot(rig) == keys
     assert refresh() == 0, "exporting left the in-betweens alone"
-    found = imported(kind, path)
+    result = imported(kind, path)
     assert len(bpy.data.actions) == 1
-    assert np.allclose(found.animation_data.action.curve_frame_range, (FRAMES[0], FRAMES[-1]), atol=1e-3)
-    assert not any(len(pose_bone.constraints) for pose_bone in found.pose.bones)
-    assert_same_poses(found, EXPORTED, moved(found), wanted)
+    assert np.allclose(result.animation_data.action.curve_frame_range, (FRAMES[0], FRAMES[-1]), atol=1e-3)
+    assert not any(len(pose_bone.constraints) for pose_bone in result.pose.bones)
+    assert_same_poses(result, EXPORTED, moved(result), expected)
 
 
 @pytest.mark.parametrize("order", ["QUATERNION", "ZXY"])
 def test_an_fbx_export_that_leaves_keys_out_is_that_of_real_keys(exporter, tmp_path, order):
     rig = every_mode(order)
-    wanted = wanted_bases(rig, EXPORTED)
+    expected = wanted_bases(rig, EXPORTED)
     shown = moved(imported("fbx", export("fbx", tmp_path / "mode.fbx")))
     ranges = [tuple(action.curve_frame_range) for action in bpy.data.actions]
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = int(PLAYED[0]), int(PLAYED[-1])
     twin = every_mode(order)
     set_mode(list(twin.pose.bones), "BLENDER")
-    key_wanted(twin, twin, EXPORTED, wanted)
-    found = imported("fbx", export("fbx", tmp_path / "keys.fbx"))
+    key_desired(twin, twin, EXPORTED, expected)
+    result = imported("fbx", export("fbx", tmp_path / "keys.fbx"))
     assert ranges == [tuple(action.curve_frame_range) for action in bpy.data.actions]
-    assert_same_poses(found, EXPORTED, shown, moved(found))
+    assert_same_poses(result, EXPORTED, shown, moved(result))
 
 
 @pytest.mark.parametrize("kind", EXACT)
 def test_an_action_in_a_strip_is_exported_with_its_modes(exporter, tmp_path, kind):
     rig = key_all(new_rig())
     set_mode(list(rig.pose.bones), "dq_sclerp")
-    wanted = relative(expected_poses(rig, EXPORTED))
+    expected = relative(expected_poses(rig, EXPORTED))
     push_down(rig, int(FRAMES[0]))
-    found = imported(kind, export(kind, tmp_path / f"rig.{kind}", **EXACT[kind]))
-    assert_same_poses(found, EXPORTED, moved(found), wanted)
+    result = imported(kind, export(kind, tmp_path / f"rig.{kind}", **EXACT[kind]))
+    assert_same_poses(result, EXPORTED, moved(result), expected)
 
 
 @pytest.mark.parametrize("kind", ["glb", "fbx"])
@@ -124,8 +124,8 @@ def test_a_mode_changes_nothing_else_that_an_export_says(exporter, tmp_path, kin
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     rig = key_all(new_rig())
     set_mode(list(rig.pose.bones), "dq_sclerp")
-    found = imported(kind, export(kind, tmp_path / f"mode.{kind}"))
-    assert ({action.name for action in bpy.data.actions}, {bone.name for bone in found.pose.bones}) == names
+    result = imported(kind, export(kind, tmp_path / f"mode.{kind}"))
+    assert ({action.name for action in bpy.data.actions}, {bone.name for bone in result.pose.bones}) == names
 
 
 # -- clips ------------------------------------------------------------------------------------------------------------

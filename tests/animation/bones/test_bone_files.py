@@ -53,8 +53,8 @@ def posed_on_a_farm(path: Path, rig: bpy.types.Object) -> tuple[dict[str, np.nda
     frames = path.with_suffix(".npy")
     np.save(frames, PLAYED)
     on_a_farm(PLAY_BONES, path, frames, rig.name)
-    with np.load(frames.with_suffix(".npz")) as found:
-        opened, played = found["opened"][None], found["played"]
+    with np.load(frames.with_suffix(".npz")) as result:
+        opened, played = result["opened"][None], result["played"]
     names = names_of(rig)
     return (
         {name: opened[:, place] for place, name in enumerate(names)},
@@ -69,9 +69,9 @@ def test_every_mode_plays_alike_in_a_blender_without_the_extension(live_file, tm
         pose_bone.bone.inherit_scale = INHERIT_SCALES[place]
         set_mode(pose_bone, mode)
     set_mode(rig.pose.bones["Lower"], "motor_spline", [FRAMES[1]])
-    wanted = expected_poses(rig, PLAYED)
+    expected = expected_poses(rig, PLAYED)
     _, played = posed_on_a_farm(save(tmp_path / "shot.blend"), rig)
-    assert_same_poses(rig, PLAYED, played, wanted)
+    assert_same_poses(rig, PLAYED, played, expected)
 
 
 @pytest.mark.parametrize("frame", sample([17.0, 7.0, 400.0]))
@@ -79,9 +79,9 @@ def test_a_file_opens_as_it_was_to_be_seen_on_the_frame_it_was_saved_on(live_fil
     rig = moving_rig("pga_slerp")
     live_file.scene.frame_set(int(frame))
     at = np.array((frame,))
-    wanted = expected_poses(rig, at)
+    expected = expected_poses(rig, at)
     opened, _ = posed_on_a_farm(save(tmp_path / "shot.blend"), rig)
-    assert_same_poses(rig, at, opened, wanted)
+    assert_same_poses(rig, at, opened, expected)
 
 
 def test_what_a_farm_saves_again_comes_back_whole(live_file, tmp_path):
@@ -111,10 +111,10 @@ def test_a_bone_that_a_farm_renames_is_followed(live_file, tmp_path):
 
 def test_baked_bones_play_alike_on_a_farm_and_can_be_un_baked_after_it_saved_the_file(live_file, tmp_path):
     rig = moving_rig()
-    keys, wanted = snapshot(rig), expected_poses(rig, PLAYED)
+    keys, expected = snapshot(rig), expected_poses(rig, PLAYED)
     bake(list(rig.pose.bones))
     path = save(tmp_path / "shot.blend")
-    assert_same_poses(rig, PLAYED, posed_on_a_farm(path, rig)[1], wanted)
+    assert_same_poses(rig, PLAYED, posed_on_a_farm(path, rig)[1], expected)
     on_a_farm(SAVE_AS, path, tmp_path / "farm.blend")
     rig = reopened(tmp_path / "farm.blend")
     assert all(is_baked(pose_bone) for pose_bone in rig.pose.bones)
@@ -134,8 +134,8 @@ def library(live_file, tmp_path) -> Path:
 
 
 def linked(library: Path, name: str) -> bpy.types.Object:
-    with bpy.data.libraries.load(str(library), link=True) as (_, wanted):
-        wanted.objects = [name]
+    with bpy.data.libraries.load(str(library), link=True) as (_, expected):
+        expected.objects = [name]
     obj = bpy.data.objects[name]
     bpy.context.scene.collection.objects.link(obj)
     bpy.context.view_layer.update()
@@ -176,10 +176,10 @@ def test_an_overridden_rig_takes_modes_and_has_them_when_the_file_is_opened_agai
     set_mode(list(rig.pose.bones), "dq_sclerp")
     assert {problem_of(pose_bone) for pose_bone in rig.pose.bones} == {""}
     assert [c.name for c in rig.pose.bones["Hand"].constraints] == ["Rigid Motion", "The library's own"]
-    wanted = expected_poses(rig, PLAYED)
+    expected = expected_poses(rig, PLAYED)
     assert_posed(rig, PLAYED)
     path = save(tmp_path / "shot.blend")
-    assert_same_poses(rig, PLAYED, posed_on_a_farm(path, rig)[1], wanted)
+    assert_same_poses(rig, PLAYED, posed_on_a_farm(path, rig)[1], expected)
     for _ in range(2):
         rig = reopened(path, "Puppet")
         assert rig.override_library is not None
@@ -254,8 +254,8 @@ def test_an_overridden_rig_gives_its_modes_up_again(library, tmp_path):
 
 
 def test_a_rig_is_appended_with_its_modes(library):
-    with bpy.data.libraries.load(str(library), link=False) as (_, wanted):
-        wanted.objects = ["Rig"]
+    with bpy.data.libraries.load(str(library), link=False) as (_, expected):
+        expected.objects = ["Rig"]
     rig = bpy.data.objects["Rig"]
     bpy.context.scene.collection.objects.link(rig)
     bpy.context.view_layer.update()

@@ -17,7 +17,7 @@ from tests.animation.bones.rigs import (
     in_turn,
     key_all,
     key_bone,
-    key_wanted,
+    key_desired,
     moving_rig,
     new_rig,
     twin_of,
@@ -76,7 +76,7 @@ def test_every_mode_is_exact_in_every_setting_on_every_frame(live_file, order, s
     keys = [snapshot(pose_bone) for pose_bone in rig.pose.bones]
     assert {problem_of(pose_bone) for pose_bone in rig.pose.bones} == {""}
     bases, twin = wanted_bases(rig, PLAYED), twin_of(rig)
-    key_wanted(twin, rig, PLAYED, bases)
+    key_desired(twin, rig, PLAYED, bases)
     shown, real = shown_poses([rig, twin], PLAYED)
     assert_same_poses(rig, PLAYED, shown, expected_poses(rig, PLAYED, bases))
     assert_same_poses(rig, PLAYED, shown, real)
@@ -89,9 +89,9 @@ def test_every_mode_is_exact_in_every_setting_on_every_frame(live_file, order, s
 def test_below_parents_that_are_scaled_unevenly_bones_move_as_with_real_keys(live_file, order, setting):
     rig = pairs(order, "uneven", setting)
     twin = twin_of(rig)
-    key_wanted(twin, rig, PLAYED)
-    shown, wanted = shown_poses([rig, twin], PLAYED)
-    assert_same_poses(rig, PLAYED, shown, wanted)
+    key_desired(twin, rig, PLAYED)
+    shown, expected = shown_poses([rig, twin], PLAYED)
+    assert_same_poses(rig, PLAYED, shown, expected)
 
 
 def test_what_is_only_drawn_or_locked_makes_no_difference(live_file):

@@ -285,10 +285,12 @@ class EditingBones(RigEditing):
         bpy.context.view_layer.update()
         frames = np.array(self._frames_that_are_seen([bone])[::7], dtype=np.float64)
         (shown,) = shown_poses([bone.id_data], frames)
-        native, wanted = (self._placed(bone, shown, how(bone, frames)) for how in (as_blender_has_it, expected_bases))
-        between = native[:, :3, 3] + influence * (wanted - native)[:, :3, 3]
+        native, expected = (self._placed(bone, shown, how(bone, frames)) for how in (as_blender_has_it, expected_bases))
+        between = native[:, :3, 3] + influence * (expected - native)[:, :3, 3]
         error = np.abs(shown[bone.name][:, :3, 3] - between).max()
-        assert error < 2 * TOLERANCE * max(1.0, np.abs(wanted).max(), np.abs(native).max()), f"{name} is off by {error}"
+        assert error < 2 * TOLERANCE * max(1.0, np.abs(expected).max(), np.abs(native).max()), (
+            f"{name} is off by {error}"
+        )
         (constraint,) = own_constraints(self._found(name))
         constraint.influence = 1.0
         bpy.context.view_layer.update()

@@ -17,7 +17,7 @@ from tests.animation.bones.rigs import (
     ORDERS,
     in_turn,
     key_all,
-    key_wanted,
+    key_desired,
     moving_rig,
     new_rig,
     twin_of,
@@ -35,9 +35,9 @@ def rows(poses: Poses, which: np.ndarray | slice) -> Poses:
     return {name: matrices[which] for name, matrices in poses.items()}
 
 
-def assert_at(rig: bpy.types.Object, scene_frames: np.ndarray, wanted: Poses) -> None:
+def assert_at(rig: bpy.types.Object, scene_frames: np.ndarray, expected: Poses) -> None:
     (shown,) = shown_poses([rig], scene_frames)
-    assert_same_poses(rig, scene_frames, shown, wanted)
+    assert_same_poses(rig, scene_frames, shown, expected)
 
 
 def filled(mode: str = "dq_sclerp", order: str = "QUATERNION", **settings: object) -> tuple[bpy.types.Object, Poses]:
@@ -56,7 +56,7 @@ PLACES = [
 @pytest.mark.parametrize(("place", "order"), in_turn(PLACES, ORDERS))
 def test_a_strip_shows_the_modes_of_its_action(live_file, place, order):
     start, scale, repeat, reverse = place
-    rig, wanted = filled(order=order)
+    rig, expected = filled(order=order)
     strip = push_down(rig, start, scale=scale, repeat=repeat, use_reverse=reverse)
     frames = np.arange(strip.frame_start, strip.frame_end)
     since = ((frames - start) / scale) % 40.0
@@ -64,14 +64,14 @@ def test_a_strip_shows_the_modes_of_its_action(live_file, place, order):
     whole = (since % 1.0 == 0.0) & ((since > 0.0) | (not reverse))
     assert whole.sum() >= 19
     action_frames = since[whole].astype(int)
-    assert_at(rig, frames[whole], rows(wanted, 40 - action_frames if reverse else action_frames))
+    assert_at(rig, frames[whole], rows(expected, 40 - action_frames if reverse else action_frames))
 
 
 def several(
     *modes: str, order: str = "QUATERNION", amount: float = 1.0, turning: bool = True
 ) -> tuple[bpy.types.Object, list[tuple[bpy.types.Action, bpy.types.ActionSlot]], list[Poses]]:
     """A rig, an Action for each of these modes with its slot, and where the bones have to be in each."""
-    rig, actions, wanted = new_rig(rotation_mode=order), [], []
+    rig, actions, expected = new_rig(rotation_mode=order), [], []
     data = rig.animation_data_create()
     for seed, mode in enumerate(modes):
         data.action = None
@@ -80,9 +80,9 @@ def several(
             remove_turns(pose_bone)
         set_mode(list(rig.pose.bones), mode, KEYS)
         actions.append((data.action, data.action_slot))
-        wanted.append(expected_poses(rig, ACTION_FRAMES))
+        expected.append(expected_poses(rig, ACTION_FRAMES))
     data.action = None
-    return rig, actions, wanted
+    return rig, actions, expected
 
 
 def put_into_strips(
@@ -106,12 +106,12 @@ def put_into_strips(
 @pytest.mark.parametrize("one_track", [True, False], ids=["one track", "two tracks"])
 @pytest.mark.parametrize("modes", [("dq_sclerp", "pga_lerp"), ("dq_sclerp", "BLENDER"), ("BLENDER", "motor_spline")])
 def test_two_strips_each_have_the_mode_that_is_keyed_in_their_action(live_file, modes, one_track, order):
-    rig, actions, wanted = several(*modes, order=order)
+    rig, actions, expected = several(*modes, order=order)
     put_into_strips(rig, actions, (1, 101), one_track=one_track)
     assert refresh() == 0
-    for start, poses in zip((1, 101), wanted, strict=True):
+    for start, poses in zip((1, 101), expected, strict=True):
         assert_at(rig, ACTION_FRAMES + start - 1, poses)
-    assert_at(rig, np.array((60.0, 90.0)), rows(wanted[0], np.array((-1, -1))))
+    assert_at(rig, np.array((60.0, 90.0)), rows(expected[0], np.array((-1, -1))))
 
 
 def remove_turns(pose_bone: bpy.types.PoseBone) -> None:
@@ -135,7 +135,7 @@ def cross_fading(
         for twin, own, bases in ((rigs[1], owned[1], None), (rigs[2], owned[2], native)):
             data = twin.animation_data_create()
             data.action = None
-            key_wanted(twin, rig, ACTION_FRAMES, bases)
+            key_desired(twin, rig, ACTION_FRAMES, bases)
             own.append((data.action, data.action_slot))
     for one, own in zip(rigs, owned, strict=True):
         one.animation_data.action = None
@@ -193,9 +193,9 @@ def test_strips_that_leave_room_for_the_pose_at_rest_mix_places_as_they_mix_real
 
 @pytest.mark.parametrize("influence", [0.0, pytest.param(0.3, marks=MIXED_TIMES), 1.0])
 def test_a_strip_of_less_influence_takes_its_share_of_the_mode(live_file, influence):
-    rig, wanted = filled()
+    rig, expected = filled()
     twin = twin_of(rig)
-    key_wanted(twin, rig, ACTION_FRAMES)
+    key_desired(twin, rig, ACTION_FRAMES)
     for owner in (rig, twin):
         strip = push_down(owner, 1)
         strip.use_animated_influence = True
@@ -204,7 +204,7 @@ def test_a_strip_of_less_influence_takes_its_share_of_the_mode(live_file, influe
     bpy.context.view_layer.update()
     shown, real = shown_poses([rig, twin], ACTION_FRAMES)
     assert_same_poses(rig, ACTION_FRAMES, shown, real)
-    assert (influence < 1.0) == bool(np.abs(shown["Hand"] - wanted["Hand"]).max() > 1e-3)
+    assert (influence < 1.0) == bool(np.abs(shown["Hand"] - expected["Hand"]).max() > 1e-3)
 
 
 def test_a_cyclic_action_repeats_in_its_strip(live_file):
@@ -212,18 +212,18 @@ def test_a_cyclic_action_repeats_in_its_strip(live_file):
     for fcurve in curves_of(rig).values():
         fcurve.modifiers.new("CYCLES")
     set_mode(list(rig.pose.bones), "dq_sclerp")
-    wanted = expected_poses(rig, ACTION_FRAMES)
+    expected = expected_poses(rig, ACTION_FRAMES)
     strip = push_down(rig, 201)
     strip.action_frame_start, strip.action_frame_end = 1.0, 121.0
     bpy.context.view_layer.update()
     refresh()
     for start in (200.0, 240.0, 280.0):
-        assert_at(rig, start + np.arange(2.0, 41.0), rows(wanted, slice(1, 40)))
+        assert_at(rig, start + np.arange(2.0, 41.0), rows(expected, slice(1, 40)))
 
 
 @pytest.mark.parametrize("name", ["Before", "Zulu"])
 def test_a_strip_beside_another_shows_the_action_that_a_rig_without_strips_plays(live_file, name):
-    rig, wanted = filled()
+    rig, expected = filled()
     rig.name = name
     walk = rig.animation_data
     other = moving_rig(name="Runner", seed=5, frames=KEYS)
@@ -233,7 +233,7 @@ def test_a_strip_beside_another_shows_the_action_that_a_rig_without_strips_plays
     for track in other.animation_data.nla_tracks:
         track.strips[0].extrapolation = "NOTHING"
     bpy.context.view_layer.update()
-    assert_at(other, ACTION_FRAMES + 99.0, wanted)
+    assert_at(other, ACTION_FRAMES + 99.0, expected)
     assert_at(other, ACTION_FRAMES, own)
-    assert_at(rig, ACTION_FRAMES, wanted)
+    assert_at(rig, ACTION_FRAMES, expected)
     assert refresh() == 0

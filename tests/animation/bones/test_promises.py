@@ -61,10 +61,10 @@ def complaints(case: RigCase, folder: Path, player: Player) -> list[str]:
         refused: list[Refused] = []
         reduce_keys_of(targets, case.mode, case.tolerance, refused=refused, **wishes)
         done = [transform for transform in targets if len(transform.motion.bakes)]
-        found = [f"{one.name} has not fewer keys" for one in done if key_count(one) >= counts[one]]
-        found += [str(refusal) for refusal in refused if "goes on outside" in str(refusal)]
+        result = [f"{one.name} has not fewer keys" for one in done if key_count(one) >= counts[one]]
+        result += [str(refusal) for refusal in refused if "goes on outside" in str(refusal)]
         if not any(transform.is_part for transform in done) or not promised.any():
-            return found
+            return result
         report = total_reduction(done)
         bpy.ops.wm.save_as_mainfile(filepath=str(reduced))
     finally:
@@ -75,18 +75,18 @@ def complaints(case: RigCase, folder: Path, player: Player) -> list[str]:
     off = float(largest(shown, truth, radii)[promised].max())
     rounding = ROUNDING * (1.0 + float(np.abs(truth).max()))
     if off > case.tolerance + rounding:
-        found.append(f"{off} off, {case.tolerance} allowed, {report.largest_error} reported")
+        result.append(f"{off} off, {case.tolerance} allowed, {report.largest_error} reported")
     if off > report.largest_error + rounding:
-        found.append(f"{off} off, {report.largest_error} reported")
+        result.append(f"{off} off, {report.largest_error} reported")
     if (
         promised.all()
         and all(bone.step in (0.0, 1.0, 2.0, 5.0) for bone in case.bones)
         and report.largest_error > 1.02 * off + rounding
     ):
-        found.append(f"{report.largest_error} reported, {off} off")
+        result.append(f"{report.largest_error} reported, {off} off")
     if report.rig.not_promised != excepted:
-        found.append(f"named are {report.rig.not_promised}, not {excepted}")
-    return found
+        result.append(f"named are {report.rig.not_promised}, not {excepted}")
+    return result
 
 
 def key_count(transform: object) -> int:
@@ -106,10 +106,10 @@ def largest(shown: np.ndarray, truth: np.ndarray, radii: np.ndarray) -> np.ndarr
     points /= np.linalg.norm(points, axis=1)[:, None]
     offset = shown - truth
     # The farthest point along the axis that is stretched the most, as well, from either end.
-    found = []
+    result = []
     for bone, radius in enumerate(radii):
         turns, moved = offset[:, bone, :3, :3], offset[:, bone, :3, 3]
         _, _, axes = np.linalg.svd(turns)
         ball = radius * np.concatenate((np.tile(points, (len(turns), 1, 1)), axes, -axes), axis=1)
-        found.append(np.linalg.norm(ball @ turns.swapaxes(1, 2) + moved[:, None], axis=2).max())
-    return np.array(found)
+        result.append(np.linalg.norm(ball @ turns.swapaxes(1, 2) + moved[:, None], axis=2).max())
+    return np.array(result)

@@ -104,8 +104,8 @@ def test_a_bone_that_is_renamed_keeps_its_mode(live_file, rename: Edit):
     rename(rig)
     bpy.context.view_layer.update()
     renamed = dict(zip(order, names_of(rig), strict=True))
-    wanted = {renamed[name]: matrices for name, matrices in before.items()}
-    assert_same_poses(rig, PLAYED, shown_poses([rig], PLAYED)[0], wanted)
+    expected = {renamed[name]: matrices for name, matrices in before.items()}
+    assert_same_poses(rig, PLAYED, shown_poses([rig], PLAYED)[0], expected)
     assert_posed(rig, PLAYED)
     held = own_constraints(rig)
     assert {name: len(held[renamed[name]]) for name in order} == {"Body": 1, "Upper": 1, "Lower": 1, "Hand": 0}

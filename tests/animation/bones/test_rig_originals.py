@@ -45,7 +45,7 @@ def changed(request, live_file) -> Iterator[Change]:
 def test_bones_that_were_renamed_get_their_own_keys_back(changed, rename):
     rig, change, go_back = changed
     own, was = rig.animation_data.action, rig.pose.bones.keys()
-    before, wanted = [snapshot(bone) for bone in rig.pose.bones], shown_poses([rig], PLAYED)[0]
+    before, expected = [snapshot(bone) for bone in rig.pose.bones], shown_poses([rig], PLAYED)[0]
     change()
     assert rig.animation_data.action != own
     rename(rig)
@@ -55,7 +55,7 @@ def test_bones_that_were_renamed_get_their_own_keys_back(changed, rename):
     assert rig.animation_data.action == own
     assert [snapshot(bone) for bone in rig.pose.bones] == before
     now = dict(zip(rig.pose.bones.keys(), was, strict=True))
-    assert_same_poses(rig, PLAYED, shown_poses([rig], PLAYED)[0], {name: wanted[old] for name, old in now.items()})
+    assert_same_poses(rig, PLAYED, shown_poses([rig], PLAYED)[0], {name: expected[old] for name, old in now.items()})
     assert refresh() == 0
     assert_nothing_stale()
 
@@ -83,11 +83,11 @@ def test_an_original_that_another_rig_plays_keeps_its_names(live_file):
     other.animation_data_create().action = own
     other.animation_data.action_slot = own.slots[0]
     refresh()
-    wanted = shown_poses([other], PLAYED)[0]
+    expected = shown_poses([other], PLAYED)[0]
     rig.data.bones["Lower"].name = "Fore"
     bpy.context.view_layer.update()
     refresh()
-    assert_same_poses(other, PLAYED, shown_poses([other], PLAYED)[0], wanted)
+    assert_same_poses(other, PLAYED, shown_poses([other], PLAYED)[0], expected)
 
 
 @pytest.mark.parametrize("muted", [False, True], ids=["without keys", "muted"])
@@ -103,7 +103,7 @@ def test_what_has_no_keys_gets_its_value_back(live_file, of_bones, muted):
             channelbag_of(obj).fcurves.remove(fcurve)
     carrier.location.yz = rest = (0.75, 0.25)
     set_mode(targets, "dq_sclerp")
-    wanted = shown_poses([obj], PLAYED)[0] if of_bones else shown_worlds([obj], PLAYED)[0]
+    expected = shown_poses([obj], PLAYED)[0] if of_bones else shown_worlds([obj], PLAYED)[0]
     bpy.context.scene.frame_set(20)
     bake(targets)
     bpy.context.view_layer.update()
@@ -111,10 +111,10 @@ def test_what_has_no_keys_gets_its_value_back(live_file, of_bones, muted):
     unbake(targets)
     assert tuple(carrier.location.yz) == rest
     if of_bones:
-        assert_same_poses(obj, PLAYED, shown_poses([obj], PLAYED)[0], wanted)
+        assert_same_poses(obj, PLAYED, shown_poses([obj], PLAYED)[0], expected)
         assert_posed(obj, PLAYED)
     else:
-        assert np.abs(shown_worlds([obj], PLAYED)[0] - wanted).max() < 1e-5
+        assert np.abs(shown_worlds([obj], PLAYED)[0] - expected).max() < 1e-5
 
 
 def sharing(of_bones: bool) -> tuple[bpy.types.Object, list | bpy.types.Object, bpy.types.Object]:

@@ -31,10 +31,10 @@ def uneven(seed: int = 0) -> np.ndarray:
 def test_what_follows_a_constraint_is_named_and_what_hangs_on_it(live_file, kind):
     rig = recorded_rig()
     rig.pose.bones["Arm.L"].constraints.new(kind)
-    found = not_promised(rig)
-    assert (found.followers, found.below) == (("Arm.L",), ("Hand.L",))
+    result = not_promised(rig)
+    assert (result.followers, result.below) == (("Arm.L",), ("Hand.L",))
     reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS)
-    assert total_reduction(bones(rig)).rig.not_promised == found
+    assert total_reduction(bones(rig)).rig.not_promised == result
 
 
 @pytest.mark.parametrize("switched_off", ["mute", "influence"])
@@ -124,12 +124,12 @@ def sheared(rig: bpy.types.Object, truth: dict[str, np.ndarray]) -> dict[str, fl
     """How far points of balls get off that may be scaled unevenly, by a few hundred of them."""
     points = np.random.default_rng(1).normal(size=(500, 3))
     points *= RADIUS / np.linalg.norm(points, axis=1)[:, None]
-    found = {}
+    result = {}
     for name, rows in matrices(rig).items():
         offset = rows - truth[name]
         moved = points @ offset[:, :3, :3].swapaxes(1, 2) + offset[:, None, :3, 3]
-        found[name] = float(np.linalg.norm(moved, axis=-1).max())
-    return found
+        result[name] = float(np.linalg.norm(moved, axis=-1).max())
+    return result
 
 
 # How large things are

@@ -34,12 +34,12 @@ def bones(rig: bpy.types.Object, *names: str) -> list[bpy.types.PoseBone]:
 
 def matrices(rig: bpy.types.Object, frames: np.ndarray = FRAMES) -> dict[str, np.ndarray]:
     """Where Blender shows every bone in the world, (n, 4, 4)."""
-    found: dict[str, list[np.ndarray]] = {bone.name: [] for bone in rig.pose.bones}
+    result: dict[str, list[np.ndarray]] = {bone.name: [] for bone in rig.pose.bones}
     for frame in frames:
         bpy.context.scene.frame_set(int(frame), subframe=frame % 1.0)
         for bone in rig.pose.bones:
-            found[bone.name].append(np.array(rig.matrix_world @ bone.matrix))
-    return {name: np.array(rows) for name, rows in found.items()}
+            result[bone.name].append(np.array(rig.matrix_world @ bone.matrix))
+    return {name: np.array(rows) for name, rows in result.items()}
 
 
 def largest(shown: np.ndarray, truth: np.ndarray, radius: float = RADIUS) -> np.ndarray:

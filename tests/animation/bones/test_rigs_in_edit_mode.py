@@ -180,13 +180,13 @@ def test_each_of_several_actions_in_the_nla_is_shown_again_after_edit_mode(live_
 
 def test_a_file_that_is_saved_in_edit_mode_plays_in_a_blender_without_the_extension(live_file, tmp_path):
     rig = rig_with_hands()
-    wanted = expected_poses(rig, PLAYED)
+    expected = expected_poses(rig, PLAYED)
     with edit_mode(rig):
         path = save(tmp_path / "shot.blend")
         assert shown_slots(rig) == NONE_SHOWN
     on_a_farm("bpy.ops.object.mode_set(mode='OBJECT')\n" + SAVE_AS, path, path)
     _, played = posed_on_a_farm(path, rig)
-    assert_same_poses(rig, PLAYED, played, wanted)
+    assert_same_poses(rig, PLAYED, played, expected)
 
 
 def test_a_file_that_is_saved_in_edit_mode_is_opened_in_it(live_file, tmp_path):

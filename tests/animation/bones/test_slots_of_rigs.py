@@ -224,8 +224,8 @@ def test_rigs_with_the_same_keys_that_are_merged_keep_modes_of_their_own(live_fi
     before = shown_poses(rigs, PLAYED)
     merge_into(*rigs)
     assert len({rig.animation_data.action for rig in rigs}) == 1
-    for rig, wanted, shown in zip(rigs, before, shown_poses(rigs, PLAYED), strict=True):
-        assert_same_poses(rig, PLAYED, shown, wanted)
+    for rig, expected, shown in zip(rigs, before, shown_poses(rigs, PLAYED), strict=True):
+        assert_same_poses(rig, PLAYED, shown, expected)
         assert_posed(rig, PLAYED)
 
 

@@ -61,7 +61,7 @@ def speeds(obj, frame: float, step: float = 0.02) -> tuple[np.ndarray, np.ndarra
     """The twist by differences, as matrices (4, 4) for a frame, before and after a key."""
     (source,) = keyed_in(slot_transforms_of([transform_of(obj)]))
     at = frame + step * np.array((-2.0, -1.0, 0.0, 1.0, 2.0))
-    poses = in_betweens(source, at).wanted
+    poses = in_betweens(source, at).desired
     world = matrices(poses.positions, poses.quaternions, np.ones((5, 3)))
     before = (1.5 * world[2] - 2.0 * world[1] + 0.5 * world[0]) / step
     after = (-1.5 * world[2] + 2.0 * world[3] - 0.5 * world[4]) / step

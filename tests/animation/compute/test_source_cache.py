@@ -52,12 +52,12 @@ EDITS = {"a value": move_up, "a frame": move_later, "an insertion": insert, "a d
 
 
 def samples_of(obj: bpy.types.Object) -> dict[tuple[str, int], np.ndarray]:
-    found = {}
+    result = {}
     for channel, fcurve in curves_of(obj).items():
         if channel[0].startswith("delta_"):
-            found[channel] = np.empty(2 * len(fcurve.sampled_points), np.float32)
-            fcurve.sampled_points.foreach_get("co", found[channel])
-    return found
+            result[channel] = np.empty(2 * len(fcurve.sampled_points), np.float32)
+            fcurve.sampled_points.foreach_get("co", result[channel])
+    return result
 
 
 @pytest.mark.parametrize("order", ["QUATERNION", "XZY"])

@@ -84,7 +84,7 @@ def assert_as_blender(keys: Keys, frames: np.ndarray, *, update: bool = True, to
     """The values are Blender's, within `tolerance` of the size of the curve, its handles and its swings."""
     with as_fcurve(keys, update=update) as fcurve:
         read = read_one(fcurve)
-        found = evaluate_one(read, frames)
+        result = evaluate_one(read, frames)
         expected = np.array([fcurve.evaluate(frame) for frame in frames.tolist()])
     handles = [rows for rows in (read.left, read.right) if rows is not None]
     # What swings elastically has a size even where every frame happens on a zero of the sine.
@@ -92,7 +92,7 @@ def assert_as_blender(keys: Keys, frames: np.ndarray, *, update: bool = True, to
     size = max(
         1e-30, np.abs(expected).max(), *(np.abs(rows[..., 1]).max() for rows in (read.points, *handles)), *swings
     )
-    np.testing.assert_allclose(found, expected, rtol=0.0, atol=tolerance * size)
+    np.testing.assert_allclose(result, expected, rtol=0.0, atol=tolerance * size)
 
 
 def keys_of(

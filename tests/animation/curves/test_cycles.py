@@ -21,8 +21,8 @@ def test_folded_times_have_the_values_of_the_cycles(keys, cycles):
     )
     frames = frames_about(keys)
     folded, backwards = cycled(repeated, frames)
-    expected, found = evaluate_one(repeated, frames), evaluate_one(keys, folded)
-    np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-7)
+    expected, result = evaluate_one(repeated, frames), evaluate_one(keys, folded)
+    np.testing.assert_allclose(result, expected, rtol=1e-7, atol=1e-7)
     assert not np.any(backwards & (frames >= keys.times[0]) & (frames <= keys.times[-1]))
 
 

@@ -44,10 +44,10 @@ def _bezier(points: np.ndarray, t: np.ndarray) -> np.ndarray:
 )
 def test_one_segment_is_recovered(handles):
     values = values_of(np.array(handles), TIMES)
-    found = fit_together(TIMES, values, np.array((1.0,)), np.array(((0.2, 0.5),)))[0]
+    result = fit_together(TIMES, values, np.array((1.0,)), np.array(((0.2, 0.5),)))[0]
     often = np.linspace(0.0, 1.0, 333)
-    assert np.abs(values_of(found, often) - values_of(np.array(handles), often)).max() < 1e-4
-    assert np.all((found[:, 0] >= 0.0) & (found[:, 0] <= 1.0))
+    assert np.abs(values_of(result, often) - values_of(np.array(handles), often)).max() < 1e-4
+    assert np.all((result[:, 0] >= 0.0) & (result[:, 0] <= 1.0))
 
 
 def test_what_no_single_segment_is_can_be_the_mean_of_several():
@@ -58,7 +58,7 @@ def test_what_no_single_segment_is_can_be_the_mean_of_several():
         handles = np.stack((x, random.normal(0.5, 0.5, size=(4, 2))), axis=2)
         old, new = random.dirichlet((2.0,) * 4, size=2)
         values = sum(share * values_of(each, TIMES) for share, each in zip(old, handles, strict=True))
-        found = fit_together(TIMES, values, new, x)
-        mean = sum(share * values_of(each, TIMES) for share, each in zip(new, found, strict=True))
+        result = fit_together(TIMES, values, new, x)
+        mean = sum(share * values_of(each, TIMES) for share, each in zip(new, result, strict=True))
         errors.append(np.abs(mean - values).max())
     assert max(errors) < 2e-4

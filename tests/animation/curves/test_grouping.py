@@ -21,8 +21,8 @@ def test_curves_together_have_the_values_that_each_has_alone(drawn, unit_elastic
     together += [dataclasses.replace(keys, points=keys.points * (1, -2)) for keys in together]
     frames = frames_about(together[0])
     times = [frames, frames.copy(), frames[::3]] * len(together)
-    found = evaluate(together, times[: len(together)], unit_elastic=unit_elastic)
-    for keys, own_times, (own,) in zip(together, times, found, strict=False):
+    result = evaluate(together, times[: len(together)], unit_elastic=unit_elastic)
+    for keys, own_times, (own,) in zip(together, times, result, strict=False):
         alone = evaluate_one(keys, own_times, unit_elastic=unit_elastic)
         size = max(np.abs(alone).max(), *(np.abs(rows[..., 1]).max() for rows in (keys.points, keys.left, keys.right)))
         np.testing.assert_allclose(own, alone, rtol=0.0, atol=1e-6 * size)
@@ -42,8 +42,8 @@ def test_curves_keyed_together_have_the_values_that_each_has_alone(drawn, cycles
         parts["points"] = parts["points"] + np.concatenate((shift, np.zeros_like(shift)), axis=2)
         alone.append(dataclasses.replace(keys, **parts, linear=drawn[0].linear, cycles=cycles))
     frames = frames_about(alone[0])
-    (found,) = evaluate([joined(alone)], [frames], unit_elastic=unit_elastic)
-    for keys, own in zip(alone, found, strict=True):
+    (result,) = evaluate([joined(alone)], [frames], unit_elastic=unit_elastic)
+    for keys, own in zip(alone, result, strict=True):
         expected = evaluate_one(keys, frames, unit_elastic=unit_elastic)
         size = max(np.abs(rows[..., 1]).max() for rows in (keys.points, keys.left, keys.right))
         np.testing.assert_allclose(own, expected, rtol=1e-9, atol=1e-6 * size)

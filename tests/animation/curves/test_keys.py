@@ -42,8 +42,8 @@ def test_the_keys_of_some_channels_have_the_values_that_those_had():
     channels = [keys_of((1, 9), (row, row + 2), kind, **easing) for row, kind in enumerate(("BACK", "LINEAR", "SINE"))]
     frames = np.arange(12.0)
     for rows in ([0], [2, 0], [1, 2]):
-        (found,) = evaluate([joined(channels).only(rows)], [frames])
-        np.testing.assert_array_equal(found, [evaluate_one(channels[row], frames) for row in rows])
+        (result,) = evaluate([joined(channels).only(rows)], [frames])
+        np.testing.assert_array_equal(result, [evaluate_one(channels[row], frames) for row in rows])
 
 
 @pytest.mark.parametrize(("name", "codes"), [("interpolation", INTERPOLATIONS), ("easing", EASINGS)])

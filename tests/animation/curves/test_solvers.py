@@ -52,8 +52,8 @@ def test_times_at_which_the_curve_is_level_are_solved_too(handles):
 def test_a_cubic_is_its_bezier_curve():
     points = np.array(((1.0, 2.0), (3.0, 5.0), (7.0, -4.0), (9.0, 1.0)), np.float32)
     c1, c2, c3 = bezier_cubics(*points[:, None, :])
-    found = points[0] + ((c3 * T[:, None] + c2) * T[:, None] + c1) * T[:, None]
-    np.testing.assert_allclose(found, de_casteljau(points.astype(np.float64), T), rtol=0.0, atol=1e-6)
+    result = points[0] + ((c3 * T[:, None] + c2) * T[:, None] + c1) * T[:, None]
+    np.testing.assert_allclose(result, de_casteljau(points.astype(np.float64), T), rtol=0.0, atol=1e-6)
 
 
 @pytest.mark.parametrize("reach", [5.0, 40.0])

@@ -19,9 +19,9 @@ def namesakes(tmp_path: Path) -> list[bpy.types.Object]:
     bpy.data.libraries.write(str(tmp_path / "library.blend"), {new_object("Tool")})
     blank()
     local = new_object("Tool")
-    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, wanted):
-        wanted.objects = ["Tool"]
-    (linked,) = wanted.objects
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, expected):
+        expected.objects = ["Tool"]
+    (linked,) = expected.objects
     bpy.context.scene.collection.objects.link(linked)
     bpy.context.view_layer.update()
     return [local, linked]

@@ -84,11 +84,11 @@ def test_who_goes_between_frames_finds_it_exact_and_an_edit_on_a_whole_frame_beg
 
 def test_what_is_taken_out_is_what_is_computed_on_whole_frames(rig):
     def samples() -> list[np.ndarray]:
-        found = []
+        result = []
         for fcurve in follower.slots_in([rig.animation_data.action])[0].bones_channelbag.fcurves:
-            found.append(np.empty(2 * len(fcurve.sampled_points), np.float32))
-            fcurve.sampled_points.foreach_get("co", found[-1])
-        return found
+            result.append(np.empty(2 * len(fcurve.sampled_points), np.float32))
+            fcurve.sampled_points.foreach_get("co", result[-1])
+        return result
 
     computed = samples()
     follower.follower.finish_drafts()

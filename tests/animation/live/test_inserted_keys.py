@@ -41,21 +41,21 @@ def insert(path: str) -> None:
     bpy.context.view_layer.update()
 
 
-def assert_key_has(wanted: np.ndarray) -> None:
+def assert_key_has(expected: np.ndarray) -> None:
     obj = bpy.data.objects["Tool"]
     assert 15.0 in key_frames(obj)
-    assert np.abs(expected_bases(obj, [15.0])[0] - wanted).max() < 2e-5
-    assert np.abs(seen() - wanted).max() < 2e-5
+    assert np.abs(expected_bases(obj, [15.0])[0] - expected).max() < 2e-5
+    assert np.abs(seen() - expected).max() < 2e-5
 
 
 @pytest.mark.parametrize("path", ["location", "rotation_quaternion"])
 def test_a_pose_by_hand_is_given_up_with_the_frame(tool, path):
-    wanted = seen()
+    expected = seen()
     pose(5.0, 2.0)
     bpy.context.scene.frame_set(30)
     bpy.context.scene.frame_set(15)
     insert(path)
-    assert_key_has(wanted)
+    assert_key_has(expected)
 
 
 def test_a_pose_by_hand_is_given_up_with_an_edit_of_the_action(tool):
@@ -63,9 +63,9 @@ def test_a_pose_by_hand_is_given_up_with_an_edit_of_the_action(tool):
     fcurve = curves_of(tool)["location", 1]
     fcurve.keyframe_points[1].co_ui.y += 2.0
     fcurve.update()
-    wanted = seen()
+    expected = seen()
     insert("location")
-    assert_key_has(wanted)
+    assert_key_has(expected)
 
 
 def test_the_same_key_of_another_pose_is_another_key(tool):
@@ -76,9 +76,9 @@ def test_the_same_key_of_another_pose_is_another_key(tool):
     bpy.ops.ed.undo()
     assert 15.0 not in key_frames(bpy.data.objects["Tool"])
     pose(5.0, -1.0)
-    wanted = seen()
+    expected = seen()
     insert("location")
-    assert_key_has(wanted)
+    assert_key_has(expected)
 
 
 ORDERS = ("QUATERNION", "XYZ", "ZXY")

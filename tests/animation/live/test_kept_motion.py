@@ -121,7 +121,7 @@ def between(obj: bpy.types.Object) -> np.ndarray:
     """Where the points are at quarters of frames, between the samples as well, shape (m, 3, 4)."""
     (source,) = keyed_in(slot_transforms_of([transform_of(obj)]))
     frames = np.arange(4.0 * FRAMES[0], 4.0 * FRAMES[-1] + 1.0) / 4.0
-    poses = in_betweens(source, frames).wanted
+    poses = in_betweens(source, frames).desired
     scales = np.ones(len(frames)) if poses.scales is None else poses.scales
     return (matrices(poses.positions, poses.quaternions, np.repeat(scales[:, None], 3, axis=1)) @ POINTS)[:, :3]
 
@@ -187,12 +187,12 @@ def test_so_it_does_for_bones(live_file):
     set_mode(hand, "motor_spline")
 
     def poses() -> np.ndarray:
-        found = []
+        result = []
         for frame in PLAYED:
             bpy.context.scene.frame_set(int(frame))
             evaluated = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
-            found.append(np.array(evaluated.pose.bones["Hand"].matrix) @ POINTS)
-        return np.array(found)[:, :3]
+            result.append(np.array(evaluated.pose.bones["Hand"].matrix) @ POINTS)
+        return np.array(result)[:, :3]
 
     before = poses()
     for frame in (31, 34):
@@ -289,5 +289,5 @@ def test_as_a_keyframe_it_shapes_the_path_again(live_file):
         point.type = "BREAKDOWN"
     bpy.context.view_layer.update()
     ends = shown_worlds([other], [1.0, 17.0, 25.0, 31.0, 49.0, 60.0])[0][:, :3, 3]
-    wanted = [POSES[number][0] for number in (0, 1, 2, 3, 4)]
-    np.testing.assert_allclose(np.delete(ends, 3, axis=0), wanted, atol=1e-5)
+    expected = [POSES[number][0] for number in (0, 1, 2, 3, 4)]
+    np.testing.assert_allclose(np.delete(ends, 3, axis=0), expected, atol=1e-5)

@@ -66,9 +66,9 @@ def keys_of(obj):
     }
 
 
-def assert_same(read: Poses, wanted: Poses) -> None:
-    assert np.abs(read.positions - wanted.positions).max() < 1e-5
-    assert angle_between(read.quaternions, wanted.quaternions).max() < 1e-5
+def assert_same(read: Poses, expected: Poses) -> None:
+    assert np.abs(read.positions - expected.positions).max() < 1e-5
+    assert angle_between(read.quaternions, expected.quaternions).max() < 1e-5
 
 
 @pytest.mark.parametrize(("mode", "rotation_mode"), in_turn(KEYFRAME_MODES, ["QUATERNION", *ORDERS]))

@@ -140,8 +140,8 @@ class EditingObjects(TakenAway, WithTools):
 
         def change() -> None:
             with suppress(animation.Refused):
-                found = bpy.data.objects[name]
-                baked.extend(animation.bake(found, step=step, first=first, last=last, interpolation=interpolation))
+                result = bpy.data.objects[name]
+                baked.extend(animation.bake(result, step=step, first=first, last=last, interpolation=interpolation))
 
         self._edit(change)
         obj = bpy.data.objects[name]
@@ -156,9 +156,9 @@ class EditingObjects(TakenAway, WithTools):
         begin, end = baked
         # Up to a baked key off whole frames, what is left of the segment before it blends into that key's pose.
         kept = (every >= np.ceil(begin)) & (every <= np.floor(end)) & ((every - begin) % step == 0.0)
-        shown, wanted = shown_worlds([obj], every[kept])[0], before[kept]
-        size = max(1.0, np.abs(wanted).max(initial=0.0))
-        for frame, now, then in zip(every[kept], shown, wanted, strict=True):
+        shown, expected = shown_worlds([obj], every[kept])[0], before[kept]
+        size = max(1.0, np.abs(expected).max(initial=0.0))
+        for frame, now, then in zip(every[kept], shown, expected, strict=True):
             assert np.abs(now - then).max() < 2e-5 * size, (
                 f"{name} is baked otherwise on frame {frame} (keys on {keys}, step {step}):\n{now}\ninstead of\n{then}"
             )
@@ -423,9 +423,9 @@ class EditingObjects(TakenAway, WithTools):
             if len(frames):
                 shown = shown_worlds([obj], frames)[0]
                 is_exact = obj.rigid_motion.is_exact
-                wanted = (expected_bases if is_exact else expected_off_whole_frames)(obj, frames, self.owns[name])
-                size = max(1.0, np.abs(wanted).max(), np.abs(expected_bases(obj, whole)).max())
-                error = np.abs(shown - wanted).max(axis=(1, 2)) / size * shortest_quaternion(obj, frames)
+                expected = (expected_bases if is_exact else expected_off_whole_frames)(obj, frames, self.owns[name])
+                size = max(1.0, np.abs(expected).max(), np.abs(expected_bases(obj, whole)).max())
+                error = np.abs(shown - expected).max(axis=(1, 2)) / size * shortest_quaternion(obj, frames)
                 assert error.max() < 1e-4, f"{name} is off by {error.max():.3g} on frame {frames[error.argmax()]}"
 
     @precondition(lambda self: self.on and self.history)

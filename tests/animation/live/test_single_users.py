@@ -64,8 +64,8 @@ def test_keys_of_a_rig_that_a_script_sets_are_followed(live_file):
     raise_keys(single.pose.bones["Body"])
     live_file.view_layer.update()
     bone = single.evaluated_get(live_file.evaluated_depsgraph_get()).pose.bones["Body"]
-    wanted = (
+    expected = (
         np.array(single.data.bones["Body"].matrix_local)
         @ expected_bases(single.pose.bones["Body"], [float(BETWEEN)])[0]
     )
-    assert np.abs(np.array(bone.matrix) - wanted).max() < 5e-5
+    assert np.abs(np.array(bone.matrix) - expected).max() < 5e-5

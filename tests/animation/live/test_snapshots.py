@@ -52,12 +52,12 @@ def slot_of(rig: bpy.types.Object) -> Slot:
 
 def edited(rig: bpy.types.Object) -> set[str]:
     """The names of bones that were edited since the last look, "" for the rig itself; all their F-curves are found."""
-    found = follower.snapshots.edited_in(slot_of(rig))
-    for place in found:
+    result = follower.snapshots.edited_in(slot_of(rig))
+    for place in result:
         if place.prefix:
             there = {(place.prefix + path, index) for path, index in curves_of(place.users[0].carrier)}
             assert place.curves.keys() == there
-    return {place.prefix.removeprefix('pose.bones["').removesuffix('"].') for place in found}
+    return {place.prefix.removeprefix('pose.bones["').removesuffix('"].') for place in result}
 
 
 def location(rig: bpy.types.Object, bone: str, index: int = 1) -> bpy.types.FCurve:

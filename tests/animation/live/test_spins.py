@@ -39,12 +39,12 @@ def turned(obj: bpy.types.Object, frames=EACH) -> np.ndarray:
 def rotations(angles, axis: int) -> np.ndarray:
     """Turns by angles (m,) about one of the axes of space, as matrices (m, 3, 3)."""
     cosines, sines = np.cos(angles), np.sin(angles)
-    found = np.zeros((len(sines), 3, 3))
+    result = np.zeros((len(sines), 3, 3))
     i, j = (axis + 1) % 3, (axis + 2) % 3
-    found[:, axis, axis] = 1.0
-    found[:, i, i] = found[:, j, j] = cosines
-    found[:, j, i], found[:, i, j] = sines, -sines
-    return found
+    result[:, axis, axis] = 1.0
+    result[:, i, i] = result[:, j, j] = cosines
+    result[:, j, i], result[:, i, j] = sines, -sines
+    return result
 
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])
@@ -52,11 +52,11 @@ def rotations(angles, axis: int) -> np.ndarray:
 def test_keys_at_every_half_turn_turn_three_times_one_way(live_file, mode, sense):
     obj = wheel(sense * pi * np.arange(7), mode)
     lerp = mode in ("pga_lerp", "cga_lerp")
-    found, even = turned(obj), rotations(sense * tau * 3.0 * (EACH - 1.0) / 72.0, 1)
+    result, even = turned(obj), rotations(sense * tau * 3.0 * (EACH - 1.0) / 72.0, 1)
     if lerp:
         # Slower at the keys, but the same on keys and half-way.
-        found, even = found[::6], even[::6]
-    assert np.abs(found - even).max() < 1e-5
+        result, even = result[::6], even[::6]
+    assert np.abs(result - even).max() < 1e-5
     steps = np.einsum("mij,mij->m", turned(obj)[1:], turned(obj)[:-1])
     assert np.all(np.arccos(np.clip((steps - 1.0) / 2.0, -1.0, 1.0)) > 0.02)
 

@@ -22,8 +22,8 @@ POINTS = np.concatenate((np.zeros((1, 3)), 0.1 * np.eye(3)))
 
 def largest_error(obj: bpy.types.Object, frames: np.ndarray, own: Own | None = None) -> float:
     """How far the object's origin, or a point ten centimetres away along its axes, is off."""
-    (shown,), wanted = shown_worlds([obj], frames), expected_worlds(obj, frames, {obj.name: own or Own()})
-    one, other = (m[:, None, :3, :3] @ POINTS[:, :, None] + m[:, None, :3, 3:] for m in (shown, wanted))
+    (shown,), expected = shown_worlds([obj], frames), expected_worlds(obj, frames, {obj.name: own or Own()})
+    one, other = (m[:, None, :3, :3] @ POINTS[:, :, None] + m[:, None, :3, 3:] for m in (shown, expected))
     return float(np.linalg.norm(one - other, axis=2).max())
 
 
@@ -120,16 +120,16 @@ def test_it_is_saved_undone_and_slowed_down(live_file, tmp_path):
     assert refresh() == 0
     assert largest_error(obj, EIGHTHS) < PROMISE
     assert tuple(obj.animation_data.action.frame_range) == (1.0, 40.0)
-    wanted = expected_worlds(obj, EIGHTHS)
+    expected = expected_worlds(obj, EIGHTHS)
     push_down(obj, scale=4.0)
     (shown,) = shown_worlds([obj], 1.0 + 4.0 * (EIGHTHS - 1.0))
-    assert np.abs(shown - wanted).max() < PROMISE
+    assert np.abs(shown - expected).max() < PROMISE
     obj.parent = new_object("Parent")
     obj.parent.location.x = 1.0
     refresh()
     bpy.context.view_layer.update()
     (shown,) = shown_worlds([obj], 1.0 + 4.0 * (EIGHTHS - 1.0))
-    assert np.abs(shown[:, :3, 3] - (1.0, 0.0, 0.0) - wanted[:, :3, 3]).max() < PROMISE
+    assert np.abs(shown[:, :3, 3] - (1.0, 0.0, 0.0) - expected[:, :3, 3]).max() < PROMISE
 
 
 @pytest.mark.parametrize(("mode", "order"), in_turn(KEYFRAME_MODES, ORDERS))

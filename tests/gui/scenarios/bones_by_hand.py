@@ -61,13 +61,13 @@ def make_the_rig() -> None:
 
 def shown(name: str = "Hand", frames=WHOLE) -> np.ndarray:
     """How a bone is seen on these frames, in the space of its channels. The scene returns to its frame."""
-    scene, found = bpy.context.scene, []
+    scene, result = bpy.context.scene, []
     before = scene.frame_current
     for frame in frames:
         scene.frame_set(frame)
-        found.append(now(name))
+        result.append(now(name))
     scene.frame_set(before)
-    return np.array(found)
+    return np.array(result)
 
 
 def now(name: str = "Hand") -> np.ndarray:

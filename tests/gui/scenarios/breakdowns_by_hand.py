@@ -35,10 +35,10 @@ def keys() -> Poses:
 
 
 def assert_on_the_screw(factor: float) -> None:
-    wanted = interpolate((0.0, 1.0), keys(), np.array([factor]), SCREW, extrapolate=True)
-    np.testing.assert_allclose(now()[:3, 3], wanted.positions[0], atol=ALIKE)
+    expected = interpolate((0.0, 1.0), keys(), np.array([factor]), SCREW, extrapolate=True)
+    np.testing.assert_allclose(now()[:3, 3], expected.positions[0], atol=ALIKE)
     turned = np.array(hand_bone().rotation_quaternion.normalized())
-    np.testing.assert_allclose(turned * np.sign(turned @ wanted.quaternions[0]), wanted.quaternions[0], atol=ALIKE)
+    np.testing.assert_allclose(turned * np.sign(turned @ expected.quaternions[0]), expected.quaternions[0], atol=ALIKE)
 
 
 def start(hand: Hand, view: bpy.types.Area, label: str, picture: str | None = None) -> Steps[tuple[int, int]]:
@@ -142,8 +142,8 @@ def an_object(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     yield from hand.picture("object")
     yield from hand.press("RET")
     ends = Poses([(0.0, 0.0, 0.0), (2.0, 0.0, 0.0)], [as_quaternion((0.0, 0.0, x), "XYZ") for x in (0.0, 2.0)])
-    wanted = interpolate((0.0, 1.0), ends, np.array([0.25]), SCREW)
-    np.testing.assert_allclose(rig().matrix_basis.translation, wanted.positions[0], atol=ALIKE)
+    expected = interpolate((0.0, 1.0), ends, np.array([0.25]), SCREW)
+    np.testing.assert_allclose(rig().matrix_basis.translation, expected.positions[0], atol=ALIKE)
 
 
 def undo_steps() -> int:

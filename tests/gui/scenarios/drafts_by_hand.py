@@ -130,14 +130,14 @@ def assert_finished() -> None:
 
 def assert_exact() -> None:
     """The hand is where its mode has it between frames."""
-    scene, found = bpy.context.scene, []
+    scene, result = bpy.context.scene, []
     before = scene.frame_current
     for frame in BETWEEN:
         scene.frame_set(int(frame), subframe=frame % 1)
-        found.append(now())
+        result.append(now())
     scene.frame_set(before)
     assert_finished()
     with as_object("Hand") as twin:
         expected = expected_bases(twin, BETWEEN)
-    off = np.abs(np.array(found) - expected)[:, :3].max()
+    off = np.abs(np.array(result) - expected)[:, :3].max()
     assert off < PROMISED, off

@@ -23,11 +23,11 @@ def keys() -> list[int]:
 
 def ends() -> np.ndarray:
     """Where the bones' ends are in the world, every third frame."""
-    found = []
+    result = []
     for frame in FRAMES[::3]:
         bpy.context.scene.frame_set(int(frame))
-        found.append([rig().matrix_world @ rig().pose.bones[name].tail for name in NAMES])
-    return np.array(found)
+        result.append([rig().matrix_world @ rig().pose.bones[name].tail for name in NAMES])
+    return np.array(result)
 
 
 def scenario(hand: Hand) -> Steps[None]:

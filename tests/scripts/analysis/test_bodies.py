@@ -170,15 +170,15 @@ def test_errors_are_in_metres_whatever_the_unit(seed: int, power: int) -> None:
 @pytest.mark.parametrize("mode", KEYFRAME_MODES)
 def test_a_body_of_one_joint_has_the_errors_of_a_single_rigid_one(mode: str) -> None:
     single = swinging_clip(seconds=1.0)
-    figure = replace(
-        swinging_body().figure,
+    rest_body = replace(
+        swinging_body().rest_body,
         joints=("Only",),
         parents=np.array([-1]),
         rest=Poses(np.zeros((1, 3)), np.eye(4)[:1]),
         tails=np.zeros((1, 3)),
     )
     poses = Poses(single.poses.positions[None], single.poses.quaternions[None])
-    made = reconstruct_body(replace(single, poses=poses, figure=figure), Uniform("6"), (mode,), 0.1)
+    made = reconstruct_body(replace(single, poses=poses, rest_body=rest_body), Uniform("6"), (mode,), 0.1)
     errors, expected = measured(made, mode, 0.1), reconstruct(single, Uniform("6"), (mode,), 0.1).errors[mode]
     np.testing.assert_allclose(errors.shell[0], expected.shell, atol=1e-12)
     assert errors.velocity[0] == pytest.approx(np.sqrt(np.mean(expected.velocity**2)))

@@ -75,13 +75,13 @@ def number(cell: str) -> bool:
 
 @pytest.mark.parametrize("choice", CHOICES, ids=str)
 def test_the_rows_are_statistics_of_all_joints_and_of_each(choice: Choice) -> None:
-    found = measured(choice)
-    made = found.made
-    assert [row.mode for row in found.rows] == list(MODES)
-    assert [(row.mode, row.joint) for row in found.joints] == [(mode, joint) for mode in MODES for joint in JOINTS]
-    for row in found.rows:
+    result = measured(choice)
+    made = result.made
+    assert [row.mode for row in result.rows] == list(MODES)
+    assert [(row.mode, row.joint) for row in result.joints] == [(mode, joint) for mode in MODES for joint in JOINTS]
+    for row in result.rows:
         errors = measure_body(made, row.mode, RADII, Ground.of(made))
-        own = [joint for joint in found.joints if joint.mode == row.mode]
+        own = [joint for joint in result.joints if joint.mode == row.mode]
         assert row.rms_shell_m == pytest.approx(np.sqrt(np.mean([joint.rms_shell_m**2 for joint in own])))
         assert row.max_shell_m == max(joint.max_shell_m for joint in own) == errors.shell.max()
         assert row.worst_joint == max(own, key=lambda joint: joint.max_shell_m).joint
@@ -118,7 +118,7 @@ def test_what_is_shown_has_the_largest_errors_and_where_the_joints_are_then(seco
     joint, sample = shown.worst
     assert errors.max() == errors[joint, sample] == shown.shell.max()
     np.testing.assert_array_equal(shown.shell, errors)
-    truth = to_blender(clip.figure.skeleton.in_root_space(clip.poses[:, made.samples])[:, sample], clip.axes)
+    truth = to_blender(clip.rest_body.skeleton.in_root_space(clip.poses[:, made.samples])[:, sample], clip.axes)
     away = np.linalg.norm(shown.places[:, sample] - 0.01 * truth.positions, axis=-1)
     assert away.max() <= errors[:, sample].max()
     assert away.max() == pytest.approx(shown.largest[0, sample], abs=1e-6)
@@ -138,24 +138,24 @@ def test_how_many_numbers_keys_take_counts_times_turns_and_places_that_vary() ->
 
 
 def test_the_columns_are_those_promised_and_read_back_exactly(tmp_path: Path) -> None:
-    found = measured(CHOICES[1], joints=HOSTILE)
-    write_joint_metrics(tmp_path / "joints.csv", found.joints)
+    result = measured(CHOICES[1], joints=HOSTILE)
+    write_joint_metrics(tmp_path / "joints.csv", result.joints)
     assert (tmp_path / "joints.csv").read_text().splitlines()[0] == HEADER
     header, *rows = cells_of(tmp_path / "joints.csv")
     assert {len(row) for row in rows} == {len(header)}
     assert [row[1] for row in rows] == [*HOSTILE] * len(MODES)
-    for row, expected in zip(rows, found.joints, strict=True):
+    for row, expected in zip(rows, result.joints, strict=True):
         for cell, value in zip(row, astuple(expected), strict=True):
             assert type(value)(cell) == value
 
 
 def test_tables_are_joined_under_one_header_whatever_joints_are_called(tmp_path: Path) -> None:
-    found = measured(joints=HOSTILE)
+    result = measured(joints=HOSTILE)
     parts = [tmp_path / f"{number}.csv" for number in range(3)]
-    for part, rows in zip(parts, (found.joints, (), found.joints[:3]), strict=True):
+    for part, rows in zip(parts, (result.joints, (), result.joints[:3]), strict=True):
         write_joint_metrics(part, rows)
     join_tables(tmp_path / "all.csv", parts)
-    write_joint_metrics(tmp_path / "expected.csv", [*found.joints, *found.joints[:3]])
+    write_joint_metrics(tmp_path / "expected.csv", [*result.joints, *result.joints[:3]])
     assert (tmp_path / "all.csv").read_bytes() == (tmp_path / "expected.csv").read_bytes()
 
 

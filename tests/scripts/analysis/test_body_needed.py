@@ -37,33 +37,33 @@ def test_the_error_is_that_of_key_poses_in_the_roots_space(mode: str) -> None:
     assert WAYS.error(keys, mode) == pytest.approx(rms(WAYS, keys, mode), rel=1e-6)
 
 
-def test_the_reference_is_evenly_spaced_and_modes_that_are_one_motion_are_one(found: KeysNeeded) -> None:
-    assert found.groups[:2] == (("lerp_slerp",), ("dq_sclerp", "cga_slerp"))
-    assert found.keys.shape == (3, 2, len(RATES))
-    assert found.targets[-1] == pytest.approx(WAYS.between(0, 36).error(np.arange(0, 37, 6), "lerp_slerp"))
-    assert found.reference_keys.tolist() == [40, 27, 20, 16, 11, 7]
+def test_the_reference_is_evenly_spaced_and_modes_that_are_one_motion_are_one(result: KeysNeeded) -> None:
+    assert result.groups[:2] == (("lerp_slerp",), ("dq_sclerp", "cga_slerp"))
+    assert result.keys.shape == (3, 2, len(RATES))
+    assert result.targets[-1] == pytest.approx(WAYS.between(0, 36).error(np.arange(0, 37, 6), "lerp_slerp"))
+    assert result.reference_keys.tolist() == [40, 27, 20, 16, 11, 7]
 
 
-def test_with_every_sample_a_key_there_is_nothing_to_be_as_good_as(found: KeysNeeded) -> None:
-    assert found.targets[0] < NOTHING
-    assert np.isnan(found.keys[..., 0]).all()
+def test_with_every_sample_a_key_there_is_nothing_to_be_as_good_as(result: KeysNeeded) -> None:
+    assert result.targets[0] < NOTHING
+    assert np.isnan(result.keys[..., 0]).all()
 
 
-def test_the_keys_needed_are_as_good_and_those_of_the_motion_are_no_more(found: KeysNeeded) -> None:
+def test_the_keys_needed_are_as_good_and_those_of_the_motion_are_no_more(result: KeysNeeded) -> None:
     for place in range(1, len(RATES)):
-        uniform, adaptive = found.keys[:, 0, place], found.keys[:, 1, place]
-        assert uniform[0] == found.reference_keys[place]
-        finite = np.isfinite(found.keys[..., place])
-        assert (found.reached[..., place][finite] <= found.targets[place] * (1.0 + 1e-9)).all()
+        uniform, adaptive = result.keys[:, 0, place], result.keys[:, 1, place]
+        assert uniform[0] == result.reference_keys[place]
+        finite = np.isfinite(result.keys[..., place])
+        assert (result.reached[..., place][finite] <= result.targets[place] * (1.0 + 1e-9)).all()
         assert (adaptive[np.isfinite(uniform)] <= uniform[np.isfinite(uniform)]).all()
 
 
-def test_evenly_one_key_fewer_is_not_as_good(found: KeysNeeded) -> None:
-    for row, (mode, *_) in list(enumerate(found.groups))[1:]:
+def test_evenly_one_key_fewer_is_not_as_good(result: KeysNeeded) -> None:
+    for row, (mode, *_) in list(enumerate(result.groups))[1:]:
         for place in range(1, len(RATES)):
-            keys = found.keys[row, 0, place]
+            keys = result.keys[row, 0, place]
             if np.isfinite(keys) and keys > 2:
-                last = round(found.durations[place] * 30.0)
+                last = round(result.durations[place] * 30.0)
                 stretch = WAYS.between(0, last)
                 fewer = evenly_spaced(stretch.clip, int(keys) - 2)
-                assert stretch.error(fewer, mode) > found.targets[place]
+                assert stretch.error(fewer, mode) > result.targets[place]

@@ -42,51 +42,51 @@ def found(swing: Clip) -> KeysNeeded:
     return keys_needed(OfRigidBody(swing, 0.1), KEYFRAME_MODES)
 
 
-def test_the_error_to_reach_is_that_of_the_reference_at_its_rate(swing: Clip, found: KeysNeeded) -> None:
-    assert found.groups == GROUPS
+def test_the_error_to_reach_is_that_of_the_reference_at_its_rate(swing: Clip, result: KeysNeeded) -> None:
+    assert result.groups == GROUPS
     for place, rate in enumerate(RATES):
         keys = decimate(swing.times, float(rate))
         covered = between(swing, 0, keys[-1])
-        assert found.reference_keys[place] == len(keys)
-        assert found.durations[place] == covered.times[-1] - covered.times[0]
+        assert result.reference_keys[place] == len(keys)
+        assert result.durations[place] == covered.times[-1] - covered.times[0]
         for row, (mode, *_) in enumerate(GROUPS):
             error = rms(shell_errors(covered, keys, mode))
-            assert found.uniform_errors[row, place] == pytest.approx(error, rel=1e-9)
-        assert found.targets[place] == found.uniform_errors[0, place]
+            assert result.uniform_errors[row, place] == pytest.approx(error, rel=1e-9)
+        assert result.targets[place] == result.uniform_errors[0, place]
 
 
-def test_adaptive_keys_reach_it_over_the_same_samples(swing: Clip, found: KeysNeeded) -> None:
+def test_adaptive_keys_reach_it_over_the_same_samples(swing: Clip, result: KeysNeeded) -> None:
     for place, rate in enumerate(RATES):
         covered = between(swing, 0, decimate(swing.times, float(rate))[-1])
         for row, (mode, *_) in enumerate(GROUPS):
-            keys = reduce_keys(covered.times, covered.poses, mode, found.targets[place], 0.1, rms=True)
+            keys = reduce_keys(covered.times, covered.poses, mode, result.targets[place], 0.1, rms=True)
             error = rms(shell_errors(covered, keys, mode))
-            assert error <= found.targets[place] * (1.0 + 1e-9)
-            assert found.keys[row, 1, place] == len(keys)
-            assert found.reached[row, 1, place] == pytest.approx(error, rel=1e-9)
+            assert error <= result.targets[place] * (1.0 + 1e-9)
+            assert result.keys[row, 1, place] == len(keys)
+            assert result.reached[row, 1, place] == pytest.approx(error, rel=1e-9)
 
 
-def test_evenly_spaced_keys_reach_it_and_one_segment_fewer_do_not(swing: Clip, found: KeysNeeded) -> None:
+def test_evenly_spaced_keys_reach_it_and_one_segment_fewer_do_not(swing: Clip, result: KeysNeeded) -> None:
     for place, rate in enumerate(RATES):
         covered = between(swing, 0, decimate(swing.times, float(rate))[-1])
         for row, (mode, *_) in list(enumerate(GROUPS))[1:]:
-            segments = int(found.keys[row, 0, place]) - 1
+            segments = int(result.keys[row, 0, place]) - 1
             enough, fewer = (
                 rms(shell_errors(covered, evenly_spaced(covered, count), mode)) for count in (segments, segments - 1)
             )
-            assert enough <= found.targets[place] * (1.0 + 1e-9) < fewer
-            assert found.reached[row, 0, place] == pytest.approx(enough, rel=1e-9)
+            assert enough <= result.targets[place] * (1.0 + 1e-9) < fewer
+            assert result.reached[row, 0, place] == pytest.approx(enough, rel=1e-9)
 
 
-def test_the_reference_needs_its_own_keys_and_shares_are_counted_from_them(found: KeysNeeded) -> None:
-    assert (found.shares[0, 0] == 1.0).all()
-    assert np.array_equal(found.keys[0, 0], found.reference_keys)
-    assert np.allclose(found.shares * found.reference_keys, found.keys)
-    assert np.allclose(found.keys_per_s * found.durations, found.keys - 1.0)
-    assert (found.shares[3, 1] < found.shares[0, 1]).all()
+def test_the_reference_needs_its_own_keys_and_shares_are_counted_from_them(result: KeysNeeded) -> None:
+    assert (result.shares[0, 0] == 1.0).all()
+    assert np.array_equal(result.keys[0, 0], result.reference_keys)
+    assert np.allclose(result.shares * result.reference_keys, result.keys)
+    assert np.allclose(result.keys_per_s * result.durations, result.keys - 1.0)
+    assert (result.shares[3, 1] < result.shares[0, 1]).all()
 
 
-def test_fitted_keys_reach_it_and_are_fewer(swing: Clip, found: KeysNeeded) -> None:
+def test_fitted_keys_reach_it_and_are_fewer(swing: Clip, result: KeysNeeded) -> None:
     shaken = np.random.default_rng(3).normal(size=swing.poses.positions.shape)
     clip = replace(swing, poses=Poses(swing.poses.positions + 1e-3 * shaken, swing.poses.quaternions))
     with_fitted = keys_needed(OfRigidBody(clip, 0.1, fit=True), ["motor_spline"])
@@ -95,7 +95,7 @@ def test_fitted_keys_reach_it_and_are_fewer(swing: Clip, found: KeysNeeded) -> N
     assert (with_fitted.keys[:, 2] <= with_fitted.keys[:, 1]).all()
     assert with_fitted.keys[:, 2].sum() < 0.97 * with_fitted.keys[:, 1].sum()
     assert overall([with_fitted, with_fitted]).shares == pytest.approx(with_fitted.shares)
-    assert found.keys.shape[1] == 2
+    assert result.keys.shape[1] == 2
 
 
 def test_where_the_reference_has_all_samples_or_no_two_there_is_nothing_to_reach() -> None:
@@ -111,12 +111,12 @@ def test_what_takes_every_sample_is_not_reached() -> None:
     random = np.random.default_rng(0)
     clip = swinging_clip(seconds=2.0, rate=30.5)
     shaken = replace(clip, poses=Poses(random.normal(size=(len(clip.times), 3)), clip.poses.quaternions))
-    found = keys_needed(OfRigidBody(shaken, 0.1), ["lerp_slerp", "motor_spline"])
+    result = keys_needed(OfRigidBody(shaken, 0.1), ["lerp_slerp", "motor_spline"])
     at = RATES.index("30")
-    assert found.targets[at] > 0.1
-    assert np.isinf(found.keys[1, 0, at])
-    assert np.isnan(overall([found]).shares[1, 0, at])
-    assert (overall([found]).clips[1, 0, at], overall([found]).asked[at]) == (0, 1)
+    assert result.targets[at] > 0.1
+    assert np.isinf(result.keys[1, 0, at])
+    assert np.isnan(overall([result]).shares[1, 0, at])
+    assert (overall([result]).clips[1, 0, at], overall([result]).asked[at]) == (0, 1)
 
 
 def clip_of(
@@ -158,17 +158,19 @@ def test_over_all_clips_those_count_that_reached_the_error_and_it_is_known_how_m
     assert together.shares[:, 1, 0] == pytest.approx([np.sqrt(0.5 * 0.25), 0.6])
 
 
-def test_the_table_as_a_file_has_a_row_for_every_mode_and_reads_back_exactly(tmp_path: Path, found: KeysNeeded) -> None:
+def test_the_table_as_a_file_has_a_row_for_every_mode_and_reads_back_exactly(
+    tmp_path: Path, result: KeysNeeded
+) -> None:
     never = clip_of("b", [[100, 50], [np.inf, np.nan]])
-    write_keys_needed(tmp_path / "keys_needed.csv", [found, never])
+    write_keys_needed(tmp_path / "keys_needed.csv", [result, never])
     with (tmp_path / "keys_needed.csv").open(newline="") as stream:
         rows = list(csv.DictReader(stream))
     assert len(rows) == len(KEYFRAME_MODES) * 2 * len(RATES) + 6
     for row in rows[:-6]:
         group = next(place for place, modes in enumerate(GROUPS) if row["mode"] in modes)
         at = group, ("uniform", "adaptive").index(row["decimation"]), RATES.index(row["as_good_as_hz"])
-        assert float(row["wanted_rms_shell_m"]) == found.targets[at[-1]]
+        assert float(row["wanted_rms_shell_m"]) == result.targets[at[-1]]
         written = [float(row[name]) for name in ("keys", "keys_per_s", "share", "rms_shell_m")]
-        assert written == [found.keys[at], found.keys_per_s[at], found.shares[at], found.reached[at]]
+        assert written == [result.keys[at], result.keys_per_s[at], result.shares[at], result.reached[at]]
     assert [row["keys"] for row in rows[-6:]] == ["100", "100", "50", "50", "", ""]
     assert {row["share"] for row in rows[-2:]} == {""}

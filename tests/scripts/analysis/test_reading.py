@@ -72,5 +72,5 @@ def test_a_body_that_was_named_is_remembered_and_the_clip_has_the_name_of_its_fi
         ([("shot", "Rig/Hand"), ("shot", "Rig/Foot")], ["shot-Rig_Hand", "shot-Rig_Foot"]),
     ],
 )
-def test_the_body_is_part_of_the_name_only_where_files_have_the_same(wanted, names):
-    assert study.clip_names(wanted) == names
+def test_the_body_is_part_of_the_name_only_where_files_have_the_same(expected, names):
+    assert study.clip_names(expected) == names

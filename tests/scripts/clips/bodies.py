@@ -9,7 +9,7 @@ import numpy as np
 
 from rigid_motion.motion import Poses
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.recordings.figures import Figure
+from rigid_motion_batch.recordings.rest_bodies import RestBody
 
 BONES = {
     "Hips": (None, (0, 90, 0)),
@@ -53,13 +53,13 @@ def swinging_body(
     arm = list(BONES).index("Arm")
     poses.quaternions[arm] = turns(np.sin(4.0 * times), np.tile((0.0, 0.3, 1.0), (len(times), 1)))
     clip = Clip(name, f"{name}.bvh", "opengl", times, poses, (), 0.01)
-    return replace(clip, figure=figure_of(clip, joints))
+    return replace(clip, rest_body=rest_body_of(clip, joints))
 
 
-def figure_of(clip: Clip, joints: Sequence[str]) -> Figure:
+def rest_body_of(clip: Clip, joints: Sequence[str]) -> RestBody:
     """The figure of a clip whose joints are called so, at rest as it begins."""
     tails = np.tile((0.0, 10.0, 0.0), (len(joints), 1))
-    unplaced = Figure(tuple(joints), PARENTS, Poses(np.zeros((len(joints), 3)), np.eye(4)[[0] * len(joints)]), tails)
+    unplaced = RestBody(tuple(joints), PARENTS, Poses(np.zeros((len(joints), 3)), np.eye(4)[[0] * len(joints)]), tails)
     return replace(unplaced, rest=unplaced.skeleton.in_root_space(clip.poses)[:, 0])
 
 

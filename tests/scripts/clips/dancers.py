@@ -10,7 +10,7 @@ from rigid_motion.motion import Poses
 from rigid_motion.motion.poses import placed
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.recordings.figures import Figure, Skin
+from rigid_motion_batch.recordings.rest_bodies import RestBody, Skin
 
 JOINTS = ("Hips", "Spine", "Head", "Left leg", "Right leg", "Left foot")
 PARENTS = (-1, 0, 1, 0, 0, 3)
@@ -49,7 +49,7 @@ def dancing_clip(
     for joint, parent in enumerate(PARENTS):
         rest[joint] = local[joint] if parent < 0 else placed(rest[parent], local[joint])
     scale = 1.0 / metres_per_unit
-    figure = Figure(
+    rest_body = RestBody(
         tuple(joints),
         np.array(PARENTS),
         Poses(rest.positions * scale, rest.quaternions),
@@ -57,7 +57,7 @@ def dancing_clip(
         _skin(rest, scale) if skin else None,
     )
     poses = Poses(places * scale, turns)
-    return Clip(name, f"{name}.bvh", axes, times, poses, (), metres_per_unit, figure=figure)
+    return Clip(name, f"{name}.bvh", axes, times, poses, (), metres_per_unit, rest_body=rest_body)
 
 
 def _skin(rest: Poses, scale: float) -> Skin:

@@ -135,12 +135,12 @@ def test_a_blender_ends_with_what_started_it(blender: str, tmp_path: Path) -> No
 
 def blenders() -> list[int]:
     """The processes that do a request."""
-    found = []
+    result = []
     for path in Path("/proc").glob("[0-9]*/cmdline"):
         try:
             command = path.read_bytes()
         except OSError:
             continue
         if b"pipeline/worker.py" in command and b"--background" in command:
-            found.append(int(path.parent.name))
-    return found
+            result.append(int(path.parent.name))
+    return result

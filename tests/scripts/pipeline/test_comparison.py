@@ -28,7 +28,7 @@ from rigid_motion_batch.pipeline.store import OutputError, Store
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.report.settings import Settings
-from rigid_motion_batch.scenes.settings import StageSettings
+from rigid_motion_batch.scenes.settings import SceneSettings
 from tests.scripts.bvh_bodies import write_body
 from tests.scripts.comparing import write_toss
 from tests.scripts.pipeline.plans import Listener, Watched, states
@@ -36,7 +36,7 @@ from tests.thoroughness import THOROUGH
 
 ROOT = Path(__file__).resolve().parents[3]
 
-STAGE = StageSettings(resolution=(64, 36), fps=10)
+STAGE = SceneSettings(resolution=(64, 36), fps=10)
 
 ABOUT = Settings(0.1, "Rigid Motion", "compare toss.csv", details={"Videos": "small"})
 
@@ -109,15 +109,20 @@ def test_what_is_kept_of_a_clip_is_what_was_found(tmp_path: Path, toss: Path, ch
     if body:
         write_body(source)
     ((clip,), _) = read_clips([str(source)], None)
-    found = compare_clip(clip, choice, ("lerp_slerp", "motor_spline"), wanted(source).radii, shared=False)
-    values.write(tmp_path / "result", found)
+    result = compare_clip(clip, choice, ("lerp_slerp", "motor_spline"), wanted(source).radii, shared=False)
+    values.write(tmp_path / "result", result)
     read = result_in(tmp_path)
-    assert (read.choice, read.first, read.rows, read.joints) == (found.choice, found.first, found.rows, found.joints)
-    for one, other in zip(read.motions, found.motions, strict=True):
+    assert (read.choice, read.first, read.rows, read.joints) == (
+        result.choice,
+        result.first,
+        result.rows,
+        result.joints,
+    )
+    for one, other in zip(read.motions, result.motions, strict=True):
         assert one.modes == other.modes
         np.testing.assert_array_equal(one.errors, other.errors)
         np.testing.assert_array_equal(one.poses.positions, other.poses.positions)
-    for mode, keys in found.keys.items():
+    for mode, keys in result.keys.items():
         for one, other in zip(read.keys[mode], keys, strict=True):
             np.testing.assert_array_equal(one, other)
     values.write(tmp_path / "clip", clip)
@@ -125,8 +130,8 @@ def test_what_is_kept_of_a_clip_is_what_was_found(tmp_path: Path, toss: Path, ch
     np.testing.assert_array_equal(again.poses.quaternions, clip.poses.quaternions)
     assert (again.axes, again.warnings, again.repairs) == (clip.axes, clip.warnings, clip.repairs)
     if body:
-        assert again.figure.joints == clip.figure.joints
-        np.testing.assert_array_equal(again.figure.rest.positions, clip.figure.rest.positions)
+        assert again.rest_body.joints == clip.rest_body.joints
+        np.testing.assert_array_equal(again.rest_body.rest.positions, clip.rest_body.rest.positions)
 
 
 def test_a_film_and_a_page_of_a_clip(output: Path, toss: Path) -> None:
@@ -307,8 +312,8 @@ def start(folder: Path, source: Path, output: Path) -> subprocess.Popen:
 
 
 def workers_of(process: int) -> list[int]:
-    found = [path.read_text().split() for path in Path(f"/proc/{process}/task").glob("*/children")]
-    children = [int(child) for some in found for child in some]
+    result = [path.read_text().split() for path in Path(f"/proc/{process}/task").glob("*/children")]
+    children = [int(child) for some in result for child in some]
     return [child for child in children if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes()]
 
 
@@ -336,8 +341,8 @@ def test_a_run_that_was_killed_again_and_again_ends_like_one_that_was_not(
         else:
             process.kill()
             process.communicate()
-            found = published(output)
-            half = [path for path, content in found.items() if content not in (reference.get(path), b"")]
+            result = published(output)
+            half = [path for path, content in result.items() if content not in (reference.get(path), b"")]
             assert half == [], f"half-written after kill {number}"
     process = start(tmp_path, toss, output)
     said, _ = process.communicate(timeout=300)

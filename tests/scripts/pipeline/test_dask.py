@@ -121,8 +121,8 @@ class Connecting:
 
 def children_of(worker: int) -> set[int]:
     """The processes that a worker has started."""
-    found = [path.read_text().split() for path in Path(f"/proc/{worker}/task").glob("*/children")]
-    return {int(one) for some in found for one in some}
+    result = [path.read_text().split() for path in Path(f"/proc/{worker}/task").glob("*/children")]
+    return {int(one) for some in result for one in some}
 
 
 def at_work(output: Path) -> list[Path]:
@@ -198,8 +198,8 @@ def test_a_worker_without_this_program_is_left_out_and_lives(cluster: Cluster, t
         stranger = cluster.add_worker(program=tmp_path)
 
         def left_out() -> bool:
-            found = executor.workers()
-            return any("No module named 'rigid_motion_batch'" in note for note in connecting.notes) and len(found) == 2
+            result = executor.workers()
+            return any("No module named 'rigid_motion_batch'" in note for note in connecting.notes) and len(result) == 2
 
         wait_for(left_out)
         assert stranger.poll() is None

@@ -342,8 +342,8 @@ def started(folder: Path, output: Path, seconds: float) -> Iterator[subprocess.P
 
 
 def children(process: int) -> list[int]:
-    found = [path.read_text().split() for path in Path(f"/proc/{process}/task").glob("*/children")]
-    return [int(child) for some in found for child in some]
+    result = [path.read_text().split() for path in Path(f"/proc/{process}/task").glob("*/children")]
+    return [int(child) for some in result for child in some]
 
 
 def alive(process: int) -> bool:
@@ -355,7 +355,7 @@ def alive(process: int) -> bool:
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes where Linux shows them")
 def test_a_run_that_was_killed_again_and_again_ends_like_one_that_was_not(output: Path, tmp_path: Path) -> None:
-    wanted = {f"{n}.txt": f"{n}" for n in range(20)} | {"all.txt": "".join(f"{n}" for n in range(20))}
+    expected = {f"{n}.txt": f"{n}" for n in range(20)} | {"all.txt": "".join(f"{n}" for n in range(20))}
     results = 0
     for number in range(MOMENTS):
         with started(tmp_path, output, 0.05) as process:
@@ -370,16 +370,16 @@ def test_a_run_that_was_killed_again_and_again_ends_like_one_that_was_not(output
             workers = children(process.pid)
             process.kill()
             process.wait()
-        found = contents(output)
-        results = len(found)
-        assert found.items() <= wanted.items()
+        result = contents(output)
+        results = len(result)
+        assert result.items() <= expected.items()
         ends = time.monotonic() + 5.0
         while any(map(alive, workers)) and time.monotonic() < ends:
             time.sleep(0.01)
         assert not any(map(alive, workers))
     with started(tmp_path, output, 0.05) as process:
         assert process.wait(60) == 0
-    assert contents(output) == wanted
+    assert contents(output) == expected
     assert not (output / OWN / "scratch").exists()
 
 

@@ -104,8 +104,8 @@ def replace_words(content: bytes, chance: Random) -> bytes:
 
 
 def _replace(pattern: re.Pattern[bytes], instead: tuple[str, ...], content: bytes, chance: Random) -> bytes:
-    found = list(pattern.finditer(content))
-    for match in sorted(chance.sample(found, min(len(found), chance.choice((1, 1, 3)))), key=re.Match.start)[::-1]:
+    result = list(pattern.finditer(content))
+    for match in sorted(chance.sample(result, min(len(result), chance.choice((1, 1, 3)))), key=re.Match.start)[::-1]:
         content = content[: match.start()] + chance.choice(instead).encode() + content[match.end() :]
     return content
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigid_motion_batch.hushing import hushed
+from rigid_motion_batch.silencing import silenced
 from tests.blank import blank
 from tests.scripts.recordings.blends import key, rig
 
@@ -89,7 +89,7 @@ def surface_in_blender(skin: bpy.types.Object) -> np.ndarray:
 
 def export(path: Path, **settings: object) -> Path:
     """Export the open scene by the ending of a path, and leave it."""
-    with hushed(), contextlib.redirect_stderr(io.StringIO()), warnings.catch_warnings():
+    with silenced(), contextlib.redirect_stderr(io.StringIO()), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         if path.suffix == ".fbx":
             settings = {"add_leaf_bones": False, "bake_anim_simplify_factor": 0.0} | settings

@@ -48,9 +48,9 @@ def assert_are(trajectory: Trajectory, expected: list[np.ndarray]) -> None:
     expected = np.stack(expected)
     lengths = np.linalg.norm(expected[:, :3, 0], axis=1)
     rotations = Rotation.from_matrix(expected[:, :3, :3] / lengths[:, None, None])
-    found = Rotation.from_quat(trajectory.poses.quaternions, scalar_first=True)
+    result = Rotation.from_quat(trajectory.poses.quaternions, scalar_first=True)
     np.testing.assert_allclose(trajectory.poses.positions, expected[:, :3, 3], atol=3e-6)
-    np.testing.assert_allclose((found * rotations.inv()).magnitude(), 0.0, atol=3e-6)
+    np.testing.assert_allclose((result * rotations.inv()).magnitude(), 0.0, atol=3e-6)
     scales = trajectory.poses.scales
     np.testing.assert_allclose(lengths if scales is None else scales, lengths if scales is not None else 1.0, atol=3e-6)
 
@@ -161,7 +161,7 @@ def test_bones_and_rigs_may_be_called_anything(saved, name: str) -> None:
     trajectory = read(f"{path}:{name}/{name}")
     assert trajectory.name == f"{name}/{name}"
     assert_are(trajectory, [matrix((frame, 1, 0)) for frame in range(3, 9)])
-    assert read(path).figure.joints == ("Hand", name)
+    assert read(path).rest_body.joints == ("Hand", name)
 
 
 def test_a_missing_bone_is_answered_with_those_nearest_to_it(saved, refusal) -> None:
@@ -182,7 +182,7 @@ def test_a_bone_without_its_rig_is_answered_with_both(saved, refusal) -> None:
 
 def places(trajectory: Trajectory) -> np.ndarray:
     """Where the joints of a whole body are in the world, shape (joints, n, 3)."""
-    return trajectory.figure.skeleton.in_root_space(trajectory.poses).positions
+    return trajectory.rest_body.skeleton.in_root_space(trajectory.poses).positions
 
 
 def shown_by_blender(arm: bpy.types.Object, frames: range) -> np.ndarray:
@@ -204,13 +204,13 @@ def test_an_armature_whose_bones_move_is_a_whole_body(saved) -> None:
         recording = read_trajectories(source)
         (body,) = recording.trajectories
         assert (body.name, recording.note) == ("Rig", "")
-        assert body.figure.joints == ("Upper", "Lower", "Hand")
-        assert body.figure.parents.tolist() == [-1, 0, 1]
+        assert body.rest_body.joints == ("Upper", "Lower", "Hand")
+        assert body.rest_body.parents.tolist() == [-1, 0, 1]
         assert body.poses.scales is None
         np.testing.assert_allclose(body.times * FPS, range(1, 10))
         np.testing.assert_allclose(places(body), expected, atol=2e-6)
-        np.testing.assert_allclose(body.figure.rest.positions, [[3, 0, 0], [3, 2, 0], [3, 4, 0]], atol=1e-6)
-        np.testing.assert_allclose(body.figure.tails, [[0, 2, 0]] * 3, atol=1e-6)
+        np.testing.assert_allclose(body.rest_body.rest.positions, [[3, 0, 0], [3, 2, 0], [3, 4, 0]], atol=1e-6)
+        np.testing.assert_allclose(body.rest_body.tails, [[0, 2, 0]] * 3, atol=1e-6)
 
 
 def test_of_a_rig_the_bones_count_that_deform(saved) -> None:
@@ -224,8 +224,8 @@ def test_of_a_rig_the_bones_count_that_deform(saved) -> None:
     recording = read_trajectories(saved())
     (body,) = map(on_frames, recording.trajectories)
     assert recording.note.startswith("took the 2 bones that deform of 4")
-    assert body.figure.joints == ("Upper", "Hand")
-    assert body.figure.parents.tolist() == [-1, 0], "the nearest that counts"
+    assert body.rest_body.joints == ("Upper", "Hand")
+    assert body.rest_body.parents.tolist() == [-1, 0], "the nearest that counts"
     np.testing.assert_allclose(places(body), expected, atol=2e-6)
 
 
@@ -247,10 +247,10 @@ def test_a_rig_whose_bones_are_still_is_an_object(saved) -> None:
     key(arm, 5, location=(0, 1, 0))
     path = saved()
     for source in (path, f"{path}:Rig", f"{path}:*"):
-        assert read(source).figure is None
+        assert read(source).rest_body is None
 
 
 @pytest.mark.parametrize("wanted", ["rig/hand.l", "RIG/Hand.L"])
-def test_objects_and_bones_have_their_names_in_any_case(saved, wanted: str) -> None:
+def test_objects_and_bones_have_their_names_in_any_case(saved, expected: str) -> None:
     rig("Rig", {"Hand.L": ((0, 0, 0), (0, 1, 0), None), "Hand.R": ((1, 0, 0), (1, 1, 0), None)})
-    assert read_trajectories(f"{saved()}:{wanted}").trajectories[0].name == "Rig/Hand.L"
+    assert read_trajectories(f"{saved()}:{expected}").trajectories[0].name == "Rig/Hand.L"

@@ -12,7 +12,7 @@ from rigid_motion.motion import Poses
 from rigid_motion_batch.recordings import ReadingOptions, Trajectory, TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import make_clip
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.recordings.figures import Figure
+from rigid_motion_batch.recordings.rest_bodies import RestBody
 
 JOINTS = {
     "Hips": (-1, (0, 1.0, 0)),
@@ -47,7 +47,9 @@ def dancer(rate: float = 30.0, seconds: float = 4.0, arms: float = 1.2, held: in
     places = np.where(PARENTS[:, None] > 0, OFFSETS + OFFSETS[PARENTS], OFFSETS)
     places[1:] += OFFSETS[0]
     rest = Poses(places, np.tile((1.0, 0.0, 0.0, 0.0), (len(JOINTS), 1)))
-    return Trajectory("dancer", times, poses, figure=Figure(tuple(JOINTS), PARENTS, rest, np.ones((len(JOINTS), 3))))
+    return Trajectory(
+        "dancer", times, poses, rest_body=RestBody(tuple(JOINTS), PARENTS, rest, np.ones((len(JOINTS), 3)))
+    )
 
 
 def clip_of(trajectory: Trajectory, measured: bool = True, **options: float) -> Clip:
@@ -60,11 +62,11 @@ def clip_of(trajectory: Trajectory, measured: bool = True, **options: float) -> 
 def test_a_t_pose_in_front_is_left_out_and_said(rate: float, held: int, metres: float) -> None:
     dance = dancer(rate, held=held)
     positions = dance.poses.positions / metres
-    rest = Poses(dance.figure.rest.positions / metres, dance.figure.rest.quaternions)
+    rest = Poses(dance.rest_body.rest.positions / metres, dance.rest_body.rest.quaternions)
     dance = replace(
         dance,
         poses=Poses(positions, dance.poses.quaternions),
-        figure=replace(dance.figure, rest=rest),
+        rest_body=replace(dance.rest_body, rest=rest),
         metres_per_unit=metres,
     )
     clip = clip_of(dance)
@@ -87,8 +89,10 @@ def test_the_pose_at_rest_in_front_is_left_out_although_it_is_no_t() -> None:
     dance = dancer(held=1)
     down = np.where(np.isin(np.arange(len(JOINTS)), (3, 5))[:, None], (0.05, -0.6, 0.3), OFFSETS)
     poses = Poses(np.repeat(down[:, None], len(dance.times), axis=1), dance.poses.quaternions)
-    places = dance.figure.rest.positions + np.where((PARENTS > 0)[:, None], down - OFFSETS, 0.0)
-    dance = replace(dance, poses=poses, figure=replace(dance.figure, rest=Poses(places, dance.figure.rest.quaternions)))
+    places = dance.rest_body.rest.positions + np.where((PARENTS > 0)[:, None], down - OFFSETS, 0.0)
+    dance = replace(
+        dance, poses=poses, rest_body=replace(dance.rest_body, rest=Poses(places, dance.rest_body.rest.quaternions))
+    )
     clip = clip_of(dance)
     assert clip.calibration == 1
     assert clip.warnings[0].text.startswith("its first frame is the pose at rest and left out: ")

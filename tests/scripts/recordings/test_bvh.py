@@ -30,10 +30,10 @@ def test_without_a_name_it_is_the_whole_body_each_joint_in_its_parents_space(wri
     recording = read_trajectories(write("arm.bvh", ARM.replace("1 5 0  90", "1 2 0  90")))
     (body,) = recording.trajectories
     assert (body.name, recording.others, recording.note, recording.axes) == ("arm", (), "", "opengl")
-    assert body.figure.joints == ("Shoulder", "Elbow")
-    np.testing.assert_array_equal(body.figure.parents, [-1, 0])
+    assert body.rest_body.joints == ("Shoulder", "Elbow")
+    np.testing.assert_array_equal(body.rest_body.parents, [-1, 0])
     np.testing.assert_allclose(body.poses.positions, [[[0, 0, 0], [1, 2, 0]], [[2, 0, 0]] * 2], atol=1e-15)
-    there = body.figure.skeleton.in_root_space(body.poses)
+    there = body.rest_body.skeleton.in_root_space(body.poses)
     for joint, alone in enumerate(read_trajectories(str(recording.path) + ":*").trajectories):
         np.testing.assert_allclose(there[joint].positions, alone.poses.positions, atol=1e-15)
         assert angle_between(there[joint].quaternions, alone.poses.quaternions).max() < 1e-15
@@ -41,10 +41,10 @@ def test_without_a_name_it_is_the_whole_body_each_joint_in_its_parents_space(wri
 
 def test_a_body_rests_where_no_joint_is_turned_and_its_bones_end_at_their_children(write) -> None:
     (body,) = read_trajectories(write("arm.bvh", ARM)).trajectories
-    np.testing.assert_array_equal(body.figure.rest.positions, [[0, 0, 0], [2, 0, 0]])
-    np.testing.assert_array_equal(body.figure.rest.quaternions, [[1, 0, 0, 0]] * 2)
-    np.testing.assert_array_equal(body.figure.tails[0], [2, 0, 0])
-    assert np.linalg.norm(body.figure.tails[1]) > 0.0  # Its end site.
+    np.testing.assert_array_equal(body.rest_body.rest.positions, [[0, 0, 0], [2, 0, 0]])
+    np.testing.assert_array_equal(body.rest_body.rest.quaternions, [[1, 0, 0, 0]] * 2)
+    np.testing.assert_array_equal(body.rest_body.tails[0], [2, 0, 0])
+    assert np.linalg.norm(body.rest_body.tails[1]) > 0.0  # Its end site.
 
 
 @pytest.mark.parametrize("order", ["".join(order) for order in permutations("XYZ")])
@@ -55,8 +55,8 @@ def test_angles_are_applied_in_the_order_of_the_channels(write, order: str) -> N
     first = Rotation.from_euler(order, [10, 20, 30], degrees=True)
     both = first * Rotation.from_euler(order, [40, 50, 60], degrees=True)
     expected = np.array([first.as_quat(), both.as_quat()])[:, [3, 0, 1, 2]]
-    found = np.array([shoulder.poses.quaternions[1], elbow.poses.quaternions[1]])
-    assert angle_between(found, expected).max() < 1e-14
+    result = np.array([shoulder.poses.quaternions[1], elbow.poses.quaternions[1]])
+    assert angle_between(result, expected).max() < 1e-14
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_spelling_and_spacing_do_not_matter(write, text: str) -> None:
 @pytest.mark.parametrize(("name", "read"), [("Shoulder", "Shoulder.001"), ("Left Elbow : top", "Left_Elbow_:_top")])
 def test_names_of_joints_are_those_that_blender_makes_of_them(write, name: str, read: str) -> None:
     (body,) = read_trajectories(write("arm.bvh", ARM.replace("Elbow", name))).trajectories
-    assert body.figure.joints == ("Shoulder", read)
+    assert body.rest_body.joints == ("Shoulder", read)
 
 
 def test_position_channels_take_the_place_of_the_offset(write) -> None:
@@ -116,15 +116,15 @@ def test_more_or_fewer_rows_than_the_file_says_are_read_with_a_warning(write, co
 def test_a_guessed_unit_is_told_with_how_sure_it_is(write, size: float, unit: str, metres: float, told: str) -> None:
     text = ARM.replace("2.0 0.0 0.0", f"{size} 0.0 0.0")
     (body,) = read_trajectories(path := write("arm.bvh", text)).trajectories
-    found = size * body.metres_per_unit
+    result = size * body.metres_per_unit
     assert unit in body.remark
     assert told in body.remark
     doubted = "; if not, say how long it is: --scale METRES" in " ".join(map(str, body.warnings))
-    assert doubted == (not 0.5 <= found <= 2.5)
+    assert doubted == (not 0.5 <= result <= 2.5)
     if doubted:
-        assert f"it is {found:.3g} m large" in body.warnings[-1].text
+        assert f"it is {result:.3g} m large" in body.warnings[-1].text
     if size > 1.0:
-        assert found == pytest.approx(metres, abs=5e-3)
+        assert result == pytest.approx(metres, abs=5e-3)
     (scaled,) = read_trajectories(path, ReadingOptions(scale=0.5)).trajectories
     assert (scaled.metres_per_unit, scaled.remark, scaled.warnings) == (0.5, "", ())
 

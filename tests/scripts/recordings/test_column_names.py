@@ -16,10 +16,10 @@ from tests.scripts.recordings import logs
 @pytest.mark.parametrize("unit", logs.TIMES)
 def test_times_are_known_with_their_unit(unit: str) -> None:
     for name in logs.spellings(logs.TIMES[unit]):
-        found = column_name(name)
-        assert found is not None, name
-        assert found.kind == "time"
-        assert found.unit == unit or (unit == "s" and not found.unit), name
+        result = column_name(name)
+        assert result is not None, name
+        assert result.kind == "time"
+        assert result.unit == unit or (unit == "s" and not result.unit), name
 
 
 @pytest.mark.parametrize(
@@ -36,10 +36,10 @@ def test_positions_and_rotations_are_known_with_their_body(templates, kinds, axe
     for template in logs.spellings(templates):
         for axis in axes:
             name = f"{prefix}{logs.spelled(template, axis)}"
-            found = column_name(name)
-            assert found is not None, name
-            assert found.kind in kinds, name
-            assert (found.axis, found.body) == (axis, prefix.strip(" _.")), name
+            result = column_name(name)
+            assert result is not None, name
+            assert result.kind in kinds, name
+            assert (result.axis, result.body) == (axis, prefix.strip(" _.")), name
 
 
 @pytest.mark.parametrize(

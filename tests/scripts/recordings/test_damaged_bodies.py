@@ -60,10 +60,10 @@ def read_and_place(source: str, _: int) -> bool:
         return False
     assert not [block for block in bpy.data.user_map() if block.name.startswith(("Body", "Skin", "Importing"))]
     for clip in clips:
-        poses = clip.poses if clip.figure is None else clip.figure.skeleton.in_root_space(clip.poses)
+        poses = clip.poses if clip.rest_body is None else clip.rest_body.skeleton.in_root_space(clip.poses)
         assert np.isfinite(poses.positions).all()
         assert np.allclose(np.linalg.norm(poses.quaternions, axis=-1), 1.0)
-        if clip.figure is not None:
+        if clip.rest_body is not None:
             assert_can_be_shown(clip, Uniform("5"), "lerp_slerp")
     return True
 

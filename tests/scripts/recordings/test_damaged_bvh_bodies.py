@@ -49,15 +49,15 @@ SEEDS = (seed("ZXY", 12), seed("XYZ", 30, moved=True), seed("YXZ", 8, roots=2, e
 
 def assert_can_be_shown(clip: Clip, choice: Choice, mode: str) -> None:
     """Measured by the program, with numbers that are some, in tables and in all that a page shows."""
-    found = compare_clip(clip, choice, (mode,), Radii(), shared=False)
-    if found is None:
+    result = compare_clip(clip, choice, (mode,), Radii(), shared=False)
+    if result is None:
         return
-    for row in (*found.rows, *found.joints):
+    for row in (*result.rows, *result.joints):
         assert all(np.isfinite(cell) for cell in astuple(row) if isinstance(cell, float)), row
-    assert found.rows[0].max_shell_m == max(row.max_shell_m for row in found.joints)
-    whole = clip_result(clip, [found])
+    assert result.rows[0].max_shell_m == max(row.max_shell_m for row in result.joints)
+    whole = clip_result(clip, [result])
     assert np.isfinite(whole.truth.positions).all()
-    for motion in found.motions:
+    for motion in result.motions:
         assert np.isfinite(motion.poses.positions).all()
         assert np.isfinite(motion.errors).all()
 

@@ -69,7 +69,7 @@ def read_and_fill_in(source: str, number: int) -> bool:
         ends = [0, len(clip.times) - 1]
         shown = interpolate(clip.times[ends], clip.poses[..., ends], clip.times, mode)
         assert np.isfinite(measure(clip.times, shown, clip.poses).shell).all()
-        if clip.figure is not None:
+        if clip.rest_body is not None:
             made = reconstruct_body(clip, Uniform("5"), (mode,), 0.03)
             if made is not None:
                 assert np.isfinite(measure_modes(made, 0.03).rows[0].rms_shell_m)

@@ -58,10 +58,10 @@ def test_a_wide_turn_is_even_however_its_numbers_are_kept(component: int, more: 
     views = [
         document["bufferViews"][document["accessors"][sampler[part]]["bufferView"]] for part in ("input", "output")
     ]
-    found = [np.frombuffer(made, "<f4", view["byteLength"] // 4, view["byteOffset"]).astype(float) for view in views]
-    np.testing.assert_allclose(found[0], np.arange(count + 1) / count, rtol=1e-6)
-    expected = turning(found[0], found[0] * np.pi / 2)
-    np.testing.assert_allclose(found[1].reshape(-1, 4), expected, atol=0.01 if component == 5120 else 1e-4)
+    result = [np.frombuffer(made, "<f4", view["byteLength"] // 4, view["byteOffset"]).astype(float) for view in views]
+    np.testing.assert_allclose(result[0], np.arange(count + 1) / count, rtol=1e-6)
+    expected = turning(result[0], result[0] * np.pi / 2)
+    np.testing.assert_allclose(result[1].reshape(-1, 4), expected, atol=0.01 if component == 5120 else 1e-4)
     assert document["buffers"][-1]["byteLength"] == len(made)
 
 

@@ -17,11 +17,11 @@ import pytest
 from rigid_motion.motion import Poses
 from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.quaternions import rotate
-from rigid_motion_batch.hushing import hushed
 from rigid_motion_batch.recordings import Trajectory, gltf, importing, read_trajectories, rigs
 from rigid_motion_batch.recordings.fbx_records import FIRST
 from rigid_motion_batch.scenes.armature import Rest
-from rigid_motion_batch.scenes.physique import figure_size
+from rigid_motion_batch.scenes.physique import body_size
+from rigid_motion_batch.silencing import silenced
 from tests.blank import blank
 from tests.scripts.recordings.blends import empty, key, on_frames, rig
 from tests.scripts.recordings.glbs import soldier
@@ -48,17 +48,17 @@ SINGLE = 2e-6
 
 def whole(source: object) -> Trajectory:
     (trajectory,) = read_trajectories(str(source)).trajectories
-    assert trajectory.figure is not None
+    assert trajectory.rest_body is not None
     return trajectory
 
 
 def in_world(trajectory: Trajectory) -> Poses:
     """Where the joints are, shape (joints, n)."""
-    return trajectory.figure.skeleton.in_root_space(trajectory.poses)
+    return trajectory.rest_body.skeleton.in_root_space(trajectory.poses)
 
 
 def places(trajectory: Trajectory, joints: tuple[str, ...] = CARRYING) -> np.ndarray:
-    return in_world(trajectory).positions[[trajectory.figure.joints.index(name) for name in joints]]
+    return in_world(trajectory).positions[[trajectory.rest_body.joints.index(name) for name in joints]]
 
 
 @pytest.fixture
@@ -87,9 +87,9 @@ def test_joints_are_where_blender_showed_them_before_the_export(exported, ending
     assert walk.poses.scales is None
     np.testing.assert_allclose(walk.times, np.arange(len(FRAMES)) / fps, rtol=1e-12)
     np.testing.assert_allclose(places(walk), seen, atol=SINGLE)
-    parents = {name: walk.figure.parents[number] for number, name in enumerate(walk.figure.joints)}
+    parents = {name: walk.rest_body.parents[number] for number, name in enumerate(walk.rest_body.joints)}
     for name, (_, _, parent) in BONES.items():
-        assert parents[name] == (walk.figure.joints.index(parent) if parent else -1)
+        assert parents[name] == (walk.rest_body.joints.index(parent) if parent else -1)
     assert (np.einsum("jni,jni->jn", walk.poses.quaternions[:, 1:], walk.poses.quaternions[:, :-1]) > 0.0).all()
 
 
@@ -104,7 +104,7 @@ def test_the_skin_moves_with_its_joints_as_in_blender(scene, tmp_path: Path, end
     else:
         export(path)
     walk = on_frames(whole(path))
-    skin, rest = walk.figure.skin, walk.figure.rest
+    skin, rest = walk.rest_body.skin, walk.rest_body.rest
     moved = placed(in_world(walk), inverse(rest[:, None]))
     carried = moved.positions[skin.joints] + np.stack(
         [rotate(moved.quaternions[joints], skin.vertices[:, None]) for joints in skin.joints.T], axis=1
@@ -124,10 +124,10 @@ def test_single_joints_are_where_they_are_in_the_whole(exported, ending: str) ->
     world = in_world(walk := whole(path))
     for source in ("Hand", "Body/Hand"):
         (hand,) = map(on_frames, read_trajectories(f"{path}:{source}").trajectories)
-        assert (hand.name, hand.figure) == (source, None)
+        assert (hand.name, hand.rest_body) == (source, None)
         np.testing.assert_allclose(hand.poses.positions, seen[-1], atol=SINGLE)
     everything = [*map(on_frames, read_trajectories(f"{path}:*").trajectories)]
-    assert tuple(one.name for one in everything) == walk.figure.joints
+    assert tuple(one.name for one in everything) == walk.rest_body.joints
     for joint, one in enumerate(everything):
         np.testing.assert_allclose(one.poses.positions, world.positions[joint], atol=1e-12)
         alike = np.abs(np.einsum("ni,ni->n", one.poses.quaternions, world.quaternions[joint]))
@@ -138,7 +138,7 @@ def test_single_joints_are_where_they_are_in_the_whole(exported, ending: str) ->
 def test_a_body_is_as_large_as_its_joints_wherever_an_importer_has_its_bones_end(scene, tmp_path: Path, ending) -> None:
     path = soldier().write(tmp_path / "soldier.glb")
     if ending == ".blend":
-        with hushed():
+        with silenced():
             bpy.ops.import_scene.gltf(filepath=str(path))
         path = path.with_suffix(".blend")
         (obj,) = (obj for obj in bpy.data.objects if obj.type == "ARMATURE")
@@ -146,14 +146,14 @@ def test_a_body_is_as_large_as_its_joints_wherever_an_importer_has_its_bones_end
         bpy.ops.wm.save_as_mainfile(filepath=str(path))
         blank()
     recording = read_trajectories(str(path))
-    (found,) = recording.trajectories
-    assert (found.metres_per_unit, recording.note, found.warnings) == (1.0, "", ())
-    assert np.linalg.norm(found.figure.tails, axis=-1).max() < 1.0
-    rest = Rest.of(found.figure, 1.0, "blender")
-    assert figure_size(rest) == pytest.approx(1.73, abs=0.01)
+    (result,) = recording.trajectories
+    assert (result.metres_per_unit, recording.note, result.warnings) == (1.0, "", ())
+    assert np.linalg.norm(result.rest_body.tails, axis=-1).max() < 1.0
+    rest = Rest.of(result.rest_body, 1.0, "blender")
+    assert body_size(rest) == pytest.approx(1.73, abs=0.01)
     assert rest.joints.positions[:, 2].min() < 0.3, "the ground is below its feet, and not below the ends of bones"
     far = replace(rest, tails=rest.joints.positions + np.array([0.0, 0.0, 40.0]))
-    assert figure_size(far) == figure_size(rest)
+    assert body_size(far) == body_size(rest)
 
 
 @pytest.mark.parametrize("ending", [".fbx", ".glb"])
@@ -181,11 +181,11 @@ def test_one_of_several_takes_is_taken_and_the_others_told(scene, tmp_path: Path
     obj.animation_data.action = None
     settings = {"bake_anim_use_all_actions": False} if ending == ".fbx" else {}
     recording = read_trajectories(str(export(tmp_path / f"walk{ending}", **settings)))
-    (found,) = recording.trajectories
+    (result,) = recording.trajectories
     taken = next(name for name in seen if f"took its take {name}" in recording.note.replace("Body|", ""))
     other = ({*seen} - {taken}).pop()
     assert other in recording.note.partition("others: ")[2]
-    np.testing.assert_allclose(places(found), seen[taken], atol=SINGLE)
+    np.testing.assert_allclose(places(result), seen[taken], atol=SINGLE)
 
 
 # -- other people's ---------------------------------------------------------------------------------------------------
@@ -257,13 +257,13 @@ def test_an_fbx_that_claims_more_than_it_holds_is_refused_before_room_is_made_fo
     path.write_bytes(content[:FIRST] + struct.pack("<IIIB", end, 2**32 - 1, length, name) + content[FIRST + 13 :])
     assert refusal(str(path))[1].startswith("this FBX is damaged (a part of it is longer than the whole); ")
 
-    def record(packed: bytes, wanted: int) -> bytes:
-        numbers = b"d" + struct.pack("<III", wanted, 1, len(packed)) + packed
+    def record(packed: bytes, expected: int) -> bytes:
+        numbers = b"d" + struct.pack("<III", expected, 1, len(packed)) + packed
         end = FIRST + 13 + 1 + len(numbers)
         return content[:FIRST] + struct.pack("<IIIB", end, 1, len(numbers), 1) + b"N" + numbers + bytes(13)
 
-    for packed, wanted in ((zlib.compress(bytes(1 << 26)), 8), (b"x" * 20, 1 << 20), (zlib.compress(b""), 2**32 - 1)):
-        path.write_bytes(record(packed, wanted))
+    for packed, expected in ((zlib.compress(bytes(1 << 26)), 8), (b"x" * 20, 1 << 20), (zlib.compress(b""), 2**32 - 1)):
+        path.write_bytes(record(packed, expected))
         assert " is not as long as it says" in (said := refusal(str(path))[1]) or "more than" in said
     path.write_bytes(record(zlib.compress(bytes(1 << 26)), 1 << 23))
     assert refusal(str(path))[1].startswith("Blender cannot import this file ("), "which is sound, and no skeleton"
@@ -365,7 +365,7 @@ def test_the_larger_armature_is_taken_and_the_other_told(scene, tmp_path: Path) 
         key(small.pose.bones["Wing"], frame, location=(0, frame, 0))
     path = export(tmp_path / "walk.fbx")
     recording = read_trajectories(str(path))
-    assert recording.trajectories[0].figure.joints == tuple(BONES)
+    assert recording.trajectories[0].rest_body.joints == tuple(BONES)
     assert recording.note == "took Body of 2 armatures; others: Bird"
-    assert whole(f"{path}:Bird").figure.joints == ("Wing",)
+    assert whole(f"{path}:Bird").rest_body.joints == ("Wing",)
     assert read_trajectories(f"{path}:Bird/Wing").trajectories[0].poses.shape == (len(FRAMES),)

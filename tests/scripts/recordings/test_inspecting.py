@@ -25,10 +25,10 @@ def log(rows: int = 300, rate: float = 90.0, scale: float = 1.0, up: int = 1, he
 
 
 def test_a_log_is_described(write) -> None:
-    found = inspect(source := write("hand.csv", log()))
-    (hand,) = found.contents
-    assert (found.source, found.format, found.bodies) == (source, "CSV with named columns", ("hand",))
-    assert found.bytes == os.path.getsize(source)
+    result = inspect(source := write("hand.csv", log()))
+    (hand,) = result.contents
+    assert (result.source, result.format, result.bodies) == (source, "CSV with named columns", ("hand",))
+    assert result.bytes == os.path.getsize(source)
     assert (hand.joints, hand.scaled, hand.repairs, hand.warnings) == ((), False, (), ())
     timing, size = hand.timing, hand.size
     assert (timing.samples, timing.recorded, timing.even, timing.gaps) == (300, 300, True, 0)
@@ -50,17 +50,17 @@ def test_a_log_is_described(write) -> None:
     ],
 )
 def test_the_unit_comes_with_where_it_is_from(write, header, scale, options, metres, name, known_from) -> None:
-    found = inspect(write("hand.csv", log(scale=scale, header=header)), options=ReadingOptions(**options))
-    unit = found.contents[0].unit
+    result = inspect(write("hand.csv", log(scale=scale, header=header)), options=ReadingOptions(**options))
+    unit = result.contents[0].unit
     assert (unit.metres, unit.name, unit.known_from) == (metres, name, known_from)
-    assert found.contents[0].size.extent == pytest.approx((0.4, 0.6, 0.6), abs=2e-3)
+    assert result.contents[0].size.extent == pytest.approx((0.4, 0.6, 0.6), abs=2e-3)
 
 
 @pytest.mark.parametrize(("up", "matching"), [(1, ("opengl", "unity")), (2, ())])
 def test_the_axis_that_is_up_speaks_for_other_axes(write, up: int, matching: tuple[str, ...]) -> None:
-    found = inspect(write("hand.csv", log(up=up)))
-    assert found.contents[0].up == "xyz"[up]
-    assert (found.axes.name, found.axes.known_from, found.axes.others) == ("blender", "assumed", matching)
+    result = inspect(write("hand.csv", log(up=up)))
+    assert result.contents[0].up == "xyz"[up]
+    assert (result.axes.name, result.axes.known_from, result.axes.others) == ("blender", "assumed", matching)
     given = inspect(write("hand.csv", log(up=up)), axes="unity").axes
     assert (given.name, given.known_from) == ("unity", "as --axes says")
     assert given.others == (() if up == 1 else ("blender", "ros", "unreal"))
@@ -70,10 +70,10 @@ def test_all_devices_of_a_log_are_described_and_those_without_poses_named(write)
     rows = log(60).splitlines()
     text = "\n".join([f"device,{rows[0]}", *(f"{side},{row}" for row in rows[1:] for side in ("left", "right"))])
     source = write("log.csv", f"{text}\nspare,9,,,,,,,\n")
-    found = inspect(source)
-    assert found.bodies == ("left", "right", "spare")
-    assert [one.name for one in found.contents] == ["left", "right"]
-    assert found.unreadable[0][0] == "spare"
+    result = inspect(source)
+    assert result.bodies == ("left", "right", "spare")
+    assert [one.name for one in result.contents] == ["left", "right"]
+    assert result.unreadable[0][0] == "spare"
     assert [one.name for one in inspect(f"{source}:RIGHT").contents] == ["right"]
 
 
@@ -113,6 +113,6 @@ def test_the_exit_code_says_how_many_could_be_read(write, capsys) -> None:
     assert "bad.csv:1: no column named" in capsys.readouterr().err
     assert main([bad]) == 2
     assert main([good, bad, "--json"]) == 1
-    found = json.loads(capsys.readouterr().out)
-    assert found[0]["contents"][0]["timing"]["samples"] == 300
-    assert "no column named" in found[1]["error"]
+    result = json.loads(capsys.readouterr().out)
+    assert result[0]["contents"][0]["timing"]["samples"] == 300
+    assert "no column named" in result[1]["error"]

@@ -196,8 +196,8 @@ def test_devices_that_nothing_tells_apart_are_refused_with_the_columns_there_are
     assert re.match(
         r"\d+ of 48 samples jump from one place to another and back, at [\d.]+ m/s: these are several", message
     )
-    found = "--columns device=NAME (found t, x, y, z, qx, qy, qz, qw), or split the file"
-    assert message.endswith(found if name == "log.csv" else "; write a file for each")
+    result = "--columns device=NAME (found t, x, y, z, qx, qy, qz, qw), or split the file"
+    assert message.endswith(result if name == "log.csv" else "; write a file for each")
 
 
 def test_a_column_that_is_named_for_devices_and_is_none_is_refused(write, refusal) -> None:

@@ -31,11 +31,11 @@ def at(trajectory: Trajectory, times: np.ndarray) -> np.ndarray:
     """Where the joints are at some times by straight in-betweens in their parents' space, shape (joints, times, 3)."""
     local = [interpolate(trajectory.times, own, times, "lerp_slerp") for own in trajectory.poses]
     poses = Poses(*(np.stack([getattr(own, part) for own in local]) for part in ("positions", "quaternions")))
-    return trajectory.figure.skeleton.in_root_space(poses).positions
+    return trajectory.rest_body.skeleton.in_root_space(poses).positions
 
 
 def off(trajectory: Trajectory, body: Body, times: np.ndarray) -> float:
-    order = [trajectory.figure.joints.index(f"Joint{joint}") for joint in range(len(body.parents))]
+    order = [trajectory.rest_body.joints.index(f"Joint{joint}") for joint in range(len(body.parents))]
     return float(np.linalg.norm(at(trajectory, times)[order] - body.places(times), axis=-1).max())
 
 
@@ -44,12 +44,12 @@ def off(trajectory: Trajectory, body: Body, times: np.ndarray) -> float:
 
 def test_the_densest_curve_says_the_rate(tmp_path: Path) -> None:
     body = mixed_rates()
-    found = read(body.write(tmp_path / "mixed.glb"))
-    assert found.rate == 30.0
-    np.testing.assert_allclose(found.times, np.arange(61) / 30.0, atol=1e-6)
-    assert off(found, body, np.arange(61) / 30.0) < SINGLE
-    assert off(found, body, body.moments) < WITHIN
-    assert found.warnings == ()
+    result = read(body.write(tmp_path / "mixed.glb"))
+    assert result.rate == 30.0
+    np.testing.assert_allclose(result.times, np.arange(61) / 30.0, atol=1e-6)
+    assert off(result, body, np.arange(61) / 30.0) < SINGLE
+    assert off(result, body, body.moments) < WITHIN
+    assert result.warnings == ()
 
 
 def test_keys_between_the_even_ones_are_samples(tmp_path: Path) -> None:
@@ -60,18 +60,18 @@ def test_keys_between_the_even_ones_are_samples(tmp_path: Path) -> None:
         Track(1, "rotation", odd, turning(odd, np.array([0.0, 0.6, -0.2, 0.7, 0.0]), (1, 0, 0))),
     ]
     body = Body(parents, offsets, tracks)
-    found = read(body.write(tmp_path / "odd.glb"))
-    assert np.abs(found.times - odd[:, None]).min(axis=1).max() < 1e-6
-    assert off(found, body, odd) < SINGLE
-    assert off(found, body, body.moments) < WITHIN
+    result = read(body.write(tmp_path / "odd.glb"))
+    assert np.abs(result.times - odd[:, None]).min(axis=1).max() < 1e-6
+    assert off(result, body, odd) < SINGLE
+    assert off(result, body, body.moments) < WITHIN
 
 
 @pytest.mark.parametrize("size", [1.0, 0.01])
 def test_splines_are_read_with_their_tangents(tmp_path: Path, size: float) -> None:
     body = curved(size)
-    found = read(body.write(tmp_path / "curved.glb"))
-    assert off(found, body, body.moments) < WITHIN
-    assert (found.rate, found.warnings) == (60.0, ()), "two keys a second tell no rate"
+    result = read(body.write(tmp_path / "curved.glb"))
+    assert off(result, body, body.moments) < WITHIN
+    assert (result.rate, result.warnings) == (60.0, ()), "two keys a second tell no rate"
 
 
 def test_wide_turns_are_even(tmp_path: Path) -> None:
@@ -93,11 +93,11 @@ def test_a_step_is_two_samples_and_is_told(tmp_path: Path) -> None:
         Track(1, "rotation", np.array([0.0, 0.4, 1.0]), turning(even[:3], np.array([0.0, 0.8, 0.8])), "STEP"),
     ]
     body = Body(parents, offsets, tracks)
-    found = read(body.write(tmp_path / "step.glb"))
-    assert len(found.times) == 32
+    result = read(body.write(tmp_path / "step.glb"))
+    assert len(result.times) == 32
     times = body.moments[(body.moments < 0.4 - 0.03 / 30) | (body.moments > 0.4)]
-    assert off(found, body, times) < WITHIN
-    (warning,) = found.warnings
+    assert off(result, body, times) < WITHIN
+    (warning,) = result.warnings
     assert "it jumps" in warning.text
     assert "first at 0.3992 s" in warning.text
 
@@ -147,8 +147,8 @@ def test_an_object_in_a_strip_is_read_within_a_millimetre_at_every_eighth(saved,
         turns = strip.frame_start + 30 * strip.scale * np.arange(1, 3)
         frames = frames[np.abs(frames - turns[:, None]).min(axis=0) > 0.05]
     expected = truth("Tool", frames)
-    found = read(saved())
-    made = interpolate(found.times, found.poses, frames / FPS, "lerp_slerp").positions
+    result = read(saved())
+    made = interpolate(result.times, result.poses, frames / FPS, "lerp_slerp").positions
     assert np.linalg.norm(made - expected, axis=-1).max() < WITHIN
 
 
@@ -161,9 +161,9 @@ def test_keys_off_whole_frames_are_samples(saved) -> None:
     ).fcurves:
         for point in fcurve.keyframe_points:
             point.interpolation = "LINEAR"
-    found = read(saved())
-    np.testing.assert_allclose(found.times * FPS, [1, 2, 2.4, 2.7, 3, 4, 5, 6], atol=1e-6)
-    np.testing.assert_allclose(found.poses.positions[2:4, 0], [1, -1], atol=1e-6)
+    result = read(saved())
+    np.testing.assert_allclose(result.times * FPS, [1, 2, 2.4, 2.7, 3, 4, 5, 6], atol=1e-6)
+    np.testing.assert_allclose(result.poses.positions[2:4, 0], [1, -1], atol=1e-6)
 
 
 def test_keys_on_every_frame_are_all_that_is_read(saved) -> None:
@@ -204,7 +204,7 @@ def test_what_swings_too_fast_is_warned_of_with_how_far_it_is_off(saved) -> None
     channels = anim_utils.action_get_channelbag_for_slot(tool.animation_data.action, tool.animation_data.action_slot)
     noise = channels.fcurves[0].modifiers.new("FNGENERATOR")
     noise.function_type, noise.amplitude, noise.phase_multiplier, noise.use_additive = "SIN", 0.5, 400.0, True
-    found = read(saved())
-    (warning,) = found.warnings
+    result = read(saved())
+    (warning,) = result.warnings
     assert "mm off a straight way" in warning.text
-    assert len(found.times) < 300
+    assert len(result.times) < 300

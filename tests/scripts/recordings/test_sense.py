@@ -82,9 +82,9 @@ def test_what_stays_far_from_its_origin_may_be_in_another_unit(shift: float, sca
     """A calm head in centimetres or inches is no faster than a quick hand in metres, but as high as a house."""
     one = hand(rate=10.0)
     calm = one.poses.positions * scale / 10.0 + np.array((0.0, shift, 0.0))
-    found = doubts(replace(one, poses=Poses(calm, one.poses.quaternions)))
-    assert len(found) == said
-    assert all("--scale 0.01, if inches, --scale 0.0254" in one.way_out for one in found)
+    result = doubts(replace(one, poses=Poses(calm, one.poses.quaternions)))
+    assert len(result) == said
+    assert all("--scale 0.01, if inches, --scale 0.0254" in one.way_out for one in result)
 
 
 def test_recordings_one_behind_the_other_are_said() -> None:

@@ -25,6 +25,6 @@ def result_of(
     needed: bool = False,
 ) -> ClipResult:
     """What the analysis finds of a clip under some choices of keys."""
-    found = [compare_clip(clip, choice, modes, EVERYWHERE, shared=False) for choice in choices]
+    result = [compare_clip(clip, choice, modes, EVERYWHERE, shared=False) for choice in choices]
     counted = keys_needed(OfRigidBody(clip, RIGID), modes) if needed else None
-    return clip_result(replace(clip, warnings=(*clip.warnings, *warnings)), [one for one in found if one], counted)
+    return clip_result(replace(clip, warnings=(*clip.warnings, *warnings)), [one for one in result if one], counted)

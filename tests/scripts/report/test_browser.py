@@ -35,8 +35,8 @@ NOISE = "GL Driver Message"
 @pytest.fixture(scope="module")
 def chromium() -> Iterator[Browser]:
     require()
-    with browser() as found:
-        yield found
+    with browser() as result:
+        yield result
 
 
 def renamed(result: ChoiceResult) -> ChoiceResult:
@@ -93,12 +93,12 @@ ADDRESS = "decodeURIComponent(location.hash)"
 LINES, TICKS, LANES = ("#plot .line", "#plot .key", "#lanes div")
 
 
-def shows(page: Browser, expression: str, wanted: object = True) -> None:
+def shows(page: Browser, expression: str, expected: object = True) -> None:
     """Wait until an expression of the page has this value: a busy machine draws late."""
     end = time.monotonic() + PATIENCE
-    while (found := page.run(expression)) != wanted and time.monotonic() < end:
+    while (result := page.run(expression)) != expected and time.monotonic() < end:
         time.sleep(0.05)
-    assert found == wanted, expression
+    assert result == expected, expression
 
 
 def count(selector: str) -> str:

@@ -48,11 +48,11 @@ def test_packed_numbers_are_read_to_half_a_step(width: int) -> None:
     block = Block()
     block.put(np.arange(7))
     described = block.put(values, width)
-    found = value_of(
+    result = value_of(
         f"(async () => unpack(await inflate('{block.text()}'), {described}).map((row) => [...row]))()", "data"
     )
     # Differences wrap around where they are larger than the width has room for.
-    np.testing.assert_allclose(found, values, atol=0.51 * described[3], rtol=1e-6)
+    np.testing.assert_allclose(result, values, atol=0.51 * described[3], rtol=1e-6)
 
 
 def test_the_same_numbers_are_the_same_text() -> None:
@@ -64,15 +64,15 @@ def test_times_errors_and_keys_of_a_clip_are_those_of_the_analysis() -> None:
     clip = result_of(swinging_clip(), TEN)
     (result,) = clip.choices
     motion = result.motions[-1]
-    found = read(
+    matches = read(
         clip, "{ times: choice.times, errors: choice.motions.at(-1).errors, keys: choice.motions.at(-1).keys }"
     )
     times = clip.times[result.first : result.first + motion.errors.shape[1]] - clip.times[0]
-    np.testing.assert_allclose(found["times"], times, atol=1e-6)
-    np.testing.assert_allclose(found["keys"], clip.times[motion.keys] - clip.times[0], atol=1e-6)
+    np.testing.assert_allclose(matches["times"], times, atol=1e-6)
+    np.testing.assert_allclose(matches["keys"], clip.times[motion.keys] - clip.times[0], atol=1e-6)
     for row, factor in enumerate((1e3, 1e3, 1.0)):
         largest = motion.errors[row].max()
-        np.testing.assert_allclose(found["errors"][row], motion.errors[row] * factor, atol=4e-5 * largest * factor)
+        np.testing.assert_allclose(matches["errors"][row], motion.errors[row] * factor, atol=4e-5 * largest * factor)
 
 
 def test_the_view_has_a_body_where_its_mode_puts_it() -> None:
@@ -118,14 +118,14 @@ def test_a_long_recording_keeps_the_worst_moments_in_view_and_chart(monkeypatch:
     monkeypatch.setattr(data, "MOST_CHARTED", 100)
     clip = result_of(swinging_clip(seconds=20.0), TEN)
     shown = "about: choice.about, moments: choice.moments, times: choice.times"
-    found = read(clip, f"{{ {shown}, errors: choice.motions.map((motion) => motion.errors[0]) }}")
+    matches = read(clip, f"{{ {shown}, errors: choice.motions.map((motion) => motion.errors[0]) }}")
     (result,) = clip.choices
-    assert len(found["moments"]) < len(clip.times) / 4
-    assert found["about"].endswith("samples; fewer in the view; in the chart the largest of every 19")
-    assert len(found["times"]) == len(found["errors"][0]) <= 100
-    for motion, errors in zip(result.motions, found["errors"], strict=True):
+    assert len(matches["moments"]) < len(clip.times) / 4
+    assert matches["about"].endswith("samples; fewer in the view; in the chart the largest of every 19")
+    assert len(matches["times"]) == len(matches["errors"][0]) <= 100
+    for motion, errors in zip(result.motions, matches["errors"], strict=True):
         worst = clip.times[result.first + motion.errors[0].argmax()] - clip.times[0]
-        assert np.abs(np.array(found["moments"]) - worst).min() < 1e-6
+        assert np.abs(np.array(matches["moments"]) - worst).min() < 1e-6
         assert max(errors) == pytest.approx(1e3 * motion.errors[0].max(), rel=1e-4)
 
 
@@ -133,9 +133,9 @@ def test_hours_far_from_the_origin_are_as_exact_as_they_need_to_be() -> None:
     swing = swinging_clip(seconds=60.0, rate=2.0)
     far = Poses(swing.poses.positions + np.array((5e5, 5.6e6, 110.0)), swing.poses.quaternions)
     clip = result_of(replace(swing, times=3600.0 * np.arange(len(swing.times)), poses=far), (Uniform("0.0001"),))
-    found = read(clip, "{ times: recording.times, places: recording.places }")
-    np.testing.assert_allclose(found["times"], clip.times, atol=1e-3)
-    np.testing.assert_allclose(np.transpose(found["places"]), clip.truth.positions - middle_of(clip), atol=2e-5)
+    result = read(clip, "{ times: recording.times, places: recording.places }")
+    np.testing.assert_allclose(result["times"], clip.times, atol=1e-3)
+    np.testing.assert_allclose(np.transpose(result["places"]), clip.truth.positions - middle_of(clip), atol=2e-5)
 
 
 def test_deviations_are_magnified_until_they_can_be_seen() -> None:
@@ -160,14 +160,14 @@ def test_a_curve_of_many_samples_keeps_its_extremes() -> None:
     (0.0, 0.6, 6, ["0.0", "0.1", "0.2", "0.3", "0.4", "0.5", "0.6"]),
     (12.0, 3600.0, 5, ["1000", "2000", "3000"]),
 ])  # fmt: skip
-def test_ticks_are_round_numbers(low: float, high: float, wanted: int, texts: list[str]) -> None:
-    assert [text for _, text in value_of(f"ticks({low}, {high}, {wanted})", "data", "mathematics")] == texts
+def test_ticks_are_round_numbers(low: float, high: float, expected: int, texts: list[str]) -> None:
+    assert [text for _, text in value_of(f"ticks({low}, {high}, {expected})", "data", "mathematics")] == texts
 
 
 @pytest.mark.parametrize("name", ["reach", "a,b#c", "100 %", "名前", "<script>"])
 def test_the_address_of_a_moment_leads_back_to_it(name: str) -> None:
-    found = value_of(f"fromAddress(addressOf({json.dumps(name)}, 'tolerance-5mm', 1.25))", "data", "mathematics")
-    assert found == {"clip": name, "choice": "tolerance-5mm", "t": 1.25}
+    result = value_of(f"fromAddress(addressOf({json.dumps(name)}, 'tolerance-5mm', 1.25))", "data", "mathematics")
+    assert result == {"clip": name, "choice": "tolerance-5mm", "t": 1.25}
 
 
 @pytest.mark.parametrize("hash", ["", "#", "#numbers", "#%E0%A4%A", "#a,b,c"])

@@ -62,7 +62,7 @@ class Page(HTMLParser):
             self.words += f" {data}"
 
     def attributes(self, tag: str, name: str) -> list[str]:
-        return [found[name] or "" for kind, found in self.elements if kind == tag and name in found]
+        return [result[name] or "" for kind, result in self.elements if kind == tag and name in result]
 
 
 def all_text(page: Page) -> str:
@@ -85,9 +85,9 @@ def test_a_run_on_the_assets_is_one_small_file(tmp_path: Path) -> None:
 
 def test_the_page_asks_for_nothing(tmp_path: Path) -> None:
     page = written(tmp_path / "report.html", result_of(swinging_clip()), result_of(swinging_body()))
-    for tag, found in page.elements:
+    for tag, result in page.elements:
         for name in ("src", "href", "data", "action", "poster", "srcset"):
-            address = found.get(name) or ""
+            address = result.get(name) or ""
             assert address.startswith(("#", "data:")) or not address, (tag, address)
     style = "".join(page.texts["style"])
     assert "url(" not in style
@@ -107,7 +107,7 @@ def test_no_name_gets_into_the_page_but_as_text(tmp_path: Path) -> None:
     assert all_text(page).count("alert(1)") >= 8
     assert "7 * 7" in all_text(page)
     assert not [text for text in page.texts["script"] if "alert(1)</script>" in text]
-    types = [found.get("type") for tag, found in page.elements if tag == "script"]
+    types = [result.get("type") for tag, result in page.elements if tag == "script"]
     assert types == ["application/json"] * 3 + ["module"]
     (data, *_) = [json.loads(text) for text in page.texts["script"] if text.startswith('{"name"')]
     assert data["name"] == HOSTILE
@@ -179,8 +179,15 @@ def test_joints_decimate_and_segments_are_folded_below(tmp_path: Path) -> None:
     swing = result_of(swinging_clip(), (Tolerance("20mm"),), (*MODES, "best_of"))
     text = all_text(written(tmp_path / "report.html", body, swing))
     assert "LeftHand" not in text
-    for wanted in ("Glove", "Joints of whole bodies", "Decimate, at the same largest error", "4.50", "Of ", "segments"):
-        assert wanted in text
+    for expected in (
+        "Glove",
+        "Joints of whole bodies",
+        "Decimate, at the same largest error",
+        "4.50",
+        "Of ",
+        "segments",
+    ):
+        assert expected in text
 
 
 def test_the_lowest_number_is_underlined_with_all_its_ties_but_not_where_all_are_the_same(tmp_path: Path) -> None:

@@ -35,12 +35,12 @@ def keys_needed(keys: Mapping[str, Sequence[float]], *, fitted: bool = False) ->
     """A clip of 10 s on which modes need so many keys to be as good as the reference with 201: one for each spacing."""
     groups = tuple((mode,) for mode in keys)
     ways = 3 if fitted else 2
-    found = np.stack([np.repeat(np.array(keys[group[0]], float)[:, None], len(RATES), axis=1) for group in groups])
-    assert found.shape[1] == ways
+    result = np.stack([np.repeat(np.array(keys[group[0]], float)[:, None], len(RATES), axis=1) for group in groups])
+    assert result.shape[1] == ways
     asked = np.array([float(rate) for rate in RATES])
     return KeysNeeded(
-        "clip1", groups, RATES, np.full(len(RATES), 10.0), 10.0 * asked + 1.0, np.full(len(RATES), 1e-3), found,
-        np.full(found.shape, 1e-3), np.full((len(groups), len(RATES)), 1e-3),
+        "clip1", groups, RATES, np.full(len(RATES), 10.0), 10.0 * asked + 1.0, np.full(len(RATES), 1e-3), result,
+        np.full(result.shape, 1e-3), np.full((len(groups), len(RATES)), 1e-3),
     )  # fmt: skip
 
 

@@ -54,10 +54,10 @@ def test_two_workers_are_measured_beside_one(tmp_path, monkeypatch):
 
     monkeypatch.setattr(benchmark_batch, "compare", compare)
     assert benchmark_batch.main(["--clips", "4", "--films", "2", "--minutes", "1", "--root", str(tmp_path)]) == 0
-    found = written(tmp_path, "benchmark_batch")
-    assert [row["clips_a_minute"] for row in found["numbers"][:2]] == [12.0, 24.0]
-    assert [row["speedup"] for row in found["videos"][:2]] == [1.0, 2.0]
-    assert [row["rendering"] for row in found["numbers"] + found["videos"]][1::3] == [None, 0.75]
+    result = written(tmp_path, "benchmark_batch")
+    assert [row["clips_a_minute"] for row in result["numbers"][:2]] == [12.0, 24.0]
+    assert [row["speedup"] for row in result["videos"][:2]] == [1.0, 2.0]
+    assert [row["rendering"] for row in result["numbers"] + result["videos"]][1::3] == [None, 0.75]
 
 
 def test_tasks_are_noted_before_their_results_go(tmp_path):

@@ -93,11 +93,11 @@ def test_native_baking_of_bones_keys_what_they_show():
 
 def shown_matrices(bone) -> np.ndarray:
     """Where a bone is on every frame, in the space of its armature (frames, 4, 4)."""
-    found = []
+    result = []
     for frame in FRAMES.tolist():
         bpy.context.scene.frame_set(frame)
-        found.append(np.array(bone.matrix))
-    return np.array(found)
+        result.append(np.array(bone.matrix))
+    return np.array(result)
 
 
 @pytest.mark.usefixtures("live_file")
@@ -118,7 +118,7 @@ def test_the_rig_is_chains_of_bones_and_its_skin_follows_two_for_each_vertex():
 
 def test_the_study_writes_what_the_page_reads(tmp_path, empty_file):
     assert benchmark_live.main(["--rounds", "1", "--scale", "0.01", "--root", str(tmp_path)]) == 0
-    found = written(tmp_path, "benchmark_live")
-    assert [shot["components"] for shot in found["shots"]] == [7, 6, 4, 3]
-    assert len(found["rigs"]) == 9
-    assert all(row["ms"] >= row["fastest_ms"] > 0.0 for row in found["rigs"])
+    result = written(tmp_path, "benchmark_live")
+    assert [shot["components"] for shot in result["shots"]] == [7, 6, 4, 3]
+    assert len(result["rigs"]) == 9
+    assert all(row["ms"] >= row["fastest_ms"] > 0.0 for row in result["rigs"])

@@ -162,8 +162,8 @@ def test_the_study_writes_what_the_page_reads(tmp_path, monkeypatch):
     monkeypatch.setattr(body_reduction, "OZZ_BODY", "leg")
     monkeypatch.setattr(body_reduction, "TRIALS", 4)
     assert reduction.main(["--bodies", str(path), "--root", str(tmp_path)]) == 0
-    found = written(tmp_path, "reduction")
-    assert str(tmp_path) not in str(found)
-    assert [row["how"] for row in found["feet"][1:4:2]] == ["each joint its own", "key poses"]
-    own, decimate = found["decimate"][0], found["decimate"][2]
-    assert found["decimate_means"][own["how"]]["numbers"] == pytest.approx(decimate["numbers"] / own["numbers"], 1e-5)
+    result = written(tmp_path, "reduction")
+    assert str(tmp_path) not in str(result)
+    assert [row["how"] for row in result["feet"][1:4:2]] == ["each joint its own", "key poses"]
+    own, decimate = result["decimate"][0], result["decimate"][2]
+    assert result["decimate_means"][own["how"]]["numbers"] == pytest.approx(decimate["numbers"] / own["numbers"], 1e-5)

@@ -19,11 +19,11 @@ def test_a_steady_hand_is_shown_steadily(engine: str) -> None:
     times = np.arange(900) / 90.0
     hand = Poses(times[:, None] * (0.5, 0.0, 0.0), np.tile((1.0, 0.0, 0.0, 0.0), (900, 1)))
     truth, frames = truth_of(times, hand), np.arange(0.5, 9.9, 1.0 / FPS)
-    found = seen(by_engine(engine, truth, Way(0.02, 0.02, 0.0), frames), truth, frames)
+    result = seen(by_engine(engine, truth, Way(0.02, 0.02, 0.0), frames), truth, frames)
     # By half an update at most: an engine without a buffer holds each until the next.
-    assert found.largest_mm < 1e3 * 0.5 / 30.0 + 3.0
-    assert (found.freezes, found.jumps_back) == (0, 0)
-    assert 0.02 < found.delay < 0.3
+    assert result.largest_mm < 1e3 * 0.5 / 30.0 + 3.0
+    assert (result.freezes, result.jumps_back) == (0, 0)
+    assert 0.02 < result.delay < 0.3
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -43,9 +43,9 @@ def test_the_study_writes_what_the_page_reads(tmp_path, monkeypatch):
     monkeypatch.setattr(live_costs, "figures", lambda users, seconds: Room(22.0, 9, 10, 0.5, 1.0, 2.0, 0.1, users))
     given = [str(tmp_path / "walk.bvh"), str(ASSETS / "pivot.csv")]
     assert live_costs.main([*given, "--users", "3", "--seconds", "2", "--root", str(tmp_path)]) == 0
-    found = written(tmp_path, "live_costs")
-    assert [row["by"] for row in found["engines"]] == [*ENGINES, "sent when needed"]
-    single = found["single"]["rows"][0]["ways"]
-    assert found["single"]["median"] == single
+    result = written(tmp_path, "live_costs")
+    assert [row["by"] for row in result["engines"]] == [*ENGINES, "sent when needed"]
+    single = result["single"]["rows"][0]["ways"]
+    assert result["single"]["median"] == single
     saved = 1.0 - single["when needed, 100 ms"]["bytes"] / single[live_costs.FLOATS]["bytes"]
-    assert found["single"]["saved"]["100 ms"] == pytest.approx(saved, abs=1e-5)
+    assert result["single"]["saved"]["100 ms"] == pytest.approx(saved, abs=1e-5)

@@ -50,9 +50,9 @@ def test_every_template_and_every_file_of_figures_is_used():
 
 def test_figures_are_plain_numbers_of_six_digits(checkout: Path):
     path = write_figures("found", {"a": np.float64(2 / 3), "b": np.arange(2), "c": (float("nan"),)}, "x", checkout)
-    found = json.loads(path.read_text(encoding="utf-8"))
-    assert found.pop("made_by").startswith("`x`: Python ")
-    assert found == {"a": 0.666667, "b": [0, 1], "c": [None]}
+    result = json.loads(path.read_text(encoding="utf-8"))
+    assert result.pop("made_by").startswith("`x`: Python ")
+    assert result == {"a": 0.666667, "b": [0, 1], "c": [None]}
 
 
 def test_a_page_is_its_template_with_figures(checkout: Path):

@@ -28,16 +28,16 @@ def live(motion, mode="dq_sclerp", rotation_mode="QUATERNION", fractions=QUARTER
     obj = keyed_object(motion, rotation_mode)
     animation.set_mode(obj, mode)
     frames = between(motion, np.asarray(fractions))
-    return deviation(obj, frames, in_betweens(source_of(obj), frames).wanted, radius=0.1)
+    return deviation(obj, frames, in_betweens(source_of(obj), frames).desired, radius=0.1)
 
 
 @pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XYZ"])
 @pytest.mark.parametrize("mode", KEYFRAME_MODES)
 def test_a_brisk_motion_is_within_millimetres_between_frames_and_exact_on_them(live_file, mode, rotation_mode):
     """Within 2, and within 2.5 where a smooth mode takes up speed between its keys."""
-    found = live(BRISK, mode, rotation_mode)
-    assert 1e-4 < found.largest < (2.5e-3 if KEYFRAME_MODES[mode].is_smooth else 2e-3)
-    assert found.rotation < np.radians(0.2)
+    result = live(BRISK, mode, rotation_mode)
+    assert 1e-4 < result.largest < (2.5e-3 if KEYFRAME_MODES[mode].is_smooth else 2e-3)
+    assert result.rotation < np.radians(0.2)
     assert live(BRISK, mode, rotation_mode, fractions=[0.0]).largest < 1e-5
 
 
@@ -55,9 +55,9 @@ def test_what_is_exact_is_within_a_tenth_of_a_millimetre(live_file, mode, rotati
 
 @pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XYZ"])
 def test_baking_every_quarter_of_a_frame_leaves_a_tenth_of_the_error(live_file, rotation_mode):
-    found, _, finely, whole = measure(BRISK, "dq_sclerp", rotation_mode, 0.1)
-    assert finely.largest < 0.1 * found.largest
-    assert whole.largest > 0.5 * found.largest, "baking whole frames does not help"
+    result, _, finely, whole = measure(BRISK, "dq_sclerp", rotation_mode, 0.1)
+    assert finely.largest < 0.1 * result.largest
+    assert whole.largest > 0.5 * result.largest, "baking whole frames does not help"
 
 
 def test_the_study_writes_what_the_page_reads(empty_file, tmp_path, monkeypatch):

@@ -16,15 +16,15 @@ from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.scenes import layout
 from rigid_motion_batch.scenes.armature import Rest
 from rigid_motion_batch.scenes.bodies import SHADES
-from rigid_motion_batch.scenes.body_scene import build_body_stage
+from rigid_motion_batch.scenes.body_scene import build_body_scene
 from rigid_motion_batch.scenes.film import save_blend
 from rigid_motion_batch.scenes.physique import BONE
-from rigid_motion_batch.scenes.settings import StageSettings
+from rigid_motion_batch.scenes.settings import SceneSettings
 from rigid_motion_batch.scenes.timeline import Timeline
 from tests.scripts.clips.dancers import JOINTS, dancing_clip
 from tests.thoroughness import sample
 
-SETTINGS = StageSettings(resolution=(160, 90), fps=24)
+SETTINGS = SceneSettings(resolution=(160, 90), fps=24)
 TWO = ("lerp_slerp", "motor_spline")
 RADIUS = 0.03
 RADII = np.full(len(JOINTS), RADIUS)
@@ -65,8 +65,8 @@ def assert_played(made: BodyReconstruction, scene: bpy.types.Scene, modes: tuple
     times = timeline.times_of(timeline.frames)
     centre = np.array(scene["recording_centre_m"])
     clip = made.clip
-    rest = Rest.of(clip.figure, clip.metres_per_unit, clip.axes)
-    wanted = {mode: to_blender(made.shown(mode, times), clip.axes) for mode in modes}
+    rest = Rest.of(clip.rest_body, clip.metres_per_unit, clip.axes)
+    expected = {mode: to_blender(made.shown(mode, times), clip.axes) for mode in modes}
     turns = {mode: turns_of(bpy.data.objects[mode], rest) for mode in modes}
     columns = [np.interp(times, clip.times, column) for column in clip.poses.positions[0].T]
     root = to_blender(clip.in_metres(Poses(np.stack(columns, axis=-1), np.zeros((len(times), 4)))), clip.axes).positions
@@ -74,13 +74,13 @@ def assert_played(made: BodyReconstruction, scene: bpy.types.Scene, modes: tuple
         scene.frame_set(frame)
         for mode in modes:
             places, quaternions = seen(bpy.data.objects[mode], turns[mode])
-            assert np.abs(places + centre - wanted[mode].positions[:, number]).max() < 2e-5
-            assert angle_between(quaternions, wanted[mode].quaternions[:, number]).max() < 2e-4
+            assert np.abs(places + centre - expected[mode].positions[:, number]).max() < 2e-5
+            assert angle_between(quaternions, expected[mode].quaternions[:, number]).max() < 2e-4
         places, _ = seen(bpy.data.objects[f"{modes[0]} recording"], turns[modes[0]])
         assert np.abs(places[0] + centre - root[number]).max() < 2e-4
     for mode in modes:
-        rig, figure = bpy.data.objects[f"{mode} recording"], bpy.data.objects[f"{mode} recording figure"]
-        assert (rig.matrix_world.translation - figure.matrix_world.translation).length < 1e-6
+        rig, rest_body = bpy.data.objects[f"{mode} recording"], bpy.data.objects[f"{mode} recording figure"]
+        assert (rig.matrix_world.translation - rest_body.matrix_world.translation).length < 1e-6
         assert (rig.matrix_world.translation - bpy.data.objects[mode].matrix_world.translation) @ Vector(
             layout.AWAY
         ) > 0.1
@@ -90,19 +90,19 @@ def assert_played(made: BodyReconstruction, scene: bpy.types.Scene, modes: tuple
 def test_every_mode_is_played_on_every_frame_as_it_was_computed(axes, metres_per_unit):
     modes = tuple(MODES)
     made = made_of(dancing_clip(axes=axes, metres_per_unit=metres_per_unit), modes)
-    assert_played(made, build_body_stage(made, SETTINGS, RADII), modes)
+    assert_played(made, build_body_scene(made, SETTINGS, RADII), modes)
 
 
 def test_keys_between_frames_and_of_each_joint_its_own_are_played_too():
     clip = dancing_clip(rate=97.0)
     made = reconstruct_body(clip, Tolerance("0.02"), TWO, RADIUS)
     assert len({len(own) for own in made.keys["lerp_slerp"]}) > 1
-    assert_played(made, build_body_stage(made, SETTINGS, RADII), TWO)
+    assert_played(made, build_body_scene(made, SETTINGS, RADII), TWO)
 
 
 def test_bones_have_the_keys_that_were_kept_and_their_mode(tmp_path):
     made = made_of(dancing_clip(still=[2]))
-    build_body_stage(made, SETTINGS, RADII)
+    build_body_scene(made, SETTINGS, RADII)
     save_blend(tmp_path / "stage.blend")
     assert not hasattr(bpy.types.PoseBone, "rigid_motion")
     animation.register()
@@ -115,8 +115,8 @@ def test_bones_have_the_keys_that_were_kept_and_their_mode(tmp_path):
                 if joint == 2:
                     assert not len(keys)
                     continue
-                wanted = timeline_of(made).frames_of(made.clip.times[made.keys[mode][joint]])
-                assert keys == pytest.approx(wanted, abs=1e-3)
+                expected = timeline_of(made).frames_of(made.clip.times[made.keys[mode][joint]])
+                assert keys == pytest.approx(expected, abs=1e-3)
                 assert set(animation.modes_of(bone, keys[:-1])) == {mode}
     finally:
         animation.unregister()
@@ -124,7 +124,7 @@ def test_bones_have_the_keys_that_were_kept_and_their_mode(tmp_path):
 
 def test_the_saved_file_plays_without_the_extension(tmp_path):
     made = made_of(dancing_clip())
-    build_body_stage(made, SETTINGS, RADII)
+    build_body_scene(made, SETTINGS, RADII)
     save_blend(tmp_path / "stage.blend")
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "stage.blend"), use_scripts=False)
     assert not hasattr(bpy.types.PoseBone, "rigid_motion")
@@ -151,18 +151,18 @@ def errors_at(made: BodyReconstruction, mode: str, frame: int) -> np.ndarray:
 def test_the_colour_of_each_face_is_that_of_its_joints_error(skin):
     # Every frame shows a sample.
     made = made_of(dancing_clip(rate=48.0, skin=skin))
-    scene = build_body_stage(made, SETTINGS, RADII)
+    scene = build_body_scene(made, SETTINGS, RADII)
     materials = bpy.data.objects["lerp_slerp figure"].data.materials
     full = float(materials[SHADES - 1].name.split()[1]) * 1e-3
     for mode in TWO:
         for frame in (1, 4, 9, 15):
             scene.frame_set(frame)
-            wanted = errors_at(made, mode, frame) / full * SHADES
-            figure = bpy.data.objects[f"{mode} figure"].evaluated_get(bpy.context.evaluated_depsgraph_get())
-            bones = [face.value for face in figure.data.attributes[BONE].data]
+            expected = errors_at(made, mode, frame) / full * SHADES
+            rest_body = bpy.data.objects[f"{mode} figure"].evaluated_get(bpy.context.evaluated_depsgraph_get())
+            bones = [face.value for face in rest_body.data.attributes[BONE].data]
             assert set(bones) == set(range(len(JOINTS)))
-            for bone, face in zip(bones, figure.data.polygons, strict=True):
-                assert face.material_index == pytest.approx(min(max(wanted[bone] - 0.5, 0), SHADES - 1), abs=0.6)
+            for bone, face in zip(bones, rest_body.data.polygons, strict=True):
+                assert face.material_index == pytest.approx(min(max(expected[bone] - 0.5, 0), SHADES - 1), abs=0.6)
 
 
 def instances_of(name: str) -> list[np.ndarray]:
@@ -180,7 +180,7 @@ def in_picture(scene: bpy.types.Scene, place: np.ndarray) -> np.ndarray:
 
 def test_joints_flash_at_their_keys_and_the_worst_has_the_ring():
     made = made_of(dancing_clip(still=[1], rate=48.0))
-    scene = build_body_stage(made, SETTINGS, RADII)
+    scene = build_body_scene(made, SETTINGS, RADII)
     frames = timeline_of(made).frames_of(made.clip.times[made.keys["lerp_slerp"][0]])
     scene.frame_set(int(frames[1]))
     assert len(instances_of("lerp_slerp keys")) == len(JOINTS) - 1
@@ -199,25 +199,25 @@ def test_joints_flash_at_their_keys_and_the_worst_has_the_ring():
 def test_a_skin_is_carried_as_linear_blending_does():
     made = made_of(dancing_clip(skin=True, axes="opengl", metres_per_unit=0.01))
     clip = made.clip
-    scene = build_body_stage(made, SETTINGS, RADII)
+    scene = build_body_scene(made, SETTINGS, RADII)
     scene.frame_set(9)
     centre = np.array(scene["recording_centre_m"])
     time = timeline_of(made).times_of(np.array([9.0]))
-    skin = clip.figure.skin
+    skin = clip.rest_body.skin
     shown = made.shown("lerp_slerp", time)[:, 0]
-    rest = clip.in_metres(clip.figure.rest)
+    rest = clip.in_metres(clip.rest_body.rest)
     turns, still = (Rotation.from_quat(some.quaternions, scalar_first=True).as_matrix() for some in (shown, rest))
     vertices = skin.vertices * clip.metres_per_unit
-    wanted = np.zeros_like(vertices)
+    expected = np.zeros_like(vertices)
     for column in range(4):
         bones = skin.joints[:, column]
         arms = np.einsum("vba,vb->va", still[bones], vertices - rest.positions[bones])
         moved = np.einsum("vab,vb->va", turns[bones], arms) + shown.positions[bones]
-        wanted += skin.weights[:, column, None] * moved
-    wanted = wanted @ np.array(((1, 0, 0), (0, 0, -1), (0, 1, 0))).T - centre
-    figure = bpy.data.objects["lerp_slerp figure"].evaluated_get(bpy.context.evaluated_depsgraph_get())
-    found = np.array([vertex.co for vertex in figure.data.vertices])
-    assert np.abs(found - wanted).max() < 1e-4
+        expected += skin.weights[:, column, None] * moved
+    expected = expected @ np.array(((1, 0, 0), (0, 0, -1), (0, 1, 0))).T - centre
+    rest_body = bpy.data.objects["lerp_slerp figure"].evaluated_get(bpy.context.evaluated_depsgraph_get())
+    result = np.array([vertex.co for vertex in rest_body.data.vertices])
+    assert np.abs(result - expected).max() < 1e-4
 
 
 HOSTILE = ("a" * 300, "a" * 299, 'quo"te\\', "['x']", "", "Kopf\n<b>\u00e4")
@@ -225,7 +225,7 @@ HOSTILE = ("a" * 300, "a" * 299, 'quo"te\\', "['x']", "", "Kopf\n<b>\u00e4")
 
 def test_hostile_names_of_joints_are_names_of_bones():
     made = made_of(dancing_clip(joints=HOSTILE))
-    assert_played(made, build_body_stage(made, SETTINGS, RADII), TWO)
+    assert_played(made, build_body_scene(made, SETTINGS, RADII), TWO)
     assert len(bpy.data.objects["lerp_slerp"].pose.bones) == len(HOSTILE)
 
 
@@ -233,7 +233,7 @@ def test_hostile_names_of_joints_are_names_of_bones():
 @pytest.mark.parametrize("modes", [TWO, tuple(KEYFRAME_MODES)], ids=["two", "all"])
 def test_bodies_stay_within_their_cards(walked, modes):
     made = made_of(dancing_clip(walked=walked), modes)
-    scene = build_body_stage(made, SETTINGS, RADII)
+    scene = build_body_scene(made, SETTINGS, RADII)
     for frame in sample(range(1, scene.frame_end + 1, 3)):
         scene.frame_set(frame)
         depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -241,14 +241,14 @@ def test_bodies_stay_within_their_cards(walked, modes):
             card = bpy.data.objects[f"{mode} card"]
             corners = np.array([in_picture(scene, card.matrix_world @ vertex.co) for vertex in card.data.vertices])
             for name in (f"{mode} figure", f"{mode} recording figure"):
-                figure = bpy.data.objects[name].evaluated_get(depsgraph)
-                points = np.array([in_picture(scene, figure.matrix_world @ v.co) for v in figure.data.vertices])
+                rest_body = bpy.data.objects[name].evaluated_get(depsgraph)
+                points = np.array([in_picture(scene, rest_body.matrix_world @ v.co) for v in rest_body.data.vertices])
                 assert (points >= corners.min(axis=0)).all()
                 assert (points <= corners.max(axis=0)).all()
 
 
 def test_a_body_that_stands_still_has_a_film():
     made = made_of(dancing_clip(still=range(len(JOINTS))))
-    scene = build_body_stage(made, SETTINGS, RADII)
+    scene = build_body_scene(made, SETTINGS, RADII)
     scene.frame_set(5)
     assert not instances_of("lerp_slerp worst joint")

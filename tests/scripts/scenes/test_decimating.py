@@ -16,7 +16,7 @@ from rigid_motion_batch.analysis.body_metrics import measure_modes
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.axes import AXES
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.recordings.figures import Figure
+from rigid_motion_batch.recordings.rest_bodies import RestBody
 from rigid_motion_batch.scenes import decimated_bodies
 from rigid_motion_batch.scenes.decimated_bodies import Left
 from rigid_motion_batch.scenes.decimating import DecimatedBody, beside_decimate, frames_of
@@ -42,9 +42,9 @@ def leg(name: str = "leg", samples: int = 40) -> Clip:
     turns = np.concatenate((np.cos(angles / 2)[..., None], np.sin(angles / 2)[..., None] * axes[:, None]), axis=-1)
     poses = Poses(places, turns)
     tails = np.tile((0.0, -20.0, 0.0), (4, 1))
-    figure = Figure(JOINTS, PARENTS, poses[:, 0], tails)
-    rest = figure.skeleton.in_root_space(poses[:, 0])
-    return Clip(name, f"{name}.bvh", "opengl", times, poses, (), 0.01, figure=replace(figure, rest=rest))
+    rest_body = RestBody(JOINTS, PARENTS, poses[:, 0], tails)
+    rest = rest_body.skeleton.in_root_space(poses[:, 0])
+    return Clip(name, f"{name}.bvh", "opengl", times, poses, (), 0.01, rest_body=replace(rest_body, rest=rest))
 
 
 def made_of(clip: Clip, *, shared: bool = False, tolerance: str = "1cm") -> BodyReconstruction:
@@ -92,10 +92,10 @@ def test_errors_of_decimated_curves_are_those_of_what_blender_shows() -> None:
     assert errors_by_hand(recorded, recorded, truth).max() < 2e-6
     for margin in (0.003, 0.05):
         decimated_bodies.decimate(body.rig.obj, mode="ERROR", remove_error_margin=margin)
-        found = errors_by_hand(as_blender_shows(body), recorded, truth)
-        np.testing.assert_allclose(body.errors(), found, atol=3e-6)
-        assert body.left().largest == pytest.approx(found.max(), abs=3e-6)
-        assert found.max() > 1e-3
+        result = errors_by_hand(as_blender_shows(body), recorded, truth)
+        np.testing.assert_allclose(body.errors(), result, atol=3e-6)
+        assert body.left().largest == pytest.approx(result.max(), abs=3e-6)
+        assert result.max() > 1e-3
 
 
 @pytest.mark.parametrize("shared", [False, True])
@@ -132,10 +132,10 @@ def test_decimate_is_held_to_our_largest_error_and_all_is_counted(monkeypatch, s
         assert own.numbers == channels + (len(keys[0]) if shared else sum(map(len, keys)))
         assert own.max_shell_m == metrics.max_shell_m
         assert 0.0 < theirs.max_shell_m <= own.max_shell_m
-        found = Left(DECIMATE, theirs.frames_with_keys, theirs.keys, theirs.numbers, theirs.max_shell_m)
-        assert found in tried
-        assert found.keys == min(one.keys for one in tried if one.largest <= own.max_shell_m)
-        assert found.keys < max(one.keys for one in tried)
+        result = Left(DECIMATE, theirs.frames_with_keys, theirs.keys, theirs.numbers, theirs.max_shell_m)
+        assert result in tried
+        assert result.keys == min(one.keys for one in tried if one.largest <= own.max_shell_m)
+        assert result.keys < max(one.keys for one in tried)
 
 
 def test_a_body_that_stays_and_an_error_beyond_single_precision_have_no_row_of_decimate() -> None:

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from rigid_motion_batch.scenes.film import join_pieces, render_film, render_piece, save_blend
-from rigid_motion_batch.scenes.scene import build_stage
-from rigid_motion_batch.scenes.settings import StageSettings
+from rigid_motion_batch.scenes.scene import build_scene
+from rigid_motion_batch.scenes.settings import SceneSettings
 from tests.scripts.clips.recordings import reconstruct, swinging_clip
 from tests.scripts.scenes.stills import pixels_of, render_still
 
-SETTINGS = StageSettings(resolution=(160, 90), fps=10)
+SETTINGS = SceneSettings(resolution=(160, 90), fps=10)
 RENDER_SAVED = """
 import os, sys, bpy
 blend, picture, frame = sys.argv[1:]
@@ -33,7 +33,7 @@ os._exit(0)
 
 @pytest.fixture
 def scene():
-    return build_stage(reconstruct(swinging_clip(seconds=0.8), "5", ("lerp_slerp", "dq_sclerp")), SETTINGS)
+    return build_scene(reconstruct(swinging_clip(seconds=0.8), "5", ("lerp_slerp", "dq_sclerp")), SETTINGS)
 
 
 def handlers() -> dict[str, list]:

@@ -18,14 +18,14 @@ from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.scenes import layout
 from rigid_motion_batch.scenes.nodes import input_path
-from rigid_motion_batch.scenes.scene import build_stage
-from rigid_motion_batch.scenes.settings import StageSettings
+from rigid_motion_batch.scenes.scene import build_scene
+from rigid_motion_batch.scenes.settings import SceneSettings
 from rigid_motion_batch.scenes.subject import vertices_of
 from rigid_motion_batch.scenes.timeline import Timeline
 from tests.scripts.clips.recordings import reconstruct, swinging_clip
 from tests.thoroughness import sample
 
-SETTINGS = StageSettings(resolution=(160, 90), fps=12)
+SETTINGS = SceneSettings(resolution=(160, 90), fps=12)
 TWO = ("lerp_slerp", "dq_sclerp")
 
 
@@ -58,50 +58,50 @@ def poses_on(frames: np.ndarray, names: Iterable[str]) -> dict[str, Poses]:
     return {name: Poses(np.array(positions), np.array(quaternions)) for name, (positions, quaternions) in shown.items()}
 
 
-def assert_same_poses(found: Poses, wanted: Poses) -> None:
-    assert np.abs(found.positions - wanted.positions).max() < 1e-5
-    assert angle_between(found.quaternions, wanted.quaternions).max() < 1e-5 * 4
+def assert_same_poses(result: Poses, expected: Poses) -> None:
+    assert np.abs(result.positions - expected.positions).max() < 1e-5
+    assert angle_between(result.quaternions, expected.quaternions).max() < 1e-5 * 4
 
 
 @pytest.mark.parametrize("axes", ["blender", "unity"])
 def test_every_mode_is_played_on_every_frame_as_it_was_computed(axes):
     clip = dataclasses.replace(changed(swinging_clip(seconds=1.0), offset=300.0), axes=axes)
     reconstruction = reconstruct(clip, "5")
-    scene = build_stage(reconstruction, SETTINGS)
+    scene = build_scene(reconstruction, SETTINGS)
     timeline = Timeline.of(reconstruction, SETTINGS.fps, 1.0)
     times = timeline.times_of(timeline.frames)
     centre = np.array(scene["recording_centre_m"])
-    found_of = poses_on(
+    results_of = poses_on(
         timeline.frames, [name for mode in KEYFRAME_MODES for name in (f"Lane {mode}", mode, f"{mode} recording")]
     )
     for mode in KEYFRAME_MODES:
         turn = np.array(bpy.data.objects[f"Lane {mode}"].matrix_world.to_quaternion())
         behind = np.array(bpy.data.objects[f"{mode} recording"].delta_location)
         assert rotate(turn, behind) @ layout.AWAY == pytest.approx(np.linalg.norm(behind))
-        places = found_of[f"Lane {mode}"].positions
+        places = results_of[f"Lane {mode}"].positions
         kept = reconstruction.keys[mode]
         shown = {
             mode: interpolate(clip.times[kept], clip.poses[kept], times, mode),
             f"{mode} recording": interpolate(clip.times, clip.poses, times, "dq_sclerp"),
         }
         for name, poses in shown.items():
-            found = found_of[name]
-            wanted = to_blender(poses, axes)
+            result = results_of[name]
+            expected = to_blender(poses, axes)
             at_home = Poses(
-                rotate(conjugate(turn), found.positions - places) + centre - behind * (name != mode),
-                multiply(conjugate(turn), found.quaternions),
+                rotate(conjugate(turn), result.positions - places) + centre - behind * (name != mode),
+                multiply(conjugate(turn), result.quaternions),
             )
-            assert_same_poses(at_home, wanted)
+            assert_same_poses(at_home, expected)
 
 
 def test_an_object_that_grows_grows_on_the_stage():
     clip = swinging_clip(seconds=0.6)
     scales = np.linspace(1.0, 2.0, len(clip.times))
     growing = dataclasses.replace(clip, poses=Poses(clip.poses.positions, clip.poses.quaternions, scales))
-    scene = build_stage(reconstruct(growing, "5", ("cga_slerp",)), SETTINGS)
-    found = read_poses(bpy.data.objects["cga_slerp"], np.array([1.0, scene.frame_end]))
-    assert found.scales[0] == pytest.approx(1.0, abs=1e-5)
-    assert found.scales[1] > 1.6
+    scene = build_scene(reconstruct(growing, "5", ("cga_slerp",)), SETTINGS)
+    result = read_poses(bpy.data.objects["cga_slerp"], np.array([1.0, scene.frame_end]))
+    assert result.scales[0] == pytest.approx(1.0, abs=1e-5)
+    assert result.scales[1] > 1.6
 
 
 CLIPS = {
@@ -118,7 +118,7 @@ CLIPS = {
 @pytest.mark.parametrize("clip", CLIPS)
 @pytest.mark.parametrize("modes", [TWO, tuple(KEYFRAME_MODES)], ids=["two", "all"])
 def test_everything_that_moves_stays_within_its_own_card(clip, modes):
-    scene = build_stage(reconstruct(changed(swinging_clip(seconds=1.0), *CLIPS[clip]), "5", modes), SETTINGS)
+    scene = build_scene(reconstruct(changed(swinging_clip(seconds=1.0), *CLIPS[clip]), "5", modes), SETTINGS)
     aspect = SETTINGS.resolution[0] / SETTINGS.resolution[1]
     deviating = {mode: f"{mode} deviating" for mode in modes if f"{mode} deviating" in bpy.data.objects}
     moving = {mode: (deviating.get(mode, mode), f"{mode} recording") for mode in modes}
@@ -146,7 +146,7 @@ def test_everything_that_moves_stays_within_its_own_card(clip, modes):
 
 def test_everything_that_is_written_is_within_the_picture():
     clip = dataclasses.replace(swinging_clip(seconds=0.6), name="a_recording_with_quite_a_long_name_" * 3)
-    scene = build_stage(reconstruct(clip, "7.5"), SETTINGS)
+    scene = build_scene(reconstruct(clip, "7.5"), SETTINGS)
     for obj in bpy.data.objects["Frame"].children:
         corners = evaluated_points(obj) if obj.type == "MESH" else [obj.matrix_world @ Vector(c) for c in obj.bound_box]
         assert len(corners)
@@ -159,7 +159,7 @@ def test_everything_that_is_written_is_within_the_picture():
 
 def test_the_number_shows_the_error_of_the_frame_and_the_graph_has_passed_so_far():
     reconstruction = reconstruct(swinging_clip(seconds=1.0), "5", TWO)
-    scene = build_stage(reconstruction, SETTINGS)
+    scene = build_scene(reconstruction, SETTINGS)
     timeline = Timeline.of(reconstruction, SETTINGS.fps, 1.0)
     times = timeline.times_of(timeline.frames)
     for mode in TWO:
@@ -182,7 +182,7 @@ def test_the_number_shows_the_error_of_the_frame_and_the_graph_has_passed_so_far
 
 
 def test_the_file_needs_no_script_to_play():
-    build_stage(reconstruct(swinging_clip(seconds=0.6), "5"), SETTINGS)
+    build_scene(reconstruct(swinging_clip(seconds=0.6), "5"), SETTINGS)
     assert not bpy.data.texts
     for block in bpy.data.user_map():
         data = getattr(block, "animation_data", None)
@@ -203,12 +203,12 @@ def test_the_file_needs_no_script_to_play():
 )
 def test_settings_that_make_no_film_are_refused(wrong, said):
     with pytest.raises(ValueError, match=said):
-        StageSettings(**wrong)
+        SceneSettings(**wrong)
 
 
 def test_adaptive_keys_are_marked_in_the_lane_of_the_mode_they_are_of_and_counted_in_its_caption():
     reconstruction = choose(swinging_clip(seconds=1.0), Tolerance("5mm"), ("lerp_slerp", "motor_spline"), 0.1)
-    scene = build_stage(reconstruction, SETTINGS)
+    scene = build_scene(reconstruction, SETTINGS)
     assert scene.name == "swing tolerance-5mm"
     assert bpy.data.curves["Choice of keys"].body == "within 5 mm"
     timeline = Timeline.of(reconstruction, SETTINGS.fps, 1.0)
@@ -224,7 +224,7 @@ def test_adaptive_keys_are_marked_in_the_lane_of_the_mode_they_are_of_and_counte
 
 def test_modes_that_are_one_motion_share_a_lane_that_names_them_all():
     made = reconstruct(swinging_clip(seconds=1.0), "5")
-    scene = build_stage(made, dataclasses.replace(SETTINGS, distinct=True))
+    scene = build_scene(made, dataclasses.replace(SETTINGS, distinct=True))
     lanes = [child.name for child in scene.collection.children if child.name.startswith("Lane ")]
     assert lanes == ["Lane lerp_slerp", "Lane dq_sclerp", "Lane pga_lerp", "Lane motor_spline"]
     assert bpy.data.curves["dq_sclerp title"].body == "Screw"
@@ -235,7 +235,7 @@ def test_a_deviation_of_millimetres_is_drawn_larger_and_the_picture_says_how_muc
     clip = swinging_clip(seconds=1.0)
     settings = dataclasses.replace(SETTINGS, deviation=20.0)
     made = reconstruct(clip, "10", TWO)
-    scene = build_stage(made, settings)
+    scene = build_scene(made, settings)
     assert scene["deviation_shown_times"] == 20.0
     assert "deviation drawn 20 times as large" in bpy.data.curves["Legend"].body
     for mode in TWO:
@@ -253,7 +253,7 @@ def test_a_deviation_of_millimetres_is_drawn_larger_and_the_picture_says_how_muc
 
 
 def test_a_clip_shorter_than_a_frame_is_one_frame():
-    scene = build_stage(reconstruct(swinging_clip(seconds=0.05), "30", TWO), SETTINGS)
+    scene = build_scene(reconstruct(swinging_clip(seconds=0.05), "30", TWO), SETTINGS)
     assert (scene.frame_start, scene.frame_end) == (1, 1)
     assert len(evaluated_points(bpy.data.objects["Time"]))
 
@@ -261,11 +261,11 @@ def test_a_clip_shorter_than_a_frame_is_one_frame():
 @pytest.mark.parametrize("engine", ["workbench", "eevee", "cycles"])
 def test_every_engine_can_be_chosen(engine):
     reconstruction = reconstruct(swinging_clip(seconds=0.6), "5", ("dq_sclerp",))
-    scene = build_stage(reconstruction, dataclasses.replace(SETTINGS, engine=engine))
+    scene = build_scene(reconstruction, dataclasses.replace(SETTINGS, engine=engine))
     assert engine in scene.render.engine.lower()
 
 
 def test_an_object_that_would_be_lost_on_its_path_is_shown_larger_and_says_so():
-    build_stage(reconstruct(changed(swinging_clip(seconds=1.0), 100.0), "5", TWO), SETTINGS)
+    build_scene(reconstruct(changed(swinging_clip(seconds=1.0), 100.0), "5", TWO), SETTINGS)
     assert "object shown" in bpy.data.curves["Legend"].body
     assert np.ptp(vertices_of(bpy.data.objects["dq_sclerp"].data), axis=0).max() > 0.5

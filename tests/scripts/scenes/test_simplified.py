@@ -45,19 +45,19 @@ def models(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize("name", MODELS)
 def test_our_models_keep_their_shape_and_what_has_the_colour_of_the_mode(name):
     whole = vertices_of(load_subject(name))
-    found = simplified(name)
-    assert MOST_TRIANGLES / 2 < len(found["triangles"]) <= MOST_TRIANGLES <= MOST_IN_A_PAGE
-    used = found["vertices"][np.unique(found["triangles"])]
+    result = simplified(name)
+    assert MOST_TRIANGLES / 2 < len(result["triangles"]) <= MOST_TRIANGLES <= MOST_IN_A_PAGE
+    used = result["vertices"][np.unique(result["triangles"])]
     for end in (np.min, np.max):
         assert np.abs(end(used, axis=0) - end(whole, axis=0)).max() < 0.02 * np.ptp(whole, axis=0).max()
-    assert {*found["tints"]} == {0.0, 1.0}
-    assert Mesh(**found).size == pytest.approx(np.linalg.norm(np.ptp(whole, axis=0)), rel=0.02)
+    assert {*result["tints"]} == {0.0, 1.0}
+    assert Mesh(**result).size == pytest.approx(np.linalg.norm(np.ptp(whole, axis=0)), rel=0.02)
 
 
 def test_triangles_that_hang_on_nothing_are_kept_within_the_budget(models):
-    found = simplified(f"{models}:Dust")
-    assert 0 < len(found["triangles"]) <= MOST_TRIANGLES
-    assert found["triangles"].max() < len(found["vertices"])
+    result = simplified(f"{models}:Dust")
+    assert 0 < len(result["triangles"]) <= MOST_TRIANGLES
+    assert result["triangles"].max() < len(result["vertices"])
 
 
 def test_an_object_that_is_not_there_is_named(models):

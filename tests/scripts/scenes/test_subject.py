@@ -79,11 +79,11 @@ def test_nothing_else_of_the_users_file_stays(user_file):
         ("hammer", "object 'hammer': give drill, controller or file.blend:Name"),
     ],
 )
-def test_what_cannot_be_shown_is_said_in_one_line(wanted, said, user_file, tmp_path):
+def test_what_cannot_be_shown_is_said_in_one_line(expected, said, user_file, tmp_path):
     (tmp_path / "text.blend").write_text("no Blender file\n" * 20)
     before = set(bpy.data.user_map())
     with pytest.raises(SubjectError) as error:
-        load_subject(wanted.format(file=user_file, folder=tmp_path))
+        load_subject(expected.format(file=user_file, folder=tmp_path))
     assert said in str(error.value)
     assert "\n" not in str(error.value)
     assert set(bpy.data.user_map()) == before

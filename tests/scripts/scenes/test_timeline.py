@@ -37,9 +37,9 @@ def test_every_mode_has_its_own_in_betweens_and_meets_the_keys(swing):
     clip, times = swing.clip, timeline.times_of(timeline.fine_frames)
     for mode, poses in motion.modes.items():
         kept = swing.keys[mode]
-        wanted = interpolate(clip.times[kept], clip.poses[kept], times, mode)
-        assert np.allclose(poses.positions + motion.centre, wanted.positions, atol=1e-12)
-        assert np.allclose(poses.quaternions, wanted.quaternions, atol=1e-12)
+        expected = interpolate(clip.times[kept], clip.poses[kept], times, mode)
+        assert np.allclose(poses.positions + motion.centre, expected.positions, atol=1e-12)
+        assert np.allclose(poses.quaternions, expected.quaternions, atol=1e-12)
         assert np.allclose(timeline.times_of(motion.key_frames[mode]), clip.times[kept])
         assert np.allclose(motion.keys[mode].positions + motion.centre, clip.poses[kept].positions)
 

@@ -22,7 +22,7 @@ import zenoh  # noqa: F401 - without it these tests are skipped
 from rigid_motion.streams import Receiver
 from rigid_motion_batch.cli.stream import main
 from rigid_motion_batch.recordings.clip_reading import read_clips
-from rigid_motion_batch.recordings.figures import Figure
+from rigid_motion_batch.recordings.rest_bodies import RestBody
 from rigid_motion_batch.streaming.receiving import Receiving
 from rigid_motion_batch.streaming.rooms import HERE, Room, RoomError, is_loopback, locator, opened, settings
 from rigid_motion_batch.streaming.written import write_bvh
@@ -120,7 +120,7 @@ def test_a_body_goes_to_several_receivers_in_the_formats_that_they_ask_for(tmp_p
     times, poses = dance(own, 2.0, 60.0)
     walk = tmp_path / "walk.bvh"
     with walk.open("w", encoding="utf-8") as file:
-        write_bvh(file, Figure(own.joints, own.parents, own.rest, own.rest.positions), own.sliding, times, poses)
+        write_bvh(file, RestBody(own.joints, own.parents, own.rest, own.rest.positions), own.sliding, times, poses)
     reading = ("--scale", "1", "--start", "0")
     options = ("--room", "r", "--at", at, "--truth", walk, *reading, *MARGIN)
     with (
@@ -130,7 +130,7 @@ def test_a_body_goes_to_several_receivers_in_the_formats_that_they_ask_for(tmp_p
         run("send", walk, "--room", "r", "--at", at, *reading)
         assert max(largest_mm(done(first)), largest_mm(done(second))) < 5.1
     (clip,), _ = read_clips([str(tmp_path / "a.bvh")])
-    assert clip.figure.parents.tolist() == own.parents.tolist()
+    assert clip.rest_body.parents.tolist() == own.parents.tolist()
     clips, _ = read_clips([f"{tmp_path / 'b.csv'}:*"])
     assert len(clips) == 6
     # Frames of a thirtieth, beside those of a seventy-second.
@@ -309,9 +309,9 @@ def test_blender_gets_the_datagrams_as_they_are_and_its_answers_get_to_the_sende
 
 def test_what_nobody_asked_for_stays_on_this_machine():
     for role in ("peer", "router"):
-        found = settings(role, None, False)
-        assert found["scouting/multicast/enabled"] is False
-        assert all(is_loopback(place) for place in found["listen/endpoints"])
+        result = settings(role, None, False)
+        assert result["scouting/multicast/enabled"] is False
+        assert all(is_loopback(place) for place in result["listen/endpoints"])
     assert settings("peer", "studio.local", False)["mode"] == "client"
     assert settings("router", None, True)["listen/endpoints"] == ["tcp/0.0.0.0:7447"]
 

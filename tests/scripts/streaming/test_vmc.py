@@ -83,12 +83,12 @@ def listener():
 
 
 def received(other: socket.socket) -> list[bytes]:
-    found = []
+    result = []
     while True:
         try:
-            found.append(other.recv(4096))
+            result.append(other.recv(4096))
         except BlockingIOError:
-            return found
+            return result
 
 
 def test_the_command_plays_a_body_in_real_time(walk, listener):

@@ -28,19 +28,19 @@ def path_and_place(bone):
 
 def shown(bone, frames, end="head"):
     """Where Blender shows an end of a bone in the world."""
-    found = []
+    result = []
     for frame in frames:
         bpy.context.scene.frame_set(int(frame))
         rig = bone.id_data.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        found.append(tuple(rig.matrix_world @ getattr(rig.pose.bones[bone.name], end)))
-    return np.array(found)
+        result.append(tuple(rig.matrix_world @ getattr(rig.pose.bones[bone.name], end)))
+    return np.array(result)
 
 
 def assert_leads(bone, end):
     path, place = path_and_place(bone)
     expected = shown(bone, WHOLE, end)
     on = np.searchsorted(path.frames, WHOLE)
-    assert place(path.wanted[on]) == pytest.approx(expected, abs=1e-5)
+    assert place(path.desired[on]) == pytest.approx(expected, abs=1e-5)
     assert np.abs(place(path.native[on]) - expected).max() > 0.01
 
 
@@ -63,7 +63,7 @@ def test_the_path_of_a_bone_that_only_turns_is_that_of_its_tail(scene, connected
     set_mode(bone, "cga_slerp" if not connected else SCREW)
     path, place = path_and_place(bone)
     on = np.searchsorted(path.frames, WHOLE)
-    assert place(path.wanted[on]) == pytest.approx(shown(bone, WHOLE, "tail"), abs=1e-5)
+    assert place(path.desired[on]) == pytest.approx(shown(bone, WHOLE, "tail"), abs=1e-5)
 
 
 def test_axes_of_a_bone_are_as_it_is_turned(scene):

@@ -19,7 +19,7 @@ WHOLE = np.arange(FRAMES[0], FRAMES[-1] + 1.0)
 
 def shown(carrier, point=(0.0, 0.0, 0.0)):
     """Where Blender shows a point of an object or a bone in the world, on all whole frames."""
-    found = []
+    result = []
     for frame in WHOLE:
         bpy.context.scene.frame_set(int(frame))
         if isinstance(carrier, bpy.types.PoseBone):
@@ -27,8 +27,8 @@ def shown(carrier, point=(0.0, 0.0, 0.0)):
             matrix = rig.matrix_world @ rig.pose.bones[carrier.name].matrix
         else:
             matrix = carrier.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world
-        found.append((np.array(matrix) @ (*point, 1.0))[:3])
-    return np.array(found)
+        result.append((np.array(matrix) @ (*point, 1.0))[:3])
+    return np.array(result)
 
 
 def path_under(bone):
@@ -40,7 +40,7 @@ def path_under(bone):
 def assert_in_world(path, expected):
     assert path.in_world
     on = np.searchsorted(path.frames, WHOLE)
-    assert path.wanted[on] == pytest.approx(expected, abs=3e-5)
+    assert path.desired[on] == pytest.approx(expected, abs=3e-5)
 
 
 @pytest.fixture

@@ -74,7 +74,7 @@ def mesh() -> bpy.types.Object:
 def test_blenders_path_leads_where_blender_shows_the_object(scene, order):
     obj = key(new_object(rotation_mode=order))
     path = path_of(obj, scene)
-    assert path.wanted is None
+    assert path.desired is None
     assert on(path, path.native, WHOLE) == pytest.approx(shown_origins(obj, WHOLE), abs=1e-5)
 
 
@@ -86,7 +86,7 @@ def test_a_modes_path_shows_beforehand_where_the_object_will_be(scene, mode, ord
     before = path_of(obj, scene)
     native = shown_origins(obj, WHOLE)
     set_mode(obj, mode)
-    assert on(before, before.wanted, WHOLE) == pytest.approx(shown_origins(obj, WHOLE), abs=2e-5)
+    assert on(before, before.desired, WHOLE) == pytest.approx(shown_origins(obj, WHOLE), abs=2e-5)
     assert on(before, before.native, WHOLE) == pytest.approx(native, abs=1e-5)
 
 
@@ -95,7 +95,7 @@ def test_looking_at_a_mode_changes_nothing(scene):
     digest, shown = source_of(obj).digest, shown_origins(obj, WHOLE)
     for mode in KEYFRAME_MODES:
         scene.rigid_motion_overlay.mode = mode
-        assert path_of(obj, scene).wanted is not None
+        assert path_of(obj, scene).desired is not None
     assert obj.rigid_motion.mode == "BLENDER"
     assert source_of(obj).digest == digest
     assert (shown_origins(obj, WHOLE) == shown).all()
@@ -105,11 +105,11 @@ def test_each_segment_runs_in_its_own_mode(scene):
     obj = key(new_object())
     set_mode(obj, "lerp_slerp", [FRAMES[1]])
     path = path_of(obj, scene)
-    same = np.isclose(path.native, path.wanted, atol=1e-9).all(axis=1)
+    same = np.isclose(path.native, path.desired, atol=1e-9).all(axis=1)
     inside = (path.frames > FRAMES[1]) & (path.frames < FRAMES[2])
     assert same[~inside].all()
     assert not same[inside].any()
-    assert on(path, path.wanted, WHOLE) == pytest.approx(shown_origins(obj, WHOLE), abs=1e-5)
+    assert on(path, path.desired, WHOLE) == pytest.approx(shown_origins(obj, WHOLE), abs=1e-5)
 
 
 @pytest.mark.parametrize("parenting", ["none", "object", "bone", "vertex", "object with an inverse"])
@@ -129,7 +129,7 @@ def test_the_world_is_where_the_parent_takes_the_path(scene, parenting):
         obj.parent, obj.parent_type, obj.parent_vertices = mesh(), "VERTEX", (2, 0, 0)
     set_mode(obj, "dq_sclerp")
     path = path_of(obj, scene)
-    assert in_world(obj, on(path, path.wanted, WHOLE)) == pytest.approx(shown_origins(obj, WHOLE), abs=2e-5)
+    assert in_world(obj, on(path, path.desired, WHOLE)) == pytest.approx(shown_origins(obj, WHOLE), abs=2e-5)
 
 
 def test_own_delta_transforms_are_part_of_the_path(scene):
@@ -139,7 +139,7 @@ def test_own_delta_transforms_are_part_of_the_path(scene):
     assert on(path, path.native, WHOLE) == pytest.approx(shown_origins(obj, WHOLE), abs=1e-5)
     set_mode(obj, "dq_sclerp")
     path = path_of(obj, scene)
-    assert on(path, path.wanted, WHOLE) == pytest.approx(shown_origins(obj, WHOLE), abs=1e-5)
+    assert on(path, path.desired, WHOLE) == pytest.approx(shown_origins(obj, WHOLE), abs=1e-5)
 
 
 def test_keys_off_whole_frames_are_on_the_path(scene):
@@ -149,9 +149,9 @@ def test_keys_off_whole_frames_are_on_the_path(scene):
     keyed = source_of(obj).values_at(np.array((1.25, 10.5, 20.0)))[ROWS["location"]].T
     assert path.keys == pytest.approx(keyed, abs=1e-6)
     for frame, place in zip((1.25, 10.5, 20.0), keyed, strict=True):
-        native, wanted = path.at(frame)
+        native, expected = path.at(frame)
         assert native == pytest.approx(place, abs=1e-6)
-        assert wanted == pytest.approx(place, abs=1e-6)
+        assert expected == pytest.approx(place, abs=1e-6)
 
 
 def test_selected_keys_are_told_apart(scene):
@@ -184,7 +184,7 @@ def test_ticks_are_on_the_same_frames_in_all_paths(scene):
     path = path_of(obj, scene)
     fives = np.arange(5.0, 41.0, 5.0)
     assert (path.native_ticks == on(path, path.native, fives)).all()
-    assert (path.wanted_ticks == on(path, path.wanted, fives)).all()
+    assert (path.desired_ticks == on(path, path.desired, fives)).all()
 
 
 @pytest.mark.parametrize(
@@ -218,7 +218,7 @@ def test_a_cycle_goes_on_to_the_end_of_the_scene_with_the_keys_of_its_first_roun
     frames = np.arange(1.0, 101.0)
     # On the seam a cycle has both ends.
     frames = frames[frames % 20 != 1]
-    assert on(path, path.wanted, frames) == pytest.approx(shown_origins(obj, frames), abs=1e-5)
+    assert on(path, path.desired, frames) == pytest.approx(shown_origins(obj, frames), abs=1e-5)
 
 
 def test_without_a_second_key_there_is_no_path(scene):

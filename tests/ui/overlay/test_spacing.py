@@ -19,12 +19,12 @@ def straight(frames: int, places: np.ndarray | None = None, *, mode: bool = Fals
     return Path(
         frames=at,
         native=line,
-        wanted=line if mode else None,
+        desired=line if mode else None,
         keys=line[list(keys)],
         selected=np.zeros(len(keys), dtype=bool),
         tick_frames=at,
         native_ticks=line,
-        wanted_ticks=line if mode else None,
+        desired_ticks=line if mode else None,
         axis_frames=at,
         axes=np.repeat(line[:, None, None], 3, axis=1).repeat(2, axis=2),
     )
@@ -51,10 +51,10 @@ def test_a_long_path_has_all_its_ticks_but_those_under_keys():
 
 @pytest.mark.parametrize(("gap", "step"), [(TICK_GAP, 1), (TICK_GAP / 2, 2), (TICK_GAP / 3, 5), (TICK_GAP / 8, 10)])
 def test_the_shorter_a_path_the_fewer_ticks_and_all_are_evenly_timed(gap, step):
-    found = ticks(straight(101), 100 * gap)
-    assert (np.diff(found) == step).all()
-    assert (found % step == 0.0).all()
-    assert len(found) >= 100 // step - 2
+    result = ticks(straight(101), 100 * gap)
+    assert (np.diff(result) == step).all()
+    assert (result % step == 0.0).all()
+    assert len(result) >= 100 // step - 2
 
 
 def test_a_path_that_is_seen_as_a_dot_has_no_ticks():

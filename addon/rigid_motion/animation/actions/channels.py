@@ -35,9 +35,9 @@ def channelbag_of(animated: bpy.types.ID) -> bpy.types.ActionChannelbag:
     action = data.action
     if data.action_slot is None:
         data.action_slot = action.slots.new(animated.id_type, animated.name)
-    found = action_get_channelbag_for_slot(action, data.action_slot)
-    if found is not None:
-        return found
+    result = action_get_channelbag_for_slot(action, data.action_slot)
+    if result is not None:
+        return result
     layer = action.layers[0] if action.layers else action.layers.new("Layer")
     strip = layer.strips[0] if layer.strips else layer.strips.new(type="KEYFRAME")
     return strip.channelbag(data.action_slot, ensure=True)

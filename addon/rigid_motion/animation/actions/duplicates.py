@@ -39,7 +39,7 @@ def mode_before_move(place: SlotTransform) -> int | None:
     What a slot was moved from has its differences and not the slot; and was filled in from the same keys. Of several,
     it is the one with the mode that the bone shows.
     """
-    found = []
+    result = []
     for action in bpy.data.actions if place.kind.has_difference_slot else ():
         moved = {pair.handle for pair in action.rigid_motion.bone_slots} - {slot.handle for slot in action.slots}
         for record in action.rigid_motion.slots if moved and action != place.slot.action else ():
@@ -47,9 +47,9 @@ def mode_before_move(place: SlotTransform) -> int | None:
                 number = MODE_NUMBERS.get(record.mode, 0)
                 with suppress(Refused):
                     if read(place, number).digest == record.digest:
-                        found.append(number)
+                        result.append(number)
     shown = {MODE_NUMBERS.get(user.motion.mode) for user in place.users}
-    return next((number for number in found if number in shown), found[0] if found else None)
+    return next((number for number in result if number in shown), result[0] if result else None)
 
 
 def _have_same_curves(one: SlotTransform, other: SlotTransform) -> bool:
@@ -62,7 +62,7 @@ def _have_same_curves(one: SlotTransform, other: SlotTransform) -> bool:
 def _numbers_of(fcurve: bpy.types.FCurve) -> np.ndarray:
     """The keys or samples of an F-curve, or the line that it is."""
     points = fcurve.keyframe_points if len(fcurve.keyframe_points) else fcurve.sampled_points
-    found = np.empty(2 * len(points), np.float32)
-    points.foreach_get("co", found)
+    result = np.empty(2 * len(points), np.float32)
+    points.foreach_get("co", result)
     lines = (modifier.coefficients for modifier in fcurve.modifiers if modifier.type == "GENERATOR")
-    return np.concatenate((found, *lines))
+    return np.concatenate((result, *lines))

@@ -51,8 +51,8 @@ def keyed_in(places: Sequence[SlotTransform]) -> list[Source | Refused]:
 
     Numbers and modes are as they are, which may be any in a damaged file: see `refuse_numbers`.
     """
-    found = sources_of_users(places)
-    return [leading(place, users) for place, users in zip(places, found, strict=True)]
+    result = sources_of_users(places)
+    return [leading(place, users) for place, users in zip(places, result, strict=True)]
 
 
 def differing_users(place: SlotTransform, sources: list[Source | Refused]) -> list[Transform]:
@@ -72,7 +72,7 @@ def differing_users(place: SlotTransform, sources: list[Source | Refused]) -> li
 
 def sources_of_users(places: Sequence[SlotTransform]) -> list[list[Source | Refused]]:
     """What is keyed in each of the places as each of its users has it."""
-    found: list[list[_Keyed | Refused]] = []
+    result: list[list[_Keyed | Refused]] = []
     drivers: dict[bpy.types.ID, set[Channel]] = {}
     for place in places:
         users: list[_Keyed | Refused] = []
@@ -84,8 +84,8 @@ def sources_of_users(places: Sequence[SlotTransform]) -> list[list[Source | Refu
                 users.append(_keyed_for(user, place, drivers[user.animated]))
             except Refused as problem:
                 users.append(problem)
-        found.append(users)
-    readable = [keyed for users in found for keyed in users if isinstance(keyed, _Keyed)]
+        result.append(users)
+    readable = [keyed for users in result for keyed in users if isinstance(keyed, _Keyed)]
     channels = iter(read_keys([list(keyed.channels.values()) for keyed in readable]))
     modes, turns = (iter(read_keys(curves)) for curves in ([k.modes for k in readable], [k.turns for k in readable]))
     return [
@@ -93,7 +93,7 @@ def sources_of_users(places: Sequence[SlotTransform]) -> list[list[Source | Refu
             _source(keyed, place, next(channels), next(modes), next(turns)) if isinstance(keyed, _Keyed) else keyed
             for keyed in users
         ]
-        for place, users in zip(places, found, strict=True)
+        for place, users in zip(places, result, strict=True)
     ]
 
 

@@ -34,18 +34,18 @@ NOTHING_RECORDED = Recorded()
 
 def recorded(place: SlotTransform) -> Recorded:
     """What is kept about a transform in a slot: looked up once, and again after it was changed by way of here."""
-    found = place.__dict__.get("recorded")
-    if found is None:
+    result = place.__dict__.get("recorded")
+    if result is None:
         record = record_of(place)
         if record is None:
-            found = NOTHING_RECORDED
+            result = NOTHING_RECORDED
         else:
             mode = record.mode if record.is_property_set("mode") else None
             axis = record.turns_axis or SCREW_AXIS
             samples = max(record.rate, 1), record.error
-            found = Recorded(mode, record.digest, record.rows, record.constraint, axis, *samples)
-        place.__dict__["recorded"] = found
-    return found
+            result = Recorded(mode, record.digest, record.rows, record.constraint, axis, *samples)
+        place.__dict__["recorded"] = result
+    return result
 
 
 def recorded_digest(place: SlotTransform) -> str:

@@ -42,7 +42,7 @@ def _follow(renamed: Collection[bpy.types.Object]) -> None:
         if slot.action.is_editable:
             rename_records(slot, names)
             # Of what no constraint shows Blender renames nothing: where two have swapped names, all looks complete.
-            if any(user.rigid_motion.laid_aside for user in slot.users):
+            if any(user.rigid_motion.detached for user in slot.users):
                 forget_in_betweens(slot, names.values())
             _take_out_doubles(slot, names.values())
         for original in _originals_of(slot) if names else ():
@@ -89,8 +89,8 @@ def _renamed_in(slot: Slot) -> dict[str, str]:
         if known := bone.rigid_motion.recorded_as:
             names.setdefault(known, []).append(bone.name)
     now = {
-        known: max(found, key=lambda name, known=known: (prefix_of(name) in keyed, name == known))
-        for known, found in names.items()
+        known: max(result, key=lambda name, known=known: (prefix_of(name) in keyed, name == known))
+        for known, result in names.items()
     }
     return {prefix_of(known): prefix_of(name) for known, name in now.items() if name != known}
 
@@ -102,8 +102,8 @@ def _originals_of(slot: Slot) -> list[Slot]:
     notes = [entry for owner in owners for entry in owner.rigid_motion.bakes if entry.changed == slot.action]
     actions = {entry.original for entry in notes if entry.original is not None and entry.original.is_editable}
     played = {(other.action, other.handle) for other in slots_in(actions)}
-    found = (in_action(action, slot) for action in actions)
-    return [one for one in found if one is not None and (one.action, one.handle) not in played]
+    result = (in_action(action, slot) for action in actions)
+    return [one for one in result if one is not None and (one.action, one.handle) not in played]
 
 
 def _take_out_doubles(slot: Slot, prefixes: Iterable[str]) -> None:

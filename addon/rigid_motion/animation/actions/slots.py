@@ -156,8 +156,8 @@ def read_again(places: Sequence[SlotTransform]) -> list[SlotTransform]:
     prefixes: dict[Slot, dict[str, None]] = {}
     for place in places:
         prefixes.setdefault(place.slot, {})[place.prefix] = None
-    found = {(slot, place.prefix): place for slot, own in prefixes.items() for place in transforms_in(slot, own)}
-    return [found[place.slot, place.prefix] for place in places]
+    result = {(slot, place.prefix): place for slot, own in prefixes.items() for place in transforms_in(slot, own)}
+    return [result[place.slot, place.prefix] for place in places]
 
 
 def transforms_with(
@@ -207,11 +207,11 @@ def slot_transforms_of(transforms: Iterable[Transform]) -> list[SlotTransform]:
     prefixes: dict[bpy.types.Object, dict[str, None]] = {}
     for transform in transforms:
         prefixes.setdefault(transform.animated, {})[transform.prefix] = None
-    found = []
+    result = []
     for slot in slots_of(prefixes):
-        wanted = dict.fromkeys(prefix for user in slot.users for prefix in prefixes.get(user, ()))
-        found += transforms_in(slot, wanted)
-    return found
+        desired = dict.fromkeys(prefix for user in slot.users for prefix in prefixes.get(user, ()))
+        result += transforms_in(slot, desired)
+    return result
 
 
 def slot_transforms_in(actions: Iterable[bpy.types.Action]) -> list[SlotTransform]:
@@ -230,33 +230,33 @@ def places_of(transform: Transform) -> list[SlotTransform]:
 
 def filled_places_of(obj: bpy.types.Object) -> list[SlotTransform]:
     """What is filled in of all that an object's Actions move of it, as if nothing else used the same slots."""
-    found = []
+    result = []
     for action, handle, strips in uses_of(obj).values():
         slot = Slot(action, handle, (obj,), frozenset(strips))
         channelbag = slot.bones_channelbag
         bones = () if channelbag is None else map(prefix_of, channelbag.groups.keys())
-        found += [place for place in transforms_in(slot, {"", *bones}) if place.filled]
-    return found
+        result += [place for place in transforms_in(slot, {"", *bones}) if place.filled]
+    return result
 
 
 def slots_of(objects: Iterable[bpy.types.Object]) -> list[Slot]:
     """The slots that move these objects, in Actions of their own and in NLA strips; each once."""
     known = {obj: uses_of(obj) for obj in objects}
-    wanted = {key for uses in known.values() for key in uses}
+    desired = {key for uses in known.values() for key in uses}
     actions = {action for uses in known.values() for action, *_ in uses.values()}
-    return _slots(actions, lambda key: key in wanted, known)
+    return _slots(actions, lambda key: key in desired, known)
 
 
 def slots_in(actions: Iterable[bpy.types.Action]) -> list[Slot]:
     """The slots of these Actions that move an object."""
     actions = set(actions)
-    wanted = {action.as_pointer() for action in actions}
-    return _slots(actions, lambda key: key[0] in wanted, {})
+    desired = {action.as_pointer() for action in actions}
+    return _slots(actions, lambda key: key[0] in desired, {})
 
 
 def _slots(
     actions: set[bpy.types.Action],
-    is_wanted: Callable[[tuple[int, int]], bool],
+    is_desired: Callable[[tuple[int, int]], bool],
     known: Mapping[bpy.types.Object, Uses],
 ) -> list[Slot]:
     """Slots of these Actions, by the names of their users, and of one user from the bottom of its NLA to the top: what
@@ -269,7 +269,7 @@ def _slots(
     users: dict[tuple[int, int], list[bpy.types.Object]] = {}
     for obj in sorted(set().union(*owners.values()), key=lambda obj: obj.name_full):
         for key, (action, handle, strips) in (known[obj] if obj in known else uses_of(obj)).items():
-            if is_wanted(key):
+            if is_desired(key):
                 users.setdefault(key, []).append(obj)
                 places.setdefault(key, (action, handle, set()))[2].update(strips)
     return [
@@ -295,29 +295,29 @@ def uses_of(obj: bpy.types.Object) -> Uses:
     data = obj.animation_data
     if data is None:
         return {}
-    found = {}
+    result = {}
     # Some of Blender's operators leave the handle of a slot that is no longer there.
     if data.action is not None and (slot := data.action_slot) is not None:
-        found[data.action.as_pointer(), slot.handle] = (data.action, slot.handle, {None})
+        result[data.action.as_pointer(), slot.handle] = (data.action, slot.handle, {None})
     if len(data.nla_tracks):
         for strip in strips_of(obj):
             if (action := strip.action) is not None and (slot := strip.action_slot) is not None:
                 span = int(np.floor(strip.action_frame_start)), int(np.ceil(strip.action_frame_end))
-                found.setdefault((action.as_pointer(), slot.handle), (action, slot.handle, set()))[2].add(span)
-    return found
+                result.setdefault((action.as_pointer(), slot.handle), (action, slot.handle, set()))[2].add(span)
+    return result
 
 
 def counterpart_in(action: bpy.types.Action, slot: bpy.types.ActionSlot) -> bpy.types.ActionSlot | None:
     """The slot in a copy of an Action, or in the original, that is the same: by its name, or renamed by its handle."""
-    found = action.slots.get(slot.identifier)
-    return found or next((one for one in action.slots if one.handle == slot.handle), None)
+    result = action.slots.get(slot.identifier)
+    return result or next((one for one in action.slots if one.handle == slot.handle), None)
 
 
 def in_action(action: bpy.types.Action, slot: Slot) -> Slot | None:
     """The same slot in a copy of its Action, or in the original. None where it was taken out of it."""
     own = next(one for one in slot.action.slots if one.handle == slot.handle)
-    found = counterpart_in(action, own)
-    return None if found is None else replace(slot, action=action, handle=found.handle)
+    result = counterpart_in(action, own)
+    return None if result is None else replace(slot, action=action, handle=result.handle)
 
 
 def strips_of(obj: bpy.types.Object) -> Iterator[bpy.types.NlaStrip]:

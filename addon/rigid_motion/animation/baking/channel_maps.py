@@ -30,9 +30,9 @@ def shown(transform: Transform, source: Source, frames: np.ndarray) -> tuple[Pos
     maps : AffineMaps, shape (n,)
         Of the channels as Blender has them: location runs along its own axes, and scale may be uneven or negative.
     """
-    wanted = in_betweens(source, frames).wanted
+    desired = in_betweens(source, frames).desired
     delta, rest, along, count = source.original, transform.components(), source.location_axes, len(frames)
-    places, quaternions = wanted.positions, wanted.quaternions
+    places, quaternions = desired.positions, desired.quaternions
     if LOCATION not in source.keyed:
         place = rest[ROWS[LOCATION]] + delta[ROWS[LOCATION]]
         places = np.tile(place if along is None else along @ place, (count, 1))
@@ -40,8 +40,8 @@ def shown(transform: Transform, source: Source, frames: np.ndarray) -> tuple[Pos
         column = rest[:, None].copy()
         turn_into_quaternions(column, source.order)
         quaternions = np.tile(multiply(delta[ROWS[ROTATION]], column[ROWS[ROTATION], 0]), (count, 1))
-    if wanted.scales is not None:
-        return Poses(places, quaternions, wanted.scales), _maps(places, quaternions, wanted.scales[:, None], along)
+    if desired.scales is not None:
+        return Poses(places, quaternions, desired.scales), _maps(places, quaternions, desired.scales[:, None], along)
     scale = np.tile(rest[ROWS[SCALE]] * delta[ROWS[SCALE]], (count, 1))
     if SCALE in source.keyed:
         scale = (source.values_at(frames)[ROWS[SCALE]] * delta[ROWS[SCALE], None]).T
@@ -62,8 +62,8 @@ def evaluated(
             fcurve = curves.get((transform.prefix + name, index))
             has_say = fcurve is not None and not fcurve.mute and not fcurve.is_empty
             columns.append([fcurve.evaluate(frame) for frame in frame_list] if has_say else [value] * len(frame_list))
-        found = np.array(columns, dtype=np.float64).T
-        return found if (np.abs(found) < LARGEST).all() else np.tile(np.array(stands), (len(frame_list), 1))
+        result = np.array(columns, dtype=np.float64).T
+        return result if (np.abs(result) < LARGEST).all() else np.tile(np.array(stands), (len(frame_list), 1))
 
     mode = bone.rotation_mode
     if mode in ORDERS:

@@ -58,8 +58,8 @@ def in_copy(transform: Transform, place: SlotTransform, changed: bpy.types.Actio
     """Something in the copy that it moves by, which has the same channels as the original."""
     slot = used_in(transform.animated, changed)
     channelbag = slot.channelbag
-    found = {channel: channelbag.fcurves.find(channel[0], index=channel[1]) for channel in place.curves}
-    curves = {channel: fcurve for channel, fcurve in found.items() if fcurve is not None}
+    result = {channel: channelbag.fcurves.find(channel[0], index=channel[1]) for channel in place.curves}
+    curves = {channel: fcurve for channel, fcurve in result.items() if fcurve is not None}
     return transforms_with(slot, channelbag, {place.prefix: curves})[0]
 
 

@@ -119,9 +119,9 @@ def fewer_keys_of_rigs(
             plans.update(dict.fromkeys(members, Refused(why)))
             continue
         for transform, plan in fewer.items():
-            found = plans.setdefault(transform, [])
-            if isinstance(found, list):
-                found.append(plan)
+            result = plans.setdefault(transform, [])
+            if isinstance(result, list):
+                result.append(plan)
     return plans
 
 

@@ -159,23 +159,23 @@ def reduce_keys_of(
         for _, source in keyed:
             refuse_modified(transform.name, source)
             refuse_drivers(transform, source.driven)
-        found = of_rigs.get(transform, [])
-        if isinstance(found, Refused):
-            raise found
+        result = of_rigs.get(transform, [])
+        if isinstance(result, Refused):
+            raise result
         if transform.is_part:
-            if not found:
+            if not result:
                 before = sum(len(distinct(source.keyed_frames)) for _, source in keyed)
                 keeps_scale = any(has_uneven_scale(source) for _, source in keyed)
                 raise _no_fewer(transform, before, keeps_scale=keeps_scale, count=count)
-            return found
+            return result
         size = radius or radius_of(transform.carrier)
-        planned = {fewer.place for fewer in found}
+        planned = {fewer.place for fewer in result}
         rest = [one for one in keyed if one[0] not in planned]
         wishes = {"best_of": best_of, "count": count}
-        found = [*found, *(fewer_keys(transform, *one, mode, tolerance, size, **wishes) for one in rest)]
-        fewer = [reduced for reduced in found if len(reduced.key_frames) < reduced.before]
+        result = [*result, *(fewer_keys(transform, *one, mode, tolerance, size, **wishes) for one in rest)]
+        fewer = [reduced for reduced in result if len(reduced.key_frames) < reduced.before]
         if not fewer:
-            before, keeps_scale = sum(kept.before for kept in found), any(kept.keeps_scale for kept in found)
+            before, keeps_scale = sum(kept.before for kept in result), any(kept.keeps_scale for kept in result)
             raise _no_fewer(transform, before, keeps_scale=keeps_scale, count=count)
         return fewer
 
@@ -210,7 +210,7 @@ def _summed(entries: _Entries, of_bones: _Entries, segments: dict[str, int]) -> 
     """All of these notes together; None where there are none. What they say of a rig is that with the most frames."""
     if not entries:
         return None
-    rig = max((_whole_rig(entry) for entry in of_bones), key=lambda found: found.frames, default=None)
+    rig = max((_whole_rig(entry) for entry in of_bones), key=lambda result: result.frames, default=None)
     return Reduction(
         sum(entry.keys_before for entry in entries),
         sum(entry.keys_after for entry in entries),
@@ -236,12 +236,12 @@ def total_reduction(targets: Targets) -> Reduction | None:
     """What became of the keys of several targets together, without their modes. None where none were reduced."""
     of_each = [(transform, _reduced(entries)) for transform, entries in entries_of(transforms_of(targets))]
     of_bones = [entry for transform, entries in of_each if transform.is_part for entry in entries]
-    found = _summed([entry for _, entries in of_each for entry in entries], of_bones, {})
-    if found is None or found.rig is None:
-        return found
+    result = _summed([entry for _, entries in of_each for entry in entries], of_bones, {})
+    if result is None or result.rig is None:
+        return result
     whole = [_whole_rig(entry) for entry in of_bones]
     objects = [entry.largest_error for transform, own in of_each if not transform.is_part for entry in own]
-    return replace(found, largest_error=max([*objects, *(rig.largest_error for rig in whole)]))
+    return replace(result, largest_error=max([*objects, *(rig.largest_error for rig in whole)]))
 
 
 def is_reduced(target: Target) -> bool:

@@ -55,16 +55,16 @@ class RigMotion:
         self.hierarchy, scale = Hierarchy(self.bones), scale_in_scene(transform_of(rig))
         self.radii = np.array([radius / scale if radius else reach_of(bone) for bone in self.bones])
         keyed, curves = _keyed_in(rig, slot)
-        found = [
+        result = [
             shown(transform, source, frames)
             if (source := sources.get(number) or keyed.get(transform.prefix)) is not None
             else evaluated(transform, curves.get(transform.prefix, {}), frames)
             for number, transform in enumerate(self.transforms)
         ]
-        self.poses = [poses for poses, _ in found]
+        self.poses = [poses for poses, _ in result]
         """Of each bone's channels, each of shape (m,)."""
         self._channels = AffineMaps(
-            np.stack([maps.axes for _, maps in found]), np.stack([maps.origins for _, maps in found])
+            np.stack([maps.axes for _, maps in result]), np.stack([maps.origins for _, maps in result])
         )
         self._recorded_channels = self._channels.copy()
         self._posed = self.hierarchy.posed(self._channels)
@@ -129,7 +129,7 @@ class RigMotion:
 
         `weights` are of shape (bones, m). Of these bones, or all.
         """
-        found = []
+        result = []
         for number in range(len(self.bones)) if numbers is None else numbers:
             now, truth, radius = self.now(number), self.truth[number], self.radii[number]
             # What is not finite is not within it, either.
@@ -137,8 +137,8 @@ class RigMotion:
             if len(may):
                 errors = ball_displacement(now[may], truth[may], np.full(len(may), radius)) * weights[number, may]
                 over = ~(errors <= allowed)
-                found += [(float(e), number, int(at)) for e, at in zip(errors[over], may[over], strict=True)]
-        return sorted(found, reverse=True)
+                result += [(float(e), number, int(at)) for e, at in zip(errors[over], may[over], strict=True)]
+        return sorted(result, reverse=True)
 
     def largest_error(self, number: int) -> float:
         """The largest displacement of any point in a bone's ball on any frame, in the scene's units."""

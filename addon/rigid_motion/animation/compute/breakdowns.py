@@ -119,16 +119,16 @@ def _nearest(keys: Poses, counts: np.ndarray, poses_at: PosesAt) -> tuple[np.nda
     nearest = GRID[np.argmin(squared, axis=1)]
     low, high = nearest - (GRID[1] - GRID[0]), nearest + (GRID[1] - GRID[0])
     at_low, at_high = slopes(low), slopes(high)
-    found = np.where(at_low > 0.0, low, high)
+    result = np.where(at_low > 0.0, low, high)
     crosses = (at_low < 0.0) & (at_high > 0.0)
     for _ in range(STEPS):
         span = np.where(at_high > at_low, at_high - at_low, 1.0)
-        found = np.where(crosses, (low * at_high - high * at_low) / span, found)
-        here = slopes(found)
+        result = np.where(crosses, (low * at_high - high * at_low) / span, result)
+        here = slopes(result)
         falls = here < 0.0
-        low, high = np.where(falls, found, low), np.where(falls, high, found)
+        low, high = np.where(falls, result, low), np.where(falls, high, result)
         at_low, at_high = np.where(falls, here, 0.5 * at_low), np.where(falls, 0.5 * at_high, here)
-    return found, off(found[:, None])[..., 0]
+    return result, off(result[:, None])[..., 0]
 
 
 def _between(first: Poses, second: Poses) -> np.ndarray:

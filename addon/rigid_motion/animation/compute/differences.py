@@ -62,7 +62,7 @@ class InBetweens:
     native: Poses
     """What Blender's own in-betweens make of the keys, shape (m,)."""
 
-    wanted: Poses
+    desired: Poses
     """What the modes make of them, shape (m,)."""
 
 
@@ -107,14 +107,14 @@ def in_betweens(
 
 def progress_at(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> list[np.ndarray]:
     """How far along its segment of the path, from 0 to 1, each source has come on rising frames of its own, (m,)."""
-    found, of_source = {}, {id(source): own for source, own in zip(sources, frames, strict=True)}
+    result, of_source = {}, {id(source): own for source, own in zip(sources, frames, strict=True)}
     for portion in _portions(sources, {name: (0, len(own)) for name, own in of_source.items()}):
         own = [of_source[id(source)] for source in portion]
         samples = each(portion, map(len, own))
         native, delta = np.empty((2, height(portion), samples[-1][1].stop))
         along = _move(portion, own, native, delta[: filled_height(portion)])
-        found.update((id(source), along[place]) for source, place in samples)
-    return [found[id(source)] for source in sources]
+        result.update((id(source), along[place]) for source, place in samples)
+    return [result[id(source)] for source in sources]
 
 
 def differences(
@@ -140,7 +140,7 @@ def differences(
     reaches : sequence of float, optional
         How far the body of each reaches from its origin: then the errors between samples are estimated.
     """
-    found = {}
+    result = {}
     rates = rates or [1] * len(sources)
     rate_of = {id(source): rate for source, rate in zip(sources, rates, strict=True)}
     reach_of = {id(source): reach for source, reach in zip(sources, reaches or rates, strict=True)}
@@ -186,8 +186,8 @@ def differences(
         for (source, place), rows_of_source, error in zip(samples, kept, errors, strict=False):
             own = Samples({row: points[row, place].ravel() for row in rows_of_source})
             own.rate, own.error = rate_of[id(source)], float(error)
-            found[id(source)] = own
-    return [found[id(source)] for source in sources]
+            result[id(source)] = own
+    return [result[id(source)] for source in sources]
 
 
 def _portions(sources: Sequence[Source], range_of: dict[int, tuple[int, int]]) -> Iterator[list[Source]]:
@@ -353,10 +353,10 @@ def _fill(
         if not mode:
             delta[:, some] = own.repeat(here, axis=1)
             continue
-        wanted = ends.poses(segment, here, progress[some], MODE_NAMES[mode], None if off is None else off[some])
+        desired = ends.poses(segment, here, progress[some], MODE_NAMES[mode], None if off is None else off[some])
         part = delta if every else np.empty((len(delta), int(here.sum())))
-        differ(wanted, native[:, some], part)
-        if wanted.scales is not None:
+        differ(desired, native[:, some], part)
+        if desired.scales is not None:
             part[ROWS[SCALE]] *= own[ROWS[SCALE]].repeat(here, axis=1)
         if not every:
             delta[:, some] = part

@@ -38,23 +38,23 @@ def blended(source: Source, frames: np.ndarray, native: np.ndarray, delta: np.nd
     v, turns = influence[some], delta[ROWS[ROTATION]][:, some].T
     if source.order is None:
         channels = native[ROWS[ROTATION]][:, some].T
-        wanted = multiply(turns, normalise(channels))
-        wanted = np.where(np.einsum("mi,mi->m", wanted, channels)[:, None] < 0.0, -wanted, wanted)
-        lacking = multiply(normalise(_mixed(wanted, v)), conjugate(normalise(_mixed(channels, v))))
+        desired = multiply(turns, normalise(channels))
+        desired = np.where(np.einsum("mi,mi->m", desired, channels)[:, None] < 0.0, -desired, desired)
+        lacking = multiply(normalise(_mixed(desired, v)), conjugate(normalise(_mixed(channels, v))))
         lacking = np.where(lacking[:, :1] < 0.0, -lacking, lacking)
         size = np.linalg.norm(_mixed(turns, v), axis=1)[:, None]
         delta[ROWS[ROTATION], some] = ((size * lacking - _mixed(0.0 * turns, v)) / v[:, None]).T
     else:
         angles = native[3:6][:, some].T
-        wanted = multiply(turns, quaternions_from_extrinsic_eulers(angles, source.order))
-        wanted = _near(angles, extrinsic_eulers_from_quaternions(wanted, source.order), source.order)
+        desired = multiply(turns, quaternions_from_extrinsic_eulers(angles, source.order))
+        desired = _near(angles, extrinsic_eulers_from_quaternions(desired, source.order), source.order)
         now = quaternions_from_extrinsic_eulers(v[:, None] * angles, source.order)
-        wanted = quaternions_from_extrinsic_eulers(v[:, None] * wanted, source.order)
-        delta[ROWS[ROTATION], some] = multiply(wanted, conjugate(now)).T
+        desired = quaternions_from_extrinsic_eulers(v[:, None] * desired, source.order)
+        delta[ROWS[ROTATION], some] = multiply(desired, conjugate(now)).T
     if len(delta) > ROWS[SCALE].start:
         channels = native[ROWS[SCALE]][:, some]
-        now, wanted = 1.0 - v + v * channels, 1.0 - v + v * channels * delta[ROWS[SCALE]][:, some]
-        delta[ROWS[SCALE], some] = (wanted / np.where(now == 0.0, 1.0, now) - 1.0 + v) / v
+        now, desired = 1.0 - v + v * channels, 1.0 - v + v * channels * delta[ROWS[SCALE]][:, some]
+        delta[ROWS[SCALE], some] = (desired / np.where(now == 0.0, 1.0, now) - 1.0 + v) / v
 
 
 def undo_blending(source: Source, frames: np.ndarray, angles: np.ndarray) -> None:

@@ -51,13 +51,13 @@ def native_twists(keys: Poses, measured: Poses) -> np.ndarray:
     """
     ends = np.zeros(6, dtype=int)
     ends[3:] = 1
-    found = twists.between(
+    result = twists.between(
         keys.positions[:, ends].reshape(-1, 3),
         keys.quaternions[:, ends].reshape(-1, 4),
         measured.positions.reshape(-1, 3),
         measured.quaternions.reshape(-1, 4),
     ).reshape(6, -1, 6)
-    return np.stack((found[..., :3] @ SLOPES, -(found[..., :2:-1] @ SLOPES)))
+    return np.stack((result[..., :3] @ SLOPES, -(result[..., :2:-1] @ SLOPES)))
 
 
 def tangents_and_lacks(

@@ -43,11 +43,11 @@ def sampled(
     rates = [need.fewest for need in needs]
     if all(math.isinf(need.tolerance) for need in needs):
         return differences(sources, ranges, rates)
-    found = _differences(sources, needs, ranges, rates)
+    result = _differences(sources, needs, ranges, rates)
     coarser: dict[int, Samples] = {}
-    pending = [number for number, (own, need) in enumerate(zip(found, needs, strict=True)) if _is_open(own, need)]
+    pending = [number for number, (own, need) in enumerate(zip(result, needs, strict=True)) if _is_open(own, need)]
     while pending:
-        rates = [_next_rate(found[number], needs[number]) for number in pending]
+        rates = [_next_rate(result[number], needs[number]) for number in pending]
         finer_ranges = (
             None
             if ranges is None
@@ -59,23 +59,23 @@ def sampled(
         chosen = [sources[number] for number in pending], [needs[number] for number in pending]
         open_still = []
         for number, finer in zip(pending, _differences(*chosen, finer_ranges, rates), strict=True):
-            need, before = needs[number], found[number]
+            need, before = needs[number], result[number]
             first = coarser.get(number, before)
             if math.isinf(before.error):
                 # There were too few to tell: half as far apart, a curve is four times as near to the line.
                 guess = finer.error * (finer.rate / first.rate) ** 2
                 if math.isinf(guess):
-                    coarser[number], found[number] = first, finer
+                    coarser[number], result[number] = first, finer
                     open_still.append(number)
                     continue
                 if guess <= need.tolerance or first.rate >= need.most:
-                    first.error, found[number] = guess, first
+                    first.error, result[number] = guess, first
                     continue
-            found[number] = finer
+            result[number] = finer
             if _is_open(finer, need):
                 open_still.append(number)
         pending = open_still
-    return found
+    return result
 
 
 def error_of(source: Source, points: Mapping[int, np.ndarray], rate: int, reach: float) -> float:

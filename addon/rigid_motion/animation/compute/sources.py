@@ -454,12 +454,12 @@ def values_of(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> list[n
     """What the channels of each source alone have on frames of its own, shape (10, m)."""
     curves = [keys for source in sources for keys in source.curves]
     times = [own for source, own in zip(sources, frames, strict=True) for _ in source.channels]
-    evaluated, found = iter(evaluate(curves, times)), []
+    evaluated, result = iter(evaluate(curves, times)), []
     for source, own in zip(sources, frames, strict=True):
         rows = np.repeat(REST[:, None], len(own), axis=1)
         for row, value in source.rest.items():
             rows[row] = value
         for of_channels, _ in source.channels:
             rows[of_channels] = next(evaluated)
-        found.append(rows)
-    return found
+        result.append(rows)
+    return result

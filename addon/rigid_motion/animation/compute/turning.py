@@ -107,25 +107,25 @@ def turning(
     first, count = keys.quaternions[:, 0], len(turns)
     second, turn = _shortest(first, keys.quaternions[:, 1])
     spins = Spins(np.zeros(count), np.zeros((3, count)), np.zeros(count, dtype=bool))
-    found, senses = Turning(spins, spins, first, second, turn), np.zeros(count)
+    result, senses = Turning(spins, spins, first, second, turn), np.zeros(count)
     parts = turns - np.rint(turns)
     if order is not None:
         ends = start[ROWS[ROTATION]][:3], end[ROWS[ROTATION]][:3]
-        senses = _add_angles(found, *ends, own, order, parts)
-    found = replace(found, by_angles=replace(spins, turns=spins.turns.copy()))
-    _add_channel(found, turns, senses, axes, backwards)
-    return found
+        senses = _add_angles(result, *ends, own, order, parts)
+    result = replace(result, by_angles=replace(spins, turns=spins.turns.copy()))
+    _add_channel(result, turns, senses, axes, backwards)
+    return result
 
 
-def in_whole_turns(found: Turning, by_angles: Turning) -> Turning:
+def in_whole_turns(result: Turning, by_angles: Turning) -> Turning:
     """Return the same motion with whole turns alone: the rest of it by the shortest way between the keys.
 
     `by_angles` is how they turn without what the channel has.
     """
-    is_whole = found.spins.turns == np.rint(found.spins.turns)
-    lacking = found.about - np.einsum("ks,ks->s", by_angles.turn, found.axes_in_body)
-    turns = np.where(is_whole, found.spins.turns, np.rint(lacking / FULL_TURN))
-    return replace(by_angles, spins=replace(found.spins, turns=turns))
+    is_whole = result.spins.turns == np.rint(result.spins.turns)
+    lacking = result.about - np.einsum("ks,ks->s", by_angles.turn, result.axes_in_body)
+    turns = np.where(is_whole, result.spins.turns, np.rint(lacking / FULL_TURN))
+    return replace(by_angles, spins=replace(result.spins, turns=turns))
 
 
 def turning_of(
@@ -139,10 +139,10 @@ def turning_of(
     backwards = np.concatenate([source.run_backwards for source in sources])
     axes = np.repeat([source.turns_axis for source in sources], [len(source.segment_turns) for source in sources])
     given = (start, end, keys, own[ROWS[ROTATION]].T, sources[0].order)
-    found = turning(*given, turns, axes, backwards)
+    result = turning(*given, turns, axes, backwards)
     if np.all(turns == np.rint(turns)):
-        return found, found
-    return found, in_whole_turns(found, turning(*given, np.zeros_like(turns), axes, backwards))
+        return result, result
+    return result, in_whole_turns(result, turning(*given, np.zeros_like(turns), axes, backwards))
 
 
 def turning_in(source: Source, segment: int, turns: float | None = None) -> Turning:
@@ -170,24 +170,24 @@ def _shortest(first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.nda
     return second * signs[:, None], shortest_turns(first, second)
 
 
-def _take_off(found: Turning, some: np.ndarray, parts: np.ndarray) -> None:
+def _take_off(result: Turning, some: np.ndarray, parts: np.ndarray) -> None:
     """Take off what is not whole of the spins of some segments, in turns (s,), from where they turn to; in place."""
     if parts.any():
-        spins = Spins(-parts, found.spins.axes[:, some], found.spins.in_space[some])
-        ends = Poses(np.zeros((len(some), 3)), found.second[some])
+        spins = Spins(-parts, result.spins.axes[:, some], result.spins.in_space[some])
+        ends = Poses(np.zeros((len(some), 3)), result.second[some])
         turned = spins.add_to(ends, np.ones(len(some), dtype=int), np.ones(len(some))).quaternions
-        found.second[some], found.turn[:, some] = _shortest(found.first[some], turned)
+        result.second[some], result.turn[:, some] = _shortest(result.first[some], turned)
 
 
 def _add_angles(
-    found: Turning, start: np.ndarray, end: np.ndarray, own: np.ndarray, order: str, parts: np.ndarray
+    result: Turning, start: np.ndarray, end: np.ndarray, own: np.ndarray, order: str, parts: np.ndarray
 ) -> np.ndarray:
     """Add the turns that Euler angles (3, S) at both ends say, and have half turns go in their sense; in place.
 
     `parts` (S,) is what the channel has that is not whole: so much of what the angles say is spin. Returns the sense of
     the angle that counts, 0 where none does, shape (S,).
     """
-    change, senses, spins = end - start, np.zeros(len(parts)), found.spins
+    change, senses, spins = end - start, np.zeros(len(parts)), result.spins
     furthest = np.abs(change).argmax(axis=0)
     by = np.take_along_axis(change, furthest[None], axis=0)[0]
     some = np.flatnonzero((np.abs(by) >= HALF_TURN) | (parts != 0.0))
@@ -202,16 +202,16 @@ def _add_angles(
     axes = np.where(stands[:, None], rotate(own[some], _mean(in_space)), _mean(in_body))
     spins.axes[:, some], spins.in_space[some] = axes.T, stands
     part = sense * parts[some]
-    _take_off(found, some, part)
-    turn, by = found.turn[:, some], by - FULL_TURN * part
-    about = np.einsum("sk,sk->s", axes, np.where(stands[:, None], rotate(found.first[some], turn.T), turn.T))
+    _take_off(result, some, part)
+    turn, by = result.turn[:, some], by - FULL_TURN * part
+    about = np.einsum("sk,sk->s", axes, np.where(stands[:, None], rotate(result.first[some], turn.T), turn.T))
     # Half a turn has two shortest ways, and rounding errors would choose one of them.
     size = np.linalg.norm(turn, axis=0)
     is_half = np.abs(np.abs(by - FULL_TURN * np.rint(by / FULL_TURN)) - np.pi) <= np.pi - HALF_TURN
     other = is_half & (size >= HALF_TURN) & (about * sense < -1.0)
     factor = np.where(other, 1.0 - FULL_TURN / np.maximum(size, 1.0), 1.0)
-    found.turn[:, some] *= factor
-    found.second[some] *= np.where(other, -1.0, 1.0)[:, None]
+    result.turn[:, some] *= factor
+    result.second[some] *= np.where(other, -1.0, 1.0)[:, None]
     turns = np.where(
         (np.abs(by) > FULL_TURN - HALF_TURN) | (part != 0.0), np.rint((by - about * factor) / FULL_TURN), 0
     )
@@ -223,11 +223,11 @@ def _add_angles(
 def _axis(angles: np.ndarray, axis: np.ndarray, order: str, *, before: bool) -> np.ndarray:
     """One of the axes of Euler angles (3, S) for each, (S, 3): as it is in the body, `before` the other turns, or in
     the space around it."""
-    found = np.eye(3)[axis]
+    result = np.eye(3)[axis]
     place = np.array([order.index(name) for name in "XYZ"])
     others = place[:, None] < place[axis] if before else place[:, None] > place[axis]
     turned = quaternions_from_extrinsic_eulers(np.where(others, angles, 0.0).T, order)
-    return rotate(conjugate(turned) if before else turned, found)
+    return rotate(conjugate(turned) if before else turned, result)
 
 
 def _mean(ends: np.ndarray) -> np.ndarray:
@@ -238,22 +238,22 @@ def _mean(ends: np.ndarray) -> np.ndarray:
 
 
 def _add_channel(
-    found: Turning, turns: np.ndarray, senses: np.ndarray, axes: np.ndarray, backwards: np.ndarray
+    result: Turning, turns: np.ndarray, senses: np.ndarray, axes: np.ndarray, backwards: np.ndarray
 ) -> None:
     """Add what the channel has, in place: about the axis of the angles' own turns where these have a sense (S,)."""
-    spins, others = found.spins, np.flatnonzero((turns != 0.0) & (senses == 0.0))
+    spins, others = result.spins, np.flatnonzero((turns != 0.0) & (senses == 0.0))
     spins.turns[:] += senses * turns
     if not len(others):
         return
-    size = np.linalg.norm(found.turn[:, others], axis=0)
+    size = np.linalg.norm(result.turn[:, others], axis=0)
     is_local = (axes[others] != SCREW_AXIS) | (size < NO_TURN)
     # What has no axis of its own turns about the last of them, Z.
     local = np.eye(3)[:, ["XYZ".find(name) for name in axes[others]]]
-    spins.axes[:, others] = np.where(is_local, local, found.turn[:, others] / np.maximum(size, NO_TURN))
+    spins.axes[:, others] = np.where(is_local, local, result.turn[:, others] / np.maximum(size, NO_TURN))
     spins.in_space[others] = False
     added = np.where(is_local & backwards[others], -1, 1) * turns[others]
     spins.turns[others] += added
-    _take_off(found, others, added - np.rint(added))
+    _take_off(result, others, added - np.rint(added))
 
 
 def without_spins(measured: Poses, spins: Spins, progress: np.ndarray) -> Poses:

@@ -64,10 +64,10 @@ def cubics_in_time(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, n
     They run from (0, 0) to (1, 1), nearest to values (..., m) at times (m,).
     """
     handles = np.stack((3.0 * times * (1.0 - times) ** 2, 3.0 * times * times * (1.0 - times)))
-    wanted = values - times**3
-    y = wanted @ np.linalg.pinv(handles)
-    found = np.stack((np.broadcast_to(STARTS[0], y.shape), y), axis=-1)
-    return found, np.abs(y @ handles - wanted).max(axis=-1)
+    desired = values - times**3
+    y = desired @ np.linalg.pinv(handles)
+    result = np.stack((np.broadcast_to(STARTS[0], y.shape), y), axis=-1)
+    return result, np.abs(y @ handles - desired).max(axis=-1)
 
 
 def _improved(x: np.ndarray, times: np.ndarray, values: np.ndarray, shares: np.ndarray) -> tuple[np.ndarray, float]:

@@ -150,7 +150,7 @@ class Spans:
             if keys.easing is None and timing == timing[:size] * channels:
                 yield [(slice(0, channels), (timing[:size], None, keys.cycles))]
                 continue
-            found = []
+            result = []
             for channel in range(channels):
                 eased = None
                 if keys.easing is not None:
@@ -158,16 +158,16 @@ class Spans:
                     if not self.unit_elastic and ELASTIC in keys.interpolation[channel]:
                         eased = first + channel
                 of_channel = timing[channel * size : (channel + 1) * size]
-                found.append((slice(channel, channel + 1), (of_channel, eased, keys.cycles)))
-            yield found
+                result.append((slice(channel, channel + 1), (of_channel, eased, keys.cycles)))
+            yield result
 
     def at(self, curve: int, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The spans of one curve that rising frames fall into one after the other, and how many into each."""
         begin, end = self.first_span[curve : curve + 2]
         if curve in self.crowded:
-            found = _search(self.start[begin + 1 : end], frames)
-            runs = np.flatnonzero(np.diff(found, prepend=-1))
-            return begin + found[runs], np.diff(runs, append=len(frames))
+            result = _search(self.start[begin + 1 : end], frames)
+            runs = np.flatnonzero(np.diff(result, prepend=-1))
+            return begin + result[runs], np.diff(runs, append=len(frames))
         bounds = np.empty(end - begin + 1, dtype=np.int64)
         bounds[0], bounds[-1] = 0, len(frames)
         bounds[1:-1] = np.searchsorted(frames, self.earliest[begin + 1 : end])
@@ -249,15 +249,15 @@ def _search(keys: np.ndarray, frames: np.ndarray) -> np.ndarray:
     spans = np.zeros(len(frames), dtype=np.int64)
     searching = np.ones(len(frames), dtype=bool)
     for outermost in (0, len(keys) - 1):
-        found = searching & (np.abs(frames - keys[outermost]) <= KEY_TOLERANCE)
-        spans[found] = outermost + 1
-        searching &= ~found
+        result = searching & (np.abs(frames - keys[outermost]) <= KEY_TOLERANCE)
+        spans[result] = outermost + 1
+        searching &= ~result
     for _ in range(len(keys).bit_length() + 1):
         middle = np.minimum((low + high) // 2, len(keys) - 1)
         elapsed = frames - keys[middle]
-        found = searching & (np.abs(elapsed) <= KEY_TOLERANCE)
-        spans[found] = middle[found] + 1
-        searching &= ~found
+        result = searching & (np.abs(elapsed) <= KEY_TOLERANCE)
+        spans[result] = middle[result] + 1
+        searching &= ~result
         low = np.where(searching & (elapsed > 0.0), middle + 1, low)
         high = np.where(searching & (elapsed < 0.0), middle - 1, high)
         going = searching & (low <= high)

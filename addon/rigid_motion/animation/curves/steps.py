@@ -29,10 +29,10 @@ def held(steps: Sequence[Stepped], times: np.ndarray) -> np.ndarray:
     """
     if not steps:
         return times
-    found = np.asarray(times).astype(np.float32)
+    result = np.asarray(times).astype(np.float32)
     # Blender asks the last one first.
     for one in reversed(steps):
         step, offset = np.float32(one.step), np.float32(one.offset)
-        blocks = np.trunc((found - offset) / step)
-        found = np.where((found >= one.start) & (found <= one.end), blocks * step + offset, found)
-    return found.astype(np.float64)
+        blocks = np.trunc((result - offset) / step)
+        result = np.where((result >= one.start) & (result <= one.end), blocks * step + offset, result)
+    return result.astype(np.float64)

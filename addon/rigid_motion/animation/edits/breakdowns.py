@@ -115,11 +115,11 @@ class _Between:
             mode = LIKE_BLENDER if self.mode == "BLENDER" else None
             middle = np.array([0.5 * sum(self.ends)])
             return components_near(
-                self.source, in_betweens(self.source, middle, mode, np.array([factor])).wanted, straight
+                self.source, in_betweens(self.source, middle, mode, np.array([factor])).desired, straight
             )
         share = -factor if kind == PUSH else factor
         native = self.source.values_at(np.array([self.frame]))[:, 0]
-        towards = in_betweens(self.source, np.array([self.frame])).wanted
+        towards = in_betweens(self.source, np.array([self.frame])).desired
         straight = self.seen + share * (components_near(self.source, towards, native) - self.seen)
         if self.mode == "BLENDER" and self.source.order is not None:
             return straight

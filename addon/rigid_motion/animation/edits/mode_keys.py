@@ -180,17 +180,17 @@ def able(transform: Transform, readings: Readings) -> list[SlotTransform]:
     """
     transform.rotation  # noqa: B018 - raises where it turns by axis and angle
     refuse_linked(transform)
-    active, found, refusals = active_place(transform, [place for place, _ in readings]), [], []
+    active, result, refusals = active_place(transform, [place for place, _ in readings]), [], []
     for place, source in readings:
         try:
             if isinstance(source, Refused):
                 raise source
             refuse_numbers(transform.name, replace(source, mode=MODE_NUMBERS["dq_sclerp"]))
-            found.append(place)
+            result.append(place)
         except Refused as refusal:
             if place is active:
                 raise
             refusals.append(refusal)
-    if refusals and not found:
+    if refusals and not result:
         raise refusals[0]
-    return found
+    return result

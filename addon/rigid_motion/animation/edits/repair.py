@@ -29,10 +29,10 @@ def constraint_trouble(target: bpy.types.PoseBone | bpy.types.Object | Transform
 
 def with_troubles(transforms: Iterable[Transform]) -> Iterator[Transform]:
     """Those whose constraints are not as they were made. For polls: no channel is looked at."""
-    found = set()
+    result = set()
     for transform, _ in _troubles(transforms):
-        if transform not in found:
-            found.add(transform)
+        if transform not in result:
+            result.add(transform)
             yield transform
 
 

@@ -21,17 +21,17 @@ def follow_mode(rig: bpy.types.Object) -> None:
     if rig.mode == "EDIT":
         detach_slots(rig)
         # Most edits find it set, and to set it again would be an edit.
-        if not rig.rigid_motion.laid_aside:
-            rig.rigid_motion.laid_aside = True
+        if not rig.rigid_motion.detached:
+            rig.rigid_motion.detached = True
     else:
         _put_back(rig)
 
 
 def _put_back(rig: bpy.types.Object) -> None:
-    if rig.rigid_motion.laid_aside:
+    if rig.rigid_motion.detached:
         follow_renamed_in(rig)
         attach_slots(rig)
-        rig.rigid_motion.laid_aside = False
+        rig.rigid_motion.detached = False
 
 
 def _for_rigs(act: Callable[[bpy.types.Object], None], objects: Iterable[bpy.types.Object]) -> None:

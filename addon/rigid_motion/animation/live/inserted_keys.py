@@ -142,7 +142,7 @@ class InsertedKeys:
         `changes` are places, the digests of what they are filled in from, and what is keyed in them now.
         """
         self._new.clear()
-        found = []
+        result = []
         for place, before, source in changes:
             if (old := _before_insertion(before, source)) is not None:
                 for user in self._by_precedence(place):
@@ -150,9 +150,9 @@ class InsertedKeys:
                     if data.use_tweak_mode:
                         own = data.nla_tweak_strip_time_to_scene(frame, invert=True)
                     if _is_inserted(old, source, own):
-                        found.append((place, user, old, source, own))
-        had = values_of([old for _, _, old, *_ in found], [old.held(np.array([own])) for _, _, old, _, own in found])
-        for (place, user, old, source, own), values in zip(found, had, strict=True):
+                        result.append((place, user, old, source, own))
+        had = values_of([old for _, _, old, *_ in result], [old.held(np.array([own])) for _, _, old, _, own in result])
+        for (place, user, old, source, own), values in zip(result, had, strict=True):
             posed = self._posed.get(_identity(user))
             posed = posed if posed is not None and posed.frame == frame else None
             self._new[place].append(_NewKey(user, posed, old, source, own, values[:, 0]))

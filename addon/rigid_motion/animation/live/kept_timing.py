@@ -151,7 +151,7 @@ keys (3, 2) between which it is linear."""
 
 def _channels_of(insertions: Sequence[Insertion]) -> tuple[_Channels | None, list[Other]]:
     """Return the channels whose handles are set, if there are any, and what else does a part of the way."""
-    found, handles, others = [], [], []
+    result, handles, others = [], [], []
     for owner, inserted in enumerate(insertions):
         old, filled = inserted.old, inserted.old.filled_rows
         first, last = inserted.ends
@@ -163,16 +163,16 @@ def _channels_of(insertions: Sequence[Insertion]) -> tuple[_Channels | None, lis
                 has_handles = keys.left is not None and beside is not None and beside[0].interpolation == "BEZIER"
                 if has_handles:
                     chosen.append(number)
-                    found.append((owner, beside, points, _weight(old, row) if row in filled else 0.0))
+                    result.append((owner, beside, points, _weight(old, row) if row in filled else 0.0))
                 if not has_handles or row not in filled:
                     others.append((owner, row, None if has_handles else points))
             if chosen:
                 before, behind = (int(np.abs(keys.times - frame).argmin()) for frame in (first, last))
                 ends = [(side[chosen, before], side[chosen, behind]) for side in (keys.points, keys.left, keys.right)]
                 handles.append((*itertools.chain(*ends), np.full(len(chosen), inserted.frame)))
-    if not found:
+    if not result:
         return None, others
-    owners, beside, points, weights = zip(*found, strict=True)
+    owners, beside, points, weights = zip(*result, strict=True)
     start, end, outer_left, left, right, outer_right, frames = map(np.concatenate, zip(*handles, strict=True))
     outer, native = np.stack((outer_left, outer_right), axis=1), _divided(start, right, left, end, frames)
     return _Channels(np.array(owners), list(beside), np.stack(points), outer, native, np.array(weights)), others
@@ -213,8 +213,8 @@ def _done_by(others: Sequence[Other], insertions: Sequence[Insertion]) -> np.nda
     """Return what these do of the way at `MOMENTS` on either side of each insertion (k, 2, m), as in `_Channels`."""
     done = np.zeros((len(insertions), 2, len(MOMENTS)))
     asked = [insertions[owner] for owner in dict.fromkeys(owner for owner, _, points in others if points is None)]
-    found = values_of([inserted.old for inserted in asked], [inserted.moments for inserted in asked])
-    values_in = dict(zip(asked, found, strict=True))
+    result = values_of([inserted.old for inserted in asked], [inserted.moments for inserted in asked])
+    values_in = dict(zip(asked, result, strict=True))
     for owner, row, points in others:
         inserted = insertions[owner]
         if points is None:
@@ -242,12 +242,12 @@ def _fitted(channels: _Channels, progress: np.ndarray, done: np.ndarray) -> np.n
     begun = progress - progress[..., :1]
     moves = (np.abs(begun[..., -1]) >= STILL) & (sums > 0.0)
     way, total = np.where(moves, (begun[..., -1], sums), 1.0)
-    wanted = (begun / way[..., None] * (done[..., -1] + total)[..., None] - done) / total[..., None]
-    handles, errors = cubics_in_time(MOMENTS, wanted)
+    desired = (begun / way[..., None] * (done[..., -1] + total)[..., None] - done) / total[..., None]
+    handles, errors = cubics_in_time(MOMENTS, desired)
     handles[~moves] = np.array(((1.0, 1.0), (2.0, 2.0))) / 3.0
-    found = handles[channels.owners]
+    result = handles[channels.owners]
     for owner, side in np.argwhere(moves & (errors >= GOOD)).tolist():
         chosen = np.flatnonzero((channels.owners == owner) & (channels.weights > 0.0))
         shares = channels.shares[chosen, side] / sums[owner, side]
-        found[chosen, side] = fit_together(MOMENTS, wanted[owner, side], shares, channels.times(chosen, side))
-    return found
+        result[chosen, side] = fit_together(MOMENTS, desired[owner, side], shares, channels.times(chosen, side))
+    return result

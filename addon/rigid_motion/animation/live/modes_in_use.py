@@ -12,12 +12,12 @@ from ..transforms import Transform, is_part, transform_of
 
 def transforms_under(objects: Iterable[bpy.types.Object]) -> list[Transform]:
     """These objects, and of rigs all bones that their Actions move, or that have modes or constraints for them."""
-    found: dict[Transform, None] = {}
+    result: dict[Transform, None] = {}
     for obj in objects:
-        found[transform_of(obj)] = None
+        result[transform_of(obj)] = None
         if obj.pose is not None and has_bones(obj):
-            found |= dict.fromkeys(map(transform_of, obj.pose.bones))
-    return list(found)
+            result |= dict.fromkeys(map(transform_of, obj.pose.bones))
+    return list(result)
 
 
 def uses_modes(obj: bpy.types.Object) -> bool:

@@ -101,12 +101,12 @@ def _agrees(keys: bpy.types.bpy_prop_collection, size: int) -> bool:
 
 def _by_property(keys: bpy.types.bpy_prop_collection) -> bytes:
     """All there is to keys, as Blender's own functions have it."""
-    found = []
+    result = []
     for name, (width, kind) in KEY_FIELDS.items():
         values = np.empty(len(keys) * width, kind)
         keys.foreach_get(name, values)
-        found.append(values.tobytes())
-    return b"".join(found)
+        result.append(values.tobytes())
+    return b"".join(result)
 
 
 class _Memory:

@@ -70,7 +70,7 @@ def refresh_places(
             continue
         regroup(place)
         before = recorded_digest(place)
-        if not _is_wanted(place, source, before):
+        if not _is_desired(place, source, before):
             # Blender can bring differences of bones that no record speaks of: it flips Actions, F-curve by F-curve.
             if before or (place.kind.has_difference_slot and place.filled):
                 emptied.append(place)
@@ -84,12 +84,12 @@ def refresh_places(
     clear(emptied)
     release(user for place in idle for user in place.users)
     read = read_again(keyed_anew)
-    stale += [pair for pair in zip(read, keyed_in(read), strict=True) if _is_wanted(*pair, recorded_digest(pair[0]))]
+    stale += [pair for pair in zip(read, keyed_in(read), strict=True) if _is_desired(*pair, recorded_digest(pair[0]))]
     if divided := [place for place, source in stale if share_out_turns(place, source)]:
         read = read_again(divided)
         anew = zip(read, keyed_in(read), strict=True)
         stale = [pair for pair in stale if pair[0] not in divided]
-        stale += [pair for pair in anew if _is_wanted(*pair, recorded_digest(pair[0]))]
+        stale += [pair for pair in anew if _is_desired(*pair, recorded_digest(pair[0]))]
     idle += _fill_in(stale, in_draft)
     editable = [place for place in places if place.slot.action.is_editable]
     # Keys of what has no mode count in the frame range of an Action as well.
@@ -118,7 +118,7 @@ def _fill_in(readings: Sequence[tuple[SlotTransform, Source]], in_draft: bool) -
     return []
 
 
-def _is_wanted(place: SlotTransform, source: Source | Refused | None, before: str) -> bool:
+def _is_desired(place: SlotTransform, source: Source | Refused | None, before: str) -> bool:
     """Whether there is more to a source than Blender's own in-betweens, and it can be had.
 
     `before` is the digest of what the slot is filled in from: that needs no second examination.

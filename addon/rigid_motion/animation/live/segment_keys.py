@@ -51,15 +51,15 @@ def _key_segments(
     """
     chosen, keyed = np.asarray(frames, dtype=np.float64), frames_in(place)
     is_chosen = _is_among(chosen, keyed)
-    wanted = np.array(values_in(place, keyed), dtype=np.float64)
-    wanted[is_chosen] = values
+    desired = np.array(values_in(place, keyed), dtype=np.float64)
+    desired[is_chosen] = values
     fcurve = place.curves.get(channel) or _new(place, channel)
     # Muted it has no say. Now it has, and all other segments keep the mode that they had without.
     old = [] if fcurve.mute else _keys_in(fcurve)
     fcurve.mute = False
     keys: list[tuple[float, float, bool]] = []
     passed = 0
-    for frame, number, meant in zip(keyed.tolist(), wanted.tolist(), is_chosen.tolist(), strict=True):
+    for frame, number, meant in zip(keyed.tolist(), desired.tolist(), is_chosen.tolist(), strict=True):
         while passed < len(old) and old[passed][0] < frame - SAME_FRAME:
             keys.append(old[passed])
             passed += 1
@@ -197,7 +197,7 @@ def _shares(
         return np.append(np.concatenate(inner), ends[-1])
 
     progress = None if along is None else sampled(along)
-    quaternions = in_betweens(source, sampled(frames), progress=progress).wanted.quaternions
+    quaternions = in_betweens(source, sampled(frames), progress=progress).desired.quaternions
     axes = np.tile(turned.spins.axes[:, 0], (len(quaternions), 1))
     if turned.spins.in_space[0]:
         axes = rotate(conjugate(quaternions), axes)
@@ -211,8 +211,8 @@ def _turns_of(source: Source, segment: int, of: Turning, share: float, axis: np.
     They are whole where that is enough: where the path of the origin does not depend on what part of a turn is spin.
     """
 
-    def about(found: Turning) -> float:
-        return float(axis @ found.twists[:, 0, 0]) / FULL_TURN
+    def about(result: Turning) -> float:
+        return float(axis @ result.twists[:, 0, 0]) / FULL_TURN
 
     one = turning_in(source, segment, turns=1.0)
     sense = np.copysign(

@@ -99,11 +99,11 @@ def _has_keys_back(rig: bpy.types.Object, differences: bpy.types.Action, names: 
     bones = _bones_of(_only_channelbag(differences).fcurves)
     timed = [action for action in bpy.data.actions if bones <= _timed_bones(action)]
     named = [action for action in timed if action.slots[0].identifier in names.get(rig.session_uid, ())]
-    if len(found := named or timed) != 1:
+    if len(result := named or timed) != 1:
         return False
     for user in _moving(rig, differences):
-        user.action = found[0]
-        user.action_slot = found[0].slots[0]
+        user.action = result[0]
+        user.action_slot = result[0].slots[0]
     return True
 
 

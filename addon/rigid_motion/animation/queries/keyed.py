@@ -34,13 +34,13 @@ def active_place(transform: Transform, places: Iterable[SlotTransform] | None = 
 
 def active_places_of(transforms: Sequence[Transform]) -> dict[Transform, SlotTransform]:
     """`active_place` of each that has one, by a single look."""
-    wanted, found = set(transforms), {}
+    desired, result = set(transforms), {}
     for place in slot_transforms_of(transforms):
         for user in place.users:
             data = user.animated.animation_data
-            if user in wanted and (data.action, data.action_slot_handle) == (place.slot.action, place.slot.handle):
-                found[user] = place
-    return found
+            if user in desired and (data.action, data.action_slot_handle) == (place.slot.action, place.slot.handle):
+                result[user] = place
+    return result
 
 
 def source_of(carrier: bpy.types.Object | Transform) -> Source | None:
@@ -52,16 +52,16 @@ def source_of(carrier: bpy.types.Object | Transform) -> Source | None:
 
 def sources_of(places: Sequence[SlotTransform]) -> list[Source | None]:
     """What is keyed in each of these, None where nothing is, it is refused, or a driver moves a part of it."""
-    found: list[Source | None] = []
+    result: list[Source | None] = []
     for place, source in zip(places, keyed_in(places), strict=True):
         try:
             if isinstance(source, Source):
                 refuse_numbers(place.name, source)
             is_whole = isinstance(source, Source) and source.channels and not source.driven
-            found.append(source if is_whole else None)
+            result.append(source if is_whole else None)
         except Refused:
-            found.append(None)
-    return found
+            result.append(None)
+    return result
 
 
 def key_frames(carrier: bpy.types.Object | Transform, *, selected: bool = False) -> np.ndarray:
@@ -90,7 +90,7 @@ def segment_modes(place: SlotTransform) -> list[str]:
 
 def frames_in(place: SlotTransform, *, selected: bool = False) -> np.ndarray:
     """`key_frames` in a slot."""
-    found = []
+    result = []
     transform = place.users[0]
     for channel, fcurve in place.curves.items():
         path = channel[0].removeprefix(place.prefix)
@@ -100,8 +100,8 @@ def frames_in(place: SlotTransform, *, selected: bool = False) -> np.ndarray:
             keys.foreach_get("co", points)
             if selected:
                 keys.foreach_get("select_control_point", chosen)
-            found.append(points[::2][chosen])
-    frames = np.unique(np.concatenate(found)).astype(np.float64) if found else np.empty(0)
+            result.append(points[::2][chosen])
+    frames = np.unique(np.concatenate(result)).astype(np.float64) if result else np.empty(0)
     return distinct(frames)
 
 

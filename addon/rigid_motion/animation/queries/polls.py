@@ -21,35 +21,35 @@ _Moved = dict[str, Transform]
 def with_modes(transforms: Iterable[Transform]) -> Iterator[Transform]:
     """Those for which another mode than Blender's own was chosen, in their slots or before they had any."""
     for moved, uses in _by_carrier(transforms):
-        found = {prefix for prefix, one in moved.items() if one.motion.awaited != "BLENDER"}
-        yield from (moved[prefix] for prefix in found)
+        result = {prefix for prefix, one in moved.items() if one.motion.awaited != "BLENDER"}
+        yield from (moved[prefix] for prefix in result)
         for record in _records(uses):
-            if record.prefix in moved and record.prefix not in found and (record.digest or record.mode != "BLENDER"):
-                found.add(record.prefix)
+            if record.prefix in moved and record.prefix not in result and (record.digest or record.mode != "BLENDER"):
+                result.add(record.prefix)
                 yield moved[record.prefix]
         for path, _ in _curves(uses):
             if path.endswith(MODE_PROPERTY):
                 prefix, prop = split_path(path)
-                if prop == MODE_PROPERTY and prefix in moved and prefix not in found:
-                    found.add(prefix)
+                if prop == MODE_PROPERTY and prefix in moved and prefix not in result:
+                    result.add(prefix)
                     yield moved[prefix]
 
 
 def with_in_betweens(transforms: Iterable[Transform]) -> Iterator[Transform]:
     """Those for which in-betweens were filled in."""
     for moved, uses in _by_carrier(transforms):
-        found = {record.prefix: None for record in _records(uses) if record.digest and record.prefix in moved}
-        yield from (moved[prefix] for prefix in found)
+        result = {record.prefix: None for record in _records(uses) if record.digest and record.prefix in moved}
+        yield from (moved[prefix] for prefix in result)
 
 
 def with_more_keys_than(transforms: Iterable[Transform], count: int) -> Iterator[Transform]:
     """Those of which a channel of location, rotation or scale has more keys than this."""
     for moved, uses in _by_carrier(transforms):
-        found = set()
+        result = set()
         for path, fcurve in _curves(uses):
             prefix, prop = split_path(path)
-            if prefix in moved and prefix not in found and prop in WIDTHS and len(fcurve.keyframe_points) > count:
-                found.add(prefix)
+            if prefix in moved and prefix not in result and prop in WIDTHS and len(fcurve.keyframe_points) > count:
+                result.add(prefix)
                 yield moved[prefix]
 
 
@@ -58,10 +58,10 @@ _Slots = list[tuple[bpy.types.Action, int]]
 
 def _by_carrier(transforms: Iterable[Transform]) -> Iterator[tuple[_Moved, _Slots]]:
     """The transforms of each data-block together, and the slots that move it."""
-    found: dict[bpy.types.Object, _Moved] = {}
+    result: dict[bpy.types.Object, _Moved] = {}
     for transform in transforms:
-        found.setdefault(transform.animated, {})[transform.prefix] = transform
-    for animated, moved in found.items():
+        result.setdefault(transform.animated, {})[transform.prefix] = transform
+    for animated, moved in result.items():
         yield moved, [(action, handle) for action, handle, _ in uses_of(animated).values()]
 
 

@@ -114,15 +114,15 @@ def prefix_of(name: str) -> str:
 @lru_cache(maxsize=65536)
 def split_path(path: str) -> tuple[str, str]:
     """The prefix of a data path, "" where it is not that of a bone's property, and the rest of it."""
-    found = _BONE.match(path)
-    return (found[0], path[found.end() :]) if found else ("", path)
+    result = _BONE.match(path)
+    return (result[0], path[result.end() :]) if result else ("", path)
 
 
 @lru_cache(maxsize=65536)
 def bone_name(prefix: str) -> str:
     """The name of the bone that data paths which begin so speak of."""
-    found = _BONE.fullmatch(prefix)
-    return "" if found is None else bpy.utils.unescape_identifier(found[1])
+    result = _BONE.fullmatch(prefix)
+    return "" if result is None else bpy.utils.unescape_identifier(result[1])
 
 
 def let_override_be_read(rig: bpy.types.Object) -> None:

@@ -93,7 +93,7 @@ class ObjectTransform(Transform):
 
     def original_values(self, path: str) -> Sequence[float]:
         """What one of its delta properties has without in-betweens."""
-        noted, now = self._noted, getattr(self.carrier, path)[:]
+        noted, now = self._recorded, getattr(self.carrier, path)[:]
         if not noted:
             return now
         then = getattr(self.motion, ORIGINALS[path][0])[:]
@@ -112,21 +112,21 @@ class ObjectTransform(Transform):
                 rotation = [component / length for component in quaternion]
         return np.array((*values("delta_location"), *rotation, *values("delta_scale")))
 
-    def is_noted(self, filled: Iterable[Channel]) -> bool:
+    def is_recorded(self, filled: Iterable[Channel]) -> bool:
         """Whether the original values of these channels are written down."""
-        noted = self._noted
+        noted = self._recorded
         return all(_BITS[channel] & noted for channel in filled if channel in _BITS)
 
     def is_more_noted(self, filled: Iterable[Channel]) -> bool:
         """Whether those of other channels are."""
-        return bool(self._noted & ~sum(_BITS[channel] for channel in set(filled) if channel in _BITS))
+        return bool(self._recorded & ~sum(_BITS[channel] for channel in set(filled) if channel in _BITS))
 
     def note_original(self, filled: Iterable[Channel], *, overwritten: bool = False) -> None:
         """Write the original values of these channels down, which in-betweens are about to take the place of.
 
         `overwritten`: they have done so already, and it has none.
         """
-        noted = self._noted
+        noted = self._recorded
         added = [channel for channel in filled if channel in _BITS and not _BITS[channel] & noted]
         for path in {path for path, _ in added}:
             now, then = getattr(self.carrier, path), list(getattr(self.motion, ORIGINALS[path][0]))
@@ -140,7 +140,7 @@ class ObjectTransform(Transform):
 
     def follow_original(self) -> None:
         """Show an edit of what is written down in all components that in-betweens are not in."""
-        noted = self._noted
+        noted = self._recorded
         for path in _paths_in(noted):
             now, then = getattr(self.carrier, path)[:], getattr(self.motion, ORIGINALS[path][0])[:]
             values = [now[i] if _BITS[path, i] & noted else value for i, value in enumerate(then)]
@@ -148,12 +148,12 @@ class ObjectTransform(Transform):
 
     def show_original(self) -> None:
         """Set the delta transforms to what is written down, for as long as Blender leaves them so."""
-        for path in _paths_in(self._noted):
+        for path in _paths_in(self._recorded):
             _set_if_other(self.carrier, path, self.original_values(path))
 
     def restore_original(self, filled: Iterable[Channel]) -> None:
         """Give the original values back, but for these channels, which are animated still."""
-        noted = self._noted
+        noted = self._recorded
         gone = noted & ~sum(_BITS[channel] for channel in set(filled) if channel in _BITS)
         for path in _paths_in(gone):
             now, then = getattr(self.carrier, path)[:], getattr(self.motion, ORIGINALS[path][0])[:]
@@ -162,7 +162,7 @@ class ObjectTransform(Transform):
             self._keep(noted & ~gone)
 
     @property
-    def _noted(self) -> int:
+    def _recorded(self) -> int:
         """The bits of the components that are written down."""
         motion = self.motion
         if noted := motion.filled_components:

@@ -179,13 +179,13 @@ class Transform(ABC):
 
     def components(self) -> np.ndarray:
         """Its properties as they are now, as the ten components of a source."""
-        found = REST.copy()
-        found[ROWS[LOCATION]], found[ROWS[SCALE]] = self.carrier.location, self.carrier.scale
+        result = REST.copy()
+        result[ROWS[LOCATION]], result[ROWS[SCALE]] = self.carrier.location, self.carrier.scale
         if self.carrier.rotation_mode == "QUATERNION":
-            found[ROWS[ROTATION]] = self.carrier.rotation_quaternion
+            result[ROWS[ROTATION]] = self.carrier.rotation_quaternion
         elif self.carrier.rotation_mode in ORDERS:
-            found[3:6] = self.carrier.rotation_euler
-        return found
+            result[3:6] = self.carrier.rotation_euler
+        return result
 
     def set_components(self, components: np.ndarray, parts: Collection[str]) -> None:
         """Set its properties for these of location, rotation and scale to components (10,)."""

@@ -14,8 +14,8 @@ from .times import constraint_path, name_of, span_of
 
 def constraint_of(user: Transform, place: SlotTransform) -> bpy.types.ActionConstraint | None:
     """The constraint that shows the differences of a slot on a bone."""
-    wanted = slot_of_differences(place)
-    return next((one for one in user.carrier.constraints if shows_differences(one) and shown_by(one) == wanted), None)
+    desired = slot_of_differences(place)
+    return next((one for one in user.carrier.constraints if shows_differences(one) and shown_by(one) == desired), None)
 
 
 def shown_by(constraint: bpy.types.ActionConstraint) -> tuple[bpy.types.Action | None, int]:

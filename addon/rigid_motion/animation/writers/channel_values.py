@@ -22,7 +22,7 @@ def channel_values(
     `added` is what modifiers add to the channels, shape (10, m), where that is to be in the values as well.
     """
     own, channels = source.original, {}
-    poses = motion.wanted if added is None else _with_added(source, motion, added)
+    poses = motion.desired if added is None else _with_added(source, motion, added)
     shown = source.held(motion.frames)
     first = source.values_at(shown[:1])[:, 0]
     if LOCATION in source.keyed:
@@ -57,7 +57,7 @@ def channel_values(
 
 def _with_added(source: Source, motion: InBetweens, added: np.ndarray) -> Poses:
     """The wanted poses with what modifiers add: in location along its axes, in rotation what it turns Blender's by."""
-    now, then = source.values_at(source.held(motion.frames)), motion.wanted
+    now, then = source.values_at(source.held(motion.frames)), motion.desired
     rows = now + added
     moved = added[:3].T if source.location_axes is None else added[:3].T @ source.location_axes.T
     for channels in (now, rows):
@@ -71,18 +71,18 @@ def components_near(source: Source, pose: Poses, near: np.ndarray) -> np.ndarray
 
     The rotation is in the sign and the turn that `near` (10,) has, and so is the scale that the modes leave to Blender.
     """
-    own, found = source.original, near.copy()
+    own, result = source.original, near.copy()
     axes = np.eye(3) if source.location_axes is None else source.location_axes
-    found[:3] = (pose.positions @ axes)[0] - own[:3]
+    result[:3] = (pose.positions @ axes)[0] - own[:3]
     quaternion = multiply(conjugate(own[3:7]), pose.quaternions)
     if source.order is None:
-        found[3:7] = quaternion[0] * (-1.0 if quaternion[0] @ near[3:7] < 0.0 else 1.0)
+        result[3:7] = quaternion[0] * (-1.0 if quaternion[0] @ near[3:7] < 0.0 else 1.0)
     else:
         angles = extrinsic_eulers_from_quaternions(quaternion, source.order)
-        found[3:6] = _beginning_near(near[3:6], angles, source.order)[0]
+        result[3:6] = _beginning_near(near[3:6], angles, source.order)[0]
     if pose.scales is not None and own[7:].mean() != 0.0:
-        found[7:] = pose.scales / own[7:].mean()
-    return found
+        result[7:] = pose.scales / own[7:].mean()
+    return result
 
 
 def _beginning_near(first: np.ndarray, angles: np.ndarray, order: str) -> np.ndarray:

@@ -19,11 +19,11 @@ def trouble_of(user: Transform, place: SlotTransform) -> str:
 
     An influence that is animated or driven is meant so.
     """
-    wanted, name, is_behind = slot_of_differences(place), name_of(place), False
+    desired, name, is_behind = slot_of_differences(place), name_of(place), False
     for constraint in user.carrier.constraints:
         if not shows_differences(constraint):
             is_behind |= constraint.enabled and constraint.influence > 0.0
-        elif shown_by(constraint) == wanted:
+        elif shown_by(constraint) == desired:
             return _trouble_with(constraint, user, place, is_behind=is_behind)
     present = user.carrier.constraints.get(name)
     return OTHER_SLOT if present is not None and shows_differences(present) else REMOVED
@@ -49,11 +49,11 @@ def _is_influence_animated(constraint: bpy.types.ActionConstraint, user: Transfo
 
 def restore(user: BoneTransform, place: SlotTransform) -> None:
     """Have a bone show the differences of a slot in full: by its constraint as it was made, or by a new one."""
-    constraints, wanted, name = user.carrier.constraints, slot_of_differences(place), name_of(place)
+    constraints, desired, name = user.carrier.constraints, slot_of_differences(place), name_of(place)
     if constraint_of(user, place) is None:
         # One that was given another name, or frames by a target, still shows them.
         for one in constraints:
-            if one.type == "ACTION" and shown_by(one) == wanted:
+            if one.type == "ACTION" and shown_by(one) == desired:
                 one.name, one.use_eval_time = name, True
                 break
     ensure_constraint(user, place)

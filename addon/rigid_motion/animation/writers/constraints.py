@@ -229,9 +229,9 @@ def _avoid_names(place: SlotTransform) -> None:
 
 def _channelbag(place: SlotTransform) -> bpy.types.ActionChannelbag:
     """Where the differences of the bones of a slot are; made where there is none yet."""
-    found = place.slot.bones_channelbag
-    if found is not None:
-        return found
+    result = place.slot.bones_channelbag
+    if result is not None:
+        return result
     action = place.slot.action
     pairs = action.rigid_motion.bone_slots
     pair = next((pair for pair in pairs if pair.handle == place.slot.handle), None) or pairs.add()

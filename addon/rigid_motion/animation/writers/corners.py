@@ -73,12 +73,12 @@ def _at_keys(source: Source, rows: list[int], near: np.ndarray) -> np.ndarray:
     """What the differences are at keys, shape (rows, k): the original ones, in the sign and turn near to these."""
     original = np.array(source.difference_at_keys)
     turning = [number for number, row in enumerate(rows) if PART_OF[row] == ROTATION]
-    found = np.repeat(original[rows, None], near.shape[1], axis=1)
+    result = np.repeat(original[rows, None], near.shape[1], axis=1)
     if not turning:
-        return found
+        return result
     if source.order is None:
-        found[turning] *= np.where(np.einsum("rk,rk->k", found[turning], near[turning]) < 0.0, -1.0, 1.0)
-        return found
+        result[turning] *= np.where(np.einsum("rk,rk->k", result[turning], near[turning]) < 0.0, -1.0, 1.0)
+        return result
     angles = extrinsic_eulers_from_quaternions(original[None, ROWS[ROTATION]], source.order)[0]
     # The same rotation by other angles.
     others = np.where(np.arange(3) == "XYZ".index(source.order[1]), np.pi - angles, angles + np.pi)
@@ -88,8 +88,8 @@ def _at_keys(source: Source, rows: list[int], near: np.ndarray) -> np.ndarray:
         turned = candidate[own, None]
         candidates.append(turned + FULL_TURN * np.rint((near[turning] - turned) / FULL_TURN))
     apart = [np.abs(candidate - near[turning]).max(axis=0) for candidate in candidates]
-    found[turning] = np.where(apart[0] <= apart[1], *candidates)
-    return found
+    result[turning] = np.where(apart[0] <= apart[1], *candidates)
+    return result
 
 
 def _knots(keys: np.ndarray, before: np.ndarray, layout: Layout) -> list[tuple[float, int]]:

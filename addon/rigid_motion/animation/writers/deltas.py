@@ -39,7 +39,7 @@ class DeltaWriter(Writer):
             self.release(place.users)
 
     def is_shown(self, place: SlotTransform, layout: Layout, channels: Collection[Channel]) -> bool:
-        return all(user.is_noted(channels) for user in place.users)
+        return all(user.is_recorded(channels) for user in place.users)
 
     def prepare(self, place: SlotTransform) -> None:
         filled = place.filled
@@ -51,7 +51,7 @@ class DeltaWriter(Writer):
         for user in place.users if filled else ():
             if not user.animated.is_editable:
                 continue
-            if not user.is_noted(filled):
+            if not user.is_recorded(filled):
                 user.note_original(filled, overwritten=_is_overwritten(user, filled))
             if user.is_more_noted(filled):  # An Action that it had before may have moved more of it.
                 self.release([user])
@@ -74,7 +74,7 @@ class DeltaWriter(Writer):
         return [(difference, parts)]
 
     def shown_parts(self, user: Transform) -> set[str]:
-        return {PART_OF[row] for row, channel in user.differences.items() if user.is_noted([channel])}
+        return {PART_OF[row] for row, channel in user.differences.items() if user.is_recorded([channel])}
 
     def hide(self, place: SlotTransform, user: Transform) -> None:
         user.show_original()

@@ -83,9 +83,9 @@ def end_drafts(actions: Collection[bpy.types.Action], filled_in: Iterable[SlotTr
 
     That will be when it does.
     """
-    found = {(place.slot.action, place.slot.handle, place.prefix) for place in filled_in}
+    result = {(place.slot.action, place.slot.handle, place.prefix) for place in filled_in}
     for action in actions:
         action.rigid_motion.is_draft = False
         for record in action.rigid_motion.slots:
-            if (action, record.handle, record.prefix) not in found:
+            if (action, record.handle, record.prefix) not in result:
                 record.digest = ""

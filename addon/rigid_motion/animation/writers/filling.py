@@ -139,8 +139,8 @@ def _fill_in_changed(edits: Sequence[_Edit]) -> list[tuple[SlotTransform, Source
     """Fill in a range of samples of each. Those for which that will not do are returned, and left as they are."""
     others = []
     fixed = [Need(edit.need.tolerance, edit.need.reach, edit.layout.rate, edit.layout.rate) for edit in edits]
-    found = sampled([edit.source for edit in edits], fixed, [edit.span for edit in edits])
-    for (place, source, need, layout, (first, last)), samples in zip(edits, found, strict=True):
+    result = sampled([edit.source for edit in edits], fixed, [edit.span for edit in edits])
+    for (place, source, need, layout, (first, last)), samples in zip(edits, result, strict=True):
         channels, rows, before = _channels(place, source), recorded_rows(place), recorded(place)
         if (samples.error > need.tolerance and before.rate < need.most) or not _are_covered(samples, rows):
             others.append((place, source, need))
@@ -247,7 +247,7 @@ def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.type
         motion = action.rigid_motion
         if action in longer and not motion.has_longer:
             motion.has_longer = True
-        was_set_for_samples = motion.range_is_ours
+        was_set_for_samples = motion.range_is_set_here
         if (action.use_frame_range and not was_set_for_samples) or not (was_set_for_samples or motion.has_longer):
             continue
         bags = [bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
@@ -274,9 +274,9 @@ def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.type
                 action.use_frame_range = True
                 action.frame_start, action.frame_end = begin, end
             if not was_set_for_samples:
-                motion.range_is_ours = True
+                motion.range_is_set_here = True
         elif was_set_for_samples:
-            action.use_frame_range = motion.range_is_ours = False
+            action.use_frame_range = motion.range_is_set_here = False
         if not samples and motion.has_longer:
             motion.has_longer = motion.is_draft = False
 

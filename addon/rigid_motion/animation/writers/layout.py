@@ -162,12 +162,12 @@ class Layout:
     def modify(self, fcurve: bpy.types.FCurve, pieces: Sequence[Piece] = ()) -> None:
         """Give an F-curve the modifiers that it needs, in place of those it has, and add these to it."""
         present = fcurve.modifiers[:]
-        wanted = self._modifiers + [piece.modifier for piece in pieces]
-        if not (present or wanted) or _are(present, wanted):
+        desired = self._modifiers + [piece.modifier for piece in pieces]
+        if not (present or desired) or _are(present, desired):
             return
         for modifier in present:
             fcurve.modifiers.remove(modifier)
-        add_modifiers(fcurve, wanted)
+        add_modifiers(fcurve, desired)
 
     @cached_property
     def _modifiers(self) -> list[Modifier]:
@@ -177,15 +177,15 @@ class Layout:
     @property
     def stepping(self) -> list[Modifier]:
         """Types and settings of those that hold frames."""
-        found = []
+        result = []
         for one in self.steps:
             settings: dict[str, object] = {"frame_step": one.step, "frame_offset": one.offset}
             for name, end in (("start", one.start), ("end", one.end)):
                 settings[f"use_frame_{name}"] = math.isfinite(end)
                 if math.isfinite(end):
                     settings[f"frame_{name}"] = end
-            found.append(("STEPPED", settings))
-        return found
+            result.append(("STEPPED", settings))
+        return result
 
     @property
     def _repeating(self) -> list[Modifier]:
@@ -213,13 +213,13 @@ def add_modifiers(fcurve: bpy.types.FCurve, modifiers: Sequence[Modifier]) -> No
             setattr(modifier, name, value)
 
 
-def _are(modifiers: Sequence[bpy.types.FModifier], wanted: Sequence[Modifier]) -> bool:
+def _are(modifiers: Sequence[bpy.types.FModifier], desired: Sequence[Modifier]) -> bool:
     """Whether modifiers are of these types, with these settings."""
-    return [modifier.type for modifier in modifiers] == [kind for kind, _ in wanted] and all(
-        (tuple(found) if isinstance(value, tuple) else found) == value
-        for modifier, (_, settings) in zip(modifiers, wanted, strict=True)
+    return [modifier.type for modifier in modifiers] == [kind for kind, _ in desired] and all(
+        (tuple(result) if isinstance(value, tuple) else result) == value
+        for modifier, (_, settings) in zip(modifiers, desired, strict=True)
         for name, value in settings.items()
-        for found in (getattr(modifier, name),)
+        for result in (getattr(modifier, name),)
     )
 
 

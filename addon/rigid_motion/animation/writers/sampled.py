@@ -114,9 +114,9 @@ def regroup(place: SlotTransform) -> None:
 
 def remove_if_empty(channelbag: bpy.types.ActionChannelbag, group: str) -> None:
     """Take out a group that nothing is left in."""
-    found = channelbag.groups.get(group)
-    if found is not None and not found.channels:
-        channelbag.groups.remove(found)
+    result = channelbag.groups.get(group)
+    if result is not None and not result.channels:
+        channelbag.groups.remove(result)
 
 
 def _new(

@@ -120,12 +120,12 @@ def _identity(target: Transform) -> tuple[int, str]:
 
 def _selection(place: SlotTransform | None) -> bytes:
     """Which keys are selected, channel by channel: quicker to have than their frames."""
-    found = []
+    result = []
     for fcurve in place.curves.values() if place is not None else ():
         chosen = np.empty(len(fcurve.keyframe_points), bool)
         fcurve.keyframe_points.foreach_get("select_control_point", chosen)
-        found.append(chosen.tobytes())
-    return b"".join(found)
+        result.append(chosen.tobytes())
+    return b"".join(result)
 
 
 def _read(

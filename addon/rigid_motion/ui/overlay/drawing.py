@@ -96,7 +96,7 @@ class _Batches:
 
     path: Path
     native: Batch
-    wanted: Batch
+    desired: Batch
     keys: Batch
     selected: Batch
 
@@ -111,7 +111,7 @@ class _Batches:
         return cls(
             path,
             native=_batch("LINE_STRIP", thinned(path.native)),
-            wanted=None if path.wanted is None else _batch("LINE_STRIP", thinned(path.wanted)),
+            desired=None if path.desired is None else _batch("LINE_STRIP", thinned(path.desired)),
             keys=_batch("POINTS", path.keys[~path.selected]),
             selected=_batch("POINTS", path.keys[path.selected]),
         )
@@ -241,13 +241,13 @@ def _draw(context: bpy.types.Context) -> None:
     scene, depsgraph = context.scene, context.view_layer.depsgraph
     settings, targets = scene.rigid_motion_overlay, list(map(transform_of, selected_in_view(context)))
     spaces = {target: PATH_KINDS[target.kind].space(target.carrier, depsgraph) for target in targets}
-    found = cache.paths_of(targets, scene, {target: turned for target, (_, turned) in spaces.items()})
-    paths = [(target, path) for target, path in zip(targets, found, strict=True) if path is not None]
+    result = cache.paths_of(targets, scene, {target: turned for target, (_, turned) in spaces.items()})
+    paths = [(target, path) for target, path in zip(targets, result, strict=True) if path is not None]
     cache.keep_only(len(targets))
     if not paths:
         return
     pen = _Pen(context)
-    native_now, wanted_now = [], []
+    native_now, desired_now = [], []
     gpu.state.blend_set("ALPHA")
     gpu.state.depth_test_set("NONE")
     gpu.state.program_point_size_set(True)
@@ -258,18 +258,18 @@ def _draw(context: bpy.types.Context) -> None:
             with gpu.matrix.push_pop():
                 gpu.matrix.multiply_matrix(space)
                 if path.ghosts is not None:
-                    color = pen.look.native_color if path.wanted is None else pen.look.mode_color
+                    color = pen.look.native_color if path.desired is None else pen.look.mode_color
                     draw_ghosts(target, path.ghosts, frame, color, pen.line, _batch)
                 if not settings.show_paths:
                     continue
                 _draw_path(pen, path, settings)
-            native, wanted = path.at(frame)
-            if settings.show_native or wanted is None:
+            native, desired = path.at(frame)
+            if settings.show_native or desired is None:
                 native_now.append(space @ Vector(native))
-            if wanted is not None:
-                wanted_now.append(space @ Vector(wanted))
+            if desired is not None:
+                desired_now.append(space @ Vector(desired))
         pen.dot(_batch("POINTS", native_now), pen.look.native_color, NOW)
-        pen.dot(_batch("POINTS", wanted_now), pen.look.mode_color, NOW)
+        pen.dot(_batch("POINTS", desired_now), pen.look.mode_color, NOW)
     finally:
         gpu.state.program_point_size_set(False)
         gpu.state.blend_set("NONE")
@@ -284,12 +284,12 @@ def _draw_path(pen: _Pen, path: Path, settings: RigidMotionOverlay) -> None:
     if settings.show_axes:
         for batch, color in zip(batches.axes(chosen.axes), pen.axis_colors, strict=True):
             pen.line(batch, color, 0.75 * look.line_width)
-    if settings.show_native or batches.wanted is None:
+    if settings.show_native or batches.desired is None:
         pen.outlined_line(batches.native, look.native_color, 0.6 * look.line_width)
         pen.dot(batches.ticks("native_ticks", chosen.native_ticks), OUTLINE, TICK, look.native_color, 1.25)
-    if batches.wanted is not None:
-        pen.outlined_line(batches.wanted, look.mode_color, look.line_width)
-        pen.dot(batches.ticks("wanted_ticks", chosen.wanted_ticks), look.tick_color, TICK)
+    if batches.desired is not None:
+        pen.outlined_line(batches.desired, look.mode_color, look.line_width)
+        pen.dot(batches.ticks("wanted_ticks", chosen.desired_ticks), look.tick_color, TICK)
     diameter = KEY if len(path.keys) <= TICKS else TICK
     pen.dot(batches.keys, WHITE, diameter)
     pen.dot(batches.selected, look.key_color, diameter)

@@ -131,9 +131,9 @@ def _geometry(obj: bpy.types.Object) -> Shape | None:
 
 
 def _read(items: bpy.types.bpy_prop_collection, name: str, kind: type, width: int) -> np.ndarray:
-    found = np.empty(len(items) * width, kind)
-    items.foreach_get(name, found)
-    return found.reshape(-1, width)
+    result = np.empty(len(items) * width, kind)
+    items.foreach_get(name, result)
+    return result.reshape(-1, width)
 
 
 def _plain(obj: bpy.types.Object) -> Shape:

@@ -108,13 +108,13 @@ class Parents:
     @property
     def digest(self) -> tuple:
         """Differs wherever anything differs that decides where they carry the target."""
-        found: list[object] = [_hung(self.target)]
+        result: list[object] = [_hung(self.target)]
         for one, (_, source) in self._read.items():
             keyed = source.keyed if source is not None else ()
             stands = [getattr(one.carrier, prop)[:] for name, prop in one.properties.items() if name not in keyed]
             rest = None if source is None else (source.digest, tuple(source.rest.items()))
-            found.append((one.animated.session_uid, one.prefix, rest, tuple(stands), _hung(one)))
-        return tuple(found)
+            result.append((one.animated.session_uid, one.prefix, rest, tuple(stands), _hung(one)))
+        return tuple(result)
 
     def spaces(self, frames: np.ndarray) -> tuple[AffineMaps, np.ndarray | None]:
         """From the space of the target's location channels into the world.

@@ -80,7 +80,7 @@ class Path:
     native: np.ndarray
     """Where it is on these frames if Blender fills in, shape (m, 3)."""
 
-    wanted: np.ndarray | None
+    desired: np.ndarray | None
     """Where it is if the mode does, shape (m, 3). None where there is no other mode than Blender's."""
 
     keys: np.ndarray
@@ -95,7 +95,7 @@ class Path:
     native_ticks: np.ndarray
     """Where Blender has it on these, shape (t, 3)."""
 
-    wanted_ticks: np.ndarray | None
+    desired_ticks: np.ndarray | None
     """Where the mode has it on these, shape (t, 3)."""
 
     axis_frames: np.ndarray
@@ -119,7 +119,7 @@ class Path:
         def point(line: np.ndarray) -> np.ndarray:
             return line[after - 1] + share * (line[after] - line[after - 1])
 
-        return point(self.native), None if self.wanted is None else point(self.wanted)
+        return point(self.native), None if self.desired is None else point(self.desired)
 
 
 def trace(
@@ -165,27 +165,27 @@ def trace(
     frames = np.union1d(samples, ticks)
     motion = in_betweens(source, frames, mode)
     on_samples, on_keys, on_ticks, on_axes = (
-        np.searchsorted(frames, wanted_frames) for wanted_frames in (samples, keys, ticks, with_axes)
+        np.searchsorted(frames, desired_frames) for desired_frames in (samples, keys, ticks, with_axes)
     )
     is_native = not source.is_live if mode is None else mode == "BLENDER"
-    shown = motion.native if is_native else motion.wanted
+    shown = motion.native if is_native else motion.desired
     spaces = None
     if parents is not None:
         spaces, turns = parents.spaces(frames)
         followed = None if followed is None else followed._replace(turned=turns)
-    native, wanted = (_points(poses, followed, spaces) for poses in (motion.native, motion.wanted))
+    native, desired = (_points(poses, followed, spaces) for poses in (motion.native, motion.desired))
     return Path(
         frames=samples,
         native=native[on_samples],
-        wanted=None if is_native else wanted[on_samples],
+        desired=None if is_native else desired[on_samples],
         keys=native[on_keys],
         selected=np.isin(keys, () if selected is None else selected),
         tick_frames=ticks,
         native_ticks=native[on_ticks],
-        wanted_ticks=None if is_native else wanted[on_ticks],
+        desired_ticks=None if is_native else desired[on_ticks],
         axis_frames=with_axes,
         axes=_axes(
-            (native if is_native else wanted)[on_axes],
+            (native if is_native else desired)[on_axes],
             shown[on_axes],
             axis_length,
             None if followed is None else followed.at(on_axes),

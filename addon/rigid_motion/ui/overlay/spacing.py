@@ -36,7 +36,7 @@ class Readable:
     native_ticks: np.ndarray
     """Which of its ticks on Blender's path, shape (t,)."""
 
-    wanted_ticks: np.ndarray | None
+    desired_ticks: np.ndarray | None
     """Which of its ticks on the mode's path, shape (t,). None without one."""
 
     axes: np.ndarray
@@ -65,17 +65,17 @@ def readable(
         return on_screen(points, projection, size) / scale
 
     native, axes = pixels(path.native_ticks), pixels(path.axes[:, 0, 0])
-    wanted = None if path.wanted_ticks is None else pixels(path.wanted_ticks)
+    desired = None if path.desired_ticks is None else pixels(path.desired_ticks)
     some_axes = _spaced(axes, _step(axes, AXES_GAP), np.empty((0, 2)), 0.5 * AXES_GAP, path.axis_frames)
     if every_tick:
         every = np.ones(len(native), dtype=bool)
-        return Readable(every, None if wanted is None else every, some_axes)
+        return Readable(every, None if desired is None else every, some_axes)
     keys = pixels(path.keys)
     # The same frames on both, so that they can be compared.
-    step = _step(native if wanted is None else wanted, TICK_GAP)
+    step = _step(native if desired is None else desired, TICK_GAP)
     return Readable(
         _spaced(native, step, keys, CLEAR, path.tick_frames),
-        None if wanted is None else _spaced(wanted, step, keys, CLEAR, path.tick_frames),
+        None if desired is None else _spaced(desired, step, keys, CLEAR, path.tick_frames),
         some_axes,
     )
 

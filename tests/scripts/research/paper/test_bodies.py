@@ -59,8 +59,8 @@ def places(poses: Poses) -> np.ndarray:
     ],
 )
 def test_hands_feet_and_heads_are_told_by_their_names(joint: str, limb: str) -> None:
-    found = bodies.limbs_of(named("Hips", joint))
-    assert [(one.kind, one.joint) for one in found] == [(limb, 1)]
+    result = bodies.limbs_of(named("Hips", joint))
+    assert [(one.kind, one.joint) for one in result] == [(limb, 1)]
 
 
 @pytest.mark.parametrize(
@@ -84,8 +84,8 @@ def test_what_is_near_a_hand_is_none(joint: str) -> None:
 
 
 def test_of_several_the_plainest_name_is_taken() -> None:
-    found = bodies.limbs_of(named("Hips", "IK_LeftHand", "LeftHand", "Left_Hand"))
-    assert [one.joint for one in found] == [2]
+    result = bodies.limbs_of(named("Hips", "IK_LeftHand", "LeftHand", "Left_Hand"))
+    assert [one.joint for one in result] == [2]
 
 
 def test_a_limb_says_how_many_moving_joints_carry_it() -> None:
@@ -96,7 +96,7 @@ def test_a_limb_says_how_many_moving_joints_carry_it() -> None:
 
 
 def test_a_limb_that_does_not_move_is_left_out() -> None:
-    clip = replace(still_body(), figure=BODY_CLIP.figure)
+    clip = replace(still_body(), rest_body=BODY_CLIP.rest_body)
     assert bodies.limbs_of(clip) == []
 
 
@@ -122,8 +122,8 @@ def test_errors_of_a_limb_in_both_ways_are_those_of_matrices(limbs: list[Limb], 
     # One of each kind here.
     rows = {row[:2]: row[4] for row in bodies.errors_of(BODY_CLIP, limbs) if row[2:4] == (mode, 5)}
     keys, times = np.arange(0, 61, 6), BODY_CLIP.times
-    truth = BODY_CLIP.figure.skeleton.in_root_space(METRES)
-    through = BODY_CLIP.figure.skeleton.in_root_space(interpolate(times[keys], METRES[:, keys], times, mode))
+    truth = BODY_CLIP.rest_body.skeleton.in_root_space(METRES)
+    through = BODY_CLIP.rest_body.skeleton.in_root_space(interpolate(times[keys], METRES[:, keys], times, mode))
     for limb in limbs:
         filled = interpolate(times[keys], truth[limb.joint][keys], times, mode)
         for way, shown in ((THROUGH, through[limb.joint]), (ALONE, filled)):
@@ -147,11 +147,11 @@ def test_a_rate_counts_though_the_file_rounds_the_time_of_a_frame() -> None:
 
 
 def test_where_joints_only_turn_a_screw_is_slerp_but_for_the_root() -> None:
-    for found in bodies.apart_of(BODY_CLIP).values():
-        assert found["parents"] < NOTHING
-        assert found["carried"] < NOTHING
-        assert found["roots"] > 1e-4
-        assert found["all"] >= found["roots"] - NOTHING
+    for result in bodies.apart_of(BODY_CLIP).values():
+        assert result["parents"] < NOTHING
+        assert result["carried"] < NOTHING
+        assert result["roots"] > 1e-4
+        assert result["all"] >= result["roots"] - NOTHING
 
 
 def test_the_difference_is_that_of_the_two_modes_by_matrices() -> None:
@@ -161,17 +161,17 @@ def test_the_difference_is_that_of_the_two_modes_by_matrices() -> None:
     clip = replace(BODY_CLIP, poses=poses)
     metres, times, keys = Poses(poses.positions * 0.01, poses.quaternions), clip.times, np.arange(0, 61, 3)
     straight, screw = (interpolate(times[keys], metres[:, keys], times, mode) for mode in ("lerp_slerp", "dq_sclerp"))
-    found = bodies.apart_of(clip)[10]
+    result = bodies.apart_of(clip)[10]
     own = np.linalg.norm(straight.positions - screw.positions, axis=-1).max(axis=1)
-    assert found["parents"] == pytest.approx(own[hand])
-    assert found["roots"] == pytest.approx(own[0])
+    assert result["parents"] == pytest.approx(own[hand])
+    assert result["roots"] == pytest.approx(own[0])
     apart = np.linalg.norm(places(straight) - places(screw), axis=-1)
-    assert found["all"] == pytest.approx(apart.max())
+    assert result["all"] == pytest.approx(apart.max())
     screw.positions[0] = straight.positions[0]
     carried = np.linalg.norm(places(straight) - places(screw), axis=-1)
-    assert found["carried"] == pytest.approx(carried[1:].max())
+    assert result["carried"] == pytest.approx(carried[1:].max())
     errors = np.linalg.norm(places(straight) - places(metres), axis=-1)
-    assert found["error"] == pytest.approx(errors.max())
+    assert result["error"] == pytest.approx(errors.max())
 
 
 # -- keys needed -------------------------------------------------------------------------------------------------------
@@ -182,15 +182,15 @@ def test_keys_are_counted_where_there_are_two_samples_to_each_and_the_reference_
 ) -> None:
     (body, of_body), (hand, of_hand) = bodies.needed_of(BODY_CLIP, limbs[:1])
     assert (body, hand) == (BODY, "hands")
-    for found in (of_body, of_hand):
-        assert set(found) == set(bodies.MODES)
-        np.testing.assert_array_equal(found["lerp_slerp"]["uniform"], [np.nan, np.nan, 1.0, 1.0, 1.0, 1.0])
+    for result in (of_body, of_hand):
+        assert set(result) == set(bodies.MODES)
+        np.testing.assert_array_equal(result["lerp_slerp"]["uniform"], [np.nan, np.nan, 1.0, 1.0, 1.0, 1.0])
 
 
 def test_of_a_long_body_the_beginning_is_searched(monkeypatch: pytest.MonkeyPatch) -> None:
     searched = []
     monkeypatch.setattr(bodies, "SEARCHED", 1.0)
-    monkeypatch.setattr(bodies, "_shares", lambda clip, found: searched.extend(found.reference_keys))
+    monkeypatch.setattr(bodies, "_shares", lambda clip, result: searched.extend(result.reference_keys))
     bodies.needed_of(BODY_CLIP, [])
     assert searched[2:] == [16, 13, 9, 6]
 
@@ -203,14 +203,14 @@ def test_means_are_geometric_and_leave_out_what_no_keys_reach() -> None:
 
 def test_a_study_says_everything_of_each_body() -> None:
     short = swinging_body("short", seconds=1.0, rate=30.0, seed=4, joints=NAMES)
-    found = bodies.study([(BODY_CLIP, 0), (short, 1)])
-    assert found["bodies"]["short"]["skipped"] == 1
-    assert found["bodies"]["walk"]["limbs"] == ["LeftHand", "RightFoot", "Head"]
-    assert set(found["needed"]) == {BODY, *bodies.LIMBS}
-    assert found["chains"]["hands"] == [4, 4]
-    assert found["errors"][BODY][THROUGH]["pga_lerp"][5]["velocity"] > 0.0
-    errors = [found["by_body"][name]["lerp_slerp"][10] for name in ("walk", "short")]
-    mean = found["errors"][BODY][THROUGH]["lerp_slerp"][10]["shell"]
+    result = bodies.study([(BODY_CLIP, 0), (short, 1)])
+    assert result["bodies"]["short"]["skipped"] == 1
+    assert result["bodies"]["walk"]["limbs"] == ["LeftHand", "RightFoot", "Head"]
+    assert set(result["needed"]) == {BODY, *bodies.LIMBS}
+    assert result["chains"]["hands"] == [4, 4]
+    assert result["errors"][BODY][THROUGH]["pga_lerp"][5]["velocity"] > 0.0
+    errors = [result["by_body"][name]["lerp_slerp"][10] for name in ("walk", "short")]
+    mean = result["errors"][BODY][THROUGH]["lerp_slerp"][10]["shell"]
     assert mean == pytest.approx(np.sqrt(np.prod(errors)))
 
 

@@ -18,28 +18,28 @@ def words_on(scene: bpy.types.Scene) -> dict[str, np.ndarray]:
     bpy.context.view_layer.update()
     width, height = scene.render.resolution_x, scene.render.resolution_y
     frame = bpy.data.objects["Frame"].matrix_world.inverted()
-    found = {}
+    result = {}
     for obj in scene.objects:
         if obj.type == "FONT":
             corners = np.array([frame @ obj.matrix_world @ Vector(corner) for corner in obj.bound_box])
             left, foot = corners[:, :2].min(axis=0) * height + (width / 2.0, height / 2.0)
             right, top = corners[:, :2].max(axis=0) * height + (width / 2.0, height / 2.0)
-            found[obj.data.body] = np.array((left, right, foot, top))
-    return found
+            result[obj.data.body] = np.array((left, right, foot, top))
+    return result
 
 
 def test_slerp_turns_evenly_and_lerp_more_slowly_at_first():
-    found = triangle.figures()
-    assert found["slerp_step"] == pytest.approx(150.0 / 21.0)
-    assert found["lerp_first_step"] < found["slerp_step"] < found["lerp_largest_step"]
-    assert 0.0 < found["apart"] < 1.0
+    result = triangle.figures()
+    assert result["slerp_step"] == pytest.approx(150.0 / 21.0)
+    assert result["lerp_first_step"] < result["slerp_step"] < result["lerp_largest_step"]
+    assert 0.0 < result["apart"] < 1.0
 
 
 def test_the_tip_rests_under_screws_and_leaves_its_place_under_the_state_of_the_art():
-    found = strips.figures()
-    assert set(found) == set(strips.ENGINES)
-    assert max(found["dq_sclerp"], found["pga_lerp"]) < 1e-9
-    assert found["lerp_slerp"] > 0.05
+    result = strips.figures()
+    assert set(result) == set(strips.ENGINES)
+    assert max(result["dq_sclerp"], result["pga_lerp"]) < 1e-9
+    assert result["lerp_slerp"] > 0.05
 
 
 def test_the_triangle_is_in_the_colours_of_the_paper():
@@ -79,6 +79,6 @@ def test_a_picture_is_as_wide_as_a_column_and_has_both_colours(tmp_path):
     assert tuple(image.size) == (picture.WIDTH, scene.render.resolution_y)
     pixels = np.array(image.pixels[:]).reshape(-1, 4)[:, :3]
     for colour in claims.COLOURS.values():
-        wanted = np.array([int(colour[start : start + 2], 16) / 255.0 for start in (1, 3, 5)])
-        assert np.count_nonzero(np.abs(pixels - wanted).max(axis=1) < 0.06) > 500
+        expected = np.array([int(colour[start : start + 2], 16) / 255.0 for start in (1, 3, 5)])
+        assert np.count_nonzero(np.abs(pixels - expected).max(axis=1) < 0.06) > 500
     assert np.all(pixels[:: picture.WIDTH] > 0.97)

@@ -48,15 +48,15 @@ def test_a_skeleton_is_represented_by_its_root(tmp_path: Path):
     path.write_text(seed("ZXY", 60), encoding="utf-8")
     clip = read_motion(path)
     (root,) = read_trajectories(f"{path}:Hips").trajectories
-    assert (clip.figure, len(clip.times)) == (None, 60)
+    assert (clip.rest_body, len(clip.times)) == (None, 60)
     np.testing.assert_allclose(clip.poses.positions, root.poses.positions, atol=1e-12)
 
 
 def test_a_file_that_is_no_recording_is_left_out_and_says_why_without_its_folder(tmp_path: Path):
     (tmp_path / "notes.csv").write_text("dear diary\n", encoding="utf-8")
     write(tmp_path / "moves.csv", swinging(3.0 * REST))
-    found, left_out = read_all(recordings_in(tmp_path), read_motion)
-    assert [clip.name for clip in found] == ["moves"]
+    result, left_out = read_all(recordings_in(tmp_path), read_motion)
+    assert [clip.name for clip in result] == ["moves"]
     assert list(left_out) == ["notes"]
     assert str(tmp_path) not in left_out["notes"]
 

@@ -30,12 +30,12 @@ def test_a_part_writes_its_figures(tmp_path: Path) -> None:
     assert study.main(["--only", "table", "--root", str(tmp_path)]) == 0
     (path,) = (tmp_path / "docs" / "figures").iterdir()
     assert path.name == "paper_table.json"
-    found = json.loads(path.read_text(encoding="utf-8"))
-    assert found["made_by"].startswith("`python scripts/research paper --only table")
-    assert found["clips"] == {"assets": ["circling"]}
-    assert found["needed"]["assets"]["rms_shell"]["lerp_slerp"]["updates"] == pytest.approx(UPDATES, rel=1e-3)
-    assert found["by_clip"]["circling"]["motor_spline"][0] > 0.3
-    assert set(found["bows"]["circling"]) == {"5", "8", "12", "15", "20", "30"}
+    result = json.loads(path.read_text(encoding="utf-8"))
+    assert result["made_by"].startswith("`python scripts/research paper --only table")
+    assert result["clips"] == {"assets": ["circling"]}
+    assert result["needed"]["assets"]["rms_shell"]["lerp_slerp"]["updates"] == pytest.approx(UPDATES, rel=1e-3)
+    assert result["by_clip"]["circling"]["motor_spline"][0] > 0.3
+    assert set(result["bows"]["circling"]) == {"5", "8", "12", "15", "20", "30"}
 
 
 @pytest.mark.parametrize(
@@ -61,13 +61,13 @@ def test_a_wrong_option_is_named_and_ends_with_code_2(
 def test_a_stream_costs_less_the_more_it_may_be_off(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sending, "DELAYS", (0.1,))
     monkeypatch.setattr(sending, "TOLERANCES", (1.0, 5.0, 3))
-    found = sending.costs([CLIP])
-    own = found["needed"]["100"]
+    result = sending.costs([CLIP])
+    own = result["needed"]["100"]
     assert own["bytes"] == sorted(own["bytes"], reverse=True)
     for datagrams, size in zip(own["datagrams"], own["bytes"], strict=True):
         assert size > HEADERS * datagrams > 0.0
-    assert found["even"]["7 doubles"][0] == 30 * (56 + HEADERS + sending.STAMP)
-    assert own["saved_bytes"]["7 doubles"][0] == pytest.approx(1.0 - own["bytes"][0] / found["even"]["7 doubles"][0])
+    assert result["even"]["7 doubles"][0] == 30 * (56 + HEADERS + sending.STAMP)
+    assert own["saved_bytes"]["7 doubles"][0] == pytest.approx(1.0 - own["bytes"][0] / result["even"]["7 doubles"][0])
 
 
 @pytest.mark.network
@@ -81,8 +81,8 @@ def test_a_stream_is_that_which_another_process_shows() -> None:
 
 
 def test_a_packing_is_off_by_no_more_than_its_steps() -> None:
-    found = sending.packings(CLIP)
-    exact, single, small = found.values()
+    result = sending.packings(CLIP)
+    exact, single, small = result.values()
     assert exact == {"bytes": 56, "error": 0.0}
     assert (single["bytes"], small["bytes"]) == (28, 10)
     assert 0.0 < single["error"] < 1e-6

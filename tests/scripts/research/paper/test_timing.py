@@ -57,16 +57,16 @@ def test_the_races_have_every_mode_at_the_rates_that_were_asked_for(monkeypatch:
     monkeypatch.setattr(timing, "USERS", 2)
     monkeypatch.setattr(timing, "SINGLES", 4)
     needed = {"lerp_slerp": {"updates": [29.0, 19.0, 14.0, 11.0]}, "pga_lerp": {"updates": [25.0, 16.0, 13.0, 11.5]}}
-    found = timing.races(CLIP, needed, 2)
+    result = timing.races(CLIP, needed, 2)
 
     def updates(pace: str, rate: int) -> dict[str, float]:
-        return {mode: own[rate]["updates"] for mode, own in found[pace].items()}
+        return {mode: own[rate]["updates"] for mode, own in result[pace].items()}
 
     for place, rate in enumerate(UPDATES):
         assert updates("equal", rate) == dict.fromkeys(MODES, rate)
         assert updates("paper", rate) == dict.fromkeys(EXACT, PAPER[rate]) | {"lerp_slerp": rate}
         as_good = {"lerp_slerp": rate, "pga_lerp": needed["pga_lerp"]["updates"][place]}
         assert updates("as good", rate) == as_good
-        assert found["equal"]["lerp_slerp"][rate]["relative"] == 1.0
-    assert set(found["algebra"]) == set(found["single"]) == set(EXACT)
-    assert all(one["processor"] > 0.0 for one in found["algebra"].values())
+        assert result["equal"]["lerp_slerp"][rate]["relative"] == 1.0
+    assert set(result["algebra"]) == set(result["single"]) == set(EXACT)
+    assert all(one["processor"] > 0.0 for one in result["algebra"].values())

@@ -14,7 +14,7 @@ OUTPUT, ERRORS = 1, 2
 
 
 @contextmanager
-def hushed(*, errors: bool = False) -> Iterator[None]:
+def silenced(*, errors: bool = False) -> Iterator[None]:
     """Keep what is written meanwhile off the standard output, and off the standard error where `errors` is set.
 
     Otherwise that stays open: where Blender has to abort, its last words are there.

@@ -62,7 +62,7 @@ class Skin:
 
 
 @dataclass(frozen=True, eq=False)
-class Figure:
+class RestBody:
     """A body at rest."""
 
     joints: tuple[str, ...]
@@ -84,23 +84,23 @@ class Figure:
         return Skeleton(self.parents)
 
 
-def repaired(figure: Figure) -> tuple[Figure, tuple[str, ...]]:
+def repaired(rest_body: RestBody) -> tuple[RestBody, tuple[str, ...]]:
     """A figure all of whose numbers are some, and what was done for that, a sentence each, as in `repair`.
 
     Where a joint is at rest, and where its bone ends, decides about nothing but how it is drawn.
     """
-    places, tails, skin, done = figure.rest.positions, figure.tails, figure.skin, []
+    places, tails, skin, done = rest_body.rest.positions, rest_body.tails, rest_body.skin, []
     wrong = ~(np.abs(np.concatenate((places, tails), axis=1)) < LARGEST).all(axis=1)
     if wrong.any():
-        names = ", ".join(np.array(figure.joints)[wrong][:MOST_NAMED].tolist())
+        names = ", ".join(np.array(rest_body.joints)[wrong][:MOST_NAMED].tolist())
         more = ", ..." if np.count_nonzero(wrong) > MOST_NAMED else ""
         done.append(f"drew no bones for joints that are nowhere at rest ({np.count_nonzero(wrong)}: {names}{more})")
         places, tails = (np.where(wrong[:, None], 0.0, some) for some in (places, tails))
-        figure = replace(figure, rest=Poses(places, figure.rest.quaternions), tails=tails)
+        rest_body = replace(rest_body, rest=Poses(places, rest_body.rest.quaternions), tails=tails)
     if skin is not None and not (np.abs(skin.vertices) < LARGEST).all():
         done.append("left out a skin with numbers that are missing, not finite or too large")
-        figure = replace(figure, skin=None)
-    return figure, tuple(done)
+        rest_body = replace(rest_body, skin=None)
+    return rest_body, tuple(done)
 
 
 def carrying(parents: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ import pytest
 from rigid_motion_batch.recordings import Trajectory
 from rigid_motion_batch.recordings.clip_reading import make_clip
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.recordings.figures import Skin, repaired, size_of
+from rigid_motion_batch.recordings.rest_bodies import Skin, repaired, size_of
 from tests.scripts.clips.bodies import JOINTS, swinging_body
 
 
@@ -19,28 +19,28 @@ def clip() -> Clip:
     """With a skin of one triangle."""
     clip = swinging_body()
     skin = Skin(np.eye(3), np.array([[0, 1, 2]]), np.zeros((3, 4), dtype=int), np.eye(4)[[0, 0, 0]])
-    return replace(clip, figure=replace(clip.figure, skin=skin))
+    return replace(clip, rest_body=replace(clip.rest_body, skin=skin))
 
 
 @pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, 1e38])
 def test_a_joint_that_is_nowhere_at_rest_has_no_bone_and_is_told(clip: Clip, number: float) -> None:
-    figure = clip.figure
-    figure.tails[2, 1] = number
-    figure.rest.positions[5, 0] = number
-    figure.skin.vertices[1, 1] = number
-    sound, done = repaired(figure)
+    rest_body = clip.rest_body
+    rest_body.tails[2, 1] = number
+    rest_body.rest.positions[5, 0] = number
+    rest_body.skin.vertices[1, 1] = number
+    sound, done = repaired(rest_body)
     assert done == (
         "drew no bones for joints that are nowhere at rest (2: Head, Glove)",
         "left out a skin with numbers that are missing, not finite or too large",
     )
     assert sound.skin is None
     for joint in range(len(JOINTS)):
-        for found, before in ((sound.tails, figure.tails), (sound.rest.positions, figure.rest.positions)):
-            assert np.array_equal(found[joint], [0, 0, 0] if joint in (2, 5) else before[joint])
-    trajectory = Trajectory("walk", clip.times, clip.poses, figure=figure)
+        for result, before in ((sound.tails, rest_body.tails), (sound.rest.positions, rest_body.rest.positions)):
+            assert np.array_equal(result[joint], [0, 0, 0] if joint in (2, 5) else before[joint])
+    trajectory = Trajectory("walk", clip.times, clip.poses, rest_body=rest_body)
     made = make_clip(trajectory, "walk.fbx", "walk", "blender")
     assert made.repairs == done
-    assert np.isfinite(made.figure.tails).all()
+    assert np.isfinite(made.rest_body.tails).all()
 
 
 def test_the_size_of_a_body_is_that_from_where_it_branches() -> None:

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from rigid_motion_batch.hushing import hushed
+from rigid_motion_batch.silencing import silenced
 
 
 def speak(words: str) -> None:
@@ -22,10 +22,10 @@ def speak(words: str) -> None:
 @pytest.mark.parametrize("errors", [False, True])
 def test_only_what_is_said_meanwhile_is_hushed(capfd, errors):
     speak("before")
-    with hushed(errors=errors):
+    with silenced(errors=errors):
         speak("meanwhile")
     speak("after")
-    with hushed():
+    with silenced():
         pass
     output, said = capfd.readouterr()
     for words in ("before", "after"):
@@ -38,7 +38,7 @@ def test_only_what_is_said_meanwhile_is_hushed(capfd, errors):
 
 
 def test_an_error_goes_through_and_the_streams_are_back(capfd):
-    with pytest.raises(ZeroDivisionError), hushed(errors=True):
+    with pytest.raises(ZeroDivisionError), silenced(errors=True):
         raise ZeroDivisionError
     print("heard")
     assert capfd.readouterr().out == "heard\n"
