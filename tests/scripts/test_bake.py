@@ -167,7 +167,7 @@ def test_un_baking_gives_back_exactly_the_keys_and_the_motion(shot, baked, tmp_p
 
 
 @pytest.mark.parametrize(
-    ("options", "wanted"),
+    ("options", "expected"),
     [
         (("--step", "0.5"), sorted({*np.arange(1.0, 40.5, 0.5)})),
         (("--step", "7"), sorted({*np.arange(1.0, 40.5, 7.0), *FRAMES})),
@@ -432,7 +432,7 @@ def test_keys_count_as_they_are_where_live_update_was_off(tmp_path):
     assert_same(shown_worlds([bpy.data.objects["Tool"]], PLAYED[:43]), [expected])
 
 
-@pytest.mark.parametrize(("options", "wanted"), [((), "LINEAR"), (("--hold",), "CONSTANT")])
+@pytest.mark.parametrize(("options", "expected"), [((), "LINEAR"), (("--hold",), "CONSTANT")])
 def test_poses_are_held_where_that_is_asked_for(tmp_path, options, expected):
     path = one_object_file(tmp_path / "shot.blend")
     assert run(path, "--step", "2", *options) == 0

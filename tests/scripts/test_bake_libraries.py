@@ -84,7 +84,7 @@ def shot_with(path: Path, link: Callable[[Path], object], library: Path) -> Path
 
 
 @pytest.mark.parametrize(
-    ("link", "wanted", "told"),
+    ("link", "expected", "told"),
     [
         (link_object, "Object Prop", "Prop: not baked: it is missing from"),
         (link_action, "Action PropAction", "Local: not baked: its Action PropAction is missing from"),

@@ -27,7 +27,7 @@ def rms(ways: OfBody, keys: np.ndarray, mode: str) -> float:
 
 
 @pytest.fixture(scope="module")
-def found() -> KeysNeeded:
+def result() -> KeysNeeded:
     return keys_needed(WAYS, MODES)
 
 

@@ -38,7 +38,7 @@ def swing() -> Clip:
 
 
 @pytest.fixture(scope="module")
-def found(swing: Clip) -> KeysNeeded:
+def result(swing: Clip) -> KeysNeeded:
     return keys_needed(OfRigidBody(swing, 0.1), KEYFRAME_MODES)
 
 

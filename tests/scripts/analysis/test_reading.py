@@ -60,7 +60,7 @@ def test_a_body_that_was_named_is_remembered_and_the_clip_has_the_name_of_its_fi
 
 
 @pytest.mark.parametrize(
-    ("wanted", "names"),
+    ("expected", "names"),
     [
         ([("log", "left")], ["log"]),
         ([("log", "left"), ("other", "left")], ["log", "other"]),

@@ -11,7 +11,7 @@ from rigid_motion_batch.pipeline.performing import Executor
 from rigid_motion_batch.pipeline.running import Share, run
 from rigid_motion_batch.pipeline.store import Store
 from rigid_motion_batch.progress import Progress
-from tests.scripts.pipeline.test_comparison import ABOUT, STAGE, expected
+from tests.scripts.pipeline.test_comparison import ABOUT, STAGE, planned
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
@@ -24,7 +24,7 @@ if __name__ == "__main__":
     number, of = map(int, options.part.split("/"))
     share, progress = Share(frozenset({options.only}), number, of), Progress()
     with Store(options.output, alone=False) as store, Executor() as executor:
-        plan = ComparisonPlan(expected(*options.inputs, stage=STAGE, about=ABOUT), store)
+        plan = ComparisonPlan(planned(*options.inputs, stage=STAGE, about=ABOUT), store)
         outcome = run(plan.reading, store, executor, share=share, progress=progress)
         plan.look_into()
         later = run(plan.tasks, store, executor, share=share, progress=progress)

@@ -14,7 +14,7 @@ from rigid_motion_batch.pipeline import bundle
 from rigid_motion_batch.pipeline.bundle import below_inputs, write_bundle
 from rigid_motion_batch.pipeline.executors import ProcessExecutor
 from tests.scripts.comparing import write_toss
-from tests.scripts.pipeline.test_comparison import ABOUT, STAGE, compared, expected, published
+from tests.scripts.pipeline.test_comparison import ABOUT, STAGE, compared, planned, published
 
 PARTS = {"read": 2, "measure": 2, "build": 1, "render": 3, "encode": 1, "report": 1}
 
@@ -46,7 +46,7 @@ def test_a_job_on_a_farm_makes_the_same_as_a_run_on_one_machine(tmp_path: Path) 
     assert ran.returncode == 0, ran.stdout + ran.stderr
     outcome, _ = compared(
         tmp_path / "here",
-        expected(*(there / source.name for source in sources), stage=STAGE, about=ABOUT),
+        planned(*(there / source.name for source in sources), stage=STAGE, about=ABOUT),
         ProcessExecutor(2),
     )
     assert outcome.failures == {}

@@ -41,7 +41,7 @@ STAGE = SceneSettings(resolution=(64, 36), fps=10)
 ABOUT = Settings(0.1, "Rigid Motion", "compare toss.csv", details={"Videos": "small"})
 
 
-def wanted(*sources: Path, **fields: object) -> Comparison:
+def planned(*sources: Path, **fields: object) -> Comparison:
     modes = ("lerp_slerp", "motor_spline")
     comparison = Comparison(tuple(map(str, sources)), (Uniform("5"), Uniform("10")), modes, blender="this")
     return replace(comparison, **fields)
@@ -83,7 +83,7 @@ def output(tmp_path: Path) -> Path:
 
 
 def test_tables_are_published_and_their_numbers_are_those_of_the_analysis(output: Path, toss: Path) -> None:
-    comparison = wanted(toss, count_keys=True)
+    comparison = planned(toss, count_keys=True)
     outcome, _ = compared(output, comparison)
     assert states(outcome) == {"up to date": 1, "done": 6}
     tables = ("lerp_slerp.csv", "motor_spline.csv", "keys.csv")
@@ -109,7 +109,7 @@ def test_what_is_kept_of_a_clip_is_what_was_found(tmp_path: Path, toss: Path, ch
     if body:
         write_body(source)
     ((clip,), _) = read_clips([str(source)], None)
-    result = compare_clip(clip, choice, ("lerp_slerp", "motor_spline"), wanted(source).radii, shared=False)
+    result = compare_clip(clip, choice, ("lerp_slerp", "motor_spline"), planned(source).radii, shared=False)
     values.write(tmp_path / "result", result)
     read = result_in(tmp_path)
     assert (read.choice, read.first, read.rows, read.joints) == (
@@ -135,7 +135,7 @@ def test_what_is_kept_of_a_clip_is_what_was_found(tmp_path: Path, toss: Path, ch
 
 
 def test_a_film_and_a_page_of_a_clip(output: Path, toss: Path) -> None:
-    comparison = wanted(toss, stage=STAGE, about=ABOUT)
+    comparison = planned(toss, stage=STAGE, about=ABOUT)
     outcome, listener = compared(output, comparison, ProcessExecutor(2))
     assert outcome.failures == {}
     assert {"toss/5/comparison.mp4", "toss/5/comparison.blend", "report.html"} <= {*published(output)}
@@ -151,7 +151,7 @@ def test_a_film_and_a_page_of_a_clip(output: Path, toss: Path) -> None:
 
 
 def test_a_page_may_be_made_before_its_films(output: Path, toss: Path) -> None:
-    comparison = wanted(toss, stage=STAGE, about=ABOUT)
+    comparison = planned(toss, stage=STAGE, about=ABOUT)
     with Store(output) as store, Executor() as executor:
         plan = ComparisonPlan(comparison, store)
         run(plan.reading, store, executor)
@@ -163,7 +163,7 @@ def test_a_page_may_be_made_before_its_films(output: Path, toss: Path) -> None:
 
 def test_a_whole_body_has_joints_films_and_a_comparison_with_decimate(output: Path, tmp_path: Path) -> None:
     write_body(body := tmp_path / "body.bvh")
-    outcome, _ = compared(output, wanted(body, choices=(Tolerance("2cm"),), stage=STAGE, about=ABOUT, count_keys=True))
+    outcome, _ = compared(output, planned(body, choices=(Tolerance("2cm"),), stage=STAGE, about=ABOUT, count_keys=True))
     assert outcome.failures == {}
     folder = "body/tolerance-2cm"
     assert {*published(output)} == {
@@ -171,7 +171,7 @@ def test_a_whole_body_has_joints_films_and_a_comparison_with_decimate(output: Pa
         *(f"{folder}/{name}" for name in ("lerp_slerp.keys.csv", "motor_spline.keys.csv")),
         *(f"{folder}/{name}" for name in ("comparison.blend", "comparison.mp4", "comparison.glb")),
     }
-    _, listener = compared(tmp_path / "without", wanted(body, choices=(Tolerance("2cm"),), blender=""))
+    _, listener = compared(tmp_path / "without", planned(body, choices=(Tolerance("2cm"),), blender=""))
     assert "body: not compared with Blender's Decimate, for there is no Blender here" in listener.notes
     assert {*published(tmp_path / "without")} >= {"metrics.csv", "metrics_joints.csv"}
     assert "decimated.csv" not in published(tmp_path / "without")
@@ -182,7 +182,7 @@ def test_more_clips_than_fit_on_a_page_have_a_page_each(
 ) -> None:
     monkeypatch.setattr("rigid_motion_batch.pipeline.comparison.ON_ONE_PAGE", 1)
     other = write_toss(toss.with_name("other.csv"), samples=50)
-    outcome, _ = compared(output, wanted(toss, other, about=ABOUT))
+    outcome, _ = compared(output, planned(toss, other, about=ABOUT))
     assert outcome.failures == {}
     assert {"report.html", "toss/report.html", "other/report.html"} <= {*published(output)}
     assert "other/report.html" in (output / "report.html").read_text()
@@ -191,7 +191,7 @@ def test_more_clips_than_fit_on_a_page_have_a_page_each(
 def test_one_bad_clip_stops_nobody(output: Path, toss: Path) -> None:
     bad, short = toss.with_name("bad.csv"), write_toss(toss.with_name("short.csv"), samples=3)
     bad.write_text("nonsense")
-    outcome, listener = compared(output, wanted(bad, toss, short, toss.with_name("none.csv"), about=ABOUT))
+    outcome, listener = compared(output, planned(bad, toss, short, toss.with_name("none.csv"), about=ABOUT))
     assert sorted(outcome.failures) == [f"read {bad}", f"read {toss.with_name('none.csv')}"]
     assert all("\n" not in said for said in outcome.failures.values())
     assert "short: too short for two keys at 5 a second; left out" in listener.notes
@@ -200,7 +200,7 @@ def test_one_bad_clip_stops_nobody(output: Path, toss: Path) -> None:
 
 
 def test_a_source_that_is_given_twice_is_read_and_measured_under_two_names(output: Path, toss: Path) -> None:
-    outcome, listener = compared(output, wanted(toss, toss))
+    outcome, listener = compared(output, planned(toss, toss))
     assert outcome.failures == {}
     assert sum(name.startswith("read ") for name in listener.made) == 1
     assert {"toss/5/keys.csv", "toss-2/5/keys.csv"} <= {*published(output)}
@@ -217,15 +217,15 @@ def test_a_source_that_is_given_twice_is_read_and_measured_under_two_names(outpu
 def test_only_what_an_option_changes_is_done_again(
     output: Path, toss: Path, change: dict[str, object], redone: set[str]
 ) -> None:
-    compared(output, wanted(toss))
-    _, listener = compared(output, wanted(toss, **change))
+    compared(output, planned(toss))
+    _, listener = compared(output, planned(toss, **change))
     assert {name.replace(str(toss), "toss") for name in listener.made} == redone
 
 
 def test_a_recording_that_was_edited_is_read_and_measured_again(output: Path, toss: Path) -> None:
-    compared(output, wanted(toss))
+    compared(output, planned(toss))
     write_toss(toss, samples=70)
-    _, listener = compared(output, wanted(toss))
+    _, listener = compared(output, planned(toss))
     assert len(listener.made) == 5
 
 
@@ -237,7 +237,7 @@ def test_an_input_that_lies_where_an_output_goes_is_refused(tmp_path: Path, plac
     toss = write_toss(tmp_path / "clips" / "toss.csv")
     before = source.read_bytes()
     with pytest.raises(OutputError, match="this input lies where"):
-        compared(tmp_path, wanted(toss, source), overwrite=True)
+        compared(tmp_path, planned(toss, source), overwrite=True)
     assert source.read_bytes() == before
 
 
@@ -255,7 +255,7 @@ def emptied(path: Path) -> None:
 @pytest.mark.parametrize("damage", [garbage, emptied])
 @pytest.mark.parametrize("part", ["facts.json", "0.json", "0.npz", "0.times.npy", "result.json", "result.npz"])
 def test_a_damaged_part_is_made_again(output: Path, toss: Path, part: str, damage: Callable[[Path], None]) -> None:
-    comparison = wanted(toss, choices=(Uniform("5"),), about=ABOUT)
+    comparison = planned(toss, choices=(Uniform("5"),), about=ABOUT)
     compared(output, comparison)
     metrics = (output / "metrics.csv").read_bytes()
     (path,) = (output / OWN / "results").glob(f"*/{part}")
@@ -277,7 +277,7 @@ def test_a_damaged_part_is_made_again(output: Path, toss: Path, part: str, damag
 
 def test_stages_in_parts_make_the_same(output: Path, toss: Path, tmp_path: Path) -> None:
     other = write_toss(toss.with_name("other.csv"), samples=70)
-    comparison = wanted(toss, other, stage=STAGE, about=ABOUT)
+    comparison = planned(toss, other, stage=STAGE, about=ABOUT)
     for stage in ("read", "measure", "build", "render", "encode", "report"):
         for number in (1, 2):
             outcome, _ = compared(output, comparison, alone=False, share=Share(frozenset({stage}), number, 2))
@@ -292,11 +292,11 @@ def test_stages_in_parts_make_the_same(output: Path, toss: Path, tmp_path: Path)
 RUN = """
 import sys
 from pathlib import Path
-from tests.scripts.pipeline.test_comparison import ABOUT, ProcessExecutor, STAGE, compared, wanted
+from tests.scripts.pipeline.test_comparison import ABOUT, ProcessExecutor, STAGE, compared, planned
 
 if __name__ == "__main__":
     outcome, _ = compared(
-        Path(sys.argv[2]), wanted(Path(sys.argv[1]), stage=STAGE, about=ABOUT, every_film=True), ProcessExecutor(2)
+        Path(sys.argv[2]), planned(Path(sys.argv[1]), stage=STAGE, about=ABOUT, every_film=True), ProcessExecutor(2)
     )
     print(outcome.failures)
     sys.exit(bool(outcome.failures))
@@ -360,7 +360,7 @@ def test_a_clip_takes_two_kilobytes_at_most_between_two_plans(output: Path, toss
 
     for number in range(60):
         (toss.parent / f"toss{number}.csv").write_bytes(toss.read_bytes())
-    comparison = wanted(*(toss.parent / f"toss{number}.csv" for number in range(60)), modes=("lerp_slerp",))
+    comparison = planned(*(toss.parent / f"toss{number}.csv" for number in range(60)), modes=("lerp_slerp",))
     compared(output, comparison)
     with Store(output) as store:
         plan = ComparisonPlan(comparison, store)
@@ -407,9 +407,9 @@ def test_numbers_and_pages_need_no_blender(output: Path, toss: Path) -> None:
 
 
 def test_without_blender_a_page_shows_a_drill_and_a_line_says_so(output: Path, toss: Path) -> None:
-    outcome, listener = compared(output, wanted(toss, about=ABOUT, subject="controller", blender=""))
+    outcome, listener = compared(output, planned(toss, about=ABOUT, subject="controller", blender=""))
     assert outcome.failures == {}
     assert "the report shows a drill, for there is no Blender here that reads controller" in listener.notes
     assert "object controller" not in listener.made
-    _, again = compared(output, wanted(toss, about=ABOUT, subject="controller"))
+    _, again = compared(output, planned(toss, about=ABOUT, subject="controller"))
     assert {*again.made} == {"object controller", "report.html"}

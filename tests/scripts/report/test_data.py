@@ -155,7 +155,7 @@ def test_a_curve_of_many_samples_keeps_its_extremes() -> None:
     assert value_of(f"polyline({values}, 3, 6, 60)", "data") == [[k, values[k]] for k in range(3, 7)]
 
 
-@pytest.mark.parametrize(("low", "high", "wanted", "texts"), [
+@pytest.mark.parametrize(("low", "high", "expected", "texts"), [
     (0.0, 9.0, 6, ["0", "2", "4", "6", "8"]),
     (0.0, 0.6, 6, ["0.0", "0.1", "0.2", "0.3", "0.4", "0.5", "0.6"]),
     (12.0, 3600.0, 5, ["1000", "2000", "3000"]),

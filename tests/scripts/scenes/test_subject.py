@@ -69,7 +69,7 @@ def test_nothing_else_of_the_users_file_stays(user_file):
 
 
 @pytest.mark.parametrize(
-    ("wanted", "said"),
+    ("expected", "said"),
     [
         ("{file}:Sphere", "tools.blend: has no object 'Sphere'; it has Cube, Lamp, Parent"),
         ("{file}:Lamp", "tools.blend: 'Lamp' has no faces to show"),
