@@ -35,8 +35,13 @@ Where there are fewer, what is done for each key takes longer than looking at sa
 at samples takes so long that another try is worth more.
 """
 
-TAKEN = 15
-"""Samples for each key up to which all of them are candidates, where a segment depends on its two keys alone."""
+BRIEF = 600
+"""Samples up to which there is time for more candidates, and for a last try."""
+
+TAKEN = 15, 10
+"""Samples for each key up to which all of them are candidates, where a segment depends on its two keys alone: in brief
+recordings, and in longer ones.
+"""
 
 ENOUGH = 10.0, 15.0
 """Times the poses that the first keys have taken, after which no try begins: in the middle and above."""
@@ -69,7 +74,8 @@ class BudgetSearch(Search):
         self._length = int(np.searchsorted(LENGTHS, len(recording.times) / budget, side="right"))
         self._is_short = self._length < 2
         """Whether there are few samples for each key."""
-        self._takes_all = self.reach == 0 and len(recording.times) < TAKEN * budget
+        self._is_brief = len(recording.times) <= BRIEF
+        self._takes_all = self.reach == 0 and len(recording.times) < TAKEN[not self._is_brief] * budget
         """Whether all samples are candidates."""
 
     def least(self, tries: int) -> np.ndarray:
@@ -110,7 +116,7 @@ class BudgetSearch(Search):
         is_long = len(self.recording.times) > SHORT and not self.reach
         if is_long or not self.is_linkable or self.costs.peak(best) == 0.0:
             return best
-        if tries > 2 and self._length < 3:
+        if tries > 2 and self._length < 3 and self._is_brief:
             # Keys that keep to a little less have better places, also when they are too many.
             aim = self.costs.peak(best) / LESS
             keys = self.refined(self.densified(self.measured(best), aim), aim)

@@ -89,6 +89,7 @@ def _run(pipe: Connection, user: int | None, place: str, datagrams: list[bytes],
     config.insert_json5("mode", json.dumps("client" if user is not None else "router"))
     config.insert_json5("connect/endpoints" if user is not None else "listen/endpoints", json.dumps([place]))
     config.insert_json5("scouting/multicast/enabled", "false")
+    config.insert_json5("transport/link/tx/queue/size/data", "16")
     taken: list[tuple[float, float]] = []
 
     def hear(sample: zenoh.Sample) -> None:

@@ -53,7 +53,7 @@ def build_body_scene(made: BodyReconstruction, settings: SceneSettings, radii: n
     Parameters
     ----------
     made : BodyReconstruction
-    settings : StageSettings
+    settings : SceneSettings
         But for the subject and the deviation: a body shows itself, as it is.
     radii : array, shape (joints,)
         Of the balls by which errors are measured, in metres.

@@ -26,7 +26,7 @@ def render_film(scene: bpy.types.Scene, path: Path, progress: Callable[[int, int
     Parameters
     ----------
     scene : bpy.types.Scene
-        Set up for video, as `stage.build_stage` leaves it.
+        Set up for video, as `scene.build_scene` leaves it.
     path : Path
         Ending in .mp4. A file that is there is replaced, once the new one is whole.
     progress : callable, optional
