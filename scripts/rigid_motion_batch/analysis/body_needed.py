@@ -1,12 +1,14 @@
 """Key poses needed: how few of them a mode can do with on a whole body to be as good as the reference is with many.
 
 As in `needed`, with the RMS over all samples and joints in the root's space. Those that the motion chooses are the best
-of so many that `reduce_skeleton_keys` finds, which keep the largest error small; how many is searched for.
+of so many that `reduce_skeleton_keys` finds, which keep the largest error small, or evenly spaced ones where these are
+better; how many is searched for.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from typing import cast
 
 import numpy as np
@@ -16,7 +18,7 @@ from rigid_motion_batch.recordings.clips import Clip
 
 from .bodies import BodyReconstruction, rms_of_body, same_body_motions
 from .choices import Uniform
-from .needed import DECIMATIONS, OfRigidBody, Ways, part_of
+from .needed import DECIMATIONS, OfRigidBody, Ways, evenly_spaced, part_of
 from .radii import Radii
 from .reconstructions import Groups
 
@@ -29,7 +31,7 @@ class OfBody:
     """Key poses of a whole body: the same samples for all joints."""
 
     clip: Clip
-    """With a figure."""
+    """Of a whole body."""
 
     radii: np.ndarray
     """Of the balls at the joints, in metres, shape (joints,)."""
@@ -79,7 +81,9 @@ class OfBody:
                 shared=True,
             )
             keys = max(cast(tuple[np.ndarray, ...], result), key=len)
-        return keys, self.error(keys, mode)
+        # Keys with the smallest largest error may have a larger RMS error than evenly spaced ones.
+        evenly = evenly_spaced(self.clip, max(budget, 2) - 1)
+        return min(((some, self.error(some, mode)) for some in (keys, evenly)), key=itemgetter(1))
 
 
 def ways_of(clip: Clip, radii: Radii, *, fit: bool) -> Ways:
