@@ -1,6 +1,6 @@
 """What bodies cost live, beside packed poses at even rates, beside game engines, and in a room of many.
 
-    python scripts/research live_costs ../shared/data/rigs ../shared/data/recordings
+    python scripts/research live_costs FOLDER ...
 
 Whole bodies and single hands are sent by the codec of [the wire](wire.md) over UDP on loopback; a receiver in another
 process shows them, and goes by the recording's clock, however busy the machine is. Bytes are those of datagrams with

@@ -49,7 +49,9 @@ def write_figures(name: str, figures: dict[str, Any], command: str, root: Path =
     """
     used = {**versions, "Python": platform.python_version(), "NumPy": np.__version__}
     on = ", ".join([*(f"{one} {version}" for one, version in used.items()), platform.system()])
-    document = {"made_by": f"`{command}`: {on} {platform.machine()}", **plain(figures)}
+    # Where somebody's folders lie is no matter of others.
+    words = (Path(word).name if word.startswith(("/", "..")) else word for word in command.split(" "))
+    document = {"made_by": f"`{' '.join(words)}`: {on} {platform.machine()}", **plain(figures)}
     path = root / FIGURES / f"{name}.json"
     write_text(path, json.dumps(document, indent=1, allow_nan=False) + "\n")
     return path

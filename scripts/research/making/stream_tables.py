@@ -1,6 +1,6 @@
 """The tables of the coder of streams: how often each symbol occurs, on recordings and on motions of our own.
 
-    python scripts/research stream_tables ../shared/data
+    python scripts/research stream_tables FOLDER
 
 counts in every body and every single body of the folder and in the generated motions of assets/, at two delays, with
 receivers that answer soon, later, and not at all, and writes addon/rigid_motion/streams/tables.py. With --held-out it
