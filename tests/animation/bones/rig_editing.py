@@ -81,7 +81,7 @@ def carried_by(bone: bpy.types.PoseBone, parent: np.ndarray) -> np.ndarray:
 class Motion(NamedTuple):
     """What moves a bone in the space of its channels on m frames."""
 
-    expected: np.ndarray
+    desired: np.ndarray
     """Matrices (m, 4, 4)."""
 
     native: np.ndarray
