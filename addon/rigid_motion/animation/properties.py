@@ -150,7 +150,7 @@ def _on_turns(motion: ObjectMotion | BoneMotion, _context: bpy.types.Context) ->
 
 
 def _transform_with(motion: ObjectMotion | BoneMotion) -> Transform:
-    """What has these properties."""
+    """Return what has these properties."""
     obj = motion.id_data
     if isinstance(motion, BoneMotion):
         # Blender has no way from it to its bone.

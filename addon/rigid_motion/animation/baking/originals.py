@@ -80,7 +80,7 @@ def move_by_copy(transform: Transform, place: SlotTransform, kind: str) -> SlotT
 
 
 def has_original(transform: Transform, kind: str) -> bool:
-    """Whether something moves by a copy with keys of this kind, and the original is still in the file."""
+    """Return whether something moves by a copy with keys of this kind, and the original is still in the file."""
     return any(entry.kind == kind and entry.original is not None for entry in entries_in_use(transform))
 
 

@@ -92,7 +92,9 @@ def largest_errors(
 
 
 def _bends(delta: np.ndarray, reach: np.ndarray, order: str | None) -> np.ndarray:
-    """By how much bodies leave the straight line about each of the inner samples (m,), of differences (., m + 2)."""
+    """Return by how much bodies leave the straight line about each of the inner samples (m,), of differences
+    (., m + 2).
+    """
     bends = 0.125 * (delta[:, :-2] + delta[:, 2:]) - 0.25 * delta[:, 1:-1]
     moved = np.sqrt(np.einsum("rm,rm->m", bends[ROWS[LOCATION]], bends[ROWS[LOCATION]]))
     if order is None:

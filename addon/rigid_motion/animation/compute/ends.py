@@ -62,7 +62,7 @@ class Ends:
 
     @classmethod
     def of(cls, start: np.ndarray, end: np.ndarray, segments: list[tuple[Source, slice]], smooth: np.ndarray) -> Ends:
-        """From the channels (10, S) at both ends, and which of the segments have a smooth mode."""
+        """Return the ends of the channels (10, S) at both ends, and which of the segments have a smooth mode."""
         sources = [source for source, _ in segments]
         owners = np.repeat(np.arange(len(sources)), [place.stop - place.start for _, place in segments])
         firsts, lasts = ([source.key_frames[part] for source in sources] for part in (slice(-1), slice(1, None)))
@@ -107,7 +107,7 @@ class Ends:
         return tangents_and_lacks(slopes, native, screws, self.times, self.pairs)
 
     def poses(self, some: slice, counts: np.ndarray, progress: np.ndarray, mode: str, off: Poses | None) -> Poses:
-        """What a mode makes of some of the segments, each with so many samples (s,) of this progress (m,).
+        """Return what a mode makes of some of the segments, each with so many samples (s,) of this progress (m,).
 
         They are so far off the path. Positions run along the axes that location does.
         """
@@ -117,7 +117,7 @@ class Ends:
         return poses if axes is None else replace(poses, positions=np.einsum("mji,mj->mi", axes, poses.positions))
 
     def on_paths(self, some: slice, counts: np.ndarray, progress: np.ndarray, mode: str) -> Poses:
-        """The same along the body's own axes at rest, and on the path."""
+        """Return the poses of `poses` along the body's own axes at rest, and on the path."""
         if mode not in self.prepared:
             self.prepared[mode] = self._prepare(mode)
         within, of_each = some, counts
@@ -147,7 +147,7 @@ class Ends:
 
 
 def measured_in(times: np.ndarray, segments: list[tuple[Source, slice]]) -> np.ndarray:
-    """The channels' own values in each of S segments at the moments `MEASURED`, shape (., S, 6)."""
+    """Return the channels' own values in each of S segments at the moments `MEASURED`, shape (., S, 6)."""
     sources = [source for source, _ in segments]
     moments = times[:, :1] + (times[:, 1:] - times[:, :1]) * MEASURED
     frames = [moments[place].ravel() for _, place in segments]

@@ -108,11 +108,11 @@ class Keys:
         return self.points[..., 1]
 
     def only(self, channels: Sequence[int]) -> Keys:
-        """The keys of these channels alone."""
+        """Return the keys of these channels alone."""
         return self._part((channels,))
 
     def at(self, chosen: np.ndarray) -> Keys:
-        """The chosen ones of the keys, by a mask of shape (n,)."""
+        """Return the chosen ones of the keys, by a mask of shape (n,)."""
         part = self._part((slice(None), chosen))
         return part if self.breakdowns is None else replace(part, breakdowns=self.breakdowns[chosen])
 

@@ -32,7 +32,7 @@ Result = TypeVar("Result")
 
 
 def transforms_of(targets: Targets) -> list[Transform]:
-    """The transforms of targets, each once."""
+    """Return the transforms of targets, each once."""
     single = isinstance(targets, Target)
     return list(dict.fromkeys(map(transform_of, (targets,) if single else targets)))
 
@@ -103,7 +103,7 @@ def apply_edit(
 
 
 def readable(transform: Transform, readings: Readings) -> list[tuple[SlotTransform, Source]]:
-    """What is keyed of a transform in all of its places. `Refused` where one of them cannot be filled in."""
+    """Return what is keyed of a transform in all of its places. `Refused` where one of them cannot be filled in."""
     for _, source in readings:
         if isinstance(source, Refused):
             raise source

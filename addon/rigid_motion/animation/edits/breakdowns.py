@@ -106,7 +106,7 @@ class _Between:
         return self.source.values_at(np.array(self.ends)).T
 
     def pose(self, kind: str, factor: float) -> np.ndarray:
-        """The components to be keyed, shape (10,)."""
+        """Return the components to be keyed, shape (10,)."""
         if kind == BREAKDOWN:
             first, last = self._values_at_ends
             straight = first + factor * (last - first)
@@ -248,7 +248,7 @@ class Breakdowns:
 
 
 def _without(source: Source, frame: float) -> Source:
-    """What is keyed but for this frame, and without holds. A channel with no other key keeps its value."""
+    """Return what is keyed but for this frame, and without holds. A channel with no other key keeps its value."""
     channels, rest = [], dict(source.rest)
     for rows, keys in source.channels:
         others = np.abs(keys.times - frame) >= SAME_FRAME

@@ -128,7 +128,7 @@ def set_turns(
 
 
 def _place_of(transform: Transform, places: Sequence[SlotTransform]) -> SlotTransform:
-    """The slot whose keys the editors show. `Refused` where there is none."""
+    """Return the slot whose keys the editors show. `Refused` where there is none."""
     place = active_place(transform, places)
     if place is None:
         raise Refused(
@@ -166,7 +166,7 @@ def on_property(transform: Transform) -> None:
 
 
 def set_whole(place: SlotTransform, mode: str) -> None:
-    """One mode for all segments of a slot."""
+    """Set one mode for all segments of a slot."""
     channel = place.users[0].mode_channel
     if channel in place.curves:
         place.channelbag.fcurves.remove(place.curves.pop(channel))

@@ -99,7 +99,7 @@ class Follower:
         self.slot_names: SlotNames = {}
 
     def _handler(self, method: Callable) -> Callable:
-        """A handler that stays quiet while edits are not followed, and never raises into Blender."""
+        """Return a handler that stays quiet while edits are not followed, and never raises into Blender."""
 
         @persistent
         @functools.wraps(method)
@@ -114,7 +114,7 @@ class Follower:
 
     @contextmanager
     def turn(self) -> Iterator[bool]:
-        """Whether edits are to be followed: not while they are the extension's."""
+        """Yield whether edits are to be followed: not while they are the extension's."""
         is_first = not self.busy
         self.busy = True
         try:
@@ -199,7 +199,7 @@ class Follower:
             self.refresh(edited)
 
     def edited_of(self, obj: bpy.types.Object) -> list[Transform]:
-        """An object that was evaluated on the frame that is shown, and of a rig the bones that were edited."""
+        """Return an object that was evaluated on the frame that is shown, and of a rig the bones that were edited."""
         if obj.pose is None or not has_bones(obj):
             return [transform_of(obj)]
         changed = self.snapshots.changed_bones(obj, self.frame, is_set=obj.session_uid in self.objects)
@@ -352,14 +352,15 @@ def set_enabled(enabled: bool) -> None:
 
 def set_drafts(allowed: bool) -> None:
     """Edit large Actions in draft, as in a window: one sample a frame, until something is shown between frames, or
-    rendered, or saved."""
+    rendered, or saved.
+    """
     follower.drafts = allowed
     if not allowed:
         follower.finish_drafts()
 
 
 def is_busy() -> bool:
-    """Whether the edits that Blender tells of at this moment are the extension's."""
+    """Return whether the edits that Blender tells of at this moment are the extension's."""
     return follower.busy
 
 

@@ -61,11 +61,11 @@ class _Channels:
 
     @cached_property
     def shares(self) -> np.ndarray:
-        """What each counts for before the new key and behind it, shape (c, 2)."""
+        """Return what each counts for before the new key and behind it, shape (c, 2)."""
         return self.weights[:, None] * self.ways[..., 1] ** 2
 
     def times(self, chosen: np.ndarray, side: int) -> np.ndarray:
-        """The times of the native handles of some on one side, from 0 to 1, shape (k, 2)."""
+        """Return the times of the native handles of some on one side, from 0 to 1, shape (k, 2)."""
         begun = self.native[chosen, side, :, 0] - self.points[chosen, side, 0, None]
         return np.clip(begun / self.ways[chosen, side, :1], 0.0, 1.0)
 
@@ -185,7 +185,7 @@ def _weight(source: Source, row: int) -> float:
 def _keys_on(
     fcurve: bpy.types.FCurve, frames: np.ndarray
 ) -> tuple[list[bpy.types.Keyframe], np.ndarray] | tuple[None, None]:
-    """The keys on three frames, and frame and value of each (3, 2), if there are any and none between them."""
+    """Return the keys on three frames, and frame and value of each (3, 2), if there are any and none between them."""
     at, all_points = nearest_key(fcurve, frames[1])
     beside = slice(max(at - 1, 0), at + 2)
     points = all_points[beside].astype(np.float64)

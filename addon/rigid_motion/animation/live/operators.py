@@ -24,7 +24,7 @@ class Operators:
     """Whether what is set is set as a script does it: none runs, nor is one adjusted that goes on from what was."""
 
     def are_any(self, beginnings: tuple[str, ...]) -> bool:
-        """Whether the name of any begins so."""
+        """Return whether the name of any begins so."""
         return any(name.startswith(beginnings) for name in self.names)
 
 
@@ -36,7 +36,7 @@ class OperatorWatch:
         """The operator that had ended last, told from others of its kind, and its name."""
 
     def look(self) -> Operators:
-        """Those that are at work now, or ended since the last look."""
+        """Return those that are at work now, or ended since the last look."""
         manager = bpy.context.window_manager
         ended = manager.operators if manager is not None else ()
         last = (ended[-1].as_pointer(), ended[-1].bl_idname) if len(ended) else (0, "")

@@ -74,7 +74,7 @@ class _Reader:
 
 
 def _checked_size(channels: Channels) -> int | None:
-    """How many bytes a key takes: see `_Layout.size`."""
+    """Return how many bytes a key takes: see `_Layout.size`."""
     several = [keys for keys in channels if len(keys) > 1]
     if not several:
         return None
@@ -86,7 +86,7 @@ def _checked_size(channels: Channels) -> int | None:
 
 
 def _agrees(keys: bpy.types.bpy_prop_collection, size: int) -> bool:
-    """Whether memory has the same keys as Blender says, one behind the other and each of so many bytes."""
+    """Return whether memory has the same keys as Blender says, one behind the other and each of so many bytes."""
     count, first = len(keys), keys[0].as_pointer()
     if size < 4 * NUMBERS or size % 4 or keys[count - 1].as_pointer() - first != size * (count - 1):
         return False
@@ -100,7 +100,7 @@ def _agrees(keys: bpy.types.bpy_prop_collection, size: int) -> bool:
 
 
 def _by_property(keys: bpy.types.bpy_prop_collection) -> bytes:
-    """All there is to keys, as Blender's own functions have it."""
+    """Return all there is to keys, as Blender's own functions have it."""
     result = []
     for name, (width, kind) in KEY_FIELDS.items():
         values = np.empty(len(keys) * width, kind)

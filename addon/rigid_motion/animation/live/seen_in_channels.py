@@ -91,7 +91,7 @@ class SeenInChannels:
 
 
 def is_baking() -> bool:
-    """Whether it is Blender's *Bake Action*, or an add-on by way of it, that has set the frame."""
+    """Return whether it is Blender's *Bake Action*, or an add-on by way of it, that has set the frame."""
     caller = inspect.currentframe()
     while caller is not None:
         if caller.f_code is bake_action_objects_iter.__code__:

@@ -101,26 +101,26 @@ class BoneTransform(Transform):
 
 
 def shows_differences(constraint: bpy.types.Constraint) -> bool:
-    """Whether a constraint is one that differences are shown by."""
+    """Return whether a constraint is one that differences are shown by."""
     return constraint.type == "ACTION" and constraint.name.startswith(CONSTRAINT) and constraint.use_eval_time
 
 
 @lru_cache(maxsize=65536)
 def prefix_of(name: str) -> str:
-    """How the data paths of a bone's properties begin, from its object."""
+    """Return how the data paths of a bone's properties begin, from its object."""
     return f'pose.bones["{bpy.utils.escape_identifier(name)}"].'
 
 
 @lru_cache(maxsize=65536)
 def split_path(path: str) -> tuple[str, str]:
-    """The prefix of a data path, "" where it is not that of a bone's property, and the rest of it."""
+    """Return the prefix of a data path, "" where it is not that of a bone's property, and the rest of it."""
     result = _BONE.match(path)
     return (result[0], path[result.end() :]) if result else ("", path)
 
 
 @lru_cache(maxsize=65536)
 def bone_name(prefix: str) -> str:
-    """The name of the bone that data paths which begin so speak of."""
+    """Return the name of the bone that data paths which begin so speak of."""
     result = _BONE.fullmatch(prefix)
     return "" if result is None else bpy.utils.unescape_identifier(result[1])
 

@@ -15,7 +15,7 @@ muted, has other settings, comes behind another constraint, or has an influence 
 
 
 def trouble_of(user: Transform, place: SlotTransform) -> str:
-    """What is amiss with the constraint by which a bone shows the differences of a slot, "" where nothing is.
+    """Return what is amiss with the constraint by which a bone shows the differences of a slot, "" where nothing is.
 
     An influence that is animated or driven is meant so.
     """
