@@ -72,7 +72,7 @@ class Take:
             keys.append((frames[rows], poses[rows]))
 
     def _kept(self, frames: np.ndarray, values: Values) -> list[np.ndarray]:
-        """The samples that are keys, of each channel."""
+        """Return the samples that are keys, of each channel."""
         if self._tolerance is None or len(frames) < 3:
             return [np.arange(len(frames))] * len(values.prefixes)
         poses, parents, unit = self.driver.locals(values)
@@ -106,7 +106,9 @@ class Take:
 
 
 def _of_all(keys: list[tuple[np.ndarray, Poses]]) -> tuple[np.ndarray, Poses]:
-    """The keys of stretches as one; a single one where nothing moves. Where stretches meet both have the same."""
+    """Return the keys of stretches as one; a single one where nothing moves.
+    Where stretches meet both have the same.
+    """
     frames, once = np.unique(np.concatenate([frames for frames, _ in keys]), return_index=True)
     poses = joined([poses for _, poses in keys])[once]
     positions, quaternions = poses.positions, align_signs(poses.quaternions)

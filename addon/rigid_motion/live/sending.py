@@ -58,7 +58,7 @@ class Sending:
 
 
 def _bones(obj: bpy.types.Object) -> Poses:
-    """Where the bones of a rig are in the world, in the order of its armature."""
+    """Return where the bones of a rig are in the world, in the order of its armature."""
     matrices = np.array([obj.pose.bones[bone.name].matrix for bone in obj.data.bones])
     return unscaled(np.array(obj.matrix_world) @ matrices)
 
@@ -67,7 +67,7 @@ running: Ticking[Sending] = Ticking("What is selected cannot be sent")
 
 
 def sending() -> Sending | None:
-    """What is sent, if anything is."""
+    """Return what is sent, if anything is."""
     return running.thing
 
 

@@ -63,7 +63,7 @@ class Ticking(Generic[Ticked]):
                 bpy.app.timers.unregister(self._timer)
 
     def look(self) -> float | None:
-        """What the timer calls: one tick, and after how many seconds there is another."""
+        """Return what the timer calls: one tick, and after how many seconds there is another."""
         if self.thing is None:
             return None
         try:
