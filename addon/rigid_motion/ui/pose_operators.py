@@ -26,7 +26,7 @@ SAME = 1e-6
 
 
 def is_elsewhere(transform: Transform) -> bool:
-    """Whether something is seen elsewhere than its channels have it."""
+    """Return whether something is seen elsewhere than its channels have it."""
     try:
         seen = shown_components(transform)
     except Refused:

@@ -17,13 +17,15 @@ DEFAULT_MODE = "motor_spline"
 
 
 def preferences() -> RigidMotionPreferences | None:
-    """The preferences, None while the package is registered without being an extension, as in tests of a checkout."""
+    """Return the preferences, None while the package is registered without being an extension,
+    as in tests of a checkout.
+    """
     addon = bpy.context.preferences.addons.get(EXTENSION)
     return addon.preferences if addon is not None else None
 
 
 def default_mode() -> str:
-    """The mode to take where nobody named one."""
+    """Return the mode to take where nobody named one."""
     chosen = preferences()
     return chosen.default_mode if chosen is not None else DEFAULT_MODE
 

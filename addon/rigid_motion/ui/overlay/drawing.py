@@ -48,7 +48,7 @@ MOST_VIEWS = 24
 
 @functools.cache
 def _dot_shader() -> gpu.types.GPUShader:
-    """Round dots with an outline. Those of Blender are square."""
+    """Return the shader of round dots with an outline. Those of Blender are square."""
     info = gpu.types.GPUShaderCreateInfo()
     info.push_constant("MAT4", "ModelViewProjectionMatrix")
     info.push_constant("VEC4", "color")
@@ -117,7 +117,7 @@ class _Batches:
         )
 
     def readable(self, pen: _Pen, *, every_tick: bool) -> Readable:
-        """What of the path can be told apart in the view that is being drawn."""
+        """Return what of the path can be told apart in the view that is being drawn."""
         projection = np.array(gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix())
         view = projection.tobytes(), pen.size, pen.scale, every_tick
         if view not in self.views:
@@ -127,12 +127,12 @@ class _Batches:
         return self.views[view]
 
     def ticks(self, name: str, chosen: np.ndarray) -> Batch:
-        """Some of the ticks that the path has by this name."""
+        """Return some of the ticks that the path has by this name."""
         (batch,) = self._of_view(name, chosen, lambda: (_batch("POINTS", getattr(self.path, name)[chosen]),))
         return batch
 
     def axes(self, chosen: np.ndarray) -> tuple[Batch, ...]:
-        """Some of the axes: x, y, z."""
+        """Return some of the axes: x, y, z."""
         axes = self.path.axes
         return self._of_view(
             "axes", chosen, lambda: tuple(_batch("LINES", axes[chosen, axis].reshape(-1, 3)) for axis in range(3))

@@ -46,7 +46,7 @@ class Readable:
 def readable(
     path: Path, projection: np.ndarray, size: tuple[float, float], scale: float = 1.0, *, every_tick: bool = False
 ) -> Readable:
-    """What of a path can be told apart in a view.
+    """Return what of a path can be told apart in a view.
 
     Parameters
     ----------
@@ -81,14 +81,16 @@ def readable(
 
 
 def on_screen(points: np.ndarray, projection: np.ndarray, size: tuple[float, float]) -> np.ndarray:
-    """Where points (n, 3) are in a view, in pixels, shape (n, 2). Not a number behind the viewer."""
+    """Return where points (n, 3) are in a view, in pixels, shape (n, 2). Not a number behind the viewer."""
     clip = points @ projection[:, :3].T + projection[:, 3]
     depth = np.where(clip[:, 3] > 0.0, clip[:, 3], np.nan)
     return 0.5 * (clip[:, :2] / depth[:, None] + 1.0) * size
 
 
 def _step(pixels: np.ndarray, gap: float) -> int:
-    """The first of 1, 2, 5, 10... points (n, 2) after which a path has usually gone as far as the gap, 0 for none."""
+    """Return the first of 1, 2, 5, 10... points (n, 2) after which a path has usually gone as far as
+    the gap, 0 for none.
+    """
     for step in STEPS:
         across, up = (pixels[step::step] - pixels[:-step:step]).T
         moved = np.sort(np.hypot(across, up))
@@ -101,7 +103,7 @@ def _step(pixels: np.ndarray, gap: float) -> int:
 
 
 def _spaced(pixels: np.ndarray, step: int, keys: np.ndarray, clear: float, frames: np.ndarray) -> np.ndarray:
-    """Which of these points (n, 2) are on multiples of the step, and clear of one another and of keys (k, 2)."""
+    """Return which of these points (n, 2) are on multiples of the step, and clear of one another and of keys (k, 2)."""
     chosen = np.zeros(len(pixels), dtype=bool)
     if not step:
         return chosen
