@@ -92,7 +92,7 @@ def _blender_ext(*arguments: str) -> None:
 
 
 def _repack(built: Path, package: Path) -> None:
-    """The same files in order of their names, with one time and one mode: what a file system adds is left out."""
+    """Write the same files in order of their names, with one time and one mode: what a file system adds is left out."""
     with (
         zipfile.ZipFile(built) as source,
         zipfile.ZipFile(package, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as target,

@@ -61,7 +61,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _parse(arguments: list[str]) -> tuple[argparse.Namespace, list[str]]:
-    """The options of the bundle, and the arguments of the comparison."""
+    """Return the options of the bundle, and the arguments of the comparison."""
     usage = "%(prog)s [-h] [--bundle FOLDER] [--parts N] [options of compare.py] [INPUT ...]"
     parser = parser_of(SCRIPT, __doc__, EPILOG, usage=usage, allow_abbrev=False)
     parser.add_argument(

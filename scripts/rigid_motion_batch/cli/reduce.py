@@ -126,7 +126,7 @@ exit code:
 
 
 def parse(arguments: list[str]) -> argparse.Namespace:
-    """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
+    """Return the options; a wrong one ends the program with code 2 and a line that says what is wrong."""
     parser = parser_of(SCRIPT, __doc__, EPILOG)
     parser.add_argument(
         "inputs",
@@ -245,7 +245,8 @@ class Reduce(Work):
 
 
 def _planned(options: argparse.Namespace) -> list[Job]:
-    """What is to be done: a body of a file is a recording, and so is a glTF file of which a .blend file is to be made.
+    """Return what is to be done: a body of a file is a recording,
+    and so is a glTF file of which a .blend file is to be made.
 
     An FBX file is none where it becomes a GLB file with all that is in it.
     """
