@@ -44,5 +44,5 @@ class Writing:
 
 
 def name_of(file: Path, body: str | None) -> str:
-    """What the files of a body are called: as the recording, and where the body was named, as that too."""
+    """Return what the files of a body are called: as the recording, and where the body was named, as that too."""
     return "-".join([file.stem, *(folder_names([body]) if body else [])])

@@ -81,7 +81,7 @@ class Work(ABC):
         """Do one input, and write what comes of it."""
 
     def task(self, job: Job) -> steps.Task:
-        """What has the key of a result: the input, these options, the version of the program and of Blender."""
+        """Return what has the key of a result: the input, these options, the version of the program and of Blender."""
         blender = ""
         if self.needs_blender(job):
             import bpy
@@ -137,7 +137,7 @@ class Outcome:
 
     @property
     def is_whole(self) -> bool:
-        """Whether something was written, and nothing is left to be done."""
+        """Return whether something was written, and nothing is left to be done."""
         return bool(self.written) and not (self.failed or self.refused or self.incomplete)
 
 
@@ -252,7 +252,7 @@ class _Session:
                 self._outcomes[place] = outcome
 
     def unmatched(self) -> set[str]:
-        """The names and patterns that were asked for, and that nothing has."""
+        """Return the names and patterns that were asked for, and that nothing has."""
         outcomes = self._outcomes.values()
         seen = any(not one.failed for one in outcomes)
         return set(self._work.objects or ()).difference(*(one.matched for one in outcomes)) if seen else set()
@@ -314,7 +314,7 @@ def _record_of(work: Work, job: Job) -> Record:
 
 
 def _inputs(job: Job) -> tuple[steps.Input, ...]:
-    """The file of an input as it is now; none where that is no file, or is to be replaced."""
+    """Return the file of an input as it is now; none where that is no file, or is to be replaced."""
     try:
         if job.in_place or not job.file.is_file():
             return ()
@@ -325,7 +325,7 @@ def _inputs(job: Job) -> tuple[steps.Input, ...]:
 
 
 def _executor(workers: int | None, count: int) -> Executor:
-    """Who does so many inputs. Raises ExecutorError where there cannot be that many processes."""
+    """Return the executor of so many inputs. Raises ExecutorError where there cannot be that many processes."""
     if workers == 0 or (workers is None and count == 1):
         return Executor()
     try:
@@ -340,7 +340,7 @@ def _executor(workers: int | None, count: int) -> Executor:
 
 
 def _summary(outcomes: Sequence[Outcome], count: int, work: Work, *, interrupted: bool) -> str:
-    """What came of it all, in a line."""
+    """Return what came of it all, in a line."""
     would = "to be " if work.dry_run else ""
     objects, bones, clips = (sum(getattr(one, what) for one in outcomes) for what in ("objects", "bones", "clips"))
     refused = sum(one.refused for one in outcomes)
@@ -361,7 +361,7 @@ def _summary(outcomes: Sequence[Outcome], count: int, work: Work, *, interrupted
 
 
 def counted(count: int, what: str) -> str:
-    """How many there are of something, "1 bone" or "24 bones"."""
+    """Return how many there are of something, "1 bone" or "24 bones"."""
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
@@ -374,7 +374,7 @@ def tell_failure(note: Note, title: object, error: Exception) -> None:
 
 @contextmanager
 def _extension() -> Iterator[None]:
-    """What the extension keeps in files and follows, from this checkout, in place of one that is installed."""
+    """Use what the extension keeps in files and follows from this checkout, in place of one that is installed."""
     import addon_utils
     import bpy
 

@@ -33,7 +33,9 @@ class Wishes:
 
 
 def doubt(size: float, tolerance: Tolerance | None, per_unit: float) -> str:
-    """What to think of where a tolerance is in metres, and a body of this size in metres hardly is; mostly nothing."""
+    """Return what to think of where a tolerance is in metres, and a body of this size in metres hardly is;
+    mostly nothing.
+    """
     name, length = unit_of(size)
     if tolerance is None or not tolerance.is_length or length == 1.0:
         return ""
@@ -42,12 +44,12 @@ def doubt(size: float, tolerance: Tolerance | None, per_unit: float) -> str:
 
 
 def fewer(before: int, after: int) -> str:
-    """How many keys became how many."""
+    """Return how many keys became how many."""
     return f", {before} -> {after} keys"
 
 
 def off(tolerance: Tolerance, metres: float, per_unit: float, *, by_number: bool) -> str:
-    """How far off that is, in the unit of the tolerance, which is of so many metres where it says none."""
+    """Return how far off that is, in the unit of the tolerance, which is of so many metres where it says none."""
     if by_number:
         return f", {tolerance.alike(metres, per_unit)} off at most"
     allowed = tolerance.alike(tolerance.metres(per_unit), per_unit)
