@@ -45,13 +45,13 @@ class Moving(Protocol):
 
     @property
     def middle(self) -> np.ndarray:
-        """What may be followed, shape (n, 3)."""
+        """The places that may be followed, shape (n, 3)."""
 
     def around(self, focus: np.ndarray) -> np.ndarray:
-        """Its outermost points at every moment, from the focus (n, 3) on: shape (k, 3)."""
+        """Return its outermost points at every moment, from the focus (n, 3) on: shape (k, 3)."""
 
     def heading(self, focus: np.ndarray) -> float:
-        """The yaw in radians from which it is seen well."""
+        """Return the yaw in radians from which it is seen well."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ class Solid:
         return layout.swept_points(poses, self.outline)
 
     def heading(self, focus: np.ndarray) -> float:
-        """From its broad side."""
+        """Return the yaw in radians from its broad side."""
         return layout.heading(self.around(focus))
 
 
@@ -98,7 +98,9 @@ class Jointed:
         return (self.places - focus[:, None]).reshape(-1, 3)
 
     def heading(self, focus: np.ndarray) -> float:
-        """Of a walk that goes to the right and a little towards the camera; from the broad side of what stays."""
+        """Return the yaw in radians of a walk that goes to the right and a little towards the camera; from the broad
+        side of what stays.
+        """
         middle = self.middle
         gone = middle[-1, :2] - middle[0, :2]
         tall = float(np.ptp(self.places[..., 2], axis=1).max())
@@ -143,7 +145,7 @@ class Framing:
     follows: bool
 
     def extent(self, recording: Moving, shown: Sequence[Moving] = ()) -> Extent:
-        """What a recording reaches, and others beside it as far as they do not make it small."""
+        """Return what a recording reaches, and others beside it as far as they do not make it small."""
         turn = layout.yaw_quaternion(self.yaw)
         seen = [layout.project(rotate(turn, moving.around(self.focus))) for moving in (recording, *shown)]
         lows, highs = (np.array([edge(points, axis=0) for points in seen]) for edge in (np.min, np.max))
@@ -154,7 +156,9 @@ class Framing:
 
     @classmethod
     def of(cls, recording: Moving, smoothing: float) -> Framing:
-        """What shows a recording well. `smoothing` is `SMOOTHING` in moments of it, or less where that shows more."""
+        """Return what shows a recording well. `smoothing` is `SMOOTHING` in moments of it,
+        or less where that shows more.
+        """
         still = cls._facing(recording, np.zeros_like(recording.middle), follows=False)
         closest = cls(recording.middle, still.yaw, follows=True)._width(recording)
         if still._width(recording) <= FOLLOW_GAIN * closest:
@@ -170,12 +174,14 @@ class Framing:
         return cls(focus, recording.heading(focus), follows)
 
     def _width(self, recording: Moving) -> float:
-        """The side of a square as large as what is seen."""
+        """Return the side of a square as large as what is seen."""
         return float(np.sqrt(self.extent(recording).size.prod()))
 
 
 def _smoothed(path: np.ndarray, deviation: float) -> np.ndarray:
-    """A path (n, 3) smoothed by a bell whose standard deviation is so many samples. It begins and ends where it did."""
+    """Return a path (n, 3) smoothed by a bell whose standard deviation is so many samples.
+    It begins and ends where it did.
+    """
     reach = int(np.ceil(3.0 * deviation))
     bell = np.exp(-0.5 * (np.arange(-reach, reach + 1) / max(deviation, 1e-9)) ** 2)
     extended = np.pad(path, ((reach, reach), (0, 0)), mode="reflect", reflect_type="odd")

@@ -15,13 +15,13 @@ GHOST = 0.5
 
 
 def ghost(theme: Theme) -> bpy.types.Material:
-    """What the recording is made of: between its colour and that of the card, as if it were translucent."""
+    """Return what the recording is made of: between its colour and that of the card, as if it were translucent."""
     colours = zip(linear(theme.ghost), linear(theme.card), strict=True)
     return _lit("Recording", tuple(GHOST * ghost + (1.0 - GHOST) * card for ghost, card in colours))
 
 
 def surface(name: str, colour: str, *, alpha: float = 1.0, roughness: float = 0.4) -> bpy.types.Material:
-    """A lit surface, translucent where alpha is below 1."""
+    """Return a lit surface, translucent where alpha is below 1."""
     return _lit(name, linear(colour), alpha, roughness)
 
 
@@ -41,7 +41,7 @@ def _lit(name: str, rgb: tuple[float, ...], alpha: float = 1.0, roughness: float
 
 
 def ink(name: str, colour: str) -> bpy.types.Material:
-    """A flat colour that no light changes, for what is read rather than seen."""
+    """Return a flat colour that no light changes, for what is read rather than seen."""
     material, nodes, output = _new(name)
     rgb = linear(colour)
     material.diffuse_color = (*(max(0.0, (value - GLOSS) / BOUNCE) for value in rgb), 1.0)

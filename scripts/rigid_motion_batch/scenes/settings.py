@@ -77,7 +77,7 @@ class SubjectError(ValueError):
 
 
 def place_of_subject(requested: str) -> tuple[Path, str]:
-    """The file that an object is in, whether or not it is there, and its name in that.
+    """Return the file that an object is in, whether or not it is there, and its name in that.
 
     Parameters
     ----------
