@@ -213,13 +213,13 @@ def _receive(pipe: Connection, times: np.ndarray, answers: bool) -> None:
 
 
 def even_rate(times: np.ndarray) -> float | None:
-    """Samples a second, where they are even."""
+    """Return samples a second, where they are even."""
     rate = 1.0 / float(np.median(np.diff(times)))
     return float(round(rate)) if abs(rate - round(rate)) < 0.01 else None
 
 
 def straight(times: np.ndarray, poses: Poses) -> Path:
-    """Samples (joints, n) with the straight way between them."""
+    """Return samples (joints, n) with the straight way between them."""
     still = np.zeros((poses.shape[0], 3))
     return Path(times, poses.positions.swapaxes(0, 1), poses.quaternions.swapaxes(0, 1), still, still)
 

@@ -65,7 +65,7 @@ class Udp:
             datagrams.append(datagram)
 
     def awaited(self, seconds: float) -> list[bytes]:
-        """What came, or comes within so many seconds: one datagram."""
+        """Return what came, or comes within so many seconds: one datagram."""
         if not select.select([self._socket], [], [], seconds)[0]:
             return []
         datagram, sender = self._socket.recvfrom(LONGEST)
