@@ -53,7 +53,7 @@ TURN_AXIS_ITEMS = [
     ("Y", "Y", "Always about the local Y axis"),
     ("Z", "Z", "Always about the local Z axis"),
 ]
-"""What turns are about."""
+"""The axes that turns are about."""
 
 
 def _on_turns_axis(record: SlotRecord, _context: bpy.types.Context) -> None:

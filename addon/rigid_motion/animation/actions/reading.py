@@ -119,7 +119,7 @@ class _Keyed:
     user: Transform
 
     names: frozenset[str]
-    """Which of location, rotation and scale are keyed."""
+    """The parts of location, rotation and scale that are keyed."""
 
     channels: dict[int, bpy.types.FCurve]
     """The channels with keys, by the rows of their components."""

@@ -187,7 +187,8 @@ def record_of(place: SlotTransform) -> bpy.types.PropertyGroup | None:
 
 
 _numbers: dict[str, int] = {}
-"""Where records were found last, by their names: a rig has many, and Blender goes through all of them for a name."""
+"""The places where records were found last, by their names: a rig has many,
+and Blender goes through all of them for a name."""
 
 
 def _key(slot: Slot, prefix: str) -> str:

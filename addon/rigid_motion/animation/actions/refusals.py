@@ -30,7 +30,7 @@ COMPONENTS = (
     *(n_("Rotation W"), n_("Rotation X"), n_("Rotation Y"), n_("Rotation Z")),
     *(n_("Scale X"), n_("Scale Y"), n_("Scale Z")),
 )
-"""What the rows of a source are called."""
+"""Names of the rows of a source."""
 
 CHANNELS = {
     "location": n_("Location"),
@@ -65,7 +65,7 @@ KEY = n_("key {number} of {channel}")
 LEFT_HANDLE = n_("left handle of key {number} of {channel}")
 RIGHT_HANDLE = n_("right handle of key {number} of {channel}")
 EASING = n_("easing of key {number} of {channel}")
-"""What keys are made of, channels and keys first."""
+"""The parts that keys are made of, channels and keys first."""
 
 NOT_FINITE = n_("{name}: {key} is not a finite number: delete it (Dope Sheet, X)")
 BAD_FRAME = n_(

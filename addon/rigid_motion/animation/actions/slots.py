@@ -76,7 +76,7 @@ class SlotTransform:
     """From the user to what is moved, in data paths: none for the user itself."""
 
     channelbag: bpy.types.ActionChannelbag | None
-    """Where the F-curves of the slot are."""
+    """The channelbag with the F-curves of the slot."""
 
     users: tuple[Transform, ...]
     find: Callable[[], Mapping[str, Curves]]
@@ -187,7 +187,7 @@ def _curves_under(channelbag: bpy.types.ActionChannelbag | None, prefixes: Itera
 
 
 _TIMES = f'constraints["{CONSTRAINT}'
-"""How the paths of channels begin that say at what time constraints of ours are."""
+"""The beginning of the paths of channels that say at what time constraints of ours are."""
 
 
 def _users_of(slot: Slot, prefix: str) -> tuple[Transform, ...]:

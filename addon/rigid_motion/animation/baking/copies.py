@@ -11,7 +11,7 @@ from ..actions.slots import Slot, SlotTransform, counterpart_in, strips_of, tran
 from ..transforms import Transform, shows_differences
 
 BAKED, REDUCED = "BAKED", "REDUCED"
-"""What was done to the keys."""
+"""The change that was made to the keys."""
 
 
 def copied(slot: Slot, kind: str) -> bpy.types.Action:

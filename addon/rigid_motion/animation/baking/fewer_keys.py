@@ -46,13 +46,14 @@ class WholeRig:
     """On how many frames any of them has keys by now."""
 
     slide_before: float
-    """How far what stands on the ground slid there as it was recorded, in the scene's units."""
+    """The distance that what stands on the ground slid there as it was recorded, in the scene's units."""
 
     slide_after: float
-    """How far it does now."""
+    """The distance that it slides now."""
 
     largest_error: float = 0.0
-    """Of all bones that the tolerance is promised for, those without keys among them, in the scene's units."""
+    """The largest error of all bones that the tolerance is promised for, those without keys among them,
+    in the scene's units."""
 
     not_promised: NotPromised = ALL_PROMISED
     """The bones that it is not promised for."""
@@ -68,10 +69,10 @@ class FewerKeys:
     """Shape (k,)."""
 
     values: dict[Channel, np.ndarray]
-    """What is written on these frames, by data path and index, each of shape (k,)."""
+    """Values that are written on these frames, by data path and index, each of shape (k,)."""
 
     key_frames: np.ndarray
-    """The same with frames of keys that a scale keeps, shape (n,)."""
+    """These frames and those of keys that a scale keeps, shape (n,)."""
 
     modes: np.ndarray
     """The numbers of the modes that go on from each of these, shape (n,)."""
@@ -82,10 +83,10 @@ class FewerKeys:
     """In the scene's units."""
 
     fewer: Source
-    """What it is to be, as a source."""
+    """The planned motion, as a source."""
 
     rig: WholeRig | None = None
-    """What became of the rig that it is a bone of."""
+    """The result for the rig that it is a bone of."""
 
     @classmethod
     def planned(

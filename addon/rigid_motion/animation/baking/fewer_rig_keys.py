@@ -52,16 +52,17 @@ NO_FEWER_POSES = n_(
 )
 
 HOLD = 4.0
-"""How many times the error counts of what stands on the ground."""
+"""The weight of the error of what stands on the ground."""
 
 SHARE = 0.5
-"""How much of the tolerance the keys of the rig itself may take, of what there is for the bones."""
+"""The part of the tolerance for the bones that the keys of the rig itself may take."""
 
 LEAST_SCALE = 1e-6
-"""What the search takes a scale of zero for."""
+"""The scale that the search takes for one of zero."""
 
 Plans = dict[Transform, "list[FewerKeys] | Refused"]
-"""What each bone is to have in each slot that moves it, or why it cannot have it; and rigs with keys of their own."""
+"""The keys that each bone is to have in each slot that moves it, or why it cannot have them;
+and rigs with keys of their own."""
 
 _Members = dict[Transform, tuple[SlotTransform, Source]]
 
@@ -141,7 +142,7 @@ class _Rig:
         samples = _united(map(samples_of, self.sources.values()))
         self.frames = seen_frames(samples, list(self.sources.values()))
         self.sampled = np.isin(self.frames, samples)
-        """Which moments keys may be on."""
+        """True for the moments that keys may be on."""
         slot: Slot = next(iter(self.places.values())).slot
         self.motion = RigMotion(rig, slot, self.sources, self.frames, radius)
         self.values = {

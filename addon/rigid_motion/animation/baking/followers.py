@@ -22,10 +22,10 @@ class NotPromised:
     """The bones that a tolerance is not promised for, by their names."""
 
     followers: tuple[str, ...] = ()
-    """Those that follow constraints or drivers."""
+    """Bones that follow constraints or drivers."""
 
     below: tuple[str, ...] = ()
-    """Those that hang on these."""
+    """Bones that hang on these."""
 
     def __bool__(self) -> bool:
         return bool(self.followers)

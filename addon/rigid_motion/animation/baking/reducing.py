@@ -48,7 +48,7 @@ HAS_KEYS = (
     n_("{name} has {count} key of location, rotation or scale"),
     n_("{name} has {count} keys of location, rotation or scale"),
 )
-"""How something begins that has hardly a key, by the number of these."""
+"""The first words on something that has hardly a key, by the number of its keys."""
 
 SIMULATED = n_("{has}, a simulation moves it: bake that first (Object > Rigid Body > Bake to Keyframes)")
 SOLVED_CAMERA = n_(
@@ -75,10 +75,10 @@ class Reduction:
     """In the scene's units; of a rig the largest of all its bones, with and without keys, but for `not_promised`."""
 
     segments: dict[str, int]
-    """How many segments each mode has by now."""
+    """The number of segments that each mode has by now."""
 
     rig: WholeRig | None = None
-    """What became of the rig, where it is a bone's."""
+    """The result for the rig, where it is a bone's."""
 
     channel_keys: tuple[int, int] = (0, 0)
     """The keys of all channels together, before and after. There may be more: a pose has all channels."""

@@ -62,7 +62,7 @@ class RigMotion:
             for number, transform in enumerate(self.transforms)
         ]
         self.poses = [poses for poses, _ in result]
-        """Of each bone's channels, each of shape (m,)."""
+        """Poses of each bone's channels, each of shape (m,)."""
         self._channels = AffineMaps(
             np.stack([maps.axes for _, maps in result]), np.stack([maps.origins for _, maps in result])
         )
@@ -70,16 +70,16 @@ class RigMotion:
         self._posed = self.hierarchy.posed(self._channels)
         recorded = self._posed.copy()
         self.world = self.carried_by(keyed.get(""))
-        """Where the rig is, shape (m,) or (1,)."""
+        """The place of the rig, shape (m,) or (1,)."""
         self._carried = self.world
         self.truth = self.world @ recorded
-        """Where the bones are in the scene, shape (bones, m)."""
+        """The places of the bones in the scene, shape (bones, m)."""
         self.unit = float(np.linalg.norm(self.world.axes, 2, axis=(-2, -1)).max()) or 1.0
-        """How long the rig's unit of length is in the scene, at most."""
+        """The length of the rig's unit of length in the scene, at most."""
         sizes = np.sqrt(np.einsum("...ij,...ij->...j", recorded.axes, recorded.axes).max(axis=-1))
         away = np.linalg.norm(recorded.origins, axis=-1) + self.radii[:, None] * sizes
         self.extent = float(away.max())
-        """How far any bone's ball gets from the rig's origin, in its unit."""
+        """The distance that any bone's ball gets from the rig's origin, in its unit."""
         self.rounding = SMALLEST * self.unit * self.extent
 
     def carried_by(self, source: Source | None) -> AffineMaps:

@@ -26,10 +26,10 @@ class Samples(dict[int, np.ndarray]):
     """
 
     rate = 1
-    """How many there are in a frame."""
+    """The number of samples in a frame."""
 
     error = 0.0
-    """How far a body is off between them at most, where that was asked for: see `largest_errors`."""
+    """The largest error of a body between them, where that was asked for: see `largest_errors`."""
 
 
 def largest_errors(

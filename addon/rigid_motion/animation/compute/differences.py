@@ -60,10 +60,10 @@ class InBetweens:
     """Shape (m,)."""
 
     native: Poses
-    """What Blender's own in-betweens make of the keys, shape (m,)."""
+    """Poses that Blender's own in-betweens make of the keys, shape (m,)."""
 
     desired: Poses
-    """What the modes make of them, shape (m,)."""
+    """Poses that the modes make of them, shape (m,)."""
 
 
 def in_betweens(
@@ -274,7 +274,7 @@ def _move(
 
 
 Weights = tuple[np.ndarray, np.ndarray]
-"""What `progress_weights` returns."""
+"""The result of `progress_weights`."""
 
 
 def _segments(sources: Sequence[Source]) -> list[tuple[Source, slice]]:

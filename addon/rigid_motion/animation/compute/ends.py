@@ -46,19 +46,19 @@ class Ends:
     """For smooth modes frames and poses of the keys before and behind as well, shape (S, 4)."""
 
     turning: Turning | None = None
-    """How they turn, None where all of them go the shortest way."""
+    """The turning of the segments, None where all of them go the shortest way."""
 
     whole: Turning | None = None
-    """The same in whole turns alone, for smooth modes."""
+    """The turning in whole turns alone, for smooth modes."""
 
     spins: np.ndarray | None = None
     """For smooth modes what spins add at both ends of the three segments around, shape (3, 2, S, 3)."""
 
     tangents: np.ndarray | None = None
-    """How long the tangents of smooth modes are at both keys, shape (2, S); None where all are 1."""
+    """The lengths of the tangents of smooth modes at both keys, shape (2, S); None where all are 1."""
 
     prepared: dict[str, Callable[..., Poses]] = field(default_factory=dict)
-    """What each mode makes of all segments, once it has been asked for."""
+    """The poses that each mode makes of all segments, once it has been asked for."""
 
     @classmethod
     def of(cls, start: np.ndarray, end: np.ndarray, segments: list[tuple[Source, slice]], smooth: np.ndarray) -> Ends:

@@ -18,14 +18,14 @@ class Need(NamedTuple):
     """How exact a motion is to be between its samples."""
 
     tolerance: float
-    """How far off it may be, in the units of its channels; infinite where that does not matter."""
+    """The largest error allowed, in the units of its channels; infinite where that does not matter."""
 
     reach: float
-    """How far the body reaches from its origin, in the same."""
+    """The distance that the body reaches from its origin, in the same units."""
 
     fewest: int = 1
     most: int = MOST_SAMPLES
-    """How many samples a frame there may be."""
+    """The largest number of samples a frame."""
 
 
 def sampled(

@@ -10,7 +10,7 @@ from .components import PART_OF, REST, ROTATION
 from .sources import Source
 
 NOTHING = 1e-9
-"""What a component varies by that is always the same but for rounding errors."""
+"""A component that varies by less is always the same but for rounding errors."""
 
 
 def kept_rows(sources: Sequence[Source], first: np.ndarray, ranges: np.ndarray) -> list[list[int]]:

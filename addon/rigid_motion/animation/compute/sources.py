@@ -34,7 +34,7 @@ UNKNOWN = -1
 """The mode of something from a file that is damaged, or of a later version."""
 
 LAYOUT = b"3"
-"""How in-betweens are laid out in F-curves. With another number, those of older files are made anew."""
+"""The layout of in-betweens in F-curves. With another number, those of older files are made anew."""
 
 FULL_TURN = 2.0 * np.pi
 
@@ -42,13 +42,13 @@ HALF_TURN = np.pi - 1e-4
 """Half a turn between two keys by angles, of which single precision has lost a little."""
 
 WHOLE_TURN = 1e-5
-"""What turns of the channel differ by from whole ones for rounding."""
+"""Turns of the channel that differ by less from whole ones do so for rounding."""
 
 SCREW_AXIS = "SCREW"
 """Turns are about the axis that a segment turns about anyway, and the local Z axis where it does not turn."""
 
 TURN_AXES = (SCREW_AXIS, "X", "Y", "Z")
-"""What turns are about: the axis of the segment's screw, or always the same local axis."""
+"""The axes that turns are about: that of the segment's screw, or always the same local axis."""
 
 SAME_FRAME = 0.01
 """Keys closer than this are one key to Blender, and here."""
@@ -75,7 +75,7 @@ class Source:
     """The order of Euler angles, or None for quaternions."""
 
     keyed: frozenset[str]
-    """Which of location, rotation and scale are keyed, in one of their components at least."""
+    """The parts of location, rotation and scale that are keyed, in one of their components at least."""
 
     channels: tuple[tuple[list[int], Keys], ...]
     """The channels with keys, those together that are keyed together: their rows among the components, and keys."""
@@ -99,7 +99,7 @@ class Source:
     """The axes that location runs along, as columns (3, 3) in those of the body at rest; None where they are one."""
 
     in_nla: bool = False
-    """Whether there are NLA strips beside it, which Blender blends with the defaults of what it does not key."""
+    """True if there are NLA strips beside it, which Blender blends with the defaults of what it does not key."""
 
     seen: tuple[int, int] | None = None
     """First and last frame that are seen of it, in scenes and strips."""
@@ -114,7 +114,7 @@ class Source:
     """Frames, and the influence that a strip with nothing below it has on them; None where that is full."""
 
     is_on_top: bool = False
-    """Whether differences come on top of the original one, and not in its place."""
+    """True if differences come on top of the original one, and not in its place."""
 
     shaping: np.ndarray | None = None
     """The frames of the keys that segments run between, where others are `passed`; None where all are."""

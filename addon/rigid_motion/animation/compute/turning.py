@@ -37,17 +37,17 @@ class Turning:
     spins: Spins
 
     by_angles: Spins
-    """Those of them that the angles of the channels make by themselves."""
+    """Spins that the angles of the channels make by themselves."""
 
     first: np.ndarray
     """The quaternions of the first keys, shape (S, 4)."""
 
     second: np.ndarray
-    """Where segments turn to without spins, in the sign that says which way round: the second keys, but for what is not
-    whole of the spins, shape (S, 4)."""
+    """The rotations that segments turn to without spins, in the sign that says which way round: the second keys, but
+    for what is not whole of the spins, shape (S, 4)."""
 
     turn: np.ndarray
-    """That rotation as a vector along the axes of the body, shape (3, S)."""
+    """The rotation there as a vector along the axes of the body, shape (3, S)."""
 
     @cached_property
     def twists(self) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 from .keys import Keys
 
 MAX_COPIES = 2**22
-"""Of key times that `cyclic_times` returns."""
+"""The largest number of key times that `cyclic_times` returns."""
 
 
 class TooManyRounds(ValueError):

@@ -32,13 +32,13 @@ class Group:
     """Spans of the first of the curves, shape (s,)."""
 
     counts: np.ndarray
-    """How many of the frames, one after the other, fall into each, shape (s,)."""
+    """The number of frames, one after the other, that fall into each, shape (s,)."""
 
     order: np.ndarray | None
-    """Where the frames belong in the result, shape (m,). None: where they are."""
+    """The places of the frames in the result, shape (m,). None: those that they have."""
 
     offsets: np.ndarray | None
-    """What cycles add to each curve, in the order of the result, shape (c, m). None: nothing."""
+    """Values that cycles add to each curve, in the order of the result, shape (c, m). None: nothing."""
 
     def chunks(self, size: int) -> Iterator[tuple[slice, Group]]:
         """Yield this group with about `size` of the curves at a time, and which these are."""

@@ -8,7 +8,7 @@ NEWTON_TOLERANCE = 1e-5
 """Last step of Newton's method: the error left is about its square."""
 
 NEWTON_STEPS = 4
-"""How many steps Newton's method takes before bisection helps it."""
+"""The number of steps that Newton's method takes before bisection helps it."""
 
 BRACKETED_STEPS = 100
 """More than bisection alone takes to the last bit."""

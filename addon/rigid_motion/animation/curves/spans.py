@@ -26,7 +26,7 @@ class Spans:
     """The spans of C curves, one curve after the other: N in all."""
 
     first_curve: list[int]
-    """How many curves there are before those of each `Keys`."""
+    """The number of curves before those of each `Keys`."""
 
     first_span: np.ndarray
     """The first span of each curve, and the end, shape (C + 1,)."""
@@ -65,10 +65,10 @@ class Spans:
     """Curves that have keys so close together that a frame may be near to two, or out of order."""
 
     linear: bool
-    """Whether any curve goes on at its slope outside of its keys."""
+    """True if any curve goes on at its slope outside of its keys."""
 
     unit_elastic: bool
-    """Whether ELASTIC is worked out for a change of 1, see `evaluate`."""
+    """True if ELASTIC is worked out for a change of 1, see `evaluate`."""
 
     @classmethod
     @np.errstate(all="ignore")

@@ -19,7 +19,7 @@ from ..live import follower
 from ..transforms import Refused, Transform, transform_of
 
 Target = bpy.types.Object | bpy.types.PoseBone | Transform
-"""What to act on."""
+"""Something to act on."""
 
 Targets = Target | Iterable[Target]
 """One or several."""

@@ -40,7 +40,7 @@ BREAKDOWN, PUSH, RELAX = KINDS = ("BREAKDOWN", "PUSH", "RELAX")
 """From the key before to the key after; away from the in-between of the mode; towards it."""
 
 LIKE_BLENDER = "lerp_slerp"
-"""What Blender's Breakdowner does to location and quaternion."""
+"""The mode that does what Blender's Breakdowner does to location and quaternion."""
 
 
 def breakdown(
@@ -76,10 +76,10 @@ class _Between:
     place: SlotTransform
 
     source: Source
-    """What is keyed without this frame."""
+    """The keys without those of this frame."""
 
     frame: float
-    """Of the Action."""
+    """The frame of the Action."""
 
     ends: tuple[float, float]
     """The frames of the keys before and after."""
@@ -94,7 +94,7 @@ class _Between:
     """The keys of its channels as they were."""
 
     turns: KeyFields | None
-    """Those of its channel of turns, None where it has none."""
+    """The keys of its channel of turns, None where it has none."""
 
     @property
     def mode(self) -> str:

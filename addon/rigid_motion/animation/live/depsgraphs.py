@@ -12,7 +12,7 @@ import bpy
 from ..actions.slots import actions_of
 
 BlockKey = tuple[str, str | None]
-"""What a data-block is found by in the file: its name, and the file that it is linked from."""
+"""The key that a data-block is found by in the file: its name, and the file that it is linked from."""
 
 
 def key_of(block: bpy.types.ID) -> BlockKey:

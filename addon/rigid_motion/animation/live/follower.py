@@ -53,11 +53,11 @@ class Follower:
 
     def __init__(self) -> None:
         self.enabled = True
-        """Whether edits are followed at once."""
+        """True if edits are followed at once."""
         self.busy = False
-        """Whether the edits that Blender tells of are the extension's."""
+        """True if the edits that Blender tells of are the extension's."""
         self.drafts = False
-        """Whether large Actions may be edited in draft: see `writers.drafts`."""
+        """True if large Actions may be edited in draft: see `writers.drafts`."""
         self.operators = OperatorWatch()
         self.handlers = {
             "depsgraph_update_pre": self._handler(self.before_update),
@@ -75,7 +75,7 @@ class Follower:
     def begin_file(self) -> None:
         """Know nothing of the file that is open."""
         self.unseen = True
-        """Whether the file has yet to be looked through."""
+        """True if the file has yet to be looked through."""
         self.frame = 0.0
         """The frame that was last shown."""
         self.ranges: dict[int, tuple[int, int]] = {}
@@ -85,7 +85,7 @@ class Follower:
         self.followed: set[int] = set()
         """The Actions, by session id, that were followed before Blender evaluated them."""
         self.moved: set[Transform] = set()
-        """What these move."""
+        """Transforms that these move."""
         self.objects: set[int] = set()
         """The objects of which something was set before Blender evaluated them, by session id."""
         self.evaluated: set[int] = set()

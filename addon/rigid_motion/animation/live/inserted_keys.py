@@ -59,19 +59,19 @@ class _Posed:
     """How a transform was posed, without a key yet."""
 
     frame: float
-    """Of the scene."""
+    """The frame of the scene."""
 
     components: np.ndarray
     """Its properties, shape (10,)."""
 
     on_top: bool
-    """Whether the pose is that with the difference on top."""
+    """True if the pose is that with the difference on top."""
 
     is_whole: bool = False
-    """Whether a whole pose was put on it, which is meant as it is, and shown so."""
+    """True if a whole pose was put on it, which is meant as it is, and shown so."""
 
     is_shown: bool = True
-    """Whether it has been evaluated so."""
+    """True if it has been evaluated so."""
 
 
 @dataclass(frozen=True)
@@ -79,22 +79,22 @@ class _NewKey:
     """A key that was inserted on the frame that is shown."""
 
     user: Transform
-    """Of which it is, if it can be."""
+    """The user of which it is, if it can be."""
 
     posed: _Posed | None
-    """How that was posed on this frame."""
+    """The pose that the user had on this frame."""
 
     old: Source
-    """What was keyed without it."""
+    """The keys without it."""
 
     source: Source
-    """What is keyed by now."""
+    """The keys as they are now."""
 
     frame: float
-    """Of the Action."""
+    """The frame of the Action."""
 
     had: np.ndarray
-    """What the channels had there without it, shape (10,)."""
+    """Values of the channels there without it, shape (10,)."""
 
     @cached_property
     def numbers(self) -> dict[int, int]:
@@ -133,8 +133,8 @@ class InsertedKeys:
         """The keys that were inserted in each place, as each of its users may have them, while edits are looked at."""
         self._insertions: list[Insertion] = []
         self._inserted: OrderedDict[tuple[str, str], tuple[np.ndarray, bool, bool]] = OrderedDict()
-        """What undo and redo bring back is decided as it was: the components that there were, whether they were all of
-        the pose, and whether they were the in-between as it was, by the digests before and after."""
+        """Decisions to keep when undo and redo bring keys back: the components that there were, whether they were all
+        of the pose, and whether they were the in-between as it was, by the digests before and after."""
 
     def look_at(self, changes: Iterable[tuple[SlotTransform, str, Source]], frame: float) -> None:
         """Find the keys that were inserted on the frame that is shown, and what the channels of all had there.

@@ -28,7 +28,7 @@ class LeftInPlace:
 
     def __init__(self) -> None:
         self._set: dict[Transform, set[str]] = {}
-        """Which of location, rotation and scale were set and are not evaluated yet."""
+        """The parts of location, rotation and scale that were set and are not evaluated yet."""
 
     def notice_assignments(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
         """Keep what was set of an object and its bones since it was evaluated."""

@@ -102,7 +102,7 @@ ONE_AXIS = 1e-5
 """Radians off an axis, for rounding."""
 
 SAMPLES = 16
-"""Of each part of a segment, and of each turn in it, to see how far a motion turns."""
+"""Samples of each part of a segment, and of each turn in it, to see how far a motion turns."""
 
 
 def share_out_turns(

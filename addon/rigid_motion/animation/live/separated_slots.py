@@ -17,7 +17,7 @@ from ..actions.slots import Slot, is_time, strips_of, uses_of
 from ..transforms import bone_name, shows_differences, split_path
 
 SlotNames = dict[int, set[str]]
-"""Of each rig the names of the slots that have its keys, as last seen, by the rig's session id."""
+"""The names of the slots that have the keys of each rig, as last seen, by the rig's session id."""
 
 
 def notice_slots(slots: Iterable[Slot], names: SlotNames) -> None:

@@ -29,7 +29,7 @@ class Snapshots:
         self._slots: dict[tuple[int, int], _SlotSnapshot] = {}
         """By the Action's session id, and the slot's handle."""
         self._rigs: dict[int, tuple[_Dependencies, _Poses, float]] = {}
-        """Of each rig what all its bones depend on, what they were, and on which frame, by its session id."""
+        """For each rig what all its bones depend on, what they were, and on which frame, by its session id."""
 
     def clear(self) -> None:
         """Take all for changed the next time."""
@@ -128,10 +128,11 @@ class _SlotSnapshot:
 
 
 _COLUMNS = [(prop, index) for prop, width in WIDTHS.items() for index in range(width)]
-"""What the columns of `_Poses.numbers` are, but for the last one: the rotation mode."""
+"""Properties in the columns of `_Poses.numbers`, but for the last one: the rotation mode."""
 
 SAME_VALUE = 1e-6
-"""How far a property may be from its channel, relative to its value or absolute below 1: single precision."""
+"""The distance that a property may have from its channel, relative to its value or absolute below 1:
+single precision."""
 
 
 class _Poses:
@@ -196,7 +197,7 @@ class _Dependencies(NamedTuple):
     """The slots, and the strips that show them."""
 
     counts: list[int]
-    """How many users the Actions have, constraints among them. While these stay, so do those of the slots."""
+    """The number of users of each Action, constraints among them. While these stay, so do those of the slots."""
 
     users: list[tuple]
     """The users of each slot, and whether any of them has an NLA."""

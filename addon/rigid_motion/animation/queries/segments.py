@@ -26,7 +26,7 @@ NEAR_HALF_TURN = np.radians(170.0)
 """From here on a small change of a key may send a body that turns the shortest way round the other way."""
 
 NEAR = 1e-6
-"""What differs by less is the same."""
+"""Values that differ by less are the same."""
 
 SAME_VALUE = 1e-5
 """Values of properties that differ by less are the same but for single precision."""
@@ -61,16 +61,16 @@ class SegmentFacts:
     """From its first position to its last."""
 
     long_way: bool
-    """Whether Blender's own in-betweens turn by more than half a turn where the modes turn by less: of quaternions."""
+    """True if Blender's own in-betweens turn by more than half a turn where the modes turn by less: of quaternions."""
 
     is_sure: bool
-    """Whether the keys say which way round it turns, however near to half a turn: angles do."""
+    """True if the keys say which way round it turns, however near to half a turn: angles do."""
 
     two_axes: bool
-    """Whether two Euler angles go by more than half a turn, of which the larger one decides."""
+    """True if two Euler angles go by more than half a turn, of which the larger one decides."""
 
     scales_unevenly: bool
-    """Whether it changes a scale that the modes leave to Blender, one that is not the same along all axes."""
+    """True if it changes a scale that the modes leave to Blender, one that is not the same along all axes."""
 
 
 def frame_in_action(obj: bpy.types.Object, frame: float) -> float:

@@ -17,10 +17,11 @@ from ..compute.components import REST
 from .transform import OWN_WORDS, Channel, Transform, channels_under
 
 CONSTRAINT = "Rigid Motion"
-"""What the constraint is called, and what its name begins with where Actions of one rig need one each."""
+"""The name of the constraint, and the beginning of its name where Actions of one rig need one each."""
 
 NEAR = 1e-4
-"""What matrices of bones differ by that are the same, having been through the space of the rig in single precision."""
+"""Matrices of bones that differ by less are the same,
+having been through the space of the rig in single precision."""
 
 _BONE = re.compile(r'pose\.bones\["((?:[^"\\]|\\.)*)"\]\.')
 

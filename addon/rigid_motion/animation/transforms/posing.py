@@ -36,11 +36,11 @@ class Hierarchy:
         """The numbers of the bones, parents before their children."""
         rest = np.array([bone.matrix_local for bone in self.bones], dtype=np.float64).reshape(-1, 4, 4)
         self.rest = AffineMaps(rest[:, :3, :3], rest[:, :3, 3])
-        """Where bones are at rest, shape (bones,)."""
+        """The poses of bones at rest, shape (bones,)."""
         inverse = np.linalg.inv(rest)
         offsets = np.where((self.parents >= 0)[:, None, None], inverse[self.parents] @ rest, rest)
         self.offsets = AffineMaps(offsets[:, :3, :3], offsets[:, :3, 3])
-        """The same in the spaces of their parents at rest."""
+        """The poses of bones at rest in the spaces of their parents."""
 
     def posed(self, channels: AffineMaps) -> AffineMaps:
         """Return where bones are in the space of the rig, shape (bones, n),

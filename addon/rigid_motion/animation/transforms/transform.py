@@ -19,12 +19,12 @@ OWN_WORDS = "Rigid Motion"
 """The context of words that Blender has another translation for, or one that is too long where they are shown."""
 
 LINKED = n_("{name} is linked from another file: make it local first (Object > Relations > Make Local)")
-"""Why a data-block cannot be edited, and the way out."""
+"""The reason why a data-block cannot be edited, and the way out."""
 
 MODE_PROPERTY, TURNS_PROPERTY = "rigid_motion.mode", "rigid_motion.turns"
 
 SEGMENT_PROPERTIES = (MODE_PROPERTY, TURNS_PROPERTY)
-"""What keys say about the segments that they begin."""
+"""Properties by which keys say something about the segments that they begin."""
 
 WIDTHS = {LOCATION: 3, "rotation_quaternion": 4, "rotation_euler": 3, SCALE: 3}
 
@@ -46,41 +46,43 @@ class Transform(ABC):
     """The type of what has the properties."""
 
     is_part: ClassVar[bool]
-    """Whether it is a part of its data-block, with a name that can be changed, and not the data-block itself."""
+    """True if it is a part of its data-block, with a name that can be changed, and not the data-block itself."""
 
     has_difference_slot: ClassVar[bool]
-    """Whether its differences are in a slot of their own, where they take the place of nothing that an animator edits.
+    """True if its differences are in a slot of their own, where they take the place of nothing that an animator edits.
     Otherwise they are beside its keys, and overwrite properties whose original values are kept meanwhile."""
 
     label: ClassVar[str]
-    """What it is called in front of its mode."""
+    """The name in front of its mode."""
 
     plural: ClassVar[str]
-    """What several are called, in English."""
+    """The name of several, in English."""
 
     linked_text: ClassVar[str]
-    """Why it cannot be edited where its data-block is linked, and the way out: {name} is that of the data-block."""
+    """The reason why it cannot be edited where its data-block is linked, and the way out:
+    {name} is that of the data-block."""
 
     differing_text: ClassVar[str]
-    """Why it is not moved by in-betweens of its own: {leader} is the user of its slot whose they are."""
+    """The reason why it is not moved by in-betweens of its own: {leader} is the user of its slot whose they are."""
 
     animated: bpy.types.Object
     """The data-block whose Action it is."""
 
     carrier: bpy.types.Object | bpy.types.PoseBone
-    """What has the properties."""
+    """The object or bone that has the properties."""
 
     prefix: str = ""
     """From the data-block to the carrier, in data paths."""
 
     placed_by: ClassVar[tuple[str, ...]]
-    """How the names of operators begin that set its properties to bring what is on the screen to a certain place."""
+    """The beginnings of the names of operators that set its properties to bring what is on the screen
+    to a certain place."""
 
     stored_by: ClassVar[tuple[str, ...]]
-    """How the names of operators begin that set its properties to a whole pose, whatever they had before."""
+    """The beginnings of the names of operators that set its properties to a whole pose, whatever they had before."""
 
     matrix_lacks_difference: ClassVar[bool]
-    """Whether Blender takes the difference off where the properties are set from a matrix."""
+    """True if Blender takes the difference off where the properties are set from a matrix."""
 
     @classmethod
     @abstractmethod

@@ -10,8 +10,8 @@ from .bone_constraints import constraint_of, ensure_constraint, shown_by, slot_o
 from .times import name_of
 
 REMOVED, OTHER_SLOT, MUTED, CHANGED, NOT_FIRST, WEAK = "REMOVED", "OTHER_SLOT", "MUTED", "CHANGED", "NOT_FIRST", "WEAK"
-"""What may keep a bone from being seen where its in-betweens have it: the constraint is gone, shows another slot, is
-muted, has other settings, comes behind another constraint, or has an influence below 1."""
+"""The troubles that may keep a bone from being seen where its in-betweens have it: the constraint is gone, shows
+another slot, is muted, has other settings, comes behind another constraint, or has an influence below 1."""
 
 
 def trouble_of(user: Transform, place: SlotTransform) -> str:

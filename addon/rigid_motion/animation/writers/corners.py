@@ -21,7 +21,7 @@ MOST_CORNERS = 64
 """Keys that are reached in one F-curve. Blender asks all modifiers on every frame."""
 
 SHARE = 0.05
-"""What a corner makes of the tolerance at least to be worth a modifier."""
+"""The least share of the tolerance that makes a corner worth a modifier."""
 
 
 class Corners(NamedTuple):
@@ -31,7 +31,7 @@ class Corners(NamedTuple):
     """For the rows of components that lack anything."""
 
     error: float
-    """How far off the body is at keys where nothing can be added."""
+    """The error of the body at keys where nothing can be added."""
 
 
 def corners(source: Source, samples: Mapping[int, np.ndarray], layout: Layout, need: Need) -> Corners:

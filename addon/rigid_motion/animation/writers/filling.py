@@ -33,8 +33,8 @@ from .layout import Layout
 from .table import release, writer_of
 
 TOLERANCE = 0.00005
-"""How far off a body may be between frames, in metres, within a metre of its origin; and what reaches farther, by this
-part of its reach. It is half of what is promised, for bones hang on one another."""
+"""The largest error of a body between frames, in metres, within a metre of its origin; and what reaches farther, by
+this part of its reach. It is half of what is promised, for bones hang on one another."""
 
 SAME_ROTATION = 1e-4
 """Components of rotations that are one, in single precision, and far from those a turn or a sign apart."""
@@ -116,7 +116,7 @@ class _Edit(NamedTuple):
     source: Source
     need: Need
     layout: Layout
-    """How the samples lie."""
+    """The layout of the samples."""
 
     span: tuple[int, int]
     """The first and the last of those to be filled in."""

@@ -44,7 +44,7 @@ class Piece(NamedTuple):
 
 
 Pieces = Mapping[Channel, Sequence[Piece]]
-"""What is added to the samples of each channel."""
+"""The pieces that are added to the samples of each channel."""
 
 Modifier = tuple[str, dict[str, object]]
 """The type of an F-curve modifier, and its settings."""
@@ -71,21 +71,22 @@ class Layout:
     """The frames of the outermost samples: not outside of the keys."""
 
     cycles: Cycles | None = None
-    """How the channels repeat, and the differences with them."""
+    """The cycles by which the channels repeat, and the differences with them."""
 
     is_ring: bool = False
 
     shift: int = 0
-    """How many frames later than they are seen the samples lie, where they are looked up by a time of their own."""
+    """The number of frames that the samples lie later than they are seen,
+    where they are looked up by a time of their own."""
 
     is_apart: bool = False
-    """Whether they are: it is that which repeats and holds, then."""
+    """True if they are: it is that which repeats and holds, then."""
 
     steps: tuple[Stepped, ...] = ()
     """The frames that the channels hold, and the differences with them."""
 
     rate: int = 1
-    """How many samples a frame has, where they are apart: then the F-curve is as many times as long."""
+    """The number of samples in a frame, where they are apart: then the F-curve is as many times as long."""
 
     @classmethod
     def of(cls, source: Source) -> Layout:

@@ -31,7 +31,7 @@ MOST_FRAMES = 1_048_574
 """The last frame that Blender lets a constraint have."""
 
 Line = tuple[float, float]
-"""What a channel is at frame 0, and by how much it grows in a frame."""
+"""The value of a channel at frame 0, and by how much it grows in a frame."""
 
 
 def name_of(place: SlotTransform) -> str:

@@ -18,7 +18,7 @@ class Writer(ABC):
     """One way, for one kind of transform. It keeps nothing itself: all there is to it is in the file."""
 
     uses_constraints: ClassVar[bool] = False
-    """Whether constraints show the differences, which an animator can mute, move or remove."""
+    """True if constraints show the differences, which an animator can mute, move or remove."""
 
     @abstractmethod
     def layout(self, source: Source, rate: int) -> Layout:
