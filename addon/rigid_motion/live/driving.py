@@ -30,11 +30,12 @@ TRIED = 0.5
 """Radians by which a control is turned to see what follows it."""
 
 MOVED = 1e-3
-"""What has turned by that many radians has followed."""
+"""The angle in radians from which on something that turns has followed."""
 
 
 SWITCHES = ("IK_FK", "neck_follow", "head_follow")
-"""Of Rigify's rigs: at 1 limbs do what their bones are turned to, and what hangs on others follows them as a whole."""
+"""Properties of Rigify's rigs: at 1 limbs do what their bones are turned to,
+and what hangs on others follows them as a whole."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +43,7 @@ class Values:
     """Channels of objects or bones, as poses: location and rotation on top of where each is with nothing keyed."""
 
     prefixes: list[str]
-    """Of the data paths, "" for an object."""
+    """Prefixes of the data paths, "" for an object."""
 
     poses: Poses
     """Shape (channels, n)."""
@@ -121,7 +122,7 @@ class RigDriver(Driver):
         self._skeleton = Skeleton(body.parents)
         placed, self._follows = _space(obj, self.bones)
         self._offsets = _beside(placed, self._follows)
-        """Where each bone is with no values, seen from the bone that it follows, or in the armature."""
+        """The pose of each bone with no values, seen from the bone that it follows, or in the armature."""
         _, turn, scale = obj.matrix_basis.decompose()
         self._turn, self._scale = np.array(turn), max(sum(map(abs, scale)) / 3.0, 1e-9)
         numbers = np.array([body.joints.index(joint) for joint in joints], dtype=np.int64)

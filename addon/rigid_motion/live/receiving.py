@@ -33,7 +33,7 @@ MOST_AHEAD = 64
 """Messages of a body whose keys wait to be shown."""
 
 Pairs = Callable[[Body, bpy.types.Object], Mapping[str, str]]
-"""Which bone of a rig each joint of a body moves."""
+"""The bone of a rig that each joint of a body moves."""
 
 
 @dataclass(frozen=True)
@@ -59,10 +59,10 @@ class _Heard:
     is_vmc: bool
     driver: Driver | None = None
     is_gone: bool = False
-    """Whether somebody deleted its object."""
+    """True if its object was deleted."""
 
     poses: Poses | None = None
-    """What is shown of it, shape (joints,), and by the sender's clock when that was."""
+    """The poses that are shown of it, shape (joints,), and by the sender's clock when that was."""
     moment: float = 0.0
 
     ahead: deque[tuple[np.ndarray, Poses]] = field(default_factory=lambda: deque(maxlen=MOST_AHEAD))

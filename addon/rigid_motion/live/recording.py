@@ -22,7 +22,7 @@ STRETCH = 60
 """Samples that are thinned together: a second of most senders. It begins and ends with keys."""
 
 STILL = 1e-6
-"""What changes by less has a single key."""
+"""The least change that takes more than a single key."""
 
 PLAIN = "lerp_slerp"
 """The mode that thinning goes by where keys are to have Blender's own in-betweens."""
@@ -48,7 +48,7 @@ class Take:
         self._last = -np.inf
         self._values: Values | None = None
         self._keys: list[list[tuple[np.ndarray, Poses]]] = []
-        """Of each channel and stretch the frames (k,) of its keys, and what it has there."""
+        """For each channel and stretch the frames (k,) of its keys, and what it has there."""
 
     def add(self, frames: np.ndarray, poses: Poses) -> None:
         """Take poses (n, joints) on rising frames (n,), those that are later than all before."""

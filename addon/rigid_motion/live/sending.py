@@ -22,7 +22,7 @@ class Sending:
         self._names = [obj.name for obj in objects]
         self._outlet = Outlet(host, port)
         self._performers: dict[str, tuple[int, Performer]] = {}
-        """Of each rig, how many bones it had."""
+        """The number of bones that each rig had."""
         self._begun = time.monotonic()
 
     def tick(self, now: float) -> None:

@@ -35,7 +35,7 @@ class Ticking(Generic[Ticked]):
     def __init__(self, failure: str, handlers: Mapping[str, Callable] | None = None) -> None:
         self.thing: Ticked | None = None
         self.trouble = ""
-        """Why it ended by itself."""
+        """The reason why it ended by itself."""
         self._failure = failure
 
         @persistent
