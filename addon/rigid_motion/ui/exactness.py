@@ -20,7 +20,7 @@ from .targets import each_target
 from .wording import length
 
 PROMISED = 0.0001
-"""How far off anything is between frames at most that is to be exact there, in metres."""
+"""The largest error between frames of what is to be exact there, in metres."""
 
 WORTH_OFFERING = 0.001
 """From which error on, in metres, an object is offered to be exact."""

@@ -22,13 +22,13 @@ COMMAND = "oskey" if sys.platform == "darwin" else "ctrl"
 class Shortcut(NamedTuple):
     keymap: str
     space: str
-    """Of the keymap."""
+    """The space of the keymap."""
 
     operator: str
     key: str
     modifier: str
     menu: str = ""
-    """What the operator calls."""
+    """The menu that the operator calls."""
 
 
 SHORTCUTS = (

@@ -23,7 +23,7 @@ HOST = "127.0.0.1"
 
 
 _is_matching = False
-"""Whether it is the program that fills the table."""
+"""True if it is the program that fills the table."""
 
 
 def _on_bones(_settings: LiveSettings | LiveBone, _context: bpy.types.Context) -> None:

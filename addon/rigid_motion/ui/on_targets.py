@@ -30,13 +30,13 @@ BUT = {
     "bones": n_("{done} of {count} bones: {summary}. But"),
     "objects and bones": n_("{done} of {count} objects and bones: {summary}. But"),
 }
-"""What comes before refusals where something was done."""
+"""The text before refusals where something was done."""
 
 LATER = {
     BAKED: n_("These keys were baked since: Un-Bake first"),
     REDUCED: n_("These keys were reduced since: Restore Keys first"),
 }
-"""Why what was done before cannot be taken back yet, by what was done last."""
+"""The reason why what was done before cannot be taken back yet, by what was done last."""
 
 MOST_REFUSALS = 8
 """Refusals that a report has room for."""
@@ -48,7 +48,7 @@ class OnTargets:
     bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
 
     nothing_to_do: ClassVar[str] = ""
-    """Why the operator is greyed out where it has nothing to do on any target."""
+    """The reason why the operator is greyed out where it has nothing to do on any target."""
 
     @classmethod
     def each_target(cls, context: bpy.types.Context) -> Iterator[Transform]:

@@ -22,7 +22,7 @@ from .targets import selected
 ON_NO_IN_BETWEEN = n_("No selected bone is on an in-between: Blender's own operator does the same")
 
 SAME = 1e-6
-"""What components differ by that are the same."""
+"""Components that differ by less are the same."""
 
 
 def is_elsewhere(transform: Transform) -> bool:

@@ -11,7 +11,7 @@ from . import keymap, manual
 from .look import DEFAULT_LOOK
 
 EXTENSION = __package__.rpartition(".")[0]
-"""What Blender knows the extension by: the package that this one is in."""
+"""The name that Blender knows the extension by: the package that this one is in."""
 
 DEFAULT_MODE = "motor_spline"
 

@@ -28,7 +28,7 @@ SCOPES = [
     (CURRENT, "Current Segment", "The segment that the playhead is in. The others keep their modes"),
     (SELECTED, "Selected Keys", "The segments that the selected keys begin. The others keep their modes"),
 ]
-"""What of a target gets a mode, as the items of an enum property."""
+"""The parts of a target that get a mode, as the items of an enum property."""
 
 Frames = tuple[float, ...] | None
 """Frames of keys, None for all of a target."""

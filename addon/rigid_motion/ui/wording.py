@@ -22,7 +22,7 @@ LABELS = {name: label for name, label, *_ in MODE_ITEMS}
 """Each mode as menus show it."""
 
 SHORT_LABELS = {name: KEYFRAME_MODES[name].short_label if name in KEYFRAME_MODES else LABELS[name] for name in LABELS}
-"""The same without the algebra, for pies and lists. Translated as `OWN_WORDS`: Blender has another Screw."""
+"""Labels without the algebra, for pies and lists. Translated as `OWN_WORDS`: Blender has another Screw."""
 
 ALGEBRAS = {
     "Dual Quaternion": n_("Algebra: dual quaternions"),
@@ -32,7 +32,7 @@ ALGEBRAS = {
 """The algebras that modes are named after."""
 
 DESCRIPTIONS = {name: description for name, _, description, _ in MODE_ITEMS}
-"""What each mode does for the motion, in one sentence without a full stop."""
+"""The effect of each mode on the motion, in one sentence without a full stop."""
 
 NO_KEYS = n_("No keys of location, rotation or scale yet")
 KEYED_BONES = n_("Its bones have keys. Choose their modes in Pose Mode")
@@ -59,7 +59,7 @@ TROUBLES = {
         n_('The constraint "Rigid Motion" has an influence below 1: a part of Blender\'s in-betweens is left'),
     ),
 }
-"""What is amiss with the constraint of a bone, each behind its icon."""
+"""Troubles with the constraint of a bone, each behind its icon."""
 
 COUNTED = {
     "objects": n_("{count} objects"),

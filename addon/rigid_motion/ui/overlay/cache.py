@@ -27,14 +27,14 @@ from .parents import Carried, Parents
 from .points import Path, trace
 
 SPARE = 64
-"""How many paths are kept that are not drawn any more."""
+"""The number of paths kept that are not drawn any more."""
 
 
 @dataclass
 class _Entry:
     path: Path | None
     digest: tuple
-    """Of all that the path depends on."""
+    """The digest of all that the path depends on."""
 
     settings: tuple
     """The part of it that is the scene's, and what stands between a bone's rotation and its location, as bytes."""
@@ -43,7 +43,7 @@ class _Entry:
     """Session id of the Action that the path was read from, 0 for none."""
 
     selected: bytes = b""
-    """Which keys of its channels were selected."""
+    """The selection among the keys of its channels."""
 
     above: frozenset[int] = frozenset()
     """Session ids of what its parents move by, where it follows them."""

@@ -101,7 +101,7 @@ class _Batches:
     selected: Batch
 
     views: dict[tuple, Readable] = field(default_factory=dict)
-    """What is drawn in the views that the path was last seen in."""
+    """The parts that can be told apart in the views that the path was last seen in."""
 
     chosen: dict[tuple[str, bytes], tuple[Batch, ...]] = field(default_factory=dict)
     """Ticks and axes: their name, and which of them can be told apart in a view."""
@@ -303,10 +303,10 @@ PLACES = (
 """The editors, what is called when one is drawn, and when."""
 
 _handles: list[tuple[type[bpy.types.Space], object]] = []
-"""What Blender knows those by."""
+"""Handles that Blender knows those by."""
 
 _complaint = ""
-"""What was wrong last."""
+"""The last problem."""
 
 
 def register() -> None:

@@ -21,16 +21,16 @@ MOST_GHOSTS = 120
 """About the most ghosts of one path: where it has more, they are further apart."""
 
 MOST_EDGES = 4000
-"""What has more edges is shown without them: they would hide one another."""
+"""The most edges of something that is shown with them: more would hide one another."""
 
 MOST_TRIANGLES = 200000
-"""What has more triangles is shown by its bounding box."""
+"""The most triangles of something that is not shown by its bounding box."""
 
 GEOMETRY = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 """Types of objects that have triangles."""
 
 RING = 0.1
-"""How far along a bone its octahedron is widest, and how wide it is there, of its length."""
+"""The place along a bone where its octahedron is widest, and its width there, as parts of its length."""
 
 BOX = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
 """The edges of a bounding box, by Blender's order of its corners."""

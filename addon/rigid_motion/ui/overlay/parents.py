@@ -100,7 +100,7 @@ class Parents:
             _moves_by_keys(one, carried) and (source is not None or not _is_keyed(place))
             for one, (place, source) in self._read.items()
         )
-        """Whether they move, and by keys alone."""
+        """True if they move, and by keys alone."""
         self.ids = {one.animated.session_uid for one in self._read}
         self.ids |= {place.slot.action.session_uid for place, _ in self._read.values() if place is not None}
         """Session ids of the data-blocks that decide on it."""

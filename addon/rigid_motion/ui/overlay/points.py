@@ -36,23 +36,23 @@ TICKS, AXES = 60, 20
 
 
 FINENESS = 5000
-"""How many times its width a line may be wide on the screen until corners show."""
+"""The extent of a path, in widths of its line, up to which no corners show on the screen."""
 
 
 class Followed(NamedTuple):
     """Which point of something a path is of, where it is not the origin."""
 
     moves: bool
-    """Whether its location counts."""
+    """True if its location counts."""
 
     stays: np.ndarray
-    """Where it is besides, shape (3,)."""
+    """The part of its place that does not move, shape (3,)."""
 
     tip: np.ndarray
     """The point on its own axes, shape (3,)."""
 
     turned: np.ndarray | None
-    """What its rotation, and the axes with it, are turned by in the space of its location: (3, 3), or (n, 3, 3)."""
+    """The turn of its rotation, and of the axes with it, in the space of its location: (3, 3), or (n, 3, 3)."""
 
     def points(self, poses: Poses) -> np.ndarray:
         """Return where the point is at these poses, shape (n, 3)."""
@@ -78,37 +78,37 @@ class Path:
     """Shape (m,), rising, with the whole frames (or as many of them as can be told apart) and the keys."""
 
     native: np.ndarray
-    """Where it is on these frames if Blender fills in, shape (m, 3)."""
+    """Places on these frames if Blender fills in, shape (m, 3)."""
 
     desired: np.ndarray | None
-    """Where it is if the mode does, shape (m, 3). None where there is no other mode than Blender's."""
+    """Places if the mode does, shape (m, 3). None where there is no other mode than Blender's."""
 
     keys: np.ndarray
     """The keys, shape (k, 3). They are the same in all modes."""
 
     selected: np.ndarray
-    """Which of the keys are selected, shape (k,)."""
+    """True for the keys that are selected, shape (k,)."""
 
     tick_frames: np.ndarray
     """Evenly spaced frames, shape (t,)."""
 
     native_ticks: np.ndarray
-    """Where Blender has it on these, shape (t, 3)."""
+    """Places on these as Blender has it, shape (t, 3)."""
 
     desired_ticks: np.ndarray | None
-    """Where the mode has it on these, shape (t, 3)."""
+    """Places on these as the mode has it, shape (t, 3)."""
 
     axis_frames: np.ndarray
-    """Those of the frames with ticks that have axes, shape (a,)."""
+    """Frames with ticks that have axes, shape (a,)."""
 
     axes: np.ndarray
-    """How it is turned on these, in the mode or else natively: the ends of its local axes, shape (a, 3, 2, 3)."""
+    """The rotation on these, in the mode or else natively: the ends of its local axes, shape (a, 3, 2, 3)."""
 
     in_world: bool = False
-    """Whether all of it is in the space of the world, and not in that of the channels."""
+    """True if all of it is in the space of the world, and not in that of the channels."""
 
     ghosts: Ghosts | None = None
-    """Where it is every few frames; None where that was not asked for."""
+    """The poses every few frames; None where that was not asked for."""
 
     def at(self, frame: float) -> tuple[np.ndarray, np.ndarray | None]:
         """Return where it is at a frame, natively and in the mode, each of shape (3,). The path holds its ends."""

@@ -18,13 +18,13 @@ TICK_GAP = 14.0
 """From tick to tick where the path goes at its usual speed, at least."""
 
 AXES_GAP = 36.0
-"""The same from axes to axes."""
+"""The gap from axes to axes."""
 
 CLEAR = 9.0
 """From a tick to its neighbour, at least, and to a key."""
 
 AT_REST = 1.0
-"""What moves by less from tick to tick says nothing of the usual speed."""
+"""The least distance from tick to tick that says something of the usual speed."""
 
 STEPS = [digit * power for power in (1, 10, 100, 1000) for digit in (1, 2, 5)]
 
@@ -34,13 +34,13 @@ class Readable:
     """What of a path is drawn in a view."""
 
     native_ticks: np.ndarray
-    """Which of its ticks on Blender's path, shape (t,)."""
+    """True for its ticks that are drawn on Blender's path, shape (t,)."""
 
     desired_ticks: np.ndarray | None
-    """Which of its ticks on the mode's path, shape (t,). None without one."""
+    """True for its ticks that are drawn on the mode's path, shape (t,). None without one."""
 
     axes: np.ndarray
-    """Which of its axes, shape (a,)."""
+    """True for its axes that are drawn, shape (a,)."""
 
 
 def readable(
