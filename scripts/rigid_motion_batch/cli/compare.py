@@ -62,7 +62,8 @@ SAYING = ("--explain", "--json", "--open", "--quiet")
 """Options that are about what is printed, and are no part of the command that a report names."""
 
 RECORD = "comparison.json"
-"""What a folder is the comparison of, among the files of the store: its recordings, as they count from there."""
+"""The file that says what a folder is the comparison of, among the files of the store: its recordings,
+as they count from there."""
 
 
 class Refused(Exception):
@@ -266,7 +267,7 @@ class _Run:
         self.notes: list[str] = []
         self.outcome = Outcome()
         self.page = False
-        """Whether there is one of this run."""
+        """True if there is one of this run."""
 
     def run(self) -> int:
         """Read the recordings, see what there is to do, do it, and say what it came to."""

@@ -333,7 +333,7 @@ class Modes:
 
     names: tuple[str, ...]
     distinct: bool
-    """Whether those that are one motion share a lane."""
+    """True if those that are one motion share a lane."""
 
 
 def _modes(text: str) -> Modes:

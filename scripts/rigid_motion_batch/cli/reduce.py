@@ -32,7 +32,7 @@ from rigid_motion_batch.keying.wishes import Wishes
 from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
 
 IN_FOLDERS = (".blend", ".bvh", ".csv", ".fbx", ".glb", ".gltf", ".tsv", ".tum")
-"""Of the files that are taken of a folder. What else it reads may be anything: .json, .txt."""
+"""Endings of the files that are taken of a folder. What else it reads may be anything: .json, .txt."""
 
 MODE = "motor_spline"
 

@@ -48,7 +48,7 @@ class Line:
     """None of somebody else's motion, whose keys are not known."""
 
     best: bool
-    """Whether no other motion has fewer errors, or fewer keys where a tolerance limits the errors."""
+    """True if no other motion has fewer errors, or fewer keys where a tolerance limits the errors."""
 
 
 def lines_of(numbers: Numbers) -> list[Line]:
