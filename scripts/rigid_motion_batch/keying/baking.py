@@ -18,7 +18,7 @@ from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.keying.targets import Action, Result
 
 BAKED, UNBAKED = "-baked", "-unbaked"
-"""Of the names of files that are written."""
+"""Endings of the names of files that are written."""
 
 FEW = 4
 """As many bones are named; of more it is said how many they are."""

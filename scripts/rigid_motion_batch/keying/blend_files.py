@@ -20,7 +20,7 @@ HERE = bpy.app.version[:2]
 """The Blender that this runs in."""
 
 MAGIC = (b"BLENDER", b"\x28\xb5\x2f\xfd", b"\x1f\x8b")
-"""What .blend files begin with: as they are, compressed, and compressed by a Blender before 3.0."""
+"""The bytes that .blend files begin with: as they are, compressed, and compressed by a Blender before 3.0."""
 
 CUT_OFF = "it broke off half-way, the disk may be full"
 
@@ -35,13 +35,13 @@ class Missing:
     """What the open file wants of libraries and cannot have."""
 
     libraries: list[str] = field(default_factory=list)
-    """Of each library that something is missing from: which, what, and the way out."""
+    """For each library that something is missing from: which, what, and the way out."""
 
     reasons: dict[bpy.types.Object, str] = field(default_factory=dict)
     """Objects of which one cannot know whether rigid motion moves them, for they or their Actions are missing."""
 
     hides_objects: bool = False
-    """Whether there may be more of those, in collections or scenes that are missing."""
+    """True if there may be more of those, in collections or scenes that are missing."""
 
 
 def open_file(path: Path) -> None:

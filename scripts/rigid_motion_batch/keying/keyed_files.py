@@ -27,7 +27,7 @@ CLOSEST = 0.01
 """Frames between keys that Blender takes for two."""
 
 ON_A_FRAME = 1e-3
-"""What is as near to a whole frame is put on it."""
+"""The distance from a whole frame within which samples are put on it."""
 
 SINGLE = float(np.finfo(np.float32).eps)
 """By what share numbers of Blender are off."""

@@ -19,7 +19,7 @@ ALL = ":*"
 """Behind a recording: all of its bodies."""
 
 NAMES_OF_FILES = {".blend", ".csv", ".glb", ".gltf", ".tum"}
-"""What a folder is not called."""
+"""Endings that the name of a folder does not have."""
 
 
 @dataclass(frozen=True)
@@ -30,23 +30,23 @@ class Job:
     """The file as it was named, and of a recording the body, where one was."""
 
     folder: Path
-    """Where the result goes."""
+    """The folder that the result goes to."""
 
     output: Path
     """The file that is written, the same as the source where it is done in place; of a recording without its ending."""
 
     endings: tuple[str, ...] = ("",)
-    """That the output may get."""
+    """Endings that the output may get."""
 
     ending: str = ""
-    """Of them the one that the user has named."""
+    """The one of them that the user has named."""
 
     is_recording: bool = False
     is_found: bool = False
-    """Whether it was found in a folder, and not named."""
+    """True if it was found in a folder, and not named."""
 
     problem: str = ""
-    """Why it cannot be done, and the way out."""
+    """The reason why it cannot be done, and the way out."""
 
     @property
     def file(self) -> Path:

@@ -36,7 +36,7 @@ LOOK = 0.2
 """Seconds between two looks at whether a session is to end."""
 
 NAMED = 5
-"""Of more inputs so many that failed are named again at the end."""
+"""The number of failed inputs that are named again at the end, where there are more inputs than that."""
 
 ROOMS = (
     "rigid_motion/animation",
@@ -47,7 +47,7 @@ ROOMS = (
     "recordings",
     "scenes/armature.py",
 )
-"""What the files that are written depend on."""
+"""The packages that the files that are written depend on."""
 
 Note = Callable[[str], None]
 """Writes a line for the user."""
@@ -61,13 +61,13 @@ class Work(ABC):
     """As a heading: "Baking"."""
 
     done: str
-    """What becomes of objects: "baked"."""
+    """The word for what becomes of objects: "baked"."""
 
     objects: Sequence[str] | None
     """The names and patterns of the objects that are meant; None for all."""
 
     overwrite: bool
-    """Whether files that were not made of an input may be replaced."""
+    """True if files that were not made of an input may be replaced."""
 
     dry_run: bool
     processes: int = field(default=1, kw_only=True)
@@ -101,21 +101,21 @@ class Outcome:
     objects: int = 0
     bones: int = 0
     clips: int = 0
-    """How many of them were done."""
+    """The number of them that were done."""
 
     refused: int = 0
-    """How many objects and bones were not."""
+    """The number of objects and bones that were not."""
 
     failed: bool = False
     unreadable: bool = False
     incomplete: bool = False
-    """Whether there may be objects in it that nobody can look at, for a library is missing."""
+    """True if there may be objects in it that cannot be looked at, for a library is missing."""
 
     is_old: bool = False
-    """Whether it was done by an earlier run."""
+    """True if it was done by an earlier run."""
 
     written: list[Path] = field(default_factory=list)
-    """Where to, or where it would have been."""
+    """The files that were written, or would have been."""
 
     beside: list[Path] = field(default_factory=list)
     """Files that belong to those."""
@@ -124,7 +124,7 @@ class Outcome:
     """The files that were read beside the input."""
 
     matched: set[str] = field(default_factory=set)
-    """Of the names and patterns that were asked for, those that there was an object or a bone for."""
+    """The names and patterns among those requested that there was an object or a bone for."""
 
     def add_written(self, path: Path) -> None:
         """Note that a file is complete at its place."""
@@ -397,7 +397,7 @@ class Stopped(KeyboardInterrupt):
     """By Ctrl-C or SIGTERM. `args` are the number of the signal."""
 
     partly: Outcome | None = None
-    """What became of the input that it came in."""
+    """The outcome of the input that it came in."""
 
 
 _received: list[int] = []

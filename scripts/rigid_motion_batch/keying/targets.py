@@ -18,13 +18,13 @@ class Result:
     done: list[Transform] = field(default_factory=list)
 
     refused: dict[Transform, str] = field(default_factory=dict)
-    """Why each could not be done, and the way out."""
+    """The reason why each could not be done, and the way out."""
 
     left: dict[Transform, str] = field(default_factory=dict)
-    """Why there was nothing to do to each after all."""
+    """The reason why there was nothing to do to each after all."""
 
     summary: str = ""
-    """What there is to say of those that were done; begins with a comma or a semicolon."""
+    """Text about those that were done; begins with a comma or a semicolon."""
 
     def refusals(self) -> Iterator[tuple[str, str, int]]:
         """Yield which targets were refused, why, and how many they are:
@@ -52,16 +52,16 @@ class Action:
     """The work, as a heading: "Baking"."""
 
     done: str
-    """What becomes of targets: "baked"."""
+    """The word for what becomes of targets: "baked"."""
 
     concerned: Callable[[Sequence[Transform]], list[Transform]]
-    """Those of several that there is something to do to, possible or not."""
+    """Returns those of several that there is something to do to, possible or not."""
 
     act: Callable[[Sequence[Transform]], Result]
     """Do it to several of one object, in one go."""
 
     whole_rigs: bool = False
-    """Whether the bones of a rig and its own motion are done in one go."""
+    """True if the bones of a rig and its own motion are done in one go."""
 
 
 def groups_of(obj: bpy.types.Object, *, whole_rigs: bool) -> Iterator[list[Transform]]:

@@ -14,22 +14,23 @@ class Wishes:
 
     mode: str
     tolerance: Tolerance | None
-    """What each thing begins with in Blender's window, or `reduce.py` with recordings, where None."""
+    """The tolerance; where None, what each thing begins with in Blender's window, or `reduce.py` with recordings."""
 
     radius: float | None
-    """Of the shell in metres; what each object and bone measures, or what `compare` takes of recordings, where None."""
+    """The radius of the shell in metres; what each object and bone measures,
+    or what `compare` takes of recordings, where None."""
 
     shared: bool
-    """Whether all bones of a rig get keys on the same frames."""
+    """True if all bones of a rig get keys on the same frames."""
 
     discard: bool = False
-    """Whether the dense keys go out of the file, so that Restore Keys cannot give them back."""
+    """True if the dense keys go out of the file, so that Restore Keys cannot give them back."""
 
     count: int | None = None
     """So many keys of each object, or key poses of each rig, instead of a tolerance."""
 
     vertices: bool = False
-    """Whether the vertices of skins are measured, in glTF files."""
+    """True if the vertices of skins are measured, in glTF files."""
 
 
 def doubt(size: float, tolerance: Tolerance | None, per_unit: float) -> str:
