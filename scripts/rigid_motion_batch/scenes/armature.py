@@ -41,10 +41,10 @@ class Rest:
     """Shape (joints,), in the space of the armature."""
 
     tails: np.ndarray
-    """Where their bones end, there too: shape (joints, 3)."""
+    """The ends of their bones, there too: shape (joints, 3)."""
 
     origin: np.ndarray
-    """Where that space begins in the figure's world: below it, on the ground. Shape (3,)."""
+    """The origin of that space in the figure's world: below it, on the ground. Shape (3,)."""
 
     @classmethod
     def of(cls, rest_body: RestBody, metres_per_unit: float, axes: str) -> Rest:

@@ -24,16 +24,16 @@ from .materials import ghost, ink, surface
 from .nodes import Group, Socket, apply_group
 
 SHADES = 16
-"""Of the bones."""
+"""The number of shades of the bones."""
 
 ERROR, FLASH, WORST = "error", "flash", "worst"
 """The attributes of the errors: in metres; how much a joint flashes and whether it has the ring, 0 to 1."""
 
 IN_FRONT = 0.45
-"""How far towards the camera what marks joints is, in units of the frame's height."""
+"""The distance of what marks joints towards the camera, in units of the frame's height."""
 
 RINGED = 0.02
-"""Of the error that colours reach up to: with less, the worst joint has no ring."""
+"""The part of the error that colours reach up to: with less, the worst joint has no ring."""
 
 # In units of the frame's height.
 FLASH_RADIUS = 0.0046

@@ -36,7 +36,7 @@ FADE, FADE_SHARE = 5.0, 0.6
 """Frames in which a flash fades; where keys are near to one another, so much of what lies between them."""
 
 BAR, BAR_GAP = 0.24, 0.012
-"""How wide the bar of colours is, and what is left free beside it, in units of the frame's height."""
+"""The width of the bar of colours, and what is left free beside it, in units of the frame's height."""
 
 LEAST = "shell error 0"
 
@@ -44,7 +44,7 @@ MARGIN = 0.04
 """The room around all joints, in units of the figure: its flesh."""
 
 GROUND = 0.05
-"""What is seen of the ground below the feet, in units of the figure."""
+"""The part of the ground that is seen below the feet, in units of the figure."""
 
 
 def build_body_scene(made: BodyReconstruction, settings: SceneSettings, radii: np.ndarray) -> bpy.types.Scene:

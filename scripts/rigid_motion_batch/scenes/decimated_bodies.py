@@ -28,13 +28,13 @@ TRIALS = 12
 """Margins tried for an error, at most."""
 
 NEAR = 0.98
-"""Of the error that is asked for: one that is as good as equal to it."""
+"""The part of the requested error that is as good as equal to it."""
 
 CLOSE = 1.01
 """Two margins whose ratio is less leave the same keys, or nearly."""
 
 EDGE = 0.1
-"""Of the margins that are in question: so much is left out with each trial at least."""
+"""The part of the margins in question that is left out with each trial at least."""
 
 Curve = tuple[str, int]
 """A data path and an index."""

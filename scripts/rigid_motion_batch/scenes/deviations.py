@@ -11,7 +11,7 @@ from rigid_motion.motion.twists import between, exponential
 from . import layout
 
 SHARE = 0.25
-"""Of the object's size: how large the largest deviation is shown at most, where it is magnified."""
+"""The most of the object's size that the largest deviation is shown at, where it is magnified."""
 
 STEPS = (1.0, 2.0, 5.0)
 """Magnifications are these, times a power of ten."""

@@ -34,10 +34,10 @@ SMOOTHING = 0.12
 """Seconds of the film: the standard deviation of the bell by which the focus is smoothed, at most."""
 
 BESIDE = 0.5
-"""What is off from the recording by more than so much of the room that this needs is cut where it leaves the view."""
+"""The part of the room that the recording needs: what is farther off from it is cut where it leaves the view."""
 
 LAG = 1.35
-"""What is followed may need so many times the room that it needs with a focus which is not smoothed."""
+"""The most times that what is followed may need the room which it needs with a focus that is not smoothed."""
 
 
 class Moving(Protocol):
@@ -120,7 +120,7 @@ class Extent:
     high: np.ndarray
 
     cut: bool
-    """Whether something gets farther to the sides."""
+    """True if something gets farther to the sides."""
 
     @property
     def size(self) -> np.ndarray:
@@ -137,7 +137,7 @@ class Framing:
     """How a motion of n moments is seen."""
 
     focus: np.ndarray
-    """What the camera looks at, shape (n, 3)."""
+    """The points that the camera looks at, shape (n, 3)."""
 
     yaw: float
     """The turn about z in radians that shows the motion well."""

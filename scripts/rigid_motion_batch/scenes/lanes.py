@@ -30,7 +30,7 @@ TITLE, NAME, NUMBER, UNIT, SMALL = 0.044, 0.026, 0.05, 0.032, 0.028
 """Sizes of letters on a card, in units of the frame's height, where there is room."""
 
 INSET, COLUMN = 0.016, 0.15
-"""What is left free at the edges of a card, and how wide the numbers beside the graph are."""
+"""The space left free at the edges of a card, and the width of the numbers beside the graph."""
 
 GRAPH, GRAPH_COLUMNS = 0.066, 300
 """The height of a graph, and how many columns keep their least and their largest sample."""
@@ -56,7 +56,7 @@ class Cast:
     """Mode id to the error at each sample of the recording, in millimetres, shape (n,)."""
 
     sample_frames: np.ndarray
-    """When the samples are, shape (n,)."""
+    """The frames of the samples, shape (n,)."""
 
     notes: Mapping[str, str]
     """Mode id to what its keys are, where the modes have different ones."""
@@ -66,7 +66,7 @@ class Cast:
     faint: bpy.types.Material
 
     joints: tuple[str, ...] = ()
-    """What the joints of a body are called."""
+    """The names of the joints of a body."""
 
     worst: Mapping[str, np.ndarray] = field(default_factory=dict)
     """Mode id to the joint that the error is of, at each frame."""

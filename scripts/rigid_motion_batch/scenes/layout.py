@@ -28,7 +28,8 @@ CARD = (0.42, 0.3)
 """The width and height of a card on which letters have their full size; on a smaller one all of them are smaller."""
 
 HEAD, NAMES, FOOT = 0.062, 0.052, 0.094
-"""What is written on a card takes so much of its height: the title, names below it if there are any, and the error."""
+"""The parts of a card's height that are taken by what is written on it: the title,
+names below it if there are any, and the error."""
 
 WRAP_GAIN = 0.85
 """A layout of fewer rows is kept while it shows motion and letters so large relative to the best."""
@@ -50,7 +51,7 @@ class Cell:
     height: float
 
     named: bool = False
-    """Whether there are names below the title."""
+    """True if there are names below the title."""
 
     @property
     def unit(self) -> float:

@@ -7,11 +7,12 @@ import bpy
 from rigid_motion_batch.palette import Theme, linear
 
 GLOSS, BOUNCE = 0.0142, 0.878
-"""What Workbench's light `paint.sl` shows of a rough colour c that faces the camera: GLOSS + BOUNCE c (measured)."""
+"""The factors of what Workbench's light `paint.sl` shows of a rough colour c that faces the camera:
+GLOSS + BOUNCE c (measured)."""
 
 
 GHOST = 0.5
-"""How much a ghost stands out from its card."""
+"""The amount that a ghost stands out from its card."""
 
 
 def ghost(theme: Theme) -> bpy.types.Material:

@@ -22,13 +22,13 @@ BONE = "bone"
 """The attribute of a face or point: the number of its bone."""
 
 SLENDER = 0.13
-"""How thick a solid is, relative to its length: its radius."""
+"""The thickness of a solid, relative to its length: its radius."""
 
 THICKNESS = 0.008, 0.034
 """The thinnest and the thickest, relative to the figure."""
 
 LINK = 0.5
-"""How thick what joins a bone to a child beside its end is, relative to a solid."""
+"""The thickness of what joins a bone to a child beside its end, relative to a solid."""
 
 AT_END = 0.02
 """A bone that ends so near to a child, relative to the figure, leads to it."""
@@ -39,7 +39,7 @@ they are of some program's making, and where they end means nothing."""
 
 SIDES = 8
 WAIST = 0.22
-"""Where along it a solid is thickest."""
+"""The place along a solid where it is thickest."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,7 +31,8 @@ LEGEND = 0.032
 """The size of the letters below the lanes, in units of the frame's height, where there is room."""
 
 SOFTENED = 0.8
-"""How much of a pixel is the mean of those around it, near ones more: edges are smooth, and small letters clear."""
+"""The part of a pixel that is the mean of those around it, near ones more: edges are smooth,
+and small letters clear."""
 
 
 def build_scene(reconstruction: Reconstruction, settings: SceneSettings) -> bpy.types.Scene:
@@ -97,10 +98,10 @@ class Header:
     choice: str
 
     legend: str
-    """How to read the picture."""
+    """Text on how to read the picture."""
 
     reserved: float = 0.0
-    """What has to be left free to the right of that, in units of the frame's height."""
+    """The space to be left free to the right of that, in units of the frame's height."""
 
 
 def assemble_scene(

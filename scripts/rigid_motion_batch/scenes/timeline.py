@@ -26,10 +26,10 @@ class Timeline:
     """The clip's time, in seconds, and the film's, in frames."""
 
     start: float
-    """When the first key is, in the clip's time."""
+    """The moment of the first key, in the clip's time."""
 
     count: int
-    """How many frames there are."""
+    """The number of frames."""
 
     rate: float
     """Frames for a second of the clip."""

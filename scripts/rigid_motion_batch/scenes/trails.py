@@ -14,7 +14,7 @@ from .nodes import Group, Socket
 
 FRAME = "frame"
 FLASH_FRAMES = 6.0
-"""How long a mark takes to swell before its key and to settle after it."""
+"""The frames that a mark takes to swell before its key and to settle after it."""
 
 
 def polyline(name: str, frames: np.ndarray, points: np.ndarray, *, joined: bool = True) -> bpy.types.Mesh:
@@ -36,11 +36,11 @@ def polyline(name: str, frames: np.ndarray, points: np.ndarray, *, joined: bool 
 
 
 WINDOW = {"Middle": "Vector", "Right": "Vector", "Up": "Vector"}
-"""What trails are kept within: the middle of a window of the picture in the world, and one over its half width and half
-height, along the directions in which these are."""
+"""The window that trails are kept within: the middle of a window of the picture in the world, and one over its half
+width and half height, along the directions in which these are."""
 
 FADE = 0.15
-"""Of the window's half: how far from its edge what is drawn begins to thin."""
+"""The part of the window's half, from its edge, where what is drawn begins to thin."""
 
 
 def trail_group(*, windowed: bool = False) -> bpy.types.NodeTree:
