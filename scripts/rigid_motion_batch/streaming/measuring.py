@@ -48,7 +48,7 @@ class Cost:
     datagrams: int
     lost: int
     joining_bytes: int
-    """Of descriptions: names, parents and rest poses; with headers."""
+    """The bytes of descriptions: names, parents and rest poses; with headers."""
     bytes_a_second: float
     """Without headers of UDP and IP."""
     bytes_a_second_with_headers: float
@@ -69,7 +69,8 @@ class Measured:
     shown: Poses
     """At the moments of the samples, shape (joints, n)."""
     errors: np.ndarray
-    """Of every joint at every sample that was shown, in metres; NaN before the first picture. Shape (joints, n)."""
+    """The error of every joint at every sample that was shown, in metres; NaN before the first picture. Shape
+    (joints, n)."""
 
 
 def measure(

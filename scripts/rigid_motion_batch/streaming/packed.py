@@ -21,7 +21,7 @@ STAMP = 5
 """Bytes of a datagram that say whose it is, and when: as few as will do."""
 
 PLACE_BITS = 16
-"""Of each coordinate of a place that is packed, over a cube of 8 metres."""
+"""The bits of each coordinate of a place that is packed, over a cube of 8 metres."""
 
 CUBE = 8.0
 
@@ -35,7 +35,7 @@ class Packed:
     rate: float
 
     bits: int | None
-    """Of each of three components of a quaternion; None for floats."""
+    """The bits of each of three components of a quaternion; None for floats."""
 
     @property
     def bits_a_turn(self) -> int:

@@ -129,11 +129,11 @@ class Receiving:
         self.receiver = Receiver()
         self.shown, self.keys = Tracks(), Tracks()
         self.datagrams, self.bytes = Counter(), Counter()
-        """Of each user."""
+        """Counts for each user."""
         self.on_frame: list[Callable[[dict[Stream, Shown]], None]] = []
         """Called with what each frame shows."""
         self._heard: dict[str, float] = {}
-        """When users who are sending were heard last."""
+        """The moments when users who are sending were heard last."""
         self._silent = math.inf
         """Since when nobody is sending, after somebody was."""
         self._answer_at = -math.inf

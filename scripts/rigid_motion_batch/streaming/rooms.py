@@ -41,7 +41,7 @@ LARGEST = 1 << 16
 """Bytes of what Zenoh takes from others at once."""
 
 BATCHES = 16
-"""That may be on the way out at once before some are dropped: in a room of many each datagram is one."""
+"""The number that may be on the way out at once before some are dropped: in a room of many each datagram is one."""
 
 MOST_WAITING = 4096
 """Datagrams that wait to be looked at; others are dropped, as a network does."""

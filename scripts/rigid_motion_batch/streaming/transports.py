@@ -80,7 +80,7 @@ class Counted:
         self._transport = transport
         self.datagrams = self.bytes = self.lost = 0
         self.joining_datagrams = self.joining_bytes = 0
-        """Of those the descriptions."""
+        """The descriptions among those."""
 
     def count(self, datagram: bytes) -> None:
         """Count a datagram that is sent, whether or not it arrives."""
