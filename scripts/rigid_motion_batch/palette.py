@@ -39,15 +39,15 @@ class Theme:
 
     background: str
     card: str
-    """What a lane stands on."""
+    """The colour that a lane stands on."""
 
     track: str
-    """What is yet to come in a graph."""
+    """The colour of what is yet to come in a graph."""
 
     faint: str
     ink: str
     ghost: str
-    """Of the recording."""
+    """The colour of the recording."""
 
 
 THEMES = {
@@ -60,17 +60,17 @@ PAGES = "#ffffff", "#0e1115"
 """Grounds of a report, light and dark."""
 
 ERROR_COLOURS = ("#5B7FB0", "#C9B98A", "#F08A24", "#C4162A")
-"""What an error looks like where it is a colour, evenly from none to the largest: calm where all is well, red where it
-is not. They differ in lightness as well, for people who cannot tell red from green."""
+"""The colours that show an error, evenly from none to the largest: calm where all is well, red where it is not. They
+differ in lightness as well, for people who cannot tell red from green."""
 
 NEARLY_ALL = 0.995
 """The share of all errors that the colours reach up to: a single wild frame would leave no other to be seen."""
 
 LEAST_CONTRAST = 3.0
-"""Of a mode with what it stands before (WCAG 2.2, 1.4.11)."""
+"""The least contrast of a mode with what it stands before (WCAG 2.2, 1.4.11)."""
 
 CONTRAST_OF_WORDS = 4.5
-"""Of its name with the page (WCAG 2.2, 1.4.3)."""
+"""The least contrast of its name with the page (WCAG 2.2, 1.4.3)."""
 
 
 def colour_of(mode: str) -> str:

@@ -25,7 +25,8 @@ NAMED = {
     "rigid_motion_batch": PACKAGE,
     **({"research": CHECKOUT / "scripts" / "research", "tests": CHECKOUT / "tests"} if CHECKOUT else {}),
 }
-"""What the program is made of, by names that are the same wherever it is; a folder that is in another comes first."""
+"""The folders and files that the program is made of, by names that are the same wherever it is; a folder that is in
+another comes first."""
 
 
 def output_folder(name: str) -> Path:

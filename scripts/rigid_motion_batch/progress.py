@@ -15,7 +15,7 @@ from typing import Any, Self, TextIO
 from rigid_motion_batch.command_line import printable
 
 FARM = "RIGID_MOTION_PROGRESS"
-"""Of the environment: "openjd" where a farm listens, to the lines that Open Job Description knows."""
+"""A variable of the environment: "openjd" where a farm listens, to the lines that Open Job Description knows."""
 
 BAR_COLUMNS = 24
 

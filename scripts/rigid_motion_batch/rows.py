@@ -14,7 +14,8 @@ from rigid_motion_batch.files import replacing
 Row = TypeVar("Row")
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
-"""What spreadsheets take for the beginning of a formula, if a text begins with it: names come from strangers' files."""
+"""Characters that spreadsheets take for the beginning of a formula, if a text begins with it: names come from
+strangers' files."""
 
 
 def plain(text: str) -> str:

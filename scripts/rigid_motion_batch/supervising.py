@@ -30,7 +30,7 @@ from typing import Any
 from .command_line import path_line, printable
 
 VARIABLE = "RIGID_MOTION_SESSION"
-"""Of the environment: the temporary folder of a child; empty where none could be made."""
+"""A variable of the environment: the temporary folder of a child; empty where none could be made."""
 
 JOURNAL = "journal"
 
@@ -44,17 +44,17 @@ LOOK = 0.1
 """Seconds between two looks at the clock."""
 
 STOPPED = "Stopped. What was written by then is complete."
-"""What is said where the child had nothing better to say."""
+"""The message where the child had nothing better to say."""
 
 SHOW_CURSOR = "\x1b[?25h"
-"""What has a terminal show its cursor."""
+"""The text that has a terminal show its cursor."""
 
 PR_SET_PDEATHSIG = 1
 """See prctl(2)."""
 
 ASK = getattr(signal, "SIGUSR1", None)
-"""What the parent asks its child with to end. Any other signal may come to both of them, from a terminal or a farm, and
-would ask twice. On Windows, where there is none, the console sends Ctrl-C to both, and the parent waits."""
+"""The signal by which the parent asks its child to end. Any other signal may come to both of them, from a terminal or a
+farm, and would ask twice. On Windows, where there is none, the console sends Ctrl-C to both, and the parent waits."""
 
 _session = ""
 _journal: int | None = None

@@ -21,7 +21,7 @@ BLENDER_PYTHONS = ("3.11", "3.13")
 """The versions of Python that there are wheels of Blender for."""
 
 LOADED_LATE = ("libEGL.so.1", "libGL.so.1")
-"""What Blender loads only when it renders. It aborts the whole process where it cannot."""
+"""Libraries that Blender loads only when it renders. It aborts the whole process where it cannot."""
 
 
 def missing_for_rendering() -> str | None:
