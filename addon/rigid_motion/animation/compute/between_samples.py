@@ -22,7 +22,7 @@ EULER = 2.0**0.5
 class Samples(dict[int, np.ndarray]):
     """The differences of one source at m moments of its range, by the rows of their components where there is any.
 
-    Frame and value of every sample by turns, in single precision, each of shape (2 m,).
+    Frame and value of every sample alternately, in single precision, each of shape (2 m,).
     """
 
     rate = 1

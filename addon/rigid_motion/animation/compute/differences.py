@@ -125,7 +125,7 @@ def differences(
     rates: Sequence[int] | None = None,
     reaches: Sequence[float] | None = None,
 ) -> list[Samples]:
-    """Return what turns Blender's in-betweens into the wanted ones,
+    """Return what turns Blender's in-betweens into the desired ones,
     on the whole frames of each source and between them.
 
     The rotation is a quaternion or, for a source that turns by Euler angles, as these, and applied on the left;
@@ -218,7 +218,7 @@ def _move(
     delta: np.ndarray,
     given: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Fill in Blender's own in-betweens, rotations as unit quaternions, and the deltas to the wanted ones.
+    """Fill in Blender's own in-betweens, rotations as unit quaternions, and the deltas to the desired ones.
 
     The sources are alike: all turn by quaternions or by Euler angles of one order, all scale evenly or none does.
     `native` is of `height`, `delta` of `filled_height`. They may be in the same place: then the deltas are there.

@@ -195,7 +195,7 @@ class Source:
 
     @cached_property
     def key_frames(self) -> np.ndarray:
-        """Those of `keyed_frames` without keys that are one to Blender, and with the copies that cycles make, (n,).
+        """Frames of `keyed_frames` without keys that are one to Blender, and with the copies that cycles make, (n,).
 
         Copies are there as far as it is seen, and a round on both sides at least. On a `path` only those that shape it.
         """

@@ -25,7 +25,7 @@ def objects_of(keys: Iterable[BlockKey]) -> list[bpy.types.Object]:
 
 
 def add_actions(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, added: set[tuple[int, int]]) -> None:
-    """Have the Actions of an object be in the dependency graph, which otherwise tells nobody of their edits.
+    """Have the Actions of an object be in the dependency graph, which otherwise does not report their edits.
 
     Blender leaves them out that *Make Single User > Object Animation* has made. `added` has the session ids of objects
     and Actions that this was tried for.

@@ -182,7 +182,7 @@ class InsertedKeys:
                 self._whole.popitem(last=False)
 
     def notice_undo(self, transform: Transform) -> None:
-        """Undo or redo gave a transform its properties: nobody has set them, though others were evaluated."""
+        """Undo or redo gave a transform its properties: they were not set, though others were evaluated."""
         self._undone[_identity(transform)] = transform.components().tobytes()
 
     def forget_undo(self) -> None:

@@ -147,7 +147,7 @@ def is_blended(transform: Transform) -> bool:
 def has_edited_differences(transform: Transform, frame: float) -> bool:
     """Return whether something has another difference than its in-betweens on this frame of its Action.
 
-    So it is once somebody has edited what they are in, until the frame changes.
+    So it is once what they are in was edited, until the frame changes.
     """
     if transform.has_difference_slot:
         # What a constraint adds cannot be edited.

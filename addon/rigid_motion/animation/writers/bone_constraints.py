@@ -70,7 +70,7 @@ def slot_of_differences(place: SlotTransform) -> tuple[bpy.types.Action, int]:
 
 
 def has_constraint(user: Transform, place: SlotTransform) -> bool:
-    """Return whether a bone has its constraint as it has to be, or somebody took it off."""
+    """Return whether a bone has its constraint as it has to be, or it was taken off."""
     constraint = constraint_of(user, place)
     if constraint is None:
         return not _may_add_constraint(user, place)
@@ -88,7 +88,7 @@ def has_stale_constraint(user: BoneTransform, place: SlotTransform) -> bool:
 
 
 def _may_add_constraint(user: Transform, place: SlotTransform) -> bool:
-    """Return whether a bone lacks a constraint that nobody took off it."""
+    """Return whether a bone lacks a constraint that was not taken off it."""
     name = name_of(place)
     present = user.carrier.constraints.get(name)
     return name not in user.motion.mounted.split("\n") or (present is not None and shows_differences(present))

@@ -17,7 +17,7 @@ from ..transforms import Transform
 def channel_values(
     transform: Transform, source: Source, motion: InBetweens, added: np.ndarray | None = None
 ) -> dict[str, np.ndarray]:
-    """Return the values (m, channels) of the keyed properties that show the wanted poses,
+    """Return the values (m, channels) of the keyed properties that show the desired poses,
     with the own delta transforms.
 
     `added` is what modifiers add to the channels, shape (10, m), where that is to be in the values as well.
@@ -57,7 +57,7 @@ def channel_values(
 
 
 def _with_added(source: Source, motion: InBetweens, added: np.ndarray) -> Poses:
-    """Return the wanted poses with what modifiers add: in location along its axes,
+    """Return the desired poses with what modifiers add: in location along its axes,
     in rotation what it turns Blender's by.
     """
     now, then = source.values_at(source.held(motion.frames)), motion.desired

@@ -32,9 +32,10 @@ class Writer(ABC):
     def write(
         self, place: SlotTransform, points: dict[Channel, np.ndarray], layout: Layout | None, pieces: Pieces
     ) -> None:
-        """Replace the in-betweens of a transform by these samples, frame and value of each by turns, and these pieces.
+        """Replace the in-betweens of a transform by these samples and pieces.
 
-        Channels that have none are taken out; without any, its users are to be released.
+        Points are frame and value of each sample alternately. Channels that have none are taken out; without any, its
+        users are to be released.
         """
 
     @abstractmethod
