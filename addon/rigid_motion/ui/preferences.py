@@ -25,7 +25,7 @@ def preferences() -> RigidMotionPreferences | None:
 
 
 def default_mode() -> str:
-    """Return the mode to take where nobody named one."""
+    """Return the mode to take where none is named."""
     chosen = preferences()
     return chosen.default_mode if chosen is not None else DEFAULT_MODE
 

@@ -32,7 +32,7 @@ MOST = 8192
 """About the most samples, and the most ticks, of one path. Where it has more frames, samples are further apart."""
 
 TICKS, AXES = 60, 20
-"""About the most ticks of a path where nobody asked for more, and the most of them with axes."""
+"""About the most ticks of a path where no more were requested, and the most of them with axes."""
 
 
 FINENESS = 5000

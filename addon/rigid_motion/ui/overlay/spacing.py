@@ -58,7 +58,7 @@ def readable(
     scale : float
         The resolution scale of the interface.
     every_tick : bool
-        Draw all ticks, since somebody asked for just these.
+        Draw all ticks, since just these were requested.
     """
 
     def pixels(points: np.ndarray) -> np.ndarray:
