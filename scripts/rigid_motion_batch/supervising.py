@@ -38,7 +38,7 @@ GRACE = 1.2
 """Seconds that the child has after a signal to end by itself."""
 
 LAST = 1.7
-"""Seconds after which nobody waits for it, though it was killed: the system may be reading from a disk that is gone."""
+"""Seconds after which nothing waits for it, although killed: the system may be reading from a disk that is gone."""
 
 LOOK = 0.1
 """Seconds between two looks at the clock."""
@@ -291,7 +291,7 @@ def _this_command() -> Sequence[str]:
 
 
 def _crash(code: int, at: str) -> str:
-    """Return how a child ended that nobody stopped, and the way out."""
+    """Return how a child ended that was not stopped, and the way out."""
     if not at:
         return f"the process died ({death(code)}) before it had done anything"
     return f"the process died ({death(code)}) at {printable(at)}: leave that out, or see whether Blender opens it"

@@ -21,7 +21,7 @@ SCRIPT = "job_bundle.py"
 PROGRAM = program_of(SCRIPT)
 
 PARTS = 16
-"""Tasks that a stage is split into, unless told."""
+"""Tasks that a stage is split into, unless requested otherwise."""
 
 FILMING = ("build", "render", "encode")
 """The stages at the end of which there are films."""

@@ -366,7 +366,7 @@ def counted(count: int, what: str) -> str:
 
 
 def tell_failure(note: Note, title: object, error: Exception) -> None:
-    """Say where the program failed: what nobody foresaw in one input must not keep the others from being done."""
+    """Say where the program failed: what was not foreseen in one input must not keep the others from being done."""
     note(f"{title}: not written, for this program failed ({type(error).__name__}: {error}):")
     for line in "".join(traceback.format_exception(error)).splitlines():
         note(line)

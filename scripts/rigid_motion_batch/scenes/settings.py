@@ -82,7 +82,7 @@ def place_of_subject(requested: str) -> tuple[Path, str]:
 
     Parameters
     ----------
-    wanted : str
+    requested : str
         A key of `MODELS`, or "file.blend:Name".
 
     Raises

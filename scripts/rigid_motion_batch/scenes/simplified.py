@@ -16,7 +16,7 @@ TRIES = 6
 def simplified(requested: str) -> dict[str, np.ndarray]:
     """Return the surface of an object in its own axes, in metres: `vertices` (v, 3), `triangles` (t, 3), `tints` (t,).
 
-    Tints are 1 where a triangle has the colour of its mode, and 0 elsewhere. What is wanted is as in `load_subject`,
+    Tints are 1 where a triangle has the colour of its mode, and 0 elsewhere. `requested` is as in `load_subject`,
     whose errors it raises.
     """
     bpy.ops.wm.read_factory_settings(use_empty=True)

@@ -23,7 +23,7 @@ def load_subject(requested: str) -> bpy.types.Mesh:
 
     Parameters
     ----------
-    wanted : str
+    requested : str
         See `place_of_subject`.
 
     Raises

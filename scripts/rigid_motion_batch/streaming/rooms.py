@@ -106,7 +106,7 @@ def opened(role: str, at: str | None = None, network: bool = False, config: Path
     Raises
     ------
     RoomError
-        Without Zenoh, for a file that it cannot read, and where nobody can be reached.
+        Without Zenoh, for a file that it cannot read, and where no one can be reached.
     """
     try:
         import zenoh
@@ -165,7 +165,7 @@ class Room:
         self._declared[key] = self._session.liveliness().declare_token(key)
 
     def watch_presence(self) -> None:
-        """Take it as something that came whenever somebody begins to listen, or does already."""
+        """Take it as something that came whenever another begins to listen, or does already."""
         key = f"{self.name}/*/{LISTENING}/*"
         self._declared[key] = self._session.liveliness().declare_subscriber(key, self._take, history=True)
 

@@ -108,7 +108,7 @@ class Sending:
             self.bytes += len(datagram)
 
     def take(self, came: Came, now: float) -> None:
-        """Deal with an answer, or with somebody who joins, at a time of the motion."""
+        """Deal with an answer, or with a receiver that joins, at a time of the motion."""
         said = []
         if came.stream == LISTENING and came.datagram is not None:
             self.joined += 1

@@ -79,7 +79,7 @@ def play(
 ) -> int:
     """Play a recording in real time, and return how many datagrams were sent.
 
-    `stopped` ends it as soon as something is in it; `reach` is told the seconds that were played.
+    `stopped` ends it as soon as something is in it; `reach` is given the seconds that were played.
     """
     performer = performer_of(clip)
     poses = to_blender(clip.in_metres(clip.poses), clip.axes)
