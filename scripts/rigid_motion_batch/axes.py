@@ -25,7 +25,7 @@ AXES: dict[str, np.ndarray] = {
 
 
 def to_blender(poses: Poses, axes: str) -> Poses:
-    """The poses in Blender's axes.
+    """Return the poses in Blender's axes.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def to_blender(poses: Poses, axes: str) -> Poses:
 
 
 def from_blender(poses: Poses, axes: str) -> Poses:
-    """The opposite of `to_blender`."""
+    """Return the opposite of `to_blender`."""
     return _changed(poses, AXES[axes].T)
 
 

@@ -25,7 +25,7 @@ BREAK_LINES = ("Cc", "Cs", "Zl", "Zp")
 
 
 def own_arguments(script: str) -> list[str]:
-    """The arguments that are meant for a script, given its `__file__`.
+    """Return the arguments that are meant for a script, given its `__file__`.
 
     In Blender (`blender --background --python SCRIPT -- ARGUMENTS`) what is behind the "--", in Python everything.
     """
@@ -35,13 +35,13 @@ def own_arguments(script: str) -> list[str]:
 
 
 def program_of(script: str) -> str:
-    """What users call a command: its script, "bake.py", or "rigid-motion bake" where they have started it so."""
+    """Return what users call a command: its script, "bake.py", or "rigid-motion bake" where they have started it so."""
     called = Path(sys.argv[0]).name if sys.argv else ""
     return called if called.startswith(f"{INSTALLED} ") else script
 
 
 def as_called(text: str, script: str) -> str:
-    """A text with examples of `python scripts/...`, in the way in which users have started the command."""
+    """Return a text with examples of `python scripts/...`, in the way in which users have started the command."""
     program = program_of(script)
     if program == script:
         return text
@@ -66,7 +66,7 @@ class Parser(argparse.ArgumentParser):
         return options
 
     def _all_options(self) -> list[str]:
-        """The options of this parser, and of its commands."""
+        """Return the options of this parser, and of its commands."""
         below = [one.choices.values() for one in self._actions if isinstance(one, argparse._SubParsersAction)]
         return [*self._option_string_actions, *(name for ones in below for one in ones for name in one._all_options())]
 
@@ -85,14 +85,16 @@ class Parser(argparse.ArgumentParser):
 
 
 def did_you_mean(word: str, words: Iterable[str]) -> str:
-    """What may have been meant by a word, as the end of a complaint; empty where none of these is near."""
+    """Return what may have been meant by a word, as the end of a complaint; empty where none of these is near."""
     plain = {name.lower().lstrip("-"): name for name in words}
     near = difflib.get_close_matches(word.lower().lstrip("-"), plain, n=1, cutoff=0.7)
     return f": did you mean {plain[near[0]]}?" if near else ""
 
 
 def parser_of(script: str, description: str, epilog: str = "", **options: Any) -> Parser:
-    """The parser of a command. Its help has these texts as they are written, and examples as they are typed here."""
+    """Return the parser of a command. Its help has these texts as they are written,
+    and examples as they are typed here.
+    """
     return Parser(
         prog=program_of(script),
         description=as_called(description, script),
@@ -103,14 +105,14 @@ def parser_of(script: str, description: str, epilog: str = "", **options: Any) -
 
 
 def as_typed(program: str, arguments: Sequence[str], inputs: Sequence[str]) -> str:
-    """A command as one would type it: of very many inputs the first few, and how many more there were."""
+    """Return a command as one would type it: of very many inputs the first few, and how many more there were."""
     left_out = set(inputs[MOST_INPUTS:]) - set(inputs[:MOST_INPUTS])
     typed = shlex.join([*program.split(), *(argument for argument in arguments if argument not in left_out)])
     return f"{typed} # and {len(left_out)} more" if left_out else typed
 
 
 def number(text: str) -> float:
-    """The number that an option says; NaN, which is within no bounds, where it is none."""
+    """Return the number that an option says; NaN, which is within no bounds, where it is none."""
     try:
         return float(text)
     except ValueError:
@@ -118,7 +120,7 @@ def number(text: str) -> float:
 
 
 def bounded(what: str, least: float, most: float, above: bool = False) -> Callable[[str], float]:
-    """A type of argument: a number from the least to the most, or above the least."""
+    """Return a type of argument: a number from the least to the most, or above the least."""
 
     def parse_number(text: str) -> float:
         value = number(text)
@@ -130,21 +132,21 @@ def bounded(what: str, least: float, most: float, above: bool = False) -> Callab
 
 
 def folder_path(text: str) -> Path:
-    """The folder that an option says."""
+    """Return the folder that an option says."""
     if not text.strip() or "\0" in text:
         raise argparse.ArgumentTypeError(f"{text!r} is no folder; give one such as renders/hand, or . for this one")
     return Path(text)
 
 
 def not_empty(text: str) -> str:
-    """The file that an argument says."""
+    """Return the file that an argument says."""
     if not text.strip():
         raise argparse.ArgumentTypeError(f"{text!r} is no file: a variable of a script may be empty")
     return text
 
 
 def printable(text: str) -> str:
-    """The text in one line, with control characters and the like as Python writes them: a line break as \\n."""
+    r"""Return the text in one line, with control characters and the like as Python writes them: a line break as \n."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
@@ -156,7 +158,9 @@ def complain(program: str, problem: object, place: object = "") -> None:
 
 
 def path_line(path: str | os.PathLike[str]) -> str:
-    """A path as a line of output: as it is, or as JSON where that would break the line or reach into a terminal."""
+    """Return a path as a line of output: as it is, or as JSON where that would break the line or reach
+    into a terminal.
+    """
     text = os.fspath(path)
     odd = text.startswith('"') or any(unicodedata.category(c) in BREAK_LINES for c in text)
     return json.dumps(text) if odd else text

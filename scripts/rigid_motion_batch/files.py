@@ -23,7 +23,8 @@ LONGEST_SUFFIX = 8
 
 @contextmanager
 def written_beside(path: Path, *, overwrite: bool = True) -> Iterator[Path]:
-    """A path next to `path` for a file that takes its place when the block ends well, and leaves no trace otherwise.
+    """Yield a path next to `path` for a file that takes its place when the block ends well,
+    and leaves no trace otherwise.
 
     It ends as `path` does, and is short however long that is. Folders that are missing on the way are made.
 
@@ -58,7 +59,7 @@ def written_beside(path: Path, *, overwrite: bool = True) -> Iterator[Path]:
 
 
 def ending_beside(path: Path) -> str:
-    """What the names of files that are written beside a path end with: a digest of its name, and its suffix."""
+    """Return what the names of files that are written beside a path end with: a digest of its name, and its suffix."""
     suffix = path.suffix if len(os.fsencode(path.suffix)) <= LONGEST_SUFFIX else ""
     return f".{zlib.crc32(os.fsencode(path.name)):08x}{suffix}"
 
@@ -117,7 +118,7 @@ def append_lines(path: Path, lines: Iterable[Mapping[str, Any]]) -> None:
 
 
 def lines_of(path: Path) -> Iterator[dict[str, Any]]:
-    """The objects of such a file; lines that are damaged are left out."""
+    """Yield the objects of such a file; lines that are damaged are left out."""
     try:
         text = path.read_bytes()
     except OSError:

@@ -39,15 +39,15 @@ class Theme:
 
     background: str
     card: str
-    """What a lane stands on."""
+    """The colour that a lane stands on."""
 
     track: str
-    """What is yet to come in a graph."""
+    """The colour of what is yet to come in a graph."""
 
     faint: str
     ink: str
     ghost: str
-    """Of the recording."""
+    """The colour of the recording."""
 
 
 THEMES = {
@@ -60,36 +60,38 @@ PAGES = "#ffffff", "#0e1115"
 """Grounds of a report, light and dark."""
 
 ERROR_COLOURS = ("#5B7FB0", "#C9B98A", "#F08A24", "#C4162A")
-"""What an error looks like where it is a colour, evenly from none to the largest: calm where all is well, red where it
-is not. They differ in lightness as well, for people who cannot tell red from green."""
+"""The colours that show an error, evenly from none to the largest: calm where all is well, red where it is not. They
+differ in lightness as well, for people who cannot tell red from green."""
 
 NEARLY_ALL = 0.995
 """The share of all errors that the colours reach up to: a single wild frame would leave no other to be seen."""
 
 LEAST_CONTRAST = 3.0
-"""Of a mode with what it stands before (WCAG 2.2, 1.4.11)."""
+"""The least contrast of a mode with what it stands before (WCAG 2.2, 1.4.11)."""
 
 CONTRAST_OF_WORDS = 4.5
-"""Of its name with the page (WCAG 2.2, 1.4.3)."""
+"""The least contrast of its name with the page (WCAG 2.2, 1.4.3)."""
 
 
 def colour_of(mode: str) -> str:
-    """The colour of a mode, the same in every run, also for a mode that the table does not know."""
+    """Return the colour of a mode, the same in every run, also for a mode that the table does not know."""
     return MODE_COLOURS.get(mode) or OTHER_COLOURS[zlib.crc32(mode.encode()) % len(OTHER_COLOURS)]
 
 
 def colour_on(theme: Theme, mode: str) -> str:
-    """The colour of a mode, as it stands out from a card."""
+    """Return the colour of a mode, as it stands out from a card."""
     return standing_out(colour_of(mode), theme.card, LEAST_CONTRAST)
 
 
 def colours_on_pages(mode: str) -> list[str]:
-    """The colour of a mode on a light page and on a dark one, where its name is written in it."""
+    """Return the colour of a mode on a light page and on a dark one, where its name is written in it."""
     return [standing_out(colour_of(mode), ground, CONTRAST_OF_WORDS) for ground in PAGES]
 
 
 def standing_out(colour: str, ground: str, contrast: float) -> str:
-    """A colour, darkened on a light ground or lightened on a dark one as far as it needs to be for a contrast."""
+    """Return a colour, darkened on a light ground or lightened on a dark one as far as it needs to be
+    for a contrast.
+    """
     behind, own = luminance(ground) + 0.05, luminance(colour)
     light = behind > 0.5
     limit = behind / contrast - 0.05 if light else behind * contrast - 0.05
@@ -103,7 +105,7 @@ def standing_out(colour: str, ground: str, contrast: float) -> str:
 
 
 def error_hex(share: float) -> str:
-    """The colour of an error by its share of the largest, 0 to 1: between those of `ERROR_COLOURS`."""
+    """Return the colour of an error by its share of the largest, 0 to 1: between those of `ERROR_COLOURS`."""
     place = min(max(share, 0.0), 1.0) * (len(ERROR_COLOURS) - 1)
     first = min(int(place), len(ERROR_COLOURS) - 2)
     low, high = map(_parts, ERROR_COLOURS[first : first + 2])
@@ -112,7 +114,7 @@ def error_hex(share: float) -> str:
 
 
 def full_colour(errors: Iterable[np.ndarray]) -> float:
-    """The error that colours reach up to, so that one scale is good for all of these: nearly the largest.
+    """Return the error that colours reach up to, so that one scale is good for all of these: nearly the largest.
 
     In metres. What is only rounding has the colour of nothing.
     """
@@ -123,22 +125,22 @@ def full_colour(errors: Iterable[np.ndarray]) -> float:
 
 
 def luminance(colour: str) -> float:
-    """Relative luminance, 0 to 1."""
+    """Return the relative luminance, 0 to 1."""
     red, green, blue = linear(colour)
     return 0.2126 * red + 0.7152 * green + 0.0722 * blue
 
 
 def linear(colour: str) -> tuple[float, float, float]:
-    """The linear RGB, 0 to 1, that Blender computes in, of an sRGB colour such as "#56B4E9"."""
+    """Return the linear RGB, 0 to 1, that Blender computes in, of an sRGB colour such as "#56B4E9"."""
     red, green, blue = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in _parts(colour))
     return red, green, blue
 
 
 def _parts(colour: str) -> list[float]:
-    """Red, green and blue, 0 to 1, as they are written."""
+    """Return red, green and blue, 0 to 1, as they are written."""
     return [int(colour[start : start + 2], 16) / 255.0 for start in (1, 3, 5)]
 
 
 def _encoded(value: float) -> float:
-    """What sRGB has for linear light."""
+    """Return what sRGB has for linear light."""
     return 12.92 * value if value <= 0.0031308 else 1.055 * value ** (1.0 / 2.4) - 0.055

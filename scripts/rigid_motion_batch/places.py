@@ -25,16 +25,20 @@ NAMED = {
     "rigid_motion_batch": PACKAGE,
     **({"research": CHECKOUT / "scripts" / "research", "tests": CHECKOUT / "tests"} if CHECKOUT else {}),
 }
-"""What the program is made of, by names that are the same wherever it is; a folder that is in another comes first."""
+"""The folders and files that the program is made of, by names that are the same wherever it is; a folder that is in
+another comes first."""
 
 
 def output_folder(name: str) -> Path:
-    """Where a command writes unless told otherwise: `renders/` of the checkout, or of the current folder."""
+    """Return where a command writes unless requested otherwise: `renders/` of the checkout,
+    or of the current folder.
+    """
     return (CHECKOUT or Path.cwd()) / "renders" / name
 
 
 def from_here(place: Path) -> Path:
-    """A path as it counts from the root of the checkout, where that is the current folder; otherwise the path itself.
+    """Return a path as it counts from the root of the checkout, where that is the current folder;
+    otherwise the path itself.
 
     What is kept by such names serves a checkout that was moved.
     """
@@ -43,7 +47,7 @@ def from_here(place: Path) -> Path:
 
 
 def place_of(name: str) -> Path:
-    """The file or folder of a name such as "rigid_motion/motion/poses.py".
+    """Return the file or folder of a name such as "rigid_motion/motion/poses.py".
 
     Raises
     ------
@@ -56,5 +60,5 @@ def place_of(name: str) -> Path:
 
 @cache
 def manifest() -> dict[str, Any]:
-    """What the extension's manifest says: its name, its version."""
+    """Return what the extension's manifest says: its name, its version."""
     return tomllib.loads(MANIFEST.read_text(encoding="utf-8"))

@@ -15,7 +15,7 @@ from typing import Any, Self, TextIO
 from rigid_motion_batch.command_line import printable
 
 FARM = "RIGID_MOTION_PROGRESS"
-"""Of the environment: "openjd" where a farm listens, to the lines that Open Job Description knows."""
+"""A variable of the environment: "openjd" where a farm listens, to the lines that Open Job Description knows."""
 
 BAR_COLUMNS = 24
 
@@ -34,7 +34,7 @@ class Stage:
 
     @property
     def fraction(self) -> float:
-        """How much is done, 0 to 1."""
+        """Share that is done, 0 to 1."""
         return min(self.done / self.total, 1.0) if self.total else 1.0
 
     def advance(self, steps: float = 1.0, doing: str | None = None) -> None:
@@ -143,7 +143,7 @@ class Progress:
             self._stream.flush()
 
     def _line(self) -> str:
-        """How long it has taken and will take, and what is being done."""
+        """Return how long it has taken and will take, and what is being done."""
         stage = self._stage
         if stage is None:
             return ""
@@ -159,14 +159,14 @@ class Progress:
 
 
 def duration(seconds: float) -> str:
-    """A time as clocks show it: "1:05" for a minute and five seconds."""
+    """Return a time as clocks show it: "1:05" for a minute and five seconds."""
     minutes, seconds = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02}:{seconds:02}" if hours else f"{minutes}:{seconds:02}"
 
 
 def _bar(stream: TextIO, line: Callable[[], str]) -> Any:
-    """A bar of rich with a line behind it, where the stream is a terminal that can show one; otherwise None."""
+    """Return a bar of rich with a line behind it, where the stream is a terminal that can show one; otherwise None."""
     if not stream.isatty() or os.environ.get("TERM") == "dumb":
         return None
     try:
@@ -202,6 +202,6 @@ def _bar(stream: TextIO, line: Callable[[], str]) -> Any:
 
 
 def _fitting(text: str, stream: TextIO) -> str:
-    """The text in one line, with what a terminal must not get or cannot show escaped."""
+    """Return the text in one line, with what a terminal must not get or cannot show escaped."""
     encoding = getattr(stream, "encoding", None) or "ascii"
     return printable(text).encode(encoding, "backslashreplace").decode(encoding)

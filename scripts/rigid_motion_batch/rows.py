@@ -14,21 +14,22 @@ from rigid_motion_batch.files import replacing
 Row = TypeVar("Row")
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
-"""What spreadsheets take for the beginning of a formula, if a text begins with it: names come from strangers' files."""
+"""Characters that spreadsheets take for the beginning of a formula, if a text begins with it: names come from
+strangers' files."""
 
 
 def plain(text: str) -> str:
-    """A text that no spreadsheet takes for a formula: with an apostrophe before it, where it would be one."""
+    """Return a text that no spreadsheet takes for a formula: with an apostrophe before it, where it would be one."""
     return f"'{text}" if text.lstrip("'").startswith(FORMULA) else text
 
 
 def meant(cell: str) -> str:
-    """What `plain` made this of."""
+    """Return what `plain` made this of."""
     return cell[1:] if cell.startswith("'") and plain(cell) != cell else cell
 
 
 def line_of(cells: Iterable[object]) -> str:
-    """Cells as a line of CSV, which ends with LF; texts are `plain`."""
+    """Return cells as a line of CSV, which ends with LF; texts are `plain`."""
     line = io.StringIO()
     cells = [plain(cell) if isinstance(cell, str) else cell for cell in cells]
     # Before Python 3.13, csv quotes no ends of lines but those it writes itself. A joint's name may have any.
@@ -48,7 +49,7 @@ READERS = {"str": meant, "int": int, "float": float}
 
 
 def read_all_rows(paths: Iterable[Path], kind: type[Row]) -> list[Row]:
-    """The rows of several files, one after the other."""
+    """Return the rows of several files, one after the other."""
     return [row for path in paths for row in read_rows(path, kind)]
 
 

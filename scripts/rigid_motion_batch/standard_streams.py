@@ -60,7 +60,7 @@ def finish(program: str, code: int) -> int:
 
 
 def _prepared(stream: TextIO | None, number: int) -> TextIO:
-    """A stream that shows every letter, escaped if need be, and never fails."""
+    """Return a stream that shows every letter, escaped if need be, and never fails."""
     if stream is None:
         return _text(number, encoding="utf-8")
     if not isinstance(stream, io.TextIOWrapper) or stream.fileno() != number:

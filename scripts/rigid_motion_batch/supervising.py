@@ -30,7 +30,7 @@ from typing import Any
 from .command_line import path_line, printable
 
 VARIABLE = "RIGID_MOTION_SESSION"
-"""Of the environment: the temporary folder of a child; empty where none could be made."""
+"""A variable of the environment: the temporary folder of a child; empty where none could be made."""
 
 JOURNAL = "journal"
 
@@ -38,23 +38,23 @@ GRACE = 1.2
 """Seconds that the child has after a signal to end by itself."""
 
 LAST = 1.7
-"""Seconds after which nobody waits for it, though it was killed: the system may be reading from a disk that is gone."""
+"""Seconds after which nothing waits for it, although killed: the system may be reading from a disk that is gone."""
 
 LOOK = 0.1
 """Seconds between two looks at the clock."""
 
 STOPPED = "Stopped. What was written by then is complete."
-"""What is said where the child had nothing better to say."""
+"""The message where the child had nothing better to say."""
 
 SHOW_CURSOR = "\x1b[?25h"
-"""What has a terminal show its cursor."""
+"""The text that has a terminal show its cursor."""
 
 PR_SET_PDEATHSIG = 1
 """See prctl(2)."""
 
 ASK = getattr(signal, "SIGUSR1", None)
-"""What the parent asks its child with to end. Any other signal may come to both of them, from a terminal or a farm, and
-would ask twice. On Windows, where there is none, the console sends Ctrl-C to both, and the parent waits."""
+"""The signal by which the parent asks its child to end. Any other signal may come to both of them, from a terminal or a
+farm, and would ask twice. On Windows, where there is none, the console sends Ctrl-C to both, and the parent waits."""
 
 _session = ""
 _journal: int | None = None
@@ -62,7 +62,7 @@ _is_child = False
 
 
 def stop_signals() -> list[signal.Signals]:
-    """The signals that stop this process. Those that are ignored, as by nohup, go on being ignored."""
+    """Return the signals that stop this process. Those that are ignored, as by nohup, go on being ignored."""
     if _is_child and ASK:
         return [ASK]
     names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
@@ -126,7 +126,7 @@ def supervise(program: str) -> int:
 
 
 def death(code: int) -> str:
-    """How a process ended, by its exit code."""
+    """Return how a process ended, by its exit code."""
     if -code not in {*signal.Signals}:
         return f"exit code {code}"
     name = signal.Signals(-code).name
@@ -146,7 +146,7 @@ def held_back(signals: Iterable[int]) -> Iterator[None]:
 
 
 def begin_child() -> bool:
-    """Whether this process is the child.
+    """Begin as a child, and return whether this process is one.
 
     It then reports in the journal, leaves what becomes of signals to its parent, and does not outlive that.
     """
@@ -172,12 +172,12 @@ def begin_child() -> bool:
 
 
 def blender_program() -> str:
-    """The Blender that this process is; empty in a Python, with or without bpy."""
+    """Return the Blender that this process is; empty in a Python, with or without bpy."""
     return getattr(getattr(sys.modules.get("bpy"), "app", None), "binary_path", "")
 
 
 def session() -> str:
-    """The temporary folder of this command, for `join_session`; empty where there is none."""
+    """Return the temporary folder of this command, for `join_session`; empty where there is none."""
     return _session
 
 
@@ -220,7 +220,7 @@ def report(**facts: Any) -> None:
 
 
 def written_of(source: str) -> list[str]:
-    """The files that this process and its workers have reported as complete that were made of an input."""
+    """Return the files that this process and its workers have reported as complete that were made of an input."""
     return [path for path, made_of in _Journal(_session).written if made_of == source]
 
 
@@ -285,20 +285,20 @@ def _environment(folder: str | None) -> dict[str, str]:
 
 
 def _this_command() -> Sequence[str]:
-    """What this process was started with: Python, or a Blender that runs a script."""
+    """Return what this process was started with: Python, or a Blender that runs a script."""
     blender = blender_program()
     return [blender, *sys.argv[1:]] if blender else [sys.executable, *sys.orig_argv[1:]]
 
 
 def _crash(code: int, at: str) -> str:
-    """How a child ended that nobody stopped, and the way out."""
+    """Return how a child ended that was not stopped, and the way out."""
     if not at:
         return f"the process died ({death(code)}) before it had done anything"
     return f"the process died ({death(code)}) at {printable(at)}: leave that out, or see whether Blender opens it"
 
 
 def _writable(stream: Any) -> bool:
-    """Whether a stream takes a line now: who reads a pipe may have stopped to."""
+    """Return whether a stream takes a line now: who reads a pipe may have stopped to."""
     if stream is None:
         return False
     if os.name == "nt":

@@ -21,11 +21,11 @@ BLENDER_PYTHONS = ("3.11", "3.13")
 """The versions of Python that there are wheels of Blender for."""
 
 LOADED_LATE = ("libEGL.so.1", "libGL.so.1")
-"""What Blender loads only when it renders. It aborts the whole process where it cannot."""
+"""Libraries that Blender loads only when it renders. It aborts the whole process where it cannot."""
 
 
 def missing_for_rendering() -> str | None:
-    """The message of the dynamic linker about the first library that is not here; None where all of them are."""
+    """Return the message of the dynamic linker about the first library that is not here; None where all of them are."""
     if sys.platform != "linux":
         return None
     for library in LOADED_LATE:
@@ -47,7 +47,7 @@ def require_blender(script: str) -> None:
 
 
 def way_out(error: str, script: str = "compare.py") -> str:
-    """What to do about the message that `import bpy` failed with in a script, in a few lines."""
+    """Return what to do about the message that `import bpy` failed with in a script, in a few lines."""
     missing = re.search(r"(\S+): cannot open shared object file", error)
     if missing:
         return (
@@ -71,7 +71,7 @@ def way_out(error: str, script: str = "compare.py") -> str:
 
 
 def without_blender(what: str, *, films: bool) -> str:
-    """What to say where a comparison needs Blender ("Videos are made by") and there is none, in a few lines."""
+    """Return what to say where a comparison needs Blender ("Videos are made by") and there is none, in a few lines."""
     here = ".".join(map(str, sys.version_info[:2]))
     fits = here in BLENDER_PYTHONS
     python = f"Python {' or '.join(BLENDER_PYTHONS)}"

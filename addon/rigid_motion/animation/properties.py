@@ -53,7 +53,7 @@ TURN_AXIS_ITEMS = [
     ("Y", "Y", "Always about the local Y axis"),
     ("Z", "Z", "Always about the local Z axis"),
 ]
-"""What turns are about."""
+"""The axes that turns are about."""
 
 
 def _on_turns_axis(record: SlotRecord, _context: bpy.types.Context) -> None:
@@ -150,7 +150,7 @@ def _on_turns(motion: ObjectMotion | BoneMotion, _context: bpy.types.Context) ->
 
 
 def _transform_with(motion: ObjectMotion | BoneMotion) -> Transform:
-    """What has these properties."""
+    """Return what has these properties."""
     obj = motion.id_data
     if isinstance(motion, BoneMotion):
         # Blender has no way from it to its bone.

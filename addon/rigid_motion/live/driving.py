@@ -30,11 +30,12 @@ TRIED = 0.5
 """Radians by which a control is turned to see what follows it."""
 
 MOVED = 1e-3
-"""What has turned by that many radians has followed."""
+"""The angle in radians from which on something that turns has followed."""
 
 
 SWITCHES = ("IK_FK", "neck_follow", "head_follow")
-"""Of Rigify's rigs: at 1 limbs do what their bones are turned to, and what hangs on others follows them as a whole."""
+"""Properties of Rigify's rigs: at 1 limbs do what their bones are turned to,
+and what hangs on others follows them as a whole."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +43,7 @@ class Values:
     """Channels of objects or bones, as poses: location and rotation on top of where each is with nothing keyed."""
 
     prefixes: list[str]
-    """Of the data paths, "" for an object."""
+    """Prefixes of the data paths, "" for an object."""
 
     poses: Poses
     """Shape (channels, n)."""
@@ -78,16 +79,17 @@ class Driver:
         return True
 
     def values(self, poses: Poses) -> Values:
-        """The channels' values of poses (joints, n)."""
+        """Return the channels' values of poses (joints, n)."""
         raise NotImplementedError
 
     def owners(self, obj: bpy.types.Object) -> Iterable[bpy.types.Object | bpy.types.PoseBone | None]:
-        """Whose channels these are, in their order."""
+        """Return whose channels these are, in their order."""
         raise NotImplementedError
 
     def locals(self, values: Values) -> tuple[Poses, np.ndarray, float]:
-        """Poses (channels, n) of these values in the space of what each hangs on, numbers of that (channels,), -1 for
-        the world, and how many metres their unit is."""
+        """Return poses (channels, n) of these values in the space of what each hangs on, numbers of that (channels,),
+        -1 for the world, and how many metres their unit is.
+        """
         return values.poses, np.full(len(values.prefixes), -1), 1.0
 
 
@@ -120,7 +122,7 @@ class RigDriver(Driver):
         self._skeleton = Skeleton(body.parents)
         placed, self._follows = _space(obj, self.bones)
         self._offsets = _beside(placed, self._follows)
-        """Where each bone is with no values, seen from the bone that it follows, or in the armature."""
+        """The pose of each bone with no values, seen from the bone that it follows, or in the armature."""
         _, turn, scale = obj.matrix_basis.decompose()
         self._turn, self._scale = np.array(turn), max(sum(map(abs, scale)) / 3.0, 1e-9)
         numbers = np.array([body.joints.index(joint) for joint in joints], dtype=np.int64)
@@ -176,7 +178,7 @@ class RigDriver(Driver):
 
 
 def _beside(placed: Poses, follows: np.ndarray) -> Poses:
-    """Poses (bones,) seen from those that each follows; as they are where that is none, -1."""
+    """Return poses (bones,) seen from those that each follows; as they are where that is none, -1."""
     hanging = (follows >= 0)[:, None]
     back = np.where(hanging, conjugate(placed.quaternions[follows]), (1.0, 0.0, 0.0, 0.0))
     return Poses(
@@ -186,7 +188,7 @@ def _beside(placed: Poses, follows: np.ndarray) -> Poses:
 
 
 def object_of(label: str, body: Body) -> bpy.types.Object | None:
-    """The object that stands for a body, made where it is missing; None for as long as none can be made."""
+    """Return the object that stands for a body, made where it is missing; None for as long as none can be made."""
     for obj in bpy.context.scene.objects:
         if obj.get(MARK) == label and (obj.type == "ARMATURE") == (len(body.joints) > 1):
             return obj
@@ -205,7 +207,9 @@ def _linked(obj: bpy.types.Object, label: str) -> bpy.types.Object:
 
 
 def _new_armature(label: str, body: Body) -> bpy.types.Object | None:
-    """A bone for each joint, at rest as the joint is. Blender makes bones in Edit Mode alone."""
+    """Return an armature with a bone for each joint, at rest as the joint is.
+    Blender makes bones in Edit Mode alone.
+    """
     if bpy.context.mode != "OBJECT":
         return None
     rest = Skeleton(body.parents).in_root_space(body.rest[:, None])[:, 0]
@@ -248,7 +252,7 @@ def clear(obj: bpy.types.Object, bones: Iterable[str]) -> None:
 
 
 def _space(obj: bpy.types.Object, bones: list[str]) -> tuple[Poses, np.ndarray]:
-    """Where bones are with nothing on them, in the armature, and which of them each follows, -1 for none."""
+    """Return where bones are with nothing on them, in the armature, and which of them each follows, -1 for none."""
     clear(obj, bones)
     rows = {name: row for row, name in enumerate(bones)}
     follows, unsure = np.full(len(bones), -1), []
@@ -281,7 +285,7 @@ def _placed(obj: bpy.types.Object, bones: list[str]) -> Poses:
 
 
 def unscaled(matrices: np.ndarray) -> Poses:
-    """Matrices (..., 4, 4) as poses, without their scale."""
+    """Return matrices (..., 4, 4) as poses, without their scale."""
     axes = matrices[..., :3, :3] / np.linalg.norm(matrices[..., :3, :3], axis=-2, keepdims=True)
     return Poses(matrices[..., :3, 3], from_matrices(axes))
 

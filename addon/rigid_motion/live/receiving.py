@@ -33,7 +33,7 @@ MOST_AHEAD = 64
 """Messages of a body whose keys wait to be shown."""
 
 Pairs = Callable[[Body, bpy.types.Object], Mapping[str, str]]
-"""Which bone of a rig each joint of a body moves."""
+"""The bone of a rig that each joint of a body moves."""
 
 
 @dataclass(frozen=True)
@@ -59,10 +59,10 @@ class _Heard:
     is_vmc: bool
     driver: Driver | None = None
     is_gone: bool = False
-    """Whether somebody deleted its object."""
+    """True if its object was deleted."""
 
     poses: Poses | None = None
-    """What is shown of it, shape (joints,), and by the sender's clock when that was."""
+    """The poses that are shown of it, shape (joints,), and by the sender's clock when that was."""
     moment: float = 0.0
 
     ahead: deque[tuple[np.ndarray, Poses]] = field(default_factory=lambda: deque(maxlen=MOST_AHEAD))
@@ -74,7 +74,7 @@ class _Heard:
 
     @property
     def is_taken(self) -> bool:
-        """Whether what comes is of the joints that are recorded."""
+        """Return whether what comes is of the joints that are recorded."""
         return self.take is not None and self.take.driver.body.joints == self.body.joints
 
 
@@ -133,7 +133,9 @@ class Listening:
         self._heard = {which: it for which, it in self._heard.items() if which in shown or it.take}
 
     def _heard_of(self, which: Which, body: Body, present: Container[Which], is_vmc: bool) -> _Heard:
-        """What is known of a body. It has a label of its own; a sender that begins again goes on with its old one."""
+        """Return what is known of a body. It has a label of its own;
+        a sender that begins again goes on with its old one.
+        """
         heard = self._heard.get(which)
         if heard is None:
             labels = {it.label for other, it in self._heard.items() if other in present}
@@ -156,7 +158,7 @@ class Listening:
             heard.driver, heard.is_gone = None, True
 
     def _driver_of(self, heard: _Heard) -> Driver | None:
-        """What shows a body; None for as long as nothing can."""
+        """Return what shows a body; None for as long as nothing can."""
         if len(heard.body.joints) > 1:
             settings = self._settings()
             rig = bpy.data.objects.get((settings.armature, None))
@@ -254,7 +256,7 @@ running: Ticking[Listening] = Ticking("What came over the network cannot be show
 
 
 def listening() -> Listening | None:
-    """What listens, if anything does."""
+    """Return what listens, if anything does."""
     return running.thing
 
 

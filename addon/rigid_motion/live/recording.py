@@ -22,7 +22,7 @@ STRETCH = 60
 """Samples that are thinned together: a second of most senders. It begins and ends with keys."""
 
 STILL = 1e-6
-"""What changes by less has a single key."""
+"""The least change that takes more than a single key."""
 
 PLAIN = "lerp_slerp"
 """The mode that thinning goes by where keys are to have Blender's own in-betweens."""
@@ -48,7 +48,7 @@ class Take:
         self._last = -np.inf
         self._values: Values | None = None
         self._keys: list[list[tuple[np.ndarray, Poses]]] = []
-        """Of each channel and stretch the frames (k,) of its keys, and what it has there."""
+        """For each channel and stretch the frames (k,) of its keys, and what it has there."""
 
     def add(self, frames: np.ndarray, poses: Poses) -> None:
         """Take poses (n, joints) on rising frames (n,), those that are later than all before."""
@@ -72,7 +72,7 @@ class Take:
             keys.append((frames[rows], poses[rows]))
 
     def _kept(self, frames: np.ndarray, values: Values) -> list[np.ndarray]:
-        """The samples that are keys, of each channel."""
+        """Return the samples that are keys, of each channel."""
         if self._tolerance is None or len(frames) < 3:
             return [np.arange(len(frames))] * len(values.prefixes)
         poses, parents, unit = self.driver.locals(values)
@@ -106,7 +106,9 @@ class Take:
 
 
 def _of_all(keys: list[tuple[np.ndarray, Poses]]) -> tuple[np.ndarray, Poses]:
-    """The keys of stretches as one; a single one where nothing moves. Where stretches meet both have the same."""
+    """Return the keys of stretches as one; a single one where nothing moves.
+    Where stretches meet both have the same.
+    """
     frames, once = np.unique(np.concatenate([frames for frames, _ in keys]), return_index=True)
     poses = joined([poses for _, poses in keys])[once]
     positions, quaternions = poses.positions, align_signs(poses.quaternions)

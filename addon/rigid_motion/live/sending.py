@@ -22,7 +22,7 @@ class Sending:
         self._names = [obj.name for obj in objects]
         self._outlet = Outlet(host, port)
         self._performers: dict[str, tuple[int, Performer]] = {}
-        """Of each rig, how many bones it had."""
+        """The number of bones that each rig had."""
         self._begun = time.monotonic()
 
     def tick(self, now: float) -> None:
@@ -58,7 +58,7 @@ class Sending:
 
 
 def _bones(obj: bpy.types.Object) -> Poses:
-    """Where the bones of a rig are in the world, in the order of its armature."""
+    """Return where the bones of a rig are in the world, in the order of its armature."""
     matrices = np.array([obj.pose.bones[bone.name].matrix for bone in obj.data.bones])
     return unscaled(np.array(obj.matrix_world) @ matrices)
 
@@ -67,7 +67,7 @@ running: Ticking[Sending] = Ticking("What is selected cannot be sent")
 
 
 def sending() -> Sending | None:
-    """What is sent, if anything is."""
+    """Return what is sent, if anything is."""
     return running.thing
 
 

@@ -59,7 +59,7 @@ class Port:
             raise
 
     def _allow_pending(self) -> None:
-        """Linux takes what is allowed of what is asked for, others refuse it."""
+        """Set how many bytes may be pending: Linux takes what is allowed of what is asked for, others refuse it."""
         size = PENDING
         while size >= LEAST_PENDING:
             try:
@@ -74,7 +74,7 @@ class Port:
         return self._socket.getsockname()[1]
 
     def received(self) -> list[tuple[bytes, Address]]:
-        """What came since the last look, and from where."""
+        """Return what came since the last look, and from where."""
         result = []
         while len(result) < MOST_AT_ONCE:
             try:

@@ -35,7 +35,7 @@ class Ticking(Generic[Ticked]):
     def __init__(self, failure: str, handlers: Mapping[str, Callable] | None = None) -> None:
         self.thing: Ticked | None = None
         self.trouble = ""
-        """Why it ended by itself."""
+        """The reason why it ended by itself."""
         self._failure = failure
 
         @persistent
@@ -63,7 +63,7 @@ class Ticking(Generic[Ticked]):
                 bpy.app.timers.unregister(self._timer)
 
     def look(self) -> float | None:
-        """What the timer calls: one tick, and after how many seconds there is another."""
+        """Return what the timer calls: one tick, and after how many seconds there is another."""
         if self.thing is None:
             return None
         try:

@@ -85,7 +85,7 @@ class _Breakdown(OnTargets):
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:
-        """Blender calls it, too, where it ends the operator by itself."""
+        """Undo the breakdowns. Blender calls it, too, where it ends the operator by itself."""
         self._slider.hide(context)
         self._breakdowns.cancel()
 

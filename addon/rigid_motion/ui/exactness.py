@@ -20,7 +20,7 @@ from .targets import each_target
 from .wording import length
 
 PROMISED = 0.0001
-"""How far off anything is between frames at most that is to be exact there, in metres."""
+"""The largest error between frames of what is to be exact there, in metres."""
 
 WORTH_OFFERING = 0.001
 """From which error on, in metres, an object is offered to be exact."""
@@ -57,7 +57,7 @@ class RIGID_MOTION_OT_exact(OnTargets, bpy.types.Operator):
 
 
 def draw(context: bpy.types.Context, layout: bpy.types.UILayout, target: Transform) -> None:
-    """How far off a target is between frames, where that is more than there should be, and what to do about it."""
+    """Draw how far off a target is between frames, where that is more than there should be, and what to do about it."""
     error, is_exact = animation.error_between_frames(target), target.has_difference_slot
     is_off = error > (PROMISED if is_exact else WORTH_OFFERING)
     if not is_off and (target.is_part or not is_exact):

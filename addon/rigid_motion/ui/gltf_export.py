@@ -98,7 +98,7 @@ def _has_exporter() -> bool:
 
 
 def _last_options(context: bpy.types.Context) -> dict[str, Any]:
-    """Return what Blender's exporter was told last in its dialog, but for what is set here."""
+    """Return the settings of Blender's exporter as last set in its dialog, but for what is set here."""
     last = context.window_manager.operator_properties_last(EXPORTER)
     if last is None:
         return {}

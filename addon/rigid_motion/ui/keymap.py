@@ -1,5 +1,6 @@
 """Shortcuts: Alt T for the pie menus, beside T, by which Blender chooses the interpolation of keys; and Ctrl C in Pose
-Mode, which is Blender's own again where its poll fails."""
+Mode, which is Blender's own again where its poll fails.
+"""
 
 from __future__ import annotations
 
@@ -21,13 +22,13 @@ COMMAND = "oskey" if sys.platform == "darwin" else "ctrl"
 class Shortcut(NamedTuple):
     keymap: str
     space: str
-    """Of the keymap."""
+    """The space of the keymap."""
 
     operator: str
     key: str
     modifier: str
     menu: str = ""
-    """What the operator calls."""
+    """The menu that the operator calls."""
 
 
 SHORTCUTS = (
@@ -60,7 +61,7 @@ def unregister() -> None:
 
 
 def draw(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
-    """The shortcuts as the user has them, to be changed."""
+    """Draw the shortcuts as the user has them, to be changed."""
     configuration = context.window_manager.keyconfigs.user
     for shortcut in SHORTCUTS:
         keymap = configuration.keymaps.find(shortcut.keymap, space_type=shortcut.space)

@@ -23,7 +23,7 @@ HOST = "127.0.0.1"
 
 
 _is_matching = False
-"""Whether it is the program that fills the table."""
+"""True if it is the program that fills the table."""
 
 
 def _on_bones(_settings: LiveSettings | LiveBone, _context: bpy.types.Context) -> None:
@@ -101,7 +101,7 @@ def _settings() -> receiving.Settings:
 
 
 def _pairs(body: Body, rig: bpy.types.Object) -> Mapping[str, str]:
-    """What the table says; it is filled in by names where it is for other joints or for another rig."""
+    """Return what the table says; it is filled in by names where it is for other joints or for another rig."""
     live = bpy.context.scene.rigid_motion_live
     if [item.name for item in live.bones] != list(body.joints) or live.bones_of != rig.name:
         _match(live, body.joints, rig)

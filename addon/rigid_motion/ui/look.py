@@ -1,5 +1,6 @@
 """How the overlay looks before anybody has changed the preferences: colours (red, green, blue, alpha, as on the screen)
-and widths (pixels at a resolution scale of 1)."""
+and widths (pixels at a resolution scale of 1).
+"""
 
 from __future__ import annotations
 

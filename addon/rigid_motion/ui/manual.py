@@ -53,12 +53,12 @@ PAGES = (
 
 
 def pages() -> tuple[str, tuple[tuple[str, str], ...]]:
-    """What Blender asks for: where pages are, and which is whose."""
+    """Return what Blender asks for: where pages are, and which is whose."""
     return DOCS, PAGES
 
 
 def draw(layout: bpy.types.UILayout) -> None:
-    """Buttons that open the documentation and the website."""
+    """Draw buttons that open the documentation and the website."""
     row = layout.row()
     row.operator("wm.url_open", text="Documentation", icon="HELP").url = DOCS + ANIMATORS
     row.operator("wm.url_open", text="Website", icon="URL").url = WEBSITE

@@ -39,7 +39,7 @@ Notes = list[tuple[str, str]]
 def facts_and_notes(
     target: bpy.types.Object | bpy.types.PoseBone | Transform, frame: float
 ) -> tuple[SegmentFacts | None, Notes]:
-    """The segment that a frame of the scene is in, and notes on it."""
+    """Return the segment that a frame of the scene is in, and notes on it."""
     target = transform_of(target)
     source, problem = _read(target)
     segment = None
@@ -74,7 +74,7 @@ _problem: tuple[tuple, str] = ((), "")
 
 
 def _read(target: Transform) -> tuple[Source | None, str]:
-    """What is keyed, or why rigid motion cannot act on it."""
+    """Return what is keyed, or why rigid motion cannot act on it."""
     global _problem
     try:
         source = source_of(target)

@@ -30,13 +30,13 @@ BUT = {
     "bones": n_("{done} of {count} bones: {summary}. But"),
     "objects and bones": n_("{done} of {count} objects and bones: {summary}. But"),
 }
-"""What comes before refusals where something was done."""
+"""The text before refusals where something was done."""
 
 LATER = {
     BAKED: n_("These keys were baked since: Un-Bake first"),
     REDUCED: n_("These keys were reduced since: Restore Keys first"),
 }
-"""Why what was done before cannot be taken back yet, by what was done last."""
+"""The reason why what was done before cannot be taken back yet, by what was done last."""
 
 MOST_REFUSALS = 8
 """Refusals that a report has room for."""
@@ -48,16 +48,16 @@ class OnTargets:
     bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
 
     nothing_to_do: ClassVar[str] = ""
-    """Why the operator is greyed out where it has nothing to do on any target."""
+    """The reason why the operator is greyed out where it has nothing to do on any target."""
 
     @classmethod
     def each_target(cls, context: bpy.types.Context) -> Iterator[Transform]:
-        """What the operator acts on here, one after the other."""
+        """Return what the operator acts on here, one after the other."""
         return each_target(context)
 
     @classmethod
     def with_work(cls, targets: Iterable[Transform]) -> Iterable[Transform]:
-        """The targets on which there is something to do."""
+        """Return the targets on which there is something to do."""
         return targets
 
     @classmethod
@@ -76,7 +76,7 @@ class OnTargets:
 
     @classmethod
     def reason(cls, targets: list[Transform], context: bpy.types.Context) -> str:
-        """Why the operator is greyed out, in the user's language."""
+        """Return why the operator is greyed out, in the user's language."""
         if targets:
             return tip_(spoken_of(cls.nothing_to_do, kind_of(targets)))
         return tip_(NOTHING_SHOWN if is_key_editor(context) else NO_BONES if is_posing(context) else NO_TARGETS)
@@ -127,7 +127,7 @@ class OnChanged(OnTargets):
 
     @classmethod
     def last_changes(cls, targets: Iterable[Transform]) -> dict[Transform, str]:
-        """What was done last to the keys of each target that something was done to."""
+        """Return what was done last to the keys of each target that something was done to."""
         result = {}
         for target, entries in entries_of(targets):
             if kind := next((entry.kind for entry in entries if entry.original is not None), None):

@@ -42,7 +42,7 @@ REFRESHED = (
     n_("In-betweens of {count} Action refreshed"),
     n_("In-betweens of {count} Actions refreshed"),
 )
-"""What was refreshed, by the number of Actions."""
+"""The text on what was refreshed, by the number of Actions."""
 
 
 class RIGID_MOTION_OT_set_mode(OnTargets, bpy.types.Operator):

@@ -173,7 +173,7 @@ def _draw_segment(context: bpy.types.Context, layout: bpy.types.UILayout, segmen
 
 
 def _draw_turns(layout: bpy.types.UILayout, target: Transform) -> None:
-    """Turns of the segment, to be set; and what they are about once there are any."""
+    """Draw the turns of the segment, to be set; and what they are about once there are any."""
     row = labelled(layout, iface_("Turns", OWN_WORDS))
     row.prop(target.motion, "turns", text="")
     place = active_place(target) if target.motion.turns else None
@@ -182,7 +182,7 @@ def _draw_turns(layout: bpy.types.UILayout, target: Transform) -> None:
 
 
 def _draw_mode_menu(layout: bpy.types.UILayout, scope: str, modes: set[str]) -> None:
-    """A button that shows the mode and sets another."""
+    """Draw a button that shows the mode and sets another."""
     layout.enabled = bool(modes)
     text = iface_(LABELS[next(iter(modes))]) if len(modes) == 1 else iface_("Mixed") if modes else iface_("None")
     layout.operator_menu_enum("rigid_motion.set_mode", "mode", text=text, translate=False).on = scope

@@ -59,7 +59,7 @@ class Switch(NamedTuple):
 
 @lru_cache(maxsize=8)
 def switches_in(script: str) -> tuple[Switch, ...]:
-    """The buttons in the script of a rig, without those that are written in another way than expected."""
+    """Return the buttons in the script of a rig, without those that are written in another way than expected."""
     result = []
     for button in BUTTON.findall(script):
         with suppress(SyntaxError, ValueError, TypeError, AttributeError, StopIteration, RecursionError, MemoryError):
@@ -74,7 +74,7 @@ def switches_in(script: str) -> tuple[Switch, ...]:
 
 
 def switches_of(context: bpy.types.Context) -> Iterator[Switch]:
-    """The parents that can be switched of selected bones with in-betweens of a mode, in the active rig."""
+    """Yield the parents that can be switched of selected bones with in-betweens of a mode, in the active rig."""
     rig = context.active_object
     script = rig.get("rig_ui") if rig is not None and context.mode == "POSE" else None
     if not isinstance(script, bpy.types.Text):
@@ -156,7 +156,7 @@ class RIGID_MOTION_OT_switch_parent(bpy.types.Operator):
 
 
 def draw_parent_switch(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """A button with the parents, where there are any."""
+    """Draw a button with the parents, where there are any."""
     if RIGID_MOTION_OT_switch_parent.poll(context):
         layout.operator_menu_enum(RIGID_MOTION_OT_switch_parent.bl_idname, "parent", icon="DOWNARROW_HLT")
 

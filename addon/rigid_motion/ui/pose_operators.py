@@ -22,11 +22,11 @@ from .targets import selected
 ON_NO_IN_BETWEEN = n_("No selected bone is on an in-between: Blender's own operator does the same")
 
 SAME = 1e-6
-"""What components differ by that are the same."""
+"""Components that differ by less are the same."""
 
 
 def is_elsewhere(transform: Transform) -> bool:
-    """Whether something is seen elsewhere than its channels have it."""
+    """Return whether something is seen elsewhere than its channels have it."""
     try:
         seen = shown_components(transform)
     except Refused:

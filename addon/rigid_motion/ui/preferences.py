@@ -11,19 +11,21 @@ from . import keymap, manual
 from .look import DEFAULT_LOOK
 
 EXTENSION = __package__.rpartition(".")[0]
-"""What Blender knows the extension by: the package that this one is in."""
+"""The name that Blender knows the extension by: the package that this one is in."""
 
 DEFAULT_MODE = "motor_spline"
 
 
 def preferences() -> RigidMotionPreferences | None:
-    """The preferences, None while the package is registered without being an extension, as in tests of a checkout."""
+    """Return the preferences, None while the package is registered without being an extension,
+    as in tests of a checkout.
+    """
     addon = bpy.context.preferences.addons.get(EXTENSION)
     return addon.preferences if addon is not None else None
 
 
 def default_mode() -> str:
-    """The mode to take where nobody named one."""
+    """Return the mode to take where none is named."""
     chosen = preferences()
     return chosen.default_mode if chosen is not None else DEFAULT_MODE
 

@@ -19,7 +19,7 @@ MARGIN = 84
 
 
 def labelled(layout: bpy.types.UILayout, label: str = "") -> bpy.types.UILayout:
-    """The right-hand part of a row, with a label on the left, in the user's language."""
+    """Return the right-hand part of a row, with a label on the left, in the user's language."""
     split = layout.split(factor=LABEL)
     left = split.row()
     left.alignment = "RIGHT"
@@ -28,7 +28,7 @@ def labelled(layout: bpy.types.UILayout, label: str = "") -> bpy.types.UILayout:
 
 
 def draw_text(context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str) -> None:
-    """A text that is broken into as many lines as the region's width asks for."""
+    """Draw a text that is broken into as many lines as the region's width asks for."""
     system = context.preferences.system
     width = context.region.width - MARGIN * system.ui_scale
     blf.size(0, context.preferences.ui_styles[0].widget.points * system.ui_scale)

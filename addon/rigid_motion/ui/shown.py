@@ -20,7 +20,7 @@ log = logging.getLogger(__package__)
 
 
 def _components(part: slice) -> list[float]:
-    """Some of the ten components of the active target as it is seen; it is asked for as it is drawn."""
+    """Return some of the ten components of the active target as it is seen; it is asked for as it is drawn."""
     shown = None
     try:
         if (target := active_target(bpy.context)) is not None:

@@ -16,7 +16,7 @@ WAY = 300.0
 """Pixels, at a resolution scale of 1, that the mouse goes from 0 to 1."""
 
 FINE, STEP = 0.1, 0.1
-"""What Shift leaves of a movement, and the steps of Ctrl."""
+"""The part of a movement that Shift leaves, and the steps of Ctrl."""
 
 DIGITS = {
     **{name: str(n) for n, name in enumerate(("ZERO", "ONE", "TWO", "THREE", "FOUR"))},
@@ -28,7 +28,7 @@ DIGITS = {
     "MINUS": "-",
     "NUMPAD_MINUS": "-",
 }
-"""What keys type into a number."""
+"""The characters that keys type into a number."""
 
 LINE, HANDLE, TEXT = (0.8, 0.8, 0.8, 0.7), (0.28, 0.45, 0.7, 1.0), (0.95, 0.95, 0.95, 1.0)
 """Colours, red, green, blue, alpha."""
@@ -49,7 +49,7 @@ class Slider:
 
     def __init__(self, factor: float, x: float, scale: float) -> None:
         self.overshoots = False
-        """Whether the factor may be below 0 and above 1."""
+        """True if the factor may be below 0 and above 1."""
         self.typed = ""
         """The number that was typed, in per cent; the mouse has no say until it is deleted."""
         self._dragged, self._x, self._scale, self._snaps = factor, x, scale, False

@@ -28,7 +28,7 @@ SCOPES = [
     (CURRENT, "Current Segment", "The segment that the playhead is in. The others keep their modes"),
     (SELECTED, "Selected Keys", "The segments that the selected keys begin. The others keep their modes"),
 ]
-"""What of a target gets a mode, as the items of an enum property."""
+"""The parts of a target that get a mode, as the items of an enum property."""
 
 Frames = tuple[float, ...] | None
 """Frames of keys, None for all of a target."""
@@ -39,28 +39,30 @@ def is_key_editor(context: bpy.types.Context) -> bool:
 
 
 def is_posing(context: bpy.types.Context) -> bool:
-    """Whether bones are selected here, and not objects: in Pose Mode, and while weights are painted for a posed rig."""
+    """Return whether bones are selected here, and not objects: in Pose Mode,
+    and while weights are painted for a posed rig.
+    """
     return context.mode == "POSE" or (context.mode == "PAINT_WEIGHT" and context.pose_object is not None)
 
 
 def active_target(context: bpy.types.Context) -> Transform | None:
-    """What panels and ticks in menus are about."""
+    """Return what panels and ticks in menus are about."""
     active = context.active_pose_bone if is_posing(context) else context.object
     return None if active is None else transform_of(active)
 
 
 def each_target(context: bpy.types.Context) -> Iterator[Transform]:
-    """What an operator acts on here, one after the other: polls need no more than the first that fits."""
+    """Return what an operator acts on here, one after the other: polls need no more than the first that fits."""
     return _shown_in_editor(context) if is_key_editor(context) else map(transform_of, selected(context))
 
 
 def targets_of(context: bpy.types.Context) -> list[Transform]:
-    """What an operator acts on here."""
+    """Return what an operator acts on here."""
     return list(each_target(context))
 
 
 def with_bones_of_rigs(context: bpy.types.Context, targets: Iterable[Transform]) -> Iterator[Transform]:
-    """The targets, and outside of Pose Mode in place of rigs all that has keys of them and of their bones.
+    """Yield the targets, and outside of Pose Mode in place of rigs all that has keys of them and of their bones.
 
     In a key editor these are the selected rigs too: it shows channels of bones only where the bones are selected.
     """
@@ -78,7 +80,7 @@ def with_bones_of_rigs(context: bpy.types.Context, targets: Iterable[Transform])
 
 
 def with_keyed_bones(target: Transform) -> list[Transform]:
-    """What has keys of a rig and its bones, where any of its bones has; otherwise the target alone."""
+    """Return what has keys of a rig and its bones, where any of its bones has; otherwise the target alone."""
     if target.is_part or target.carrier.type != "ARMATURE":
         return [target]
     keyed = list(with_more_keys_than((target, *map(transform_of, target.carrier.pose.bones)), 0))
@@ -86,23 +88,25 @@ def with_keyed_bones(target: Transform) -> list[Transform]:
 
 
 def selected(context: bpy.types.Context) -> list[bpy.types.Object] | list[bpy.types.PoseBone]:
-    """The selected objects, without any the active one; or the selected bones alone, as Blender's operators have it."""
+    """Return the selected objects, without any the active one; or the selected bones alone,
+    as Blender's operators have it.
+    """
     result = selected_in_view(context)
     return result if result or is_posing(context) or context.object is None else [context.object]
 
 
 def selected_in_view(context: bpy.types.Context) -> list[bpy.types.Object] | list[bpy.types.PoseBone]:
-    """The selected bones of all rigs in Pose Mode while these are posed, else the selected objects."""
+    """Return the selected bones of all rigs in Pose Mode while these are posed, else the selected objects."""
     return list((context.selected_pose_bones if is_posing(context) else context.selected_objects) or ())
 
 
 def scope_for(context: bpy.types.Context) -> str:
-    """What of the targets gets a mode here, unless asked for otherwise."""
+    """Return what of the targets gets a mode here, unless asked for otherwise."""
     return SELECTED if is_key_editor(context) else WHOLE
 
 
 def frames_meant(context: bpy.types.Context, target: Transform, scope: str) -> Frames:
-    """The keys of a target that begin the segments meant, None for all of it. `Refused` where there are none."""
+    """Return the keys of a target that begin the segments meant, None for all of it. `Refused` where there are none."""
     if scope == WHOLE:
         return None
     if scope == SELECTED:
@@ -130,7 +134,9 @@ def frames_meant(context: bpy.types.Context, target: Transform, scope: str) -> F
 def grouped_by_frames(
     context: bpy.types.Context, targets: Iterable[Transform], scope: str, refused: list[Refused]
 ) -> dict[Frames, list[Transform]]:
-    """The targets whose segments meant begin on the same keys, together. `refused` takes why others have none."""
+    """Return the targets whose segments meant begin on the same keys, together.
+    `refused` takes why others have none.
+    """
     groups: dict[Frames, list[Transform]] = {}
     for target in targets:
         try:
@@ -141,7 +147,7 @@ def grouped_by_frames(
 
 
 def modes_meant(context: bpy.types.Context, target: Transform | None, scope: str) -> set[str]:
-    """The modes that what is meant of a target has now."""
+    """Return the modes that what is meant of a target has now."""
     if target is None:
         return set()
     try:
@@ -157,7 +163,7 @@ def modes_meant(context: bpy.types.Context, target: Transform | None, scope: str
 
 
 def _shown_in_editor(context: bpy.types.Context) -> Iterator[Transform]:
-    """The objects and the bones of which location, rotation, scale or the mode is shown in a key editor."""
+    """Yield the objects and the bones of which location, rotation, scale or the mode is shown in a key editor."""
     shown = {fcurve.as_pointer() for fcurve in context.visible_fcurves or ()}
     for obj in _animated_in_editor(context) if shown else ():
         result = set()
@@ -170,7 +176,7 @@ def _shown_in_editor(context: bpy.types.Context) -> Iterator[Transform]:
 
 
 def _animated_in_editor(context: bpy.types.Context) -> Iterable[bpy.types.Object]:
-    """The objects that a key editor may show."""
+    """Return the objects that a key editor may show."""
     if not context.space_data.dopesheet.show_only_selected:
         return context.view_layer.objects
     active = (context.object,) if context.object is not None else ()
@@ -178,14 +184,14 @@ def _animated_in_editor(context: bpy.types.Context) -> Iterable[bpy.types.Object
 
 
 def _carrier(obj: bpy.types.Object, prefix: str) -> bpy.types.Object | bpy.types.PoseBone | None:
-    """What a prefix of data paths stands for in an object; None where that has no such bone."""
+    """Return what a prefix of data paths stands for in an object; None where that has no such bone."""
     if not prefix:
         return obj
     return None if obj.pose is None else obj.pose.bones.get(bone_name(prefix))
 
 
 def fcurves_of(animated: bpy.types.Object) -> bpy.types.bpy_prop_collection | tuple:
-    """The F-curves of an object's slot. Looks at nothing else in the file, for it is asked of many objects."""
+    """Return the F-curves of an object's slot. Looks at nothing else in the file, for it is asked of many objects."""
     data = animated.animation_data
     if data is None or data.action is None or data.action_slot is None:
         return ()

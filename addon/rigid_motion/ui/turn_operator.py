@@ -19,7 +19,7 @@ TURN_SCOPES = [
     (CURRENT, "Current Segment", "The segment that the playhead is in. The others keep their turns"),
     (SELECTED, "Selected Keys", "The segments that the selected keys begin. The others keep their turns"),
 ]
-"""What of a target gets turns, as the items of an enum property."""
+"""The parts of a target that get turns, as the items of an enum property."""
 
 
 class RIGID_MOTION_OT_set_turns(OnTargets, bpy.types.Operator):

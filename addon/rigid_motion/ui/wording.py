@@ -22,7 +22,7 @@ LABELS = {name: label for name, label, *_ in MODE_ITEMS}
 """Each mode as menus show it."""
 
 SHORT_LABELS = {name: KEYFRAME_MODES[name].short_label if name in KEYFRAME_MODES else LABELS[name] for name in LABELS}
-"""The same without the algebra, for pies and lists. Translated as `OWN_WORDS`: Blender has another Screw."""
+"""Labels without the algebra, for pies and lists. Translated as `OWN_WORDS`: Blender has another Screw."""
 
 ALGEBRAS = {
     "Dual Quaternion": n_("Algebra: dual quaternions"),
@@ -32,7 +32,7 @@ ALGEBRAS = {
 """The algebras that modes are named after."""
 
 DESCRIPTIONS = {name: description for name, _, description, _ in MODE_ITEMS}
-"""What each mode does for the motion, in one sentence without a full stop."""
+"""The effect of each mode on the motion, in one sentence without a full stop."""
 
 NO_KEYS = n_("No keys of location, rotation or scale yet")
 KEYED_BONES = n_("Its bones have keys. Choose their modes in Pose Mode")
@@ -59,7 +59,7 @@ TROUBLES = {
         n_('The constraint "Rigid Motion" has an influence below 1: a part of Blender\'s in-betweens is left'),
     ),
 }
-"""What is amiss with the constraint of a bone, each behind its icon."""
+"""Troubles with the constraint of a bone, each behind its icon."""
 
 COUNTED = {
     "objects": n_("{count} objects"),
@@ -70,7 +70,9 @@ COUNTED = {
 
 
 def cautions(segment: SegmentFacts) -> list[str]:
-    """What an animator may not expect of a segment, and what to do about it. Nothing where it is Blender's own."""
+    """Return what an animator may not expect of a segment, and what to do about it.
+    Nothing where it is Blender's own.
+    """
     if segment.mode == "BLENDER":
         return []
     texts = []
@@ -101,24 +103,26 @@ def cautions(segment: SegmentFacts) -> list[str]:
 
 
 def algebra_of(mode: str) -> str:
-    """The line of a tooltip that says which algebra a mode is in, in English; empty where it is named after none."""
+    """Return the line of a tooltip that says which algebra a mode is in, in English;
+    empty where it is named after none.
+    """
     return ALGEBRAS.get(KEYFRAME_MODES[mode].algebra, "") if mode in KEYFRAME_MODES else ""
 
 
 def degrees(angle: float) -> str:
-    """An angle in radians, to be read."""
+    """Return an angle in radians, to be read."""
     return f"{math.degrees(angle):.1f}°"
 
 
 def turn(segment: SegmentFacts) -> str:
-    """By how much a segment turns, to be read: in turns where there are whole ones, else in degrees."""
+    """Return by how much a segment turns, to be read: in turns where there are whole ones, else in degrees."""
     if not segment.turns:
         return degrees(segment.turn)
     return iface_("{turns} turns").format(turns=f"{segment.turn / math.tau:.3g}")
 
 
 def length(scene: bpy.types.Scene, units: float, precision: int = 4) -> str:
-    """A length in Blender's units, to be read in those of the scene."""
+    """Return a length in Blender's units, to be read in those of the scene."""
     settings = scene.unit_settings
     if settings.system == "NONE":
         return f"{units:.{precision}g}"
@@ -126,7 +130,7 @@ def length(scene: bpy.types.Scene, units: float, precision: int = 4) -> str:
 
 
 def reduction_summary(scene: bpy.types.Scene, reduction: Reduction) -> str:
-    """What became of the keys of a target."""
+    """Return what became of the keys of a target."""
     error = length(scene, reduction.largest_error, precision=3)
     summary = rpt_("{before} keys became {after}, largest error {error}").format(
         before=reduction.before, after=reduction.after, error=error
@@ -149,14 +153,14 @@ def reduction_summary(scene: bpy.types.Scene, reduction: Reduction) -> str:
 
 
 def reduced_to(scene: bpy.types.Scene, reduction: Reduction) -> str:
-    """How many keys became how many, and how far off the motion is, for a line of a panel."""
+    """Return how many keys became how many, and how far off the motion is, for a line of a panel."""
     became = f"{reduction.before} \N{RIGHTWARDS ARROW} {reduction.after}"
     error = length(scene, reduction.largest_error, precision=3)
     return iface_("{keys}, {error} off").format(keys=became, error=error)
 
 
 def reduction_rows(scene: bpy.types.Scene, reduction: Reduction) -> list[tuple[str, str]]:
-    """What became of keys, and of the rig where it is one, as labels and what belongs to them."""
+    """Return what became of keys, and of the rig where it is one, as labels and what belongs to them."""
     rows = [
         (iface_("Keys", OWN_WORDS), f"{reduction.before} \N{RIGHTWARDS ARROW} {reduction.after}"),
         (
@@ -180,7 +184,7 @@ def reduction_rows(scene: bpy.types.Scene, reduction: Reduction) -> list[tuple[s
 
 
 def _slides(scene: bpy.types.Scene, rig: WholeRig) -> str | None:
-    """How far feet slide while they stand; None where none does."""
+    """Return how far feet slide while they stand; None where none does."""
     if rig.slide_before <= 0.0:
         return None
     before, after = (length(scene, slide, precision=2) for slide in (rig.slide_before, rig.slide_after))
@@ -188,7 +192,7 @@ def _slides(scene: bpy.types.Scene, rig: WholeRig) -> str | None:
 
 
 def counted_modes(segments: Mapping[str, int]) -> list[str]:
-    """Each mode with how many segments have it, most of them first."""
+    """Return each mode with how many segments have it, most of them first."""
     return [
         f"{count} {iface_(SHORT_LABELS[mode], OWN_WORDS)}"
         for mode, count in sorted(segments.items(), key=lambda item: -item[1])
@@ -196,24 +200,24 @@ def counted_modes(segments: Mapping[str, int]) -> list[str]:
 
 
 def listed(items: Sequence[str], most: int = 3) -> str:
-    """A list that fits into a line."""
+    """Return a list that fits into a line."""
     rest = len(items) - most
     return ", ".join(items[:most]) + (rpt_(" and {count} more").format(count=rest) if rest > 0 else "")
 
 
 def names_of(targets: Sequence[Transform]) -> str:
-    """One target by its name, several by their number."""
+    """Return one target by its name, several by their number."""
     return targets[0].name if len(targets) == 1 else rpt_(COUNTED[kind_of(targets)]).format(count=len(targets))
 
 
 def kind_of(targets: Iterable[Transform]) -> str:
-    """What several targets are called together."""
+    """Return what several targets are called together."""
     kinds = {target.plural for target in targets}
     return "objects and bones" if len(kinds) > 1 else next(iter(kinds), "objects")
 
 
 def spoken_of(text: str, kind: str) -> str:
-    """A text about objects, as it is where `kind` is meant: "objects", "bones" or "objects and bones".
+    """Return a text about objects, as it is where `kind` is meant: "objects", "bones" or "objects and bones".
 
     It is English in and out: what comes out is translated as a whole.
     """
@@ -224,7 +228,7 @@ def spoken_of(text: str, kind: str) -> str:
 
 
 def wrapped(text: str, fits: Callable[[str], bool]) -> list[str]:
-    """The lines of a text, broken between words. A word that does not fit gets a line of its own."""
+    """Return the lines of a text, broken between words. A word that does not fit gets a line of its own."""
     lines: list[str] = []
     for word in text.split():
         if lines and fits(f"{lines[-1]} {word}"):

@@ -81,7 +81,7 @@ exit code:
 
 
 def parse(arguments: list[str]) -> argparse.Namespace:
-    """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
+    """Return the options; a wrong one ends the program with code 2 and a line that says what is wrong."""
     parser = parser_of(SCRIPT, __doc__, EPILOG)
     parser.add_argument("files", nargs="+", type=not_empty, metavar="FILE.blend", help="files to bake, folders")
     parser.add_argument("--unbake", action="store_true", help="give baked objects and bones their own keys back")
@@ -138,7 +138,7 @@ class Bake(Work):
 
     @classmethod
     def of(cls, options: argparse.Namespace) -> Bake:
-        """What the options say."""
+        """Return what the options say."""
         doing, done = ("Un-baking", "un-baked") if options.unbake else ("Baking", "baked")
         interpolation = "CONSTANT" if options.hold else "LINEAR"
         where = options.objects, options.overwrite, options.dry_run

@@ -38,7 +38,7 @@ Exit code: 0 done, 2 it could not be built, or Blender calls it invalid.
 """
 
 BESIDE = (MANIFEST, LICENSE)
-"""What goes into the zip beside the package."""
+"""Files that go into the zip beside the package."""
 
 EPOCH = (1980, 1, 1, 0, 0, 0)
 """The time of every file in the zip, the earliest that a zip can hold: the same bytes whenever it is built."""
@@ -92,7 +92,7 @@ def _blender_ext(*arguments: str) -> None:
 
 
 def _repack(built: Path, package: Path) -> None:
-    """The same files in order of their names, with one time and one mode: what a file system adds is left out."""
+    """Write the same files in order of their names, with one time and one mode: what a file system adds is left out."""
     with (
         zipfile.ZipFile(built) as source,
         zipfile.ZipFile(package, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as target,

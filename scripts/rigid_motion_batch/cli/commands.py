@@ -41,7 +41,7 @@ RESEARCH = {
     "check_release": "check_release",
     "pages": "pages",
 }
-"""What `python scripts/research NAME` runs of a checkout: the module of the package `research`."""
+"""The programs that `python scripts/research NAME` runs of a checkout: the module of the package `research`."""
 
 COMMANDS = {
     "compare": Command("compare", "compare interpolation modes on recordings: numbers, charts, videos"),

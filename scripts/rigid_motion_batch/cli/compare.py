@@ -62,7 +62,8 @@ SAYING = ("--explain", "--json", "--open", "--quiet")
 """Options that are about what is printed, and are no part of the command that a report names."""
 
 RECORD = "comparison.json"
-"""What a folder is the comparison of, among the files of the store: its recordings, as they count from there."""
+"""The file that says what a folder is the comparison of, among the files of the store: its recordings,
+as they count from there."""
 
 
 class Refused(Exception):
@@ -96,7 +97,7 @@ def main(arguments: list[str]) -> int:
 
 
 def comparison_of(options: argparse.Namespace, command: str, blender: str) -> Comparison:
-    """What is wanted by these options of that command, with a Blender of that version."""
+    """Return what is requested by these options of that command, with a Blender of that version."""
     stage, details = options.stage, {"Blender": blender} if blender else {}
     if stage:
         speed = "real time" if stage.slow_motion == 1 else f"{stage.slow_motion:g} times slower"
@@ -132,7 +133,9 @@ def comparison_of(options: argparse.Namespace, command: str, blender: str) -> Co
 
 
 def free_folder(sources: list[str]) -> Path:
-    """`renders/NAME`, by the first recording, with a number where that holds another comparison or anything else."""
+    """Return `renders/NAME`, by the first recording, with a number where that holds another comparison
+    or anything else.
+    """
     if sources == own_recordings():
         name = "comparison"
     else:
@@ -148,13 +151,13 @@ def _is_free(folder: Path) -> bool:
 
 
 def _is_same(folder: Path, sources: list[str]) -> bool:
-    """Whether a folder holds the comparison of some of these recordings."""
+    """Return whether a folder holds the comparison of some of these recordings."""
     held = _held(folder)
     return held is not None and (not held or not held.keys().isdisjoint(_places(sources, folder)))
 
 
 def _held(folder: Path) -> dict[str, str] | None:
-    """The recordings that a folder holds the comparison of, and their digests; None where it holds none."""
+    """Return the recordings that a folder holds the comparison of, and their digests; None where it holds none."""
     if not (folder / OWN).is_dir():
         return None
     try:
@@ -164,7 +167,7 @@ def _held(folder: Path) -> dict[str, str] | None:
 
 
 def _places(sources: list[str], folder: Path) -> list[str]:
-    """The sources as they count from a folder, so that both can be moved."""
+    """Return the sources as they count from a folder, so that both can be moved."""
     here = os.path.abspath(folder)
     return [os.path.relpath(source, here) if Path(source).drive == folder.drive else source for source in sources]
 
@@ -181,13 +184,13 @@ def _require_same_comparison(output: Path, sources: list[str]) -> None:
 
 
 def _short(path: Path) -> str:
-    """A path as one would type it here."""
+    """Return a path as one would type it here."""
     path, here = path.absolute(), Path.cwd()
     return os.fspath(path.relative_to(here) if path.is_relative_to(here) else path)
 
 
 def _digests(sources: list[str], store: Store) -> dict[str, str]:
-    """Source to the digest of its file, of those that are there."""
+    """Return the digest of the file of each source, of those that are there."""
     result = {}
     for source in sources:
         with suppress(TrajectoryError):
@@ -199,7 +202,7 @@ def _digests(sources: list[str], store: Store) -> dict[str, str]:
 
 
 def _blender(options: argparse.Namespace) -> str:
-    """The version of the Blender that films and reads; empty where none is needed, and there is none.
+    """Return the version of the Blender that films and reads; empty where none is needed, and there is none.
 
     Raises
     ------
@@ -233,13 +236,13 @@ def _blender(options: argparse.Namespace) -> str:
 
 
 def _suffix(source: str) -> str:
-    """Of the file of a source: ".fbx" of walk.fbx:Hand."""
+    """Return the suffix of the file of a source: ".fbx" of walk.fbx:Hand."""
     lower = source.lower()
     return next((end for end in IN_BLENDER if lower.endswith(end) or f"{end}:" in lower), "")
 
 
 def _executor(options: argparse.Namespace, store: Store, progress: Progress) -> Executor:
-    """Who does the tasks. Raises ExecutorError where that cannot be."""
+    """Return the executor of the tasks. Raises ExecutorError where that cannot be."""
     if options.scheduler is None:
         return Executor() if options.jobs == 0 else ProcessExecutor(options.jobs or processors())
     try:
@@ -264,7 +267,7 @@ class _Run:
         self.notes: list[str] = []
         self.outcome = Outcome()
         self.page = False
-        """Whether there is one of this run."""
+        """True if there is one of this run."""
 
     def run(self) -> int:
         """Read the recordings, see what there is to do, do it, and say what it came to."""
@@ -370,7 +373,7 @@ class _Run:
             terminal.show(terminal.table_of(terminal.lines_of(numbers), len(numbers.clips)), str(said))
 
     def _numbers(self) -> tuple[Numbers | None, Verdict | None]:
-        """All numbers that there are, and what they come to."""
+        """Return all numbers that there are, and what they come to."""
         gathering, needed = Gathering(), []
         for name, tasks in groupby(self._measuring(), key=lambda task: task.parameters.clip.name):
             choices = []
@@ -432,7 +435,7 @@ class _Run:
 
 
 def _share(options: argparse.Namespace) -> Share:
-    """What is to be done here."""
+    """Return what is to be done here."""
     return Share(frozenset({options.only}), *options.part) if options.only else Share()
 
 

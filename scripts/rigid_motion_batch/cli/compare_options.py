@@ -130,7 +130,7 @@ stopped by Ctrl-C, and 143 by SIGTERM.
 
 
 def parse(arguments: list[str]) -> argparse.Namespace:
-    """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
+    """Return the options; a wrong one ends the program with code 2 and a line that says what is wrong."""
     parser = parser_of(SCRIPT, DESCRIPTION, EPILOG)
     parser.add_argument("inputs", nargs="*", metavar="INPUT", help="recordings (those in assets/)")
     parser.add_argument(
@@ -278,7 +278,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
 
 
 def without(arguments: list[str], *options: str) -> list[str]:
-    """Arguments of a comparison but for some options and their values."""
+    """Return arguments of a comparison but for some options and their values."""
     parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
     for option in options:
         parser.add_argument(option)
@@ -286,12 +286,12 @@ def without(arguments: list[str], *options: str) -> list[str]:
 
 
 def own_recordings() -> list[str]:
-    """Those that come with the program."""
+    """Return those that come with the program."""
     return [str(path) for path in sorted(from_here(ASSETS).glob("*.csv"))]
 
 
 def _choices(options: argparse.Namespace) -> list[Choice]:
-    """All choices of keys of the run. Raises ValueError for options that do not go together."""
+    """Return all choices of keys of the run. Raises ValueError for options that do not go together."""
     rates, tolerance, budget, shared = options.rates, options.tolerance, options.budget, options.shared
     options.decimate = options.decimate or ("adaptive" if tolerance or budget else "uniform")
     if options.decimate == "uniform":
@@ -315,7 +315,7 @@ def _choices(options: argparse.Namespace) -> list[Choice]:
 
 
 def _amounts(kind: type[Choice]) -> Callable[[str], list[Choice]]:
-    """How a list of amounts is read: each as a choice of that kind."""
+    """Return how a list of amounts is read: each as a choice of that kind."""
 
     def parse_amounts(text: str) -> list[Choice]:
         written = ["".join(part.split()) for part in text.split(",") if part.strip()] or [text]
@@ -333,7 +333,7 @@ class Modes:
 
     names: tuple[str, ...]
     distinct: bool
-    """Whether those that are one motion share a lane."""
+    """True if those that are one motion share a lane."""
 
 
 def _modes(text: str) -> Modes:
@@ -356,7 +356,7 @@ def _modes(text: str) -> Modes:
 
 
 def _whole(pattern: str, what: str, fits: Callable[..., bool] = lambda *numbers: True) -> Callable[[str], Any]:
-    """How whole numbers are read: those in the groups of a pattern, or the single one."""
+    """Return how whole numbers are read: those in the groups of a pattern, or the single one."""
 
     def parse_whole(text: str) -> int | tuple[int, ...]:
         result = re.fullmatch(pattern, text, re.ASCII)

@@ -37,7 +37,7 @@ def main(arguments: list[str]) -> int:
 
 
 def whole_parser() -> argparse.ArgumentParser:
-    """A parser with all commands. Those that need packages that are not here take files alone."""
+    """Return a parser with all commands. Those that need packages that are not here take files alone."""
     whole = argparse.ArgumentParser(INSTALLED)
     commands = whole.add_subparsers()
     for name, command in COMMANDS.items():
@@ -56,7 +56,7 @@ class _Shown(Exception):
 
 
 def parser_of_module(module: str) -> argparse.ArgumentParser | None:
-    """The parser of a command, which makes it to show its help; None where it cannot be made here."""
+    """Return the parser of a command, which makes it to show its help; None where it cannot be made here."""
 
     def show(parser: argparse.ArgumentParser, file: object = None) -> None:
         raise _Shown(parser)

@@ -26,7 +26,7 @@ class NoEnvironment(Exception):
 
 
 def elsewhere(script: str, arguments: list[str]) -> list[str] | None:
-    """The command line that does the work of a script in another Python; None where this one has all it needs.
+    """Return the command line that does the work of a script in another Python; None where this one has all it needs.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def become(command: list[str]) -> int:
 
 
 def _without_option(arguments: list[str]) -> tuple[list[str], str]:
-    """The arguments without `--environment DIR`, and DIR; empty where it was not given."""
+    """Return the arguments without `--environment DIR`, and DIR; empty where it was not given."""
     rest, folder = [], ""
     given = iter(arguments)
     for argument in given:
@@ -74,7 +74,7 @@ def _python_in(folder: Path) -> Path:
 
 
 def _lacks(python: Path) -> str:
-    """What a Python lacks of all that is needed, as it says itself; empty where it lacks nothing."""
+    """Return what a Python lacks of all that is needed, as it says itself; empty where it lacks nothing."""
     code = f"import sys, {', '.join(LIBRARIES)}; sys.exit(sys.version_info < (3, 11) and 'Python 3.11 or newer')"
     try:
         tried = subprocess.run([python, "-c", code], capture_output=True, text=True, env=_environment())
@@ -84,7 +84,7 @@ def _lacks(python: Path) -> str:
 
 
 def _environment() -> dict[str, str]:
-    """Without what would have the other Python look for modules in this one."""
+    """Return the environment without what would have the other Python look for modules in this one."""
     return {name: value for name, value in os.environ.items() if name not in ("PYTHONHOME", "PYTHONPATH")}
 
 
@@ -98,13 +98,13 @@ def _checked(folder: Path) -> Path:
 
 
 def _found() -> Path | None:
-    """The Python of an environment of the checkout that has everything."""
+    """Return the Python of an environment of the checkout that has everything."""
     folders = sorted((CHECKOUT / ".venv").glob("*python-*"), reverse=True)
     return next((python for python in map(_python_in, folders) if python.exists() and not _lacks(python)), None)
 
 
 def _made() -> Path:
-    """The Python of an environment that is made by Blender's own."""
+    """Return the Python of an environment that is made by Blender's own."""
     bootstrap = CHECKOUT / "scripts" / "bootstrap.py"
     made = subprocess.run([sys.executable, bootstrap, "environment"], stdout=subprocess.PIPE, text=True)
     if made.returncode:

@@ -81,7 +81,7 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
 
 
 def _lines(result: Inspection) -> Iterator[str]:
-    """What is in a recording, as text."""
+    """Yield what is in a recording, as text."""
     size = f"{result.bytes / 1e6:.1f} MB" if result.bytes >= 1e6 else f"{result.bytes / 1e3:.1f} KB"
     yield printable(f"{result.source}: {result.format}, {size}")
     if len(result.bodies) > 1:

@@ -21,7 +21,7 @@ SCRIPT = "job_bundle.py"
 PROGRAM = program_of(SCRIPT)
 
 PARTS = 16
-"""Tasks that a stage is split into, unless told."""
+"""Tasks that a stage is split into, unless requested otherwise."""
 
 FILMING = ("build", "render", "encode")
 """The stages at the end of which there are films."""
@@ -61,7 +61,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _parse(arguments: list[str]) -> tuple[argparse.Namespace, list[str]]:
-    """The options of the bundle, and the arguments of the comparison."""
+    """Return the options of the bundle, and the arguments of the comparison."""
     usage = "%(prog)s [-h] [--bundle FOLDER] [--parts N] [options of compare.py] [INPUT ...]"
     parser = parser_of(SCRIPT, __doc__, EPILOG, usage=usage, allow_abbrev=False)
     parser.add_argument(

@@ -32,7 +32,7 @@ from rigid_motion_batch.keying.wishes import Wishes
 from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
 
 IN_FOLDERS = (".blend", ".bvh", ".csv", ".fbx", ".glb", ".gltf", ".tsv", ".tum")
-"""Of the files that are taken of a folder. What else it reads may be anything: .json, .txt."""
+"""Endings of the files that are taken of a folder. What else it reads may be anything: .json, .txt."""
 
 MODE = "motor_spline"
 
@@ -126,7 +126,7 @@ exit code:
 
 
 def parse(arguments: list[str]) -> argparse.Namespace:
-    """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
+    """Return the options; a wrong one ends the program with code 2 and a line that says what is wrong."""
     parser = parser_of(SCRIPT, __doc__, EPILOG)
     parser.add_argument(
         "inputs",
@@ -245,7 +245,8 @@ class Reduce(Work):
 
 
 def _planned(options: argparse.Namespace) -> list[Job]:
-    """What is to be done: a body of a file is a recording, and so is a glTF file of which a .blend file is to be made.
+    """Return what is to be done: a body of a file is a recording,
+    and so is a glTF file of which a .blend file is to be made.
 
     An FBX file is none where it becomes a GLB file with all that is in it.
     """

@@ -174,7 +174,7 @@ def router(options: argparse.Namespace, stopped: list[int]) -> None:
 
 
 def measure(options: argparse.Namespace, _: list[int]) -> None:
-    """What a recording costs."""
+    """Measure what a recording costs."""
     stream_measure.run(options)
 
 
@@ -183,7 +183,7 @@ def measure(options: argparse.Namespace, _: list[int]) -> None:
 
 @contextmanager
 def stopping() -> Iterator[list[int]]:
-    """The signals that ask for an end come into this list; the second of them ends the program as ever."""
+    """Yield a list that signals which ask for an end come into; the second of them ends the program as ever."""
     received: list[int] = []
 
     def handle(which: int, _: object) -> None:
@@ -222,7 +222,7 @@ def _motions(tracks: Tracks) -> list[Motion]:
 
 
 def _error(motion: Motion, truth: Clip | None) -> str:
-    """How far off a motion is, as text; nothing where the truth has other joints."""
+    """Return how far off a motion is, as text; nothing where the truth has other joints."""
     if truth is None:
         return ""
     times, poses = samples_of(truth)
@@ -234,7 +234,7 @@ def _error(motion: Motion, truth: Clip | None) -> str:
 
 
 def _stage(progress: Progress, title: str, seconds: float | None) -> AbstractContextManager[Stage | None]:
-    """A stage of so many seconds, where they are known."""
+    """Return a stage of so many seconds, where they are known."""
     return progress.stage(title, seconds) if seconds else nullcontext()
 
 

@@ -48,7 +48,7 @@ _share = bounded("part of all", 0.0, 0.99)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options beside those of reading."""
+    """Add the options beside those of reading."""
     parser.add_argument("recording", metavar="RECORDING", help="a recording of a body; FILE:BODY takes one of several")
     parser.add_argument("--tolerance", default="5mm", metavar="LENGTH", help="largest error: 5mm, 0.5cm (%(default)s)")
     parser.add_argument("--delay", type=_delay, default=0.1, metavar="S", help="seconds of delay (%(default)s)")
@@ -88,7 +88,7 @@ def run(options: argparse.Namespace) -> None:
 
 
 def packed(body: Body, times: np.ndarray, poses: Poses) -> dict[str, dict[str, float]]:
-    """What even streams of packed joints cost, and how far off they are."""
+    """Return what even streams of packed joints cost, and how far off they are."""
     forest, result = Forest([body]), {}
     samples = straight(times, Poses(poses.positions, align_signs(poses.quaternions)))
     for way in WAYS:
@@ -115,7 +115,7 @@ def write(path: Path, clip: Clip, body: Body, times: np.ndarray, shown: Poses) -
 
 
 def lines(result: Measured, beside: dict[str, dict[str, float]], tolerance: float) -> list[str]:
-    """The numbers as text."""
+    """Return the numbers as text."""
     cost = result.cost
     rows = [
         f"datagrams: {cost.datagrams}, of which {cost.lost} were lost, in {cost.seconds:.2f} s",

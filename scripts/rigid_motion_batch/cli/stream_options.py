@@ -78,7 +78,7 @@ It runs until Ctrl-C, or for --seconds.
 
 
 def parse(arguments: list[str]) -> argparse.Namespace:
-    """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
+    """Return the options; a wrong one ends the program with code 2 and a line that says what is wrong."""
     style = {"formatter_class": argparse.RawDescriptionHelpFormatter}
     parser = Parser(prog=PROGRAM, description=DESCRIPTION, epilog=as_called(EPILOG, SCRIPT), **style)
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")

@@ -48,11 +48,11 @@ class Line:
     """None of somebody else's motion, whose keys are not known."""
 
     best: bool
-    """Whether no other motion has fewer errors, or fewer keys where a tolerance limits the errors."""
+    """True if no other motion has fewer errors, or fewer keys where a tolerance limits the errors."""
 
 
 def lines_of(numbers: Numbers) -> list[Line]:
-    """The table: choices from the fewest keys to the most, motions in the order of the modes."""
+    """Return the table: choices from the fewest keys to the most, motions in the order of the modes."""
     places = {measure.metric: place for place, measure in enumerate(MEASURES)}
     mean, groups = numbers.mean(), numbers.groups()
     columns = [numbers.modes.index(group[0]) for group in groups]
@@ -80,7 +80,7 @@ def lines_of(numbers: Numbers) -> list[Line]:
 
 
 def table_of(lines: Sequence[Line], clips: int) -> Table:
-    """The table for a terminal; the best of each choice is marked with a star."""
+    """Return the table for a terminal; the best of each choice is marked with a star."""
     title = "Shell error" if clips == 1 else f"Shell error, mean and largest of {clips} clips"
     table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("Keys")
@@ -105,7 +105,7 @@ def table_of(lines: Sequence[Line], clips: int) -> Table:
 
 
 def as_data(lines: Sequence[Line]) -> list[dict[str, object]]:
-    """The table for JSON."""
+    """Return the table for JSON."""
     return [asdict(line) for line in lines]
 
 

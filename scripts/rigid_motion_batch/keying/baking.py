@@ -18,14 +18,14 @@ from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.keying.targets import Action, Result
 
 BAKED, UNBAKED = "-baked", "-unbaked"
-"""Of the names of files that are written."""
+"""Endings of the names of files that are written."""
 
 FEW = 4
 """As many bones are named; of more it is said how many they are."""
 
 
 def baking(step: float, first: float | None, last: float | None, interpolation: str) -> Action:
-    """Keys of this interpolation on every `step` frames, from `first` to `last`."""
+    """Return the action that makes keys of this interpolation on every `step` frames, from `first` to `last`."""
 
     def bake(targets: Sequence[Transform]) -> Result:
         problems = {target: problem for target in targets if (problem := animation.problem_of(target))}
@@ -42,7 +42,7 @@ def baking(step: float, first: float | None, last: float | None, interpolation: 
 
 
 def unbaking() -> Action:
-    """The keys from before."""
+    """Return the action that brings back the keys from before."""
 
     def unbake(targets: Sequence[Transform]) -> Result:
         refusals: list[Refused] = []
@@ -61,7 +61,9 @@ def _result(
 
 
 def _by_target(refusals: Iterable[Refused], targets: Sequence[Transform]) -> dict[Transform, str]:
-    """Which target each refusal is about: it begins with the name, and of names that begin alike with the longest."""
+    """Return which target each refusal is about: it begins with the name,
+    and of names that begin alike with the longest.
+    """
     longest_first = sorted(targets, key=lambda target: -len(target.name))
     result = {}
     for text in map(str, refusals):
@@ -71,7 +73,7 @@ def _by_target(refusals: Iterable[Refused], targets: Sequence[Transform]) -> dic
 
 
 def with_rigid_segments(targets: Sequence[Transform]) -> list[Transform]:
-    """Those that are to move otherwise than by Blender's own in-betweens, in any segment and possible or not."""
+    """Return those that are to move otherwise than by Blender's own in-betweens, in any segment and possible or not."""
     places = slot_transforms_of(targets)
     rigid = {
         user
@@ -93,7 +95,7 @@ def _has_rigid_segments(place: SlotTransform, source: Source | Refused) -> bool:
 
 
 def _has_mode(place: SlotTransform) -> bool:
-    """Whether there is any mode but Blender's own in a slot, also one that this version does not know."""
+    """Return whether there is any mode but Blender's own in a slot, also one that this version does not know."""
     channel = place.curves.get(place.users[0].mode_channel)
     if channel is None or channel.mute or not len(channel.keyframe_points):
         return recorded_mode(place) != 0
@@ -101,7 +103,7 @@ def _has_mode(place: SlotTransform) -> bool:
 
 
 def modes_of(targets: Sequence[Transform]) -> dict[Transform, str]:
-    """The modes of each target's segments as Blender's menus show them, each once."""
+    """Return the modes of each target's segments as Blender's menus show them, each once."""
     modes: dict[Transform, dict[str, None]] = {target: {} for target in targets}
     for place in slot_transforms_of(targets):
         for user in place.users:
@@ -114,7 +116,7 @@ def modes_of(targets: Sequence[Transform]) -> dict[Transform, str]:
 
 
 def described(modes: Mapping[Transform, str]) -> str:
-    """Which modes targets have: one by itself, several bones by mode, and few of them by name."""
+    """Return which modes targets have: one by itself, several bones by mode, and few of them by name."""
     if len(modes) == 1:
         return f", {next(iter(modes.values()))}"
     if len(modes) > FEW:

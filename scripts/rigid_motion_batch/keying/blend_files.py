@@ -20,7 +20,7 @@ HERE = bpy.app.version[:2]
 """The Blender that this runs in."""
 
 MAGIC = (b"BLENDER", b"\x28\xb5\x2f\xfd", b"\x1f\x8b")
-"""What .blend files begin with: as they are, compressed, and compressed by a Blender before 3.0."""
+"""The bytes that .blend files begin with: as they are, compressed, and compressed by a Blender before 3.0."""
 
 CUT_OFF = "it broke off half-way, the disk may be full"
 
@@ -35,13 +35,13 @@ class Missing:
     """What the open file wants of libraries and cannot have."""
 
     libraries: list[str] = field(default_factory=list)
-    """Of each library that something is missing from: which, what, and the way out."""
+    """For each library that something is missing from: which, what, and the way out."""
 
     reasons: dict[bpy.types.Object, str] = field(default_factory=dict)
     """Objects of which one cannot know whether rigid motion moves them, for they or their Actions are missing."""
 
     hides_objects: bool = False
-    """Whether there may be more of those, in collections or scenes that are missing."""
+    """True if there may be more of those, in collections or scenes that are missing."""
 
 
 def open_file(path: Path) -> None:
@@ -73,7 +73,9 @@ def open_file(path: Path) -> None:
 
 
 def missing_data() -> Missing:
-    """What the open file wants of libraries and cannot have, which Blender puts nothing but names in the place of."""
+    """Return what the open file wants of libraries and cannot have,
+    which Blender puts nothing but names in the place of.
+    """
     result = Missing()
     for library in bpy.data.libraries:
         blocks = [block for block in library.users_id if block.is_missing]
@@ -95,7 +97,7 @@ def missing_data() -> Missing:
 
 
 def _reasons(blocks: list[bpy.types.ID], path: str) -> dict[bpy.types.Object, str]:
-    """Why these objects cannot be known, of which something is among what is missing from a library."""
+    """Return why these objects cannot be known, of which something is among what is missing from a library."""
     reasons = {block: f"it is missing from {path}" for block in blocks if isinstance(block, bpy.types.Object)}
     for obj in bpy.data.objects:
         if obj.override_library is not None and obj.override_library.reference in blocks:
@@ -111,7 +113,9 @@ def _reasons(blocks: list[bpy.types.ID], path: str) -> dict[bpy.types.Object, st
 
 
 def only_overridden() -> set[bpy.types.Object]:
-    """The linked objects that are in the open file for the sake of overrides of them, and are not shown themselves."""
+    """Return the linked objects that are in the open file for the sake of overrides of them,
+    and are not shown themselves.
+    """
     overrides = [obj.override_library for obj in bpy.data.objects if obj.override_library is not None]
     linked = {override.reference for override in overrides}
     instanced = {obj.instance_collection for obj in bpy.data.objects if obj.instance_collection is not None}
@@ -169,5 +173,5 @@ def refuse_cut_off(path: Path) -> None:
 
 
 def named(version: tuple[int, int]) -> str:
-    """A version of Blender as people write it."""
+    """Return a version of Blender as people write it."""
     return ".".join(map(str, version))

@@ -89,5 +89,5 @@ def _import_fbx(path: Path) -> None:
 
 
 def _reason(error: RuntimeError) -> str:
-    """The last line of what an operator said, which names the problem."""
+    """Return the last line of what an operator said, which names the problem."""
     return (str(error).strip().splitlines() or [""])[-1].removeprefix("Error: ")

@@ -49,7 +49,7 @@ class GltfRun:
     def reduce(
         self, job: Job, outcome: Outcome, export: Callable[[Path], None] | None = None, per_unit: float = 1.0
     ) -> None:
-        """The same without refusals of places; raises FileProblem. A tolerance without a unit is in `per_unit` metres.
+        """Reduce without refusals of places; raises FileProblem. A tolerance without a unit is in `per_unit` metres.
 
         What was exported is written also where nothing of it could be reduced.
         """
@@ -122,7 +122,7 @@ def _unreadable(error: OSError) -> Unreadable:
 
 
 def _holds(path: Path, content: bytes) -> bool:
-    """Whether a file has this content already."""
+    """Return whether a file has this content already."""
     try:
         return path.read_bytes() == content
     except OSError:
@@ -137,7 +137,7 @@ def _exported(export: Callable[[Path], None]) -> Document:
 
 
 def _summary(clip: ReducedClip, tolerance: Tolerance, per_unit: float, would: str, *, by_number: bool) -> str:
-    """What became of a clip."""
+    """Return what became of a clip."""
     if clip.tracks is None:
         return f"stays as it was, {clip.before.keys} keys in {clip.before.size} bytes: {clip.reason}"
     summary = f"{would}reduced{fewer(clip.before.keys, clip.after.keys)}, {clip.before.size} -> {clip.after.size} bytes"

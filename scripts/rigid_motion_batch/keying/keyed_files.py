@@ -27,7 +27,7 @@ CLOSEST = 0.01
 """Frames between keys that Blender takes for two."""
 
 ON_A_FRAME = 1e-3
-"""What is as near to a whole frame is put on it."""
+"""The distance from a whole frame within which samples are put on it."""
 
 SINGLE = float(np.finfo(np.float32).eps)
 """By what share numbers of Blender are off."""
@@ -37,7 +37,9 @@ ARROW = 0.2
 
 
 def rate_of(clip: Clip) -> float:
-    """Frames a second with a sample on every frame; of one that is not even, the whole number next to its rate."""
+    """Return frames a second with a sample on every frame; of one that is not even,
+    the whole number next to its rate.
+    """
     whole = float(np.clip(round(clip.samples_a_second), *RATES))
     even = (len(clip.times) - 1) / float(clip.times[-1] - clip.times[0])
     return even if RATES[0] <= even <= RATES[1] and _are_on_frames(clip, even) > _are_on_frames(clip, whole) else whole
@@ -48,7 +50,7 @@ def _are_on_frames(clip: Clip, rate: float) -> bool:
 
 
 def frames_of(clip: Clip, rate: float) -> np.ndarray:
-    """On which frames the samples are, shape (n,), the first on frame 1."""
+    """Return on which frames the samples are, shape (n,), the first on frame 1."""
     frames = 1.0 + (clip.times - clip.times[0]) * rate
     return np.where(np.abs(frames - np.round(frames)) < ON_A_FRAME, np.round(frames), frames)
 
@@ -124,7 +126,7 @@ def _axes(name: str) -> bpy.types.Object:
 
 
 def _rig(clip: Clip, frames: np.ndarray, name: str) -> Rig:
-    """A rig in the open file with a key for every sample of a whole body, on frames (n,)."""
+    """Return a rig in the open file with a key for every sample of a whole body, on frames (n,)."""
     rest = Rest.of(clip.rest_body, clip.metres_per_unit, clip.axes)
     rig = Rig(name, rest, clip.rest_body.joints, bpy.context.scene.collection)
     channels = rig.channels_of(to_blender(clip.in_metres(clip.poses), clip.axes))

@@ -19,7 +19,7 @@ ALL = ":*"
 """Behind a recording: all of its bodies."""
 
 NAMES_OF_FILES = {".blend", ".csv", ".glb", ".gltf", ".tum"}
-"""What a folder is not called."""
+"""Endings that the name of a folder does not have."""
 
 
 @dataclass(frozen=True)
@@ -30,23 +30,23 @@ class Job:
     """The file as it was named, and of a recording the body, where one was."""
 
     folder: Path
-    """Where the result goes."""
+    """The folder that the result goes to."""
 
     output: Path
     """The file that is written, the same as the source where it is done in place; of a recording without its ending."""
 
     endings: tuple[str, ...] = ("",)
-    """That the output may get."""
+    """Endings that the output may get."""
 
     ending: str = ""
-    """Of them the one that the user has named."""
+    """The one of them that the user has named."""
 
     is_recording: bool = False
     is_found: bool = False
-    """Whether it was found in a folder, and not named."""
+    """True if it was found in a folder, and not named."""
 
     problem: str = ""
-    """Why it cannot be done, and the way out."""
+    """The reason why it cannot be done, and the way out."""
 
     @property
     def file(self) -> Path:
@@ -62,7 +62,7 @@ class Job:
 
 
 def file_and_body(source: str) -> tuple[Path, str | None]:
-    """The file of a recording, and which body of it is meant; all of it where there is no such file."""
+    """Return the file of a recording, and which body of it is meant; all of it where there is no such file."""
     try:
         return split_source(source)
     except TrajectoryError:
@@ -72,7 +72,7 @@ def file_and_body(source: str) -> tuple[Path, str | None]:
 def results_below(
     folder: Path, endings: tuple[str, ...], made: Callable[[Path], bool], problems: list[OSError]
 ) -> Iterator[Path]:
-    """The files of a folder and of those below it, but for hidden ones, results, and links that lead out.
+    """Yield the files of a folder and of those below it, but for hidden ones, results, and links that lead out.
 
     Why folders cannot be read is added to the problems.
     """
@@ -92,7 +92,8 @@ def planned(
     made: Callable[[Path], bool],
     job_of: Callable[[str, Path], Job],
 ) -> list[Job]:
-    """What is to be done, in the order of the inputs and of the paths in folders; a file that is named twice is one.
+    """Return what is to be done, in the order of the inputs and of the paths in folders;
+    a file that is named twice is one.
 
     Parameters
     ----------
@@ -128,7 +129,7 @@ def planned(
 
 
 def named_file(output: Path | None, inputs: Sequence[str], endings: Collection[str]) -> Path | None:
-    """The output where it is the name of a file, for the one input that there is; None where it is a folder.
+    """Return the output where it is the name of a file, for the one input that there is; None where it is a folder.
 
     Raises
     ------
@@ -145,7 +146,7 @@ def named_file(output: Path | None, inputs: Sequence[str], endings: Collection[s
 
 
 def place_of(path: Path) -> str:
-    """Where a path leads to; the same for all paths that lead there."""
+    """Return where a path leads to; the same for all paths that lead there."""
     return os.path.normcase(os.path.realpath(path))  # Path.resolve of Python 3.11 fails where links go in circles.
 
 
@@ -154,7 +155,7 @@ def _identity(job: Job) -> object:
 
 
 def _settled(jobs: list[Job]) -> Iterator[Job]:
-    """The jobs without what this program made of others; what would be written over another is a problem."""
+    """Yield the jobs without what this program made of others; what would be written over another is a problem."""
     outputs = {place_of(path) for job in jobs if not job.in_place for path in _outputs(job)}
     jobs = [job for job in jobs if place_of(job.file) not in outputs or not is_made(job.file)]
     sources = {place_of(job.file) for job in jobs}
@@ -171,6 +172,6 @@ def _settled(jobs: list[Job]) -> Iterator[Job]:
 
 
 def _outputs(job: Job) -> list[Path]:
-    """The files that may be written, as far as one can say before a recording is read."""
+    """Return the files that may be written, as far as one can say before a recording is read."""
     some = not job.source.endswith(ALL)
     return [job.output.with_name(f"{job.output.name}{ending}") for ending in job.endings if some]

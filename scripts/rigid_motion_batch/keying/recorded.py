@@ -13,10 +13,10 @@ RATES = 1, 240
 """Frames a second that a .blend file may be given for the rate of its recording."""
 
 TOLERANCE = Tolerance("5mm")
-"""Where none is given, of tables and .blend files."""
+"""The tolerance where none is given, of tables and .blend files."""
 
 SUFFIX, GLB_SUFFIX = "-keys", "-reduced"
-"""Of the names of files that are written, and of GLB files."""
+"""Endings of the names of files that are written, and of GLB files."""
 
 
 @dataclass(frozen=True)
@@ -34,15 +34,15 @@ class Writing:
     """What is to be written of recordings."""
 
     blend: bool
-    """Whether rigid motions become .blend files too."""
+    """True if rigid motions become .blend files too."""
 
     fps: int | None
     """None for the rate of each recording."""
 
     glb: bool = False
-    """Whether GLB files are written, and nothing else."""
+    """True if GLB files are written, and nothing else."""
 
 
 def name_of(file: Path, body: str | None) -> str:
-    """What the files of a body are called: as the recording, and where the body was named, as that too."""
+    """Return what the files of a body are called: as the recording, and where the body was named, as that too."""
     return "-".join([file.stem, *(folder_names([body]) if body else [])])

@@ -177,7 +177,7 @@ class RecordingRun:
 
 
 def _names(file: Path, clips: Sequence[Clip]) -> list[str]:
-    """What the files of bodies of a recording are called."""
+    """Return what the files of bodies of a recording are called."""
     if len(clips) == 1:
         return [name_of(file, clips[0].body)]
     return [f"{file.stem}-{body}" for body in folder_names(clip.name.removeprefix(f"{file.stem}-") for clip in clips)]

@@ -50,7 +50,7 @@ class Record:
 
     @contextmanager
     def writing(self, path: Path) -> Iterator[Path]:
-        """A path for a file that takes its place at `path` when the block ends well: see `written_beside`.
+        """Yield a path for a file that takes its place at `path` when the block ends well: see `written_beside`.
 
         Raises
         ------
@@ -83,7 +83,9 @@ class Record:
             append_lines(self._file, [line])
 
     def done(self, key: str) -> tuple[list[Path], Mapping[str, Any]] | None:
-        """The files that were made under a key, and facts; None where one, or what was read, is not as it was."""
+        """Return the files that were made under a key, and facts; None where one, or what was read,
+        is not as it was.
+        """
         with suppress(LookupError, TypeError, AttributeError):
             line = [line for line in self._lines if line.get("key") == key][-1]
             if all(_digest(self.folder / name) == digest for name, digest in line["files"].items()):
@@ -94,7 +96,7 @@ class Record:
         return self.overwrite or self._is_own(path)
 
     def _is_own(self, path: Path) -> bool:
-        """Whether a file is there as it was made of this input."""
+        """Return whether a file is there as it was made of this input."""
         return _is_among(path, _from(self.folder, path), self._lines)
 
     @property
@@ -103,18 +105,18 @@ class Record:
 
 
 def is_made(path: Path) -> bool:
-    """Whether a file is as this program has written it, by the record of its folder."""
+    """Return whether a file is as this program has written it, by the record of its folder."""
     return _is_among(path, path.name, _lines_of(path.parent / OWN / NAME))
 
 
 def _is_among(path: Path, name: str, lines: Iterable[Mapping[str, Any]]) -> bool:
-    """Whether a file is as lines of a record say under its name."""
+    """Return whether a file is as lines of a record say under its name."""
     digests = {line.get("sha256") for line in lines if line.get("file") == name}
     return bool(digests) and _digest(path) in digests
 
 
 def _lines_of(file: Path) -> Sequence[dict[str, Any]]:
-    """The lines of a record, read anew when it has grown."""
+    """Return the lines of a record, read anew when it has grown."""
     try:
         return _read(file, os.stat(file).st_size)
     except OSError:
@@ -127,7 +129,7 @@ def _read(file: Path, _size: int) -> Sequence[dict[str, Any]]:
 
 
 def _from(folder: Path, path: str | os.PathLike[str]) -> str:
-    """A path as it counts from a folder, so that both can be moved."""
+    """Return a path as it counts from a folder, so that both can be moved."""
     try:
         return Path(os.path.relpath(path, folder)).as_posix()
     except ValueError:  # On another drive.
@@ -135,7 +137,7 @@ def _from(folder: Path, path: str | os.PathLike[str]) -> str:
 
 
 def _digest(path: Path) -> str:
-    """Of a file; empty where it cannot be read."""
+    """Return the digest of a file; empty where it cannot be read."""
     try:
         return sha256_of(path) if path.is_file() else ""
     except OSError:

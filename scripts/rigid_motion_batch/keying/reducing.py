@@ -24,7 +24,9 @@ LEAST = 1e-6
 
 
 def reducing(wishes: Wishes, asked: Sequence[str] | None = None) -> Action:
-    """Fewer keys for what has more than two; and for what was asked for by its very name, if only to say why not."""
+    """Return the action that makes fewer keys for what has more than two; and for what was asked for by its very name,
+    if only to say why not.
+    """
 
     def concerned(targets: Sequence[Transform]) -> list[Transform]:
         keyed = set(with_more_keys_than(targets, FEWEST))
@@ -74,7 +76,9 @@ def reduced(targets: Sequence[Transform], wishes: Wishes) -> Result:
 
 
 def _described(reduction: Reduction, tolerance: Tolerance, unit: float, *, by_number: bool) -> str:
-    """How many keys there were and are, and how far off they are; lengths of the reduction are of `unit` metres."""
+    """Return how many keys there were and are, and how far off they are;
+    lengths of the reduction are of `unit` metres.
+    """
     rig = reduction.rig
     summary = fewer(reduction.before, reduction.after)
     summary += f" on {counted(rig.frames, 'frame')}" if rig else ""
@@ -89,7 +93,7 @@ def _described(reduction: Reduction, tolerance: Tolerance, unit: float, *, by_nu
 
 
 def not_promised(rig: WholeRig) -> str:
-    """Which bones the tolerance is not promised for, and why; nothing where it is for all."""
+    """Return which bones the tolerance is not promised for, and why; nothing where it is for all."""
     followers, below = rig.not_promised.followers, rig.not_promised.below
     if not followers:
         return ""
@@ -99,23 +103,25 @@ def not_promised(rig: WholeRig) -> str:
 
 
 def _doubt(targets: Sequence[Transform], tolerance: Tolerance | None, unit: float) -> str:
-    """What to think of where a tolerance is in metres, and a rig hardly is: importers leave it in units of its own."""
+    """Return what to think of where a tolerance is in metres, and a rig hardly is:
+    importers leave it in units of its own.
+    """
     return doubt(rig_size(targets[0].animated) * unit if targets[0].is_part else 0.0, tolerance, unit)
 
 
 def _written(metres: float) -> Tolerance:
-    """A length as a user would write it."""
+    """Return a length as a user would write it."""
     number, unit = (metres, "m") if metres >= 1.0 else (1e3 * metres, "mm")
     return Tolerance(f"{max(number, LEAST):.6f}{unit}")
 
 
 def _has_bones(target: Transform) -> bool:
-    """Whether the name of an object stands for the bones of a rig."""
+    """Return whether the name of an object stands for the bones of a rig."""
     return not target.is_part and target.carrier.pose is not None
 
 
 def _reason(target: Transform, refusal: Refused) -> str:
-    """A refusal without the name that it begins with: the target's, or that of its rig."""
+    """Return a refusal without the name that it begins with: the target's, or that of its rig."""
     names = (f"{name}{end}" for name in (target.name, target.animated.name) for end in (": ", " "))
     begin = next((name for name in names if str(refusal).startswith(name)), "")
     return str(refusal).removeprefix(begin)

@@ -36,7 +36,7 @@ LOOK = 0.2
 """Seconds between two looks at whether a session is to end."""
 
 NAMED = 5
-"""Of more inputs so many that failed are named again at the end."""
+"""The number of failed inputs that are named again at the end, where there are more inputs than that."""
 
 ROOMS = (
     "rigid_motion/animation",
@@ -47,7 +47,7 @@ ROOMS = (
     "recordings",
     "scenes/armature.py",
 )
-"""What the files that are written depend on."""
+"""The packages that the files that are written depend on."""
 
 Note = Callable[[str], None]
 """Writes a line for the user."""
@@ -61,13 +61,13 @@ class Work(ABC):
     """As a heading: "Baking"."""
 
     done: str
-    """What becomes of objects: "baked"."""
+    """The word for what becomes of objects: "baked"."""
 
     objects: Sequence[str] | None
     """The names and patterns of the objects that are meant; None for all."""
 
     overwrite: bool
-    """Whether files that were not made of an input may be replaced."""
+    """True if files that were not made of an input may be replaced."""
 
     dry_run: bool
     processes: int = field(default=1, kw_only=True)
@@ -81,7 +81,7 @@ class Work(ABC):
         """Do one input, and write what comes of it."""
 
     def task(self, job: Job) -> steps.Task:
-        """What has the key of a result: the input, these options, the version of the program and of Blender."""
+        """Return what has the key of a result: the input, these options, the version of the program and of Blender."""
         blender = ""
         if self.needs_blender(job):
             import bpy
@@ -101,21 +101,21 @@ class Outcome:
     objects: int = 0
     bones: int = 0
     clips: int = 0
-    """How many of them were done."""
+    """The number of them that were done."""
 
     refused: int = 0
-    """How many objects and bones were not."""
+    """The number of objects and bones that were not."""
 
     failed: bool = False
     unreadable: bool = False
     incomplete: bool = False
-    """Whether there may be objects in it that nobody can look at, for a library is missing."""
+    """True if there may be objects in it that cannot be looked at, for a library is missing."""
 
     is_old: bool = False
-    """Whether it was done by an earlier run."""
+    """True if it was done by an earlier run."""
 
     written: list[Path] = field(default_factory=list)
-    """Where to, or where it would have been."""
+    """The files that were written, or would have been."""
 
     beside: list[Path] = field(default_factory=list)
     """Files that belong to those."""
@@ -124,7 +124,7 @@ class Outcome:
     """The files that were read beside the input."""
 
     matched: set[str] = field(default_factory=set)
-    """Of the names and patterns that were asked for, those that there was an object or a bone for."""
+    """The names and patterns among those requested that there was an object or a bone for."""
 
     def add_written(self, path: Path) -> None:
         """Note that a file is complete at its place."""
@@ -137,7 +137,7 @@ class Outcome:
 
     @property
     def is_whole(self) -> bool:
-        """Whether something was written, and nothing is left to be done."""
+        """Return whether something was written, and nothing is left to be done."""
         return bool(self.written) and not (self.failed or self.refused or self.incomplete)
 
 
@@ -252,7 +252,7 @@ class _Session:
                 self._outcomes[place] = outcome
 
     def unmatched(self) -> set[str]:
-        """The names and patterns that were asked for, and that nothing has."""
+        """Return the names and patterns that were asked for, and that nothing has."""
         outcomes = self._outcomes.values()
         seen = any(not one.failed for one in outcomes)
         return set(self._work.objects or ()).difference(*(one.matched for one in outcomes)) if seen else set()
@@ -314,7 +314,7 @@ def _record_of(work: Work, job: Job) -> Record:
 
 
 def _inputs(job: Job) -> tuple[steps.Input, ...]:
-    """The file of an input as it is now; none where that is no file, or is to be replaced."""
+    """Return the file of an input as it is now; none where that is no file, or is to be replaced."""
     try:
         if job.in_place or not job.file.is_file():
             return ()
@@ -325,7 +325,7 @@ def _inputs(job: Job) -> tuple[steps.Input, ...]:
 
 
 def _executor(workers: int | None, count: int) -> Executor:
-    """Who does so many inputs. Raises ExecutorError where there cannot be that many processes."""
+    """Return the executor of so many inputs. Raises ExecutorError where there cannot be that many processes."""
     if workers == 0 or (workers is None and count == 1):
         return Executor()
     try:
@@ -340,7 +340,7 @@ def _executor(workers: int | None, count: int) -> Executor:
 
 
 def _summary(outcomes: Sequence[Outcome], count: int, work: Work, *, interrupted: bool) -> str:
-    """What came of it all, in a line."""
+    """Return what came of it all, in a line."""
     would = "to be " if work.dry_run else ""
     objects, bones, clips = (sum(getattr(one, what) for one in outcomes) for what in ("objects", "bones", "clips"))
     refused = sum(one.refused for one in outcomes)
@@ -361,12 +361,12 @@ def _summary(outcomes: Sequence[Outcome], count: int, work: Work, *, interrupted
 
 
 def counted(count: int, what: str) -> str:
-    """How many there are of something, "1 bone" or "24 bones"."""
+    """Return how many there are of something, "1 bone" or "24 bones"."""
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
 def tell_failure(note: Note, title: object, error: Exception) -> None:
-    """Say where the program failed: what nobody foresaw in one input must not keep the others from being done."""
+    """Say where the program failed: what was not foreseen in one input must not keep the others from being done."""
     note(f"{title}: not written, for this program failed ({type(error).__name__}: {error}):")
     for line in "".join(traceback.format_exception(error)).splitlines():
         note(line)
@@ -374,7 +374,7 @@ def tell_failure(note: Note, title: object, error: Exception) -> None:
 
 @contextmanager
 def _extension() -> Iterator[None]:
-    """What the extension keeps in files and follows, from this checkout, in place of one that is installed."""
+    """Use what the extension keeps in files and follows from this checkout, in place of one that is installed."""
     import addon_utils
     import bpy
 
@@ -397,7 +397,7 @@ class Stopped(KeyboardInterrupt):
     """By Ctrl-C or SIGTERM. `args` are the number of the signal."""
 
     partly: Outcome | None = None
-    """What became of the input that it came in."""
+    """The outcome of the input that it came in."""
 
 
 _received: list[int] = []

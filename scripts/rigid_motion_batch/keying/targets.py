@@ -18,16 +18,18 @@ class Result:
     done: list[Transform] = field(default_factory=list)
 
     refused: dict[Transform, str] = field(default_factory=dict)
-    """Why each could not be done, and the way out."""
+    """The reason why each could not be done, and the way out."""
 
     left: dict[Transform, str] = field(default_factory=dict)
-    """Why there was nothing to do to each after all."""
+    """The reason why there was nothing to do to each after all."""
 
     summary: str = ""
-    """What there is to say of those that were done; begins with a comma or a semicolon."""
+    """Text about those that were done; begins with a comma or a semicolon."""
 
     def refusals(self) -> Iterator[tuple[str, str, int]]:
-        """Which targets were refused, why, and how many they are: all bones of a rig at once where it is the rig's."""
+        """Yield which targets were refused, why, and how many they are:
+        all bones of a rig at once where it is the rig's.
+        """
         reasons = set(self.refused.values())
         if len(reasons) == 1 < len(self.refused) and not (any(one.is_part for one in self.done) or self.left):
             yield title_of(list(self.refused)), *reasons, len(self.refused)
@@ -35,7 +37,7 @@ class Result:
             yield from ((target.name, reason, 1) for target, reason in self.refused.items())
 
     def describe_kept(self) -> str:
-        """Which targets were left as they are, and why; of several bones the reason of one."""
+        """Return which targets were left as they are, and why; of several bones the reason of one."""
         (first, reason), *others = self.left.items()
         example = f", such as {first.name}" if any(other != reason for _, other in others) else ""
         left = "are left as they are" if others else "is left as it is"
@@ -50,20 +52,20 @@ class Action:
     """The work, as a heading: "Baking"."""
 
     done: str
-    """What becomes of targets: "baked"."""
+    """The word for what becomes of targets: "baked"."""
 
     concerned: Callable[[Sequence[Transform]], list[Transform]]
-    """Those of several that there is something to do to, possible or not."""
+    """Returns those of several that there is something to do to, possible or not."""
 
     act: Callable[[Sequence[Transform]], Result]
     """Do it to several of one object, in one go."""
 
     whole_rigs: bool = False
-    """Whether the bones of a rig and its own motion are done in one go."""
+    """True if the bones of a rig and its own motion are done in one go."""
 
 
 def groups_of(obj: bpy.types.Object, *, whole_rigs: bool) -> Iterator[list[Transform]]:
-    """What is done in one go of an object: all bones of a rig, and with them or after them its own motion.
+    """Yield what is done in one go of an object: all bones of a rig, and with them or after them its own motion.
 
     The other way round each bone would be compared with what it was in the Action of which a copy is there already.
     """
@@ -75,12 +77,14 @@ def groups_of(obj: bpy.types.Object, *, whole_rigs: bool) -> Iterator[list[Trans
 
 
 def matching(target: Transform, asked: Iterable[str]) -> set[str]:
-    """The names and patterns that a target fits. Those of a rig mean its bones too, and RIG/BONE means a bone."""
+    """Return the names and patterns that a target fits. Those of a rig mean its bones too,
+    and RIG/BONE means a bone.
+    """
     return {one for one in asked for name in {target.name, target.animated.name} if _fits(name, one)}
 
 
 def matching_missing(obj: bpy.types.Object, asked: Iterable[str]) -> set[str]:
-    """The names and patterns that an object fits, or may have bones for that nobody can look at."""
+    """Return the names and patterns that an object fits, or may have bones for that cannot be looked at."""
     return {one for one in asked if any(_fits(obj.name, part) for part in (one, *_before_slashes(one)))}
 
 
@@ -93,7 +97,9 @@ def _fits(name: str, pattern: str) -> bool:
 
 
 def title_of(targets: Sequence[Transform]) -> str:
-    """One target by its name, several bones by how many they are of which rig, and the rig itself along with them."""
+    """Return one target by its name, several bones by how many they are of which rig,
+    and the rig itself along with them.
+    """
     rig, bones = targets[0].animated.name, sum(target.is_part for target in targets)
     if len(targets) == 1:
         return targets[0].name

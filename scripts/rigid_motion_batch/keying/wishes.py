@@ -14,26 +14,29 @@ class Wishes:
 
     mode: str
     tolerance: Tolerance | None
-    """What each thing begins with in Blender's window, or `reduce.py` with recordings, where None."""
+    """The tolerance; where None, what each thing begins with in Blender's window, or `reduce.py` with recordings."""
 
     radius: float | None
-    """Of the shell in metres; what each object and bone measures, or what `compare` takes of recordings, where None."""
+    """The radius of the shell in metres; what each object and bone measures,
+    or what `compare` takes of recordings, where None."""
 
     shared: bool
-    """Whether all bones of a rig get keys on the same frames."""
+    """True if all bones of a rig get keys on the same frames."""
 
     discard: bool = False
-    """Whether the dense keys go out of the file, so that Restore Keys cannot give them back."""
+    """True if the dense keys go out of the file, so that Restore Keys cannot give them back."""
 
     count: int | None = None
     """So many keys of each object, or key poses of each rig, instead of a tolerance."""
 
     vertices: bool = False
-    """Whether the vertices of skins are measured, in glTF files."""
+    """True if the vertices of skins are measured, in glTF files."""
 
 
 def doubt(size: float, tolerance: Tolerance | None, per_unit: float) -> str:
-    """What to think of where a tolerance is in metres, and a body of this size in metres hardly is; mostly nothing."""
+    """Return what to think of where a tolerance is in metres, and a body of this size in metres hardly is;
+    mostly nothing.
+    """
     name, length = unit_of(size)
     if tolerance is None or not tolerance.is_length or length == 1.0:
         return ""
@@ -42,12 +45,12 @@ def doubt(size: float, tolerance: Tolerance | None, per_unit: float) -> str:
 
 
 def fewer(before: int, after: int) -> str:
-    """How many keys became how many."""
+    """Return how many keys became how many."""
     return f", {before} -> {after} keys"
 
 
 def off(tolerance: Tolerance, metres: float, per_unit: float, *, by_number: bool) -> str:
-    """How far off that is, in the unit of the tolerance, which is of so many metres where it says none."""
+    """Return how far off that is, in the unit of the tolerance, which is of so many metres where it says none."""
     if by_number:
         return f", {tolerance.alike(metres, per_unit)} off at most"
     allowed = tolerance.alike(tolerance.metres(per_unit), per_unit)

@@ -41,14 +41,14 @@ class Rest:
     """Shape (joints,), in the space of the armature."""
 
     tails: np.ndarray
-    """Where their bones end, there too: shape (joints, 3)."""
+    """The ends of their bones, there too: shape (joints, 3)."""
 
     origin: np.ndarray
-    """Where that space begins in the figure's world: below it, on the ground. Shape (3,)."""
+    """The origin of that space in the figure's world: below it, on the ground. Shape (3,)."""
 
     @classmethod
     def of(cls, rest_body: RestBody, metres_per_unit: float, axes: str) -> Rest:
-        """The figure in metres; it may be in any unit and axes, and at rest anywhere."""
+        """Return the figure in metres; it may be in any unit and axes, and at rest anywhere."""
         metres = Poses(rest_body.rest.positions * metres_per_unit, rest_body.rest.quaternions)
         joints = to_blender(metres, axes)
         turned = np.tile(STILL, (len(rest_body.tails), 1))
@@ -107,15 +107,17 @@ class Rig:
         self._before, self._after = placed(from_rest, to_parents), Poses(none, turns)
 
     def channels_of(self, joints: Poses) -> Poses:
-        """The channels of all bones where the joints have these poses in their parents' space, shape (joints, n)."""
+        """Return the channels of all bones where the joints have these poses in their parents' space, shape
+        (joints, n).
+        """
         return placed(self._before[:, None], placed(joints, self._after[:, None]))
 
     def channels_of_bone(self, bone: int, joint: Poses) -> Poses:
-        """The same of one bone, shape (n,)."""
+        """Return the channels of one bone where its joint has these poses, shape (n,)."""
         return placed(self._before[bone], placed(joint, self._after[bone]))
 
     def joints_of(self, channels: Poses) -> Poses:
-        """The joints in their parents' space where the bones have these channels, shape (joints, n)."""
+        """Return the joints in their parents' space where the bones have these channels, shape (joints, n)."""
         return placed(inverse(self._before)[:, None], placed(channels, inverse(self._after)[:, None]))
 
     def key(self, bone: int, frames: np.ndarray, channels: Poses) -> None:

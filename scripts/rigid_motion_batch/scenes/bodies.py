@@ -24,16 +24,16 @@ from .materials import ghost, ink, surface
 from .nodes import Group, Socket, apply_group
 
 SHADES = 16
-"""Of the bones."""
+"""The number of shades of the bones."""
 
 ERROR, FLASH, WORST = "error", "flash", "worst"
 """The attributes of the errors: in metres; how much a joint flashes and whether it has the ring, 0 to 1."""
 
 IN_FRONT = 0.45
-"""How far towards the camera what marks joints is, in units of the frame's height."""
+"""The distance of what marks joints towards the camera, in units of the frame's height."""
 
 RINGED = 0.02
-"""Of the error that colours reach up to: with less, the worst joint has no ring."""
+"""The part of the error that colours reach up to: with less, the worst joint has no ring."""
 
 # In units of the frame's height.
 FLASH_RADIUS = 0.0046
@@ -74,7 +74,9 @@ class BodyMotion:
     """Mode id to how much each joint flashes, 0 to 1, shape (joints, n)."""
 
     def places(self, poses: Poses) -> np.ndarray:
-        """Where the bones begin and end that are seen, of joints in their parents' space (joints, n): (n, m, 3)."""
+        """Return where the bones begin and end that are seen,
+        of joints in their parents' space (joints, n): (n, m, 3).
+        """
         seen = physique.seen_bones(self.rest)
         joints = self.rest_body.skeleton.in_root_space(poses)[seen]
         back = conjugate(self.rest.joints.quaternions[seen])
@@ -178,7 +180,7 @@ class Bodies:
         )
 
     def _errors(self, lane: Lane) -> bpy.types.Object:
-        """The errors of a mode: a vertex for each bone and frame, all bones of a frame one after another."""
+        """Return the errors of a mode: a vertex for each bone and frame, all bones of a frame one after another."""
         mode = lane.mode
         errors = self.motion.errors[mode]
         mesh = bpy.data.meshes.new(f"{mode} errors")
@@ -205,7 +207,7 @@ class Bodies:
 
 
 def ground_grid(motion: BodyMotion, spacing: float) -> bpy.types.Mesh:
-    """Lines on the ground around the way of a body, so many metres apart, as a mesh of edges."""
+    """Return lines on the ground around the way of a body, so many metres apart, as a mesh of edges."""
     reach = 2.5 * physique.body_size(motion.rest)
     way = motion.places(motion.recording).mean(axis=1)[:, :2]
     low, high = way.min(axis=0) - reach, way.max(axis=0) + reach
@@ -230,7 +232,8 @@ def ground_grid(motion: BodyMotion, spacing: float) -> bpy.types.Mesh:
 
 
 def flashes(key_frames: list[np.ndarray], frames: np.ndarray, fade: float) -> np.ndarray:
-    """How much joints with keys at these frames flash at others (n,), 0 to 1: all at once, then less for `fade` frames.
+    """Return how much joints with keys at these frames flash at others (n,), 0 to 1: all at once,
+    then less for `fade` frames.
 
     Shape (joints, n). A joint with a single key does not.
     """
@@ -244,7 +247,7 @@ def flashes(key_frames: list[np.ndarray], frames: np.ndarray, fade: float) -> np
 
 
 def _looked_up(group: Group, name: str) -> Socket:
-    """What the errors have of the bone of each face or point at the frame that is shown."""
+    """Return what the errors have of the bone of each face or point at the frame that is shown."""
     bone = group.add("GeometryNodeInputNamedAttribute", physique.BONE, settings={"data_type": "INT"})
     frame = group.math("SUBTRACT", group.frame(), 1.0)
     # Numbers are cut off to be an index.
@@ -259,7 +262,7 @@ def _looked_up(group: Group, name: str) -> Socket:
 
 
 def _colours_group() -> bpy.types.NodeTree:
-    """The material of each face by the error of its bone: one of `Shades` for each metre."""
+    """Return the material of each face by the error of its bone: one of `Shades` for each metre."""
     group = Group("Colours of errors", Errors="Object", Bones="Float", Shades="Float")
     shade = group.math("MULTIPLY", _looked_up(group, ERROR), group.inputs["Shades"])
     shade = group.math("MINIMUM", group.math("MAXIMUM", shade, 0.0), SHADES - 0.5)
@@ -269,7 +272,7 @@ def _colours_group() -> bpy.types.NodeTree:
 
 
 def _flashes_group() -> bpy.types.NodeTree:
-    """A ball at each joint that has just had a key."""
+    """Return a ball at each joint that has just had a key."""
     group = Group("Key flashes", Errors="Object", Bones="Float", Radius="Float", Towards="Vector", Material="Material")
     flash = _looked_up(group, FLASH)
     dark = group.math("LESS_THAN", flash, 0.02)
@@ -282,7 +285,7 @@ def _flashes_group() -> bpy.types.NodeTree:
 
 
 def _rings_group() -> bpy.types.NodeTree:
-    """A ring around the joint that is off the most."""
+    """Return a ring around the joint that is off the most."""
     inputs = {"Radius": "Float", "Thickness": "Float", "Towards": "Vector", "Facing": "Vector", "Material": "Material"}
     group = Group("Ring around the worst", Errors="Object", Bones="Float", **inputs)
     other = group.math("LESS_THAN", _looked_up(group, WORST), 0.5)
@@ -299,10 +302,12 @@ def _rings_group() -> bpy.types.NodeTree:
 
 
 def _shifted(group: Group, points: Socket) -> Socket:
-    """Towards the camera, where nothing hides them; its rays are parallel, so they are seen where they were."""
+    """Return the points moved towards the camera, where nothing hides them; its rays are parallel, so they are seen
+    where they were.
+    """
     return group.add("GeometryNodeSetPosition", points, Offset=group.inputs["Towards"])
 
 
 def _input(socket: Socket, name: str) -> Socket:
-    """The input of a socket's node that is in use, of several that have the name."""
+    """Return the input of a socket's node that is in use, of several that have the name."""
     return next(one for one in socket.node.inputs if one.name == name and one.enabled)

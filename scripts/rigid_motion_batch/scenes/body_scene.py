@@ -36,7 +36,7 @@ FADE, FADE_SHARE = 5.0, 0.6
 """Frames in which a flash fades; where keys are near to one another, so much of what lies between them."""
 
 BAR, BAR_GAP = 0.24, 0.012
-"""How wide the bar of colours is, and what is left free beside it, in units of the frame's height."""
+"""The width of the bar of colours, and what is left free beside it, in units of the frame's height."""
 
 LEAST = "shell error 0"
 
@@ -44,7 +44,7 @@ MARGIN = 0.04
 """The room around all joints, in units of the figure: its flesh."""
 
 GROUND = 0.05
-"""What is seen of the ground below the feet, in units of the figure."""
+"""The part of the ground that is seen below the feet, in units of the figure."""
 
 
 def build_body_scene(made: BodyReconstruction, settings: SceneSettings, radii: np.ndarray) -> bpy.types.Scene:
@@ -97,7 +97,9 @@ def build_body_scene(made: BodyReconstruction, settings: SceneSettings, radii: n
 def shown_motion(
     made: BodyReconstruction, modes: Sequence[str], timeline: Timeline, rest: Rest, radii: np.ndarray
 ) -> tuple[BodyMotion, np.ndarray]:
-    """What moves on the stage, and what became its origin: the middle of the recording, on the ground, shape (3,)."""
+    """Return what moves on the stage, and what became its origin: the middle of the recording,
+    on the ground, shape (3,).
+    """
     clip = made.clip
     times = timeline.times_of(timeline.frames)
 
@@ -111,7 +113,7 @@ def shown_motion(
     centre = np.append((low + high)[:2] / 2.0, low[2])
 
     def around(poses: Poses, joint: int | None = None) -> Poses:
-        """With the roots, or the joint if it is one, moved by the centre."""
+        """Return the poses with the roots, or the joint if it is one, moved by the centre."""
         if joint is not None:
             return Poses(poses.positions - centre, poses.quaternions) if clip.rest_body.parents[joint] < 0 else poses
         positions = poses.positions.copy()
@@ -142,7 +144,7 @@ def shown_motion(
 
 
 def _sampled_errors(made: BodyReconstruction, mode: str, radii: np.ndarray) -> np.ndarray:
-    """The largest error of any joint at each sample, in metres, shape (n,)."""
+    """Return the largest error of any joint at each sample, in metres, shape (n,)."""
     samples = np.arange(made.samples.start, made.samples.stop)
     blocks = np.array_split(samples, len(samples) // BLOCK + 1)
     errors = [shell_error(made.shown(mode, made.clip.times[some]), made.truth(some), radii[:, None]) for some in blocks]
@@ -150,7 +152,7 @@ def _sampled_errors(made: BodyReconstruction, mode: str, radii: np.ndarray) -> n
 
 
 def _notes(made: BodyReconstruction, modes: Iterable[str]) -> dict[str, str]:
-    """Mode id to its own number of keys, where the modes have different ones."""
+    """Return mode id to its own number of keys, where the modes have different ones."""
     kind = "key poses" if made.shared else "keys"
     counts = {
         mode: len(key_samples(keys)) if made.shared else sum(map(len, keys))
@@ -161,7 +163,7 @@ def _notes(made: BodyReconstruction, modes: Iterable[str]) -> dict[str, str]:
 
 
 def _legend(made: BodyReconstruction, settings: SceneSettings) -> str:
-    """How to read the picture, but for the colours."""
+    """Return how to read the picture, but for the colours."""
     parts = [
         "grey: recording",
         "ring: the worst joint",
@@ -180,7 +182,7 @@ class _Bar:
 
     @classmethod
     def of(cls, full: float, largest: float) -> _Bar:
-        """Of colours up to an error, and the largest there is, both in millimetres."""
+        """Return the bar of colours up to an error, and the largest there is, both in millimetres."""
         top = f"{full:.{captions.decimals_for(full)}f} mm"
         return cls(
             f"{top} and more, to {largest:.{captions.decimals_for(largest)}f}" if largest > 1.005 * full else top
@@ -208,7 +210,7 @@ class _Bar:
 
 @contextmanager
 def _extension() -> Iterator[None]:
-    """With what the extension brings, which stays out of the way otherwise."""
+    """Register what the extension brings, which stays out of the way otherwise."""
     there = hasattr(bpy.types.PoseBone, "rigid_motion")
     if not there:
         animation.register()

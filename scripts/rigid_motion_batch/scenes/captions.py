@@ -22,7 +22,7 @@ CORNER = 0.012
 def card(
     name: str, width: float, height: float, material: bpy.types.Material, corner: float = CORNER
 ) -> bpy.types.Mesh:
-    """A rectangle with round corners around the origin."""
+    """Return a rectangle with round corners around the origin."""
     corner = min(corner, width / 2.0, height / 2.0)
     angles = np.radians(np.arange(0.0, 91.0, 15.0))
     arc = corner * np.stack((np.cos(angles), np.sin(angles)), axis=-1)
@@ -41,7 +41,7 @@ def card(
 
 
 def words(name: str, text: str, size: float, material: bpy.types.Material, align: str = "LEFT") -> bpy.types.Object:
-    """A line of text, from or to the origin of the new object.
+    """Return a line of text, from or to the origin of the new object.
 
     Its outlines stay as the font has them: moved outwards, those of an M cross, which Blender before 5.2 fills as one
     blot.
@@ -56,7 +56,7 @@ def words(name: str, text: str, size: float, material: bpy.types.Material, align
 
 
 def wrapped(parts: Sequence[str], width: float) -> str:
-    """The parts with commas between them, in lines that are no wider than that where they have several parts."""
+    """Return the parts with commas between them, in lines that are no wider than that where they have several parts."""
     lines = [parts[0]]
     for part in parts[1:]:
         if width_of(f"{lines[-1]}, {part},") <= width:
@@ -83,7 +83,7 @@ def put(
 
 @cache
 def width_of(text: str) -> float:
-    """How wide `words` of size 1 are."""
+    """Return how wide `words` of size 1 are."""
     curve = bpy.data.curves.new("Measured", "FONT")
     curve.body = text
     obj = bpy.data.objects.new("Measured", curve)
@@ -95,7 +95,7 @@ def width_of(text: str) -> float:
 
 
 def readout_group(name: str, decimals: int, material: bpy.types.Material) -> bpy.types.NodeTree:
-    """The number `Value`, written to the left of the origin in letters of size 1."""
+    """Return the number `Value`, written to the left of the origin in letters of size 1."""
     group = Group(name, Value="Float")
     string = group.add("FunctionNodeValueToString", group.inputs["Value"], decimals)
     curves = group.add("GeometryNodeStringToCurves", string, 1.0)
@@ -109,19 +109,19 @@ def readout_group(name: str, decimals: int, material: bpy.types.Material) -> bpy
 def readout(
     name: str, group: bpy.types.NodeTree, size: float, frames: np.ndarray, values: np.ndarray
 ) -> bpy.types.Object:
-    """A number that has `values` at `frames`, both of shape (n,)."""
+    """Return a number that has `values` at `frames`, both of shape (n,)."""
     return _written(name, group, size, frames, values)
 
 
 def decimals_for(largest: float) -> int:
-    """The decimals that leave the largest of some numbers three digits, or one decimal up to a thousand."""
+    """Return the decimals that leave the largest of some numbers three digits, or one decimal up to a thousand."""
     if largest <= 0.0:
         return 1
     return int(np.clip(2 - np.floor(np.log10(largest)), 1 if largest < 1000.0 else 0, 4))
 
 
 def choice_group(name: str, texts: Sequence[str], material: bpy.types.Material) -> bpy.types.NodeTree:
-    """One of some texts, that with the number `Value`, written from the origin on in letters of size 1."""
+    """Return one of some texts, that with the number `Value`, written from the origin on in letters of size 1."""
     group = Group(name, Value="Float")
     chosen = group.add("GeometryNodeIndexSwitch", settings={"data_type": "STRING"}).node
     while len(chosen.index_switch_items) < len(texts):
@@ -136,7 +136,7 @@ def choice_group(name: str, texts: Sequence[str], material: bpy.types.Material) 
 def choice(
     name: str, group: bpy.types.NodeTree, size: float, frames: np.ndarray, chosen: np.ndarray
 ) -> bpy.types.Object:
-    """A text that is number `chosen` of those of the group at `frames`, both of shape (n,)."""
+    """Return a text that is number `chosen` of those of the group at `frames`, both of shape (n,)."""
     return _written(name, group, size, *_changes(frames, chosen), interpolation="CONSTANT")
 
 
@@ -146,7 +146,7 @@ def _lettered(group: Group, curves: Socket, material: bpy.types.Material) -> bpy
 
 
 def _changes(frames: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Only where a value is not that before."""
+    """Return frames and values only where a value is not that before."""
     new = np.append(True, np.diff(values) != 0)
     return frames[new], values[new]
 
@@ -159,7 +159,7 @@ def _written(
     values: np.ndarray,
     interpolation: str = "LINEAR",
 ) -> bpy.types.Object:
-    """An object with a group, in which `Value` has these values at `frames`, both of shape (n,)."""
+    """Return an object with a group, in which `Value` has these values at `frames`, both of shape (n,)."""
     obj = bpy.data.objects.new(name, bpy.data.meshes.new(name))
     obj.scale = (size, size, size)
     modifier = apply_group(obj, group, Value=float(values[0]))

@@ -28,13 +28,13 @@ TRIALS = 12
 """Margins tried for an error, at most."""
 
 NEAR = 0.98
-"""Of the error that is asked for: one that is as good as equal to it."""
+"""The part of the requested error that is as good as equal to it."""
 
 CLOSE = 1.01
 """Two margins whose ratio is less leave the same keys, or nearly."""
 
 EDGE = 0.1
-"""Of the margins that are in question: so much is left out with each trial at least."""
+"""The part of the margins in question that is left out with each trial at least."""
 
 Curve = tuple[str, int]
 """A data path and an index."""
@@ -80,23 +80,23 @@ def decimate(obj: bpy.types.Object, **options: object) -> None:
 
 
 def fcurves_of(obj: bpy.types.Object) -> dict[Curve, bpy.types.FCurve]:
-    """The F-curves of an object and its bones."""
+    """Return the F-curves of an object and its bones."""
     return {(fcurve.data_path, fcurve.array_index): fcurve for fcurve in animation.channelbag_of(obj).fcurves}
 
 
 def values_of(obj: bpy.types.Object, frames: np.ndarray) -> dict[Curve, np.ndarray]:
-    """What they show on frames (n,), by Blender's own evaluation of F-curves, each of shape (n,)."""
+    """Return what they show on frames (n,), by Blender's own evaluation of F-curves, each of shape (n,)."""
     listed = frames.tolist()
     return {curve: np.array([fcurve.evaluate(frame) for frame in listed]) for curve, fcurve in fcurves_of(obj).items()}
 
 
 def varying(values: dict[Curve, np.ndarray]) -> set[Curve]:
-    """The F-curves that change, and count."""
+    """Return the F-curves that change, and count."""
     return {curve for curve, own in values.items() if np.ptp(own) > VARIES}
 
 
 def key_frames_of(obj: bpy.types.Object, counted: set[Curve]) -> dict[Curve, list[float]]:
-    """The frames of the keys of the F-curves that count."""
+    """Return the frames of the keys of the F-curves that count."""
     return {
         curve: [key.co.x for key in fcurve.keyframe_points]
         for curve, fcurve in fcurves_of(obj).items()
@@ -105,7 +105,7 @@ def key_frames_of(obj: bpy.types.Object, counted: set[Curve]) -> dict[Curve, lis
 
 
 def left_of_fcurves(how: str, keys: dict[Curve, list[float]], largest: float, numbers_of_key: int) -> Left:
-    """What is left where F-curves have keys on these frames."""
+    """Return what is left where F-curves have keys on these frames."""
     count = sum(map(len, keys.values()))
     return Left(how, len(set().union(*keys.values())), count, numbers_of_key * count, largest)
 
@@ -130,7 +130,8 @@ class Decimations:
         """The logarithm of a margin, and what it left."""
 
     def within(self, largest: float) -> Left | None:
-        """The fewest keys found whose error is at most this, in metres; None where not even the smallest margin does.
+        """Return the fewest keys found whose error is at most this, in metres;
+        None where not even the smallest margin does.
 
         Margins are searched for between one that is too large and one that is not: from two errors, as if they were
         a power of the margin, and by halving in turn.
@@ -147,14 +148,14 @@ class Decimations:
         return list(self.tried.values())
 
     def _between(self, largest: float) -> tuple[float, float]:
-        """The logarithms of the smallest margin that is too large, and of the largest below that is not."""
+        """Return the logarithms of the smallest margin that is too large, and of the largest below that is not."""
         low, high = np.log(MARGINS)
         high = min((margin for margin, left in self.tried.items() if left.largest > largest), default=high)
         within = [margin for margin, left in self.tried.items() if left.largest <= largest and margin < high]
         return max(within, default=low), high
 
     def _next(self, low: float, high: float, largest: float, *, halving: bool) -> float:
-        """The logarithm of the margin to try."""
+        """Return the logarithm of the margin to try."""
         ends = [self.tried.get(low), self.tried.get(high)]
         if not any(ends):
             return float(np.clip(np.log(max(largest, 1e-12)), low, high))

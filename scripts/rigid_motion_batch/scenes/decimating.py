@@ -78,17 +78,17 @@ class DecimatedBody:
             self.decimations.append(Decimations(self.rig.obj, self.left))
 
     def errors(self) -> np.ndarray:
-        """How far off each joint is by the F-curves that the rig has now, in metres, shape (joints, n)."""
+        """Return how far off each joint is by the F-curves that the rig has now, in metres, shape (joints, n)."""
         shown = self._skeleton.in_root_space(self.rig.joints_of(self._channels()))
         return shell_error(shown, self._truth, self._radius)
 
     def left(self) -> Left:
-        """The keys that the rig has now, and their largest error."""
+        """Return the keys that the rig has now, and their largest error."""
         keys = key_frames_of(self.rig.obj, self._counted)
         return left_of_fcurves(DECIMATE, keys, float(self.errors().max()), FREE)
 
     def within(self, largest: float) -> Left | None:
-        """The fewest keys whose error is nowhere larger than this, in metres.
+        """Return the fewest keys whose error is nowhere larger than this, in metres.
 
         None where it is smaller than what Blender can keep in single precision, or no channel varies.
         """
@@ -98,7 +98,7 @@ class DecimatedBody:
         return min(result, key=lambda left: left.keys, default=None)
 
     def _channels(self) -> Poses:
-        """Of all bones at the samples, shape (joints, n)."""
+        """Return the channels of all bones at the samples, shape (joints, n)."""
         values = values_of(self.rig.obj, self.frames)
         bones = [self.rig.obj.pose.bones[name] for name in self.rig.bones]
 
@@ -108,7 +108,7 @@ class DecimatedBody:
         return Poses(channels("location"), normalise(channels("rotation_quaternion")))
 
     def _filled(self, values: Mapping[tuple[str, int], np.ndarray], path: str, still: Sequence[float]) -> np.ndarray:
-        """A property at the samples, shape (n, components): what is not keyed stays as it is."""
+        """Return a property at the samples, shape (n, components): what is not keyed stays as it is."""
         columns = [values.get((path, index), np.full(len(self.frames), value)) for index, value in enumerate(still)]
         return np.stack(columns, axis=-1)
 
@@ -116,7 +116,7 @@ class DecimatedBody:
 def beside_decimate(
     made: BodyReconstruction, radius: float | np.ndarray, measured: Sequence[Metrics]
 ) -> list[KeysOfBody]:
-    """The keys of each mode, and behind each what Decimate needs for the largest error that these have.
+    """Return the keys of each mode, and behind each what Decimate needs for the largest error that these have.
 
     Parameters
     ----------
@@ -164,7 +164,8 @@ def smooth(obj: bpy.types.Object) -> None:
 
 
 def frames_of(times: np.ndarray) -> np.ndarray:
-    """Frames for samples at these times (n,), from 1 on, at their own rate: whole ones where they are evenly spaced.
+    """Return frames for samples at these times (n,), from 1 on, at their own rate:
+    whole ones where they are evenly spaced.
 
     Raises
     ------

@@ -11,20 +11,21 @@ from rigid_motion.motion.twists import between, exponential
 from . import layout
 
 SHARE = 0.25
-"""Of the object's size: how large the largest deviation is shown at most, where it is magnified."""
+"""The most of the object's size that the largest deviation is shown at, where it is magnified."""
 
 STEPS = (1.0, 2.0, 5.0)
 """Magnifications are these, times a power of ten."""
 
 
 def largest_deviation(shown: Poses, recording: Poses, outline: np.ndarray) -> float:
-    """The farthest that any of the points (m, 3) of the object is off between poses (n,), in metres."""
+    """Return the farthest that any of the points (m, 3) of the object is off between poses (n,), in metres."""
     apart = layout.swept_points(shown, outline) - layout.swept_points(recording, outline)
     return float(np.linalg.norm(apart, axis=-1).max())
 
 
 def magnification(deviation: float, size: float) -> float:
-    """How many times larger deviations up to this are shown on an object of this size; 1 where they are seen anyway.
+    """Return how many times larger deviations up to this are shown on an object of this size;
+    1 where they are seen anyway.
 
     A round number.
     """
@@ -34,7 +35,8 @@ def magnification(deviation: float, size: float) -> float:
 
 
 def magnified(shown: Poses, recording: Poses, factor: float, middle: np.ndarray) -> Poses:
-    """Poses (n,) so many times as far off from the recording: the middle, shape (3,), of the object, and the turn.
+    """Return poses (n,) so many times as far off from the recording: the middle, shape (3,), of the object,
+    and the turn.
 
     A point of the object is displaced by the factor times what it is, but for what large turns bend; no turn is
     magnified beyond half a turn.

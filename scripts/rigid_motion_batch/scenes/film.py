@@ -121,7 +121,7 @@ def join_pieces(
 
 
 def _open(blend: Path) -> bpy.types.Scene:
-    """The scene of a saved stage, which is opened for it. Its scripts, if it has come by any, do not run."""
+    """Return the scene of a saved stage, which is opened for it. Its scripts, if it has come by any, do not run."""
     with silenced():
         bpy.ops.wm.open_mainfile(filepath=str(blend), use_scripts=False, load_ui=False)
     return bpy.context.scene

@@ -34,10 +34,10 @@ SMOOTHING = 0.12
 """Seconds of the film: the standard deviation of the bell by which the focus is smoothed, at most."""
 
 BESIDE = 0.5
-"""What is off from the recording by more than so much of the room that this needs is cut where it leaves the view."""
+"""The part of the room that the recording needs: what is farther off from it is cut where it leaves the view."""
 
 LAG = 1.35
-"""What is followed may need so many times the room that it needs with a focus which is not smoothed."""
+"""The most times that what is followed may need the room which it needs with a focus that is not smoothed."""
 
 
 class Moving(Protocol):
@@ -45,13 +45,13 @@ class Moving(Protocol):
 
     @property
     def middle(self) -> np.ndarray:
-        """What may be followed, shape (n, 3)."""
+        """The places that may be followed, shape (n, 3)."""
 
     def around(self, focus: np.ndarray) -> np.ndarray:
-        """Its outermost points at every moment, from the focus (n, 3) on: shape (k, 3)."""
+        """Return its outermost points at every moment, from the focus (n, 3) on: shape (k, 3)."""
 
     def heading(self, focus: np.ndarray) -> float:
-        """The yaw in radians from which it is seen well."""
+        """Return the yaw in radians from which it is seen well."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ class Solid:
         return layout.swept_points(poses, self.outline)
 
     def heading(self, focus: np.ndarray) -> float:
-        """From its broad side."""
+        """Return the yaw in radians from its broad side."""
         return layout.heading(self.around(focus))
 
 
@@ -98,7 +98,9 @@ class Jointed:
         return (self.places - focus[:, None]).reshape(-1, 3)
 
     def heading(self, focus: np.ndarray) -> float:
-        """Of a walk that goes to the right and a little towards the camera; from the broad side of what stays."""
+        """Return the yaw in radians of a walk that goes to the right and a little towards the camera; from the broad
+        side of what stays.
+        """
         middle = self.middle
         gone = middle[-1, :2] - middle[0, :2]
         tall = float(np.ptp(self.places[..., 2], axis=1).max())
@@ -118,7 +120,7 @@ class Extent:
     high: np.ndarray
 
     cut: bool
-    """Whether something gets farther to the sides."""
+    """True if something gets farther to the sides."""
 
     @property
     def size(self) -> np.ndarray:
@@ -135,7 +137,7 @@ class Framing:
     """How a motion of n moments is seen."""
 
     focus: np.ndarray
-    """What the camera looks at, shape (n, 3)."""
+    """The points that the camera looks at, shape (n, 3)."""
 
     yaw: float
     """The turn about z in radians that shows the motion well."""
@@ -143,7 +145,7 @@ class Framing:
     follows: bool
 
     def extent(self, recording: Moving, shown: Sequence[Moving] = ()) -> Extent:
-        """What a recording reaches, and others beside it as far as they do not make it small."""
+        """Return what a recording reaches, and others beside it as far as they do not make it small."""
         turn = layout.yaw_quaternion(self.yaw)
         seen = [layout.project(rotate(turn, moving.around(self.focus))) for moving in (recording, *shown)]
         lows, highs = (np.array([edge(points, axis=0) for points in seen]) for edge in (np.min, np.max))
@@ -154,7 +156,9 @@ class Framing:
 
     @classmethod
     def of(cls, recording: Moving, smoothing: float) -> Framing:
-        """What shows a recording well. `smoothing` is `SMOOTHING` in moments of it, or less where that shows more."""
+        """Return what shows a recording well. `smoothing` is `SMOOTHING` in moments of it,
+        or less where that shows more.
+        """
         still = cls._facing(recording, np.zeros_like(recording.middle), follows=False)
         closest = cls(recording.middle, still.yaw, follows=True)._width(recording)
         if still._width(recording) <= FOLLOW_GAIN * closest:
@@ -170,12 +174,14 @@ class Framing:
         return cls(focus, recording.heading(focus), follows)
 
     def _width(self, recording: Moving) -> float:
-        """The side of a square as large as what is seen."""
+        """Return the side of a square as large as what is seen."""
         return float(np.sqrt(self.extent(recording).size.prod()))
 
 
 def _smoothed(path: np.ndarray, deviation: float) -> np.ndarray:
-    """A path (n, 3) smoothed by a bell whose standard deviation is so many samples. It begins and ends where it did."""
+    """Return a path (n, 3) smoothed by a bell whose standard deviation is so many samples.
+    It begins and ends where it did.
+    """
     reach = int(np.ceil(3.0 * deviation))
     bell = np.exp(-0.5 * (np.arange(-reach, reach + 1) / max(deviation, 1e-9)) ** 2)
     extended = np.pad(path, ((reach, reach), (0, 0)), mode="reflect", reflect_type="odd")

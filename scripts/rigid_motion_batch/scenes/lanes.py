@@ -30,7 +30,7 @@ TITLE, NAME, NUMBER, UNIT, SMALL = 0.044, 0.026, 0.05, 0.032, 0.028
 """Sizes of letters on a card, in units of the frame's height, where there is room."""
 
 INSET, COLUMN = 0.016, 0.15
-"""What is left free at the edges of a card, and how wide the numbers beside the graph are."""
+"""The space left free at the edges of a card, and the width of the numbers beside the graph."""
 
 GRAPH, GRAPH_COLUMNS = 0.066, 300
 """The height of a graph, and how many columns keep their least and their largest sample."""
@@ -56,7 +56,7 @@ class Cast:
     """Mode id to the error at each sample of the recording, in millimetres, shape (n,)."""
 
     sample_frames: np.ndarray
-    """When the samples are, shape (n,)."""
+    """The frames of the samples, shape (n,)."""
 
     notes: Mapping[str, str]
     """Mode id to what its keys are, where the modes have different ones."""
@@ -66,7 +66,7 @@ class Cast:
     faint: bpy.types.Material
 
     joints: tuple[str, ...] = ()
-    """What the joints of a body are called."""
+    """The names of the joints of a body."""
 
     worst: Mapping[str, np.ndarray] = field(default_factory=dict)
     """Mode id to the joint that the error is of, at each frame."""
@@ -75,7 +75,7 @@ class Cast:
     def arranged(
         cls, settings: SceneSettings, lanes_of: Groups, extent: Extent, notes: Mapping[str, str], **own: Any
     ) -> Cast:
-        """With lanes arranged for what is seen of the motion; `own` are the fields that are left."""
+        """Return the cast with lanes arranged for what is seen of the motion; `own` are the fields that are left."""
         theme, (width, height) = THEMES[settings.theme], settings.resolution
         named = any(names_of(modes, notes) for modes in lanes_of)
         plan = layout.arrange(len(lanes_of), extent.size, width / height, named=named)
@@ -89,7 +89,7 @@ class Cast:
 
     @property
     def behind(self) -> np.ndarray:
-        """How far behind what moves the recording is, in the space of a lane, where it hides nothing."""
+        """The distance of the recording behind what moves, in the space of a lane, where it hides nothing."""
         return rotate(layout.yaw_quaternion(-self.framing.yaw), self.extent.depth * layout.AWAY)
 
 
@@ -105,13 +105,13 @@ class Lane:
     cell: layout.Cell
 
     def window(self, metres: float) -> dict[str, np.ndarray]:
-        """What can be seen of it, as inputs of `trails.WINDOW`; the picture's height spans so many metres."""
+        """Return what can be seen of it, as inputs of `trails.WINDOW`; the picture's height spans so many metres."""
         width, height = self.cell.room * metres / 2.0
         middle = layout.unproject(np.append(self.cell.view * metres, 0.0))
         return {"Middle": middle, "Right": layout.RIGHT / width, "Up": layout.UP / height}
 
     def child(self, name: str, data: bpy.types.ID | None) -> bpy.types.Object:
-        """A new object that moves with the lane."""
+        """Return a new object that moves with the lane."""
         child = bpy.data.objects.new(name, data)
         child.parent = self.empty
         self.collection.objects.link(child)
@@ -162,7 +162,9 @@ class Lanes:
             lane.animation_data.action.name = lane.name
 
     def _add_caption(self, modes: tuple[str, ...], cell: layout.Cell) -> None:
-        """At the top the title and what else is known of the keys, at the foot a graph of the error and a number."""
+        """Add at the top the title and what else is known of the keys,
+        at the foot a graph of the error and a number.
+        """
         cast, mode, unit = self.cast, modes[0], cell.unit
         card = captions.card(f"{mode} card", cell.width, cell.height, self.card)
         self._put(bpy.data.objects.new(card.name, card), cell.x, cell.y, 1)
@@ -194,7 +196,7 @@ class Lanes:
             self._put(joint, column, foot)
 
     def _add_graph(self, mode: str, left: float, foot: float, width: float, height: float) -> None:
-        """The error over time, all of it faint, and what has passed in the colour of the mode."""
+        """Add the error over time, all of it faint, and what has passed in the colour of the mode."""
         cast = self.cast
         kept = peaks(cast.sampled[mode], GRAPH_COLUMNS)
         heights = height * cast.sampled[mode][kept] / (cast.largest_error or 1.0)
@@ -212,11 +214,13 @@ class Lanes:
 
 
 def names_of(modes: tuple[str, ...], notes: Mapping[str, str]) -> list[str]:
-    """What is written below the title of modes that are one motion: a note on their keys, and the other modes."""
+    """Return what is written below the title of modes that are one motion: a note on their keys,
+    and the other modes.
+    """
     others = [_title(mode) for mode in modes[1:]]
     return [*filter(None, (notes.get(modes[0]),)), *(["= " + others[0], *others[1:]] if others else [])]
 
 
 def _title(mode: str) -> str:
-    """What a mode is called, without the algebra in brackets: its id tells."""
+    """Return what a mode is called, without the algebra in brackets: its id tells."""
     return label_of(mode).partition(" (")[0]

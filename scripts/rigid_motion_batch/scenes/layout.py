@@ -28,7 +28,8 @@ CARD = (0.42, 0.3)
 """The width and height of a card on which letters have their full size; on a smaller one all of them are smaller."""
 
 HEAD, NAMES, FOOT = 0.062, 0.052, 0.094
-"""What is written on a card takes so much of its height: the title, names below it if there are any, and the error."""
+"""The parts of a card's height that are taken by what is written on it: the title,
+names below it if there are any, and the error."""
 
 WRAP_GAIN = 0.85
 """A layout of fewer rows is kept while it shows motion and letters so large relative to the best."""
@@ -50,7 +51,7 @@ class Cell:
     height: float
 
     named: bool = False
-    """Whether there are names below the title."""
+    """True if there are names below the title."""
 
     @property
     def unit(self) -> float:
@@ -91,7 +92,9 @@ class Layout:
 
 
 def heading(points: np.ndarray) -> float:
-    """The yaw in radians that brings the longest horizontal extent of `points`, shape (n, 3), across the frame."""
+    """Return the yaw in radians that brings the longest horizontal extent of `points`, shape (n, 3),
+    across the frame.
+    """
     flat = points[:, :2] - points[:, :2].mean(axis=0)
     axis = np.linalg.eigh(flat.T @ flat)[1][:, 1]
     yaw = -np.arctan2(axis[1], axis[0])
@@ -104,7 +107,7 @@ def yaw_quaternion(yaw: float) -> np.ndarray:
 
 
 def outermost(points: np.ndarray) -> np.ndarray:
-    """The few points, shape (m, 3), that reach furthest in any of many directions.
+    """Return the few points, shape (m, 3), that reach furthest in any of many directions.
 
     They span what all points span, but for a thousandth of their size, and are few enough to be followed through
     every frame.
@@ -117,13 +120,13 @@ def outermost(points: np.ndarray) -> np.ndarray:
 
 
 def swept_points(poses: Poses, points: np.ndarray) -> np.ndarray:
-    """Where the object's points, shape (m, 3), come to be: shape (n m, 3)."""
+    """Return where the object's points, shape (m, 3), come to be: shape (n m, 3)."""
     arms = points[None] if poses.scales is None else points[None] * poses.scales[:, None, None]
     return (rotate(poses.quaternions[:, None], arms) + poses.positions[:, None]).reshape(-1, 3)
 
 
 def telling_point(poses: Poses, points: np.ndarray) -> np.ndarray:
-    """The point whose path is drawn, shape (3,): the tip of the object, where that moves.
+    """Return the point whose path is drawn, shape (3,): the tip of the object, where that moves.
 
     The tip is the point furthest from the origin. A tool that pivots about it is better told by another point: the
     one that travels furthest, if that is more than twice as far.
@@ -135,23 +138,23 @@ def telling_point(poses: Poses, points: np.ndarray) -> np.ndarray:
 
 
 def display_scale(path: np.ndarray, size: float) -> float:
-    """How much larger than it is the object is shown, so that it stays visible on a path of shape (n, 3)."""
+    """Return how much larger than it is the object is shown, so that it stays visible on a path of shape (n, 3)."""
     extent = float(np.ptp(path, axis=0).max())
     return max(1.0, extent / (SHOWN_RATIO * size))
 
 
 def project(points: np.ndarray) -> np.ndarray:
-    """Metres right and up in the frame, and away from the camera, of points on the stage: shape (..., 3)."""
+    """Return metres right and up in the frame, and away from the camera, of points on the stage: shape (..., 3)."""
     return points @ np.stack((RIGHT, UP, AWAY), axis=-1)
 
 
 def unproject(seen: np.ndarray) -> np.ndarray:
-    """The points on the stage that `project` takes to these."""
+    """Return the points on the stage that `project` takes to these."""
     return seen @ np.stack((RIGHT, UP, AWAY))
 
 
 def arrange(lanes: int, extent: np.ndarray, aspect: float, *, named: bool = False) -> Layout:
-    """Cells in as few rows as show the object, and what is written, well.
+    """Return cells in as few rows as show the object, and what is written, well.
 
     Parameters
     ----------

@@ -7,21 +7,22 @@ import bpy
 from rigid_motion_batch.palette import Theme, linear
 
 GLOSS, BOUNCE = 0.0142, 0.878
-"""What Workbench's light `paint.sl` shows of a rough colour c that faces the camera: GLOSS + BOUNCE c (measured)."""
+"""The factors of what Workbench's light `paint.sl` shows of a rough colour c that faces the camera:
+GLOSS + BOUNCE c (measured)."""
 
 
 GHOST = 0.5
-"""How much a ghost stands out from its card."""
+"""The amount that a ghost stands out from its card."""
 
 
 def ghost(theme: Theme) -> bpy.types.Material:
-    """What the recording is made of: between its colour and that of the card, as if it were translucent."""
+    """Return what the recording is made of: between its colour and that of the card, as if it were translucent."""
     colours = zip(linear(theme.ghost), linear(theme.card), strict=True)
     return _lit("Recording", tuple(GHOST * ghost + (1.0 - GHOST) * card for ghost, card in colours))
 
 
 def surface(name: str, colour: str, *, alpha: float = 1.0, roughness: float = 0.4) -> bpy.types.Material:
-    """A lit surface, translucent where alpha is below 1."""
+    """Return a lit surface, translucent where alpha is below 1."""
     return _lit(name, linear(colour), alpha, roughness)
 
 
@@ -41,7 +42,7 @@ def _lit(name: str, rgb: tuple[float, ...], alpha: float = 1.0, roughness: float
 
 
 def ink(name: str, colour: str) -> bpy.types.Material:
-    """A flat colour that no light changes, for what is read rather than seen."""
+    """Return a flat colour that no light changes, for what is read rather than seen."""
     material, nodes, output = _new(name)
     rgb = linear(colour)
     material.diffuse_color = (*(max(0.0, (value - GLOSS) / BOUNCE) for value in rgb), 1.0)

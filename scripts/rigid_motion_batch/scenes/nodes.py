@@ -47,11 +47,11 @@ class Group:
         return outputs["Value" if operation in ("DOT_PRODUCT", "DISTANCE", "LENGTH") else "Vector"]
 
     def attribute(self, name: str) -> Socket:
-        """A number that each point of the geometry carries."""
+        """Return a number that each point of the geometry carries."""
         return self.add("GeometryNodeInputNamedAttribute", name, settings={"data_type": "FLOAT"})
 
     def frame(self) -> Socket:
-        """The frame that is shown."""
+        """Return the frame that is shown."""
         return self.add("GeometryNodeInputSceneTime").node.outputs["Frame"]
 
     def finish(self, geometry: Socket) -> bpy.types.NodeTree:
@@ -72,7 +72,7 @@ def apply_group(obj: bpy.types.Object, group: bpy.types.NodeTree, **inputs: Any)
 
 
 def input_path(modifier: bpy.types.Modifier, name: str) -> str:
-    """The data path, from the object on, by which an input is animated. Blender 5.2 moved it."""
+    """Return the data path, from the object on, by which an input is animated. Blender 5.2 moved it."""
     identifier = _identifier(modifier.node_group, name)
     if hasattr(modifier, "properties"):
         return getattr(modifier.properties.inputs, identifier).path_from_id("value")

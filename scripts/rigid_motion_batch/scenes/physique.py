@@ -22,13 +22,13 @@ BONE = "bone"
 """The attribute of a face or point: the number of its bone."""
 
 SLENDER = 0.13
-"""How thick a solid is, relative to its length: its radius."""
+"""The thickness of a solid, relative to its length: its radius."""
 
 THICKNESS = 0.008, 0.034
 """The thinnest and the thickest, relative to the figure."""
 
 LINK = 0.5
-"""How thick what joins a bone to a child beside its end is, relative to a solid."""
+"""The thickness of what joins a bone to a child beside its end, relative to a solid."""
 
 AT_END = 0.02
 """A bone that ends so near to a child, relative to the figure, leads to it."""
@@ -39,7 +39,7 @@ they are of some program's making, and where they end means nothing."""
 
 SIDES = 8
 WAIST = 0.22
-"""Where along it a solid is thickest."""
+"""The place along a solid where it is thickest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ class Physique:
 
     @classmethod
     def of(cls, rest_body: RestBody, rest: Rest, metres_per_unit: float, axes: str) -> Physique:
-        """The skin, or else solids."""
+        """Return the skin, or else solids."""
         if rest_body.skin is None:
             return cls._of_solids(rest)
         skin = rest_body.skin
@@ -89,7 +89,7 @@ class Physique:
 
 
 def _parts(rest: Rest, size: float) -> Iterator[tuple[int, np.ndarray, np.ndarray, float]]:
-    """The bone of each solid, where it begins and ends, and how thick it is, relative to others."""
+    """Yield the bone of each solid, where it begins and ends, and how thick it is, relative to others."""
     heads, tails, seen = rest.joints.positions, rest.tails, seen_bones(rest)
     children = {joint: np.flatnonzero(rest.parents == joint) for joint in seen}
     gaps = {joint: np.linalg.norm(heads[own] - tails[joint], axis=1) for joint, own in children.items() if len(own)}
@@ -112,7 +112,7 @@ def _parts(rest: Rest, size: float) -> Iterator[tuple[int, np.ndarray, np.ndarra
 
 
 def body_size(rest: Rest) -> float:
-    """The largest extent of the joints of a figure at rest, without what only carries it about.
+    """Return the largest extent of the joints of a figure at rest, without what only carries it about.
 
     Where bones end is often made up by importers, and counts for a single joint alone.
     """
@@ -123,13 +123,13 @@ def body_size(rest: Rest) -> float:
 
 
 def seen_bones(rest: Rest) -> list[int]:
-    """The bones but for roots that carry a single child about: they may reach to wherever the body was left."""
+    """Return the bones but for roots that carry a single child about: they may reach to wherever the body was left."""
     carries = carrying(rest.parents)
     return np.flatnonzero(~carries if not carries.all() else carries).tolist()
 
 
 def _solid(head: np.ndarray, tail: np.ndarray, share: float, size: float) -> tuple[np.ndarray, list[tuple[int, ...]]]:
-    """A spindle from head to tail, thickest near its head: its corners and faces."""
+    """Return a spindle from head to tail, thickest near its head: its corners and faces."""
     along = tail - head
     length = float(np.linalg.norm(along))
     radius = share * float(np.clip(SLENDER * length, THICKNESS[0] * size, THICKNESS[1] * size))
@@ -163,7 +163,7 @@ class Carried:
 
     @classmethod
     def rest_body(cls, name: str, physique: Physique) -> Carried:
-        """A physique. Its faces know their bones."""
+        """Return a physique. Its faces know their bones."""
         mesh = bpy.data.meshes.new(name)
         mesh.from_pydata(physique.vertices.tolist(), [], physique.faces)
         mesh.attributes.new(BONE, "INT", "FACE").data.foreach_set("value", physique.bones.astype(np.int32))
@@ -173,7 +173,7 @@ class Carried:
 
     @classmethod
     def joints(cls, name: str, rest: Rest) -> Carried:
-        """A vertex at each joint, which knows its bone."""
+        """Return a vertex at each joint, which knows its bone."""
         mesh = bpy.data.meshes.new(name)
         mesh.from_pydata(rest.joints.positions.tolist(), [], [])
         numbers = np.arange(len(rest.parents))[:, None]

@@ -31,7 +31,8 @@ LEGEND = 0.032
 """The size of the letters below the lanes, in units of the frame's height, where there is room."""
 
 SOFTENED = 0.8
-"""How much of a pixel is the mean of those around it, near ones more: edges are smooth, and small letters clear."""
+"""The part of a pixel that is the mean of those around it, near ones more: edges are smooth,
+and small letters clear."""
 
 
 def build_scene(reconstruction: Reconstruction, settings: SceneSettings) -> bpy.types.Scene:
@@ -83,7 +84,7 @@ def build_scene(reconstruction: Reconstruction, settings: SceneSettings) -> bpy.
 
 
 def begin(made: Reconstruction | BodyReconstruction, settings: SceneSettings) -> Timeline:
-    """Empty the file, and name its scene after what is compared."""
+    """Empty the file, name its scene after what is compared, and return the timeline."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.scene.name = f"{made.clip.name} {made.choice.name}"
     return Timeline.of(made, settings.fps, settings.slow_motion)
@@ -97,10 +98,10 @@ class Header:
     choice: str
 
     legend: str
-    """How to read the picture."""
+    """Text on how to read the picture."""
 
     reserved: float = 0.0
-    """What has to be left free to the right of that, in units of the frame's height."""
+    """The space to be left free to the right of that, in units of the frame's height."""
 
 
 def assemble_scene(
@@ -122,7 +123,7 @@ def assemble_scene(
 
 
 def _notes(reconstruction: Reconstruction) -> dict[str, str]:
-    """Mode id to its own number of keys, where the modes have different ones."""
+    """Return mode id to its own number of keys, where the modes have different ones."""
     counts = {mode: len(keys) for mode, keys in reconstruction.keys.items() if len(keys)}
     if len(set(counts.values())) == 1:
         return {}
@@ -131,7 +132,7 @@ def _notes(reconstruction: Reconstruction) -> dict[str, str]:
 
 
 def _legend(cast: Cast, settings: SceneSettings, deviation: float, enlarged: float) -> str:
-    """How to read the picture."""
+    """Return how to read the picture."""
     full = f"{cast.largest_error:.{captions.decimals_for(cast.largest_error)}f}"
     drawn = f", deviation drawn {deviation:g} times as large" if deviation > 1.0 else ""
     parts = ["grey: recording", f"colour: mode{drawn}", "dots: keys", f"mm: shell error (graphs up to {full})"]
@@ -143,7 +144,7 @@ def _legend(cast: Cast, settings: SceneSettings, deviation: float, enlarged: flo
 
 
 def make_frame(metres: float) -> bpy.types.Object:
-    """The plane of the picture, behind everything that moves."""
+    """Return the plane of the picture, behind everything that moves."""
     frame = bpy.data.objects.new("Frame", None)
     frame.rotation_euler.x = math.pi / 2.0 - layout.ELEVATION
     frame.scale = (metres, metres, metres)
@@ -152,7 +153,7 @@ def make_frame(metres: float) -> bpy.types.Object:
 
 
 def _make_header(header: Header, cast: Cast, frame: bpy.types.Object) -> None:
-    """What is written above and below the lanes: clip, rate and time, and how to read the picture."""
+    """Make what is written above and below the lanes: clip, rate and time, and how to read the picture."""
     collection = bpy.data.collections.new("Captions")
     bpy.context.scene.collection.children.link(collection)
     collection.objects.link(frame)
@@ -178,7 +179,7 @@ def _make_header(header: Header, cast: Cast, frame: bpy.types.Object) -> None:
 
 
 def make_camera(scene: bpy.types.Scene, metres: float, depth: float) -> None:
-    """A camera square to the frame, in front of all that moves, with parallel rays."""
+    """Make a camera square to the frame, in front of all that moves, with parallel rays."""
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     scene.collection.objects.link(camera)
     scene.camera = camera
@@ -192,7 +193,7 @@ def make_camera(scene: bpy.types.Scene, metres: float, depth: float) -> None:
 
 
 def make_lights(scene: bpy.types.Scene) -> None:
-    """Two suns for EEVEE and Cycles. Workbench brings its own light."""
+    """Make two suns for EEVEE and Cycles. Workbench brings its own light."""
     for name, strength, pitch, yaw in (("Key light", 3.0, 40.0, -35.0), ("Fill light", 1.2, 60.0, 50.0)):
         light = bpy.data.lights.new(name, "SUN")
         light.energy = strength
@@ -205,7 +206,7 @@ def make_lights(scene: bpy.types.Scene) -> None:
 def set_up_render(
     scene: bpy.types.Scene, settings: SceneSettings, frames: int, background: str = DARK.background
 ) -> None:
-    """Engine, size, colours and encoder of a scene of so many frames."""
+    """Set engine, size, colours and encoder of a scene of so many frames."""
     scene.frame_start, scene.frame_end = 1, frames
     scene.frame_set(1)
     render = scene.render
@@ -249,7 +250,7 @@ def _smooth_edges(scene: bpy.types.Scene) -> None:
 
 
 def _set_up_video(scene: bpy.types.Scene) -> None:
-    """H.264 in an MP4 beside the .blend, wherever that is taken, by Blender's own encoder."""
+    """Set H.264 in an MP4 beside the .blend, wherever that is taken, by Blender's own encoder."""
     image, video = scene.render.image_settings, scene.render.ffmpeg
     if hasattr(image, "media_type"):  # Blender 5 asks for the kind of output first.
         image.media_type = "VIDEO"
@@ -265,7 +266,7 @@ def _set_up_video(scene: bpy.types.Scene) -> None:
 
 
 def _set_background(scene: bpy.types.Scene, background: str) -> None:
-    """One colour, for Workbench and for the others."""
+    """Set one colour, for Workbench and for the others."""
     scene.world = bpy.data.worlds.new("World")
     colour = linear(background)
     scene.world.color = colour
@@ -279,7 +280,7 @@ def _set_background(scene: bpy.types.Scene, background: str) -> None:
 
 
 def _engine_id(engine: str) -> str:
-    """Blender's name of an engine. EEVEE's was another before Blender 5."""
+    """Return Blender's name of an engine. EEVEE's was another before Blender 5."""
     if engine == "eevee":
         return "BLENDER_EEVEE" if bpy.app.version >= (5, 0) else "BLENDER_EEVEE_NEXT"
     return {"workbench": "BLENDER_WORKBENCH", "cycles": "CYCLES"}[engine]

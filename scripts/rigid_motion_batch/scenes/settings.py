@@ -29,29 +29,30 @@ class SceneSettings:
     fps: int = 30
 
     slow_motion: float = 1.0
-    """How many times slower than life."""
+    """The factor by which it is slower than life."""
 
     subject: str = "drill"
     """The object that moves: "drill", "controller" or "file.blend:Name"."""
 
     antialiasing: str | None = None
-    """Of Workbench: one of `ANTIALIASING`; numbers are samples.
+    """The antialiasing of Workbench: one of `ANTIALIASING`; numbers are samples.
 
     Where nothing is asked for, the compositor softens the picture, on the processor: without a graphics card that
     takes a tenth of the time of FXAA.
     """
 
     samples: int = 16
-    """Of EEVEE and Cycles."""
+    """The samples of EEVEE and Cycles."""
 
     theme: str = "dark"
     """One of `palette.THEMES`."""
 
     deviation: float | None = None
-    """How many times larger than it is a mode's deviation from the recording is shown; None for what shows it well."""
+    """The factor by which a mode's deviation from the recording is shown larger than it is;
+    None for what shows it well."""
 
     distinct: bool = False
-    """Whether modes that are one motion share a lane."""
+    """True if modes that are one motion share a lane."""
 
     def __post_init__(self) -> None:
         if self.engine not in ENGINES:
@@ -77,11 +78,11 @@ class SubjectError(ValueError):
 
 
 def place_of_subject(requested: str) -> tuple[Path, str]:
-    """The file that an object is in, whether or not it is there, and its name in that.
+    """Return the file that an object is in, whether or not it is there, and its name in that.
 
     Parameters
     ----------
-    wanted : str
+    requested : str
         A key of `MODELS`, or "file.blend:Name".
 
     Raises

@@ -14,9 +14,9 @@ TRIES = 6
 
 
 def simplified(requested: str) -> dict[str, np.ndarray]:
-    """The surface of an object in its own axes, in metres: `vertices` (v, 3), `triangles` (t, 3), `tints` (t,).
+    """Return the surface of an object in its own axes, in metres: `vertices` (v, 3), `triangles` (t, 3), `tints` (t,).
 
-    Tints are 1 where a triangle has the colour of its mode, and 0 elsewhere. What is wanted is as in `load_subject`,
+    Tints are 1 where a triangle has the colour of its mode, and 0 elsewhere. `requested` is as in `load_subject`,
     whose errors it raises.
     """
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -53,7 +53,7 @@ def _surface(obj: bpy.types.Object) -> dict[str, np.ndarray]:
 
 
 def _welded(result: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """With vertices that are close together as one, as coarsely as it has to be."""
+    """Return the surface with vertices that are close together as one, as coarsely as it has to be."""
     places, triangles, tints = result.values()
     cell = np.ptp(places, axis=0).max() / 256.0
     while len(triangles) > MOST_TRIANGLES:

@@ -48,7 +48,7 @@ class Shape:
     """The point of the object whose path is drawn, shape (3,)."""
 
     def path_of(self, poses: Poses) -> np.ndarray:
-        """The way of the traced point, shape (n, 3)."""
+        """Return the way of the traced point, shape (n, 3)."""
         return layout.swept_points(poses, self.traced[None])
 
 

@@ -19,11 +19,11 @@ TINTED = "Mode"
 
 
 def load_subject(requested: str) -> bpy.types.Mesh:
-    """The mesh of an object, in its own axes and its size in the world of its file.
+    """Return the mesh of an object, in its own axes and its size in the world of its file.
 
     Parameters
     ----------
-    wanted : str
+    requested : str
         See `place_of_subject`.
 
     Raises
@@ -35,20 +35,20 @@ def load_subject(requested: str) -> bpy.types.Mesh:
 
 
 def vertices_of(mesh: bpy.types.Mesh) -> np.ndarray:
-    """Shape (n, 3), metres."""
+    """Return the vertices, shape (n, 3), in metres."""
     flat = np.empty(3 * len(mesh.vertices), dtype=np.float32)
     mesh.vertices.foreach_get("co", flat)
     return flat.reshape(-1, 3).astype(np.float64)
 
 
 def tinted_slots(mesh: bpy.types.Mesh) -> list[int]:
-    """The material slots that take the colour of the lane: those named `TINTED`, or else the first."""
+    """Return the material slots that take the colour of the lane: those named `TINTED`, or else the first."""
     named = [index for index, material in enumerate(mesh.materials) if material and _plain(material.name) == TINTED]
     return named or [0]
 
 
 def _plain(name: str) -> str:
-    """The name without the number that Blender adds to make it unique."""
+    """Return the name without the number that Blender adds to make it unique."""
     stem, dot, number = name.rpartition(".")
     return stem if dot and number.isdecimal() else name
 
@@ -84,7 +84,7 @@ def _listed(names: list[str]) -> str:
 
 
 def _evaluated_copy(loaded: bpy.types.Object) -> bpy.types.Mesh | None:
-    """The shape as its scene shows it, sized as in its file; None for what has no faces."""
+    """Return the shape as its scene shows it, sized as in its file; None for what has no faces."""
     objects = bpy.context.scene.collection.objects
     objects.link(loaded)
     depsgraph = bpy.context.evaluated_depsgraph_get()

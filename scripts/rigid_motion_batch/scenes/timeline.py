@@ -26,10 +26,10 @@ class Timeline:
     """The clip's time, in seconds, and the film's, in frames."""
 
     start: float
-    """When the first key is, in the clip's time."""
+    """The moment of the first key, in the clip's time."""
 
     count: int
-    """How many frames there are."""
+    """The number of frames."""
 
     rate: float
     """Frames for a second of the clip."""
@@ -39,12 +39,12 @@ class Timeline:
 
     @classmethod
     def of(cls, made: Reconstruction | BodyReconstruction, fps: int, slow_motion: float) -> Timeline:
-        """All frames from the first key to the last, `slow_motion` times slower than life."""
+        """Return all frames from the first key to the last, `slow_motion` times slower than life."""
         return cls.between(float(made.times[0]), float(made.times[-1]), fps, slow_motion)
 
     @classmethod
     def between(cls, start: float, end: float, fps: int, slow_motion: float) -> Timeline:
-        """All frames between two moments of a clip."""
+        """Return all frames between two moments of a clip."""
         rate = fps * slow_motion
         count = math.floor((end - start) * rate + 1e-6) + 1
         return cls(start, count, rate, max(1, math.ceil(PATH_RATE / fps)))
@@ -60,20 +60,22 @@ class Timeline:
         return 1.0 + np.arange((self.count - 1) * self.steps + 1) / self.steps
 
     def frames_per_key(self, keys: int) -> float:
-        """How many frames lie between two of so many keys, on average."""
+        """Return how many frames lie between two of so many keys, on average."""
         return (self.count - 1) / max(1, keys - 1) or 1.0
 
     def times_of(self, frames: np.ndarray) -> np.ndarray:
-        """The clip's times that frames show."""
+        """Return the clip's times that frames show."""
         return self.start + (frames - 1.0) / self.rate
 
     def frames_of(self, times: np.ndarray) -> np.ndarray:
-        """The frames, not whole ones, that show the clip's times."""
+        """Return the frames, not whole ones, that show the clip's times."""
         return 1.0 + (times - self.start) * self.rate
 
 
 def peaks(values: np.ndarray, columns: int) -> np.ndarray:
-    """The numbers, rising, of the least and the largest of values (n,) in each of so many columns; the ends too."""
+    """Return the numbers, rising, of the least and the largest of values (n,) in each of so many columns;
+    the ends too.
+    """
     parts = np.array_split(np.arange(len(values)), min(columns, len(values)))
     chosen = [part[find(values[part])] for part in parts for find in (np.argmin, np.argmax)]
     return np.unique([0, *chosen, len(values) - 1])
@@ -99,7 +101,7 @@ class ShownMotion:
 
     @classmethod
     def of(cls, reconstruction: Reconstruction, timeline: Timeline) -> ShownMotion:
-        """Every mode's own in-betweens, not those of the recording's sample times joined by lines."""
+        """Return every mode's own in-betweens, not those of the recording's sample times joined by lines."""
         clip, kept = reconstruction.clip, reconstruction.keys
         key_times = {mode: clip.times[keys] for mode, keys in kept.items()}
         keys = {mode: clip.poses[of_mode] for mode, of_mode in kept.items()}

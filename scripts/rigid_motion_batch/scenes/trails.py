@@ -14,11 +14,11 @@ from .nodes import Group, Socket
 
 FRAME = "frame"
 FLASH_FRAMES = 6.0
-"""How long a mark takes to swell before its key and to settle after it."""
+"""The frames that a mark takes to swell before its key and to settle after it."""
 
 
 def polyline(name: str, frames: np.ndarray, points: np.ndarray, *, joined: bool = True) -> bpy.types.Mesh:
-    """A mesh of vertices that know their frame, joined one to the next or single.
+    """Return a mesh of vertices that know their frame, joined one to the next or single.
 
     Parameters
     ----------
@@ -36,15 +36,15 @@ def polyline(name: str, frames: np.ndarray, points: np.ndarray, *, joined: bool 
 
 
 WINDOW = {"Middle": "Vector", "Right": "Vector", "Up": "Vector"}
-"""What trails are kept within: the middle of a window of the picture in the world, and one over its half width and half
-height, along the directions in which these are."""
+"""The window that trails are kept within: the middle of a window of the picture in the world, and one over its half
+width and half height, along the directions in which these are."""
 
 FADE = 0.15
-"""Of the window's half: how far from its edge what is drawn begins to thin."""
+"""The part of the window's half, from its edge, where what is drawn begins to thin."""
 
 
 def trail_group(*, windowed: bool = False) -> bpy.types.NodeTree:
-    """A tube from `Past` frames ago to `Ahead` frames from now, that thins by `Taper` towards its old end.
+    """Return a tube from `Past` frames ago to `Ahead` frames from now, that thins by `Taper` towards its old end.
 
     Windowed, also with the inputs of `WINDOW`, outside of which there is none.
     """
@@ -63,13 +63,13 @@ def trail_group(*, windowed: bool = False) -> bpy.types.NodeTree:
 
 
 def cut_group() -> bpy.types.NodeTree:
-    """What an object has within the `WINDOW`."""
+    """Return what an object has within the `WINDOW`."""
     group = Group("Cut", **WINDOW)
     return group.finish(_within_picture(group, group.inputs["Geometry"])[0])
 
 
 def marks_group() -> bpy.types.NodeTree:
-    """A ball at each key from `Past` frames ago to `Ahead` frames from now; it swells while its key is reached.
+    """Return a ball at each key from `Past` frames ago to `Ahead` frames from now; it swells while its key is reached.
 
     None outside of the `WINDOW`.
     """
@@ -86,7 +86,7 @@ def marks_group() -> bpy.types.NodeTree:
 
 
 def graph(name: str, frames: np.ndarray, heights: np.ndarray, width: float) -> bpy.types.Mesh:
-    """The area below a curve, from the origin to the right, whose vertices know their frame.
+    """Return the area below a curve, from the origin to the right, whose vertices know their frame.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def graph(name: str, frames: np.ndarray, heights: np.ndarray, width: float) -> b
 
 
 def graph_group() -> bpy.types.NodeTree:
-    """What a graph has up to now."""
+    """Return what a graph has up to now."""
     group = Group("Graph", Material="Material")
     future = group.math("GREATER_THAN", group.attribute(FRAME), group.math("ADD", group.frame(), 1e-3))
     kept = group.add("GeometryNodeDeleteGeometry", group.inputs["Geometry"], future, settings={"domain": "POINT"})
@@ -119,7 +119,7 @@ def graph_group() -> bpy.types.NodeTree:
 
 
 def _within_picture(group: Group, points: Socket) -> tuple[Socket, Socket]:
-    """The points within the window, and how much is left of what is drawn there: 1, and 0 at its edge."""
+    """Return the points within the window, and how much is left of what is drawn there: 1, and 0 at its edge."""
     itself = group.add("GeometryNodeSelfObject")
     world = group.add("GeometryNodeObjectInfo", itself).node.outputs["Transform"]
     place = group.add("FunctionNodeTransformPoint", group.add("GeometryNodeInputPosition"), world)
@@ -134,7 +134,7 @@ def _within_picture(group: Group, points: Socket) -> tuple[Socket, Socket]:
 
 
 def _within_window(group: Group) -> tuple[Socket, Socket]:
-    """How many frames ago each point was passed, and the points within the window."""
+    """Return how many frames ago each point was passed, and the points within the window."""
     age = group.math("SUBTRACT", group.frame(), group.attribute(FRAME))
     old = group.math("GREATER_THAN", age, group.inputs["Past"])
     # Frames are single precision: the point of this very frame stays.
@@ -145,7 +145,7 @@ def _within_window(group: Group) -> tuple[Socket, Socket]:
 
 
 def _tube(group: Group, curve: Socket, profile: Socket, radius: Socket) -> Socket:
-    """Blender 5 takes the radius as an input of the tube, Blender 4.5 from the curve."""
+    """Return a tube. Blender 5 takes the radius as an input of the tube, Blender 4.5 from the curve."""
     tube = group.add("GeometryNodeCurveToMesh", None, profile)
     if "Scale" in tube.node.inputs:
         group.tree.links.new(radius, tube.node.inputs["Scale"])

@@ -48,7 +48,7 @@ class Cost:
     datagrams: int
     lost: int
     joining_bytes: int
-    """Of descriptions: names, parents and rest poses; with headers."""
+    """The bytes of descriptions: names, parents and rest poses; with headers."""
     bytes_a_second: float
     """Without headers of UDP and IP."""
     bytes_a_second_with_headers: float
@@ -69,7 +69,8 @@ class Measured:
     shown: Poses
     """At the moments of the samples, shape (joints, n)."""
     errors: np.ndarray
-    """Of every joint at every sample that was shown, in metres; NaN before the first picture. Shape (joints, n)."""
+    """The error of every joint at every sample that was shown, in metres; NaN before the first picture. Shape
+    (joints, n)."""
 
 
 def measure(
@@ -213,13 +214,13 @@ def _receive(pipe: Connection, times: np.ndarray, answers: bool) -> None:
 
 
 def even_rate(times: np.ndarray) -> float | None:
-    """Samples a second, where they are even."""
+    """Return samples a second, where they are even."""
     rate = 1.0 / float(np.median(np.diff(times)))
     return float(round(rate)) if abs(rate - round(rate)) < 0.01 else None
 
 
 def straight(times: np.ndarray, poses: Poses) -> Path:
-    """Samples (joints, n) with the straight way between them."""
+    """Return samples (joints, n) with the straight way between them."""
     still = np.zeros((poses.shape[0], 3))
     return Path(times, poses.positions.swapaxes(0, 1), poses.quaternions.swapaxes(0, 1), still, still)
 

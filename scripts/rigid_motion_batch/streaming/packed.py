@@ -21,7 +21,7 @@ STAMP = 5
 """Bytes of a datagram that say whose it is, and when: as few as will do."""
 
 PLACE_BITS = 16
-"""Of each coordinate of a place that is packed, over a cube of 8 metres."""
+"""The bits of each coordinate of a place that is packed, over a cube of 8 metres."""
 
 CUBE = 8.0
 
@@ -35,7 +35,7 @@ class Packed:
     rate: float
 
     bits: int | None
-    """Of each of three components of a quaternion; None for floats."""
+    """The bits of each of three components of a quaternion; None for floats."""
 
     @property
     def bits_a_turn(self) -> int:
@@ -55,7 +55,7 @@ WAYS = (
 
 
 def errors(way: Packed, forest: Forest, samples: Path) -> np.ndarray:
-    """How far off joints are shown at every sample, shape (joints, n)."""
+    """Return how far off joints are shown at every sample, shape (joints, n)."""
     moments = np.arange(samples.moments[0], samples.moments[-1] + 1.0 / way.rate, 1.0 / way.rate)
     sent = samples.at(np.minimum(moments, samples.moments[-1]))
     positions, quaternions = sent.positions.swapaxes(0, 1), normalise(sent.quaternions.swapaxes(0, 1))
@@ -73,13 +73,13 @@ def errors(way: Packed, forest: Forest, samples: Path) -> np.ndarray:
 
 
 def bytes_a_second(way: Packed, forest: Forest) -> tuple[float, float]:
-    """Bytes without headers and with them."""
+    """Return bytes without headers and with them."""
     size = -(-(len(forest) * way.bits_a_turn + int(forest.sliding.sum()) * way.bits_a_place) // 8)
     return way.rate * size, way.rate * (size + STAMP + HEADERS)
 
 
 def smallest_three(quaternions: np.ndarray, bits: int) -> np.ndarray:
-    """Unit quaternions (..., 4) as they come back from three components of so many bits each."""
+    """Return unit quaternions (..., 4) as they come back from three components of so many bits each."""
     largest = np.argmax(np.abs(quaternions), axis=-1)[..., None]
     sign = np.where(np.take_along_axis(quaternions, largest, axis=-1) < 0.0, -1.0, 1.0)
     step = np.sqrt(2.0) / (2**bits - 2)

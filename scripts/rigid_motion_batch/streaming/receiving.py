@@ -47,13 +47,13 @@ class Track:
             self.poses.append(poses)
 
     def samples(self) -> tuple[np.ndarray, Poses]:
-        """Moments (n,) and poses (joints, n)."""
+        """Return moments (n,) and poses (joints, n)."""
         parts = ([getattr(pose, part) for pose in self.poses] for part in ("positions", "quaternions"))
         return np.array(self.moments), Poses(*(np.stack(part, axis=1) for part in parts))
 
 
 def errors(body: Body, shown: Poses, truth: Poses) -> np.ndarray:
-    """How far off any point of the joints' balls is, the largest of each moment (n,), of poses (joints, n)."""
+    """Return how far off any point of the joints' balls is, the largest of each moment (n,), of poses (joints, n)."""
     forest = Forest([body])
     shown, truth = (forest.skeleton.in_root_space(poses) for poses in (shown, truth))
     return shell_error(shown, truth, forest.radii[:, None]).max(axis=0)
@@ -87,7 +87,7 @@ class Handing:
             self._sockets[user].send(datagram)
 
     def answers(self) -> list[tuple[str, bytes]]:
-        """What came back, and to whom it goes."""
+        """Return what came back, and to whom it goes."""
         result = []
         for user, own in self._sockets.items():
             with suppress(OSError):
@@ -129,11 +129,11 @@ class Receiving:
         self.receiver = Receiver()
         self.shown, self.keys = Tracks(), Tracks()
         self.datagrams, self.bytes = Counter(), Counter()
-        """Of each user."""
+        """Counts for each user."""
         self.on_frame: list[Callable[[dict[Stream, Shown]], None]] = []
         """Called with what each frame shows."""
         self._heard: dict[str, float] = {}
-        """When users who are sending were heard last."""
+        """The moments when users who are sending were heard last."""
         self._silent = math.inf
         """Since when nobody is sending, after somebody was."""
         self._answer_at = -math.inf

@@ -41,7 +41,7 @@ LARGEST = 1 << 16
 """Bytes of what Zenoh takes from others at once."""
 
 BATCHES = 16
-"""That may be on the way out at once before some are dropped: in a room of many each datagram is one."""
+"""The number that may be on the way out at once before some are dropped: in a room of many each datagram is one."""
 
 MOST_WAITING = 4096
 """Datagrams that wait to be looked at; others are dropped, as a network does."""
@@ -61,7 +61,7 @@ class Came(NamedTuple):
 
 
 def locator(address: str) -> str:
-    """HOST, HOST:PORT or [IPV6]:PORT as Zenoh writes it; its own, such as tls/HOST:PORT, stay as they are."""
+    """Return HOST, HOST:PORT or [IPV6]:PORT as Zenoh writes it; its own, such as tls/HOST:PORT, stay as they are."""
     if "/" in address:
         return address
     has_port = re.fullmatch(r"(\[[^]]*\]|[^:]*):\d+", address)
@@ -69,7 +69,7 @@ def locator(address: str) -> str:
 
 
 def is_loopback(address: str) -> bool:
-    """Whether an address, as a locator or HOST:PORT, is of this machine alone."""
+    """Return whether an address, as a locator or HOST:PORT, is of this machine alone."""
     host = re.sub(r"^\w+/|[?#].*$|:\d+([?#].*)?$", "", address).strip("[]")
     try:
         return host == "localhost" or ipaddress.ip_address(host).is_loopback
@@ -78,7 +78,7 @@ def is_loopback(address: str) -> bool:
 
 
 def settings(role: str, at: str | None, network: bool) -> dict[str, Any]:
-    """What is set of Zenoh's configuration, by its keys.
+    """Return what is set of Zenoh's configuration, by its keys.
 
     On loopback whoever comes first keeps the port, and brings the others together. Elsewhere a router is expected.
     """
@@ -101,12 +101,12 @@ def settings(role: str, at: str | None, network: bool) -> dict[str, Any]:
 
 
 def opened(role: str, at: str | None = None, network: bool = False, config: Path | None = None) -> zenoh.Session:
-    """A session as a `peer` or a `router`. A file of Zenoh's configuration says what is not said here.
+    """Return a session as a `peer` or a `router`. A file of Zenoh's configuration says what is not said here.
 
     Raises
     ------
     RoomError
-        Without Zenoh, for a file that it cannot read, and where nobody can be reached.
+        Without Zenoh, for a file that it cannot read, and where no one can be reached.
     """
     try:
         import zenoh
@@ -165,7 +165,7 @@ class Room:
         self._declared[key] = self._session.liveliness().declare_token(key)
 
     def watch_presence(self) -> None:
-        """Take it as something that came whenever somebody begins to listen, or does already."""
+        """Take it as something that came whenever another begins to listen, or does already."""
         key = f"{self.name}/*/{LISTENING}/*"
         self._declared[key] = self._session.liveliness().declare_subscriber(key, self._take, history=True)
 
@@ -178,7 +178,7 @@ class Room:
         self._publisher(user, stream).delete()
 
     def come(self, seconds: float) -> list[Came]:
-        """What came since the last call or, where that is nothing, the first thing within so many seconds."""
+        """Return what came since the last call or, where that is nothing, the first thing within so many seconds."""
         result = []
         try:
             result.append(self._came.get(timeout=seconds) if seconds > 0.0 else self._came.get_nowait())
@@ -188,7 +188,7 @@ class Room:
             return result
 
     def wait(self, until: float) -> list[Came]:
-        """The same until a moment of `time.monotonic`."""
+        """Return what came, as `come` does, until a moment of `time.monotonic`."""
         return self.come(until - time.monotonic())
 
     def _publisher(self, user: str, stream: str) -> Any:
@@ -206,7 +206,7 @@ class Room:
         return self._declared[key]
 
     def _take(self, sample: zenoh.Sample) -> None:
-        """Called by Zenoh, in a thread of its own."""
+        """Take what came: called by Zenoh, in a thread of its own."""
         user, stream, *_ = str(sample.key_expr).removeprefix(f"{self.name}/").split("/")
         gone = str(sample.kind) == "SampleKind.DELETE"
         datagram = None if gone else sample.payload.to_bytes()

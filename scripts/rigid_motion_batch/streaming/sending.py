@@ -37,7 +37,7 @@ AFTER = 0.3
 
 
 def samples_of(clip: Clip) -> tuple[np.ndarray, Poses]:
-    """The moments (n,) of a clip and its poses (joints, n), in metres and Blender's axes.
+    """Return the moments (n,) of a clip and its poses (joints, n), in metres and Blender's axes.
 
     Of a file whose keys are not at its frames those are what it shows at its frames.
     """
@@ -51,7 +51,7 @@ def samples_of(clip: Clip) -> tuple[np.ndarray, Poses]:
 
 
 def body_of(clip: Clip, poses: Poses, radius: float = RADIUS) -> Body:
-    """What is streamed of a clip. A rigid body is at rest as in its first sample."""
+    """Return what is streamed of a clip. A rigid body is at rest as in its first sample."""
     if clip.rest_body is None:
         return Body.rigid(clip.name, poses[:, 0], radius)
     parents, turns = clip.rest_body.parents, to_blender(clip.rest_body.rest, clip.axes).quaternions
@@ -62,7 +62,7 @@ def body_of(clip: Clip, poses: Poses, radius: float = RADIUS) -> Body:
 
 
 def together(clips: Sequence[Clip], rate: float | None = None) -> tuple[list[Body], np.ndarray, Poses]:
-    """The bodies of clips that begin together, their moments (n,), and the poses (joints, n) of all.
+    """Return the bodies of clips that begin together, their moments (n,), and the poses (joints, n) of all.
 
     The moments are those of the first clip where all have the same or it is alone, or else even ones: so many a second,
     or as many as the fastest has. A clip that is over stays as it is.
@@ -84,7 +84,7 @@ def together(clips: Sequence[Clip], rate: float | None = None) -> tuple[list[Bod
 
 
 def sender_of(bodies: list[Body], moments: np.ndarray, tolerance: float, delay: float, rate: float | None) -> Sender:
-    """A sender that says what is needed or, with a rate, a key at each of its ticks."""
+    """Return a sender that says what is needed or, with a rate, a key at each of its ticks."""
     if rate:
         return Sender(bodies, tolerance, delay, rate, keepalive=ALMOST / rate)
     return Sender(bodies, tolerance, delay, even_rate(moments) if len(moments) > 1 else None)
@@ -108,7 +108,7 @@ class Sending:
             self.bytes += len(datagram)
 
     def take(self, came: Came, now: float) -> None:
-        """Deal with an answer, or with somebody who joins, at a time of the motion."""
+        """Deal with an answer, or with a receiver that joins, at a time of the motion."""
         said = []
         if came.stream == LISTENING and came.datagram is not None:
             self.joined += 1

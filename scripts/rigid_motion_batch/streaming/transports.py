@@ -65,7 +65,7 @@ class Udp:
             datagrams.append(datagram)
 
     def awaited(self, seconds: float) -> list[bytes]:
-        """What came, or comes within so many seconds: one datagram."""
+        """Return what came, or comes within so many seconds: one datagram."""
         if not select.select([self._socket], [], [], seconds)[0]:
             return []
         datagram, sender = self._socket.recvfrom(LONGEST)
@@ -80,7 +80,7 @@ class Counted:
         self._transport = transport
         self.datagrams = self.bytes = self.lost = 0
         self.joining_datagrams = self.joining_bytes = 0
-        """Of those the descriptions."""
+        """The descriptions among those."""
 
     def count(self, datagram: bytes) -> None:
         """Count a datagram that is sent, whether or not it arrives."""

@@ -37,7 +37,9 @@ Address = tuple[str, int]
 
 
 def performer_of(clip: Clip) -> Performer | None:
-    """What a clip of a body is to VMC; None for a single rigid body. Raises ValueError where no bone is a person's."""
+    """Return what a clip of a body is to VMC; None for a single rigid body.
+    Raises ValueError where no bone is a person's.
+    """
     if clip.rest_body is None:
         return None
     performer = Performer(clip.rest_body.joints, to_blender(clip.in_metres(clip.rest_body.rest), clip.axes))
@@ -77,7 +79,7 @@ def play(
 ) -> int:
     """Play a recording in real time, and return how many datagrams were sent.
 
-    `stopped` ends it as soon as something is in it; `reach` is told the seconds that were played.
+    `stopped` ends it as soon as something is in it; `reach` is given the seconds that were played.
     """
     performer = performer_of(clip)
     poses = to_blender(clip.in_metres(clip.poses), clip.axes)
@@ -122,7 +124,7 @@ class Performers:
         self._socket.close()
 
     def samples(self) -> list[tuple[tuple[Body, ...], np.ndarray, Poses]]:
-        """What came since the last call: bodies, moments (n,) of their clock, and poses (joints, n) of all.
+        """Return what came since the last call: bodies, moments (n,) of their clock, and poses (joints, n) of all.
 
         They are others as soon as bones or devices come that were not there before.
         """
@@ -152,7 +154,8 @@ class Performers:
 
 class ToVmc:
     """What a receiver shows, frame by frame, to another program: the first skeleton as its performer, for VMC has one
-    to a port, and all rigid bodies as trackers."""
+    to a port, and all rigid bodies as trackers.
+    """
 
     def __init__(self, receiver: Receiver, to: Address) -> None:
         self._receiver, self._outlet = receiver, Outlet(to)

@@ -37,7 +37,7 @@ class Motion:
     """In metres and Blender's axes, each joint in its parent's space. Shape (joints, n)."""
 
     def even(self, mode: str, fps: float) -> Motion:
-        """So many poses a second instead, with the in-betweens of a mode."""
+        """Return so many poses a second instead, with the in-betweens of a mode."""
         times = self.times[0] + np.arange(int((self.times[-1] - self.times[0]) * fps + 1e-6) + 1) / fps
         return replace(self, times=times, poses=interpolate(self.times, self.poses, times, mode))
 
@@ -81,7 +81,7 @@ def _write_table(file: TextIO, motions: Sequence[Motion]) -> None:
 
 
 def write_bvh(file: TextIO, rest_body: RestBody, sliding: np.ndarray, times: np.ndarray, poses: Poses) -> None:
-    """The poses (joints, n) of a body, each joint in its parent's space, at an even rate.
+    """Write the poses (joints, n) of a body, each joint in its parent's space, at an even rate.
 
     Joints that slide (joints,) have channels for their places, the others are where they are at rest. A body with
     several roots is written with as many hierarchies, which Blender and this program read.

@@ -28,7 +28,9 @@ KeyFields = dict[str, np.ndarray]
 
 
 def channelbag_of(animated: bpy.types.ID) -> bpy.types.ActionChannelbag:
-    """The channels of `animated` in its Action. Whatever of Action, slot, layer and strip is missing is made."""
+    """Return the channels of `animated` in its Action, and make whatever of Action, slot,
+    layer and strip is missing.
+    """
     data = animated.animation_data or animated.animation_data_create()
     if data.action is None:
         data.action = bpy.data.actions.new(f"{animated.name}Action")
@@ -121,12 +123,12 @@ def replace_keys(
 
 
 def empty_key_fields(count: int) -> KeyFields:
-    """All there is to so many keys, zero."""
+    """Return all there is to so many keys, zero."""
     return {name: np.zeros((count, width), kind) for name, (width, kind) in KEY_FIELDS.items()}
 
 
 def key_fields(fcurve: bpy.types.FCurve) -> KeyFields:
-    """All there is to the keys of an F-curve."""
+    """Return all there is to the keys of an F-curve."""
     fields = empty_key_fields(len(fcurve.keyframe_points))
     for name, numbers in fields.items():
         fcurve.keyframe_points.foreach_get(name, numbers.ravel())
@@ -144,12 +146,14 @@ def set_key_fields(fcurve: bpy.types.FCurve, fields: KeyFields) -> None:
 
 
 def ensure_group(channelbag: bpy.types.ActionChannelbag, name: str) -> bpy.types.ActionGroup:
-    """The group of this name, made where there is none yet."""
+    """Return the group of this name, made where there is none yet."""
     return channelbag.groups.get(name) or channelbag.groups.new(name)
 
 
 def copy_fcurve(fcurve: bpy.types.FCurve, channelbag: bpy.types.ActionChannelbag) -> bpy.types.FCurve:
-    """A copy of an F-curve with keys in another slot or Action, in a group of the same name. It has none there yet."""
+    """Return a copy of an F-curve with keys in another slot or Action, in a group of the same name.
+    It has none there yet.
+    """
     copy = channelbag.fcurves.new(fcurve.data_path, index=fcurve.array_index)
     if fcurve.group is not None:
         copy.group = ensure_group(channelbag, fcurve.group.name)
@@ -183,12 +187,12 @@ def add_cycles(fcurve: bpy.types.FCurve, cycles: Cycles) -> None:
 
 
 def code_of(name: str, value: str) -> int:
-    """The number that stands for a value of one of the enumerations of `bpy.types.Keyframe`."""
+    """Return the number that stands for a value of one of the enumerations of `bpy.types.Keyframe`."""
     return bpy.types.Keyframe.bl_rna.properties[name].enum_items[value].value
 
 
 def read_poses(obj: bpy.types.Object, frames: np.ndarray) -> Poses:
-    """The world poses of `obj` as the scene evaluates them: parents, constraints, drivers, deltas and all.
+    """Return the world poses of `obj` as the scene evaluates them: parents, constraints, drivers, deltas and all.
 
     The scene steps through `frames` (shape (n,), sub-frames allowed) and returns to the frame it was on. Scales are
     kept where the object is not of its own size; they are the mean of the three axes.

@@ -19,7 +19,7 @@ from .slots import SlotTransform, is_time
 
 
 def original_of(place: SlotTransform) -> SlotTransform | None:
-    """The same transform in the slot with a mode that this is a duplicate of, None where it is none.
+    """Return the same transform in the slot with a mode that this is a duplicate of, None where it is none.
 
     It has what only in-betweens have, none of which are recorded, and its F-curves are those of the other slot.
     """
@@ -34,7 +34,7 @@ def original_of(place: SlotTransform) -> SlotTransform | None:
 
 
 def mode_before_move(place: SlotTransform) -> int | None:
-    """The number of the mode that a bone had in the Action that its slot was moved from, None where it was not.
+    """Return the number of the mode that a bone had in the Action that its slot was moved from, None where it was not.
 
     What a slot was moved from has its differences and not the slot; and was filled in from the same keys. Of several,
     it is the one with the mode that the bone shows.
@@ -60,7 +60,7 @@ def _have_same_curves(one: SlotTransform, other: SlotTransform) -> bool:
 
 
 def _numbers_of(fcurve: bpy.types.FCurve) -> np.ndarray:
-    """The keys or samples of an F-curve, or the line that it is."""
+    """Return the keys or samples of an F-curve, or the line that it is."""
     points = fcurve.keyframe_points if len(fcurve.keyframe_points) else fcurve.sampled_points
     result = np.empty(2 * len(points), np.float32)
     points.foreach_get("co", result)

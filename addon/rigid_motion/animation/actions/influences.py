@@ -12,7 +12,9 @@ Influence = tuple[tuple[float, float], ...]
 
 
 def influence_of(slot: Slot) -> Influence | None:
-    """The influence of the only strip that shows a slot, with nothing below it; None where it is full or another."""
+    """Return the influence of the only strip that shows a slot, with nothing below it;
+    None where it is full or another.
+    """
     if len(slot.users) != 1 or None in slot.strips or len(slot.strips) != 1:
         return None
     data = slot.users[0].animation_data
@@ -29,7 +31,7 @@ def influence_of(slot: Slot) -> Influence | None:
 
 
 def _of_strip(strip: bpy.types.NlaStrip) -> Influence | None:
-    """That of a strip which replaces what is below, and plays its Action once, forwards."""
+    """Return the influence of a strip which replaces what is below, and plays its Action once, forwards."""
     if strip.blend_type != "REPLACE" or strip.repeat != 1.0 or strip.use_reverse or strip.use_animated_time:
         return None
     if strip.use_animated_influence:

@@ -17,7 +17,8 @@ BREAKDOWN = bpy.types.Keyframe.bl_rna.properties["type"].enum_items["BREAKDOWN"]
 
 
 def read_keys(fcurves: Sequence[Sequence[bpy.types.FCurve]]) -> list[list[tuple[list[int], Keys]]]:
-    """The keys of F-curves, the first Cycles modifier and the Stepped ones of each; none of their other modifiers.
+    """Return the keys of F-curves, the first Cycles modifier and the Stepped ones of each;
+    none of their other modifiers.
 
     Parameters
     ----------
@@ -49,7 +50,9 @@ def read_keys(fcurves: Sequence[Sequence[bpy.types.FCurve]]) -> list[list[tuple[
 def _read_batch(
     owners: Sequence[int], channels: Sequence, linear: bool, cycles: Cycles | None, steps: tuple[Stepped, ...]
 ) -> Iterator[tuple[list[int], Keys]]:
-    """The keys of channels, from their `keyframe_points` with equally many each: the rows of those keyed together."""
+    """Yield the keys of channels, from their `keyframe_points` with equally many each:
+    the rows of those keyed together.
+    """
     points = _read_property("co", channels, np.float32, 2)
     groups = _keyed_together(owners, points[..., 0])
     order = [row for rows in groups for row in rows]
@@ -90,7 +93,9 @@ def _read_batch(
 
 
 def _keyed_together(owners: Sequence[int], frames: np.ndarray) -> list[list[int]]:
-    """The rows of channels with keys on these frames (c, n), those together of one owner and on the same frames."""
+    """Return the rows of channels with keys on these frames (c, n),
+    those together of one owner and on the same frames.
+    """
     raw, width = frames.tobytes(), frames.shape[1] * frames.itemsize
     groups: dict[tuple[int, bytes], list[int]] = {}
     for row, owner in enumerate(owners):
@@ -101,7 +106,9 @@ def _keyed_together(owners: Sequence[int], frames: np.ndarray) -> list[list[int]
 def _read_property(
     name: str, channels: Sequence, dtype: type, *width: int, rows: Sequence[int] | None = None
 ) -> np.ndarray:
-    """A property of the n keys of each of c channels, (c, n) or (c, n, width); read for these rows, else zero."""
+    """Return a property of the n keys of each of c channels, (c, n) or (c, n, width);
+    read for these rows, else zero.
+    """
     values = np.zeros((len(channels), len(channels[0]) * math.prod(width)), dtype)
     read_all = rows is None or len(rows) == len(channels)
     pairs = zip(channels, values, strict=True) if read_all else ((channels[row], values[row]) for row in rows)
@@ -123,7 +130,7 @@ def _read_cycles(modifiers: Iterable[bpy.types.FModifier]) -> Cycles | None:
 
 
 def read_steps(modifiers: Iterable[bpy.types.FModifier]) -> tuple[Stepped, ...]:
-    """The Stepped modifiers of an F-curve that are not muted, first to last."""
+    """Return the Stepped modifiers of an F-curve that are not muted, first to last."""
     return tuple(
         Stepped(
             modifier.frame_step,

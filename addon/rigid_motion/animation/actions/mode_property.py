@@ -33,13 +33,13 @@ def set_pending_mode(transform: Transform, mode: str) -> None:
 
 
 def is_keyed(place: SlotTransform) -> bool:
-    """Whether a mode channel decides."""
+    """Return whether a mode channel decides."""
     fcurve = place.curves.get(place.users[0].mode_channel)
     return fcurve is not None and not fcurve.mute and len(fcurve.keyframe_points) > 0
 
 
 def has_to_do_with_modes(place: SlotTransform) -> bool:
-    """Whether a place has a mode, a channel for it, in-betweens, or a record of any of them."""
+    """Return whether a place has a mode, a channel for it, in-betweens, or a record of any of them."""
     return recorded(place) != NOTHING_RECORDED or is_keyed(place) or bool(place.filled)
 
 
@@ -81,7 +81,7 @@ def adopt_from_properties(transforms: Iterable[Transform]) -> None:
 
 
 def _is_shown(user: Transform, place: SlotTransform) -> bool:
-    """Whether a place is the one that a user's property speaks of: its Action, or a strip where it has none."""
+    """Return whether a place is the one that a user's property speaks of: its Action, or a strip where it has none."""
     data = user.animated.animation_data
     return data.action is None or (data.action, data.action_slot_handle) == (place.slot.action, place.slot.handle)
 

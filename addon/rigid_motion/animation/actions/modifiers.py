@@ -18,29 +18,31 @@ FOLLOWED = ("CYCLES", "STEPPED")
 
 
 def may_add(modifier: bpy.types.FModifier) -> bool:
-    """Whether modifiers of this type add something, or can be set to."""
+    """Return whether modifiers of this type add something, or can be set to."""
     return modifier.type in ("NOISE", "GENERATOR", "FNGENERATOR")
 
 
 def is_added(modifier: bpy.types.FModifier) -> bool:
-    """Whether a modifier adds something to the value that depends on the time alone."""
+    """Return whether a modifier adds something to the value that depends on the time alone."""
     if modifier.type == "NOISE":
         return modifier.blend_type != "MULTIPLY"
     return may_add(modifier) and modifier.use_additive
 
 
 def is_modified(fcurve: bpy.types.FCurve) -> bool:
-    """Whether a channel that in-betweens can follow has something added to it."""
+    """Return whether a channel that in-betweens can follow has something added to it."""
     return any(is_added(modifier) and not modifier.mute for modifier in fcurve.modifiers)
 
 
 def is_whole(modifier: bpy.types.FModifier) -> bool:
-    """Whether a modifier acts in full and everywhere. Blender does not show the range of a Stepped one to Python."""
+    """Return whether a modifier acts in full and everywhere.
+    Blender does not show the range of a Stepped one to Python.
+    """
     return not (modifier.use_restricted_range or (modifier.use_influence and modifier.influence < 1.0))
 
 
 def added_values(place: SlotTransform, user: Transform, source: Source, frames: np.ndarray) -> np.ndarray:
-    """What modifiers add to the channels of a slot on these frames (m,) of its Action, shape (10, m)."""
+    """Return what modifiers add to the channels of a slot on these frames (m,) of its Action, shape (10, m)."""
     added = np.zeros((10, len(frames)))
     if source.modified:
         native = source.values_at(source.held(frames))

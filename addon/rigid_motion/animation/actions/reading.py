@@ -21,7 +21,7 @@ from .slots import SlotTransform
 
 
 def read(place: SlotTransform, mode: int | None = None) -> Source:
-    """What is keyed of a transform in a slot.
+    """Return what is keyed of a transform in a slot.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def read(place: SlotTransform, mode: int | None = None) -> Source:
 
 
 def keyed_in(places: Sequence[SlotTransform]) -> list[Source | Refused]:
-    """What is keyed in each of several places, or why it cannot be filled in.
+    """Return what is keyed in each of several places, or why it cannot be filled in.
 
     Where several users of a slot differ in what in-betweens depend on, it is what the leading one of them has: that by
     which the in-betweens were made that are there, or else the first one that the channels turn.
@@ -56,7 +56,7 @@ def keyed_in(places: Sequence[SlotTransform]) -> list[Source | Refused]:
 
 
 def differing_users(place: SlotTransform, sources: list[Source | Refused]) -> list[Transform]:
-    """The users of a slot that are moved by the in-betweens of another one, which do not fit them.
+    """Return the users of a slot that are moved by the in-betweens of another one, which do not fit them.
 
     `sources` is what is keyed as each of the users has it.
     """
@@ -71,7 +71,7 @@ def differing_users(place: SlotTransform, sources: list[Source | Refused]) -> li
 
 
 def sources_of_users(places: Sequence[SlotTransform]) -> list[list[Source | Refused]]:
-    """What is keyed in each of the places as each of its users has it."""
+    """Return what is keyed in each of the places as each of its users has it."""
     result: list[list[_Keyed | Refused]] = []
     drivers: dict[bpy.types.ID, set[Channel]] = {}
     for place in places:
@@ -98,7 +98,7 @@ def sources_of_users(places: Sequence[SlotTransform]) -> list[list[Source | Refu
 
 
 def leading(place: SlotTransform, users: list[Source | Refused]) -> Source | Refused:
-    """The source of the leading user: see `keyed_in`."""
+    """Return the source of the leading user: see `keyed_in`."""
     if len(users) == 1:
         return users[0]
     digest = recorded_digest(place)
@@ -119,7 +119,7 @@ class _Keyed:
     user: Transform
 
     names: frozenset[str]
-    """Which of location, rotation and scale are keyed."""
+    """The parts of location, rotation and scale that are keyed."""
 
     channels: dict[int, bpy.types.FCurve]
     """The channels with keys, by the rows of their components."""
@@ -141,7 +141,7 @@ class _Keyed:
 
 
 def _keyed_for(user: Transform, place: SlotTransform, drivers: Collection[Channel]) -> _Keyed:
-    """What of a slot moves one of its users. `Refused` where that cannot be filled in."""
+    """Return what of a slot moves one of its users. `Refused` where that cannot be filled in."""
     refuse_what_is_taken(user, place, drivers)
     keyed, channels = {}, user.channels
     driven = frozenset(row for row, channel in channels.items() if channel in drivers) if drivers else frozenset()
@@ -176,7 +176,7 @@ def _source(
     modes: list[tuple[list[int], Keys]],
     turns: list[tuple[list[int], Keys]],
 ) -> Source:
-    """What is keyed in a slot, as one of its users has it, from the keys that were read of its channels."""
+    """Return what is keyed in a slot, as one of its users has it, from the keys that were read of its channels."""
     user, rows = keyed.user, list(keyed.channels)
     goes_on = any(keys.linear or keys.cycles is not None for _, keys in channels)
     original = user.original()
@@ -202,7 +202,7 @@ def _source(
 
 
 def _has_say(user: Transform, fcurve: bpy.types.FCurve) -> bool:
-    """Whether a channel has keys that count. `Refused` where it has something else that does."""
+    """Return whether a channel has keys that count. `Refused` where it has something else that does."""
     if fcurve.mute:
         return False
     has_keys = len(fcurve.keyframe_points) > 0

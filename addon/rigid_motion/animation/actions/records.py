@@ -33,7 +33,9 @@ NOTHING_RECORDED = Recorded()
 
 
 def recorded(place: SlotTransform) -> Recorded:
-    """What is kept about a transform in a slot: looked up once, and again after it was changed by way of here."""
+    """Return what is kept about a transform in a slot: looked up once,
+    and again after it was changed by way of here.
+    """
     result = place.__dict__.get("recorded")
     if result is None:
         record = record_of(place)
@@ -49,29 +51,31 @@ def recorded(place: SlotTransform) -> Recorded:
 
 
 def recorded_digest(place: SlotTransform) -> str:
-    """The digest of the source that a transform was filled in from, "" where it was not."""
+    """Return the digest of the source that a transform was filled in from, "" where it was not."""
     return recorded(place).digest
 
 
 def recorded_rows(place: SlotTransform) -> list[int]:
-    """The rows of the components that in-betweens were written for."""
+    """Return the rows of the components that in-betweens were written for."""
     return [int(row, 16) for row in recorded(place).rows]
 
 
 def recorded_mode(place: SlotTransform) -> int:
-    """The number of the mode that a transform has throughout, `UNKNOWN` where it is none that is known."""
+    """Return the number of the mode that a transform has throughout, `UNKNOWN` where it is none that is known."""
     mode = recorded(place).mode
     # A number that is no mode, from a damaged file or a later version, reads as an empty name.
     return 0 if mode is None else MODE_NUMBERS.get(mode, UNKNOWN)
 
 
 def has_mode(place: SlotTransform) -> bool:
-    """Whether a mode other than Blender's was chosen for all segments of a transform in this slot."""
+    """Return whether a mode other than Blender's was chosen for all segments of a transform in this slot."""
     return recorded(place).mode is not None
 
 
 def has_in_betweens(place: SlotTransform) -> bool:
-    """Whether a transform was filled in, by whichever version; constants that are held beside strips are none."""
+    """Return whether a transform was filled in, by whichever version;
+    constants that are held beside strips are none.
+    """
     return (
         bool(recorded_digest(place))
         or any(len(fcurve.sampled_points) > 2 for fcurve in place.filled.values())
@@ -80,7 +84,8 @@ def has_in_betweens(place: SlotTransform) -> bool:
 
 
 def _has_time_of_its_own(place: SlotTransform) -> bool:
-    """Whether a bone was filled in, be it in an Action that its slot was in before: it has the time of a constraint.
+    """Return whether a bone was filled in, be it in an Action that its slot was in before:
+    it has the time of a constraint.
 
     Those that are held in the NLA for other Actions have no influence.
     """
@@ -118,7 +123,8 @@ def record_in_betweens(
     place: SlotTransform, digest: str, rows: Iterable[int], rate: int = 1, error: float = 0.0
 ) -> None:
     """Keep what in-betweens were made from, which components they are in, how many samples a frame they have, and how
-    far off they are between these."""
+    far off they are between these.
+    """
     if digest:
         record = _ensure_record(place)
         record.digest, record.rows = digest, "".join(f"{row:x}" for row in sorted(rows))
@@ -166,7 +172,7 @@ def forget_in_betweens(slot: Slot, prefixes: Iterable[str]) -> None:
 
 
 def record_of(place: SlotTransform) -> bpy.types.PropertyGroup | None:
-    """What an Action keeps about a transform, None where that is nothing."""
+    """Return what an Action keeps about a transform, None where that is nothing."""
     records, key = place.slot.action.rigid_motion.slots, _key(place.slot, place.prefix)
     number = _numbers.get(key, -1)
     if not (0 <= number < len(records) and records[number].name == key):
@@ -181,16 +187,17 @@ def record_of(place: SlotTransform) -> bpy.types.PropertyGroup | None:
 
 
 _numbers: dict[str, int] = {}
-"""Where records were found last, by their names: a rig has many, and Blender goes through all of them for a name."""
+"""The places where records were found last, by their names: a rig has many,
+and Blender goes through all of them for a name."""
 
 
 def _key(slot: Slot, prefix: str) -> str:
-    """The name that a record is found by."""
+    """Return the name that a record is found by."""
     return f"{slot.handle} {prefix}"
 
 
 def _ensure_record(place: SlotTransform) -> bpy.types.PropertyGroup:
-    """The record of a transform in a slot, made where there is none yet."""
+    """Return the record of a transform in a slot, made where there is none yet."""
     record = record_of(place)
     if record is not None:
         return record

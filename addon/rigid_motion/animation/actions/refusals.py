@@ -30,7 +30,7 @@ COMPONENTS = (
     *(n_("Rotation W"), n_("Rotation X"), n_("Rotation Y"), n_("Rotation Z")),
     *(n_("Scale X"), n_("Scale Y"), n_("Scale Z")),
 )
-"""What the rows of a source are called."""
+"""Names of the rows of a source."""
 
 CHANNELS = {
     "location": n_("Location"),
@@ -65,7 +65,7 @@ KEY = n_("key {number} of {channel}")
 LEFT_HANDLE = n_("left handle of key {number} of {channel}")
 RIGHT_HANDLE = n_("right handle of key {number} of {channel}")
 EASING = n_("easing of key {number} of {channel}")
-"""What keys are made of, channels and keys first."""
+"""The parts that keys are made of, channels and keys first."""
 
 NOT_FINITE = n_("{name}: {key} is not a finite number: delete it (Dope Sheet, X)")
 BAD_FRAME = n_(
@@ -121,7 +121,7 @@ def _refuse_driver(name: str, channel: Channel) -> None:
 
 
 def _was_filled_in(fcurve: bpy.types.FCurve, user: Transform, place: SlotTransform) -> bool:
-    """Whether in-betweens are in an F-curve that has been put into another group, or into none."""
+    """Return whether in-betweens are in an F-curve that has been put into another group, or into none."""
     channels = user.differences
     written = [channels.get(row) for row in recorded_rows(place)] if recorded_digest(place) else []
     return (fcurve.data_path, fcurve.array_index) in written and not fcurve.keyframe_points
@@ -214,7 +214,7 @@ def refuse_numbers(name: str, source: Source) -> None:
 
 
 def _numbers(keys: Keys) -> dict[str, np.ndarray]:
-    """All that keys are made of, channels and keys first, by what it is to a key."""
+    """Return all that keys are made of, channels and keys first, by what it is to a key."""
     settings = None if keys.easing_settings is None else np.moveaxis(keys.easing_settings, 0, -1)
     parts = {KEY: keys.points, LEFT_HANDLE: keys.left, RIGHT_HANDLE: keys.right, EASING: settings}
     return {part: numbers for part, numbers in parts.items() if numbers is not None}
@@ -291,7 +291,7 @@ def _refuse_turns(name: str, turns: Keys | None) -> None:
 
 
 def _label(fcurve: bpy.types.FCurve) -> str:
-    """A channel as the Dope Sheet names it."""
+    """Return a channel as the Dope Sheet names it."""
     return _label_at(fcurve.data_path, fcurve.array_index)
 
 
@@ -302,5 +302,5 @@ def _label_at(path: str, index: int) -> str:
 
 
 def _label_of(name: str) -> str:
-    """A property as the Dope Sheet names its channels."""
+    """Return a property as the Dope Sheet names its channels."""
     return iface_(CHANNELS.get(name, name))

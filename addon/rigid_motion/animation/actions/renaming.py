@@ -62,7 +62,7 @@ def keep_names(rig: bpy.types.Object) -> None:
 
 
 def forget_names(transforms: Iterable[Transform]) -> None:
-    """What no slot moves any more has no F-curves that Blender would rename with it."""
+    """Forget the names of what no slot moves any more: it has no F-curves that Blender would rename with it."""
     for bone in transforms:
         if bone.is_part and bone.motion.recorded_as and bone.animated.is_editable:
             bone.motion.recorded_as = ""
@@ -73,12 +73,12 @@ def _bones_of(rig: bpy.types.Object) -> Iterator[Transform]:
 
 
 def _is_renamed(bone: Transform) -> bool:
-    """Whether records have a bone under another name. So have they a copy of it, which they do not speak of."""
+    """Return whether records have a bone under another name. So have they a copy of it, which they do not speak of."""
     return bone.motion.recorded_as not in ("", bone.carrier.name)
 
 
 def _renamed_in(slot: Slot) -> dict[str, str]:
-    """The prefixes that bones of a slot's users have by now, by those that records have them under.
+    """Return the prefixes that bones of a slot's users have by now, by those that records have them under.
 
     Of several, a bone and its copy or bones of two rigs, it is the one that Blender has given the F-curves.
     """
@@ -96,7 +96,7 @@ def _renamed_in(slot: Slot) -> dict[str, str]:
 
 
 def _originals_of(slot: Slot) -> list[Slot]:
-    """The slots from before keys of rigs were baked or reduced in this one, as far as nothing moves by them."""
+    """Return the slots from before keys of rigs were baked or reduced in this one, as far as nothing moves by them."""
     rigs = [user for user in slot.users if user.pose is not None]
     owners = [owner for rig in rigs for owner in (rig, *rig.pose.bones)]
     notes = [entry for owner in owners for entry in owner.rigid_motion.bakes if entry.changed == slot.action]
@@ -108,7 +108,8 @@ def _originals_of(slot: Slot) -> list[Slot]:
 
 def _take_out_doubles(slot: Slot, prefixes: Iterable[str]) -> None:
     """Take out in-betweens that bones have twice: by their own, and by those of bones that are gone, whose names they
-    have. Of both Blender makes two groups of one name, and leaves it open which of them counts."""
+    have. Of both Blender makes two groups of one name, and leaves it open which of them counts.
+    """
     channelbag = slot.bones_channelbag
     if channelbag is None:
         return

@@ -51,7 +51,7 @@ class Slot:
 
     @property
     def in_nla(self) -> bool:
-        """Whether a strip shows it, or stands beside it in the NLA of one of its users."""
+        """Return whether a strip shows it, or stands beside it in the NLA of one of its users."""
         return any(len(user.animation_data.nla_tracks) > 0 for user in self.users)
 
     @property
@@ -60,7 +60,7 @@ class Slot:
 
     @property
     def bones_channelbag(self) -> bpy.types.ActionChannelbag | None:
-        """Where the differences of bones are: in the slot that goes with this one."""
+        """The channelbag with the differences of bones: of the slot that goes with this one."""
         for pair in self.action.rigid_motion.bone_slots:
             if pair.handle == self.handle:
                 return _channelbag(self.action, pair.differences)
@@ -76,7 +76,7 @@ class SlotTransform:
     """From the user to what is moved, in data paths: none for the user itself."""
 
     channelbag: bpy.types.ActionChannelbag | None
-    """Where the F-curves of the slot are."""
+    """The channelbag with the F-curves of the slot."""
 
     users: tuple[Transform, ...]
     find: Callable[[], Mapping[str, Curves]]
@@ -93,12 +93,12 @@ class SlotTransform:
 
     @property
     def name(self) -> str:
-        """What messages call it: the name of its first user."""
+        """The name for messages: that of its first user."""
         return self.users[0].name
 
     @property
     def home(self) -> tuple[bpy.types.ActionChannelbag | None, str]:
-        """Where in-betweens are, or are to be, and the name of their group there."""
+        """The slot that in-betweens are in, or are to be in, and the name of their group there."""
         kind = self.kind
         channelbag = self.slot.bones_channelbag if kind.has_difference_slot else self.channelbag
         return channelbag, kind.difference_group(self.prefix)
@@ -122,7 +122,7 @@ class SlotTransform:
         self.__dict__["filled"] = curves
 
     def ensure_curve(self, channel: Channel) -> bpy.types.FCurve:
-        """The F-curve of a channel, made where there is none yet."""
+        """Return the F-curve of a channel, made where there is none yet."""
         fcurve = self.curves.get(channel)
         if fcurve is None:
             path, index = channel
@@ -130,12 +130,12 @@ class SlotTransform:
         return fcurve
 
     def read_again(self) -> SlotTransform:
-        """The same, with the F-curves that there are by now."""
+        """Return this place with the F-curves that there are by now."""
         return read_again([self])[0]
 
 
 def transforms_in(slot: Slot, prefixes: Collection[str] | None = None) -> list[SlotTransform]:
-    """What a slot moves, transform by transform: these, or all that it has something of."""
+    """Return what a slot moves, transform by transform: these, or all that it has something of."""
     channelbag = slot.channelbag
     if prefixes is not None:
         return _transforms(slot, channelbag, prefixes, cache(partial(_curves_under, channelbag, prefixes)))
@@ -152,7 +152,7 @@ def transforms_in(slot: Slot, prefixes: Collection[str] | None = None) -> list[S
 
 
 def read_again(places: Sequence[SlotTransform]) -> list[SlotTransform]:
-    """The same, with the F-curves that there are by now."""
+    """Return these places with the F-curves that there are by now."""
     prefixes: dict[Slot, dict[str, None]] = {}
     for place in places:
         prefixes.setdefault(place.slot, {})[place.prefix] = None
@@ -163,7 +163,7 @@ def read_again(places: Sequence[SlotTransform]) -> list[SlotTransform]:
 def transforms_with(
     slot: Slot, channelbag: bpy.types.ActionChannelbag | None, curves: Mapping[str, Curves]
 ) -> list[SlotTransform]:
-    """What a slot moves by these F-curves, transform by transform: all there are of each prefix."""
+    """Return what a slot moves by these F-curves, transform by transform: all there are of each prefix."""
     return _transforms(slot, channelbag, curves, lambda: curves)
 
 
@@ -187,11 +187,11 @@ def _curves_under(channelbag: bpy.types.ActionChannelbag | None, prefixes: Itera
 
 
 _TIMES = f'constraints["{CONSTRAINT}'
-"""How the paths of channels begin that say at what time constraints of ours are."""
+"""The beginning of the paths of channels that say at what time constraints of ours are."""
 
 
 def _users_of(slot: Slot, prefix: str) -> tuple[Transform, ...]:
-    """What a prefix stands for in each of the users of a slot that has it."""
+    """Return what a prefix stands for in each of the users of a slot that has it."""
     kind = kind_of(prefix)
     users = () if kind is None else (kind.in_object(user, prefix) for user in slot.users)
     return () if kind is None else kind.together(tuple(user for user in users if user is not None))
@@ -203,7 +203,7 @@ def _channelbag(action: bpy.types.Action, handle: int) -> bpy.types.ActionChanne
 
 
 def slot_transforms_of(transforms: Iterable[Transform]) -> list[SlotTransform]:
-    """The slots that move these, and of each slot what is in it of them."""
+    """Return the slots that move these, and of each slot what is in it of them."""
     prefixes: dict[bpy.types.Object, dict[str, None]] = {}
     for transform in transforms:
         prefixes.setdefault(transform.animated, {})[transform.prefix] = None
@@ -215,12 +215,12 @@ def slot_transforms_of(transforms: Iterable[Transform]) -> list[SlotTransform]:
 
 
 def slot_transforms_in(actions: Iterable[bpy.types.Action]) -> list[SlotTransform]:
-    """What these Actions move, transform by transform."""
+    """Return what these Actions move, transform by transform."""
     return [place for slot in slots_in(actions) for place in transforms_in(slot)]
 
 
 def places_of(transform: Transform) -> list[SlotTransform]:
-    """What moves a transform, as if nothing else used the same slots: without a look at other objects."""
+    """Return what moves a transform, as if nothing else used the same slots: without a look at other objects."""
     slots = (
         Slot(action, handle, (transform.animated,), frozenset(strips))
         for action, handle, strips in uses_of(transform.animated).values()
@@ -229,7 +229,7 @@ def places_of(transform: Transform) -> list[SlotTransform]:
 
 
 def filled_places_of(obj: bpy.types.Object) -> list[SlotTransform]:
-    """What is filled in of all that an object's Actions move of it, as if nothing else used the same slots."""
+    """Return what is filled in of all that an object's Actions move of it, as if nothing else used the same slots."""
     result = []
     for action, handle, strips in uses_of(obj).values():
         slot = Slot(action, handle, (obj,), frozenset(strips))
@@ -240,7 +240,7 @@ def filled_places_of(obj: bpy.types.Object) -> list[SlotTransform]:
 
 
 def slots_of(objects: Iterable[bpy.types.Object]) -> list[Slot]:
-    """The slots that move these objects, in Actions of their own and in NLA strips; each once."""
+    """Return the slots that move these objects, in Actions of their own and in NLA strips; each once."""
     known = {obj: uses_of(obj) for obj in objects}
     desired = {key for uses in known.values() for key in uses}
     actions = {action for uses in known.values() for action, *_ in uses.values()}
@@ -248,7 +248,7 @@ def slots_of(objects: Iterable[bpy.types.Object]) -> list[Slot]:
 
 
 def slots_in(actions: Iterable[bpy.types.Action]) -> list[Slot]:
-    """The slots of these Actions that move an object."""
+    """Return the slots of these Actions that move an object."""
     actions = set(actions)
     desired = {action.as_pointer() for action in actions}
     return _slots(actions, lambda key: key[0] in desired, {})
@@ -259,8 +259,9 @@ def _slots(
     is_desired: Callable[[tuple[int, int]], bool],
     known: Mapping[bpy.types.Object, Uses],
 ) -> list[Slot]:
-    """Slots of these Actions, by the names of their users, and of one user from the bottom of its NLA to the top: what
-    depends on the order comes out the same whichever was edited."""
+    """Return slots of these Actions, by the names of their users, and of one user from the bottom of its NLA to the
+    top: what depends on the order comes out the same whichever was edited.
+    """
     if not actions:
         return []
     # A slot's own list of users may have some that are gone, which crashes Blender 5.2.
@@ -282,7 +283,7 @@ Uses = dict[tuple[int, int], tuple[bpy.types.Action, int, set[tuple[int, int] | 
 
 
 def actions_of(animated: bpy.types.ID) -> Iterator[bpy.types.Action]:
-    """The Actions that move something, by themselves and in strips."""
+    """Yield the Actions that move something, by themselves and in strips."""
     data = animated.animation_data
     if data is not None:
         if data.action is not None:
@@ -308,20 +309,22 @@ def uses_of(obj: bpy.types.Object) -> Uses:
 
 
 def counterpart_in(action: bpy.types.Action, slot: bpy.types.ActionSlot) -> bpy.types.ActionSlot | None:
-    """The slot in a copy of an Action, or in the original, that is the same: by its name, or renamed by its handle."""
+    """Return the slot in a copy of an Action, or in the original, that is the same: by its name,
+    or renamed by its handle.
+    """
     result = action.slots.get(slot.identifier)
     return result or next((one for one in action.slots if one.handle == slot.handle), None)
 
 
 def in_action(action: bpy.types.Action, slot: Slot) -> Slot | None:
-    """The same slot in a copy of its Action, or in the original. None where it was taken out of it."""
+    """Return the same slot in a copy of its Action, or in the original. None where it was taken out of it."""
     own = next(one for one in slot.action.slots if one.handle == slot.handle)
     result = counterpart_in(action, own)
     return None if result is None else replace(slot, action=action, handle=result.handle)
 
 
 def strips_of(obj: bpy.types.Object) -> Iterator[bpy.types.NlaStrip]:
-    """The strips in the NLA of an object, those in strips of strips among them."""
+    """Return the strips in the NLA of an object, those in strips of strips among them."""
     return _strips(strip for track in obj.animation_data.nla_tracks for strip in track.strips)
 
 
@@ -372,7 +375,9 @@ def _give_length(strip: bpy.types.NlaStrip, track: bpy.types.NlaTrack, slot: bpy
 
 
 def is_replacing(obj: bpy.types.Object, slot: Slot) -> bool:
-    """Whether a slot, wherever it moves an object in the NLA, takes the place of what is below it: nothing is added."""
+    """Return whether a slot, wherever it moves an object in the NLA, takes the place of what is below it:
+    nothing is added.
+    """
     data = obj.animation_data
     if data.action == slot.action and data.action_blend_type != "REPLACE":
         return False
@@ -381,7 +386,7 @@ def is_replacing(obj: bpy.types.Object, slot: Slot) -> bool:
 
 
 def is_above(obj: bpy.types.Object, slot: Slot, other: Slot) -> bool:
-    """Whether a slot plays above another one in the NLA of an object, on some frame."""
+    """Return whether a slot plays above another one in the NLA of an object, on some frame."""
     return any(
         level > below and start < end_below and start_below < end
         for level, start, end in _spans(obj, slot)
@@ -390,8 +395,9 @@ def is_above(obj: bpy.types.Object, slot: Slot, other: Slot) -> bool:
 
 
 def _spans(obj: bpy.types.Object, slot: Slot) -> list[tuple[int, float, float]]:
-    """Where in the NLA of an object a slot plays: the number of the track, that of its Action behind all of them, and
-    the frames of the scene."""
+    """Return where in the NLA of an object a slot plays: the number of the track, that of its Action behind all of
+    them, and the frames of the scene.
+    """
     data, own = obj.animation_data, (slot.action, slot.handle)
     spans = [
         (level, strip.frame_start, strip.frame_end)
@@ -405,17 +411,17 @@ def _spans(obj: bpy.types.Object, slot: Slot) -> list[tuple[int, float, float]]:
 
 
 def is_filled_in(fcurve: bpy.types.FCurve) -> bool:
-    """Whether an F-curve is one that in-betweens of an object are in: without keys, and in the group of them."""
+    """Return whether an F-curve is one that in-betweens of an object are in: without keys, and in the group of them."""
     group = fcurve.group
     is_in_group = group is not None and group.name == GROUP
     return is_in_group and not fcurve.keyframe_points and _is_difference(fcurve.data_path)
 
 
 def _is_difference(path: str) -> bool:
-    """Whether a data path is that of a delta transform."""
+    """Return whether a data path is that of a delta transform."""
     return path.startswith("delta_")
 
 
 def is_time(fcurve: bpy.types.FCurve) -> bool:
-    """Whether an F-curve says at what time a constraint of ours is."""
+    """Return whether an F-curve says at what time a constraint of ours is."""
     return split_path(fcurve.data_path)[1].startswith(_TIMES)

@@ -71,7 +71,7 @@ def bake_poses(obj: bpy.types.Object, frames: np.ndarray, poses: Poses, *, key_t
 
 
 def _rotation(obj: bpy.types.Object, quaternions: np.ndarray) -> tuple[str, np.ndarray]:
-    """The rotation channels of the object's mode, and their values."""
+    """Return the rotation channels of the object's mode, and their values."""
     if obj.rotation_mode == "QUATERNION":
         return "rotation_quaternion", align_signs(quaternions)
     if obj.rotation_mode in ORDERS:
@@ -181,12 +181,14 @@ def go_back(targets: Targets, kind: str, refused: list[Refused] | None) -> None:
 
 
 def is_baked(target: Target) -> bool:
-    """Whether something moves by an Action with baked keys, and its original is still in the file."""
+    """Return whether something moves by an Action with baked keys, and its original is still in the file."""
     return has_original(transform_of(target), BAKED)
 
 
 def _widened(transform: Transform, source: Source, first: float | None, last: float | None) -> tuple[float, float]:
-    """The range from key to key that has the frames from first to last in it, and what hangs together with them."""
+    """Return the range from key to key that has the frames from first to last in it,
+    and what hangs together with them.
+    """
     keys = source.key_frames
     if _may_repeat(source):
         # Cycles go on from the outermost keys: what lies in between is baked as a whole.
@@ -214,12 +216,14 @@ def _widened(transform: Transform, source: Source, first: float | None, last: fl
 
 
 def _may_repeat(source: Source) -> bool:
-    """Whether cycles of what is baked show every round: holds and what is added need not be alike in all of them."""
+    """Return whether cycles of what is baked show every round:
+    holds and what is added need not be alike in all of them.
+    """
     return source.repeats and not source.steps and not source.modified
 
 
 def _frames(source: Source, begin: float, end: float, step: float) -> np.ndarray:
-    """Every step from begin to end, and the keys in between."""
+    """Return every step from begin to end, and the keys in between."""
     keys = source.key_frames
     keys = keys[(keys >= begin - SAME_FRAME) & (keys <= end + SAME_FRAME)]
     frames = begin + step * np.arange(np.floor((end - begin) / step + 1e-9) + 1)

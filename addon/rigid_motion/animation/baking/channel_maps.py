@@ -21,7 +21,7 @@ from ..transforms import Channel, Transform
 
 
 def shown(transform: Transform, source: Source, frames: np.ndarray) -> tuple[Poses, AffineMaps]:
-    """How a source is seen on these frames (n,), with the object's own delta transforms, and what is not keyed.
+    """Return how a source is seen on these frames (n,), with the object's own delta transforms, and what is not keyed.
 
     Returns
     -------
@@ -52,7 +52,9 @@ def shown(transform: Transform, source: Source, frames: np.ndarray) -> tuple[Pos
 def evaluated(
     transform: Transform, curves: Mapping[Channel, bpy.types.FCurve], frames: np.ndarray
 ) -> tuple[Poses, AffineMaps]:
-    """The same of a bone that makes no source: by its F-curves as Blender evaluates them, or as it stands."""
+    """Return what `shown` does, for a bone that makes no source: by its F-curves as Blender evaluates them,
+    or as it stands.
+    """
     bone, frame_list = transform.carrier, frames.tolist()
 
     def values(name: str) -> np.ndarray:
@@ -80,6 +82,6 @@ def evaluated(
 
 
 def _maps(places: np.ndarray, quaternions: np.ndarray, scale: np.ndarray, along: np.ndarray | None) -> AffineMaps:
-    """From places (n, 3) along the axes of the body, quaternions (n, 4) and scales (n, 3) or (n, 1)."""
+    """Return the maps with places (n, 3) along the axes of the body, quaternions (n, 4) and scales (n, 3) or (n, 1)."""
     axes = np.moveaxis(matrices(quaternions), -1, 0) * scale[:, None, :]
     return AffineMaps(axes, places if along is None else places @ along)

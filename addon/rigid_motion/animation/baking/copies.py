@@ -11,11 +11,11 @@ from ..actions.slots import Slot, SlotTransform, counterpart_in, strips_of, tran
 from ..transforms import Transform, shows_differences
 
 BAKED, REDUCED = "BAKED", "REDUCED"
-"""What was done to the keys."""
+"""The change that was made to the keys."""
 
 
 def copied(slot: Slot, kind: str) -> bpy.types.Action:
-    """A copy of an Action with one slot, to be given other keys in a way, `BAKED` or `REDUCED`."""
+    """Return a copy of an Action with one slot, to be given other keys in a way, `BAKED` or `REDUCED`."""
     changed = slot.action.copy()
     name = re.sub(rf" {kind.title()}(\.\d+)?$", "", slot.action.name)
     changed.name = f"{name} {kind.title()}"
@@ -49,13 +49,13 @@ def let_rest(
 
 
 def used_in(animated: bpy.types.Object, action: bpy.types.Action | None) -> Slot | None:
-    """The slot of an Action that something moves by, as if nothing else used it."""
+    """Return the slot of an Action that something moves by, as if nothing else used it."""
     uses = uses_of(animated).values()
     return next((Slot(action, handle, (animated,), frozenset(at)) for used, handle, at in uses if used == action), None)
 
 
 def in_copy(transform: Transform, place: SlotTransform, changed: bpy.types.Action) -> SlotTransform:
-    """Something in the copy that it moves by, which has the same channels as the original."""
+    """Return something in the copy that it moves by, which has the same channels as the original."""
     slot = used_in(transform.animated, changed)
     channelbag = slot.channelbag
     result = {channel: channelbag.fcurves.find(channel[0], index=channel[1]) for channel in place.curves}
@@ -93,14 +93,14 @@ def exchange(obj: bpy.types.Object, old: Slot, new: bpy.types.Action) -> None:
 
 
 def entries_of(transforms: Iterable[Transform]) -> Iterator[tuple[Transform, list[bpy.types.PropertyGroup]]]:
-    """What has such notes, and those in use."""
+    """Yield what has such notes, and those of them in use."""
     for transform in transforms:
         if len(transform.motion.bakes):
             yield transform, list(entries_in_use(transform))
 
 
 def entries_in_use(transform: Transform) -> Iterator[bpy.types.PropertyGroup]:
-    """The notes on copies that something moves by, the latest first."""
+    """Yield the notes on copies that something moves by, the latest first."""
     bakes = transform.motion.bakes
     if len(bakes):
         actions = {action for action, *_ in uses_of(transform.animated).values()}

@@ -46,13 +46,14 @@ class WholeRig:
     """On how many frames any of them has keys by now."""
 
     slide_before: float
-    """How far what stands on the ground slid there as it was recorded, in the scene's units."""
+    """The distance that what stands on the ground slid there as it was recorded, in the scene's units."""
 
     slide_after: float
-    """How far it does now."""
+    """The distance that it slides now."""
 
     largest_error: float = 0.0
-    """Of all bones that the tolerance is promised for, those without keys among them, in the scene's units."""
+    """The largest error of all bones that the tolerance is promised for, those without keys among them,
+    in the scene's units."""
 
     not_promised: NotPromised = ALL_PROMISED
     """The bones that it is not promised for."""
@@ -68,10 +69,10 @@ class FewerKeys:
     """Shape (k,)."""
 
     values: dict[Channel, np.ndarray]
-    """What is written on these frames, by data path and index, each of shape (k,)."""
+    """Values that are written on these frames, by data path and index, each of shape (k,)."""
 
     key_frames: np.ndarray
-    """The same with frames of keys that a scale keeps, shape (n,)."""
+    """These frames and those of keys that a scale keeps, shape (n,)."""
 
     modes: np.ndarray
     """The numbers of the modes that go on from each of these, shape (n,)."""
@@ -82,10 +83,10 @@ class FewerKeys:
     """In the scene's units."""
 
     fewer: Source
-    """What it is to be, as a source."""
+    """The planned motion, as a source."""
 
     rig: WholeRig | None = None
-    """What became of the rig that it is a bone of."""
+    """The result for the rig that it is a bone of."""
 
     @classmethod
     def planned(
@@ -99,7 +100,9 @@ class FewerKeys:
         largest_error: float,
         rig: WholeRig | None = None,
     ) -> FewerKeys:
-        """From what was keyed to what is to be: values (k,) by the rows of components, on frames (k,)."""
+        """Return the plan from what was keyed to what is to be: values (k,) by the rows of components,
+        on frames (k,).
+        """
         key_frames = distinct(fewer.keyed_frames)
         return cls(
             place,
@@ -127,7 +130,7 @@ def fewer_keys(
     more_frames: np.ndarray = NO_FRAMES,
     count: int | None = None,
 ) -> FewerKeys:
-    """The keys that one slot needs, which may be as many as it has. Lengths are the scene's units.
+    """Return the keys that one slot needs, which may be as many as it has. Lengths are the scene's units.
 
     The tolerance holds on all whole frames, on those with keys, and on `more_frames`. With a count there are so many
     keys instead, those with the smallest largest error that is found.
@@ -192,7 +195,9 @@ def with_best_modes(
     rounding: float,
     allowed: float,
 ) -> Source:
-    """The source with the best mode in each segment, of those that keep within what is allowed on these frames."""
+    """Return the source with the best mode in each segment,
+    of those that keep within what is allowed on these frames.
+    """
     keys = distinct(source.keyed_frames)
     numbers = np.array([source.mode, *(mode.number for mode in KEYFRAME_MODES.values() if mode.number != source.mode)])
     alike = [shown(transform, replace(source, mode=int(number)), frames)[0] for number in numbers]
@@ -205,7 +210,8 @@ def with_best_modes(
 
 
 def _worst(chosen: np.ndarray, error: np.ndarray, samples: np.ndarray, allowed: float) -> np.ndarray:
-    """Where keys are put back: in each segment between those chosen at the moment that is furthest off, if too far.
+    """Return where keys are put back: in each segment between those chosen at the moment that is
+    furthest off, if too far.
 
     Moments that are no samples count for the samples around them, as long as one of these is no key.
     """
@@ -223,7 +229,7 @@ def _worst(chosen: np.ndarray, error: np.ndarray, samples: np.ndarray, allowed: 
 
 
 def samples_of(source: Source) -> np.ndarray:
-    """Where the recording is looked at: on its keys, and on whole frames where those are further apart."""
+    """Return where the recording is looked at: on its keys, and on whole frames where those are further apart."""
     keys = distinct(source.keyed_frames)
     whole = np.arange(np.ceil(keys[0]), np.floor(keys[-1]) + 1.0)
     place = np.clip(np.searchsorted(keys, whole), 1, max(len(keys) - 1, 1))
@@ -233,13 +239,15 @@ def samples_of(source: Source) -> np.ndarray:
 
 
 def seen_frames(frames: np.ndarray, sources: Sequence[Source]) -> np.ndarray:
-    """These frames and all whole ones that are seen: between them, and outside of the keys where something goes on."""
+    """Return these frames and all whole ones that are seen: between them,
+    and outside of the keys where something goes on.
+    """
     first, last = min(source.seen_range[0] for source in sources), max(source.seen_range[1] for source in sources)
     return np.union1d(frames, np.arange(np.floor(first), np.ceil(last) + 1.0))
 
 
 def goes_elsewhere(name: str) -> Refused:
-    """Why something cannot have fewer keys, although those that are left say all about the time between them."""
+    """Return why something cannot have fewer keys, although those that are left say all about the time between them."""
     return Refused(
         rpt_(
             "{name} goes on outside of its keys, and with fewer of them would go elsewhere there: "
@@ -249,7 +257,9 @@ def goes_elsewhere(name: str) -> Refused:
 
 
 def values_on(transform: Transform, source: Source, frames: np.ndarray) -> dict[int, np.ndarray]:
-    """What the channels that get other keys have on these frames, each (n,), by their rows among the components."""
+    """Return what the channels that get other keys have on these frames, each (n,),
+    by their rows among the components.
+    """
     by_path = channel_values(transform, source, in_betweens(source, frames))
     if SCALE in source.keyed and not source.uniform_scale:
         scale = source.values_at(frames)[ROWS[SCALE]].T
@@ -261,12 +271,12 @@ def values_on(transform: Transform, source: Source, frames: np.ndarray) -> dict[
 
 
 def keeps_scale(source: Source, values: Mapping[int, np.ndarray]) -> bool:
-    """Whether a scale keeps the keys it has, where these are the values of what gets others."""
+    """Return whether a scale keeps the keys it has, where these are the values of what gets others."""
     return SCALE in source.keyed and ROWS[SCALE].start not in values
 
 
 def has_uneven_scale(source: Source) -> bool:
-    """Whether a scale is keyed that differs from axis to axis as it changes."""
+    """Return whether a scale is keyed that differs from axis to axis as it changes."""
     if SCALE not in source.keyed or source.uniform_scale:
         return False
     return not np.all(_is_constant(source.values_at(source.keyed_frames)[ROWS[SCALE]].T))
@@ -277,7 +287,7 @@ def _is_constant(columns: np.ndarray) -> np.ndarray:
 
 
 def with_keys(source: Source, frames: np.ndarray, values: dict[int, np.ndarray], mode: str) -> Source:
-    """The source with these keys alone in the channels that have values, straight lines between them."""
+    """Return the source with these keys alone in the channels that have values, straight lines between them."""
     old = {row: keys for own, keys in source.channels for row in own}
     alike: dict[tuple, list[int]] = {}
     for row in values:

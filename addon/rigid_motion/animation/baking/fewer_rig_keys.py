@@ -52,16 +52,17 @@ NO_FEWER_POSES = n_(
 )
 
 HOLD = 4.0
-"""How many times the error counts of what stands on the ground."""
+"""The weight of the error of what stands on the ground."""
 
 SHARE = 0.5
-"""How much of the tolerance the keys of the rig itself may take, of what there is for the bones."""
+"""The part of the tolerance for the bones that the keys of the rig itself may take."""
 
 LEAST_SCALE = 1e-6
-"""What the search takes a scale of zero for."""
+"""The scale that the search takes for one of zero."""
 
 Plans = dict[Transform, "list[FewerKeys] | Refused"]
-"""What each bone is to have in each slot that moves it, or why it cannot have it; and rigs with keys of their own."""
+"""The keys that each bone is to have in each slot that moves it, or why it cannot have them;
+and rigs with keys of their own."""
 
 _Members = dict[Transform, tuple[SlotTransform, Source]]
 
@@ -77,7 +78,8 @@ def fewer_keys_of_rigs(
     best_of: bool,
     count: int | None = None,
 ) -> Plans:
-    """Plans for all bones among the targets, those together that one slot of a rig moves, and the rig along with them.
+    """Return plans for all bones among the targets, those together that one slot of a rig moves,
+    and the rig along with them.
 
     Lengths are the scene's units. With a count there are so many key poses, whatever the tolerance.
     """
@@ -140,7 +142,7 @@ class _Rig:
         samples = _united(map(samples_of, self.sources.values()))
         self.frames = seen_frames(samples, list(self.sources.values()))
         self.sampled = np.isin(self.frames, samples)
-        """Which moments keys may be on."""
+        """True for the moments that keys may be on."""
         slot: Slot = next(iter(self.places.values())).slot
         self.motion = RigMotion(rig, slot, self.sources, self.frames, radius)
         self.values = {
@@ -153,13 +155,13 @@ class _Rig:
         self._search_in()
 
     def _stand(self, *, hold: bool) -> None:
-        """Which bones stand on the ground, and how much their errors count."""
+        """Find which bones stand on the ground, and how much their errors count."""
         render, truth = bpy.context.scene.render, self.motion.truth.origins
         self.stands = standing(self.frames * render.fps_base / render.fps, truth)
         self.weights = np.where(self.stands, HOLD, 1.0) if hold else np.ones(self.stands.shape)
 
     def _search_in(self) -> None:
-        """The rig as the search has it: rigid, with even scale, in chains of bones that inherit all."""
+        """Make the rig as the search has it: rigid, with even scale, in chains of bones that inherit all."""
         motion = self.motion
         for number, bone in enumerate(motion.bones):
             if motion.passes_zero(number):
@@ -190,7 +192,7 @@ class _Rig:
     def reduce_own_keys(
         self, transform: Transform, place: SlotTransform, source: Source, mode: str, *, best_of: bool
     ) -> FewerKeys:
-        """Fewer keys for the rig itself: on the key poses, or within a share of the tolerance at any bone."""
+        """Return fewer keys for the rig itself: on the key poses, or within a share of the tolerance at any bone."""
         if self.key_poses is not None:
             first, last = np.searchsorted(self.frames, distinct(source.keyed_frames)[[0, -1]] - SAME_FRAME)
             keys = np.union1d(np.clip(self.key_poses, first, last), (first, last))
@@ -242,7 +244,7 @@ class _Rig:
             self.key_poses = samples[keys[fixed.index(False)]]
 
     def _fixed(self) -> list[bool]:
-        """Which bones keep the keys that they have."""
+        """Return which bones keep the keys that they have."""
         return [n not in self.targets or self._keeps_all(n) for n in range(len(self.motion.bones))]
 
     def fewer_keys(self, mode: str, *, shared: bool, best_of: bool) -> dict[Transform, FewerKeys]:
@@ -297,19 +299,19 @@ class _Rig:
         }
 
     def _keeps_all(self, number: int) -> bool:
-        """Whether the scale of a bone, which keeps its keys, has some wherever anything of it has."""
+        """Return whether the scale of a bone, which keeps its keys, has some wherever anything of it has."""
         source, values = self.sources[number], self.values[number]
         kept = [keys.times for rows, keys in source.channels if any(row not in values for row in rows)]
         return bool(kept) and len(_united(kept)) >= len(self.before[number])
 
     def _within_its_keys(self, keys: np.ndarray, number: int) -> np.ndarray:
-        """The moments of a bone's keys, none of them outside of those that it has: there it holds."""
+        """Return the moments of a bone's keys, none of them outside of those that it has: there it holds."""
         first, last = self._ends(number)
         inside = keys[(keys > first) & (keys < last)]
         return keys if len(keys) == 1 else np.union1d(inside, (first, last))
 
     def _ends(self, number: int) -> np.ndarray:
-        """The moments of the first and the last key that a bone has."""
+        """Return the moments of the first and the last key that a bone has."""
         return np.searchsorted(self.frames, self.before[number][[0, -1]] - SAME_FRAME)
 
     def _with_keys(self, number: int, keys: np.ndarray, mode: str) -> Source:
@@ -317,7 +319,7 @@ class _Rig:
         return with_keys(self.sources[number], self.frames[keys], columns, mode)
 
     def _proven(self, chosen: dict[int, np.ndarray], mode: str, *, shared: bool) -> dict[int, Source]:
-        """The bones that get fewer keys, and these, so that all of the rig keeps to the tolerance.
+        """Return the bones that get fewer keys, and these, so that all of the rig keeps to the tolerance.
 
         Keys are put back in `chosen` where the motion of the channels is off after all. What would not have fewer keys
         than before stays as it is.
@@ -354,7 +356,7 @@ class _Rig:
         return changed
 
     def _with_keys_at(self, moment: int, movable: list[int], chosen: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
-        """The keys of those of these bones that get any more at a moment: there, or on the samples around it."""
+        """Return the keys of those of these bones that get any more at a moment: there, or on the samples around it."""
         samples = np.flatnonzero(self.sampled)
         at = np.searchsorted(samples, moment)
         around = [moment] if self.sampled[moment] else samples[max(at - 1, 0) : at + 1].tolist()
@@ -393,18 +395,18 @@ class _Rig:
 
 
 def _united(frames: Iterable[np.ndarray]) -> np.ndarray:
-    """All frames, those that are one to Blender once."""
+    """Return all frames, those that are one to Blender once."""
     return distinct(np.unique(np.concatenate(list(frames))))
 
 
 def _follows(bone: bpy.types.PoseBone, grows: bool) -> bool:
-    """Whether a bone is moved by all that its parent does."""
+    """Return whether a bone is moved by all that its parent does."""
     own = bone.bone
     return bool(bone.parent and own.use_inherit_rotation and (own.inherit_scale == "FULL" or not grows))
 
 
 def _rest(motion: RigMotion, number: int, follows: bool) -> Poses:
-    """Where a bone is at rest: in its parent's space, or that of the rig."""
+    """Return where a bone is at rest: in its parent's space, or that of the rig."""
     bone = motion.bones[number]
     matrix = bone.bone.matrix_local
     if follows:

@@ -22,10 +22,10 @@ class NotPromised:
     """The bones that a tolerance is not promised for, by their names."""
 
     followers: tuple[str, ...] = ()
-    """Those that follow constraints or drivers."""
+    """Bones that follow constraints or drivers."""
 
     below: tuple[str, ...] = ()
-    """Those that hang on these."""
+    """Bones that hang on these."""
 
     def __bool__(self) -> bool:
         return bool(self.followers)
@@ -38,7 +38,7 @@ ALL_PROMISED = NotPromised()
 
 
 def not_promised(rig: bpy.types.Object) -> NotPromised:
-    """The bones of a rig whose motion is not that of their channels, and of those above them, alone."""
+    """Return the bones of a rig whose motion is not that of their channels, and of those above them, alone."""
     followers = {*_constrained(rig), *_driven(rig)}
     bones = rig.pose.bones
     below = {bone.name for bone in bones if any(parent.name in followers for parent in bone.parent_recursive)}
@@ -80,7 +80,7 @@ def _drivers(rig: bpy.types.Object) -> Iterator[bpy.types.FCurve]:
 
 
 def _animated_paths(rig: bpy.types.Object) -> set[str]:
-    """The data paths that drivers or F-curves of the rig set."""
+    """Return the data paths that drivers or F-curves of the rig set."""
     bags = (slot.channelbag for slot in slots_of([rig]))
     curves = {fcurve.data_path for bag in bags if bag is not None for fcurve in bag.fcurves}
     return curves | {driver.data_path for driver in _drivers(rig)}

@@ -30,20 +30,20 @@ NOT_DONE = {
     BAKED: n_("{name} is not baked, or has another Action by now"),
     REDUCED: n_("{name} is not reduced, or has another Action by now"),
 }
-"""Why something cannot be taken back."""
+"""The reason why something cannot be taken back."""
 
 DONE_SINCE = {
     BAKED: n_("{name} was baked since it was reduced: Un-Bake first"),
     REDUCED: n_("{name} was reduced since it was baked: Restore Keys first"),
 }
-"""Why that cannot which was done before, by what was done last."""
+"""The reason why what was done before cannot be taken back, by what was done last."""
 
 
 WITHOUT_SLOT = n_(
     "{name} cannot get its keys back: their slot was taken out of the Action {action}. "
     "Choose by hand the Action that has them by now"
 )
-"""Why something cannot be taken back although its original is still in the file."""
+"""The reason why something cannot be taken back although its original is still in the file."""
 
 
 def refuse_tweak_mode(transform: Transform) -> None:
@@ -80,7 +80,7 @@ def move_by_copy(transform: Transform, place: SlotTransform, kind: str) -> SlotT
 
 
 def has_original(transform: Transform, kind: str) -> bool:
-    """Whether something moves by a copy with keys of this kind, and the original is still in the file."""
+    """Return whether something moves by a copy with keys of this kind, and the original is still in the file."""
     return any(entry.kind == kind and entry.original is not None for entry in entries_in_use(transform))
 
 

@@ -48,7 +48,7 @@ HAS_KEYS = (
     n_("{name} has {count} key of location, rotation or scale"),
     n_("{name} has {count} keys of location, rotation or scale"),
 )
-"""How something begins that has hardly a key, by the number of these."""
+"""The first words on something that has hardly a key, by the number of its keys."""
 
 SIMULATED = n_("{has}, a simulation moves it: bake that first (Object > Rigid Body > Bake to Keyframes)")
 SOLVED_CAMERA = n_(
@@ -75,10 +75,10 @@ class Reduction:
     """In the scene's units; of a rig the largest of all its bones, with and without keys, but for `not_promised`."""
 
     segments: dict[str, int]
-    """How many segments each mode has by now."""
+    """The number of segments that each mode has by now."""
 
     rig: WholeRig | None = None
-    """What became of the rig, where it is a bone's."""
+    """The result for the rig, where it is a bone's."""
 
     channel_keys: tuple[int, int] = (0, 0)
     """The keys of all channels together, before and after. There may be more: a pose has all channels."""
@@ -188,7 +188,7 @@ def reduce_keys_of(
 
 
 def reduction_of(target: Target) -> Reduction | None:
-    """What became of the keys that something moves by when they were reduced. None where they were not."""
+    """Return what became of the keys that something moves by when they were reduced. None where they were not."""
     transform = transform_of(target)
     if not len(transform.motion.bakes):
         return None
@@ -207,7 +207,9 @@ def _reduced(entries: Iterable[bpy.types.PropertyGroup]) -> _Entries:
 
 
 def _summed(entries: _Entries, of_bones: _Entries, segments: dict[str, int]) -> Reduction | None:
-    """All of these notes together; None where there are none. What they say of a rig is that with the most frames."""
+    """Return all of these notes together; None where there are none.
+    What they say of a rig is that with the most frames.
+    """
     if not entries:
         return None
     rig = max((_whole_rig(entry) for entry in of_bones), key=lambda result: result.frames, default=None)
@@ -233,7 +235,7 @@ def _whole_rig(entry: bpy.types.PropertyGroup) -> WholeRig:
 
 
 def total_reduction(targets: Targets) -> Reduction | None:
-    """What became of the keys of several targets together, without their modes. None where none were reduced."""
+    """Return what became of the keys of several targets together, without their modes. None where none were reduced."""
     of_each = [(transform, _reduced(entries)) for transform, entries in entries_of(transforms_of(targets))]
     of_bones = [entry for transform, entries in of_each if transform.is_part for entry in entries]
     result = _summed([entry for _, entries in of_each for entry in entries], of_bones, {})
@@ -245,7 +247,7 @@ def total_reduction(targets: Targets) -> Reduction | None:
 
 
 def is_reduced(target: Target) -> bool:
-    """Whether something moves by an Action with reduced keys, and its original is still in the file."""
+    """Return whether something moves by an Action with reduced keys, and its original is still in the file."""
     return has_original(transform_of(target), REDUCED)
 
 
@@ -340,7 +342,7 @@ def _no_fewer(transform: Transform, before: int, *, keeps_scale: bool, count: in
 
 
 def _why_nothing_is_keyed(transform: Transform, count: int) -> str:
-    """What moves something that has hardly a key, and how that becomes keys."""
+    """Return what moves something that has hardly a key, and how that becomes keys."""
     obj = transform.carrier
     has = rpt_(HAS_KEYS[min(count, 2)]).format(name=transform.name, count=count)
     constraints = {

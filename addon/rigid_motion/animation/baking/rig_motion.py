@@ -62,7 +62,7 @@ class RigMotion:
             for number, transform in enumerate(self.transforms)
         ]
         self.poses = [poses for poses, _ in result]
-        """Of each bone's channels, each of shape (m,)."""
+        """Poses of each bone's channels, each of shape (m,)."""
         self._channels = AffineMaps(
             np.stack([maps.axes for _, maps in result]), np.stack([maps.origins for _, maps in result])
         )
@@ -70,20 +70,20 @@ class RigMotion:
         self._posed = self.hierarchy.posed(self._channels)
         recorded = self._posed.copy()
         self.world = self.carried_by(keyed.get(""))
-        """Where the rig is, shape (m,) or (1,)."""
+        """The place of the rig, shape (m,) or (1,)."""
         self._carried = self.world
         self.truth = self.world @ recorded
-        """Where the bones are in the scene, shape (bones, m)."""
+        """The places of the bones in the scene, shape (bones, m)."""
         self.unit = float(np.linalg.norm(self.world.axes, 2, axis=(-2, -1)).max()) or 1.0
-        """How long the rig's unit of length is in the scene, at most."""
+        """The length of the rig's unit of length in the scene, at most."""
         sizes = np.sqrt(np.einsum("...ij,...ij->...j", recorded.axes, recorded.axes).max(axis=-1))
         away = np.linalg.norm(recorded.origins, axis=-1) + self.radii[:, None] * sizes
         self.extent = float(away.max())
-        """How far any bone's ball gets from the rig's origin, in its unit."""
+        """The distance that any bone's ball gets from the rig's origin, in its unit."""
         self.rounding = SMALLEST * self.unit * self.extent
 
     def carried_by(self, source: Source | None) -> AffineMaps:
-        """Where the rig itself is, by its own keys or as it stands. Its parents are where they are now."""
+        """Return where the rig itself is, by its own keys or as it stands. Its parents are where they are now."""
         own = transform_of(self.rig)
         if source is None:
             world = np.array(self.rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
@@ -104,28 +104,28 @@ class RigMotion:
         self.hierarchy.pose(sources, self._channels, self._posed)
 
     def now(self, number: int | slice = slice(None)) -> AffineMaps:
-        """Where a bone, or all of them, are in the scene by now, shape (m,) or (bones, m)."""
+        """Return where a bone, or all of them, are in the scene by now, shape (m,) or (bones, m)."""
         return self._carried @ self._posed[number]
 
     def passes_zero(self, number: int) -> bool:
-        """Whether the scale of a bone's channels changes, and is zero or another way round at times."""
+        """Return whether the scale of a bone's channels changes, and is zero or another way round at times."""
         volumes = np.linalg.det(self._recorded_channels[number].axes)
         return bool(np.ptp(volumes) > 0.0 and volumes.min() <= 0.0 <= volumes.max())
 
     def above(self, number: int) -> Iterator[int]:
-        """A bone and all that it hangs on."""
+        """Yield a bone and all that it hangs on."""
         while number >= 0:
             yield number
             number = int(self.hierarchy.parents[number])
 
     def below(self, number: int) -> list[int]:
-        """A bone and all that hang on it."""
+        """Return a bone and all that hang on it."""
         return [one for one in range(len(self.bones)) if number in self.above(one)]
 
     def over(
         self, allowed: float, weights: np.ndarray, numbers: Iterable[int] | None = None
     ) -> list[tuple[float, int, int]]:
-        """Where errors are over what is allowed: weighted error, bone and moment, the largest first.
+        """Return where errors are over what is allowed: weighted error, bone and moment, the largest first.
 
         `weights` are of shape (bones, m). Of these bones, or all.
         """
@@ -141,7 +141,7 @@ class RigMotion:
         return sorted(result, reverse=True)
 
     def largest_error(self, number: int) -> float:
-        """The largest displacement of any point in a bone's ball on any frame, in the scene's units."""
+        """Return the largest displacement of any point in a bone's ball on any frame, in the scene's units."""
         now, truth, radius = self.now(number), self.truth[number], self.radii[number]
         bounds = displacement_bound(now, truth, radius)
         at = [int(np.argmax(bounds))]
@@ -153,7 +153,7 @@ class RigMotion:
 def _keyed_in(
     rig: bpy.types.Object, slot: Slot
 ) -> tuple[dict[str, Source], dict[str, dict[Channel, bpy.types.FCurve]]]:
-    """What a slot has of a rig and its bones, by the prefixes of their data paths: sources, and all F-curves."""
+    """Return what a slot has of a rig and its bones, by the prefixes of their data paths: sources, and all F-curves."""
     sources: dict[str, Source] = {}
     places = transforms_in(slot)
     for place, of_users in zip(places, sources_of_users(places), strict=True):

@@ -60,7 +60,9 @@ def put_back(transform: Transform, kind: str, lookup: Lookup) -> None:
 
 
 def _copy_of(rig: bpy.types.Object, slot: Slot) -> bpy.types.Action | None:
-    """The Action that a rig moves by and that has other keys for parts of it, which this slot has from before."""
+    """Return the Action that a rig moves by and that has other keys for parts of it,
+    which this slot has from before.
+    """
     noted = {entry.changed for entry in _entries(rig) if entry.original == slot.action}
     # One that somebody has put the original in place of by hand is not used any more.
     return next((one for one in noted if used_in(rig, one) is not None and in_action(one, slot) is not None), None)
@@ -71,7 +73,7 @@ def _originals_of(rig: bpy.types.Object, changed: bpy.types.Action) -> Iterator[
 
 
 def _entries(rig: bpy.types.Object) -> Iterator[bpy.types.PropertyGroup]:
-    """The notes on all that there is of a rig."""
+    """Yield the notes on all that there is of a rig."""
     yield from rig.rigid_motion.bakes
     for bone in rig.pose.bones:
         yield from bone.rigid_motion.bakes
@@ -84,30 +86,30 @@ def _rename_in_notes(rig: bpy.types.Object, old: bpy.types.Action, new: bpy.type
 
 
 def _is_shared(rig: bpy.types.Object, slot: Slot) -> bool:
-    """Whether something else moves by a slot of a rig as well."""
+    """Return whether something else moves by a slot of a rig as well."""
     return any(one.users != (rig,) for one in slots_of([rig]) if (one.action, one.handle) == (slot.action, slot.handle))
 
 
 def _is_as_in(action: bpy.types.Action, place: SlotTransform) -> bool:
-    """Whether a transform has the same keys and modes in another Action."""
+    """Return whether a transform has the same keys and modes in another Action."""
     slot = in_action(action, place.slot)
     return slot is not None and _is_as(*transforms_in(slot, (place.prefix,)), place)
 
 
 def _is_as(one: SlotTransform, other: SlotTransform) -> bool:
-    """Whether a transform has the same keys and modes in these two."""
+    """Return whether a transform has the same keys and modes in these two."""
     settings = [(recorded_mode(place), recorded(place).turns_axis) for place in (one, other)]
     return settings[0] == settings[1] and _summary(one) == _summary(other)
 
 
 def _animators(place: SlotTransform) -> dict[tuple[str, int], bpy.types.FCurve]:
-    """The channels that the animator has keyed, those of modes and turns among them."""
+    """Return the channels that the animator has keyed, those of modes and turns among them."""
     names = (*WIDTHS, *SEGMENT_PROPERTIES)
     return {channel: curve for channel, curve in place.curves.items() if channel[0].removeprefix(place.prefix) in names}
 
 
 def _summary(place: SlotTransform) -> dict:
-    """What tells whether channels are the same."""
+    """Return what tells whether channels are the same."""
     return {channel: _summary_of(fcurve) for channel, fcurve in _animators(place).items()}
 
 

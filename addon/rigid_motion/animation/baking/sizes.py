@@ -16,7 +16,7 @@ SAME_PLACE = 0.1
 
 
 def radius_of(obj: bpy.types.Object | bpy.types.PoseBone) -> float:
-    """How far an object or a pose bone reaches from its origin, in the scene's units.
+    """Return how far an object or a pose bone reaches from its origin, in the scene's units.
 
     That is the farthest corner of an object's bounding box as it is now, how far a bone reaches at rest (`reach_of`),
     and of a rig how far its bones reach as it is posed now. Empties and cameras are as large as they are drawn; what
@@ -42,7 +42,7 @@ def radius_of(obj: bpy.types.Object | bpy.types.PoseBone) -> float:
 
 
 def rig_size(rig: bpy.types.Object) -> float:
-    """The size of a rig in the scene's units: the largest extent of its joints along any axis, at rest.
+    """Return the size of a rig in the scene's units: the largest extent of its joints along any axis, at rest.
 
     Joints are the heads of bones, for importers make up where the last bones end. A rig whose heads are in one place is
     as large as the bone that reaches farthest.
@@ -55,7 +55,7 @@ def rig_size(rig: bpy.types.Object) -> float:
 
 
 def first_tolerance(scene: bpy.types.Scene, targets: Iterable[Transform], *, shared: bool = False) -> float:
-    """The tolerance to begin with, in the scene's units: a millimetre, and of a rig a share of its size.
+    """Return the tolerance to begin with, in the scene's units: a millimetre, and of a rig a share of its size.
 
     That is larger where its bones share key poses.
     """
@@ -70,12 +70,14 @@ def _evaluated(obj: bpy.types.Object) -> bpy.types.Object:
 
 
 def scale_in_scene(transform: Transform) -> float:
-    """The size of something in the scene as it is now, 1 where it has none."""
+    """Return the size of something in the scene as it is now, 1 where it has none."""
     return size_of(_evaluated(transform.animated).matrix_world) or 1.0
 
 
 def into_scene(transform: Transform) -> np.ndarray:
-    """What takes the axes of an object's channels to those of the scene, shape (3, 3): its parents, as they are now."""
+    """Return what takes the axes of an object's channels to those of the scene, shape (3, 3): its parents,
+    as they are now.
+    """
     obj = transform.carrier
     if obj.parent is None and not obj.constraints:
         return np.eye(3)

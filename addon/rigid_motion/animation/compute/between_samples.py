@@ -22,14 +22,14 @@ EULER = 2.0**0.5
 class Samples(dict[int, np.ndarray]):
     """The differences of one source at m moments of its range, by the rows of their components where there is any.
 
-    Frame and value of every sample by turns, in single precision, each of shape (2 m,).
+    Frame and value of every sample alternately, in single precision, each of shape (2 m,).
     """
 
     rate = 1
-    """How many there are in a frame."""
+    """The number of samples in a frame."""
 
     error = 0.0
-    """How far a body is off between them at most, where that was asked for: see `largest_errors`."""
+    """The largest error of a body between them, where that was asked for: see `largest_errors`."""
 
 
 def largest_errors(
@@ -92,7 +92,9 @@ def largest_errors(
 
 
 def _bends(delta: np.ndarray, reach: np.ndarray, order: str | None) -> np.ndarray:
-    """By how much bodies leave the straight line about each of the inner samples (m,), of differences (., m + 2)."""
+    """Return by how much bodies leave the straight line about each of the inner samples (m,), of differences
+    (., m + 2).
+    """
     bends = 0.125 * (delta[:, :-2] + delta[:, 2:]) - 0.25 * delta[:, 1:-1]
     moved = np.sqrt(np.einsum("rm,rm->m", bends[ROWS[LOCATION]], bends[ROWS[LOCATION]]))
     if order is None:

@@ -52,7 +52,9 @@ def differ(poses: Poses, native: np.ndarray, delta: np.ndarray) -> None:
 
 
 def location_axes(sources: Sequence[Source], owners: np.ndarray) -> np.ndarray | None:
-    """The axes that the location of each segment's owner runs along, (S, 3, 3); None where all have their own."""
+    """Return the axes that the location of each segment's owner runs along, (S, 3, 3);
+    None where all have their own.
+    """
     if all(source.location_axes is None for source in sources):
         return None
     same = np.eye(3)

@@ -22,7 +22,7 @@ GRID = np.linspace(-0.25, 1.25, 49)
 """Progress at which a path is first compared with a key: an easing may pass both ends."""
 
 STEPS = 14
-"""Of the search from there, for more digits than single precision has."""
+"""Steps of the search from there, for more digits than single precision has."""
 
 DIFFERENCE = 1e-4
 """The progress on either side that slopes are measured over."""
@@ -39,16 +39,16 @@ class Passages:
     """The first of the segments on each segment of a path, and the end, shape (P + 1,)."""
 
     progress: np.ndarray
-    """How far along its segment of the path each of the segments starts and ends, shape (2, S)."""
+    """The progress along its segment of the path where each of the segments starts and ends, shape (2, S)."""
 
     offsets: Poses
-    """How far off the path each of the segments starts, in the body's own axes, shape (S,)."""
+    """The difference from the path where each of the segments starts, in the body's own axes, shape (S,)."""
 
     changes: np.ndarray
     """The twists by which that changes up to its end, and the growth of log scale, shape (7, S)."""
 
     smooth: np.ndarray
-    """Whether it changes without a corner, shape (S,)."""
+    """True if it changes without a corner, shape (S,)."""
 
     @classmethod
     def of(cls, passed: np.ndarray, keys: Poses, poses_at: PosesAt, smooth: np.ndarray) -> Passages:

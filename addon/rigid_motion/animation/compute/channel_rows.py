@@ -13,7 +13,7 @@ from .sources import SAME_FRAME, Source
 
 
 def each(sources: Sequence[Source], counts: Iterator[int]) -> list[tuple[Source, slice]]:
-    """Each source with the place of what it has this many of."""
+    """Return each source with the place of what it has this many of."""
     bounds = [0, *itertools.accumulate(counts)]
     return [(source, slice(*place)) for source, place in zip(sources, itertools.pairwise(bounds), strict=True)]
 
@@ -25,7 +25,7 @@ def sampled(
     unit_elastic: bool = False,
     out: np.ndarray | None = None,
 ) -> np.ndarray:
-    """The channels' own values at the frames of each source, m in all, with a row for each of the `height`."""
+    """Return the channels' own values at the frames of each source, m in all, with a row for each of the `height`."""
     rows = np.empty((height([source for source, _ in samples]), samples[-1][1].stop)) if out is None else out
     curves, times, out, apart = [], [], [], []
     for (source, place), at in zip(samples, frames, strict=True):
@@ -50,7 +50,7 @@ def sampled(
 def channels_at_ends(
     segments: list[tuple[Source, slice]], *, unit_elastic: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The channels' own values where each segment starts and where it ends, rows as `sampled` has them."""
+    """Return the channels' own values where each segment starts and where it ends, rows as `sampled` has them."""
     sources = [source for source, _ in segments]
     keys = each(sources, (len(source.key_frames) for source in sources))
     rows = sampled(keys, [source.key_frames for source in sources], unit_elastic=unit_elastic)
@@ -68,12 +68,12 @@ def channels_at_ends(
 
 
 def height(sources: Sequence[Source]) -> int:
-    """How many of the components are needed for what the sources key."""
+    """Return how many of the components are needed for what the sources key."""
     return ROWS[SCALE].stop if any(SCALE in source.keyed for source in sources) else ROWS[ROTATION].stop
 
 
 def filled_height(sources: Sequence[Source]) -> int:
-    """How many of them for what is filled in."""
+    """Return how many of them for what is filled in."""
     return ROWS[SCALE].stop if sources[0].uniform_scale else ROWS[ROTATION].stop
 
 
@@ -89,7 +89,7 @@ def _rest(rows: np.ndarray, source: Source) -> None:
 
 
 def _jumps(keys: Keys, times: np.ndarray) -> np.ndarray:
-    """At which of these times a cyclic channel goes from its last value to its first, shape (n,)."""
+    """Return at which of these times a cyclic channel goes from its last value to its first, shape (n,)."""
     cycles = keys.cycles
     first, last = keys.times[[0, -1]]
     if cycles is None or first == last:

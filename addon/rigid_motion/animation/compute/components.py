@@ -6,10 +6,10 @@ import numpy as np
 
 LOCATION, ROTATION, SCALE = "location", "rotation", "scale"
 ROWS = {LOCATION: slice(0, 3), ROTATION: slice(3, 7), SCALE: slice(7, 10)}
-"""Where the components of each are, in arrays with a row for each of the ten. Euler angles leave row 6 alone."""
+"""The rows of the components of each, in arrays with a row for each of the ten. Euler angles leave row 6 alone."""
 
 PART_OF = tuple(name for name, own in ROWS.items() for _ in range(own.start, own.stop))
-"""Of which of them each row is a component."""
+"""The one of them that each row is a component of."""
 
 REST = np.array((0, 0, 0, 1, 0, 0, 0, 1, 1, 1), dtype=np.float64)
 """The components of something that is not moved. Rotations are quaternions where they are not channels."""

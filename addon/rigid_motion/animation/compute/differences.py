@@ -60,16 +60,16 @@ class InBetweens:
     """Shape (m,)."""
 
     native: Poses
-    """What Blender's own in-betweens make of the keys, shape (m,)."""
+    """Poses that Blender's own in-betweens make of the keys, shape (m,)."""
 
     desired: Poses
-    """What the modes make of them, shape (m,)."""
+    """Poses that the modes make of them, shape (m,)."""
 
 
 def in_betweens(
     source: Source, frames: np.ndarray, mode: str | None = None, progress: np.ndarray | None = None
 ) -> InBetweens:
-    """The motion of a source at any rising frames, sub-frames included.
+    """Return the motion of a source at any rising frames, sub-frames included.
 
     Parameters
     ----------
@@ -106,7 +106,9 @@ def in_betweens(
 
 
 def progress_at(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """How far along its segment of the path, from 0 to 1, each source has come on rising frames of its own, (m,)."""
+    """Return how far along its segment of the path, from 0 to 1,
+    each source has come on rising frames of its own, (m,).
+    """
     result, of_source = {}, {id(source): own for source, own in zip(sources, frames, strict=True)}
     for portion in _portions(sources, {name: (0, len(own)) for name, own in of_source.items()}):
         own = [of_source[id(source)] for source in portion]
@@ -123,7 +125,8 @@ def differences(
     rates: Sequence[int] | None = None,
     reaches: Sequence[float] | None = None,
 ) -> list[Samples]:
-    """What turns Blender's in-betweens into the wanted ones, on the whole frames of each source and between them.
+    """Return what turns Blender's in-betweens into the desired ones,
+    on the whole frames of each source and between them.
 
     The rotation is a quaternion or, for a source that turns by Euler angles, as these, and applied on the left;
     location is added, scale multiplied. Components that are the source's original ones throughout are left out. Holds
@@ -191,7 +194,7 @@ def differences(
 
 
 def _portions(sources: Sequence[Source], range_of: dict[int, tuple[int, int]]) -> Iterator[list[Source]]:
-    """The sources in lists of about `AT_ONCE` samples, those apart that scale evenly or turn otherwise."""
+    """Yield the sources in lists of about `AT_ONCE` samples, those apart that scale evenly or turn otherwise."""
     alike: dict[tuple, list[Source]] = {}
     for source in sources:
         alike.setdefault((source.order, source.uniform_scale), []).append(source)
@@ -215,7 +218,7 @@ def _move(
     delta: np.ndarray,
     given: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Fill in Blender's own in-betweens, rotations as unit quaternions, and the deltas to the wanted ones.
+    """Fill in Blender's own in-betweens, rotations as unit quaternions, and the deltas to the desired ones.
 
     The sources are alike: all turn by quaternions or by Euler angles of one order, all scale evenly or none does.
     `native` is of `height`, `delta` of `filled_height`. They may be in the same place: then the deltas are there.
@@ -271,7 +274,7 @@ def _move(
 
 
 Weights = tuple[np.ndarray, np.ndarray]
-"""What `progress_weights` returns."""
+"""The result of `progress_weights`."""
 
 
 def _segments(sources: Sequence[Source]) -> list[tuple[Source, slice]]:
@@ -363,7 +366,9 @@ def _fill(
 
 
 def _counts(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """How many samples each segment has, shape (segments,); which samples of all are on a key; and of which source."""
+    """Return how many samples each segment has, shape (segments,); which samples of all are on a key;
+    and of which source.
+    """
     keys = np.concatenate([source.key_frames for source in sources])
     owners = np.repeat(np.arange(len(sources)), [len(source.key_frames) for source in sources])
     ends = np.cumsum([len(own) for own in frames])

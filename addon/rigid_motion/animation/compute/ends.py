@@ -46,23 +46,23 @@ class Ends:
     """For smooth modes frames and poses of the keys before and behind as well, shape (S, 4)."""
 
     turning: Turning | None = None
-    """How they turn, None where all of them go the shortest way."""
+    """The turning of the segments, None where all of them go the shortest way."""
 
     whole: Turning | None = None
-    """The same in whole turns alone, for smooth modes."""
+    """The turning in whole turns alone, for smooth modes."""
 
     spins: np.ndarray | None = None
     """For smooth modes what spins add at both ends of the three segments around, shape (3, 2, S, 3)."""
 
     tangents: np.ndarray | None = None
-    """How long the tangents of smooth modes are at both keys, shape (2, S); None where all are 1."""
+    """The lengths of the tangents of smooth modes at both keys, shape (2, S); None where all are 1."""
 
     prepared: dict[str, Callable[..., Poses]] = field(default_factory=dict)
-    """What each mode makes of all segments, once it has been asked for."""
+    """The poses that each mode makes of all segments, once it has been asked for."""
 
     @classmethod
     def of(cls, start: np.ndarray, end: np.ndarray, segments: list[tuple[Source, slice]], smooth: np.ndarray) -> Ends:
-        """From the channels (10, S) at both ends, and which of the segments have a smooth mode."""
+        """Return the ends of the channels (10, S) at both ends, and which of the segments have a smooth mode."""
         sources = [source for source, _ in segments]
         owners = np.repeat(np.arange(len(sources)), [place.stop - place.start for _, place in segments])
         firsts, lasts = ([source.key_frames[part] for source in sources] for part in (slice(-1), slice(1, None)))
@@ -107,7 +107,7 @@ class Ends:
         return tangents_and_lacks(slopes, native, screws, self.times, self.pairs)
 
     def poses(self, some: slice, counts: np.ndarray, progress: np.ndarray, mode: str, off: Poses | None) -> Poses:
-        """What a mode makes of some of the segments, each with so many samples (s,) of this progress (m,).
+        """Return what a mode makes of some of the segments, each with so many samples (s,) of this progress (m,).
 
         They are so far off the path. Positions run along the axes that location does.
         """
@@ -117,7 +117,7 @@ class Ends:
         return poses if axes is None else replace(poses, positions=np.einsum("mji,mj->mi", axes, poses.positions))
 
     def on_paths(self, some: slice, counts: np.ndarray, progress: np.ndarray, mode: str) -> Poses:
-        """The same along the body's own axes at rest, and on the path."""
+        """Return the poses of `poses` along the body's own axes at rest, and on the path."""
         if mode not in self.prepared:
             self.prepared[mode] = self._prepare(mode)
         within, of_each = some, counts
@@ -147,7 +147,7 @@ class Ends:
 
 
 def measured_in(times: np.ndarray, segments: list[tuple[Source, slice]]) -> np.ndarray:
-    """The channels' own values in each of S segments at the moments `MEASURED`, shape (., S, 6)."""
+    """Return the channels' own values in each of S segments at the moments `MEASURED`, shape (., S, 6)."""
     sources = [source for source, _ in segments]
     moments = times[:, :1] + (times[:, 1:] - times[:, :1]) * MEASURED
     frames = [moments[place].ravel() for _, place in segments]

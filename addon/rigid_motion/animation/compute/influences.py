@@ -19,7 +19,7 @@ LEAST = 1e-3
 
 
 def influence_at(source: Source, frames: np.ndarray) -> np.ndarray:
-    """The influence of the strip on frames (m,) of the Action."""
+    """Return the influence of the strip on frames (m,) of the Action."""
     at, values = np.array(source.influence).T
     return np.interp(frames, at, values)
 
@@ -64,12 +64,12 @@ def undo_blending(source: Source, frames: np.ndarray, angles: np.ndarray) -> Non
 
 
 def _mixed(quaternions: np.ndarray, influence: np.ndarray) -> np.ndarray:
-    """What Blender makes of quaternions (m, 4) over no rotation."""
+    """Return what Blender makes of quaternions (m, 4) over no rotation."""
     return (1.0 - influence[:, None]) * REST[ROWS[ROTATION]] + influence[:, None] * quaternions
 
 
 def _near(angles: np.ndarray, others: np.ndarray, order: str) -> np.ndarray:
-    """The same turns as the other angles (m, 3), as near to these as may be."""
+    """Return the same turns as the other angles (m, 3), as near to these as may be."""
     middle = "XYZ".index(order[1])
     flipped = others + np.pi
     flipped[:, middle] = np.pi - others[:, middle]

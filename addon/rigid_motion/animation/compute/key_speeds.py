@@ -19,13 +19,13 @@ from ...motion import Poses, twists
 from ...motion.curves import _shares as twist_shares
 
 STEP = 1.0 / 8.0
-"""What part of a segment slopes are measured over: exact for cubics in time, and finite for vertical handles."""
+"""The part of a segment that slopes are measured over: exact for cubics in time, and finite for vertical handles."""
 
 SLOPES = np.array((18.0, -9.0, 2.0)) / (6.0 * STEP)
 """The slope at 0 of the cubic through 0 and three values that are `STEP` apart."""
 
 MEASURED = np.concatenate((np.arange(1, 4) * STEP, 1.0 - np.arange(3, 0, -1) * STEP))
-"""How far in its time a segment is where it is measured: next to its first key, and next to its second."""
+"""The moments in the time of a segment where it is measured: next to its first key, and next to its second."""
 
 FASTEST = 3.0
 """The largest slope of progress that is corrected: up to here a cubic between two keys does not turn back.
@@ -35,8 +35,8 @@ SHORTEST = 0.1
 """The length of a tangent from which on progress is not corrected any further to make up for it."""
 
 SMALL = 0.01
-"""What part of the squared speeds that it is made of the mean has at least: where the motion turns back on itself there
-is no direction to measure along."""
+"""The least part that the mean has of the squared speeds that it is made of: where the motion turns back on itself
+there is no direction to measure along."""
 
 
 def progress_slopes(progress: np.ndarray) -> np.ndarray:

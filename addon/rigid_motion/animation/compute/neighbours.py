@@ -11,7 +11,7 @@ from ...motion.poses import beyond
 def with_neighbours(
     times: np.ndarray, keys: Poses, holds: np.ndarray, pairs: tuple[np.ndarray, np.ndarray]
 ) -> tuple[np.ndarray, Poses]:
-    """Frames and poses (S, 4) of the keys around each segment, from those (S, 2) at its ends.
+    """Return frames and poses (S, 4) of the keys around each segment, from those (S, 2) at its ends.
 
     `pairs` are the segments that meet, as `meeting` finds them. Where there is none, or a cycle jumps, the motion goes
     on as in the segment; where a segment holds, it rests.
@@ -37,8 +37,8 @@ def with_neighbours(
 def spins_of_neighbours(
     signs: np.ndarray, spins: np.ndarray, around: Poses, holds: np.ndarray, pairs: tuple[np.ndarray, np.ndarray]
 ) -> tuple[Poses, np.ndarray]:
-    """What spins make of `with_neighbours`: the keys (S, 4) in signs that say which way round segments turn, and the
-    angular velocities (3, 2, S, 3) that spins add at both ends of the three segments between them.
+    """Return what spins make of `with_neighbours`: the keys (S, 4) in signs that say which way round segments turn, and
+    the angular velocities (3, 2, S, 3) that spins add at both ends of the three segments between them.
 
     From the signs (S,) and velocities (3, 2, S) of the segments.
     """
@@ -63,6 +63,6 @@ def meeting(owners: np.ndarray, times: np.ndarray, keys: Poses) -> tuple[np.ndar
 
 
 def packed(poses: Poses) -> np.ndarray:
-    """Positions, quaternions and scales in one array (..., 7 or 8)."""
+    """Return positions, quaternions and scales in one array (..., 7 or 8)."""
     scales = () if poses.scales is None else (poses.scales[..., None],)
     return np.concatenate((poses.positions, poses.quaternions, *scales), axis=-1)

@@ -17,7 +17,9 @@ from .sources import Source
 
 
 def progress_weights(start: np.ndarray, end: np.ndarray, order: str | None) -> tuple[np.ndarray, np.ndarray]:
-    """What a segment's progress is made of: weights (10, S) for the channels, and what to take off their sum, (S,)."""
+    """Return what a segment's progress is made of: weights (10, S) for the channels,
+    and what to take off their sum, (S,).
+    """
     chord = end - start
     weights = chord.copy()
     if order is None:
@@ -29,7 +31,9 @@ def progress_weights(start: np.ndarray, end: np.ndarray, order: str | None) -> t
 
 
 def are_idle(weights: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    """Whether segments turn although no channel changes in them, from the weights (., S) of their progress, (S,)."""
+    """Return whether segments turn although no channel changes in them,
+    from the weights (., S) of their progress, (S,).
+    """
     return (turns != 0) & ~weights.any(axis=0)
 
 
@@ -53,7 +57,7 @@ def idle_progress(source: Source, frames: np.ndarray, first: np.ndarray, last: n
 
 
 def _counting(keys: Keys) -> Keys:
-    """The curve with the frames and interpolations of these keys, and their numbers for values."""
+    """Return the curve with the frames and interpolations of these keys, and their numbers for values."""
     numbers = np.arange(len(keys.times), dtype=np.float32)
 
     def numbered(points: np.ndarray | None) -> np.ndarray | None:

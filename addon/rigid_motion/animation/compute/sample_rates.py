@@ -18,20 +18,21 @@ class Need(NamedTuple):
     """How exact a motion is to be between its samples."""
 
     tolerance: float
-    """How far off it may be, in the units of its channels; infinite where that does not matter."""
+    """The largest error allowed, in the units of its channels; infinite where that does not matter."""
 
     reach: float
-    """How far the body reaches from its origin, in the same."""
+    """The distance that the body reaches from its origin, in the same units."""
 
     fewest: int = 1
     most: int = MOST_SAMPLES
-    """How many samples a frame there may be."""
+    """The largest number of samples a frame."""
 
 
 def sampled(
     sources: Sequence[Source], needs: Sequence[Need], ranges: Sequence[tuple[int, int]] | None = None
 ) -> list[Samples]:
-    """The differences of each source, with as few samples a frame as it needs, and the error that is left between them.
+    """Return the differences of each source, with as few samples a frame as it needs, and the error that is left
+    between them.
 
     Parameters
     ----------
@@ -79,7 +80,7 @@ def sampled(
 
 
 def error_of(source: Source, points: Mapping[int, np.ndarray], rate: int, reach: float) -> float:
-    """How far a body is off between samples, as `differences` returns them for all of a source's range."""
+    """Return how far a body is off between samples, as `differences` returns them for all of a source's range."""
     first, last = source.sample_range(rate)
     delta = np.repeat(source.difference_at_keys[:, None], last - first + 1, axis=1)
     if source.order is not None:
@@ -100,7 +101,7 @@ def _differences(
 
 
 def _is_open(samples: Samples, need: Need) -> bool:
-    """Whether more samples may do better, or tell how far off it is."""
+    """Return whether more samples may do better, or tell how far off it is."""
     if math.isinf(samples.error):
         return math.isfinite(need.tolerance)
     return samples.error > need.tolerance and samples.rate < need.most

@@ -10,11 +10,13 @@ from .components import PART_OF, REST, ROTATION
 from .sources import Source
 
 NOTHING = 1e-9
-"""What a component varies by that is always the same but for rounding errors."""
+"""A component that varies by less is always the same but for rounding errors."""
 
 
 def kept_rows(sources: Sequence[Source], first: np.ndarray, ranges: np.ndarray) -> list[list[int]]:
-    """The rows that each source has samples of, in which these are at first and vary by this much, (., sources)."""
+    """Return the rows that each source has samples of, in which these are at first and vary by this much,
+    (., sources).
+    """
     kept = []
     for source, constant, varies in zip(sources, first.T, (ranges > NOTHING).T.tolist(), strict=True):
         changing = {row for row in source.filled_rows if varies[row]}
@@ -23,7 +25,7 @@ def kept_rows(sources: Sequence[Source], first: np.ndarray, ranges: np.ndarray) 
 
 
 def _held_rows(source: Source, changing: set[int], constant: np.ndarray) -> set[int]:
-    """The rows that never change, and have to be held all the same, of what is constant (.,) in them.
+    """Return the rows that never change, and have to be held all the same, of what is constant (.,) in them.
 
     The components of a quaternion are one by one only where they are zero. In the NLA Blender puts what a strip has no
     channel of to its default.
@@ -42,5 +44,5 @@ def _held_rows(source: Source, changing: set[int], constant: np.ndarray) -> set[
 
 
 def range_of_each(rows: np.ndarray, starts: Sequence[int]) -> np.ndarray:
-    """By how much rows (r, m) vary within each of the parts that start there, shape (r, parts)."""
+    """Return by how much rows (r, m) vary within each of the parts that start there, shape (r, parts)."""
     return np.maximum.reduceat(rows, starts, axis=1) - np.minimum.reduceat(rows, starts, axis=1)

@@ -40,7 +40,7 @@ def cache_source(source: Source) -> None:
 
 
 def cached_source(digest: str) -> Source | None:
-    """The source with this digest, None where it is not known any more."""
+    """Return the source with this digest, None where it is not known any more."""
     return known.get(digest)
 
 
@@ -51,12 +51,12 @@ def clear() -> None:
 
 
 def size_of(source: Source) -> int:
-    """About how many bytes a source has."""
+    """Return about how many bytes a source has."""
     return sum(array.nbytes for keys in source.curves for array in _arrays(keys).values())
 
 
 def changed_range(old: Source, new: Source) -> tuple[int, int] | None:
-    """The whole frames on which in-betweens may have changed from one source to the next, of the same transform.
+    """Return the whole frames on which in-betweens may have changed from one source to the next, of the same transform.
 
     None where it may be all of them.
     """
@@ -95,7 +95,7 @@ def changed_range(old: Source, new: Source) -> tuple[int, int] | None:
 
 
 def _changed(old: Keys, new: Keys) -> tuple[float, float] | None:
-    """From which frame on and up to which channels may have changed.
+    """Return from which frame on and up to which channels may have changed.
 
     These are the nearest keys before and behind that are the same; (inf, -inf) where all are, None where there is no
     telling.
@@ -122,7 +122,7 @@ def _changed(old: Keys, new: Keys) -> tuple[float, float] | None:
 
 
 def _differ(before: dict[str, np.ndarray], after: dict[str, np.ndarray]) -> np.ndarray:
-    """Which of the keys differ in anything, shape (n,), where there are equally many."""
+    """Return which of the keys differ in anything, shape (n,), where there are equally many."""
     differ = np.zeros(before["interpolation"].shape[1], dtype=bool)
     for name, array in before.items():
         # Most are the same throughout, which is told ten times as quickly.
@@ -132,7 +132,7 @@ def _differ(before: dict[str, np.ndarray], after: dict[str, np.ndarray]) -> np.n
 
 
 def _part(name: str, array: np.ndarray, part: slice) -> np.ndarray:
-    """An array with these of the keys."""
+    """Return an array with these of the keys."""
     return array[:, :, part] if name == "easing_settings" else array[:, part]
 
 
@@ -145,7 +145,7 @@ _OTHER_AXES = {
 
 
 def _arrays(keys: Keys) -> dict[str, np.ndarray]:
-    """The arrays that keys are made of."""
+    """Return the arrays that keys are made of."""
     arrays = {name: getattr(keys, name) for name in _OTHER_AXES}
     return {name: array for name, array in arrays.items() if array is not None}
 

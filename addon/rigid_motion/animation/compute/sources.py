@@ -34,7 +34,7 @@ UNKNOWN = -1
 """The mode of something from a file that is damaged, or of a later version."""
 
 LAYOUT = b"3"
-"""How in-betweens are laid out in F-curves. With another number, those of older files are made anew."""
+"""The layout of in-betweens in F-curves. With another number, those of older files are made anew."""
 
 FULL_TURN = 2.0 * np.pi
 
@@ -42,25 +42,27 @@ HALF_TURN = np.pi - 1e-4
 """Half a turn between two keys by angles, of which single precision has lost a little."""
 
 WHOLE_TURN = 1e-5
-"""What turns of the channel differ by from whole ones for rounding."""
+"""Turns of the channel that differ by less from whole ones do so for rounding."""
 
 SCREW_AXIS = "SCREW"
 """Turns are about the axis that a segment turns about anyway, and the local Z axis where it does not turn."""
 
 TURN_AXES = (SCREW_AXIS, "X", "Y", "Z")
-"""What turns are about: the axis of the segment's screw, or always the same local axis."""
+"""The axes that turns are about: that of the segment's screw, or always the same local axis."""
 
 SAME_FRAME = 0.01
 """Keys closer than this are one key to Blender, and here."""
 
 
 def distinct(frames: np.ndarray) -> np.ndarray:
-    """Rising frames of keys, those that are one key to Blender once."""
+    """Return rising frames of keys, those that are one key to Blender once."""
     return frames[np.diff(frames, prepend=-np.inf) > SAME_FRAME]
 
 
 def rows_left_to(driven: Collection[int]) -> set[int]:
-    """The rows of components that are left to drivers of these: with one of a rotation or a scale go all of it."""
+    """Return the rows of components that are left to drivers of these:
+    with one of a rotation or a scale go all of it.
+    """
     parts = {PART_OF[row] for row in driven} - {LOCATION}
     return {row for row, part in enumerate(PART_OF) if row in driven or part in parts}
 
@@ -73,7 +75,7 @@ class Source:
     """The order of Euler angles, or None for quaternions."""
 
     keyed: frozenset[str]
-    """Which of location, rotation and scale are keyed, in one of their components at least."""
+    """The parts of location, rotation and scale that are keyed, in one of their components at least."""
 
     channels: tuple[tuple[list[int], Keys], ...]
     """The channels with keys, those together that are keyed together: their rows among the components, and keys."""
@@ -97,7 +99,7 @@ class Source:
     """The axes that location runs along, as columns (3, 3) in those of the body at rest; None where they are one."""
 
     in_nla: bool = False
-    """Whether there are NLA strips beside it, which Blender blends with the defaults of what it does not key."""
+    """True if there are NLA strips beside it, which Blender blends with the defaults of what it does not key."""
 
     seen: tuple[int, int] | None = None
     """First and last frame that are seen of it, in scenes and strips."""
@@ -112,7 +114,7 @@ class Source:
     """Frames, and the influence that a strip with nothing below it has on them; None where that is full."""
 
     is_on_top: bool = False
-    """Whether differences come on top of the original one, and not in its place."""
+    """True if differences come on top of the original one, and not in its place."""
 
     shaping: np.ndarray | None = None
     """The frames of the keys that segments run between, where others are `passed`; None where all are."""
@@ -147,7 +149,7 @@ class Source:
 
     @property
     def difference_at_keys(self) -> np.ndarray:
-        """What is written on keys, as components, shape (10,)."""
+        """Components that are written on keys, shape (10,)."""
         return REST if self.is_on_top else self.original
 
     @cached_property
@@ -157,12 +159,12 @@ class Source:
 
     @cached_property
     def key_count(self) -> int:
-        """How many keys its channels have."""
+        """The number of keys that its channels have."""
         return sum(keys.interpolation.size for keys in self.curves)
 
     @cached_property
     def is_together(self) -> bool:
-        """Whether all channels have their keys on the same frames, and go through them once."""
+        """Return whether all channels have their keys on the same frames, and go through them once."""
         return len(self.channels) == 1 and self.cyclic is None and self.shaping is None
 
     @cached_property
@@ -172,28 +174,28 @@ class Source:
 
     @property
     def unheld(self) -> Source:
-        """The same without Stepped modifiers."""
+        """Source without Stepped modifiers, but otherwise the same."""
         if not self.steps:
             return self
         return replace(self, channels=tuple((rows, replace(keys, steps=())) for rows, keys in self.channels))
 
     def held(self, frames: np.ndarray) -> np.ndarray:
-        """The frames (m,) whose poses are shown on these ones (m,)."""
+        """Return the frames (m,) whose poses are shown on these ones (m,)."""
         return held(self.steps, frames)
 
     @property
     def has_modified_scale(self) -> bool:
-        """Whether modifiers add something to the scale, which the modes leave to Blender then."""
+        """Return whether modifiers add something to the scale, which the modes leave to Blender then."""
         return any(PART_OF[row] == SCALE for row in self.modified)
 
     @cached_property
     def keyed_frames(self) -> np.ndarray:
-        """Where any of the channels has a key of the animator's, shape (k,)."""
+        """Frames on which any of the channels has a key of the animator's, shape (k,)."""
         return np.unique(np.concatenate([keys.times for keys in self.curves]))
 
     @cached_property
     def key_frames(self) -> np.ndarray:
-        """The same without keys that are one to Blender, and with the copies that cycles make, (n,).
+        """Frames of `keyed_frames` without keys that are one to Blender, and with the copies that cycles make, (n,).
 
         Copies are there as far as it is seen, and a round on both sides at least. On a `path` only those that shape it.
         """
@@ -222,12 +224,12 @@ class Source:
 
     @cached_property
     def goes_on(self) -> bool:
-        """Whether any channel goes on outside of its keys, by cycles or at its slope."""
+        """Return whether any channel goes on outside of its keys, by cycles or at its slope."""
         return any(keys.linear or keys.cycles is not None for keys in self.curves)
 
     @cached_property
     def repeats(self) -> bool:
-        """Whether the difference to Blender's in-betweens in every round of its cycles is that in the first.
+        """Return whether the difference to Blender's in-betweens in every round of its cycles is that in the first.
 
         So it is where all channels go round together, over whole frames, and in a round turn and grow by nothing, or
         turn about one and the same axis; and where no mode looks at keys that only some of the rounds have.
@@ -257,7 +259,7 @@ class Source:
 
     @cached_property
     def is_smooth(self) -> bool:
-        """Whether a mode in it looks at the keys around a segment."""
+        """Return whether a mode in it looks at the keys around a segment."""
         numbers = np.unique(np.rint(self.mode.values)) if isinstance(self.mode, Keys) else (self.mode,)
         names = [MODE_NAMES.get(int(number), "BLENDER") for number in numbers]
         return any(name != "BLENDER" and KEYFRAME_MODES[name].is_smooth for name in names)
@@ -270,7 +272,7 @@ class Source:
         return self.modes_at(starts if self.cyclic is None else cycled(self.cyclic, starts)[0])
 
     def modes_at(self, frames: np.ndarray) -> np.ndarray:
-        """The numbers of the modes at these frames: each key of the mode channel holds until the next."""
+        """Return the numbers of the modes at these frames: each key of the mode channel holds until the next."""
         if not isinstance(self.mode, Keys):
             return np.full(len(frames), self.mode)
         modes = self.mode.values[0, np.clip(np.searchsorted(self.mode.times, frames, side="right") - 1, 0, None)]
@@ -300,13 +302,13 @@ class Source:
 
     @cached_property
     def run_backwards(self) -> np.ndarray:
-        """Whether cycles run through a segment backwards, shape (n - 1,)."""
+        """Return whether cycles run through a segment backwards, shape (n - 1,)."""
         starts = self.key_frames[:-1] + SAME_FRAME
         return np.zeros(len(starts), dtype=bool) if self.cyclic is None else cycled(self.cyclic, starts)[1]
 
     @cached_property
     def has_half_turns(self) -> bool:
-        """Whether an Euler angle goes by half a turn or more from one of its keys to the next."""
+        """Return whether an Euler angle goes by half a turn or more from one of its keys to the next."""
         if self.order is None:
             return False
         angles = (
@@ -318,7 +320,7 @@ class Source:
 
     @cached_property
     def passed(self) -> np.ndarray:
-        """Which keys lie on the path between the keys around them instead of shaping it, shape (n,).
+        """Return which keys lie on the path between the keys around them instead of shaping it, shape (n,).
 
         Breakdowns in all channels, that is, between others with the same mode, where a path depends on its keys and
         goes the shortest way round.
@@ -334,7 +336,7 @@ class Source:
 
     @cached_property
     def path(self) -> Source:
-        """The same without the keys that are `passed`."""
+        """Source without the keys that are `passed`, but otherwise the same."""
         if not self.passed.any():
             return self
         # Channels keep these keys: one without a key on the others would be elsewhere there.
@@ -342,7 +344,7 @@ class Source:
 
     @cached_property
     def is_live(self) -> bool:
-        """Whether there is a segment that is to be filled in otherwise than Blender does."""
+        """Return whether there is a segment that is to be filled in otherwise than Blender does."""
         if not self.curves or len(self.key_frames) < 2:
             return False
         return bool(np.any(self.modes)) if isinstance(self.mode, Keys) else self.mode != 0
@@ -353,7 +355,9 @@ class Source:
         return self.sample_range(1)
 
     def sample_range(self, rate: int) -> tuple[int, int]:
-        """The numbers of the first and last sample that in-betweens are for, of so many a frame, from frame 0 on."""
+        """Return the numbers of the first and last sample that in-betweens are for, of so many a frame,
+        from frame 0 on.
+        """
         first, last = self._live_range
         return math.floor(first * rate), math.ceil(last * rate)
 
@@ -383,7 +387,8 @@ class Source:
     @cached_property
     def seen_range(self) -> tuple[int, int]:
         """The first and last whole frame that there is something to be seen on: where it goes on outside of its keys,
-        as far as it is looked at."""
+        as far as it is looked at.
+        """
         first, last = self.keyed_range
         if self.seen is not None and self.goes_on:
             # What is held there may be from before, or before an offset from behind.
@@ -400,25 +405,27 @@ class Source:
 
     @cached_property
     def uniform_scale(self) -> bool:
-        """Whether the scale is animated, and at every key the same along all axes and positive. Else Blender scales."""
+        """Return whether the scale is animated, and at every key the same along all axes and positive.
+        Else Blender scales.
+        """
         if SCALE not in self.keyed or self.has_modified_scale:
             return False
         x, y, z = self.values_at(self._all_key_frames)[ROWS[SCALE]]
         return bool(np.allclose(x, y) and np.allclose(x, z) and np.all(x > 0.0) and np.ptp(x) > 0.0)
 
     def values_at(self, frames: np.ndarray) -> np.ndarray:
-        """What the channels alone have on these frames, shape (10, m)."""
+        """Return what the channels alone have on these frames, shape (10, m)."""
         (rows,) = values_of([self], [frames])
         return rows
 
     @cached_property
     def holds(self) -> np.ndarray:
-        """Whether all channels hold their value throughout a segment, shape (n - 1,)."""
+        """Return whether all channels hold their value throughout a segment, shape (n - 1,)."""
         return np.all(self._interpolations == CONSTANT, axis=0)
 
     @cached_property
     def has_handles(self) -> np.ndarray:
-        """Whether handles shape a segment, and no easing does nor a hold, shape (n - 1,)."""
+        """Return whether handles shape a segment, and no easing does nor a hold, shape (n - 1,)."""
         codes = self._interpolations
         return np.all((codes == LINEAR) | (codes == BEZIER), axis=0) & np.any(codes == BEZIER, axis=0)
 
@@ -433,7 +440,7 @@ class Source:
 
     @cached_property
     def is_elastic(self) -> bool:
-        """Whether any key eases elastically, which depends on how far a channel goes."""
+        """Return whether any key eases elastically, which depends on how far a channel goes."""
         return any(keys.easing is not None and np.any(keys.interpolation == ELASTIC) for keys in self.curves)
 
     @cached_property
@@ -451,7 +458,7 @@ class Source:
 
 
 def values_of(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """What the channels of each source alone have on frames of its own, shape (10, m)."""
+    """Return what the channels of each source alone have on frames of its own, shape (10, m)."""
     curves = [keys for source in sources for keys in source.curves]
     times = [own for source, own in zip(sources, frames, strict=True) for _ in source.channels]
     evaluated, result = iter(evaluate(curves, times)), []

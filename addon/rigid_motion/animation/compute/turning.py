@@ -37,17 +37,17 @@ class Turning:
     spins: Spins
 
     by_angles: Spins
-    """Those of them that the angles of the channels make by themselves."""
+    """Spins that the angles of the channels make by themselves."""
 
     first: np.ndarray
     """The quaternions of the first keys, shape (S, 4)."""
 
     second: np.ndarray
-    """Where segments turn to without spins, in the sign that says which way round: the second keys, but for what is not
-    whole of the spins, shape (S, 4)."""
+    """The rotations that segments turn to without spins, in the sign that says which way round: the second keys, but
+    for what is not whole of the spins, shape (S, 4)."""
 
     turn: np.ndarray
-    """That rotation as a vector along the axes of the body, shape (3, S)."""
+    """The rotation there as a vector along the axes of the body, shape (3, S)."""
 
     @cached_property
     def twists(self) -> np.ndarray:
@@ -61,7 +61,7 @@ class Turning:
 
     @property
     def about(self) -> np.ndarray:
-        """How far each segment turns about the axis of its spins, in radians, shape (S,)."""
+        """Angles that segments turn about the axes of their spins, in radians, shape (S,)."""
         return np.einsum("ks,ks->s", self.turn + self.twists[:, 0], self.axes_in_body)
 
     @property
@@ -71,7 +71,7 @@ class Turning:
 
 
 def needs_turning(source: Source) -> bool:
-    """Whether any segment may turn otherwise than by the shortest way."""
+    """Return whether any segment may turn otherwise than by the shortest way."""
     return source.has_half_turns or source.turns is not None
 
 
@@ -159,13 +159,15 @@ def turning_in(source: Source, segment: int, turns: float | None = None) -> Turn
 
 
 def shortest_turns(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """The shortest turns (3, S) from quaternions (S, 4) to others."""
+    """Return the shortest turns (3, S) from quaternions (S, 4) to others."""
     nowhere = np.zeros((len(first), 3))
     return twists.between(nowhere, first, nowhere, second)[:3]
 
 
 def _shortest(first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The second quaternions (S, 4) in the sign of the shorter way from the first, and the turns (3, S) there."""
+    """Return the second quaternions (S, 4) in the sign of the shorter way from the first,
+    and the turns (3, S) there.
+    """
     signs = np.where(np.einsum("si,si->s", first, second) < 0.0, -1.0, 1.0)
     return second * signs[:, None], shortest_turns(first, second)
 
@@ -221,8 +223,9 @@ def _add_angles(
 
 
 def _axis(angles: np.ndarray, axis: np.ndarray, order: str, *, before: bool) -> np.ndarray:
-    """One of the axes of Euler angles (3, S) for each, (S, 3): as it is in the body, `before` the other turns, or in
-    the space around it."""
+    """Return one of the axes of Euler angles (3, S) for each, (S, 3): as it is in the body, `before` the other turns,
+    or in the space around it.
+    """
     result = np.eye(3)[axis]
     place = np.array([order.index(name) for name in "XYZ"])
     others = place[:, None] < place[axis] if before else place[:, None] > place[axis]
@@ -231,7 +234,7 @@ def _axis(angles: np.ndarray, axis: np.ndarray, order: str, *, before: bool) -> 
 
 
 def _mean(ends: np.ndarray) -> np.ndarray:
-    """The unit vector (S, 3) half-way between two (2, S, 3), the first one where they are opposite."""
+    """Return the unit vector (S, 3) half-way between two (2, S, 3), the first one where they are opposite."""
     total = ends.sum(axis=0)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     return np.where(length > NO_TURN, total / np.maximum(length, NO_TURN), ends[0])

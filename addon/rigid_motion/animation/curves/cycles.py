@@ -7,7 +7,7 @@ import numpy as np
 from .keys import Keys
 
 MAX_COPIES = 2**22
-"""Of key times that `cyclic_times` returns."""
+"""The largest number of key times that `cyclic_times` returns."""
 
 
 class TooManyRounds(ValueError):
@@ -19,7 +19,7 @@ class TooManyRounds(ValueError):
 
 
 def cycled(keys: Keys, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Times folded back into the range of the keys by the curve's cycles.
+    """Return times folded back into the range of the keys by the curve's cycles.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def cycled(keys: Keys, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def cyclic_times(keys: Keys, times: np.ndarray, first: float, last: float) -> np.ndarray:
-    """Key times and their copies in the curve's cycles.
+    """Return key times and their copies in the curve's cycles.
 
     Parameters
     ----------
@@ -86,7 +86,8 @@ def cyclic_times(keys: Keys, times: np.ndarray, first: float, last: float) -> np
 
 
 def fold(keys: Keys, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times folded, whether they run backwards, and how many times the change from first to last key is to be added.
+    """Return times folded, whether they run backwards, and how many times the change from first to
+    last key is to be added.
 
     All in single precision and in Blender's order of steps: it decides on which side of a key a frame falls.
     """

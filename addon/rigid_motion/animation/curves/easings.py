@@ -13,7 +13,7 @@ import numpy as np
 
 
 def ease(interpolation: str, easing: str, u: np.ndarray, back: np.ndarray | float = 0.0) -> np.ndarray:
-    """How much of the change of a segment is done at `u`.
+    """Return how much of the change of a segment is done at `u`.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def elastic(
     amplitude: np.ndarray | float,
     period: np.ndarray | float,
 ) -> np.ndarray:
-    """How far ELASTIC has moved a value at `u`.
+    """Return how far ELASTIC has moved a value at `u`.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def elastic(
 def _directed(
     ease_in: Callable[[np.ndarray], np.ndarray], easing: str, u: np.ndarray, change: np.ndarray | float
 ) -> np.ndarray:
-    """What eases in from 0 to `change`, made to ease in, out, or in and out."""
+    """Return what eases in from 0 to `change`, made to ease in, out, or in and out."""
     if easing == "EASE_IN":
         return ease_in(u)
     if easing == "EASE_OUT":
@@ -103,7 +103,7 @@ def _back(u: np.ndarray, back: np.ndarray | float) -> np.ndarray:
 
 
 def _bounce(u: np.ndarray, _: object) -> np.ndarray:
-    """Four parabolas, each with its vertex where the ball is highest; the first is half a one."""
+    """Return four parabolas, each with its vertex where the ball is highest; the first is half a one."""
     left = 1.0 - u
     arc = np.searchsorted((1.0 / 2.75, 2.0 / 2.75, 2.5 / 2.75), left, side="right")
     top = np.array((0.0, 1.5 / 2.75, 2.25 / 2.75, 2.625 / 2.75))[arc]

@@ -22,7 +22,7 @@ def evaluate(
     unit_elastic: bool = False,
     out: Sequence[np.ndarray] | None = None,
 ) -> Sequence[np.ndarray]:
-    """The values of curves at their times.
+    """Return the values of curves at their times.
 
     Parameters
     ----------

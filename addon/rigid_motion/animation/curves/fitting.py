@@ -7,16 +7,16 @@ import numpy as np
 from .solvers import solve_cubics
 
 STARTS = ((1.0 / 3.0, 2.0 / 3.0), (0.1, 0.6), (0.4, 0.9), (0.1, 0.9), (0.7, 0.3))
-"""Where handles are tried at first, in time; at the first of them the segment is a cubic in time."""
+"""The places where handles are tried at first, in time; at the first of them the segment is a cubic in time."""
 
 STEPS = 40
-"""Of the Levenberg-Marquardt method, from each of the starts."""
+"""Steps of the Levenberg-Marquardt method, from each of the starts."""
 
 GOOD = 1e-6
 """The largest error with which nothing better is looked for: a few times the rounding of single precision."""
 
 LEAST_PULL = 1e-6
-"""What a handle counts for at least, relative to the largest, to be moved for the others."""
+"""The least that a handle counts for, relative to the largest, to be moved for the others."""
 
 RIDGE = 1e-9
 """Keeps steps finite where handles may be anywhere, as on a straight line."""

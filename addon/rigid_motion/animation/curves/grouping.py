@@ -32,16 +32,16 @@ class Group:
     """Spans of the first of the curves, shape (s,)."""
 
     counts: np.ndarray
-    """How many of the frames, one after the other, fall into each, shape (s,)."""
+    """The number of frames, one after the other, that fall into each, shape (s,)."""
 
     order: np.ndarray | None
-    """Where the frames belong in the result, shape (m,). None: where they are."""
+    """The places of the frames in the result, shape (m,). None: those that they have."""
 
     offsets: np.ndarray | None
-    """What cycles add to each curve, in the order of the result, shape (c, m). None: nothing."""
+    """Values that cycles add to each curve, in the order of the result, shape (c, m). None: nothing."""
 
     def chunks(self, size: int) -> Iterator[tuple[slice, Group]]:
-        """The same with about `size` of the curves at a time, and which these are."""
+        """Yield this group with about `size` of the curves at a time, and which these are."""
         begin = first = end = 0
         for place, (_, channels) in enumerate(self.members, start=1):
             end += channels.stop - channels.start
@@ -67,7 +67,7 @@ class Group:
 
 
 def group_by_timing(curves: Sequence[Keys], times: Sequence[np.ndarray], spans: Spans) -> Iterator[Group]:
-    """Curves that share their timing and are asked for the same frames, wherever in the list they are."""
+    """Yield curves that share their timing and are asked for the same frames, wherever in the list they are."""
     requests, distinct = _requests(times)
     groups: dict[tuple, list[tuple[int, slice]]] = {}
     for number, (request, timings) in enumerate(zip(requests, spans.timings(curves), strict=True)):
@@ -94,7 +94,7 @@ def group_by_timing(curves: Sequence[Keys], times: Sequence[np.ndarray], spans: 
 
 
 def _requests(times: Sequence[np.ndarray]) -> tuple[list[int], list[np.ndarray]]:
-    """Which of the distinct arrays of frames each curve is asked for, and those, in Blender's precision."""
+    """Return which of the distinct arrays of frames each curve is asked for, and those, in Blender's precision."""
     requests: list[int] = []
     distinct: list[np.ndarray] = []
     of_array: dict[int, int] = {}
@@ -110,7 +110,7 @@ def _requests(times: Sequence[np.ndarray]) -> tuple[list[int], list[np.ndarray]]
 
 
 def blocks(groups: Iterable[Group]) -> Iterator[list[Group]]:
-    """Groups of equally many curves, in lists of about `BLOCK` frames."""
+    """Yield groups of equally many curves, in lists of about `BLOCK` frames."""
     block: list[Group] = []
     size = 0
     for group in sorted(groups, key=lambda group: len(group.curves)):

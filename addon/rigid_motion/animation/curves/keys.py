@@ -84,7 +84,7 @@ class Keys:
     """BACK's overshoot, ELASTIC's amplitude and ELASTIC's period in frames, shape (3, c, n)."""
 
     linear: bool = False
-    """Whether the curves go on at their slope outside of the keys, instead of holding their value."""
+    """True if the curves go on at their slope outside of the keys, instead of holding their value."""
 
     cycles: Cycles | None = None
 
@@ -92,10 +92,10 @@ class Keys:
     """Stepped modifiers, first to last. The values of curves are worked out without: see `held`."""
 
     breakdowns: np.ndarray | None = None
-    """Which of the keys are of type *Breakdown*, shape (n,), where any is."""
+    """True for the keys of type *Breakdown*, shape (n,), where any is."""
 
     is_sound: bool = True
-    """Whether all numbers that were read are smaller than `LARGEST`, and the keys in the order of their frames."""
+    """True if all numbers that were read are smaller than `LARGEST`, and the keys in the order of their frames."""
 
     @cached_property
     def times(self) -> np.ndarray:
@@ -108,11 +108,11 @@ class Keys:
         return self.points[..., 1]
 
     def only(self, channels: Sequence[int]) -> Keys:
-        """The keys of these channels alone."""
+        """Return the keys of these channels alone."""
         return self._part((channels,))
 
     def at(self, chosen: np.ndarray) -> Keys:
-        """The chosen ones of the keys, by a mask of shape (n,)."""
+        """Return the chosen ones of the keys, by a mask of shape (n,)."""
         part = self._part((slice(None), chosen))
         return part if self.breakdowns is None else replace(part, breakdowns=self.breakdowns[chosen])
 

@@ -8,14 +8,14 @@ NEWTON_TOLERANCE = 1e-5
 """Last step of Newton's method: the error left is about its square."""
 
 NEWTON_STEPS = 4
-"""How many steps Newton's method takes before bisection helps it."""
+"""The number of steps that Newton's method takes before bisection helps it."""
 
 BRACKETED_STEPS = 100
 """More than bisection alone takes to the last bit."""
 
 
 def bezier_cubics(start: np.ndarray, right: np.ndarray, left: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Bezier curves as cubics, after the correction that keeps frames from running backwards.
+    """Return bezier curves as cubics, after the correction that keeps frames from running backwards.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def bezier_cubics(start: np.ndarray, right: np.ndarray, left: np.ndarray, end: n
 
 
 def _shortened(key: np.ndarray, handle: np.ndarray, duration: np.ndarray) -> np.ndarray:
-    """The handle, no longer in time than the segment."""
+    """Return the handle, no longer in time than the segment."""
     arm = key - handle
     length = np.abs(arm[:, :1])
     long = length > duration
@@ -49,7 +49,7 @@ def _shortened(key: np.ndarray, handle: np.ndarray, duration: np.ndarray) -> np.
 
 @np.errstate(divide="ignore", invalid="ignore", over="ignore")
 def solve_cubics(u: np.ndarray, cubics: np.ndarray) -> np.ndarray:
-    """The t from 0 to 1 at which the cubic c1 t + c2 t^2 + c3 t^3 is u.
+    """Return the t from 0 to 1 at which the cubic c1 t + c2 t^2 + c3 t^3 is u.
 
     There is one for every u from 0 to 1: the cubic goes from 0 to 1, and handles no longer than the segment let it turn
     at most before it leaves 0 for good and after it has reached 1.
@@ -84,7 +84,9 @@ def solve_cubics(u: np.ndarray, cubics: np.ndarray) -> np.ndarray:
 
 
 def _solve_bracketed(u: np.ndarray, cubics: np.ndarray) -> np.ndarray:
-    """As `solve_cubics`, for the few near a vanishing slope: Newton's steps, or bisection where they lead out."""
+    """Solve cubics as `solve_cubics` does, for the few near a vanishing slope: Newton's steps, or bisection where they
+    lead out.
+    """
     c1, c2, c3 = cubics
     low, high = np.zeros_like(u), np.ones_like(u)
     t = np.clip(u, 0.0, 1.0)

@@ -26,7 +26,7 @@ class Spans:
     """The spans of C curves, one curve after the other: N in all."""
 
     first_curve: list[int]
-    """How many curves there are before those of each `Keys`."""
+    """The number of curves before those of each `Keys`."""
 
     first_span: np.ndarray
     """The first span of each curve, and the end, shape (C + 1,)."""
@@ -65,15 +65,15 @@ class Spans:
     """Curves that have keys so close together that a frame may be near to two, or out of order."""
 
     linear: bool
-    """Whether any curve goes on at its slope outside of its keys."""
+    """True if any curve goes on at its slope outside of its keys."""
 
     unit_elastic: bool
-    """Whether ELASTIC is worked out for a change of 1, see `evaluate`."""
+    """True if ELASTIC is worked out for a change of 1, see `evaluate`."""
 
     @classmethod
     @np.errstate(all="ignore")
     def of(cls, curves: Sequence[Keys], unit_elastic: bool) -> Spans:
-        """The spans of all curves of these keys, in their order."""
+        """Return the spans of all curves of these keys, in their order."""
         curves = [keys if len(keys.times) else _without_keys(len(keys.points)) for keys in curves]
         channels = [len(keys.points) for keys in curves]
         first_span = np.concatenate(((0,), np.cumsum(np.repeat([len(keys.times) + 1 for keys in curves], channels))))
@@ -142,7 +142,9 @@ class Spans:
         )
 
     def timings(self, curves: Sequence[Keys]) -> Iterator[list[tuple[slice, tuple]]]:
-        """For each of the keys which channels have their timing in common, and all that this timing depends on."""
+        """Yield for each of the keys which channels have their timing in common,
+        and all that this timing depends on.
+        """
         for first, keys in zip(self.first_curve, curves, strict=True):
             channels = len(keys.points)
             begin, end = (TIMING_SIZE * self.first_span[curve] for curve in (first, first + channels))
@@ -162,7 +164,7 @@ class Spans:
             yield result
 
     def at(self, curve: int, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The spans of one curve that rising frames fall into one after the other, and how many into each."""
+        """Return the spans of one curve that rising frames fall into one after the other, and how many into each."""
         begin, end = self.first_span[curve : curve + 2]
         if curve in self.crowded:
             result = _search(self.start[begin + 1 : end], frames)
@@ -174,7 +176,9 @@ class Spans:
         return np.arange(begin, end), bounds[1:] - bounds[:-1]
 
     def parameters(self, spans: np.ndarray, counts: np.ndarray, frames: np.ndarray) -> np.ndarray:
-        """The parameters of the cubics on frames (m,), of which each of `spans` (s,) has the next `counts` (s,)."""
+        """Return the parameters of the cubics on frames (m,),
+        of which each of `spans` (s,) has the next `counts` (s,).
+        """
 
         def spread(of_spans: np.ndarray) -> np.ndarray:
             return of_spans[..., spans].repeat(counts, axis=-1)
@@ -208,12 +212,14 @@ class Spans:
 
 
 def _without_keys(channels: int) -> Keys:
-    """Stands for curves without keys, which are 0 everywhere in Blender."""
+    """Return keys that stand for curves without any, which are 0 everywhere in Blender."""
     return Keys(np.zeros((channels, 1, 2), np.float32), np.full((channels, 1), CONSTANT, CODE))
 
 
 def _concatenated(curves: Sequence[Keys]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Points, left and right handles (n, 2) and codes (n,) of the keys of all curves; points where handles are None."""
+    """Return points, left and right handles (n, 2) and codes (n,) of the keys of all curves;
+    points where handles are None.
+    """
     points = [keys.points.reshape(-1, 2) for keys in curves]
     left, right = (
         [on_key if handles is None else handles.reshape(-1, 2) for on_key, handles in zip(points, side, strict=True)]
@@ -224,7 +230,9 @@ def _concatenated(curves: Sequence[Keys]) -> tuple[np.ndarray, np.ndarray, np.nd
 
 
 def _easings(curves: Sequence[Keys]) -> tuple[np.ndarray, np.ndarray]:
-    """Easings and their settings for the keys of all curves, shapes (n,) and (3, n); zeros where none were read."""
+    """Return easings and their settings for the keys of all curves, shapes (n,) and (3, n);
+    zeros where none were read.
+    """
     counts = [keys.interpolation.size for keys in curves]
     easing, settings = np.zeros(sum(counts), dtype=CODE), np.zeros((3, sum(counts)))
     for keys, end, count in zip(curves, itertools.accumulate(counts), counts, strict=True):
@@ -235,13 +243,13 @@ def _easings(curves: Sequence[Keys]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _slopes(ends: np.ndarray, neighbours: np.ndarray, handles: np.ndarray, codes: np.ndarray) -> np.ndarray:
-    """Slopes beyond keys at the end of a curve, from points of shape (k, 2)."""
+    """Return slopes beyond keys at the end of a curve, from points of shape (k, 2)."""
     run, rise = (np.where(codes[:, None] == LINEAR, neighbours, handles) - ends).astype(np.float64).T
     return np.where((run == 0.0) | (codes == CONSTANT), 0.0, rise / run)
 
 
 def _search(keys: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """The spans, counted from 0 for the time before the first key, that frames fall into by Blender's bisection.
+    """Return the spans, counted from 0 for the time before the first key, that frames fall into by Blender's bisection.
 
     Where several keys are near to a frame it decides for the one that it comes across first.
     """

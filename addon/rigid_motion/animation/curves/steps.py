@@ -22,7 +22,7 @@ class Stepped:
 
 
 def held(steps: Sequence[Stepped], times: np.ndarray) -> np.ndarray:
-    """The frames whose values a curve with these modifiers, first to last, has at these times (m,).
+    """Return the frames whose values a curve with these modifiers, first to last, has at these times (m,).
 
     In single precision and in Blender's order of steps: it decides on which side of a key a frame falls. Blender rounds
     towards the offset, so before that a hold shows the frame that it ends on.

@@ -19,7 +19,7 @@ from ..live import follower
 from ..transforms import Refused, Transform, transform_of
 
 Target = bpy.types.Object | bpy.types.PoseBone | Transform
-"""What to act on."""
+"""Something to act on."""
 
 Targets = Target | Iterable[Target]
 """One or several."""
@@ -32,7 +32,7 @@ Result = TypeVar("Result")
 
 
 def transforms_of(targets: Targets) -> list[Transform]:
-    """The transforms of targets, each once."""
+    """Return the transforms of targets, each once."""
     single = isinstance(targets, Target)
     return list(dict.fromkeys(map(transform_of, (targets,) if single else targets)))
 
@@ -103,7 +103,7 @@ def apply_edit(
 
 
 def readable(transform: Transform, readings: Readings) -> list[tuple[SlotTransform, Source]]:
-    """What is keyed of a transform in all of its places. `Refused` where one of them cannot be filled in."""
+    """Return what is keyed of a transform in all of its places. `Refused` where one of them cannot be filled in."""
     for _, source in readings:
         if isinstance(source, Refused):
             raise source

@@ -40,7 +40,7 @@ BREAKDOWN, PUSH, RELAX = KINDS = ("BREAKDOWN", "PUSH", "RELAX")
 """From the key before to the key after; away from the in-between of the mode; towards it."""
 
 LIKE_BLENDER = "lerp_slerp"
-"""What Blender's Breakdowner does to location and quaternion."""
+"""The mode that does what Blender's Breakdowner does to location and quaternion."""
 
 
 def breakdown(
@@ -76,10 +76,10 @@ class _Between:
     place: SlotTransform
 
     source: Source
-    """What is keyed without this frame."""
+    """The keys without those of this frame."""
 
     frame: float
-    """Of the Action."""
+    """The frame of the Action."""
 
     ends: tuple[float, float]
     """The frames of the keys before and after."""
@@ -94,7 +94,7 @@ class _Between:
     """The keys of its channels as they were."""
 
     turns: KeyFields | None
-    """Those of its channel of turns, None where it has none."""
+    """The keys of its channel of turns, None where it has none."""
 
     @property
     def mode(self) -> str:
@@ -106,7 +106,7 @@ class _Between:
         return self.source.values_at(np.array(self.ends)).T
 
     def pose(self, kind: str, factor: float) -> np.ndarray:
-        """The components to be keyed, shape (10,)."""
+        """Return the components to be keyed, shape (10,)."""
         if kind == BREAKDOWN:
             first, last = self._values_at_ends
             straight = first + factor * (last - first)
@@ -248,7 +248,7 @@ class Breakdowns:
 
 
 def _without(source: Source, frame: float) -> Source:
-    """What is keyed but for this frame, and without holds. A channel with no other key keeps its value."""
+    """Return what is keyed but for this frame, and without holds. A channel with no other key keeps its value."""
     channels, rest = [], dict(source.rest)
     for rows, keys in source.channels:
         others = np.abs(keys.times - frame) >= SAME_FRAME

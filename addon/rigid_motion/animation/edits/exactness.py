@@ -58,7 +58,7 @@ def set_exact(targets: Targets, is_exact: bool = True, *, refused: list[Refused]
 
 
 def error_between_frames(target: bpy.types.Object | bpy.types.PoseBone | Transform) -> float:
-    """How far something is off between frames at most, as estimated when it was filled in, in metres."""
+    """Return how far something is off between frames at most, as estimated when it was filled in, in metres."""
     transform = transform_of(target)
     errors = [recorded(place).error for place in places_of(transform) if recorded_digest(place)]
     return max(errors, default=0.0) * metres_per_channel_unit(transform)

@@ -128,7 +128,7 @@ def set_turns(
 
 
 def _place_of(transform: Transform, places: Sequence[SlotTransform]) -> SlotTransform:
-    """The slot whose keys the editors show. `Refused` where there is none."""
+    """Return the slot whose keys the editors show. `Refused` where there is none."""
     place = active_place(transform, places)
     if place is None:
         raise Refused(
@@ -140,7 +140,7 @@ def _place_of(transform: Transform, places: Sequence[SlotTransform]) -> SlotTran
 
 
 def on_turns(transform: Transform) -> None:
-    """Take it as a choice for the segment on the frame that is shown that somebody set the property of turns."""
+    """Take an edit of the property of turns as a choice for the segment on the frame that is shown."""
     place, turns = active_place(transform), transform.motion.turns
     source = None if place is None or not place.slot.action.is_editable else read(place)
     frame = frame_in_action(transform.animated, bpy.context.scene.frame_current_final)
@@ -150,7 +150,7 @@ def on_turns(transform: Transform) -> None:
 
 
 def on_property(transform: Transform) -> None:
-    """Take it as a choice for the whole that somebody set the mode property."""
+    """Take an edit of the mode property as a choice for the whole."""
     mode = transform.motion.mode
     places = [place for place in slot_transforms_of([transform]) if place.slot.action.is_editable]
     if not places:
@@ -166,7 +166,7 @@ def on_property(transform: Transform) -> None:
 
 
 def set_whole(place: SlotTransform, mode: str) -> None:
-    """One mode for all segments of a slot."""
+    """Set one mode for all segments of a slot."""
     channel = place.users[0].mode_channel
     if channel in place.curves:
         place.channelbag.fcurves.remove(place.curves.pop(channel))

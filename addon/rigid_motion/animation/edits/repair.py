@@ -15,7 +15,7 @@ from .apply import Readings, Targets, apply_edit
 
 
 def constraint_trouble(target: bpy.types.PoseBone | bpy.types.Object | Transform) -> str:
-    """Why a bone is not seen where its in-betweens have it.
+    """Return why a bone is not seen where its in-betweens have it.
 
     Returns
     -------
@@ -28,7 +28,7 @@ def constraint_trouble(target: bpy.types.PoseBone | bpy.types.Object | Transform
 
 
 def with_troubles(transforms: Iterable[Transform]) -> Iterator[Transform]:
-    """Those whose constraints are not as they were made. For polls: no channel is looked at."""
+    """Yield those whose constraints are not as they were made. For polls: no channel is looked at."""
     result = set()
     for transform, _ in _troubles(transforms):
         if transform not in result:
@@ -72,7 +72,7 @@ def restore_constraints(targets: Targets, *, refused: list[Refused] | None = Non
 
 
 def _troubles(transforms: Iterable[Transform]) -> Iterator[tuple[Transform, str]]:
-    """What is amiss with the constraints of each."""
+    """Yield what is amiss with the constraints of each."""
     by_prefix: dict[bpy.types.Object, dict[str, Transform]] = {}
     for transform in transforms:
         if WRITERS[transform.kind].uses_constraints:

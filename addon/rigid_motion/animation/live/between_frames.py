@@ -12,7 +12,7 @@ PATIENCE = 10.0
 
 
 def shows_between_frames() -> bool:
-    """Whether a scene is shown between frames of its Actions, or one is being rendered."""
+    """Return whether a scene is shown between frames of its Actions, or one is being rendered."""
     return bpy.app.is_job_running("RENDER") or any(
         scene.frame_subframe or scene.render.frame_map_old != scene.render.frame_map_new for scene in bpy.data.scenes
     )

@@ -59,19 +59,21 @@ def keep_motion(place: SlotTransform, before: str, source: Source) -> bool:
 
 
 def _without(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """The frames that are none of the others; both rise."""
+    """Return the frames that are none of the others; both rise."""
     places = np.clip(np.searchsorted(others, frames)[:, None] - (0, 1), 0, len(others) - 1)
     return frames[np.abs(others[places] - frames[:, None]).min(axis=1) >= SAME_FRAME]
 
 
 def _bounds(keyed: np.ndarray, inserted: np.ndarray) -> np.ndarray:
-    """The keyed frames that have inserted ones on one side alone."""
+    """Return the keyed frames that have inserted ones on one side alone."""
     is_dense = np.diff(np.searchsorted(inserted, keyed)) > 0
     return keyed[np.diff(is_dense.astype(int), prepend=0, append=0) != 0]
 
 
 def _off_curves(new: Source, old: Source, frames: np.ndarray, place: SlotTransform) -> np.ndarray:
-    """How far the keys on these frames (m,) are off the curves that were there before, 0 where none is, (10, m)."""
+    """Return how far the keys on these frames (m,) are off the curves that were there before,
+    0 where none is, (10, m).
+    """
     off = np.zeros((10, len(frames)))
     for rows, keys in new.channels:
         places = np.clip(np.searchsorted(frames, keys.times - SAME_FRAME), 0, len(frames) - 1)

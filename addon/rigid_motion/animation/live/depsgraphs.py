@@ -12,7 +12,7 @@ import bpy
 from ..actions.slots import actions_of
 
 BlockKey = tuple[str, str | None]
-"""What a data-block is found by in the file: its name, and the file that it is linked from."""
+"""The key that a data-block is found by in the file: its name, and the file that it is linked from."""
 
 
 def key_of(block: bpy.types.ID) -> BlockKey:
@@ -20,12 +20,12 @@ def key_of(block: bpy.types.ID) -> BlockKey:
 
 
 def objects_of(keys: Iterable[BlockKey]) -> list[bpy.types.Object]:
-    """The objects with these keys that are still there."""
+    """Return the objects with these keys that are still there."""
     return [obj for obj in map(bpy.data.objects.get, keys) if obj is not None]
 
 
 def add_actions(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, added: set[tuple[int, int]]) -> None:
-    """Have the Actions of an object be in the dependency graph, which otherwise tells nobody of their edits.
+    """Have the Actions of an object be in the dependency graph, which otherwise does not report their edits.
 
     Blender leaves them out that *Make Single User > Object Animation* has made. `added` has the session ids of objects
     and Actions that this was tried for.
@@ -39,7 +39,7 @@ def add_actions(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, added: se
 
 
 def edited_actions(depsgraph: bpy.types.Depsgraph | None) -> list[bpy.types.Action]:
-    """The Actions that wait to be evaluated, or just were."""
+    """Return the Actions that wait to be evaluated, or just were."""
     if depsgraph is None or not depsgraph.id_type_updated("ACTION"):
         return []
     blocks = [update.id for update in depsgraph.updates if isinstance(update.id, bpy.types.Action)]
@@ -47,14 +47,15 @@ def edited_actions(depsgraph: bpy.types.Depsgraph | None) -> list[bpy.types.Acti
 
 
 def actions_to_evaluate(scene: bpy.types.Scene) -> set[bpy.types.Action]:
-    """The Actions that were edited since any of the scene's graphs was evaluated."""
+    """Return the Actions that were edited since any of the scene's graphs was evaluated."""
     return {action for layer in scene.view_layers for action in edited_actions(layer.depsgraph)}
 
 
 def objects_to_evaluate(
     scene: bpy.types.Scene, evaluated: set[int]
 ) -> Iterator[tuple[bpy.types.Object, bpy.types.Depsgraph | None]]:
-    """The objects that wait to be evaluated: all where nothing has been yet. With the graph they were evaluated in.
+    """Yield the objects that wait to be evaluated: all where nothing has been yet.
+    With the graph they were evaluated in.
 
     `evaluated` has the addresses of the graphs that were evaluated before. Those of the scene are added.
     """

@@ -53,11 +53,11 @@ class Follower:
 
     def __init__(self) -> None:
         self.enabled = True
-        """Whether edits are followed at once."""
+        """True if edits are followed at once."""
         self.busy = False
-        """Whether the edits that Blender tells of are the extension's."""
+        """True if the edits that Blender tells of are the extension's."""
         self.drafts = False
-        """Whether large Actions may be edited in draft: see `writers.drafts`."""
+        """True if large Actions may be edited in draft: see `writers.drafts`."""
         self.operators = OperatorWatch()
         self.handlers = {
             "depsgraph_update_pre": self._handler(self.before_update),
@@ -75,7 +75,7 @@ class Follower:
     def begin_file(self) -> None:
         """Know nothing of the file that is open."""
         self.unseen = True
-        """Whether the file has yet to be looked through."""
+        """True if the file has yet to be looked through."""
         self.frame = 0.0
         """The frame that was last shown."""
         self.ranges: dict[int, tuple[int, int]] = {}
@@ -85,7 +85,7 @@ class Follower:
         self.followed: set[int] = set()
         """The Actions, by session id, that were followed before Blender evaluated them."""
         self.moved: set[Transform] = set()
-        """What these move."""
+        """Transforms that these move."""
         self.objects: set[int] = set()
         """The objects of which something was set before Blender evaluated them, by session id."""
         self.evaluated: set[int] = set()
@@ -99,7 +99,7 @@ class Follower:
         self.slot_names: SlotNames = {}
 
     def _handler(self, method: Callable) -> Callable:
-        """A handler that stays quiet while edits are not followed, and never raises into Blender."""
+        """Return a handler that stays quiet while edits are not followed, and never raises into Blender."""
 
         @persistent
         @functools.wraps(method)
@@ -114,7 +114,7 @@ class Follower:
 
     @contextmanager
     def turn(self) -> Iterator[bool]:
-        """Whether edits are to be followed: not while they are the extension's."""
+        """Yield whether edits are to be followed: not while they are the extension's."""
         is_first = not self.busy
         self.busy = True
         try:
@@ -199,7 +199,7 @@ class Follower:
             self.refresh(edited)
 
     def edited_of(self, obj: bpy.types.Object) -> list[Transform]:
-        """An object that was evaluated on the frame that is shown, and of a rig the bones that were edited."""
+        """Return an object that was evaluated on the frame that is shown, and of a rig the bones that were edited."""
         if obj.pose is None or not has_bones(obj):
             return [transform_of(obj)]
         changed = self.snapshots.changed_bones(obj, self.frame, is_set=obj.session_uid in self.objects)
@@ -352,14 +352,15 @@ def set_enabled(enabled: bool) -> None:
 
 def set_drafts(allowed: bool) -> None:
     """Edit large Actions in draft, as in a window: one sample a frame, until something is shown between frames, or
-    rendered, or saved."""
+    rendered, or saved.
+    """
     follower.drafts = allowed
     if not allowed:
         follower.finish_drafts()
 
 
 def is_busy() -> bool:
-    """Whether the edits that Blender tells of at this moment are the extension's."""
+    """Return whether the edits that Blender tells of at this moment are the extension's."""
     return follower.busy
 
 

@@ -59,19 +59,19 @@ class _Posed:
     """How a transform was posed, without a key yet."""
 
     frame: float
-    """Of the scene."""
+    """The frame of the scene."""
 
     components: np.ndarray
     """Its properties, shape (10,)."""
 
     on_top: bool
-    """Whether the pose is that with the difference on top."""
+    """True if the pose is that with the difference on top."""
 
     is_whole: bool = False
-    """Whether a whole pose was put on it, which is meant as it is, and shown so."""
+    """True if a whole pose was put on it, which is meant as it is, and shown so."""
 
     is_shown: bool = True
-    """Whether it has been evaluated so."""
+    """True if it has been evaluated so."""
 
 
 @dataclass(frozen=True)
@@ -79,22 +79,22 @@ class _NewKey:
     """A key that was inserted on the frame that is shown."""
 
     user: Transform
-    """Of which it is, if it can be."""
+    """The user of which it is, if it can be."""
 
     posed: _Posed | None
-    """How that was posed on this frame."""
+    """The pose that the user had on this frame."""
 
     old: Source
-    """What was keyed without it."""
+    """The keys without it."""
 
     source: Source
-    """What is keyed by now."""
+    """The keys as they are now."""
 
     frame: float
-    """Of the Action."""
+    """The frame of the Action."""
 
     had: np.ndarray
-    """What the channels had there without it, shape (10,)."""
+    """Values of the channels there without it, shape (10,)."""
 
     @cached_property
     def numbers(self) -> dict[int, int]:
@@ -110,7 +110,7 @@ class _NewKey:
         }
 
     def has_values(self, shown: np.ndarray) -> bool:
-        """Whether every key on this frame has the value that the property had, of these components (10,)."""
+        """Return whether every key on this frame has the value that the property had, of these components (10,)."""
         for rows, keys in self.source.channels:
             if rows[0] in self.numbers:
                 had = shown[rows]
@@ -133,8 +133,8 @@ class InsertedKeys:
         """The keys that were inserted in each place, as each of its users may have them, while edits are looked at."""
         self._insertions: list[Insertion] = []
         self._inserted: OrderedDict[tuple[str, str], tuple[np.ndarray, bool, bool]] = OrderedDict()
-        """What undo and redo bring back is decided as it was: the components that there were, whether they were all of
-        the pose, and whether they were the in-between as it was, by the digests before and after."""
+        """Decisions to keep when undo and redo bring keys back: the components that there were, whether they were all
+        of the pose, and whether they were the in-between as it was, by the digests before and after."""
 
     def look_at(self, changes: Iterable[tuple[SlotTransform, str, Source]], frame: float) -> None:
         """Find the keys that were inserted on the frame that is shown, and what the channels of all had there.
@@ -158,7 +158,7 @@ class InsertedKeys:
             self._new[place].append(_NewKey(user, posed, old, source, own, values[:, 0]))
 
     def _by_precedence(self, place: SlotTransform) -> list[Transform]:
-        """The users of a slot that a key may be of: first what was posed by hand, or else what is active."""
+        """Return the users of a slot that a key may be of: first what was posed by hand, or else what is active."""
         users = [user for user in place.users if user.animated.animation_data.action == place.slot.action]
         if len(users) > 1:
             layer = bpy.context.view_layer
@@ -182,15 +182,15 @@ class InsertedKeys:
                 self._whole.popitem(last=False)
 
     def notice_undo(self, transform: Transform) -> None:
-        """Undo or redo gave a transform its properties: nobody has set them, though others were evaluated."""
+        """Undo or redo gave a transform its properties: they were not set, though others were evaluated."""
         self._undone[_identity(transform)] = transform.components().tobytes()
 
     def forget_undo(self) -> None:
-        """All has been evaluated since."""
+        """Forget what undo or redo posed: all has been evaluated since."""
         self._undone.clear()
 
     def is_whole_again(self, transform: Transform, frame: float) -> bool:
-        """Whether undo or redo brought a whole pose back that was put on a transform on this frame."""
+        """Return whether undo or redo brought a whole pose back that was put on a transform on this frame."""
         posed = self._whole.get((_identity(transform), transform.components().tobytes()))
         if posed is None or posed.frame != frame:
             return False
@@ -207,7 +207,7 @@ class InsertedKeys:
         self._keep(transform, _Posed(frame, transform.components(), False, True))
 
     def _is_shown_whole(self, transform: Transform) -> bool:
-        """Whether a whole pose was put on a transform, and it has been shown without the difference since."""
+        """Return whether a whole pose was put on a transform, and it has been shown without the difference since."""
         before = self._posed.get(_identity(transform))
         if before is None or not before.is_whole:
             return False
@@ -215,7 +215,7 @@ class InsertedKeys:
         return seen is None or np.allclose(seen, transform.components(), rtol=TOLERANCE, atol=TOLERANCE)
 
     def posed_of(self, animated: bpy.types.ID) -> set[str]:
-        """The prefixes of what was posed of a data-block, and has no key yet."""
+        """Return the prefixes of what was posed of a data-block, and has no key yet."""
         return {prefix for uid, prefix in self._posed if uid == animated.session_uid}
 
     def notice_assignment(
@@ -244,7 +244,7 @@ class InsertedKeys:
         return is_whole
 
     def notice_values(self, transform: Transform, frame: float) -> None:
-        """Keys of a transform that are set on the frame that is shown are meant as they are."""
+        """Note that keys of a transform that are set on the frame that is shown are meant as they are."""
         self._keep(transform, _Posed(frame, transform.components(), False, is_shown=False))
 
     def forget_poses(self, transforms: Iterable[Transform] | None = None) -> None:
@@ -322,13 +322,13 @@ def _is_inserted(old: Source, new: Source, frame: float) -> bool:
 
 
 def _is_same(source: Source, components: np.ndarray, others: np.ndarray) -> bool:
-    """Whether these are the same components (10,), as far as they are keyed."""
+    """Return whether these are the same components (10,), as far as they are keyed."""
     rows = [row for own, _ in source.channels for row in own]
     return bool(np.all(np.abs(components - others)[rows] <= TOLERANCE * np.maximum(1.0, np.abs(others[rows]))))
 
 
 def _seen_components(user: Transform, place: SlotTransform, old: Source, shown: np.ndarray, frame: float) -> np.ndarray:
-    """The components (10,) that, with the original difference alone, look as the screen does."""
+    """Return the components (10,) that, with the original difference alone, look as the screen does."""
     filled, difference = place.filled, writer_of(place).difference(place, user, frame)
     parts = {PART_OF[row] for row, channel in user.differences.items() if channel in filled}
     return visible_components(shown, old.original, difference, old.order, parts)

@@ -23,10 +23,10 @@ from ..curves.fitting import GOOD, cubics_in_time, fit_together
 from ..curves.solvers import bezier_cubics, solve_cubics
 
 MOMENTS = np.linspace(0.0, 1.0, 41)
-"""Of either side, at which the timing is looked at."""
+"""Moments of either side, at which the timing is looked at."""
 
 QUATERNION = 4.0
-"""What the square of a quaternion's change counts for: it moves by half of the angle that the object turns."""
+"""The weight of the square of a quaternion's change: it moves by half of the angle that the object turns."""
 
 STILL = 1e-6
 """Progress along a path that is none."""
@@ -49,10 +49,11 @@ class _Channels:
     """The handles before the first of them and behind the last, shape (c, 2, 2)."""
 
     native: np.ndarray
-    """Those between, with which a curve would stay as it was: before the new key and behind it, shape (c, 2, 2, 2)."""
+    """Handles between, with which a curve would stay as it was: before the new key and behind it, shape
+    (c, 2, 2, 2)."""
 
     weights: np.ndarray
-    """What the square of its way counts for in that of all channels, 0 where a curve is to stay as it was, (c,)."""
+    """The weight of the square of its way in that of all channels, 0 where a curve is to stay as it was, (c,)."""
 
     @cached_property
     def ways(self) -> np.ndarray:
@@ -61,11 +62,11 @@ class _Channels:
 
     @cached_property
     def shares(self) -> np.ndarray:
-        """What each counts for before the new key and behind it, shape (c, 2)."""
+        """Return what each counts for before the new key and behind it, shape (c, 2)."""
         return self.weights[:, None] * self.ways[..., 1] ** 2
 
     def times(self, chosen: np.ndarray, side: int) -> np.ndarray:
-        """The times of the native handles of some on one side, from 0 to 1, shape (k, 2)."""
+        """Return the times of the native handles of some on one side, from 0 to 1, shape (k, 2)."""
         begun = self.native[chosen, side, :, 0] - self.points[chosen, side, 0, None]
         return np.clip(begun / self.ways[chosen, side, :1], 0.0, 1.0)
 
@@ -145,8 +146,8 @@ def keep_timing(insertions: Iterable[Insertion]) -> None:
 
 
 Other = tuple[int, int, np.ndarray | None]
-"""What else does a part of the way: the number of an insertion, the row of a component, and frame and value of three
-keys (3, 2) between which it is linear."""
+"""Something else that does a part of the way: the number of an insertion, the row of a component, and frame and value
+of three keys (3, 2) between which it is linear."""
 
 
 def _channels_of(insertions: Sequence[Insertion]) -> tuple[_Channels | None, list[Other]]:
@@ -185,7 +186,7 @@ def _weight(source: Source, row: int) -> float:
 def _keys_on(
     fcurve: bpy.types.FCurve, frames: np.ndarray
 ) -> tuple[list[bpy.types.Keyframe], np.ndarray] | tuple[None, None]:
-    """The keys on three frames, and frame and value of each (3, 2), if there are any and none between them."""
+    """Return the keys on three frames, and frame and value of each (3, 2), if there are any and none between them."""
     at, all_points = nearest_key(fcurve, frames[1])
     beside = slice(max(at - 1, 0), at + 2)
     points = all_points[beside].astype(np.float64)

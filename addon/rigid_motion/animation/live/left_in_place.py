@@ -28,7 +28,7 @@ class LeftInPlace:
 
     def __init__(self) -> None:
         self._set: dict[Transform, set[str]] = {}
-        """Which of location, rotation and scale were set and are not evaluated yet."""
+        """The parts of location, rotation and scale that were set and are not evaluated yet."""
 
     def notice_assignments(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
         """Keep what was set of an object and its bones since it was evaluated."""
@@ -49,7 +49,7 @@ class LeftInPlace:
             }
 
     def forget_assignments(self) -> None:
-        """They are evaluated by now."""
+        """Forget the assignments: they are evaluated by now."""
         self._set.clear()
 
     @contextmanager
@@ -74,7 +74,7 @@ class LeftInPlace:
 
 
 def _animated_parts(user: Transform, place: SlotTransform) -> set[str]:
-    """Which of location, rotation and scale a place animates."""
+    """Return which of location, rotation and scale a place animates."""
     return {
         PART_OF[row]
         for row, channel in user.channels.items()
@@ -83,7 +83,7 @@ def _animated_parts(user: Transform, place: SlotTransform) -> set[str]:
 
 
 def _set_bones(rig: bpy.types.Object, evaluated: bpy.types.Object) -> list[int]:
-    """The numbers of the bones of which a property is not as it was evaluated."""
+    """Return the numbers of the bones of which a property is not as it was evaluated."""
     count = len(rig.pose.bones)
     if len(evaluated.pose.bones) != count:
         return []

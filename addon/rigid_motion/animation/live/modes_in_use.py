@@ -11,7 +11,9 @@ from ..transforms import Transform, is_part, transform_of
 
 
 def transforms_under(objects: Iterable[bpy.types.Object]) -> list[Transform]:
-    """These objects, and of rigs all bones that their Actions move, or that have modes or constraints for them."""
+    """Return these objects, and of rigs all bones that their Actions move,
+    or that have modes or constraints for them.
+    """
     result: dict[Transform, None] = {}
     for obj in objects:
         result[transform_of(obj)] = None
@@ -21,20 +23,20 @@ def transforms_under(objects: Iterable[bpy.types.Object]) -> list[Transform]:
 
 
 def uses_modes(obj: bpy.types.Object) -> bool:
-    """Whether an object or its bones have, or had, anything to do with modes."""
+    """Return whether an object or its bones have, or had, anything to do with modes."""
     if obj.rigid_motion.has_bones or _has_properties(obj):
         return True
     return any(len(action.rigid_motion.slots) > 0 for action in actions_of(obj))
 
 
 def has_mode(obj: bpy.types.Object) -> bool:
-    """Whether an object itself has, or had, anything to do with modes."""
+    """Return whether an object itself has, or had, anything to do with modes."""
     records = (record for action in actions_of(obj) for record in action.rigid_motion.slots)
     return _has_properties(obj) or any(not is_part(record.prefix) for record in records)
 
 
 def has_bones(obj: bpy.types.Object) -> bool:
-    """Whether bones of a rig have anything to do with modes."""
+    """Return whether bones of a rig have anything to do with modes."""
     return obj.rigid_motion.has_bones or any(
         is_part(record.prefix) for action in actions_of(obj) for record in action.rigid_motion.slots
     )

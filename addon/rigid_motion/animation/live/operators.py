@@ -10,7 +10,8 @@ BLENDING = (
     "TRANSFORM_OT_",
     *(f"POSE_OT_{name}" for name in ("push", "relax", "breakdown", "blend", "user_transforms_clear")),
 )
-"""How the names of operators begin that go on from what properties have, also when they are adjusted afterwards."""
+"""The beginnings of the names of operators that go on from what properties have,
+also when they are adjusted afterwards."""
 
 
 @dataclass(frozen=True)
@@ -18,13 +19,13 @@ class Operators:
     """The operators that are at work."""
 
     names: tuple[str, ...] = ()
-    """Of those that run, and of the one that has ended last if it did since edits were last seen."""
+    """Names of those that run, and of the one that has ended last if it did since edits were last seen."""
 
     is_script: bool = True
-    """Whether what is set is set as a script does it: none runs, nor is one adjusted that goes on from what was."""
+    """True if what is set is set as a script does it: none runs, nor is one adjusted that goes on from what was."""
 
     def are_any(self, beginnings: tuple[str, ...]) -> bool:
-        """Whether the name of any begins so."""
+        """Return whether the name of any begins so."""
         return any(name.startswith(beginnings) for name in self.names)
 
 
@@ -36,7 +37,7 @@ class OperatorWatch:
         """The operator that had ended last, told from others of its kind, and its name."""
 
     def look(self) -> Operators:
-        """Those that are at work now, or ended since the last look."""
+        """Return those that are at work now, or ended since the last look."""
         manager = bpy.context.window_manager
         ended = manager.operators if manager is not None else ()
         last = (ended[-1].as_pointer(), ended[-1].bl_idname) if len(ended) else (0, "")

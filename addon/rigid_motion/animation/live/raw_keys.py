@@ -22,10 +22,10 @@ Channels = Sequence[bpy.types.bpy_prop_collection]
 """`keyframe_points` of F-curves."""
 
 POINTS = {"handle_left": slice(0, 2), "co": slice(3, 5), "handle_right": slice(6, 8)}
-"""Where in the memory of a key its points are, counted in single-precision numbers: behind each is an unused one."""
+"""The places of a key's points in its memory, counted in single-precision numbers: behind each is an unused one."""
 
 NUMBERS = 9
-"""How many numbers a key begins with."""
+"""The number of numbers that a key begins with."""
 
 _NOTHING = np.empty(0, np.uint8)
 
@@ -43,7 +43,7 @@ class _Layout:
     """What is known of the memory of keys."""
 
     size: int | None = None
-    """How many bytes a key takes. None as long as no two of one F-curve were seen, 0 where it is not as expected."""
+    """The bytes that a key takes. None as long as no two of one F-curve were seen, 0 where it is not as expected."""
 
 
 class _Reader:
@@ -55,7 +55,7 @@ class _Reader:
     def __init__(self, channels: Channels) -> None:
         self.channels = channels
         self.places = [(0, 0)] * len(channels)
-        """Where the keys of each channel are in memory, and how many bytes."""
+        """The addresses of the keys of each channel in memory, and how many bytes they are."""
         self.views = [_NOTHING] * len(channels)
 
     def read(self) -> list[bytes]:
@@ -74,7 +74,7 @@ class _Reader:
 
 
 def _checked_size(channels: Channels) -> int | None:
-    """How many bytes a key takes: see `_Layout.size`."""
+    """Return how many bytes a key takes: see `_Layout.size`."""
     several = [keys for keys in channels if len(keys) > 1]
     if not several:
         return None
@@ -86,7 +86,7 @@ def _checked_size(channels: Channels) -> int | None:
 
 
 def _agrees(keys: bpy.types.bpy_prop_collection, size: int) -> bool:
-    """Whether memory has the same keys as Blender says, one behind the other and each of so many bytes."""
+    """Return whether memory has the same keys as Blender says, one behind the other and each of so many bytes."""
     count, first = len(keys), keys[0].as_pointer()
     if size < 4 * NUMBERS or size % 4 or keys[count - 1].as_pointer() - first != size * (count - 1):
         return False
@@ -100,7 +100,7 @@ def _agrees(keys: bpy.types.bpy_prop_collection, size: int) -> bool:
 
 
 def _by_property(keys: bpy.types.bpy_prop_collection) -> bytes:
-    """All there is to keys, as Blender's own functions have it."""
+    """Return all there is to keys, as Blender's own functions have it."""
     result = []
     for name, (width, kind) in KEY_FIELDS.items():
         values = np.empty(len(keys) * width, kind)

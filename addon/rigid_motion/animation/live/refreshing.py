@@ -119,7 +119,7 @@ def _fill_in(readings: Sequence[tuple[SlotTransform, Source]], in_draft: bool) -
 
 
 def _is_desired(place: SlotTransform, source: Source | Refused | None, before: str) -> bool:
-    """Whether there is more to a source than Blender's own in-betweens, and it can be had.
+    """Return whether there is more to a source than Blender's own in-betweens, and it can be had.
 
     `before` is the digest of what the slot is filled in from: that needs no second examination.
     """

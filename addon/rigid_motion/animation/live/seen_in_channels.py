@@ -28,18 +28,18 @@ class _Shown(NamedTuple):
     """A transform whose properties were given the pose that is seen."""
 
     key: BlockKey
-    """Of its data-block. Blender may replace bones meanwhile."""
+    """The key of its data-block. Blender may replace bones meanwhile."""
 
     prefix: str
     rotation: str
     parts: set[str]
-    """Which of location, rotation and scale were set."""
+    """The parts of location, rotation and scale that were set."""
 
     before: np.ndarray
-    """What its properties had, as components (10,)."""
+    """Values that its properties had, as components (10,)."""
 
     after: np.ndarray
-    """What they were given."""
+    """Values that they were given."""
 
 
 class SeenInChannels:
@@ -91,7 +91,7 @@ class SeenInChannels:
 
 
 def is_baking() -> bool:
-    """Whether it is Blender's *Bake Action*, or an add-on by way of it, that has set the frame."""
+    """Return whether it is Blender's *Bake Action*, or an add-on by way of it, that has set the frame."""
     caller = inspect.currentframe()
     while caller is not None:
         if caller.f_code is bake_action_objects_iter.__code__:

@@ -73,7 +73,7 @@ def _key_segments(
 
 
 def _keys_in(fcurve: bpy.types.FCurve) -> list[tuple[float, float, bool]]:
-    """Frame, value and whether it is selected, of each key."""
+    """Return frame, value and whether it is selected, of each key."""
     points, selected = (
         np.empty(2 * len(fcurve.keyframe_points), np.float32),
         np.empty(len(fcurve.keyframe_points), bool),
@@ -84,7 +84,7 @@ def _keys_in(fcurve: bpy.types.FCurve) -> list[tuple[float, float, bool]]:
 
 
 def _is_among(chosen: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """Which of the frames (n,) are one of the chosen, shape (n,)."""
+    """Return which of the frames (n,) are one of the chosen, shape (n,)."""
     chosen = np.sort(chosen)
     return np.searchsorted(chosen, frames + SAME_FRAME) > np.searchsorted(chosen, frames - SAME_FRAME, side="right")
 
@@ -102,7 +102,7 @@ ONE_AXIS = 1e-5
 """Radians off an axis, for rounding."""
 
 SAMPLES = 16
-"""Of each part of a segment, and of each turn in it, to see how far a motion turns."""
+"""Samples of each part of a segment, and of each turn in it, to see how far a motion turns."""
 
 
 def share_out_turns(
@@ -136,7 +136,7 @@ def share_out_turns(
 
 
 def _divided(old: Source, source: Source, progress: float | None) -> dict[float, float]:
-    """The turns of the parts that keys divide segments into, by the frames that these begin on."""
+    """Return the turns of the parts that keys divide segments into, by the frames that these begin on."""
     shared: dict[float, float] = {}
     for segment in np.flatnonzero(old.modes).tolist():
         parts = _within(source.key_frames, *old.key_frames[segment : segment + 2])
@@ -153,7 +153,7 @@ def _divided(old: Source, source: Source, progress: float | None) -> dict[float,
 
 
 def _joined(old: Source, source: Source) -> dict[float, float]:
-    """The whole turns of segments in place of which there were several, not all of them in whole turns."""
+    """Return the whole turns of segments in place of which there were several, not all of them in whole turns."""
     shared: dict[float, float] = {}
     for segment in np.flatnonzero(source.segment_turns != np.rint(source.segment_turns)).tolist():
         ends = source.key_frames[segment : segment + 2]
@@ -166,12 +166,12 @@ def _joined(old: Source, source: Source) -> dict[float, float]:
 
 
 def _within(frames: np.ndarray, first: float, last: float) -> np.ndarray:
-    """The segments between these frames of keys that begin from a first frame on, and before a last one."""
+    """Return the segments between these frames of keys that begin from a first frame on, and before a last one."""
     return np.flatnonzero((frames[:-1] > first - SAME_FRAME) & (frames[:-1] < last - SAME_FRAME))
 
 
 def _is_enough_in_whole_turns(source: Source, segment: int, turned: Turning) -> bool:
-    """Whether it makes no difference for the motion what part of a turn is spin.
+    """Return whether it makes no difference for the motion what part of a turn is spin.
 
     So it is where all of it is about one axis, and the path of the origin does not depend on it.
     """
@@ -187,9 +187,10 @@ def _shares(
     turns: float | None = None,
     along: Sequence[float] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What part of the turn of a segment is made from each of the frames (p + 1,) in it to the next, (p,); and the axis
-    of its spins as it lies in the body on each of them, (p, 3). `turns` are about as many as are made in all, `along`
-    is the progress (p + 1,) on the frames, if it is not that of the motion."""
+    """Return what part of the turn of a segment is made from each of the frames (p + 1,) in it to the next, (p,); and
+    the axis of its spins as it lies in the body on each of them, (p, 3). `turns` are about as many as are made in all,
+    `along` is the progress (p + 1,) on the frames, if it is not that of the motion.
+    """
     steps = SAMPLES * (1 + int(abs(turned.spins.turns[0] if turns is None else turns)))
 
     def sampled(ends: Sequence[float]) -> np.ndarray:
@@ -206,7 +207,8 @@ def _shares(
 
 
 def _turns_of(source: Source, segment: int, of: Turning, share: float, axis: np.ndarray, *, whole: bool) -> float:
-    """The turns that a segment needs to have this share of a turning, whose axis (3,) is as it lies in the body there.
+    """Return the turns that a segment needs to have this share of a turning,
+    whose axis (3,) is as it lies in the body there.
 
     They are whole where that is enough: where the path of the origin does not depend on what part of a turn is spin.
     """

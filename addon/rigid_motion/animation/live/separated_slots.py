@@ -17,7 +17,7 @@ from ..actions.slots import Slot, is_time, strips_of, uses_of
 from ..transforms import bone_name, shows_differences, split_path
 
 SlotNames = dict[int, set[str]]
-"""Of each rig the names of the slots that have its keys, as last seen, by the rig's session id."""
+"""The names of the slots that have the keys of each rig, as last seen, by the rig's session id."""
 
 
 def notice_slots(slots: Iterable[Slot], names: SlotNames) -> None:
@@ -29,7 +29,7 @@ def notice_slots(slots: Iterable[Slot], names: SlotNames) -> None:
 
 
 def _names_of(rig: bpy.types.Object) -> set[str]:
-    """The names of the slots that a rig moves by and that have differences in others."""
+    """Return the names of the slots that a rig moves by and that have differences in others."""
     keyed = {(action, handle) for action, handle, _ in uses_of(rig).values()}
     return {
         slot.identifier
@@ -41,7 +41,7 @@ def _names_of(rig: bpy.types.Object) -> set[str]:
 
 
 def are_separated(actions: Iterable[bpy.types.Action]) -> bool:
-    """Whether one of these is what a rig was left with."""
+    """Return whether one of these is what a rig was left with."""
     return any(_rigs_left_with(action) for action in actions)
 
 
@@ -59,7 +59,7 @@ def discard(actions: Iterable[bpy.types.Action]) -> None:
 
 
 def _rigs_left_with(action: bpy.types.Action) -> list[bpy.types.Object]:
-    """The rigs that move by this Action, although constraints of ours show it."""
+    """Return the rigs that move by this Action, although constraints of ours show it."""
     if not _has_samples_alone(action):
         return []
     owners = bpy.data.user_map(subset={action}, key_types={"ACTION"}, value_types={"OBJECT"})[action]
@@ -74,13 +74,13 @@ def _has_samples_alone(action: bpy.types.Action) -> bool:
 
 
 def _only_channelbag(action: bpy.types.Action) -> bpy.types.ActionChannelbag | None:
-    """What is in an Action of one slot, to which none has the differences."""
+    """Return what is in an Action of one slot, to which none has the differences."""
     is_single = len(action.slots) == 1 and not action.rigid_motion.bone_slots
     return action_get_channelbag_for_slot(action, action.slots[0]) if is_single else None
 
 
 def _moving(rig: bpy.types.Object, action: bpy.types.Action) -> list[bpy.types.AnimData | bpy.types.NlaStrip]:
-    """By what of its animation a rig moves by an Action: it itself, and strips."""
+    """Return by what of its animation a rig moves by an Action: it itself, and strips."""
     data = rig.animation_data
     return [] if data is None else [user for user in (data, *strips_of(rig)) if user.action == action]
 
@@ -108,7 +108,7 @@ def _has_keys_back(rig: bpy.types.Object, differences: bpy.types.Action, names: 
 
 
 def _timed_bones(action: bpy.types.Action) -> set[str]:
-    """The bones that an Action of one slot has times of differences for."""
+    """Return the bones that an Action of one slot has times of differences for."""
     channelbag = _only_channelbag(action) if action.is_editable else None
     return _bones_of(filter(is_time, channelbag.fcurves)) if channelbag is not None else set()
 

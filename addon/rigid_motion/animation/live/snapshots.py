@@ -29,7 +29,7 @@ class Snapshots:
         self._slots: dict[tuple[int, int], _SlotSnapshot] = {}
         """By the Action's session id, and the slot's handle."""
         self._rigs: dict[int, tuple[_Dependencies, _Poses, float]] = {}
-        """Of each rig what all its bones depend on, what they were, and on which frame, by its session id."""
+        """For each rig what all its bones depend on, what they were, and on which frame, by its session id."""
 
     def clear(self) -> None:
         """Take all for changed the next time."""
@@ -37,7 +37,7 @@ class Snapshots:
         self._rigs.clear()
 
     def edited_in(self, slot: Slot) -> list[SlotTransform]:
-        """What of all that a slot moves has other channels than before; everything where there is no telling."""
+        """Return what of all that a slot moves has other channels than before; everything where there is no telling."""
         if all(user.pose is None for user in slot.users):
             return transforms_in(slot)
         channelbag, key = slot.channelbag, (slot.action.session_uid, slot.handle)
@@ -52,7 +52,7 @@ class Snapshots:
         return transforms_with(slot, channelbag, {prefix: snapshot.curves_under(prefix) for prefix in changed})
 
     def changed_bones(self, rig: bpy.types.Object, frame: float, *, is_set: bool = True) -> list[bpy.types.PoseBone]:
-        """The bones of a rig that are other than before: how they are posed, or what moves them.
+        """Return the bones of a rig that are other than before: how they are posed, or what moves them.
 
         Along with them those of other rigs that move by slots which this one has left.
 
@@ -91,7 +91,7 @@ class _SlotSnapshot:
         self.flags, self.keys, self.modified = self._flags(), self.read_keys(), self._modified()
 
     def is_of(self, channelbag: bpy.types.ActionChannelbag) -> bool:
-        """Whether these are still the F-curves that there are, under the same data paths."""
+        """Return whether these are still the F-curves that there are, under the same data paths."""
         fcurves = list(channelbag.fcurves)
         return (
             self.address == channelbag.as_pointer()
@@ -109,16 +109,18 @@ class _SlotSnapshot:
         return changed
 
     def curves_under(self, prefix: str) -> Curves:
-        """The F-curves whose data paths begin so."""
+        """Return the F-curves whose data paths begin so."""
         indices = self.flags[-1]
         return {(self.paths[number], int(indices[number])): self.fcurves[number] for number in self.under[prefix]}
 
     def _modified(self) -> list[int]:
-        """The numbers of those that have modifiers, which may have been changed for all that can be seen here."""
+        """Return the numbers of those that have modifiers, which may have been changed for all that can be
+        seen here.
+        """
         return [number for number, modifiers in enumerate(self.modifiers) if len(modifiers)]
 
     def _flags(self) -> np.ndarray:
-        """Whether each F-curve is muted, how it goes on outside of its keys, and its index, shape (3, n)."""
+        """Return whether each F-curve is muted, how it goes on outside of its keys, and its index, shape (3, n)."""
         flags = np.empty((3, len(self.fcurves)), np.int32)
         for row, name in zip(flags, ("mute", "extrapolation", "array_index"), strict=True):
             self.channelbag.fcurves.foreach_get(name, row)
@@ -126,17 +128,18 @@ class _SlotSnapshot:
 
 
 _COLUMNS = [(prop, index) for prop, width in WIDTHS.items() for index in range(width)]
-"""What the columns of `_Poses.numbers` are, but for the last one: the rotation mode."""
+"""Properties in the columns of `_Poses.numbers`, but for the last one: the rotation mode."""
 
 SAME_VALUE = 1e-6
-"""How far a property may be from its channel, relative to its value or absolute below 1: single precision."""
+"""The distance that a property may have from its channel, relative to its value or absolute below 1:
+single precision."""
 
 
 class _Poses:
     """All about the bones of a rig that in-betweens may depend on, but for their channels."""
 
     def __init__(self, rig: bpy.types.Object, as_in: _Poses | None) -> None:
-        """Settings are those of an earlier snapshot, `as_in`, where that is of the same bones."""
+        """Take a snapshot. Settings are those of an earlier snapshot, `as_in`, where that is of the same bones."""
         bones = rig.pose.bones
         self.names, columns = bones.keys(), []
         for name, width in WIDTHS.items():
@@ -150,7 +153,7 @@ class _Poses:
         self.settings = as_in.settings if is_known else [_settings_of(bone) for bone in bones]
 
     def changed_from(self, before: _Poses) -> list[int]:
-        """The numbers of the bones, the same ones, that were otherwise before."""
+        """Return the numbers of the bones, the same ones, that were otherwise before."""
         moved = (self.numbers != before.numbers).any(axis=1).tolist()
         return [
             number
@@ -161,7 +164,7 @@ class _Poses:
     def posed_since(
         self, before: _Poses, numbers: list[int], fcurves: Iterable[bpy.types.FCurve], frame: float
     ) -> list[int]:
-        """Those of some bones that are not merely where their channels have them on another frame."""
+        """Return those of some bones that are not merely where their channels have them on another frame."""
         posed = {number for number in numbers if self.settings[number] != before.settings[number]}
         moved: dict[Channel, tuple[int, float]] = {}
         for number, column in np.argwhere(self.numbers != before.numbers).tolist():
@@ -194,7 +197,7 @@ class _Dependencies(NamedTuple):
     """The slots, and the strips that show them."""
 
     counts: list[int]
-    """How many users the Actions have, constraints among them. While these stay, so do those of the slots."""
+    """The number of users of each Action, constraints among them. While these stay, so do those of the slots."""
 
     users: list[tuple]
     """The users of each slot, and whether any of them has an NLA."""
@@ -213,12 +216,12 @@ class _Dependencies(NamedTuple):
         return cls(moved_by, counts, users, _rest_of(rig.data.bones))
 
     def is_as(self, other: _Dependencies) -> bool:
-        """Whether the bones depend on the same, however many constraints there are."""
+        """Return whether the bones depend on the same, however many constraints there are."""
         return (self.moved_by, self.users, self.rest) == (other.moved_by, other.users, other.rest)
 
 
 def _users_of(keys: set[tuple[int, int]]) -> set[bpy.types.Object]:
-    """The rigs that slots move: given by the addresses of their Actions, and their handles."""
+    """Return the rigs that slots move: given by the addresses of their Actions, and their handles."""
     addresses = {address for address, _ in keys}
     actions = [action for action in bpy.data.actions if action.as_pointer() in addresses] if keys else ()
     slots = [slot for slot in slots_in(actions) if (slot.action.as_pointer(), slot.handle) in keys]
@@ -226,7 +229,9 @@ def _users_of(keys: set[tuple[int, int]]) -> set[bpy.types.Object]:
 
 
 def _rest_of(bones: bpy.types.ArmatureBones) -> bytes:
-    """How bones are at rest, as far as it matters to any: for the axes of locations that are not the bone's own."""
+    """Return how bones are at rest, as far as it matters to any:
+    for the axes of locations that are not the bone's own.
+    """
     is_local = np.empty(len(bones), bool)
     bones.foreach_get("use_local_location", is_local)
     if is_local.all():
@@ -237,7 +242,7 @@ def _rest_of(bones: bpy.types.ArmatureBones) -> bytes:
 
 
 def _played_fcurves(rig: bpy.types.Object) -> Iterable[bpy.types.FCurve]:
-    """The F-curves of the Action that a rig plays by itself."""
+    """Return the F-curves of the Action that a rig plays by itself."""
     data = rig.animation_data
     if data is None or data.action is None or data.action_slot is None:
         return ()

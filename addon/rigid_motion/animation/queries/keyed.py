@@ -17,7 +17,7 @@ from ..transforms import WIDTHS, Refused, Transform, transform_of
 
 
 def active_place(transform: Transform, places: Iterable[SlotTransform] | None = None) -> SlotTransform | None:
-    """The slot whose keys the editors show: that of the Action, in tweak mode that of the strip.
+    """Return the slot whose keys the editors show: that of the Action, in tweak mode that of the strip.
 
     `places` are those that are known already, else all of the transform's are looked up.
     """
@@ -33,7 +33,7 @@ def active_place(transform: Transform, places: Iterable[SlotTransform] | None = 
 
 
 def active_places_of(transforms: Sequence[Transform]) -> dict[Transform, SlotTransform]:
-    """`active_place` of each that has one, by a single look."""
+    """Return `active_place` of each that has one, by a single look."""
     desired, result = set(transforms), {}
     for place in slot_transforms_of(transforms):
         for user in place.users:
@@ -44,14 +44,14 @@ def active_places_of(transforms: Sequence[Transform]) -> dict[Transform, SlotTra
 
 
 def source_of(carrier: bpy.types.Object | Transform) -> Source | None:
-    """What is keyed in the Action, None where nothing is. `Refused` where rigid motion cannot act on it."""
+    """Return what is keyed in the Action, None where nothing is. `Refused` where rigid motion cannot act on it."""
     place = active_place(transform_of(carrier))
     source = None if place is None else read(place)
     return source if source and source.channels else None
 
 
 def sources_of(places: Sequence[SlotTransform]) -> list[Source | None]:
-    """What is keyed in each of these, None where nothing is, it is refused, or a driver moves a part of it."""
+    """Return what is keyed in each of these, None where nothing is, it is refused, or a driver moves a part of it."""
     result: list[Source | None] = []
     for place, source in zip(places, keyed_in(places), strict=True):
         try:
@@ -65,7 +65,7 @@ def sources_of(places: Sequence[SlotTransform]) -> list[Source | None]:
 
 
 def key_frames(carrier: bpy.types.Object | Transform, *, selected: bool = False) -> np.ndarray:
-    """The frames of location, rotation and scale keys, or of the selected ones alone, shape (n,), rising.
+    """Return the frames of location, rotation and scale keys, or of the selected ones alone, shape (n,), rising.
 
     Keys of the channels of modes and turns count among the selected ones.
     """
@@ -75,7 +75,7 @@ def key_frames(carrier: bpy.types.Object | Transform, *, selected: bool = False)
 
 
 def modes_of(carrier: bpy.types.Object | Transform, frames: np.ndarray) -> list[str]:
-    """The modes of the segments at these frames. Without an Action, the mode that is awaited."""
+    """Return the modes of the segments at these frames. Without an Action, the mode that is awaited."""
     transform = transform_of(carrier)
     place = active_place(transform, places_of(transform))
     if place is None:
@@ -84,12 +84,12 @@ def modes_of(carrier: bpy.types.Object | Transform, frames: np.ndarray) -> list[
 
 
 def segment_modes(place: SlotTransform) -> list[str]:
-    """The modes of the segments between the keys of a slot, one after the other."""
+    """Return the modes of the segments between the keys of a slot, one after the other."""
     return [MODE_NAMES[number] for number in modes_in(place, frames_in(place)[:-1])]
 
 
 def frames_in(place: SlotTransform, *, selected: bool = False) -> np.ndarray:
-    """`key_frames` in a slot."""
+    """Return `key_frames` in a slot."""
     result = []
     transform = place.users[0]
     for channel, fcurve in place.curves.items():
@@ -106,7 +106,7 @@ def frames_in(place: SlotTransform, *, selected: bool = False) -> np.ndarray:
 
 
 def modes_in(place: SlotTransform, frames: np.ndarray) -> list[int]:
-    """The numbers of the modes at these frames; Blender's own where there is what is no mode."""
+    """Return the numbers of the modes at these frames; Blender's own where there is what is no mode."""
     fcurve = place.curves.get(place.users[0].mode_channel)
     if fcurve is None or fcurve.mute or not fcurve.keyframe_points:
         modes = [recorded_mode(place)] * len(frames)
@@ -116,7 +116,7 @@ def modes_in(place: SlotTransform, frames: np.ndarray) -> list[int]:
 
 
 def turns_in(place: SlotTransform, frames: np.ndarray) -> np.ndarray:
-    """The turns more of the segments at these frames, shape (n,)."""
+    """Return the turns more of the segments at these frames, shape (n,)."""
     fcurve = place.curves.get(place.users[0].turns_channel)
     if fcurve is None or fcurve.mute or not fcurve.keyframe_points:
         return np.zeros(len(frames))
@@ -129,7 +129,7 @@ def turns_in(place: SlotTransform, frames: np.ndarray) -> np.ndarray:
 
 
 def _mode_at(fcurve: bpy.types.FCurve, frame: float) -> int:
-    """The mode of the segment that begins on this frame, `UNKNOWN` where that is not a number."""
+    """Return the mode of the segment that begins on this frame, `UNKNOWN` where that is not a number."""
     moment = frame + 0.5 * SAME_FRAME
     if any(modifier.type != "CYCLES" for modifier in fcurve.modifiers):
         # The modes are those of the keys, whichever frames are held, and whatever is added.

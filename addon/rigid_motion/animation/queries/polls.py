@@ -19,7 +19,7 @@ _Moved = dict[str, Transform]
 
 
 def with_modes(transforms: Iterable[Transform]) -> Iterator[Transform]:
-    """Those for which another mode than Blender's own was chosen, in their slots or before they had any."""
+    """Yield those for which another mode than Blender's own was chosen, in their slots or before they had any."""
     for moved, uses in _by_carrier(transforms):
         result = {prefix for prefix, one in moved.items() if one.motion.awaited != "BLENDER"}
         yield from (moved[prefix] for prefix in result)
@@ -36,14 +36,14 @@ def with_modes(transforms: Iterable[Transform]) -> Iterator[Transform]:
 
 
 def with_in_betweens(transforms: Iterable[Transform]) -> Iterator[Transform]:
-    """Those for which in-betweens were filled in."""
+    """Yield those for which in-betweens were filled in."""
     for moved, uses in _by_carrier(transforms):
         result = {record.prefix: None for record in _records(uses) if record.digest and record.prefix in moved}
         yield from (moved[prefix] for prefix in result)
 
 
 def with_more_keys_than(transforms: Iterable[Transform], count: int) -> Iterator[Transform]:
-    """Those of which a channel of location, rotation or scale has more keys than this."""
+    """Yield those of which a channel of location, rotation or scale has more keys than this."""
     for moved, uses in _by_carrier(transforms):
         result = set()
         for path, fcurve in _curves(uses):
@@ -57,7 +57,7 @@ _Slots = list[tuple[bpy.types.Action, int]]
 
 
 def _by_carrier(transforms: Iterable[Transform]) -> Iterator[tuple[_Moved, _Slots]]:
-    """The transforms of each data-block together, and the slots that move it."""
+    """Yield the transforms of each data-block together, and the slots that move it."""
     result: dict[bpy.types.Object, _Moved] = {}
     for transform in transforms:
         result.setdefault(transform.animated, {})[transform.prefix] = transform
@@ -71,7 +71,7 @@ def _records(slots: _Slots) -> Iterator[bpy.types.PropertyGroup]:
 
 
 def _curves(slots: _Slots) -> Iterator[tuple[str, bpy.types.FCurve]]:
-    """The F-curves of slots, and their data paths."""
+    """Yield the F-curves of slots, and their data paths."""
     for action, handle in slots:
         slot = next((slot for slot in action.slots if slot.handle == handle), None)
         channelbag = None if slot is None else action_get_channelbag_for_slot(action, slot)

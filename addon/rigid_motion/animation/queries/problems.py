@@ -15,7 +15,7 @@ from ..transforms import Refused, Transform, transform_of
 
 
 def problem_of(target: bpy.types.Object | bpy.types.PoseBone | Transform) -> str:
-    """Why something does not move as its mode says, and the way out; "" where nothing is amiss."""
+    """Return why something does not move as its mode says, and the way out; "" where nothing is amiss."""
     transform = transform_of(target)
     places = slot_transforms_of([transform])
     try:

@@ -26,7 +26,7 @@ NEAR_HALF_TURN = np.radians(170.0)
 """From here on a small change of a key may send a body that turns the shortest way round the other way."""
 
 NEAR = 1e-6
-"""What differs by less is the same."""
+"""Values that differ by less are the same."""
 
 SAME_VALUE = 1e-5
 """Values of properties that differ by less are the same but for single precision."""
@@ -61,20 +61,20 @@ class SegmentFacts:
     """From its first position to its last."""
 
     long_way: bool
-    """Whether Blender's own in-betweens turn by more than half a turn where the modes turn by less: of quaternions."""
+    """True if Blender's own in-betweens turn by more than half a turn where the modes turn by less: of quaternions."""
 
     is_sure: bool
-    """Whether the keys say which way round it turns, however near to half a turn: angles do."""
+    """True if the keys say which way round it turns, however near to half a turn: angles do."""
 
     two_axes: bool
-    """Whether two Euler angles go by more than half a turn, of which the larger one decides."""
+    """True if two Euler angles go by more than half a turn, of which the larger one decides."""
 
     scales_unevenly: bool
-    """Whether it changes a scale that the modes leave to Blender, one that is not the same along all axes."""
+    """True if it changes a scale that the modes leave to Blender, one that is not the same along all axes."""
 
 
 def frame_in_action(obj: bpy.types.Object, frame: float) -> float:
-    """A frame of the scene, as the keys in the editors have it: in tweak mode those of the strip."""
+    """Return a frame of the scene, as the keys in the editors have it: in tweak mode those of the strip."""
     data = obj.animation_data
     if data is None or not data.use_tweak_mode:
         return frame
@@ -82,7 +82,7 @@ def frame_in_action(obj: bpy.types.Object, frame: float) -> float:
 
 
 def segment_at(source: Source, frame: float) -> SegmentFacts | None:
-    """The segment that a frame is in, None before the first key and after the last.
+    """Return the segment that a frame is in, None before the first key and after the last.
 
     A key is in the segment that it starts; the last one in the segment that it ends.
     """
@@ -111,20 +111,20 @@ def segment_at(source: Source, frame: float) -> SegmentFacts | None:
 
 
 def is_up_to_date(target: bpy.types.Object | Transform, source: Source) -> bool:
-    """Whether in-betweens are those of the keys as they are, which they need not be while live update is off."""
+    """Return whether in-betweens are those of the keys as they are, which they need not be while live update is off."""
     transform = transform_of(target)
     place = active_place(transform, places_of(transform))
     return place is not None and recorded_digest(place) == (source.digest if source.is_live else "")
 
 
 def parts_with_in_betweens(transform: Transform) -> set[str]:
-    """Which of location, rotation and scale in-betweens are in. `Refused` where it turns by axis and angle."""
+    """Return which of location, rotation and scale in-betweens are in. `Refused` where it turns by axis and angle."""
     filled = {channel for place in places_of(transform) for channel in place.filled}
     return {PART_OF[row] for row, channel in transform.differences.items() if channel in filled}
 
 
 def is_blended(transform: Transform) -> bool:
-    """Whether in-betweens of a bone are in an Action that strips fade in or out, or mix with what is below.
+    """Return whether in-betweens of a bone are in an Action that strips fade in or out, or mix with what is below.
 
     Blender blends the keys, and the time of the constraint beside them: that is not the blend of the poses.
     """
@@ -145,9 +145,9 @@ def is_blended(transform: Transform) -> bool:
 
 
 def has_edited_differences(transform: Transform, frame: float) -> bool:
-    """Whether something has another difference than its in-betweens on this frame of its Action.
+    """Return whether something has another difference than its in-betweens on this frame of its Action.
 
-    So it is once somebody has edited what they are in, until the frame changes.
+    So it is once what they are in was edited, until the frame changes.
     """
     if transform.has_difference_slot:
         # What a constraint adds cannot be edited.
@@ -164,12 +164,14 @@ def has_edited_differences(transform: Transform, frame: float) -> bool:
 
 
 def _components(source: Source, ends: np.ndarray) -> np.ndarray:
-    """What the channels have at both ends of a segment, shape (10, 2), as seen from within it where cycles jump."""
+    """Return what the channels have at both ends of a segment, shape (10, 2),
+    as seen from within it where cycles jump.
+    """
     return source.values_at(ends if source.cyclic is None else ends + np.array((MOMENT, -MOMENT)))
 
 
 def _deciding_key(source: Source, start: float) -> float:
-    """The key that a segment's mode hangs on."""
+    """Return the key that a segment's mode hangs on."""
     cyclic = source.cyclic
     if cyclic is None:
         return float(start)

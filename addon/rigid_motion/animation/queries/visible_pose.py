@@ -13,7 +13,7 @@ from ..writers.table import shown_differences
 
 
 def shown_components(transform: Transform) -> np.ndarray | None:
-    """How a transform is seen now, in the terms of what an animator keys.
+    """Return how a transform is seen now, in the terms of what an animator keys.
 
     Returns
     -------
@@ -39,7 +39,7 @@ def shown_components(transform: Transform) -> np.ndarray | None:
 def visible_components(
     components: np.ndarray, original: np.ndarray, difference: np.ndarray, order: str | None, parts: Collection[str]
 ) -> np.ndarray:
-    """What the properties would have to be to look the same with the original difference alone.
+    """Return what the properties would have to be to look the same with the original difference alone.
 
     Parameters
     ----------

@@ -17,10 +17,11 @@ from ..compute.components import REST
 from .transform import OWN_WORDS, Channel, Transform, channels_under
 
 CONSTRAINT = "Rigid Motion"
-"""What the constraint is called, and what its name begins with where Actions of one rig need one each."""
+"""The name of the constraint, and the beginning of its name where Actions of one rig need one each."""
 
 NEAR = 1e-4
-"""What matrices of bones differ by that are the same, having been through the space of the rig in single precision."""
+"""Matrices of bones that differ by less are the same,
+having been through the space of the rig in single precision."""
 
 _BONE = re.compile(r'pose\.bones\["((?:[^"\\]|\\.)*)"\]\.')
 
@@ -101,26 +102,26 @@ class BoneTransform(Transform):
 
 
 def shows_differences(constraint: bpy.types.Constraint) -> bool:
-    """Whether a constraint is one that differences are shown by."""
+    """Return whether a constraint is one that differences are shown by."""
     return constraint.type == "ACTION" and constraint.name.startswith(CONSTRAINT) and constraint.use_eval_time
 
 
 @lru_cache(maxsize=65536)
 def prefix_of(name: str) -> str:
-    """How the data paths of a bone's properties begin, from its object."""
+    """Return how the data paths of a bone's properties begin, from its object."""
     return f'pose.bones["{bpy.utils.escape_identifier(name)}"].'
 
 
 @lru_cache(maxsize=65536)
 def split_path(path: str) -> tuple[str, str]:
-    """The prefix of a data path, "" where it is not that of a bone's property, and the rest of it."""
+    """Return the prefix of a data path, "" where it is not that of a bone's property, and the rest of it."""
     result = _BONE.match(path)
     return (result[0], path[result.end() :]) if result else ("", path)
 
 
 @lru_cache(maxsize=65536)
 def bone_name(prefix: str) -> str:
-    """The name of the bone that data paths which begin so speak of."""
+    """Return the name of the bone that data paths which begin so speak of."""
     result = _BONE.fullmatch(prefix)
     return "" if result is None else bpy.utils.unescape_identifier(result[1])
 

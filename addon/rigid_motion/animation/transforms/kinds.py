@@ -14,7 +14,7 @@ KINDS: tuple[type[Transform], ...] = (BoneTransform, ObjectTransform, ExactObjec
 
 
 def transform_of(carrier: bpy.types.Object | bpy.types.PoseBone | Transform) -> Transform:
-    """The transform of something that Blender has, where it is none already."""
+    """Return the transform of something that Blender has, where it is none already."""
     if isinstance(carrier, Transform):
         return carrier
     for kind in KINDS:
@@ -25,11 +25,11 @@ def transform_of(carrier: bpy.types.Object | bpy.types.PoseBone | Transform) -> 
 
 @lru_cache(maxsize=65536)
 def kind_of(prefix: str) -> type[Transform] | None:
-    """The kind of what data paths that begin so lead to, None where no kind has such paths."""
+    """Return the kind of what data paths that begin so lead to, None where no kind has such paths."""
     return next((kind for kind in KINDS if kind.has_prefix(prefix)), None)
 
 
 def is_part(prefix: str) -> bool:
-    """Whether data paths that begin so lead to a part of a data-block."""
+    """Return whether data paths that begin so lead to a part of a data-block."""
     kind = kind_of(prefix)
     return kind is not None and kind.is_part

@@ -92,7 +92,7 @@ class ObjectTransform(Transform):
         return channels_under("delta_", rotation)
 
     def original_values(self, path: str) -> Sequence[float]:
-        """What one of its delta properties has without in-betweens."""
+        """Return what one of its delta properties has without in-betweens."""
         noted, now = self._recorded, getattr(self.carrier, path)[:]
         if not noted:
             return now
@@ -113,12 +113,12 @@ class ObjectTransform(Transform):
         return np.array((*values("delta_location"), *rotation, *values("delta_scale")))
 
     def is_recorded(self, filled: Iterable[Channel]) -> bool:
-        """Whether the original values of these channels are written down."""
+        """Return whether the original values of these channels are written down."""
         noted = self._recorded
         return all(_BITS[channel] & noted for channel in filled if channel in _BITS)
 
     def is_more_noted(self, filled: Iterable[Channel]) -> bool:
-        """Whether those of other channels are."""
+        """Return whether the original values of channels other than these are written down."""
         return bool(self._recorded & ~sum(_BITS[channel] for channel in set(filled) if channel in _BITS))
 
     def note_original(self, filled: Iterable[Channel], *, overwritten: bool = False) -> None:
@@ -183,7 +183,8 @@ class ObjectTransform(Transform):
 
 class ExactObjectTransform(ObjectTransform):
     """An object that is to be exact between frames. The difference is put on top of it by a constraint, as on bones:
-    samples of delta transforms lie on whole frames."""
+    samples of delta transforms lie on whole frames.
+    """
 
     has_difference_slot = True
     matrix_lacks_difference = False
@@ -203,7 +204,7 @@ class ExactObjectTransform(ObjectTransform):
 
 
 def _paths_in(bits: int) -> set[str]:
-    """The delta transforms that have any of these components."""
+    """Return the delta transforms that have any of these components."""
     return {path for (path, _), bit in _BITS.items() if bit & bits}
 
 
@@ -216,5 +217,5 @@ def _set_if_other(owner: bpy.types.bpy_struct, name: str, values: Iterable[float
 
 @cache
 def default_of(path: str) -> tuple[float, ...]:
-    """What a delta transform is where an object has none of its own."""
+    """Return what a delta transform is where an object has none of its own."""
     return tuple(bpy.types.Object.bl_rna.properties[path].default_array)

@@ -36,14 +36,16 @@ class Hierarchy:
         """The numbers of the bones, parents before their children."""
         rest = np.array([bone.matrix_local for bone in self.bones], dtype=np.float64).reshape(-1, 4, 4)
         self.rest = AffineMaps(rest[:, :3, :3], rest[:, :3, 3])
-        """Where bones are at rest, shape (bones,)."""
+        """The poses of bones at rest, shape (bones,)."""
         inverse = np.linalg.inv(rest)
         offsets = np.where((self.parents >= 0)[:, None, None], inverse[self.parents] @ rest, rest)
         self.offsets = AffineMaps(offsets[:, :3, :3], offsets[:, :3, 3])
-        """The same in the spaces of their parents at rest."""
+        """The poses of bones at rest in the spaces of their parents."""
 
     def posed(self, channels: AffineMaps) -> AffineMaps:
-        """Where bones are in the space of the rig, shape (bones, n), posed by matrices (bones, n) of their channels."""
+        """Return where bones are in the space of the rig, shape (bones, n),
+        posed by matrices (bones, n) of their channels.
+        """
         placed = AffineMaps(np.empty_like(channels.axes), np.empty_like(channels.origins))
         self.pose(range(len(self.bones)), channels, placed)
         return placed
@@ -58,7 +60,7 @@ class Hierarchy:
                 placed[number] = self.placed(number, channels[number], placed[parent] if parent >= 0 else None)
 
     def placed(self, number: int, channels: AffineMaps, above: AffineMaps | None) -> AffineMaps:
-        """Where a bone with these channels (n,) is, its parent being at `above` (n,), None where it has none."""
+        """Return where a bone with these channels (n,) is, its parent being at `above` (n,), None where it has none."""
         bone, offset, parent = self.bones[number], self.offsets[number], int(self.parents[number])
         if above is None:
             along = offset.axes if bone.use_local_location else np.eye(3)
@@ -75,7 +77,7 @@ class Hierarchy:
 def _inherited(
     bone: bpy.types.Bone, above: np.ndarray, above_at_rest: np.ndarray, offset: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray | float]:
-    """What a bone's rotation and scale are applied in, (n, 3, 3), and what its axes are scaled by in the end.
+    """Return what a bone's rotation and scale are applied in, (n, 3, 3), and what its axes are scaled by in the end.
 
     `above` are the axes (n, 3, 3) of its parent, `above_at_rest` and `offset` (3, 3) the parent's at rest and its own
     at rest in that.
@@ -106,7 +108,8 @@ def _inherited(
 
 
 def without_shear(axes: np.ndarray, *, normalise: bool = False) -> np.ndarray:
-    """Axes (n, 3, 3) made orthogonal around y as Blender does it: x and z are both turned by half of what they lack.
+    """Return axes (n, 3, 3) made orthogonal around y as Blender does it:
+    x and z are both turned by half of what they lack.
 
     The volume stays, unless they are to have the length 1.
     """
@@ -131,29 +134,29 @@ def without_shear(axes: np.ndarray, *, normalise: bool = False) -> np.ndarray:
 
 
 def _normalised(axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Axes (n, 3, 3) of length 1, and their lengths as a row each (n, 1, 3)."""
+    """Return axes (n, 3, 3) of length 1, and their lengths as a row each (n, 1, 3)."""
     lengths = _lengths(axes)
     return axes / np.where(lengths > 0.0, lengths, 1.0), lengths
 
 
 def _lengths(axes: np.ndarray) -> np.ndarray:
-    """The lengths of axes (n, 3, 3) as a row each (n, 1, 3)."""
+    """Return the lengths of axes (n, 3, 3) as a row each (n, 1, 3)."""
     return np.sqrt(np.einsum("nij,nij->nj", axes, axes))[:, None]
 
 
 def _lengths_by_volume(axes: np.ndarray) -> np.ndarray:
-    """The lengths of axes (n, 3, 3) as rows (n, 1, 3) whose product is the volume, also where there is shear."""
+    """Return the lengths of axes (n, 3, 3) as rows (n, 1, 3) whose product is the volume, also where there is shear."""
     lengths = _lengths(axes)
     product = lengths.prod(axis=-1, keepdims=True)
     return lengths * np.cbrt(np.abs(np.linalg.det(axes))[:, None, None] / np.where(product > 0.0, product, 1.0))
 
 
 def _unit(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vectors (n, 3) of length 1, and the lengths (n,) that they had. Those without a length stay zero."""
+    """Return vectors (n, 3) of length 1, and the lengths (n,) that they had. Those without a length stay zero."""
     lengths = np.sqrt(_dot(vectors, vectors))
     return vectors / np.where(lengths > 0.0, lengths, 1.0)[:, None], lengths
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Of vectors (n, 3)."""
+    """Return the dot products of vectors (n, 3)."""
     return np.einsum("ni,ni->n", a, b)

@@ -12,7 +12,7 @@ SOME_SIZE = 0.1
 
 
 def reach_of(bone: bpy.types.PoseBone) -> float:
-    """How far a bone reaches from its head at rest, in the rig's unit: its length.
+    """Return how far a bone reaches from its head at rest, in the rig's unit: its length.
 
     Importers make up the lengths of bones that nothing hangs on: such a bone reaches no further than the one before it,
     as far as that is long, or its head is from the head of that.
@@ -29,13 +29,13 @@ def metres_per_unit(scene: bpy.types.Scene) -> float:
 
 
 def size_of(matrix: object) -> float:
-    """The scale of a matrix, the same along all axes."""
+    """Return the scale of a matrix, the same along all axes."""
     return float(np.cbrt(abs(np.linalg.det(np.array(matrix)[:3, :3]))))
 
 
 def reach_at_rest(transform: Transform, known: dict[bpy.types.Bone, float]) -> float:
-    """How far a transform reaches from its origin, in the units of its channels: with all bones that hang on it, as far
-    as these stretch in one line; an object's box without its modifiers.
+    """Return how far a transform reaches from its origin, in the units of its channels: with all bones that hang on it,
+    as far as these stretch in one line; an object's box without its modifiers.
 
     `known` keeps what was found of bones.
     """
@@ -49,7 +49,7 @@ def reach_at_rest(transform: Transform, known: dict[bpy.types.Bone, float]) -> f
 
 
 def metres_per_channel_unit(transform: Transform) -> float:
-    """How many metres a unit of its channels is as it stands, 1 where its parents have no size."""
+    """Return how many metres a unit of its channels is as it stands, 1 where its parents have no size."""
     obj = transform.carrier.id_data
     space = obj if transform.is_part else obj.parent
     return metres_per_unit(bpy.context.scene) * (1.0 if space is None else size_of(space.matrix_world) or 1.0)
@@ -70,7 +70,7 @@ def _reach_of_chain(bone: bpy.types.Bone | None, known: dict[bpy.types.Bone, flo
 
 
 def _length(bone: bpy.types.Bone) -> float:
-    """How far a bone reaches that nothing hangs on: see `reach_of`."""
+    """Return how far a bone reaches that nothing hangs on: see `reach_of`."""
     length, parent = bone.length, bone.parent
     if parent is not None:
         length = min(length, max((bone.head_local - parent.head_local).length, parent.length))

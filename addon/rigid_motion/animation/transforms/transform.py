@@ -19,12 +19,12 @@ OWN_WORDS = "Rigid Motion"
 """The context of words that Blender has another translation for, or one that is too long where they are shown."""
 
 LINKED = n_("{name} is linked from another file: make it local first (Object > Relations > Make Local)")
-"""Why a data-block cannot be edited, and the way out."""
+"""The reason why a data-block cannot be edited, and the way out."""
 
 MODE_PROPERTY, TURNS_PROPERTY = "rigid_motion.mode", "rigid_motion.turns"
 
 SEGMENT_PROPERTIES = (MODE_PROPERTY, TURNS_PROPERTY)
-"""What keys say about the segments that they begin."""
+"""Properties by which keys say something about the segments that they begin."""
 
 WIDTHS = {LOCATION: 3, "rotation_quaternion": 4, "rotation_euler": 3, SCALE: 3}
 
@@ -46,65 +46,67 @@ class Transform(ABC):
     """The type of what has the properties."""
 
     is_part: ClassVar[bool]
-    """Whether it is a part of its data-block, with a name that can be changed, and not the data-block itself."""
+    """True if it is a part of its data-block, with a name that can be changed, and not the data-block itself."""
 
     has_difference_slot: ClassVar[bool]
-    """Whether its differences are in a slot of their own, where they take the place of nothing that an animator edits.
+    """True if its differences are in a slot of their own, where they take the place of nothing that an animator edits.
     Otherwise they are beside its keys, and overwrite properties whose original values are kept meanwhile."""
 
     label: ClassVar[str]
-    """What it is called in front of its mode."""
+    """The name in front of its mode."""
 
     plural: ClassVar[str]
-    """What several are called, in English."""
+    """The name of several, in English."""
 
     linked_text: ClassVar[str]
-    """Why it cannot be edited where its data-block is linked, and the way out: {name} is that of the data-block."""
+    """The reason why it cannot be edited where its data-block is linked, and the way out:
+    {name} is that of the data-block."""
 
     differing_text: ClassVar[str]
-    """Why it is not moved by in-betweens of its own: {leader} is the user of its slot whose they are."""
+    """The reason why it is not moved by in-betweens of its own: {leader} is the user of its slot whose they are."""
 
     animated: bpy.types.Object
     """The data-block whose Action it is."""
 
     carrier: bpy.types.Object | bpy.types.PoseBone
-    """What has the properties."""
+    """The object or bone that has the properties."""
 
     prefix: str = ""
     """From the data-block to the carrier, in data paths."""
 
     placed_by: ClassVar[tuple[str, ...]]
-    """How the names of operators begin that set its properties to bring what is on the screen to a certain place."""
+    """The beginnings of the names of operators that set its properties to bring what is on the screen
+    to a certain place."""
 
     stored_by: ClassVar[tuple[str, ...]]
-    """How the names of operators begin that set its properties to a whole pose, whatever they had before."""
+    """The beginnings of the names of operators that set its properties to a whole pose, whatever they had before."""
 
     matrix_lacks_difference: ClassVar[bool]
-    """Whether Blender takes the difference off where the properties are set from a matrix."""
+    """True if Blender takes the difference off where the properties are set from a matrix."""
 
     @classmethod
     @abstractmethod
     def has_prefix(cls, prefix: str) -> bool:
-        """Whether data paths that begin so lead to something of this kind."""
+        """Return whether data paths that begin so lead to something of this kind."""
 
     @classmethod
     @abstractmethod
     def in_object(cls, obj: bpy.types.Object, prefix: str) -> Transform | None:
-        """What such data paths lead to in an object, None where it has no such thing."""
+        """Return what such data paths lead to in an object, None where it has no such thing."""
 
     @classmethod
     @abstractmethod
     def difference_group(cls, prefix: str) -> str:
-        """The group of F-curves that its differences are in."""
+        """Return the group of F-curves that its differences are in."""
 
     @classmethod
     def of(cls, carrier: bpy.types.Object | bpy.types.PoseBone) -> Transform:
-        """The transform of a carrier of this kind."""
+        """Return the transform of a carrier of this kind."""
         return cls(carrier)
 
     @classmethod
     def together(cls, users: tuple[Transform, ...]) -> tuple[Transform, ...]:
-        """Users of one slot as what they are there, where all have the same differences."""
+        """Return users of one slot as what they are there, where all have the same differences."""
         return users
 
     def __eq__(self, other: object) -> bool:
@@ -129,10 +131,12 @@ class Transform(ABC):
 
     @abstractmethod
     def evaluated(self, depsgraph: bpy.types.Depsgraph) -> bpy.types.Object | bpy.types.PoseBone | None:
-        """The carrier as it was evaluated last, None where it was not there yet."""
+        """Return the carrier as it was evaluated last, None where it was not there yet."""
 
     def is_as_seen(self, _evaluated: bpy.types.Object | bpy.types.PoseBone) -> bool:
-        """Whether its properties were set to what was seen when its carrier was evaluated, difference and all."""
+        """Return whether its properties were set to what was seen when its carrier was evaluated,
+        difference and all.
+        """
         return False
 
     @property
@@ -141,7 +145,7 @@ class Transform(ABC):
 
     @property
     def motion(self) -> bpy.types.PropertyGroup:
-        """What this extension keeps on it."""
+        """The properties that this extension keeps on it."""
         return self.carrier.rigid_motion
 
     @property
@@ -178,7 +182,7 @@ class Transform(ABC):
         return self.prefix + TURNS_PROPERTY, 0
 
     def components(self) -> np.ndarray:
-        """Its properties as they are now, as the ten components of a source."""
+        """Return its properties as they are now, as the ten components of a source."""
         result = REST.copy()
         result[ROWS[LOCATION]], result[ROWS[SCALE]] = self.carrier.location, self.carrier.scale
         if self.carrier.rotation_mode == "QUATERNION":
@@ -200,16 +204,19 @@ class Transform(ABC):
 
     @abstractmethod
     def differences_for(self, rotation: str) -> dict[int, Channel]:
-        """The same for something that this property turns."""
+        """Return what `differences` does, for something that this property turns."""
 
     @abstractmethod
     def original(self) -> np.ndarray:
-        """What it has for a difference without in-betweens, as components (10,): rotation as a unit quaternion."""
+        """Return what it has for a difference without in-betweens, as components (10,):
+        rotation as a unit quaternion.
+        """
 
     @property
     def constraint_settings(self) -> dict[str, object]:
-        """How a constraint mixes its difference in: location added, rotation from the left, scale multiplied, and
-        transforms by hand see it."""
+        """The settings by which a constraint mixes its difference in: location added, rotation from the left, scale
+        multiplied, and transforms by hand see it.
+        """
         return {
             "use_eval_time": True,
             "mix_mode": "BEFORE_SPLIT",
@@ -219,13 +226,13 @@ class Transform(ABC):
 
 
 def properties_for(rotation: str) -> dict[str, str]:
-    """Location, rotation and scale, and which property each of them is, for what is turned by this one."""
+    """Return location, rotation and scale, and which property each of them is, for what is turned by this one."""
     return {LOCATION: "location", ROTATION: rotation, SCALE: "scale"}
 
 
 @cache
 def channels_under(prefix: str, rotation: str) -> dict[int, Channel]:
-    """The channels of a transform's components whose data paths begin so, by their rows."""
+    """Return the channels of a transform's components whose data paths begin so, by their rows."""
     return {
         ROWS[name].start + index: (prefix + prop, index)
         for name, prop in properties_for(rotation).items()

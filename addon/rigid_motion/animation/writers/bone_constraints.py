@@ -13,13 +13,15 @@ from .times import constraint_path, name_of, span_of
 
 
 def constraint_of(user: Transform, place: SlotTransform) -> bpy.types.ActionConstraint | None:
-    """The constraint that shows the differences of a slot on a bone."""
+    """Return the constraint that shows the differences of a slot on a bone."""
     desired = slot_of_differences(place)
     return next((one for one in user.carrier.constraints if shows_differences(one) and shown_by(one) == desired), None)
 
 
 def shown_by(constraint: bpy.types.ActionConstraint) -> tuple[bpy.types.Action | None, int]:
-    """The Action and the handle of the slot in it that a constraint shows, or will when its rig leaves Edit Mode."""
+    """Return the Action and the handle of the slot in it that a constraint shows,
+    or will when its rig leaves Edit Mode.
+    """
     handle = constraint.action_slot_handle
     if not handle and constraint.id_data.mode == "EDIT" and (slot := _last_slot(constraint)) is not None:
         handle = slot.handle
@@ -27,7 +29,7 @@ def shown_by(constraint: bpy.types.ActionConstraint) -> tuple[bpy.types.Action |
 
 
 def curves_shown_by(constraint: bpy.types.ActionConstraint, user: Transform) -> Curves:
-    """The F-curves that a constraint shows on a bone."""
+    """Return the F-curves that a constraint shows on a bone."""
     action, slot = constraint.action, constraint.action_slot
     channelbag = None if action is None or slot is None else action_get_channelbag_for_slot(action, slot)
     group = None if channelbag is None else channelbag.groups.get(user.difference_group(user.prefix))
@@ -61,14 +63,14 @@ def _last_slot(constraint: bpy.types.ActionConstraint) -> bpy.types.ActionSlot |
 
 
 def slot_of_differences(place: SlotTransform) -> tuple[bpy.types.Action, int]:
-    """The Action and the handle of the slot in it that the differences are in, 0 where there is none yet."""
+    """Return the Action and the handle of the slot in it that the differences are in, 0 where there is none yet."""
     pairs = place.slot.action.rigid_motion.bone_slots
     handle = next((pair.differences for pair in pairs if pair.handle == place.slot.handle), 0)
     return place.slot.action, handle
 
 
 def has_constraint(user: Transform, place: SlotTransform) -> bool:
-    """Whether a bone has its constraint as it has to be, or somebody took it off."""
+    """Return whether a bone has its constraint as it has to be, or it was taken off."""
     constraint = constraint_of(user, place)
     if constraint is None:
         return not _may_add_constraint(user, place)
@@ -76,7 +78,9 @@ def has_constraint(user: Transform, place: SlotTransform) -> bool:
 
 
 def has_stale_constraint(user: BoneTransform, place: SlotTransform) -> bool:
-    """Whether a bone has a constraint that shows what is shown already, or what does not move its rig any more."""
+    """Return whether a bone has a constraint that shows what is shown already,
+    or what does not move its rig any more.
+    """
     shown = [shown_by(constraint) for constraint in user.carrier.constraints if shows_differences(constraint)]
     if not shown or shown == [slot_of_differences(place)]:
         return False
@@ -84,7 +88,7 @@ def has_stale_constraint(user: BoneTransform, place: SlotTransform) -> bool:
 
 
 def _may_add_constraint(user: Transform, place: SlotTransform) -> bool:
-    """Whether a bone lacks a constraint that nobody took off it."""
+    """Return whether a bone lacks a constraint that was not taken off it."""
     name = name_of(place)
     present = user.carrier.constraints.get(name)
     return name not in user.motion.mounted.split("\n") or (present is not None and shows_differences(present))
@@ -114,7 +118,7 @@ def ensure_constraint(user: BoneTransform, place: SlotTransform) -> None:
 
 
 def _new(user: BoneTransform, index: int, name: str) -> bpy.types.ActionConstraint:
-    """A constraint of this name, at a place in the stack of a bone."""
+    """Return a constraint of this name, at a place in the stack of a bone."""
     constraints = user.carrier.constraints
     constraint = constraints.new("ACTION")
     constraint.name = name
@@ -129,7 +133,7 @@ def _new(user: BoneTransform, index: int, name: str) -> bpy.types.ActionConstrai
 def _renamed(
     constraint: bpy.types.ActionConstraint, name: str, user: BoneTransform, place: SlotTransform
 ) -> bpy.types.ActionConstraint:
-    """A constraint of another name in place of one, and channels of it in its slot.
+    """Return a constraint of another name in place of one, and channels of it in its slot.
 
     Where one is renamed, Blender renames channels of the same name as well that other slots of the rig have for
     constraints of their own, of all bones that lack them yet.
@@ -150,13 +154,13 @@ def _renamed(
 
 
 def _can_be_reused(constraint: bpy.types.ActionConstraint, user: BoneTransform, place: SlotTransform) -> bool:
-    """Whether a constraint shows a slot already, or one that does not move the rig any more."""
+    """Return whether a constraint shows a slot already, or one that does not move the rig any more."""
     shown = shown_by(constraint)
     return shown == slot_of_differences(place) or shown not in _in_use(user.animated)
 
 
 def _in_use(rig: bpy.types.Object) -> set[tuple[bpy.types.Action, int]]:
-    """The Actions of a rig, and the handles of the slots in them that differences of its bones are in."""
+    """Return the Actions of a rig, and the handles of the slots in them that differences of its bones are in."""
     return {
         (action, pair.differences)
         for action, handle, _ in uses_of(rig).values()

@@ -17,7 +17,8 @@ from ..transforms import Transform
 def channel_values(
     transform: Transform, source: Source, motion: InBetweens, added: np.ndarray | None = None
 ) -> dict[str, np.ndarray]:
-    """The values (m, channels) of the keyed properties that show the wanted poses, with the own delta transforms.
+    """Return the values (m, channels) of the keyed properties that show the desired poses,
+    with the own delta transforms.
 
     `added` is what modifiers add to the channels, shape (10, m), where that is to be in the values as well.
     """
@@ -56,7 +57,9 @@ def channel_values(
 
 
 def _with_added(source: Source, motion: InBetweens, added: np.ndarray) -> Poses:
-    """The wanted poses with what modifiers add: in location along its axes, in rotation what it turns Blender's by."""
+    """Return the desired poses with what modifiers add: in location along its axes,
+    in rotation what it turns Blender's by.
+    """
     now, then = source.values_at(source.held(motion.frames)), motion.desired
     rows = now + added
     moved = added[:3].T if source.location_axes is None else added[:3].T @ source.location_axes.T
@@ -67,7 +70,7 @@ def _with_added(source: Source, motion: InBetweens, added: np.ndarray) -> Poses:
 
 
 def components_near(source: Source, pose: Poses, near: np.ndarray) -> np.ndarray:
-    """The components that show one pose (1,) with the own delta transforms, shape (10,).
+    """Return the components that show one pose (1,) with the own delta transforms, shape (10,).
 
     The rotation is in the sign and the turn that `near` (10,) has, and so is the scale that the modes leave to Blender.
     """
@@ -86,7 +89,7 @@ def components_near(source: Source, pose: Poses, near: np.ndarray) -> np.ndarray
 
 
 def _beginning_near(first: np.ndarray, angles: np.ndarray, order: str) -> np.ndarray:
-    """The same turns as these Euler angles (m, 3), of which the first are as near to `first` (3,) as may be."""
+    """Return the same turns as these Euler angles (m, 3), of which the first are as near to `first` (3,) as may be."""
     # Half a turn more about the outer axes, and the middle one from the other side, turn alike.
     middle = "XYZ".index(order[1])
     others = angles + np.pi

@@ -10,12 +10,12 @@ from .bone_constraints import constraint_of, ensure_constraint, shown_by, slot_o
 from .times import name_of
 
 REMOVED, OTHER_SLOT, MUTED, CHANGED, NOT_FIRST, WEAK = "REMOVED", "OTHER_SLOT", "MUTED", "CHANGED", "NOT_FIRST", "WEAK"
-"""What may keep a bone from being seen where its in-betweens have it: the constraint is gone, shows another slot, is
-muted, has other settings, comes behind another constraint, or has an influence below 1."""
+"""The troubles that may keep a bone from being seen where its in-betweens have it: the constraint is gone, shows
+another slot, is muted, has other settings, comes behind another constraint, or has an influence below 1."""
 
 
 def trouble_of(user: Transform, place: SlotTransform) -> str:
-    """What is amiss with the constraint by which a bone shows the differences of a slot, "" where nothing is.
+    """Return what is amiss with the constraint by which a bone shows the differences of a slot, "" where nothing is.
 
     An influence that is animated or driven is meant so.
     """

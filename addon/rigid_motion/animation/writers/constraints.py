@@ -228,7 +228,7 @@ def _avoid_names(place: SlotTransform) -> None:
 
 
 def _channelbag(place: SlotTransform) -> bpy.types.ActionChannelbag:
-    """Where the differences of the bones of a slot are; made where there is none yet."""
+    """Return where the differences of the bones of a slot are; made where there is none yet."""
     result = place.slot.bones_channelbag
     if result is not None:
         return result
@@ -251,7 +251,7 @@ def _remove_slot_if_empty(slot: Slot) -> None:
 
 
 def _shown_on(user: Transform) -> Iterator[tuple[bpy.types.ActionConstraint, Curves, set[str]]]:
-    """The constraints that add to a user, what they show, and which of location, rotation and scale that is."""
+    """Yield the constraints that add to a user, what they show, and which of location, rotation and scale that is."""
     for constraint in user.carrier.constraints:
         if shows_differences(constraint) and constraint.enabled:
             shown = curves_shown_by(constraint, user)
@@ -267,7 +267,7 @@ def _no_difference(user: Transform) -> np.ndarray:
 
 
 def _difference_at(constraint: bpy.types.ActionConstraint, time: float, filled: Curves, user: Transform) -> np.ndarray:
-    """What a constraint adds to a bone at an evaluation time, as components (10,)."""
+    """Return what a constraint adds to a bone at an evaluation time, as components (10,)."""
     difference = _no_difference(user)
     at = constraint.frame_start + time * (constraint.frame_end - constraint.frame_start)
     for row, channel in user.differences.items():
@@ -277,7 +277,7 @@ def _difference_at(constraint: bpy.types.ActionConstraint, time: float, filled: 
 
 
 def _frame_of_a_key(place: SlotTransform) -> float:
-    """A frame on which there is no difference: that of a key, and a whole one if there is any."""
+    """Return a frame on which there is no difference: that of a key, and a whole one if there is any."""
     frames = [
         key.co.x
         for (path, _), fcurve in place.curves.items()
@@ -288,7 +288,7 @@ def _frame_of_a_key(place: SlotTransform) -> float:
 
 
 def _at_rest(channelbag: bpy.types.ActionChannelbag) -> dict[Channel, bpy.types.FCurve]:
-    """The F-curves that hold quaternions without samples."""
+    """Return the F-curves that hold quaternions without samples."""
     group = channelbag.groups.get(AT_REST)
     return {} if group is None else {(one.data_path, one.array_index): one for one in group.channels}
 
@@ -323,7 +323,7 @@ def _keep_at_rest(place: SlotTransform, points: Collection[Channel]) -> None:
 
 
 def _with_original(difference: np.ndarray, user: Transform) -> np.ndarray:
-    """A difference that comes on top of a user's original one, together with that."""
+    """Return a difference that comes on top of a user's original one, together with that."""
     original = user.original()
     if np.array_equal(original, REST):
         return difference
@@ -340,7 +340,7 @@ def _with_original(difference: np.ndarray, user: Transform) -> np.ndarray:
 
 
 def _weighted(difference: np.ndarray, influence: float, user: Transform) -> np.ndarray:
-    """A difference as the influence of a constraint lets it through."""
+    """Return a difference as the influence of a constraint lets it through."""
     if influence == 1.0:
         return difference
     location, rotation, scale = ROWS[LOCATION], ROWS[ROTATION], ROWS[SCALE]

@@ -21,7 +21,7 @@ MOST_CORNERS = 64
 """Keys that are reached in one F-curve. Blender asks all modifiers on every frame."""
 
 SHARE = 0.05
-"""What a corner makes of the tolerance at least to be worth a modifier."""
+"""The least share of the tolerance that makes a corner worth a modifier."""
 
 
 class Corners(NamedTuple):
@@ -31,11 +31,11 @@ class Corners(NamedTuple):
     """For the rows of components that lack anything."""
 
     error: float
-    """How far off the body is at keys where nothing can be added."""
+    """The error of the body at keys where nothing can be added."""
 
 
 def corners(source: Source, samples: Mapping[int, np.ndarray], layout: Layout, need: Need) -> Corners:
-    """What samples, as `differences` returns them, lack at the keys between them."""
+    """Return what samples, as `differences` returns them, lack at the keys between them."""
     if math.isinf(need.tolerance):
         return Corners({}, 0.0)
     keys = _keys(source, layout)
@@ -60,7 +60,7 @@ def corners(source: Source, samples: Mapping[int, np.ndarray], layout: Layout, n
 
 
 def _keys(source: Source, layout: Layout) -> np.ndarray:
-    """The frames of the keys between samples, (k,)."""
+    """Return the frames of the keys between samples, (k,)."""
     keys = source.key_frames
     first, last = layout.first / layout.rate, layout.last / layout.rate
     numbers = keys * layout.rate
@@ -70,7 +70,9 @@ def _keys(source: Source, layout: Layout) -> np.ndarray:
 
 
 def _at_keys(source: Source, rows: list[int], near: np.ndarray) -> np.ndarray:
-    """What the differences are at keys, shape (rows, k): the original ones, in the sign and turn near to these."""
+    """Return what the differences are at keys, shape (rows, k): the original ones,
+    in the sign and turn near to these.
+    """
     original = np.array(source.difference_at_keys)
     turning = [number for number, row in enumerate(rows) if PART_OF[row] == ROTATION]
     result = np.repeat(original[rows, None], near.shape[1], axis=1)
@@ -93,7 +95,9 @@ def _at_keys(source: Source, rows: list[int], near: np.ndarray) -> np.ndarray:
 
 
 def _knots(keys: np.ndarray, before: np.ndarray, layout: Layout) -> list[tuple[float, int]]:
-    """Frames of the F-curve between which lines run, in order, each with the number of its key; -1 for a sample."""
+    """Return frames of the F-curve between which lines run, in order, each with the number of its key;
+    -1 for a sample.
+    """
     knots: list[tuple[float, int]] = []
     shift = layout.shift * layout.rate
     for number, (key, sample) in enumerate(zip(keys.tolist(), before.tolist(), strict=True)):

@@ -80,8 +80,11 @@ class DeltaWriter(Writer):
         user.show_original()
 
     def hold(self, place: SlotTransform, beside: Sequence[SlotTransform]) -> bool:
-        """While a strip plays whose Action lacks a channel that another strip's has, Blender puts it to its default, or
-        leaves what is below: a slot without in-betweens holds its users' original differences for them."""
+        """Return whether a slot without in-betweens has come to hold its users' original differences.
+
+        It has to while a strip plays whose Action lacks a channel that another strip's has: Blender puts that to its
+        default, or leaves what is below.
+        """
         if recorded_digest(place):
             return False
         held, before = _held(place, beside), place.filled
@@ -103,7 +106,7 @@ class DeltaWriter(Writer):
 
 
 def _is_overwritten(user: ObjectTransform, filled: dict[Channel, bpy.types.FCurve]) -> bool:
-    """Whether what a user has for a difference is what in-betweens are on the frame that is shown."""
+    """Return whether what a user has for a difference is what in-betweens are on the frame that is shown."""
     frame = bpy.context.scene.frame_current_final
     return all(
         abs(user.animated.path_resolve(path)[index] - fcurve.evaluate(frame)) < 1e-6
@@ -112,7 +115,7 @@ def _is_overwritten(user: ObjectTransform, filled: dict[Channel, bpy.types.FCurv
 
 
 def _held(place: SlotTransform, beside: Sequence[SlotTransform]) -> dict[Channel, float]:
-    """The channels that a slot which is not filled in has to have, and what they hold."""
+    """Return the channels that a slot which is not filled in has to have, and what they hold."""
     in_nla = [user for user in place.users if len(user.animated.animation_data.nla_tracks)]
     first, *others = [_held_for(user, place, beside) for user in in_nla] or [{}]
     if any(held != first for held in others) or any(

@@ -74,7 +74,7 @@ def is_draft(action: bpy.types.Action) -> bool:
 
 
 def drafts_among(actions: Iterable[bpy.types.Action]) -> set[bpy.types.Action]:
-    """Those that are in draft and can be finished."""
+    """Return those that are in draft and can be finished."""
     return {action for action in actions if is_draft(action) and action.is_editable}
 
 

@@ -33,8 +33,8 @@ from .layout import Layout
 from .table import release, writer_of
 
 TOLERANCE = 0.00005
-"""How far off a body may be between frames, in metres, within a metre of its origin; and what reaches farther, by this
-part of its reach. It is half of what is promised, for bones hang on one another."""
+"""The largest error of a body between frames, in metres, within a metre of its origin; and what reaches farther, by
+this part of its reach. It is half of what is promised, for bones hang on one another."""
 
 SAME_ROTATION = 1e-4
 """Components of rotations that are one, in single precision, and far from those a turn or a sign apart."""
@@ -96,7 +96,7 @@ def finish_drafts(actions: Iterable[bpy.types.Action]) -> None:
 
 
 def _needs(readings: Sequence[tuple[SlotTransform, Source]]) -> list[Need]:
-    """How exact each of these is to be between frames: in a draft, not at all."""
+    """Return how exact each of these is to be between frames: in a draft, not at all."""
     reaches: dict[bpy.types.Bone, float] = {}
     needs = []
     for place, source in readings:
@@ -116,14 +116,14 @@ class _Edit(NamedTuple):
     source: Source
     need: Need
     layout: Layout
-    """How the samples lie."""
+    """The layout of the samples."""
 
     span: tuple[int, int]
     """The first and the last of those to be filled in."""
 
 
 def _edit_of(place: SlotTransform, source: Source, need: Need) -> _Edit | None:
-    """What has to be filled in of a place, None where all has to be."""
+    """Return what has to be filled in of a place, None where all has to be."""
     old, rate = cached_source(recorded_digest(place)), recorded(place).rate
     if old is None or old is source or old.sample_range(rate) != source.sample_range(rate):
         return None
@@ -171,7 +171,9 @@ def _fill_in_changed(edits: Sequence[_Edit]) -> list[tuple[SlotTransform, Source
 
 
 def _are_covered(samples: Samples, rows: Sequence[int]) -> bool:
-    """Whether there are F-curves for all components that differ in these samples, and samples for all F-curves."""
+    """Return whether there are F-curves for all components that differ in these samples,
+    and samples for all F-curves.
+    """
     others = samples.keys() - set(rows)
     return len(others) + len(rows) == len(samples) and all(np.ptp(samples[row][1::2]) < NOTHING for row in others)
 
@@ -195,7 +197,7 @@ def _continue(values: np.ndarray, before: np.ndarray, rows: Sequence[int], sourc
 
 
 def is_complete(place: SlotTransform, source: Source, layout: Layout | None = None) -> bool:
-    """Whether all F-curves are as they were written for a source, whose samples lie so."""
+    """Return whether all F-curves are as they were written for a source, whose samples lie so."""
     writer, channels, curves = writer_of(place), _channels(place, source), place.filled
     layout = layout or writer.layout(source, recorded(place).rate)
     written = [channels.get(row) for row in recorded_rows(place)]
@@ -233,7 +235,7 @@ def _tag(place: SlotTransform) -> None:
 
 
 def _channels(place: SlotTransform, source: Source) -> dict[int, Channel]:
-    """The channels that the differences of a source go into, by their rows."""
+    """Return the channels that the differences of a source go into, by their rows."""
     rotation = "rotation_quaternion" if source.order is None else "rotation_euler"
     return place.users[0].differences_for(rotation)
 
@@ -282,11 +284,13 @@ def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.type
 
 
 def _has_range(fcurve: bpy.types.FCurve) -> bool:
-    """Whether an F-curve begins and ends anywhere. A modifier alone makes no range, be it the time of a constraint."""
+    """Return whether an F-curve begins and ends anywhere. A modifier alone makes no range,
+    be it the time of a constraint.
+    """
     return len(fcurve.keyframe_points) > 0 or len(fcurve.sampled_points) > 0
 
 
 def _is_outside(fcurve: bpy.types.FCurve, begin: float, end: float) -> bool:
-    """Whether samples of an F-curve lie outside of these frames."""
+    """Return whether samples of an F-curve lie outside of these frames."""
     first, last = fcurve.range()
     return (first < begin or last > end) and _has_range(fcurve)

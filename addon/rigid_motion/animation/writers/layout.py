@@ -44,14 +44,14 @@ class Piece(NamedTuple):
 
 
 Pieces = Mapping[Channel, Sequence[Piece]]
-"""What is added to the samples of each channel."""
+"""The pieces that are added to the samples of each channel."""
 
 Modifier = tuple[str, dict[str, object]]
 """The type of an F-curve modifier, and its settings."""
 
 
 def _single(*values: float) -> tuple[float, ...]:
-    """Numbers as Blender keeps them."""
+    """Return numbers as Blender keeps them."""
     return tuple(np.float32(values).tolist())
 
 
@@ -71,32 +71,35 @@ class Layout:
     """The frames of the outermost samples: not outside of the keys."""
 
     cycles: Cycles | None = None
-    """How the channels repeat, and the differences with them."""
+    """The cycles by which the channels repeat, and the differences with them."""
 
     is_ring: bool = False
 
     shift: int = 0
-    """How many frames later than they are seen the samples lie, where they are looked up by a time of their own."""
+    """The number of frames that the samples lie later than they are seen,
+    where they are looked up by a time of their own."""
 
     is_apart: bool = False
-    """Whether they are: it is that which repeats and holds, then."""
+    """True if they are: it is that which repeats and holds, then."""
 
     steps: tuple[Stepped, ...] = ()
     """The frames that the channels hold, and the differences with them."""
 
     rate: int = 1
-    """How many samples a frame has, where they are apart: then the F-curve is as many times as long."""
+    """The number of samples in a frame, where they are apart: then the F-curve is as many times as long."""
 
     @classmethod
     def of(cls, source: Source) -> Layout:
-        """In an F-curve that is read as the frames pass."""
+        """Return the layout in an F-curve that is read as the frames pass."""
         first, last = source.frame_range
         cycles = source.cyclic.cycles if source.repeats else None
         return cls(first, last, _ends(source, first, last), cycles, first < 0 and cycles is None, steps=source.steps)
 
     @classmethod
     def apart(cls, source: Source, rate: int) -> Layout:
-        """In an F-curve that is looked up by a time of its own, which goes round where the channels do."""
+        """Return the layout in an F-curve that is looked up by a time of its own,
+        which goes round where the channels do.
+        """
         first, last = source.sample_range(rate)
         cycles = source.cyclic.cycles if source.repeats else None
         shift, steps = max(0, -source.frame_range[0]), source.steps
@@ -110,7 +113,7 @@ class Layout:
 
     @cached_property
     def count(self) -> int:
-        """How many samples there are in the F-curve."""
+        """The number of samples in the F-curve."""
         return self.last - self.first + (2 if self.is_ring else 1)
 
     @cached_property
@@ -122,12 +125,12 @@ class Layout:
 
     @cached_property
     def _order(self) -> np.ndarray:
-        """Which sample of the range lies on each place of the ring."""
+        """Return which sample of the range lies on each place of the ring."""
         period = self.count - 1
         return (np.arange(self.count) - self.first) % period
 
     def points(self, samples: np.ndarray) -> np.ndarray:
-        """What goes into the F-curve, from frame and value of every sample by turns."""
+        """Return frame and value of every sample in the F-curve, alternately."""
         points = samples.reshape(-1, 2)
         if self.is_ring:
             points = points[self._order]
@@ -141,7 +144,7 @@ class Layout:
         return points.ravel()
 
     def fits(self, fcurve: bpy.types.FCurve) -> bool:
-        """Whether an F-curve has its samples so, and repeats them so."""
+        """Return whether an F-curve has its samples so, and repeats them so."""
         return (
             len(fcurve.sampled_points) == self.count
             and tuple(fcurve.range()) == self.outermost
@@ -149,7 +152,7 @@ class Layout:
         )
 
     def _has_modifiers(self, fcurve: bpy.types.FCurve) -> bool:
-        """Whether it has those that all have; whatever is added to it may have to be something else by now."""
+        """Return whether it has those that all have; whatever is added to it may have to be something else by now."""
         modifiers = fcurve.modifiers[:]
         if not (modifiers or self._modifiers):
             return True
@@ -214,7 +217,7 @@ def add_modifiers(fcurve: bpy.types.FCurve, modifiers: Sequence[Modifier]) -> No
 
 
 def _are(modifiers: Sequence[bpy.types.FModifier], desired: Sequence[Modifier]) -> bool:
-    """Whether modifiers are of these types, with these settings."""
+    """Return whether modifiers are of these types, with these settings."""
     return [modifier.type for modifier in modifiers] == [kind for kind, _ in desired] and all(
         (tuple(result) if isinstance(value, tuple) else result) == value
         for modifier, (_, settings) in zip(modifiers, desired, strict=True)
@@ -224,7 +227,7 @@ def _are(modifiers: Sequence[bpy.types.FModifier], desired: Sequence[Modifier]) 
 
 
 def _ends(source: Source, first: float, last: float) -> tuple[float, float]:
-    """The frames on which the outermost samples of a source lie, which are for these."""
+    """Return the frames on which the outermost samples of a source lie, which are for these."""
     if source.goes_on and not source.repeats:
         return first, last
     begin, end = source.keyed_range

@@ -26,7 +26,7 @@ def replace_samples(
     layout: Layout | None,
     pieces: Pieces,
 ) -> tuple[Curves, list[Channel]]:
-    """Have sampled F-curves of a group hold these samples, frame and value of each by turns, and no others.
+    """Have sampled F-curves of a group hold these samples, frame and value of each alternately, and no others.
 
     Parameters
     ----------

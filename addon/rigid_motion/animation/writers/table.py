@@ -23,13 +23,14 @@ WRITERS: dict[type[Transform], Writer] = {
 
 
 def writer_of(place: SlotTransform) -> Writer:
-    """Where the differences of a transform go."""
+    """Return where the differences of a transform go."""
     return WRITERS[place.kind]
 
 
 def leave_other_way(place: SlotTransform) -> None:
     """Take the in-betweens of an object out of where they are not to be any more: it came to share a slot, or an Action
-    came to it, and so it is exact between frames, or is so no more."""
+    came to it, and so it is exact between frames, or is so no more.
+    """
     if place.kind.is_part:
         return
     kind = ObjectTransform if place.kind is ExactObjectTransform else ExactObjectTransform
@@ -54,12 +55,12 @@ def release(transforms: Iterable[Transform]) -> None:
 
 
 def shown_differences(user: Transform) -> list[tuple[np.ndarray, set[str]]]:
-    """What is on top of a transform as it is shown now: see `Writer.shown_differences`."""
+    """Return what is on top of a transform as it is shown now: see `Writer.shown_differences`."""
     return WRITERS[user.kind].shown_differences(user)
 
 
 def shown_parts(user: Transform) -> set[str]:
-    """Which of location, rotation and scale that is in."""
+    """Return which of location, rotation and scale that is in."""
     return WRITERS[user.kind].shown_parts(user)
 
 

@@ -31,55 +31,57 @@ MOST_FRAMES = 1_048_574
 """The last frame that Blender lets a constraint have."""
 
 Line = tuple[float, float]
-"""What a channel is at frame 0, and by how much it grows in a frame."""
+"""The value of a channel at frame 0, and by how much it grows in a frame."""
 
 
 def name_of(place: SlotTransform) -> str:
-    """What the constraint of a slot is called."""
+    """Return what the constraint of a slot is called."""
     return recorded(place).constraint or CONSTRAINT
 
 
 def constraint_path(place: SlotTransform, name: str) -> str:
-    """The data path of a constraint of this name."""
+    """Return the data path of a constraint of this name."""
     return f'{place.prefix}constraints["{name}"]'
 
 
 def time_path(place: SlotTransform) -> str:
-    """Where the evaluation time of a slot's constraint is."""
+    """Return the data path of the evaluation time of a slot's constraint is."""
     return f"{constraint_path(place, name_of(place))}.eval_time"
 
 
 def influence_path(place: SlotTransform) -> str:
-    """Where its influence is."""
+    """Return the data path of the influence of a slot's constraint."""
     return f"{constraint_path(place, name_of(place))}.influence"
 
 
 def time_of(place: SlotTransform) -> bpy.types.FCurve | None:
-    """The channel of its own constraint's evaluation time."""
+    """Return the channel of its own constraint's evaluation time."""
     return place.curves.get((time_path(place), 0)) if place.filled else None
 
 
 def span_of(place: SlotTransform) -> tuple[int, int]:
-    """The frames of the differences that an evaluation time of 0 and one of 1 stand for: there are more than one where
-    more than one sample is shown in a frame."""
+    """Return the frames of the differences that an evaluation time of 0 and one of 1 stand for: there are more than one
+    where more than one sample is shown in a frame.
+    """
     (_, last), rate = next(iter(place.filled.values())).range(), recorded(place).rate
     return 0, _duration(math.ceil(last / rate)) * rate
 
 
 def most_samples(source: Source) -> int:
-    """How many samples a frame can have for a constraint to show all of them."""
+    """Return how many samples a frame can have for a constraint to show all of them."""
     first, last = source.frame_range
     fit = MOST_FRAMES // _duration(last + max(0, -first))
     return min(1 << max(fit.bit_length() - 1, 0), MOST_SAMPLES)
 
 
 def _duration(last: int) -> int:
-    """The power of two that this frame of the samples is not behind."""
+    """Return the power of two that this frame of the samples is not behind."""
     return min(1 << max(last - 1, 0).bit_length(), MOST_FRAMES)
 
 
 def held_by(place: SlotTransform, beside: Sequence[SlotTransform]) -> dict[Channel, Line]:
-    """What an Action has of constraints in the NLA of a rig: of its own the influence, of the others the time too.
+    """Return what an Action has of constraints in the NLA of a rig: of its own the influence,
+    of the others the time too.
 
     The others are among what is `beside` it there.
     """
@@ -102,7 +104,9 @@ def _moves_bone(place: SlotTransform) -> bool:
 
 
 def _time_seen_from(place: SlotTransform, other: SlotTransform, rig: bpy.types.Object) -> Line:
-    """The time of another Action's constraint at frames of this one; of its first frame, where there is no one time."""
+    """Return the time of another Action's constraint at frames of this one; of its first frame,
+    where there is no one time.
+    """
     line = next((_line_of(fcurve) for fcurve in (time_of(other),) if fcurve is not None), None)
     own, others = (_frames_of(rig, one.slot) for one in (place, other))
     if line is None or own is None or others is None:
@@ -116,7 +120,7 @@ def _time_seen_from(place: SlotTransform, other: SlotTransform, rig: bpy.types.O
 
 
 def _frames_of(rig: bpy.types.Object, slot: Slot) -> Line | None:
-    """The scene's frames by those of an Action, where it plays once."""
+    """Return the scene's frames by those of an Action, where it plays once."""
     data = rig.animation_data
     lines: list[Line | None] = []
     if (data.action, data.action_slot_handle) == (slot.action, slot.handle):
@@ -150,14 +154,14 @@ def write_time(place: SlotTransform, layout: Layout) -> None:
 
 
 def write_line(place: SlotTransform, path: str, line: Line) -> bpy.types.FCurve:
-    """An F-curve beside those of a transform that is a line, without keys."""
+    """Return an F-curve beside those of a transform that is a line, without keys."""
     group = place.kind.difference_group(place.prefix)
     fcurve = place.curves[path, 0] = new_line(place.channelbag, group, (path, 0), line)
     return fcurve
 
 
 def new_line(channelbag: bpy.types.ActionChannelbag, group: str, channel: Channel, line: Line) -> bpy.types.FCurve:
-    """An F-curve in a group that is a line, without keys."""
+    """Return an F-curve in a group that is a line, without keys."""
     path, index = channel
     fcurve = channelbag.fcurves.new(path, index=index)
     generator = fcurve.modifiers.new("GENERATOR")
@@ -168,7 +172,7 @@ def new_line(channelbag: bpy.types.ActionChannelbag, group: str, channel: Channe
 
 
 def says(fcurve: bpy.types.FCurve, layout: Layout) -> bool:
-    """Whether an evaluation time goes through the samples as they lie."""
+    """Return whether an evaluation time goes through the samples as they lie."""
     if layout.cycles is None:
         return is_line(fcurve, _line(layout), layout.steps)
     kinds = [modifier.type for modifier in fcurve.modifiers]
@@ -186,12 +190,12 @@ def is_line(fcurve: bpy.types.FCurve, line: Line, steps: tuple[Stepped, ...] = (
 
 
 def _holds(fcurve: bpy.types.FCurve, steps: tuple[Stepped, ...]) -> bool:
-    """Whether the modifiers of an F-curve are one, and behind it those that hold these frames."""
+    """Return whether the modifiers of an F-curve are one, and behind it those that hold these frames."""
     return len(fcurve.modifiers) == 1 + len(steps) and (not steps or read_steps(fcurve.modifiers) == steps)
 
 
 def _line_of(fcurve: bpy.types.FCurve) -> Line | None:
-    """The line that an F-curve is, None where it is none, or has been changed."""
+    """Return the line that an F-curve is, None where it is none, or has been changed."""
     modifiers = list(fcurve.modifiers)
     plain = len(modifiers) > 0 and not (fcurve.mute or len(fcurve.keyframe_points) or len(fcurve.sampled_points))
     if not plain or modifiers[0].type != "GENERATOR" or modifiers[0].mute or modifiers[0].poly_order != 1:
@@ -200,19 +204,21 @@ def _line_of(fcurve: bpy.types.FCurve) -> Line | None:
 
 
 def _line(layout: Layout) -> Line:
-    """From frames to the evaluation times of their samples."""
+    """Return the line from frames to the evaluation times of their samples."""
     duration = _duration(layout.frames[1] + layout.shift)
     return layout.shift / duration, 1.0 / duration
 
 
 def _seams(layout: Layout) -> list[tuple[float, float]]:
-    """The outermost frames, and the evaluation times of their samples."""
+    """Return the outermost frames, and the evaluation times of their samples."""
     start, step = _line(layout)
     return [(frame, start + step * frame) for frame in layout.frames]
 
 
 def _without_offset(cycles: Cycles) -> Cycles:
-    """The difference repeats as it is also where the channels go on from where they have come."""
+    """Return cycles without offset: the difference repeats as it is also where the channels go on from
+    where they have come.
+    """
     before, after = (mode.removesuffix("_OFFSET") for mode in (cycles.before, cycles.after))
     return Cycles(before, after, cycles.before_count, cycles.after_count)
 

@@ -18,28 +18,29 @@ class Writer(ABC):
     """One way, for one kind of transform. It keeps nothing itself: all there is to it is in the file."""
 
     uses_constraints: ClassVar[bool] = False
-    """Whether constraints show the differences, which an animator can mute, move or remove."""
+    """True if constraints show the differences, which an animator can mute, move or remove."""
 
     @abstractmethod
     def layout(self, source: Source, rate: int) -> Layout:
-        """How the samples of a source lie in F-curves, so many of them a frame."""
+        """Return how the samples of a source lie in F-curves, so many of them a frame."""
 
     @abstractmethod
     def most_samples(self, source: Source) -> int:
-        """How many samples a frame there can be."""
+        """Return how many samples a frame there can be."""
 
     @abstractmethod
     def write(
         self, place: SlotTransform, points: dict[Channel, np.ndarray], layout: Layout | None, pieces: Pieces
     ) -> None:
-        """Replace the in-betweens of a transform by these samples, frame and value of each by turns, and these pieces.
+        """Replace the in-betweens of a transform by these samples and pieces.
 
-        Channels that have none are taken out; without any, its users are to be released.
+        Points are frame and value of each sample alternately. Channels that have none are taken out; without any, its
+        users are to be released.
         """
 
     @abstractmethod
     def is_shown(self, place: SlotTransform, layout: Layout, channels: Collection[Channel]) -> bool:
-        """Whether what is written in these channels, lying so, is to be seen on all users."""
+        """Return whether what is written in these channels, lying so, is to be seen on all users."""
 
     def prepare(self, place: SlotTransform) -> None:
         """Get users ready that were edited, before Blender evaluates them with what is written."""
@@ -51,21 +52,22 @@ class Writer(ABC):
 
     @abstractmethod
     def difference(self, place: SlotTransform, user: Transform, frame: float | None) -> np.ndarray:
-        """What is on top of a user on a frame of the Action, or as it is shown now.
+        """Return what is on top of a user on a frame of the Action, or as it is shown now.
 
         As components (10,): the rotation as the properties have it.
         """
 
     @abstractmethod
     def shown_differences(self, user: Transform) -> list[tuple[np.ndarray, set[str]]]:
-        """What is on top of a user as it is shown now, one behind the other, even where nothing moves it any more.
+        """Return what is on top of a user as it is shown now, one behind the other,
+        even where nothing moves it any more.
 
         Each as components (10,), and which of location, rotation and scale it is in.
         """
 
     @abstractmethod
     def shown_parts(self, user: Transform) -> set[str]:
-        """Which of location, rotation and scale they are in."""
+        """Return which of location, rotation and scale they are in."""
 
     @abstractmethod
     def hide(self, place: SlotTransform, user: Transform) -> None:
@@ -79,7 +81,9 @@ class Writer(ABC):
         """
 
     def trouble_of(self, user: Transform, place: SlotTransform) -> str:
-        """Why a user is not seen where its in-betweens have it, see `constraint_repair`; "" where nothing is amiss."""
+        """Return why a user is not seen where its in-betweens have it, see `constraint_repair`;
+        "" where nothing is amiss.
+        """
         return ""
 
     def restore(self, user: Transform, place: SlotTransform) -> None:

@@ -19,7 +19,8 @@ SAME = 1e-5
 
 
 def space_of_bone(bone: bpy.types.PoseBone, depsgraph: bpy.types.Depsgraph) -> tuple[Matrix, np.ndarray | None]:
-    """From the space of a bone's location channels into the world, as its parent is posed on the current frame.
+    """Return the map from the space of a bone's location channels into the world,
+    as its parent is posed on the current frame.
 
     Returns
     -------
@@ -49,7 +50,7 @@ def space_of_bone(bone: bpy.types.PoseBone, depsgraph: bpy.types.Depsgraph) -> t
 
 
 def followed(bone: bpy.types.PoseBone, source: Source, turned: np.ndarray | None) -> Followed:
-    """The point of a bone that its path is of."""
+    """Return the point of a bone that its path is of."""
     moves = LOCATION in source.keyed and not bone.bone.use_connect
     stays = np.zeros(3) if moves or bone.bone.use_connect else np.array(bone.location)
     tip = np.zeros(3) if moves else np.array((0.0, bone.bone.length, 0.0))
@@ -58,6 +59,6 @@ def followed(bone: bpy.types.PoseBone, source: Source, turned: np.ndarray | None
 
 
 def axis_length_of_bone(bone: bpy.types.PoseBone, source: Source) -> float:
-    """How long to draw its local axes: half as long as it is. At scale 1, where the source has a scale."""
+    """Return how long to draw its local axes: half as long as it is. At scale 1, where the source has a scale."""
     size = 0.5 * bone.bone.length
     return float(size if source.uniform_scale else size * np.abs(np.array(bone.scale)).max()) or 1.0

@@ -27,14 +27,14 @@ from .parents import Carried, Parents
 from .points import Path, trace
 
 SPARE = 64
-"""How many paths are kept that are not drawn any more."""
+"""The number of paths kept that are not drawn any more."""
 
 
 @dataclass
 class _Entry:
     path: Path | None
     digest: tuple
-    """Of all that the path depends on."""
+    """The digest of all that the path depends on."""
 
     settings: tuple
     """The part of it that is the scene's, and what stands between a bone's rotation and its location, as bytes."""
@@ -43,7 +43,7 @@ class _Entry:
     """Session id of the Action that the path was read from, 0 for none."""
 
     selected: bytes = b""
-    """Which keys of its channels were selected."""
+    """The selection among the keys of its channels."""
 
     above: frozenset[int] = frozenset()
     """Session ids of what its parents move by, where it follows them."""
@@ -56,7 +56,7 @@ _entries: OrderedDict[tuple[int, str], _Entry] = OrderedDict()
 
 
 def path_of(target: bpy.types.Object | bpy.types.PoseBone | Transform, scene: bpy.types.Scene) -> Path | None:
-    """The path of a target, as the overlay of the scene is set.
+    """Return the path of a target, as the overlay of the scene is set.
 
     None where it has none: without keys in its Action, with a single one, and where rigid motion is refused.
     """
@@ -66,7 +66,7 @@ def path_of(target: bpy.types.Object | bpy.types.PoseBone | Transform, scene: bp
 def paths_of(
     targets: Sequence[Transform], scene: bpy.types.Scene, turned: Mapping[Transform, np.ndarray | None] | None = None
 ) -> list[Path | None]:
-    """The paths of several targets. `turned` is what stands between the rotation of a bone and its location."""
+    """Return the paths of several targets. `turned` is what stands between the rotation of a bone and its location."""
     overlay = scene.rigid_motion_overlay
     settings = (
         *(overlay.mode, overlay.tick_step, overlay.axes_size, overlay.ghost_step if overlay.show_ghosts else 0),
@@ -101,7 +101,7 @@ def keep_only(drawn: int) -> None:
 
 
 def notice_selection(targets: Iterable[bpy.types.Object | Transform]) -> bool:
-    """Whether keys of these are selected otherwise than in their paths; those are looked at again then.
+    """Return whether keys of these are selected otherwise than in their paths; those are looked at again then.
 
     Selecting is no edit, so Blender's handlers are silent about it.
     """
@@ -119,7 +119,7 @@ def _identity(target: Transform) -> tuple[int, str]:
 
 
 def _selection(place: SlotTransform | None) -> bytes:
-    """Which keys are selected, channel by channel: quicker to have than their frames."""
+    """Return which keys are selected, channel by channel: quicker to have than their frames."""
     result = []
     for fcurve in place.curves.values() if place is not None else ():
         chosen = np.empty(len(fcurve.keyframe_points), bool)

@@ -48,7 +48,7 @@ MOST_VIEWS = 24
 
 @functools.cache
 def _dot_shader() -> gpu.types.GPUShader:
-    """Round dots with an outline. Those of Blender are square."""
+    """Return the shader of round dots with an outline. Those of Blender are square."""
     info = gpu.types.GPUShaderCreateInfo()
     info.push_constant("MAT4", "ModelViewProjectionMatrix")
     info.push_constant("VEC4", "color")
@@ -101,7 +101,7 @@ class _Batches:
     selected: Batch
 
     views: dict[tuple, Readable] = field(default_factory=dict)
-    """What is drawn in the views that the path was last seen in."""
+    """The parts that can be told apart in the views that the path was last seen in."""
 
     chosen: dict[tuple[str, bytes], tuple[Batch, ...]] = field(default_factory=dict)
     """Ticks and axes: their name, and which of them can be told apart in a view."""
@@ -117,7 +117,7 @@ class _Batches:
         )
 
     def readable(self, pen: _Pen, *, every_tick: bool) -> Readable:
-        """What of the path can be told apart in the view that is being drawn."""
+        """Return what of the path can be told apart in the view that is being drawn."""
         projection = np.array(gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix())
         view = projection.tobytes(), pen.size, pen.scale, every_tick
         if view not in self.views:
@@ -127,12 +127,12 @@ class _Batches:
         return self.views[view]
 
     def ticks(self, name: str, chosen: np.ndarray) -> Batch:
-        """Some of the ticks that the path has by this name."""
+        """Return some of the ticks that the path has by this name."""
         (batch,) = self._of_view(name, chosen, lambda: (_batch("POINTS", getattr(self.path, name)[chosen]),))
         return batch
 
     def axes(self, chosen: np.ndarray) -> tuple[Batch, ...]:
-        """Some of the axes: x, y, z."""
+        """Return some of the axes: x, y, z."""
         axes = self.path.axes
         return self._of_view(
             "axes", chosen, lambda: tuple(_batch("LINES", axes[chosen, axis].reshape(-1, 3)) for axis in range(3))
@@ -303,10 +303,10 @@ PLACES = (
 """The editors, what is called when one is drawn, and when."""
 
 _handles: list[tuple[type[bpy.types.Space], object]] = []
-"""What Blender knows those by."""
+"""Handles that Blender knows those by."""
 
 _complaint = ""
-"""What was wrong last."""
+"""The last problem."""
 
 
 def register() -> None:

@@ -19,7 +19,7 @@ SOLID, EDGES = 0.15, 0.55
 """Opacity of the triangles and of the edges of a ghost."""
 
 WIDTH = 1.0
-"""Of edges, in pixels at a resolution scale of 1."""
+"""The width of edges, in pixels at a resolution scale of 1."""
 
 NEAR = 0.5
 """Frames from the current one within which there is no ghost, since the thing itself is there."""

@@ -21,16 +21,16 @@ MOST_GHOSTS = 120
 """About the most ghosts of one path: where it has more, they are further apart."""
 
 MOST_EDGES = 4000
-"""What has more edges is shown without them: they would hide one another."""
+"""The most edges of something that is shown with them: more would hide one another."""
 
 MOST_TRIANGLES = 200000
-"""What has more triangles is shown by its bounding box."""
+"""The most triangles of something that is not shown by its bounding box."""
 
 GEOMETRY = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 """Types of objects that have triangles."""
 
 RING = 0.1
-"""How far along a bone its octahedron is widest, and how wide it is there, of its length."""
+"""The place along a bone where its octahedron is widest, and its width there, as parts of its length."""
 
 BOX = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
 """The edges of a bounding box, by Blender's order of its corners."""
@@ -59,7 +59,7 @@ class Ghosts:
 
 
 def ghost_frames(first: int, last: int, step: int) -> np.ndarray:
-    """The multiples of a step from the first frame to the last."""
+    """Return the multiples of a step from the first frame to the last."""
     step = max(step, -(-(last - first) // MOST_GHOSTS))
     return np.arange(-(-first // step), last // step + 1.0) * step
 
@@ -67,7 +67,7 @@ def ghost_frames(first: int, last: int, step: int) -> np.ndarray:
 def ghosts_of(
     transform: Transform, source: Source, mode: str | None, step: int, turn: np.ndarray | None, parents: Parents | None
 ) -> Ghosts:
-    """Where something is every few frames of a mode.
+    """Return where something is every few frames of a mode.
 
     `turn` is what stands between the rotation of a bone and that space, where there are no `parents`. ValueError where
     its numbers make no motion.
@@ -94,7 +94,7 @@ def _in_space(transform: Transform, maps: AffineMaps, turn: np.ndarray | None) -
 
 
 def shape_of(transform: Transform, depsgraph: bpy.types.Depsgraph) -> Shape:
-    """What ghosts of something look like."""
+    """Return what ghosts of something look like."""
     if transform.is_part:
         return octahedron(transform.carrier.bone.length)
     obj = transform.carrier.evaluated_get(depsgraph)
@@ -103,7 +103,7 @@ def shape_of(transform: Transform, depsgraph: bpy.types.Depsgraph) -> Shape:
 
 
 def octahedron(length: float) -> Shape:
-    """A bone of a length along y, as Blender draws it."""
+    """Return a bone of a length along y, as Blender draws it."""
     wide = RING * length
     head, tail = np.zeros(3), np.array((0.0, length, 0.0))
     ring = [np.array((x, wide, z)) for x, z in ((wide, wide), (-wide, wide), (-wide, -wide), (wide, -wide))]
@@ -115,7 +115,7 @@ def octahedron(length: float) -> Shape:
 
 
 def _geometry(obj: bpy.types.Object) -> Shape | None:
-    """The triangles and edges of an evaluated object; None where there are none or too many."""
+    """Return the triangles and edges of an evaluated object; None where there are none or too many."""
     mesh = obj.to_mesh()
     try:
         mesh.calc_loop_triangles()
@@ -137,7 +137,7 @@ def _read(items: bpy.types.bpy_prop_collection, name: str, kind: type, width: in
 
 
 def _plain(obj: bpy.types.Object) -> Shape:
-    """The bounding box of an object, or a cross of its axes where it has no size."""
+    """Return the bounding box of an object, or a cross of its axes where it has no size."""
     corners = np.array(obj.bound_box)
     if np.ptp(corners) > 0.0:
         return Shape(corners[np.ravel(BOX)], np.empty((0, 3)))

@@ -21,13 +21,14 @@ class PathKind(NamedTuple):
     """How the paths of one kind of transform are drawn."""
 
     space: Callable[[Carrier, bpy.types.Depsgraph], tuple[Matrix, np.ndarray | None]]
-    """Where a path leads in the world, and what stands between rotation and location in it, None where nothing does."""
+    """Returns where a path leads in the world, and what stands between rotation and location in it,
+    None where nothing does."""
 
     point: Callable[[Carrier, Source, np.ndarray | None], Followed | None]
     """The point that a path is of, None for the origin."""
 
     axis_length: Callable[[Carrier, Source], float]
-    """How long its local axes are."""
+    """Returns how long its local axes are."""
 
 
 OBJECT = PathKind(lambda obj, depsgraph: (space_of(obj, depsgraph), None), lambda *_: None, axis_length_of)

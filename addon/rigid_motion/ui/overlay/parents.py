@@ -39,7 +39,7 @@ class Carried:
         self._posed: dict[tuple[Transform, bytes], AffineMaps] = {}
 
     def read(self, transforms: Iterable[Transform]) -> dict[Transform, tuple[SlotTransform | None, Source | None]]:
-        """The place that each moves by, and what is keyed there; None where there is none."""
+        """Return the place that each moves by, and what is keyed there; None where there is none."""
         transforms = list(transforms)
         if missing := [one for one in transforms if one not in self._read]:
             places = active_places_of(missing)
@@ -48,21 +48,21 @@ class Carried:
         return {one: self._read[one] for one in transforms}
 
     def follows(self, bone: Transform) -> bool:
-        """Whether a bone follows constraints or drivers, or hangs on one that does."""
+        """Return whether a bone follows constraints or drivers, or hangs on one that does."""
         rig = bone.animated
         if rig not in self._followers:
             self._followers[rig] = not_promised(rig)
         return bone.carrier.name in self._followers[rig]
 
     def hierarchy(self, rig: bpy.types.Object) -> tuple[Hierarchy, dict[str, int]]:
-        """The bones of a rig, and their numbers by name."""
+        """Return the bones of a rig, and their numbers by name."""
         if rig not in self._hierarchies:
             numbers = {bone.name: number for number, bone in enumerate(rig.pose.bones)}
             self._hierarchies[rig] = Hierarchy(list(rig.pose.bones)), numbers
         return self._hierarchies[rig]
 
     def channels(self, transform: Transform, frames: np.ndarray) -> AffineMaps:
-        """What the channels of something say on frames (n,), with its mode."""
+        """Return what the channels of something say on frames (n,), with its mode."""
         key = transform, frames.tobytes()
         if key not in self._channels:
             _, source = self._read[transform]
@@ -73,7 +73,7 @@ class Carried:
         return self._channels[key]
 
     def posed(self, bone: bpy.types.PoseBone, frames: np.ndarray) -> AffineMaps:
-        """Where a bone is in the space of its rig on frames (n,)."""
+        """Return where a bone is in the space of its rig on frames (n,)."""
         transform = transform_of(bone)
         key = transform, frames.tobytes()
         if key not in self._posed:
@@ -100,7 +100,7 @@ class Parents:
             _moves_by_keys(one, carried) and (source is not None or not _is_keyed(place))
             for one, (place, source) in self._read.items()
         )
-        """Whether they move, and by keys alone."""
+        """True if they move, and by keys alone."""
         self.ids = {one.animated.session_uid for one in self._read}
         self.ids |= {place.slot.action.session_uid for place, _ in self._read.values() if place is not None}
         """Session ids of the data-blocks that decide on it."""
@@ -117,7 +117,7 @@ class Parents:
         return tuple(result)
 
     def spaces(self, frames: np.ndarray) -> tuple[AffineMaps, np.ndarray | None]:
-        """From the space of the target's location channels into the world.
+        """Return the maps from the space of the target's location channels into the world.
 
         Parameters
         ----------
@@ -158,7 +158,7 @@ class Parents:
 
 
 def _above(target: Transform) -> Iterator[Transform]:
-    """All that carries something: the bones that it hangs on, and the objects."""
+    """Yield all that carries something: the bones that it hangs on, and the objects."""
     obj = target.animated
     if target.is_part:
         yield from map(transform_of, target.carrier.parent_recursive)
@@ -171,7 +171,7 @@ def _above(target: Transform) -> Iterator[Transform]:
 
 
 def _moves_by_keys(transform: Transform, carried: Carried) -> bool:
-    """Whether nothing but keys of its Action has a part in where something is."""
+    """Return whether nothing but keys of its Action has a part in where something is."""
     obj = transform.animated
     if transform.is_part:
         return not carried.follows(transform)
@@ -183,7 +183,9 @@ def _moves_by_keys(transform: Transform, carried: Carried) -> bool:
 
 
 def _hangs_on_a_whole(obj: bpy.types.Object) -> bool:
-    """Whether an object hangs on nothing, on an object or on a bone: on vertices it goes where these are deformed."""
+    """Return whether an object hangs on nothing, on an object or on a bone:
+    on vertices it goes where these are deformed.
+    """
     if obj.parent is None or obj.parent_type in WHOLE_OBJECTS:
         return True
     bones = obj.parent.pose.bones if obj.parent_type == "BONE" and obj.parent.pose is not None else {}
@@ -195,7 +197,7 @@ def _is_keyed(place: SlotTransform | None) -> bool:
 
 
 def _hung(transform: Transform) -> tuple:
-    """How something hangs on its parent."""
+    """Return how something hangs on its parent."""
     if not transform.is_part:
         obj = transform.carrier
         return obj.parent_type, obj.parent_bone, tuple(map(tuple, obj.matrix_parent_inverse))

@@ -32,41 +32,41 @@ MOST = 8192
 """About the most samples, and the most ticks, of one path. Where it has more frames, samples are further apart."""
 
 TICKS, AXES = 60, 20
-"""About the most ticks of a path where nobody asked for more, and the most of them with axes."""
+"""About the most ticks of a path where no more were requested, and the most of them with axes."""
 
 
 FINENESS = 5000
-"""How many times its width a line may be wide on the screen until corners show."""
+"""The extent of a path, in widths of its line, up to which no corners show on the screen."""
 
 
 class Followed(NamedTuple):
     """Which point of something a path is of, where it is not the origin."""
 
     moves: bool
-    """Whether its location counts."""
+    """True if its location counts."""
 
     stays: np.ndarray
-    """Where it is besides, shape (3,)."""
+    """The part of its place that does not move, shape (3,)."""
 
     tip: np.ndarray
     """The point on its own axes, shape (3,)."""
 
     turned: np.ndarray | None
-    """What its rotation, and the axes with it, are turned by in the space of its location: (3, 3), or (n, 3, 3)."""
+    """The turn of its rotation, and of the axes with it, in the space of its location: (3, 3), or (n, 3, 3)."""
 
     def points(self, poses: Poses) -> np.ndarray:
-        """Where the point is at these poses, shape (n, 3)."""
+        """Return where the point is at these poses, shape (n, 3)."""
         arms = rotate(poses.quaternions, self.tip)
         if poses.scales is not None:
             arms = poses.scales[:, None] * arms
         return poses.positions * self.moves + self.stays + self.strokes(arms)
 
     def strokes(self, vectors: np.ndarray) -> np.ndarray:
-        """What vectors (n, 3) that turn with it are in the space of its location."""
+        """Return what vectors (n, 3) that turn with it are in the space of its location."""
         return vectors if self.turned is None else turned(self.turned, vectors)
 
     def at(self, places: np.ndarray) -> Followed:
-        """The same for some of the poses."""
+        """Return the point as it is followed at some of the poses."""
         return self if self.turned is None or self.turned.ndim == 2 else self._replace(turned=self.turned[places])
 
 
@@ -78,40 +78,40 @@ class Path:
     """Shape (m,), rising, with the whole frames (or as many of them as can be told apart) and the keys."""
 
     native: np.ndarray
-    """Where it is on these frames if Blender fills in, shape (m, 3)."""
+    """Places on these frames if Blender fills in, shape (m, 3)."""
 
     desired: np.ndarray | None
-    """Where it is if the mode does, shape (m, 3). None where there is no other mode than Blender's."""
+    """Places if the mode does, shape (m, 3). None where there is no other mode than Blender's."""
 
     keys: np.ndarray
     """The keys, shape (k, 3). They are the same in all modes."""
 
     selected: np.ndarray
-    """Which of the keys are selected, shape (k,)."""
+    """True for the keys that are selected, shape (k,)."""
 
     tick_frames: np.ndarray
     """Evenly spaced frames, shape (t,)."""
 
     native_ticks: np.ndarray
-    """Where Blender has it on these, shape (t, 3)."""
+    """Places on these as Blender has it, shape (t, 3)."""
 
     desired_ticks: np.ndarray | None
-    """Where the mode has it on these, shape (t, 3)."""
+    """Places on these as the mode has it, shape (t, 3)."""
 
     axis_frames: np.ndarray
-    """Those of the frames with ticks that have axes, shape (a,)."""
+    """Frames with ticks that have axes, shape (a,)."""
 
     axes: np.ndarray
-    """How it is turned on these, in the mode or else natively: the ends of its local axes, shape (a, 3, 2, 3)."""
+    """The rotation on these, in the mode or else natively: the ends of its local axes, shape (a, 3, 2, 3)."""
 
     in_world: bool = False
-    """Whether all of it is in the space of the world, and not in that of the channels."""
+    """True if all of it is in the space of the world, and not in that of the channels."""
 
     ghosts: Ghosts | None = None
-    """Where it is every few frames; None where that was not asked for."""
+    """The poses every few frames; None where that was not asked for."""
 
     def at(self, frame: float) -> tuple[np.ndarray, np.ndarray | None]:
-        """Where it is at a frame, natively and in the mode, each of shape (3,). The path holds its ends."""
+        """Return where it is at a frame, natively and in the mode, each of shape (3,). The path holds its ends."""
         after = min(max(int(self.frames.searchsorted(frame)), 1), len(self.frames) - 1)
         first, last = self.frames[after - 1], self.frames[after]
         share = min(max((frame - first) / (last - first), 0.0), 1.0)
@@ -131,7 +131,7 @@ def trace(
     followed: Followed | None = None,
     parents: Parents | None = None,
 ) -> Path | None:
-    """The path of a source, None where it has fewer than two keys.
+    """Return the path of a source, None where it has fewer than two keys.
 
     Parameters
     ----------
@@ -196,13 +196,13 @@ def trace(
 
 
 def _points(poses: Poses, followed: Followed | None, spaces: AffineMaps | None) -> np.ndarray:
-    """Where the point that a path is of is at poses (n,), in these spaces."""
+    """Return where the point that a path is of is at poses (n,), in these spaces."""
     points = poses.positions if followed is None else followed.points(poses)
     return points if spaces is None else spaces.at(points)
 
 
 def sample_frames(first: int, last: int) -> np.ndarray:
-    """Evenly spaced frames from the first to the last whole one: close enough for a path to look round."""
+    """Return evenly spaced frames from the first to the last whole one: close enough for a path to look round."""
     length = last - first
     if length > MOST:
         return np.append(np.arange(first, last, -(-length // MOST)), last).astype(np.float64)
@@ -212,14 +212,16 @@ def sample_frames(first: int, last: int) -> np.ndarray:
 
 
 def tick_frames(first: int, last: int, step: int = 0) -> np.ndarray:
-    """The multiples of a step, the same for all objects, from the first frame to the last. 0 chooses 1, 2, 5, 10..."""
+    """Return the multiples of a step, the same for all objects, from the first frame to the last.
+    0 chooses 1, 2, 5, 10...
+    """
     length = last - first
     step = max(step, -(-length // MOST)) if step else _round_step(length, TICKS)
     return np.arange(-(-first // step), last // step + 1.0) * step
 
 
 def axis_frames(ticks: np.ndarray) -> np.ndarray:
-    """Those of the ticks that have axes."""
+    """Return those of the ticks that have axes."""
     if len(ticks) < 2:
         return ticks
     step = ticks[1] - ticks[0]
@@ -227,7 +229,7 @@ def axis_frames(ticks: np.ndarray) -> np.ndarray:
 
 
 def _round_step(length: int, most: int) -> int:
-    """The least of 1, 2, 5, 10, 20... that a length has at most this many of."""
+    """Return the least of 1, 2, 5, 10, 20... that a length has at most this many of."""
     return next(
         digit * power
         for power in (10**n for n in itertools.count())
@@ -239,7 +241,7 @@ def _round_step(length: int, most: int) -> int:
 def _axes(
     points: np.ndarray, poses: Poses, length: float, followed: Followed | None, spaces: AffineMaps | None
 ) -> np.ndarray:
-    """Both ends of the local axes at each pose, from these points on, shape (n, 3, 2, 3)."""
+    """Return both ends of the local axes at each pose, from these points on, shape (n, 3, 2, 3)."""
     lengths = np.full(len(poses), length) if poses.scales is None else length * poses.scales
     strokes = lengths[:, None, None] * rotate(poses.quaternions[:, None], np.eye(3))
     for axis in range(3):
@@ -252,7 +254,7 @@ def _axes(
 
 
 def thinned(line: np.ndarray) -> np.ndarray:
-    """The points of a line without those that nobody would miss, shape (fewer, 3).
+    """Return the points of a line without those that make no visible difference, shape (fewer, 3).
 
     Every other point goes where the line stays within 1/`FINENESS` of its extent, and so on until all have to stay.
     """
@@ -273,7 +275,9 @@ def thinned(line: np.ndarray) -> np.ndarray:
 
 
 def axis_length_of(obj: bpy.types.Object, source: Source) -> float:
-    """How long to draw an object's local axes: half as long as it is. At scale 1, where the source has a scale."""
+    """Return how long to draw an object's local axes: half as long as it is. At scale 1,
+    where the source has a scale.
+    """
     if obj.type == "EMPTY":
         size = np.full(3, obj.empty_display_size)
     elif obj.type == "CAMERA":
@@ -286,7 +290,7 @@ def axis_length_of(obj: bpy.types.Object, source: Source) -> float:
 
 
 def space_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Matrix:
-    """From the space of an object's channels into the world, as its parent is on the current frame.
+    """Return the matrix from the space of an object's channels into the world, as its parent is on the current frame.
 
     For a parent that is an object: that one's evaluated matrix, and the inverse at parenting. For a bone, vertices or a
     lattice: what takes the object's evaluated location, rotation and scale to where it is seen, constraints included.

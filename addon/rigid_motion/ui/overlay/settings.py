@@ -72,7 +72,7 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
 
 
 def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """The settings of the overlay, for a panel."""
+    """Draw the settings of the overlay, for a panel."""
     settings = context.scene.rigid_motion_overlay
     if (settings.show_paths or settings.show_ghosts) and not is_shown(context):
         draw_text(context, layout, HIDDEN, "INFO")
@@ -96,7 +96,7 @@ def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
 
 
 def draw_toggle(panel: bpy.types.Panel, context: bpy.types.Context) -> None:
-    """The overlay's place among Blender's own, in the viewport's Overlays pop-over."""
+    """Draw the overlay's place among Blender's own, in the viewport's Overlays pop-over."""
     column = panel.layout.column()
     column.active = context.space_data.overlay.show_overlays and context.space_data.overlay.show_motion_paths
     column.prop(context.scene.rigid_motion_overlay, "show_paths")
@@ -104,7 +104,7 @@ def draw_toggle(panel: bpy.types.Panel, context: bpy.types.Context) -> None:
 
 
 def is_shown(context: bpy.types.Context) -> bool:
-    """Whether the scene, and the viewport if the context is in one, show paths or ghosts."""
+    """Return whether the scene, and the viewport if the context is in one, show paths or ghosts."""
     overlay, settings = getattr(context.space_data, "overlay", None), context.scene.rigid_motion_overlay
     in_view = not isinstance(overlay, bpy.types.View3DOverlay) or (overlay.show_overlays and overlay.show_motion_paths)
     return in_view and (settings.show_paths or settings.show_ghosts)

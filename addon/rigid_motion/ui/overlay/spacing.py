@@ -18,13 +18,13 @@ TICK_GAP = 14.0
 """From tick to tick where the path goes at its usual speed, at least."""
 
 AXES_GAP = 36.0
-"""The same from axes to axes."""
+"""The gap from axes to axes."""
 
 CLEAR = 9.0
 """From a tick to its neighbour, at least, and to a key."""
 
 AT_REST = 1.0
-"""What moves by less from tick to tick says nothing of the usual speed."""
+"""The least distance from tick to tick that says something of the usual speed."""
 
 STEPS = [digit * power for power in (1, 10, 100, 1000) for digit in (1, 2, 5)]
 
@@ -34,19 +34,19 @@ class Readable:
     """What of a path is drawn in a view."""
 
     native_ticks: np.ndarray
-    """Which of its ticks on Blender's path, shape (t,)."""
+    """True for its ticks that are drawn on Blender's path, shape (t,)."""
 
     desired_ticks: np.ndarray | None
-    """Which of its ticks on the mode's path, shape (t,). None without one."""
+    """True for its ticks that are drawn on the mode's path, shape (t,). None without one."""
 
     axes: np.ndarray
-    """Which of its axes, shape (a,)."""
+    """True for its axes that are drawn, shape (a,)."""
 
 
 def readable(
     path: Path, projection: np.ndarray, size: tuple[float, float], scale: float = 1.0, *, every_tick: bool = False
 ) -> Readable:
-    """What of a path can be told apart in a view.
+    """Return what of a path can be told apart in a view.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def readable(
     scale : float
         The resolution scale of the interface.
     every_tick : bool
-        Draw all ticks, since somebody asked for just these.
+        Draw all ticks, since just these were requested.
     """
 
     def pixels(points: np.ndarray) -> np.ndarray:
@@ -81,14 +81,16 @@ def readable(
 
 
 def on_screen(points: np.ndarray, projection: np.ndarray, size: tuple[float, float]) -> np.ndarray:
-    """Where points (n, 3) are in a view, in pixels, shape (n, 2). Not a number behind the viewer."""
+    """Return where points (n, 3) are in a view, in pixels, shape (n, 2). Not a number behind the viewer."""
     clip = points @ projection[:, :3].T + projection[:, 3]
     depth = np.where(clip[:, 3] > 0.0, clip[:, 3], np.nan)
     return 0.5 * (clip[:, :2] / depth[:, None] + 1.0) * size
 
 
 def _step(pixels: np.ndarray, gap: float) -> int:
-    """The first of 1, 2, 5, 10... points (n, 2) after which a path has usually gone as far as the gap, 0 for none."""
+    """Return the first of 1, 2, 5, 10... points (n, 2) after which a path has usually gone as far as
+    the gap, 0 for none.
+    """
     for step in STEPS:
         across, up = (pixels[step::step] - pixels[:-step:step]).T
         moved = np.sort(np.hypot(across, up))
@@ -101,7 +103,7 @@ def _step(pixels: np.ndarray, gap: float) -> int:
 
 
 def _spaced(pixels: np.ndarray, step: int, keys: np.ndarray, clear: float, frames: np.ndarray) -> np.ndarray:
-    """Which of these points (n, 2) are on multiples of the step, and clear of one another and of keys (k, 2)."""
+    """Return which of these points (n, 2) are on multiples of the step, and clear of one another and of keys (k, 2)."""
     chosen = np.zeros(len(pixels), dtype=bool)
     if not step:
         return chosen
