@@ -65,20 +65,20 @@ def _span(times: np.ndarray) -> str:
 
 def _as_in(clip: Clip, other: Clip, source: str) -> Poses:
     """The poses of another clip in the axes, the unit and, of a whole body, the joints of a clip."""
-    rest_bodies = clip.rest_body, other.rest_body
+    own, theirs = clip.rest_body, other.rest_body
     poses = from_blender(to_blender(other.in_metres(other.poses), other.axes), clip.axes)
     poses = Poses(poses.positions / clip.metres_per_unit, poses.quaternions, poses.scales)
-    if rest_bodies == (None, None):
+    if own is None and theirs is None:
         return poses
-    kinds = [f"a body of {len(one.joints)} joints" if one else "a single rigid body" for one in rest_bodies]
-    if None in rest_bodies:
+    if own is None or theirs is None:
+        kinds = [f"a body of {len(one.joints)} joints" if one else "a single rigid body" for one in (own, theirs)]
         raise TrajectoryError(source, f"this is {kinds[1]}, and {clip.source} {kinds[0]}", "give the same of both")
-    places = {name: place for place, name in enumerate(other.rest_body.joints)}
-    if missing := [name for name in clip.rest_body.joints if name not in places]:
+    places = {name: place for place, name in enumerate(theirs.joints)}
+    if missing := [name for name in own.joints if name not in places]:
         has = f"{clip.source} has {'it' if len(missing) == 1 else 'them'}"
         raise TrajectoryError(source, f"it has no joint {listed(missing, 5)}", has)
-    world = other.rest_body.skeleton.in_root_space(poses)[[places[name] for name in clip.rest_body.joints]]
-    parents = clip.rest_body.parents
+    world = theirs.skeleton.in_root_space(poses)[[places[name] for name in own.joints]]
+    parents = own.parents
     hanging = parents >= 0
     world[hanging] = placed(inverse(world[parents[hanging]]), world[hanging])
     return world

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from dataclasses import fields
+from typing import Any
 
 from rigid_motion_batch.axes import AXES
 from rigid_motion_batch.command_line import number
@@ -75,7 +76,7 @@ def _field(name: str, convert: Callable[[str], object]) -> Callable[[str], objec
     return lambda text: getattr(_checked(**{name: convert(text)}), name)
 
 
-def _checked(**said: object) -> ReadingOptions:
+def _checked(**said: Any) -> ReadingOptions:
     try:
         return ReadingOptions(**said)
     except ValueError as error:

@@ -8,12 +8,12 @@ are Blender units, axes are Blender's; those of a bone are its own, y along it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from difflib import SequenceMatcher
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from .key_moments import BONE_CHANNEL, curves_that_move, fcurves_of, moments_of
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .probe_scene import probe
 from .recordings import ALL, Selection, Trajectory, TrajectoryError, listed, shown
-from .rigs import LAST_FRAME, whole_body
+from .rigs import LAST_FRAME, armature_of, whole_body
 from .sampling import LEAD, OF_OBJECTS, Moments, merged, sampled
 
 if TYPE_CHECKING:
@@ -58,10 +58,11 @@ class Body:
         data = self.obj.animation_data
         if data is None:
             return None
-        ranges = [(strip.frame_start, strip.frame_end) for track in data.nla_tracks for strip in track.strips]
+        strips = [strip for track in data.nla_tracks for strip in track.strips]
+        ranges: list[tuple[float, ...]] = [(strip.frame_start, strip.frame_end) for strip in strips]
         # One that only its modifiers make has no keys, and says that they are on frame 0.
         ranges += [
-            tuple(fcurve.range())
+            fcurve.range()[:]
             for fcurve in curves_that_move(data.action, data.action_slot, bones=self.bone is not None)
             if fcurve.keyframe_points or fcurve.sampled_points
         ]
@@ -110,7 +111,7 @@ def _bones_of(objects: dict[str, bpy.types.Object]) -> Iterator[str]:
     """The bones of all armatures, as OBJECT/BONE."""
     for name, obj in objects.items():
         if obj.type == "ARMATURE":
-            yield from (f"{name}/{bone}" for bone in obj.data.bones.keys())  # noqa: SIM118 - it runs over bones
+            yield from (f"{name}/{bone}" for bone in armature_of(obj).bones.keys())  # noqa: SIM118 - it runs over bones
 
 
 def _bone_called(path: Path, requested: str, objects: dict[str, bpy.types.Object]) -> Body | None:
@@ -127,22 +128,24 @@ def _bone_called(path: Path, requested: str, objects: dict[str, bpy.types.Object
     ]
     rigs = [body for body in split if body.obj.type == "ARMATURE"]
     for body in rigs:
-        if body.bone in body.obj.data.bones:
+        if body.bone and body.bone in armature_of(body.obj).bones:
             return body
     if rigs:
-        rig, missing = rigs[0].obj, rigs[0].bone
-        problem, bones = f"{shown(rig.name)} has no bone {shown(missing)}", rig.data.bones.keys()
+        rig, missing = rigs[0].obj, rigs[0].bone or ""
+        problem, bones = f"{shown(rig.name)} has no bone {shown(missing)}", armature_of(rig).bones.keys()
         way_out = f"of its {len(bones)} bones the nearest by name: {listed(_nearest(missing, bones))}"
         raise TrajectoryError(path, problem, way_out if bones else "it has none at all")
     if split:
         obj = split[0].obj
         if obj.is_missing:
-            problem = f"{shown(obj.name)} is missing from {obj.library.filepath}"
+            library = cast("bpy.types.Library", obj.library)
+            problem = f"{shown(obj.name)} is missing from {library.filepath}"
             raise TrajectoryError(path, problem, "bring that file back, or tell Blender where it is now")
-        kind = obj.bl_rna.properties["type"].enum_items[obj.type].name
+        types = cast("bpy.types.EnumProperty", obj.bl_rna.properties["type"])
+        kind = types.enum_items[obj.type].name
         problem = f"{shown(obj.name)} has no bones, for it is no armature (its type is {kind})"
         raise TrajectoryError(path, problem, f"name the object alone with {path}:{obj.name}")
-    if alone := [rig for rig, obj in objects.items() if obj.type == "ARMATURE" and requested in obj.data.bones]:
+    if alone := [rig for rig, obj in objects.items() if obj.type == "ARMATURE" and requested in armature_of(obj).bones]:
         problem = f"no body named {shown(requested)}, only a bone of {listed(alone, FEW)}"
         raise TrajectoryError(path, problem, f"name it with {path}:{alone[0]}/{requested}")
     return None
@@ -164,7 +167,7 @@ def _sample(path: Path, body: Body, scenes: list[bpy.types.Scene], scale: float 
 
     moments, metres = _moments(path, body, scenes)
     with probe() as obj:
-        follow = obj.constraints.new("COPY_TRANSFORMS")
+        follow = cast("bpy.types.CopyTransformsConstraint", obj.constraints.new("COPY_TRANSFORMS"))
         follow.target = body.obj
         if body.bone is not None:
             follow.subtarget = body.bone
@@ -177,10 +180,10 @@ def _sample(path: Path, body: Body, scenes: list[bpy.types.Scene], scale: float 
 
 
 def _sample_whole(path: Path, rig: bpy.types.Object, scenes: list[bpy.types.Scene], scale: float | None) -> Trajectory:
-    if not rig.data.bones:
+    if not armature_of(rig).bones:
         raise TrajectoryError(path, f"{shown(rig.name)} has no bones at all", "name another object of the file")
     # What moves any bone counts.
-    moments, metres = _moments(path, Body(rig, rig.data.bones[0].name), scenes, rig.name)
+    moments, metres = _moments(path, Body(rig, armature_of(rig).bones[0].name), scenes, rig.name)
     return whole_body(path, rig, rig.name, moments, metres, scale)
 
 
@@ -238,7 +241,7 @@ def _bones_with_keys(obj: bpy.types.Object) -> list[str]:
         for fcurve in fcurves_of(action, slot)
         if (channel := BONE_CHANNEL.match(fcurve.data_path))
     }
-    return [bone.name for bone in obj.data.bones if bone.name in result]
+    return [bone.name for bone in armature_of(obj).bones if bone.name in result]
 
 
 @contextmanager
@@ -255,8 +258,9 @@ def _opened(path: Path) -> Iterator[tuple[dict[str, bpy.types.Object], list[bpy.
         yield _by_name(own, scenes), scenes
         return
     before = set(bpy.data.libraries)
+    load = cast("Callable[..., AbstractContextManager[tuple[Any, Any]]]", bpy.data.libraries.load)
     try:
-        with bpy.data.libraries.load(str(path.resolve()), link=True) as (there, here):
+        with load(str(path.resolve()), link=True) as (there, here):
             here.objects, here.scenes = list(there.objects), list(there.scenes)
     except (OSError, RuntimeError) as error:
         reason = " ".join(str(error).split())
@@ -286,7 +290,7 @@ def _without_scripts() -> Iterator[None]:
     """No Python of the file runs. The preference also switches off what Blender was started with (`-y`)."""
     import bpy
 
-    preferences = bpy.context.preferences.filepaths
+    preferences = cast("bpy.types.Preferences", bpy.context.preferences).filepaths
     allowed = preferences.use_scripts_auto_execute
     preferences.use_scripts_auto_execute = False
     try:

@@ -80,8 +80,8 @@ def calibration_pose(
     size = max(size_of(rest_body.parents, places[:, 0]), size_of(rest_body.parents, rest_body.rest.positions))
     steps = np.linalg.norm(np.diff(places, axis=1), axis=-1)
     held = int(np.argmax(steps.max(axis=0) > SAME * size)) + 1
-    joint = int(steps[:, held - 1].argmax())
-    jump, others = steps[joint, held - 1], steps[:, held:].max(initial=0.0)
+    joint = int(np.argmax(steps[:, held - 1]))
+    jump, others = steps[joint, held - 1], np.max(steps[:, held:], initial=0.0)
     speed = jump * metres / (times[held] - times[held - 1])
     described = (
         f"from there to the next {shown(rest_body.joints[joint])} jumps {jump * metres:.2g} m, and none jumps more "
@@ -119,7 +119,7 @@ def breaks(
     result = [*_gaps(times, steps, begin)]
     if len(times) >= FEWEST:
         result += _jumps(times, steps, np.concatenate(list(_lengths(poses, rest_body))) * metres, begin)
-    return sorted(result, key=lambda warning: warning.start_s)
+    return sorted(result, key=lambda warning: warning.start_s or 0.0)
 
 
 def _gaps(times: np.ndarray, steps: np.ndarray, begin: float) -> Iterator[ClipWarning]:

@@ -244,8 +244,8 @@ def _read_hierarchy(path: Path) -> tuple[list[Joint], int]:
                 offset = tuple(words.number("a number of the OFFSET") for _ in range(3))
                 if joint:
                     joint.offset = offset
-                else:
-                    joints[opened[-2]].end = offset
+                elif (carrier := opened[-2]) is not None:
+                    joints[carrier].end = offset
             case "CHANNELS" if joint and not joint.channels:
                 joint.channels = _read_channels(words)
             case "}" if opened:

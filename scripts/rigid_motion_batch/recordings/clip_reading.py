@@ -176,7 +176,8 @@ def folder_names(requested: Iterable[str]) -> list[str]:
     does how a letter with an accent is spelled in Unicode. No name begins with what spreadsheets take for a formula.
     """
     names: list[str] = []
-    unavailable, numbers = set(NOT_FOLDERS), {}
+    unavailable = set(NOT_FOLDERS)
+    numbers: dict[str, int] = {}
     for name in requested:
         safe = _safe(name)
         folded = safe.casefold()

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import cast
 
 from .options import TICKS
 
@@ -180,7 +181,7 @@ def _pose(words: list[str], unit: str, taken: set[int]) -> ColumnName | None:
     if words[place] in TURNS:
         return ColumnName("euler", words[place], unit)
     kinds = {KIND_OF[words[other]] for other in of_kinds - {place}}
-    fused, axis, fused_unit = AXIS.fullmatch(words[place]).groups()
+    fused, axis, fused_unit = cast("re.Match[str]", AXIS.fullmatch(words[place])).groups()
     if fused:
         kinds.add(KIND_OF[fused])
     elif place and len(words[place - 1]) == 1 and words[place - 1] in KIND_OF:

@@ -13,7 +13,7 @@ from pathlib import Path
 from .column_names import DEVICES, METRES, TURNS, ColumnName, column_name, unit_in
 from .options import TICKS, ReadingOptions
 from .recordings import NoMotion, TrajectoryError, listed, shown
-from .tables import is_number
+from .vector_cells import is_number
 
 POSITION = ("x", "y", "z")
 QUATERNION = ("qx", "qy", "qz", "qw")
@@ -85,7 +85,8 @@ def layout_of(cells: Sequence[str], options: ReadingOptions) -> Layout:
     if explicit.keys() >= set(needed):
         whole = {"": {}}
     # A date beside a count of seconds says the same again.
-    times = [index for index in of_kind["time"] if names[index].axis != "date"] or of_kind["time"]
+    axes = [name.axis if name else "" for name in names]
+    times = [index for index in of_kind["time"] if axes[index] != "date"] or of_kind["time"]
     times = (options.frame_rate and of_kind["frame"]) or times
     times = [explicit["t"]] if "t" in explicit else times
     if whole and of_kind["frame"] and not times:
@@ -108,7 +109,7 @@ def layout_of(cells: Sequence[str], options: ReadingOptions) -> Layout:
     units = {index: name.unit for index, name in enumerate(names) if name and name.unit}
     units |= {index: unit for index in explicit.values() if (unit := unit_in(cells[index]))}
     time = only("t", times)
-    devices = sorted(of_kind["device"], key=lambda index: DEVICES.index(names[index].axis))
+    devices = sorted(of_kind["device"], key=lambda index: DEVICES.index(axes[index]))
     devices = [explicit["device"]] if "device" in explicit else devices
     return Layout(time, options.time_unit or units.get(time, ""), where, units, tuple(devices))
 
@@ -186,7 +187,7 @@ def _missing(
     others = ",".join(f"{one}=NAME" for one in missing[:3]) + ",..." * (len(missing) > 3)
     way_out = f"known are {KNOWN}; or --columns {others}"
     if not any(names) and not explicit:
-        kind = NoMotion
+        kind: type[TrajectoryError] = NoMotion
         if all(map(is_number, cells)):
             kind = TrajectoryError
             way_out = f"write a first line of names: {','.join(('t', *needed))}"

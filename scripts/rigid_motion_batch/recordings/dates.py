@@ -17,8 +17,9 @@ import numpy as np
 
 from .options import TICKS
 from .recordings import TrajectoryError, shown
-from .tables import Table, is_number
+from .tables import Table
 from .times import earliest
+from .vector_cells import is_number
 
 MOMENT = re.compile(
     r"(?:(\d{4}-\d\d-\d\d)[T ])?(\d\d?):(\d\d)(?::(\d\d)(?:[.,](\d{1,9}))?)?(?: ?(Z|[+-]\d\d(?::?\d\d)?))?",
@@ -120,11 +121,13 @@ def _moments(table: Table, kind: Kind) -> Iterator[tuple[int, int]]:
             yield 0, MISSING
             continue
         try:
+            if match is None:
+                raise ValueError(cell)
             day, hour, minute, second, fraction, offset = match.groups()
             seconds = _minute(day, hour, minute, offset) + int(second or 0)
             if int(second or 0) > LEAP_SECOND:
                 raise ValueError(second)
-        except (AttributeError, ValueError):
+        except ValueError:
             name = "date" if kind.dated else "clock time"
             raise TrajectoryError(
                 table.path, f"t is {shown(cell, LONGEST_SHOWN)}, not a {name}", way_out, number

@@ -63,7 +63,8 @@ class _Records:
         self.unpacked = 0
 
     def walk(self) -> None:
-        place, ends = FIRST, []
+        place = FIRST
+        ends: list[int] = []
         zeros = self.head.size
         try:
             while True:

@@ -12,7 +12,7 @@ import json
 import shutil
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -63,7 +63,8 @@ def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE
     refuse_too_large(path)
     content = path.read_bytes()
     try:
-        chunks = dict(reversed(chunks_of(content))) if content.startswith(MAGIC) else {JSON_CHUNK: content}
+        parts = dict(reversed(chunks_of(content))) if content.startswith(MAGIC) else {JSON_CHUNK: content}
+        chunks = cast(dict[bytes, bytes], parts)  # parts of bytes are bytes
         document = parsed(chunks[JSON_CHUNK])
         others = _buffers(path, document)
     except GltfError as error:

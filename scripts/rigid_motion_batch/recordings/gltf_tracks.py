@@ -54,7 +54,7 @@ def straightened(document: dict[str, Any], bytes_of: Callable[[int], bytes]) -> 
         Seconds at which there are keys now, and no track had one before.
     """
     made = _Made(document, bytes_of)
-    lists = [document.get(name) for name in ("buffers", "bufferViews", "accessors", "animations")]
+    lists: list[Any] = [document.get(name) for name in ("buffers", "bufferViews", "accessors", "animations")]
     for animation in lists[-1] if all(isinstance(some, list) for some in lists) else ():
         try:
             turns = {

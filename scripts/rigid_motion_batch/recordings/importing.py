@@ -10,11 +10,12 @@ from __future__ import annotations
 import io
 import re
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import ModuleType
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from rigid_motion_batch.silencing import silenced
 
 from .key_moments import BONE_CHANNEL, curves_that_move, fcurves_of, keys_of, moments_of, with_parents
 from .recordings import ALL, NoMotion, Selection, Trajectory, TrajectoryError, listed
-from .rigs import LAST_FRAME, joints_of, refuse_too_many, single_joints, whole_body
+from .rigs import LAST_FRAME, armature_of, joints_of, refuse_too_many, single_joints, whole_body
 from .sampling import LEAD, SAME, Moments, away, merged
 from .tables import LARGEST_FILE
 
@@ -129,7 +130,7 @@ def _read(
     if not moving:
         problem = "no skeleton that moves" if rigs else "no skeleton"
         raise NoMotion(path, f"{problem} in this file", "export the armature together with its animation")
-    bones = {name: rig.data.bones.keys() for name, rig in rigs.items()}
+    bones = {name: armature_of(rig).bones.keys() for name, rig in rigs.items()}
     selection.match([*rigs, *(bone for own in bones.values() for bone in own)])
     selection.match(f"{name}/{bone}" for name, own in bones.items() for bone in own)
     name, bone = _requested(rigs, moving, selection.requested)
@@ -150,26 +151,27 @@ def _read(
         several = single_joints(path, rig, taken, moments, scale)
         return [_with_remarks(several[0], joints.remark, *remarks), *several[1:]]
     known = bone in joints.names or bone in joints.left_out
-    selection.of(joints.names, unlisted=[*joints.left_out, *([selection.requested] if known else [])])
+    unlisted = [*joints.left_out, *([selection.requested or ""] if known else [])]
+    (requested,) = selection.of(joints.names, unlisted)
     (motion,) = single_joints(path, rig, [bone], moments, scale)
-    return [_with_remarks(replace(motion, name=selection.requested), *remarks)]
+    return [_with_remarks(replace(motion, name=requested), *remarks)]
 
 
 def _requested(
-    rigs: dict[str, bpy.types.Object], moving: dict[str, object], requested: str | None
+    rigs: dict[str, bpy.types.Object], moving: Mapping[str, object], requested: str | None
 ) -> tuple[str, str | None]:
     """The armature that is meant and its bone, or None for the whole."""
-    largest = max(moving, key=lambda name: len(rigs[name].data.bones))
+    largest = max(moving, key=lambda name: len(armature_of(rigs[name]).bones))
     if requested in (None, ALL):
         return largest, None
     in_order = sorted(rigs, key=lambda name: name != largest)
     for name in in_order:
-        if requested in rigs[name].data.bones:
+        if requested in armature_of(rigs[name]).bones:
             return name, requested
     if requested in rigs:
         return requested, None
     for name in in_order:
-        if requested.startswith(f"{name}/") and requested[len(name) + 1 :] in rigs[name].data.bones:
+        if requested.startswith(f"{name}/") and requested[len(name) + 1 :] in armature_of(rigs[name]).bones:
             return name, requested[len(name) + 1 :]
     return largest, requested
 
@@ -182,7 +184,7 @@ def _remarks(
         others = listed([other for other in rigs if other != name], FEW)
         yield f"took {name} of {len(rigs)} armatures; others: {others}"
     data = rig.animation_data
-    if data and data.action and (takes := _other_takes(rig, scene)):
+    if data and data.action and (takes := _other_takes(rig, data.action, scene)):
         yield f"took its take {data.action.name}; others: {listed(takes, FEW)}"
 
 
@@ -243,11 +245,11 @@ def _moments(rig: bpy.types.Object, first: float, last: float, fps: float, step:
     return Moments(frames, fps, first, step, straight and not len(made))
 
 
-def _other_takes(rig: bpy.types.Object, scene: bpy.types.Scene) -> list[str]:
+def _other_takes(rig: bpy.types.Object, own: bpy.types.Action, scene: bpy.types.Scene) -> list[str]:
     """Other Actions that move its bones, of those that the importer has made after the scene."""
     import bpy
 
-    own, bones, result = rig.animation_data.action, set(rig.data.bones.keys()), []
+    bones, result = set(armature_of(rig).bones.keys()), []
     for action in bpy.data.actions:
         if action != own and action.session_uid > scene.session_uid:
             curves = (fcurve for slot in action.slots for fcurve in fcurves_of(action, slot))
@@ -328,7 +330,8 @@ def enabled(path: Path, addon: str) -> Iterator[None]:
     _, loaded = addon_utils.check(addon)
     if not loaded:
         with silenced():
-            module = addon_utils.enable(addon, default_set=False)
+            enable = cast("Callable[..., ModuleType | None]", addon_utils.enable)
+            module = enable(addon, default_set=False)
         if module is None:
             raise TrajectoryError(path, f"this Blender has no add-on {addon}", "take a Blender that has it")
     try:

@@ -84,7 +84,8 @@ class Size:
 
     @property
     def extent(self) -> tuple[float, float, float]:
-        return tuple(high - low for low, high in zip(self.lowest, self.highest, strict=True))
+        low, high = self.lowest, self.highest
+        return high[0] - low[0], high[1] - low[1], high[2] - low[2]
 
 
 @dataclass(frozen=True)
@@ -257,7 +258,7 @@ def _up(clip: Clip) -> str:
     if clip.rest_body is not None:
         places = clip.rest_body.skeleton.in_root_space(clip.poses[:, :1]).positions[:, 0]
         extents = np.ptp(places, axis=0)
-        largest = int(extents.argmax())
+        largest = int(np.argmax(extents))
         return "xyz"[largest] if extents[largest] > 1.5 * np.delete(extents, largest).max() else ""
     low, high = np.percentile(clip.poses.positions * clip.metres_per_unit, (1.0, 99.0), axis=0)
     above = (low > ABOVE_THE_FLOOR[0]) & (high < ABOVE_THE_FLOOR[1])

@@ -6,7 +6,7 @@ Frames are those of the scene: keys in strips are where the strips put them, sca
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -80,9 +80,10 @@ def keys_of(fcurve: bpy.types.FCurve) -> Keys:
 
 def with_parents(obj: bpy.types.Object) -> Iterator[bpy.types.Object]:
     """An object, and what it hangs on."""
-    while obj is not None:
-        yield obj
-        obj = obj.parent
+    one: bpy.types.Object | None = obj
+    while one is not None:
+        yield one
+        one = one.parent
 
 
 def moments_of(obj: bpy.types.Object, lead: float) -> tuple[np.ndarray, bool]:
@@ -114,7 +115,7 @@ def moments_of(obj: bpy.types.Object, lead: float) -> tuple[np.ndarray, bool]:
     return np.concatenate(result), straight
 
 
-def _of_strips(strips: bpy.types.NlaStrips, lead: float) -> Iterator[np.ndarray]:
+def _of_strips(strips: Iterable[bpy.types.NlaStrip], lead: float) -> Iterator[np.ndarray]:
     for strip in strips:
         yield np.array([strip.frame_start - lead, strip.frame_start, strip.frame_end])
         yield np.array([strip.frame_start + strip.blend_in, strip.frame_end - strip.blend_out])

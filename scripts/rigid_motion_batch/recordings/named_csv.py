@@ -9,7 +9,7 @@ is `Trajectory.metres_per_unit`. Euler angles need their order from the user.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
 from pathlib import Path
@@ -119,8 +119,8 @@ def _find_header(path: Path, options: ReadingOptions) -> tuple[HeaderLine, Layou
         for line in lines:
             try:
                 result.append((line, layout_of(line.cells, options)))
-            except ColumnProblem as problem:
-                problems.append((problem, line.number))
+            except ColumnProblem as error:
+                problems.append((error, line.number))
             if result and is_first:
                 return result[0]
     if len(result) == 1:
@@ -131,10 +131,10 @@ def _find_header(path: Path, options: ReadingOptions) -> tuple[HeaderLine, Layou
         raise TrajectoryError(
             path, problem, "make a file of each table, without what is before it", result[0][0].number
         )
-    problem, number = max(problems, key=lambda known: known[0].known)
-    if not problem.known:
-        problem, number = problems[-1]
-    raise problem.at(path, number)
+    nearest, number = max(problems, key=lambda known: known[0].known)
+    if not nearest.known:
+        nearest, number = problems[-1]
+    raise nearest.at(path, number)
 
 
 def _bodies(path: Path, header: HeaderLine, layout: Layout, named: bool) -> list[_Body]:
@@ -147,16 +147,14 @@ def _bodies(path: Path, header: HeaderLine, layout: Layout, named: bool) -> list
         for prefix, columns in layout.bodies.items()
     ]
     names = unique([name for name, *_ in bodies])
-    return [_Body(name, *rest) for name, (_, *rest) in zip(names, bodies, strict=True)]
+    return [_Body(name, prefix, columns, rows) for name, (_, prefix, columns, rows) in zip(names, bodies, strict=True)]
 
 
 def _devices(table: Table, named: bool) -> dict[str, np.ndarray | slice]:
     """The rows of each device: of the first column that tells several apart, or else that tells the one there is."""
     only = ""
     for column in table.columns:
-        codes: dict[str, int] = {}
-        cells = takewhile(lambda _, codes=codes: len(codes) <= MOST_DEVICES, table.cells(column))
-        of_rows = np.fromiter((codes.setdefault(text, len(codes)) for _, text in cells), np.int64)
+        codes, of_rows = _codes(table.cells(column))
         if len(codes) > MOST_DEVICES and named:
             problem = f"more than {MOST_DEVICES} different values in the column of devices"
             raise TrajectoryError(table.path, problem, "name another with --columns device=NAME", table.header)
@@ -168,6 +166,13 @@ def _devices(table: Table, named: bool) -> dict[str, np.ndarray | slice]:
             return dict(zip(codes, rows, strict=True))
         only = only or next(iter(codes), "")
     return {only: slice(None)}
+
+
+def _codes(cells: Iterator[tuple[int, str]]) -> tuple[dict[str, int], np.ndarray]:
+    """A number for each text, of up to so many as there may be devices and one more, and those of the rows."""
+    codes: dict[str, int] = {}
+    rows = takewhile(lambda _: len(codes) <= MOST_DEVICES, cells)
+    return codes, np.fromiter((codes.setdefault(text, len(codes)) for _, text in rows), np.int64)
 
 
 def _trajectory(
@@ -193,7 +198,7 @@ def _radians(
 ) -> tuple[np.ndarray, tuple[ClipWarning, ...]]:
     """Angles of shape (n, 3) as radians, and what is hard to believe of them."""
     largest = float(np.nanmax(np.abs(angles), initial=0.0, where=np.isfinite(angles)))
-    warnings = ()
+    warnings: tuple[ClipWarning, ...] = ()
     if options.degrees and len(angles) and 0.0 < largest <= SMALLEST_DEGREES:
         text = f"its angles are all within {largest:.3g} degrees"
         warnings = (ClipWarning(text, "radians need no --degrees"),)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rigid_motion.motion import Poses, Skeleton
 from rigid_motion.motion.repair import LARGEST
 
 from . import aframe, blend, bvh, euroc, fbx, gltf, motive, named_csv, tum
@@ -141,7 +142,7 @@ def _sized(path: Path, trajectory: Trajectory, *, told: bool) -> Trajectory:
     """A whole body in the unit that it is likely to be in by its size, where that is not told or cannot be."""
     if trajectory.rest_body is None:
         return trajectory
-    places = _first_whole(trajectory)
+    places = _first_whole(trajectory.rest_body.skeleton, trajectory.poses)
     if places is None:
         return trajectory
     size = size_of(trajectory.rest_body.parents, places) * trajectory.metres_per_unit
@@ -160,13 +161,12 @@ def _sized(path: Path, trajectory: Trajectory, *, told: bool) -> Trajectory:
     return replace(trajectory, metres_per_unit=trajectory.metres_per_unit * length, remark=remark, warnings=warnings)
 
 
-def _first_whole(trajectory: Trajectory) -> np.ndarray | None:
-    """Where the joints of a body are in the first sample without damage, shape (joints, 3)."""
-    skeleton = trajectory.rest_body.skeleton
-    for first in range(0, len(trajectory.times), LOOKED_AT):
+def _first_whole(skeleton: Skeleton, poses: Poses) -> np.ndarray | None:
+    """Where the joints of a body (joints, n) are in the first sample without damage, shape (joints, 3)."""
+    for first in range(0, poses.shape[1], LOOKED_AT):
         # What is not finite, or far beyond all measure, is for the repair to say.
         with np.errstate(invalid="ignore", over="ignore"):
-            places = skeleton.in_root_space(trajectory.poses[:, first : first + LOOKED_AT]).positions
+            places = skeleton.in_root_space(poses[:, first : first + LOOKED_AT]).positions
         whole = np.flatnonzero((np.abs(places) < LARGEST).all(axis=(0, 2)))
         if len(whole):
             return places[:, whole[0]]
@@ -245,6 +245,6 @@ def format_of(path: Path) -> Format:
             head = file.read(HEAD)
         lines = head.decode(encoding_of(head), errors="replace").splitlines() or [""]
         for candidate in candidates[:-1]:
-            if candidate.recognises(lines):
+            if candidate.recognises and candidate.recognises(lines):
                 return candidate
     return candidates[-1]

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -55,9 +55,14 @@ class Joints:
         return f"took the {count} bones that deform of {count + len(self.left_out)}" if self.left_out else ""
 
 
+def armature_of(rig: bpy.types.Object) -> bpy.types.Armature:
+    """The data of an object that is an armature."""
+    return cast("bpy.types.Armature", rig.data)
+
+
 def joints_of(rig: bpy.types.Object) -> Joints:
     """The bones that deform, if any do, or else all; parents before their children."""
-    bones = list(rig.data.bones)  # Blender lists the hierarchy from its roots on.
+    bones = list(armature_of(rig).bones)  # Blender lists the hierarchy from its roots on.
     kept = [bone for bone in bones if bone.use_deform] or bones
     numbers = {bone.name: number for number, bone in enumerate(kept)}
     nearest: dict[str, int] = {}
@@ -136,7 +141,7 @@ def _metres(rig: bpy.types.Object, metres_per_unit: float) -> float:
     """The length of the unit that a rig is likely to be in, from where its joints rest."""
     joints, there = joints_of(rig), _matrix(rig)
     with np.errstate(invalid="ignore", over="ignore"):
-        heads = np.array([rig.data.bones[name].head_local for name in joints.names]) @ there[:3, :3].T
+        heads = np.array([armature_of(rig).bones[name].head_local for name in joints.names]) @ there[:3, :3].T
         size = size_of(joints.parents, heads) * metres_per_unit
     return metres_per_unit * (unit_of(size)[1] if np.isfinite(size) else 1.0)
 
@@ -148,12 +153,13 @@ def looking(
     """Look at bones in the world, with everything that moves them; `followed` are evaluated as well."""
     with probe() as obj:
         # The bones are evaluated that something depends on.
-        held = obj.constraints.new("ARMATURE")
+        held = cast("bpy.types.ArmatureConstraint", obj.constraints.new("ARMATURE"))
         for bone in bones:
             target = held.targets.new()
             target.target, target.subtarget = rig, bone
         for other in followed:
-            obj.constraints.new("COPY_TRANSFORMS").target = other
+            copying = cast("bpy.types.CopyTransformsConstraint", obj.constraints.new("COPY_TRANSFORMS"))
+            copying.target = other
         yield _Look(path, rig, bones, followed)
 
 
@@ -182,18 +188,19 @@ class _Look:
         count = len(self.bones)
         poses = Poses(np.empty((count, len(frames), 3)), np.empty((count, len(frames), 4)))
         matrices = np.empty((min(BLOCK, len(frames)), count, 4, 4))
-        scene, depsgraph = bpy.context.scene, bpy.context.evaluated_depsgraph_get()
+        scene, depsgraph = cast("bpy.types.Scene", bpy.context.scene), bpy.context.evaluated_depsgraph_get()
         rows = None
         for number, frame in enumerate(frames.tolist()):
             whole = int(np.floor(frame))
             scene.frame_set(whole, subframe=frame - whole)
             seen = self.rig.evaluated_get(depsgraph)
+            pose = cast("bpy.types.Pose", seen.pose)  # Where there is none, `_rows` says so.
             if rows is None:
                 rows = _rows(self.path, seen, self.bones)
-                raw = np.empty(16 * len(seen.pose.bones), dtype=np.float32)
+                raw = np.empty(16 * len(pose.bones), dtype=np.float32)
                 for one in (self.rig, *self.followed):
                     self.first.setdefault(one, _matrix(one.evaluated_get(depsgraph)))
-            seen.pose.bones.foreach_get("matrix", raw)
+            pose.bones.foreach_get("matrix", raw)
             row = number % BLOCK
             # They come column by column.
             columns = raw.reshape(-1, 4, 4)[rows].astype(np.float64)
@@ -275,7 +282,7 @@ def _rest_body(
     *,
     made_up: bool,
 ) -> RestBody:
-    bones, there = rig.data.bones, matrices[rig]
+    bones, there = armature_of(rig).bones, matrices[rig]
     rest = rigid(there @ np.array([bones[name].matrix_local for name in joints.names]))
     rest = _filled(Poses(rest.positions[:, None], rest.quaternions[:, None]))[:, 0]
     ends = np.array([bones[name].tail_local for name in joints.names]) @ there[:3, :3].T + there[:3, 3]

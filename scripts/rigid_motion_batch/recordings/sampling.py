@@ -170,12 +170,13 @@ def sampled(
     frames, poses = moments.frames, look(moments.frames)
     allowed, most = SEEN * WITHIN / metres, min((1 + MOST_ADDED) * len(frames), MOST_POSES // len(parents))
     closest, longest = CLOSEST * moments.step, moments.step * (1.0 + SAME)
-    unsure, left, before, flips = np.arange(len(frames) - 1), {}, len(frames), 0
+    unsure, before, flips = np.arange(len(frames) - 1), len(frames), 0
+    left: dict[float, float] = {}
     for halving in range(HALVINGS + 1):
         errors, turned = gaps.errors(frames, poses, unsure)
         lengths = np.diff(frames)[unsure]
         over = (turned > FLIP) & (lengths <= longest) if halving == 0 else np.zeros(len(unsure), dtype=bool)
-        flips += np.count_nonzero(over)
+        flips += int(np.count_nonzero(over))
         off = (errors > allowed) & ~over
         halved = off & (lengths > 2.1 * closest) & (halving < HALVINGS)
         if len(frames) + np.count_nonzero(halved) > most:

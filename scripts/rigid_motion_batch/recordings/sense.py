@@ -8,6 +8,7 @@ a second.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
@@ -45,7 +46,7 @@ FEWEST = 16
 """Samples that are enough to see that."""
 
 
-def require_one_body(trajectory: Trajectory, path: object, way_out: str, line: int) -> None:
+def require_one_body(trajectory: Trajectory, path: Path | str, way_out: str, line: int) -> None:
     """Refuse samples that jump to and fro between places: those of several devices, taken for one.
 
     Raises

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -24,12 +24,17 @@ def carried_by(rig: bpy.types.Object) -> list[bpy.types.Object]:
     import bpy
 
     meshes = [obj for obj in bpy.data.objects if obj.type == "MESH" and obj.data and _deforms(rig, obj)]
-    return meshes if sum(len(obj.data.vertices) for obj in meshes) <= MOST_VERTICES else []
+    return meshes if sum(len(_mesh_of(obj).vertices) for obj in meshes) <= MOST_VERTICES else []
+
+
+def _mesh_of(obj: bpy.types.Object) -> bpy.types.Mesh:
+    return cast("bpy.types.Mesh", obj.data)
 
 
 def _deforms(rig: bpy.types.Object, obj: bpy.types.Object) -> bool:
     by_parent = obj.parent == rig and obj.parent_type == "ARMATURE"
-    return by_parent or any(one.type == "ARMATURE" and one.object == rig for one in obj.modifiers)
+    deforming = (cast("bpy.types.ArmatureModifier", one) for one in obj.modifiers if one.type == "ARMATURE")
+    return by_parent or any(one.object == rig for one in deforming)
 
 
 def skin_of(
@@ -48,7 +53,7 @@ def skin_of(
     numbers = {name: number for number, name in enumerate(joints)}
     vertices, triangles, carriers, weights, before = [], [], [], [], 0
     for obj in meshes:
-        mesh, there = obj.data, matrices[obj]
+        mesh, there = _mesh_of(obj), matrices[obj]
         places = np.empty(3 * len(mesh.vertices), dtype=np.float32)
         mesh.vertices.foreach_get("co", places)
         mesh.calc_loop_triangles()

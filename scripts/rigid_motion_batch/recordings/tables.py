@@ -134,8 +134,8 @@ def _pieces(path: Path, largest: int) -> Iterator[str]:
         if size > largest:
             problem = f"the file has {size >> 20} MiB, and {largest >> 20} can be read"
             raise TrajectoryError(path, problem, "split the recording, or export fewer bodies")
-        decoder = codecs.getincrementaldecoder(encoding_of(file.read(2)))()
-        decoder = io.IncrementalNewlineDecoder(decoder, translate=True)
+        encoding = encoding_of(file.read(2))
+        decoder = io.IncrementalNewlineDecoder(codecs.getincrementaldecoder(encoding)(), translate=True)
         file.seek(0)
         data = b"start"
         while data:
@@ -223,14 +223,15 @@ def lines_above_numbers(path: Path) -> Iterator[HeaderLine]:
     for number, line in islice(lines_of(path), MOST_METADATA):
         if not (text := line.strip().lstrip("# \t")):
             continue
-        cells = cells_of(path, number, text, above.separator) if above else []
-        filled = [cell if above.separator == "," else cell.replace(",", ".") for cell in cells if cell]
-        if sum(map(is_number, filled)) > len(filled) / 2:
-            if len(cells) == len(above.cells) and not any(map(is_number, above.cells)):
-                yield above
-            above = None
-        else:
-            above = HeaderLine.of(path, number, text)
+        if above:
+            cells = cells_of(path, number, text, above.separator)
+            filled = [cell if above.separator == "," else cell.replace(",", ".") for cell in cells if cell]
+            if sum(map(is_number, filled)) > len(filled) / 2:
+                if len(cells) == len(above.cells) and not any(map(is_number, above.cells)):
+                    yield above
+                above = None
+                continue
+        above = HeaderLine.of(path, number, text)
 
 
 def split_row(line: str, separator: str | None) -> list[str]:
@@ -283,10 +284,11 @@ def parse_rows(
         With the number of the line.
     """
     needed = max(needed, *(index + 1 for index in columns.values()))
-    convert = float if dtype is np.float64 else _whole
+    convert: Callable[[str], float | np.int64] = float if dtype is np.float64 else _whole
     indices = [*columns.values()]
     pick = itemgetter(*indices) if len(indices) > 1 else lambda cells: [cells[indices[0]]]
-    rows, blocks, count = iter(rows), [np.empty((0, len(columns)), dtype)], 0
+    rows, count = iter(rows), 0
+    blocks: list[np.ndarray] = [np.empty((0, len(columns)), dtype)]
     while block := list(islice(rows, BLOCK)):
         count += len(block)
         if count > MOST_ROWS:
@@ -318,7 +320,9 @@ def _whole(cell: str) -> np.int64:
     return np.int64(int(cell))
 
 
-def _number(path: Path, line: int, name: str, cell: str, convert: Callable[[str], float]) -> float:
+def _number(
+    path: Path, line: int, name: str, cell: str, convert: Callable[[str], float | np.int64]
+) -> float | np.int64:
     """The number in a cell, which may be empty or have a decimal comma in quotes."""
     try:
         if not cell.strip(" ") and convert is float:
