@@ -58,7 +58,9 @@ class Parser(argparse.ArgumentParser):
         error = f"{self.prog}: error: {printable(message)}"
         self.exit(2, f"usage: {usage}   (--help lists the options)\n{error}\n")
 
-    def parse_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:
+    def parse_args(  # type: ignore[override]  # what it returns is Any, whatever the namespace is
+        self, args: Sequence[str] | None = None, namespace: Any = None
+    ) -> Any:
         options, unknown = self.parse_known_args(args, namespace)
         if unknown:
             name = next((word for word in unknown if word.startswith("-")), unknown[0]).partition("=")[0]

@@ -42,8 +42,8 @@ def from_here(place: Path) -> Path:
 
     What is kept by such names serves a checkout that was moved.
     """
-    here = Path.cwd() == CHECKOUT and place.is_relative_to(CHECKOUT)
-    return place.relative_to(CHECKOUT) if here else place
+    here = Path.cwd()
+    return place.relative_to(here) if here == CHECKOUT and place.is_relative_to(here) else place
 
 
 def place_of(name: str) -> Path:

@@ -10,7 +10,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, Self, TextIO
+from typing import Any, Self, TextIO, cast
 
 from rigid_motion_batch.command_line import printable
 
@@ -131,15 +131,16 @@ class Progress:
         self.note(": ".join(filter(None, (self._program, text))), "red")
 
     def _redraw(self, now: bool = False) -> None:
+        stage = cast(Stage, self._stage)
         if self._bar:
-            self._bar.update(self._bar.task_ids[0], completed=self._stage.fraction)
+            self._bar.update(self._bar.task_ids[0], completed=stage.fraction)
         elif self._on_farm:
-            done, words = 100.0 * self._stage.fraction, self._stage.doing or self._stage.title
+            done, words = 100.0 * stage.fraction, stage.doing or stage.title
             self._stream.write(f"openjd_progress: {done:.1f}\nopenjd_status: {_fitting(words, self._stream)}\n")
             self._stream.flush()
         elif not self._quiet and (now or self._clock() - self._shown_at >= INTERVAL):
-            self._shown_at, self._shown = self._clock(), self._stage.fraction
-            self._stream.write(f"{self._stage.fraction:4.0%}  {self._line()}\n")
+            self._shown_at, self._shown = self._clock(), stage.fraction
+            self._stream.write(f"{stage.fraction:4.0%}  {self._line()}\n")
             self._stream.flush()
 
     def _line(self) -> str:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import astuple, fields
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from rigid_motion_batch.files import replacing
 
-Row = TypeVar("Row")
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Row = TypeVar("Row", bound="DataclassInstance")
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """Characters that spreadsheets take for the beginning of a formula, if a text begins with it: names come from
@@ -45,7 +48,7 @@ def write_rows(path: Path, kind: type[Row], rows: Iterable[Row]) -> None:
             stream.write(line_of(astuple(row)))
 
 
-READERS = {"str": meant, "int": int, "float": float}
+READERS: dict[str, Callable[[str], Any]] = {"str": meant, "int": int, "float": float}
 
 
 def read_all_rows(paths: Iterable[Path], kind: type[Row]) -> list[Row]:
@@ -57,5 +60,5 @@ def read_rows(path: Path, kind: type[Row]) -> list[Row]:
     """Read what `write_rows` wrote."""
     with path.open(encoding="utf-8", newline="") as stream:
         lines = list(csv.reader(stream))[1:]
-    readers = [READERS[field.type] for field in fields(kind)]
+    readers = [READERS[cast(str, field.type)] for field in fields(kind)]
     return [kind(*(read(cell) for read, cell in zip(readers, line, strict=True))) for line in lines]

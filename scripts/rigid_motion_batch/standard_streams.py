@@ -21,7 +21,7 @@ class _Descriptor(io.FileIO):
 
     error: OSError | None = None
 
-    def write(self, data: bytes) -> int | None:
+    def write(self, data: Any) -> int:
         if self.error is None:
             try:
                 return super().write(data)

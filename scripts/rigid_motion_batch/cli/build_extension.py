@@ -13,6 +13,7 @@ import tempfile
 import tomllib
 import zipfile
 from pathlib import Path
+from typing import Any, cast
 
 from rigid_motion_batch.command_line import complain, parser_of, path_line, program_of
 from rigid_motion_batch.system_libraries import require_blender
@@ -82,7 +83,7 @@ def _stage(folder: Path) -> None:
 
 def _blender_ext(*arguments: str) -> None:
     """Run Blender's own command for extensions, with the tags that Blender knows, as if Blender ran it."""
-    scripts = Path(bpy.utils.system_resource("SCRIPTS"))
+    scripts = Path(cast(Any, bpy.utils).system_resource("SCRIPTS"))
     tool = scripts / "addons_core" / "bl_pkg" / "cli" / "blender_ext.py"
     tags = scripts / "modules" / "_bpy_internal" / "extensions" / "tags.py"
     command = [sys.executable, str(tool), *arguments, f"--valid-tags={tags}"]

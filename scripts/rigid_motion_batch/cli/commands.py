@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from typing import cast
 
 from rigid_motion_batch import standard_streams
 from rigid_motion_batch.command_line import INSTALLED, did_you_mean, own_arguments, printable, program_of
@@ -128,7 +129,7 @@ def _as_program(program: str, do: Callable[[], int], *, alone: bool = False) -> 
     try:
         code = do() if begin_child() or alone else supervise(program)
     except SystemExit as ended:
-        code = ended.code or 0
+        code = cast(int, ended.code or 0)
     return standard_streams.finish(program, code)
 
 

@@ -6,6 +6,7 @@ import argparse
 import io
 from contextlib import redirect_stderr
 from importlib import import_module
+from typing import Any, cast
 
 import shtab
 
@@ -47,7 +48,7 @@ def whole_parser() -> argparse.ArgumentParser:
             parser.add_argument("files", nargs="*")
         for action in parser._actions:
             if not action.choices and action.nargs != 0:
-                action.complete = shtab.FILE
+                cast(Any, action).complete = shtab.FILE
     return whole
 
 
@@ -61,7 +62,8 @@ def parser_of_module(module: str) -> argparse.ArgumentParser | None:
     def show(parser: argparse.ArgumentParser, file: object = None) -> None:
         raise _Shown(parser)
 
-    before, argparse.ArgumentParser.print_help = argparse.ArgumentParser.print_help, show
+    parsers: Any = argparse.ArgumentParser
+    before, parsers.print_help = parsers.print_help, show
     try:
         with redirect_stderr(io.StringIO()):
             import_module(f".{module}", __package__).main(["--help"])
@@ -70,5 +72,5 @@ def parser_of_module(module: str) -> argparse.ArgumentParser | None:
     except (ImportError, SystemExit):
         pass
     finally:
-        argparse.ArgumentParser.print_help = before
+        parsers.print_help = before
     return None

@@ -11,6 +11,7 @@ import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
+from typing import cast
 
 from rigid_motion_batch.places import CHECKOUT
 from rigid_motion_batch.supervising import blender_program
@@ -99,13 +100,13 @@ def _checked(folder: Path) -> Path:
 
 def _found() -> Path | None:
     """Return the Python of an environment of the checkout that has everything."""
-    folders = sorted((CHECKOUT / ".venv").glob("*python-*"), reverse=True)
+    folders = sorted((cast(Path, CHECKOUT) / ".venv").glob("*python-*"), reverse=True)
     return next((python for python in map(_python_in, folders) if python.exists() and not _lacks(python)), None)
 
 
 def _made() -> Path:
     """Return the Python of an environment that is made by Blender's own."""
-    bootstrap = CHECKOUT / "scripts" / "bootstrap.py"
+    bootstrap = cast(Path, CHECKOUT) / "scripts" / "bootstrap.py"
     made = subprocess.run([sys.executable, bootstrap, "environment"], stdout=subprocess.PIPE, text=True)
     if made.returncode:
         raise NoEnvironment(

@@ -48,7 +48,7 @@ def main(arguments: list[str]) -> int:
     command = {"send": send, "receive": receive, "router": router, "measure": measure}[options.command]
     stopped: list[int] = []
     try:
-        with stopping() if command is not measure else nullcontext([]) as stopped:
+        with stopping() if command is not measure else nullcontext(stopped) as stopped:
             command(options, stopped)
         report(ended=True)
         return 128 + stopped[0] if stopped else 0

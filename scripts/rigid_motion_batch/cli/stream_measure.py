@@ -10,6 +10,7 @@ import argparse
 import json
 from dataclasses import asdict
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
@@ -111,7 +112,7 @@ def write(path: Path, clip: Clip, body: Body, times: np.ndarray, shown: Poses) -
         write_poses(path, times, there[0])
     else:
         with replacing(path) as file:
-            write_bvh(file, clip.rest_body, body.sliding, times, there)
+            write_bvh(file, clip.rest_body, cast(np.ndarray, body.sliding), times, there)
 
 
 def lines(result: Measured, beside: dict[str, dict[str, float]], tolerance: float) -> list[str]:

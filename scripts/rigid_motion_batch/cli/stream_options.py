@@ -7,6 +7,7 @@ import os
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from rigid_motion.motion import MODES
 from rigid_motion_batch.analysis.choices import Tolerance
@@ -79,7 +80,7 @@ It runs until Ctrl-C, or for --seconds.
 
 def parse(arguments: list[str]) -> argparse.Namespace:
     """Return the options; a wrong one ends the program with code 2 and a line that says what is wrong."""
-    style = {"formatter_class": argparse.RawDescriptionHelpFormatter}
+    style: dict[str, Any] = {"formatter_class": argparse.RawDescriptionHelpFormatter}
     parser = Parser(prog=PROGRAM, description=DESCRIPTION, epilog=as_called(EPILOG, SCRIPT), **style)
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 

@@ -30,7 +30,7 @@ def baking(step: float, first: float | None, last: float | None, interpolation: 
     def bake(targets: Sequence[Transform]) -> Result:
         problems = {target: problem for target in targets if (problem := animation.problem_of(target))}
         fit = [target for target in targets if target not in problems]
-        modes, refusals = modes_of(fit), []
+        modes, refusals = modes_of(fit), list[Refused]()
         begin, end = (
             animation.bake(fit, step=step, first=first, last=last, interpolation=interpolation, refused=refusals)
             if fit

@@ -6,6 +6,7 @@ import os
 import shutil
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, cast
 
 import bpy
 
@@ -65,7 +66,7 @@ def open_file(path: Path) -> None:
         raise Unreadable(
             f"Blender cannot read this file, which looks damaged ({reason}): take a copy of it, or its NAME.blend1"
         ) from None
-    if (newer := bpy.data.version[:2]) > HERE:
+    if (newer := cast(Any, bpy.data.version)[:2]) > HERE:
         # Blender opens it all the same, and would leave out on saving what it does not know.
         raise Unreadable(
             f"this was saved by Blender {named(newer)}, and this is {named(HERE)}: take that one or a later one"
@@ -83,7 +84,7 @@ def missing_data() -> Missing:
             continue
         path = os.path.normpath(bpy.path.abspath(library.filepath))
         is_there = os.path.exists(path)
-        missing = ", ".join(f"{block.bl_rna.name} {block.name}" for block in blocks[:NAMED])
+        missing = ", ".join(f"{cast(bpy.types.Struct, block.bl_rna).name} {block.name}" for block in blocks[:NAMED])
         more = f" and {len(blocks) - NAMED} more" if len(blocks) > NAMED else ""
         result.libraries.append(
             f"library {path} {'cannot be read, or lacks something' if is_there else 'was not found'} "
@@ -106,9 +107,9 @@ def _reasons(blocks: list[bpy.types.ID], path: str) -> dict[bpy.types.Object, st
     actions = [block for block in blocks if isinstance(block, bpy.types.Action)]
     if actions:
         for action, users in bpy.data.user_map(subset=actions, value_types={"OBJECT"}).items():
-            for obj in users:
-                if isinstance(obj, bpy.types.Object):
-                    reasons.setdefault(obj, f"its Action {action.name} is missing from {path}")
+            for user in users:
+                if isinstance(user, bpy.types.Object):
+                    reasons.setdefault(user, f"its Action {action.name} is missing from {path}")
     return reasons
 
 
@@ -117,7 +118,8 @@ def only_overridden() -> set[bpy.types.Object]:
     and are not shown themselves.
     """
     overrides = [obj.override_library for obj in bpy.data.objects if obj.override_library is not None]
-    linked = {override.reference for override in overrides}
+    references = (override.reference for override in overrides)
+    linked = {reference for reference in references if isinstance(reference, bpy.types.Object)}
     instanced = {obj.instance_collection for obj in bpy.data.objects if obj.instance_collection is not None}
     for shown in (*(scene.collection for scene in bpy.data.scenes), *instanced):
         linked.difference_update(shown.all_objects)
@@ -159,19 +161,19 @@ def write_file(output: Path, record: Record | None, opened: int | None = None) -
         reason = said.rpartition(": ")[2].replace(beside.name, output.name) if ": " in said else CUT_OFF
         raise FileProblem(f"{output} could not be written ({reason}): write elsewhere with --output") from None
     except OSError as error:
-        place, reason = error.filename or output, error.strerror or error
+        place, reason = error.filename or output, error.strerror or str(error)
         raise FileProblem(f"{place} could not be written ({reason}): write elsewhere with --output") from None
 
 
 def refuse_cut_off(path: Path) -> None:
     """Raise OSError where a file is not whole: of compressed ones Blender does not notice that a disk is full."""
     try:
-        with bpy.data.libraries.load(str(path.absolute())):
+        with cast(Any, bpy.data.libraries).load(str(path.absolute())):
             pass
     except OSError:
         raise OSError(None, CUT_OFF, str(path)) from None
 
 
-def named(version: tuple[int, int]) -> str:
+def named(version: tuple[int, ...]) -> str:
     """Return a version of Blender as people write it."""
     return ".".join(map(str, version))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import cast
 
 import bpy
 
@@ -38,7 +39,7 @@ def export_glb(path: Path) -> None:
 @contextmanager
 def _asking_extension() -> Iterator[None]:
     """Have the exporter leave out clips of differences and of dense keys that are kept: it asks the listed add-ons."""
-    addons = bpy.context.preferences.addons
+    addons = cast(bpy.types.Preferences, bpy.context.preferences).addons
     entry = addons.new()
     entry.module = rigid_motion.__name__
     try:

@@ -89,8 +89,8 @@ class GltfRun:
     def _write(self, job: Job, document: Document, report: Report, outcome: Outcome) -> None:
         files = report.document.files(job.output.name)
         if document.chunks is None:
-            beside = document.companions(job.file.parent)
-            outcome.read = [job.file.parent / name for name in beside]
+            companions = document.companions(job.file.parent)
+            outcome.read = [job.file.parent / name for name in companions]
             if place_of(job.output.parent) != place_of(job.file.parent):
                 files = report.document.companions(job.file.parent) | files
         if self.dry_run:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any, cast
 
 import bpy
 
@@ -81,17 +82,15 @@ class BlendRun:
                     self._refuse(job, outcome, obj.name, missing.reasons[obj])
                 continue
             for targets in groups_of(obj, whole_rigs=self.action.whole_rigs):
-                fitting = {
-                    target: {"*"} if self._asked is None else matching(target, self._asked) for target in targets
-                }
-                concerned = self.action.concerned([target for target, names in fitting.items() if names])
+                fit = {target: {"*"} if self._asked is None else matching(target, self._asked) for target in targets}
+                concerned = self.action.concerned([target for target, names in fit.items() if names])
                 if concerned:
-                    self._begin(job, outcome, set().union(*(fitting[target] for target in concerned)))
+                    self._begin(job, outcome, set().union(*(fit[target] for target in concerned)))
                     self._do_targets(job, outcome, concerned)
                     stop_if_asked()
 
     @property
-    def _asked(self) -> list[str] | None:
+    def _asked(self) -> Sequence[str] | None:
         return self.work.objects
 
     def _begin(self, job: Job, outcome: Outcome, fitting: set[str]) -> None:
@@ -132,7 +131,7 @@ class BlendRun:
             why = "nothing could be" if outcome.refused else "nothing to be"
             self._note(f"{job.source}: {why} {self.action.done}; left alone")
             return
-        if (before := bpy.data.version[:2]) < HERE:
+        if (before := cast(Any, bpy.data.version)[:2]) < HERE:
             self._note(
                 f"{job.source}: was saved by Blender {named(before)}; what is written is of Blender {named(HERE)}"
             )

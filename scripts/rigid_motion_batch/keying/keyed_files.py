@@ -6,6 +6,7 @@ In metres and Blender's axes, where it was recorded; the first sample is on fram
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import cast
 
 import bpy
 import numpy as np
@@ -77,7 +78,7 @@ def new_file(clip: Clip, tolerance: float, fps: int | None) -> np.ndarray:
         )
     with silenced():
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    scene = bpy.context.scene
+    scene = cast(bpy.types.Scene, bpy.context.scene)
     scene.render.fps = max(round(rate), 1)
     scene.render.fps_base = scene.render.fps / rate
     scene.frame_start, scene.frame_end = 1, int(frames[-1])
@@ -111,7 +112,8 @@ def key_body(clip: Clip, frames: np.ndarray, wishes: Wishes, name: str) -> Resul
         What became of the bones that move; those that were left play straight from sample to sample.
     """
     rig = _rig(clip, frames, name)
-    keyed = [transform_of(bone) for bone in rig.obj.pose.bones if len(animation.key_frames(bone))]
+    bones = map(transform_of, cast(bpy.types.Pose, rig.obj.pose).bones)
+    keyed = [bone for bone in bones if len(animation.key_frames(bone))]
     if not keyed:
         return Result()
     return reduced(keyed, replace(wishes, discard=True))  # The recording has the dense keys.
@@ -121,14 +123,15 @@ def _axes(name: str) -> bpy.types.Object:
     obj = bpy.data.objects.new(name, None)
     obj.empty_display_type, obj.empty_display_size = "ARROWS", ARROW
     obj.rotation_mode = "QUATERNION"
-    bpy.context.scene.collection.objects.link(obj)
+    cast(bpy.types.Scene, bpy.context.scene).collection.objects.link(obj)
     return obj
 
 
 def _rig(clip: Clip, frames: np.ndarray, name: str) -> Rig:
     """Return a rig in the open file with a key for every sample of a whole body, on frames (n,)."""
-    rest = Rest.of(clip.rest_body, clip.metres_per_unit, clip.axes)
-    rig = Rig(name, rest, clip.rest_body.joints, bpy.context.scene.collection)
+    scene, rest_body = cast(bpy.types.Scene, bpy.context.scene), clip.whole_body
+    rest = Rest.of(rest_body, clip.metres_per_unit, clip.axes)
+    rig = Rig(name, rest, rest_body.joints, scene.collection)
     channels = rig.channels_of(to_blender(clip.in_metres(clip.poses), clip.axes))
     for bone in range(len(rig.bones)):
         rig.key(bone, frames, channels[bone])

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any, cast
 
 import bpy
 
 from rigid_motion import animation
 from rigid_motion.animation import NeedsItsKeys, Reduction, Refused, WholeRig
-from rigid_motion.animation.baking.sizes import first_tolerance, metres_per_unit, rig_size
+from rigid_motion.animation.baking.sizes import first_tolerance, rig_size
 from rigid_motion.animation.queries.polls import with_more_keys_than
 from rigid_motion.animation.transforms import Transform
+from rigid_motion.animation.transforms.reaches import metres_per_unit
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.keying.sessions import counted
 from rigid_motion_batch.keying.targets import Action, Result
@@ -41,10 +43,10 @@ def reducing(wishes: Wishes, asked: Sequence[str] | None = None) -> Action:
 
 def reduced(targets: Sequence[Transform], wishes: Wishes) -> Result:
     """Leave targets of the open file the few keys that they need."""
-    scene = bpy.context.scene
+    scene = cast(bpy.types.Scene, bpy.context.scene)
     unit = metres_per_unit(scene)
     tolerance = wishes.tolerance or _written(first_tolerance(scene, targets, shared=wishes.shared) * unit)
-    before = [len(target.motion.bakes) for target in targets]
+    before = list(map(_bakes, targets))
     refusals: list[Refused] = []
     animation.reduce_keys_of(
         targets,
@@ -55,16 +57,15 @@ def reduced(targets: Sequence[Transform], wishes: Wishes) -> Result:
         count=wishes.count,
         refused=refusals,
     )
-    done = [target for target, count in zip(targets, before, strict=True) if len(target.motion.bakes) > count]
+    done = [target for target, count in zip(targets, before, strict=True) if _bakes(target) > count]
     # Refusals come in the order of what refused.
     problems = dict(zip([target for target in targets if target not in done], refusals, strict=True))
     doubt = _doubt(targets, wishes.tolerance, unit)
     left = {target for target, refusal in problems.items() if isinstance(refusal, NeedsItsKeys)}
     reasons = {target: _reason(target, refusal) for target, refusal in problems.items()}
     by_number = wishes.count is not None
-    summary = (
-        f"{_described(animation.total_reduction(done), tolerance, unit, by_number=by_number)}{doubt}" if done else ""
-    )
+    reduction = animation.total_reduction(done)
+    summary = f"{_described(reduction, tolerance, unit, by_number=by_number)}{doubt}" if reduction else ""
     if wishes.discard and done:
         animation.discard_dense_keys(done)
     return Result(
@@ -87,8 +88,8 @@ def _described(reduction: Reduction, tolerance: Tolerance, unit: float, *, by_nu
     if after > before:
         summary += f"; channels have {after} keys together, and had {before}"
     if rig and rig.slide_before > 0.0:
-        before, after = (tolerance.alike(slide * unit, unit) for slide in (rig.slide_before, rig.slide_after))
-        summary += f"; feet slide {after}, and {before} before"
+        slid, slides = (tolerance.alike(slide * unit, unit) for slide in (rig.slide_before, rig.slide_after))
+        summary += f"; feet slide {slides}, and {slid} before"
     return summary + not_promised(rig) if rig else summary
 
 
@@ -115,9 +116,13 @@ def _written(metres: float) -> Tolerance:
     return Tolerance(f"{max(number, LEAST):.6f}{unit}")
 
 
+def _bakes(target: Transform) -> int:
+    return len(cast(Any, target.motion).bakes)
+
+
 def _has_bones(target: Transform) -> bool:
     """Return whether the name of an object stands for the bones of a rig."""
-    return not target.is_part and target.carrier.pose is not None
+    return not target.is_part and target.animated.pose is not None
 
 
 def _reason(target: Transform, refusal: Refused) -> str:

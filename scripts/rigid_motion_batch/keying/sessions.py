@@ -16,9 +16,10 @@ import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import cast
 
 from rigid_motion_batch.command_line import complain, path_line, printable
 from rigid_motion_batch.pipeline import steps
@@ -145,7 +146,7 @@ class Outcome:
 def keyed(task: steps.Job, parameters: tuple[Work, Job]) -> dict[str, Outcome]:
     """Do one input, wherever that is."""
     work, job = parameters
-    blender = nullcontext()
+    blender: AbstractContextManager[None] = nullcontext()
     if work.needs_blender(job):
         import bpy  # noqa: F401  It brings addon_utils.
 
@@ -380,7 +381,7 @@ def _extension() -> Iterator[None]:
 
     from rigid_motion import animation
 
-    enabled = [addon.module for addon in bpy.context.preferences.addons]
+    enabled = [addon.module for addon in cast(bpy.types.Preferences, bpy.context.preferences).addons]
     installed = [name for name in enabled if name.rpartition(".")[2] == EXTENSION]
     for name in installed:
         addon_utils.disable(name)

@@ -32,7 +32,7 @@ class Result:
         """
         reasons = set(self.refused.values())
         if len(reasons) == 1 < len(self.refused) and not (any(one.is_part for one in self.done) or self.left):
-            yield title_of(list(self.refused)), *reasons, len(self.refused)
+            yield title_of(list(self.refused)), reasons.pop(), len(self.refused)
         else:
             yield from ((target.name, reason, 1) for target, reason in self.refused.items())
 

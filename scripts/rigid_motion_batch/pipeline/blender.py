@@ -15,6 +15,7 @@ import tempfile
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 from rigid_motion_batch.places import EXTENSION, PACKAGE
 from rigid_motion_batch.supervising import death, end_with_parent
@@ -22,7 +23,7 @@ from rigid_motion_batch.supervising import death, end_with_parent
 from .performing import INTERVAL, Answer, ExecutorError, Order, Tell, last_words, progress_of
 from .steps import Step
 
-WORKER = Path(__file__).with_name("worker.py")
+WORKER = str(Path(__file__).with_name("worker.py"))
 
 STARTING = 120.0
 """Seconds that a Blender has to say which it is."""
@@ -50,7 +51,7 @@ def perform_in_blender(order: Order, tell: Tell | None) -> Answer:
         with tempfile.TemporaryDirectory() as folder:
             file, answer, log = (Path(folder, name) for name in ("order", "order.answer", "log"))
             file.write_bytes(pickle.dumps(replace(order, blender="")))
-            command = [order.blender, "--background", "--factory-startup", "--python", WORKER, "--", file, *path]
+            command = [order.blender, "--background", "--factory-startup", "--python", WORKER, "--", str(file), *path]
             with (
                 log.open("wb") as errors,
                 subprocess.Popen(
@@ -82,4 +83,4 @@ def _of_module(step: Step) -> list[Path]:
     name = step.function.__module__
     if name.partition(".")[0] == PACKAGE.name:
         return []
-    return [Path(sys.modules[name].__file__).resolve().parents[name.count(".")]]
+    return [Path(cast(str, sys.modules[name].__file__)).resolve().parents[name.count(".")]]

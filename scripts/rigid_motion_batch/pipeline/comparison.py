@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -332,7 +332,7 @@ class ComparisonPlan:
             publish = {table: f"{folder}/{table}" for table in (body_table_names(choice, modes) if joints else names)}
             parameters = steps.Measure(clip, choice, tuple(modes), comparison.radii, comparison.shared, comparison.form)
             weight = 0.02 + 6e-6 * size * len(modes) * (1.0 if choice.decimation == "uniform" else 45.0)
-            about = {"title": title, "weight": weight, "group": name}
+            about: dict[str, Any] = {"title": title, "weight": weight, "group": name}
             measuring = Task(steps.measure, parameters, f"measure {folder}", after, publish=publish, **about)
             yield Part("measure", clip, choice.name), measuring
             if choice in study.decimated:
@@ -341,9 +341,9 @@ class ComparisonPlan:
                 yield Part("decimate", clip, choice.name), decimating
         if comparison.count_keys:
             fit = comparison.fit and not joints
-            parameters = steps.CountKeys(clip, comparison.modes, comparison.radii, fit)
+            counting = steps.CountKeys(clip, comparison.modes, comparison.radii, fit)
             about = {"title": f"{name}, keys needed", "weight": size * (0.03 if fit else 0.008), "group": name}
-            yield Part("count_keys", clip), Task(steps.count_keys, parameters, f"count keys {name}", after, **about)
+            yield Part("count_keys", clip), Task(steps.count_keys, counting, f"count keys {name}", after, **about)
 
     def _model(self, study: Study, choice: Choice, measured: str) -> Task:
         comparison, folder = self.comparison, f"{study.name}/{choice.name}"
@@ -360,7 +360,7 @@ class ComparisonPlan:
 
     def _film(self, study: Study, choice: Choice, measured: str) -> Iterator[Task]:
         """The tasks of a film; the last one makes it."""
-        comparison, stage = self.comparison, self.comparison.stage
+        comparison, stage = self.comparison, cast(SceneSettings, self.comparison.stage)
         seconds = 0.03 + 4e-7 * stage.resolution[0] * stage.resolution[1]
         folder, title = f"{study.name}/{choice.name}", f"{study.name} {choice.phrase}"
         how = comparison.radii, comparison.shared, stage, comparison.blender
@@ -378,11 +378,12 @@ class ComparisonPlan:
         count = Timeline.between(*study.choices[choice], stage.fps, stage.slow_motion).count
         pieces = math.ceil(count / PIECE)
         firsts = [1 + count * number // pieces for number in range(pieces + 1)]
-        rendering = []
+        rendering: list[Task] = []
+        about: dict[str, Any] = {"title": title, "unit": "frame", "group": study.name}
         for first, following in itertools.pairwise(firsts):
             frames, name = following - first, f"{folder} from {first}"
             part = steps.Frames(title, first, following - 1)
-            about = {"title": title, "weight": seconds * frames, "amount": frames, "unit": "frame", "group": study.name}
+            about |= {"weight": seconds * frames, "amount": frames}
             rendering.append(Task(steps.render, part, f"render {name}", (building.key,), **about))
         keys = tuple(task.key for task in rendering)
         encoding = Task(
@@ -428,7 +429,7 @@ class ComparisonPlan:
         yield self._page(steps.overview, keys, pages)
 
     def _page(self, step: Step, parts: dict[Part, str], pages: Iterable[str] = (), **how: Any) -> Task:
-        parameters = Page(tuple(parts), self.comparison.about, **how)
+        parameters = Page(tuple(parts), cast(Settings, self.comparison.about), **how)
         folder, place = parameters.folder, f"{parameters.folder}/" if parameters.folder else ""
         return Task(
             step,

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import groupby, zip_longest
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 from rigid_motion_batch.analysis.choices import Choice
 from rigid_motion_batch.analysis.radii import Radii
@@ -24,6 +24,7 @@ from . import values
 from .steps import Job, TaskError, step
 
 if TYPE_CHECKING:
+    from rigid_motion_batch.analysis.bodies import BodyReconstruction
     from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult
 
 RECORDINGS = ("rigid_motion/motion", "recordings", "axes.py", "command_line.py", "files.py", "rows.py")
@@ -132,7 +133,7 @@ def measure(job: Job, parameters: Measure) -> None:
     """Choose keys of a clip, let the modes fill them in, and measure what was lost. Before: the recording."""
     from rigid_motion_batch.analysis import body_metrics, metrics, results
 
-    clip, choice, radii = parameters.clip.read(job.before[0]), parameters.choice, parameters.radii
+    clip, choice, radii = parameters.clip.read(job.results[0]), parameters.choice, parameters.radii
     made = results.made_of(clip, choice, parameters.modes, radii, shared=parameters.shared)
     if made is None:
         raise TaskError(f"{clip.name}: too short for two keys {choice.phrase}")
@@ -161,7 +162,7 @@ def count_keys(job: Job, parameters: CountKeys) -> None:
     from rigid_motion_batch.analysis.modes import single_modes
 
     done = iter(range(1, len(needed.RATES) + 1))
-    ways = ways_of(parameters.clip.read(job.before[0]), parameters.radii, fit=parameters.fit)
+    ways = ways_of(parameters.clip.read(job.results[0]), parameters.radii, fit=parameters.fit)
     modes = single_modes(parameters.modes)
     result = needed.keys_needed(ways, modes, advance=lambda: job.progress(next(done), len(needed.RATES)))
     needed.write_keys_needed(job.folder / ROWS, [result])
@@ -175,11 +176,11 @@ def decimate(job: Job, parameters: Measure) -> None:
     from rigid_motion_batch.analysis.results import made_again
     from rigid_motion_batch.scenes.decimating import beside_decimate
 
-    clip, result = parameters.clip.read(job.before[0]), result_in(job.before[1])
-    made = made_again(clip, result, parameters.radii, shared=parameters.shared)
+    clip, result = parameters.clip.read(job.results[0]), result_in(job.results[1])
+    made = cast("BodyReconstruction", made_again(clip, result, parameters.radii, shared=parameters.shared))
     known = [row for row in result.rows if row.keys]
     with _told(f"{clip.name} {result.choice.phrase}: not compared with Blender's Decimate"):
-        rows = beside_decimate(made, parameters.radii.of(clip.rest_body.joints), known)
+        rows = beside_decimate(made, parameters.radii.of(clip.whole_body.joints), known)
     write_keys_of_bodies(job.folder / ROWS, rows)
     values.write(job.folder / "decimated", tuple(rows))
 
@@ -198,7 +199,7 @@ def model(job: Job, parameters: Model) -> None:
     from rigid_motion_batch.analysis.results import made_again
     from rigid_motion_batch.report.glb import comparison_glb
 
-    clip, result = parameters.clip.read(job.before[0]), result_in(job.before[1])
+    clip, result = parameters.clip.read(job.results[0]), result_in(job.results[1])
     made = made_again(clip, result, parameters.radii, shared=parameters.shared)
     try:
         content = comparison_glb(made, [motion.modes for motion in result.motions])
@@ -218,7 +219,7 @@ def tabulate(job: Job, parameters: Join) -> None:
     """Write the table of all clips. Before: its parts."""
     from rigid_motion_batch.analysis.body_metrics import join_tables
 
-    join_tables(job.folder / "table.csv", [folder / parameters.rows for folder in job.before if folder])
+    join_tables(job.folder / "table.csv", [folder / parameters.rows for folder in job.results])
 
 
 def result_in(folder: Path) -> ChoiceResult:
@@ -243,18 +244,19 @@ class Build:
 @step(rooms=SCENES, stage="build", blender=True)
 def build(job: Job, parameters: Build) -> None:
     """Build the scene of a film, and save it. Before: the recording, and what was measured."""
+    from rigid_motion_batch.analysis.reconstructions import Reconstruction
     from rigid_motion_batch.analysis.results import made_again
     from rigid_motion_batch.scenes.body_scene import build_body_scene
     from rigid_motion_batch.scenes.film import save_blend
     from rigid_motion_batch.scenes.scene import build_scene
 
-    clip, result, radii = parameters.clip.read(job.before[0]), result_in(job.before[1]), parameters.radii
+    clip, result, radii = parameters.clip.read(job.results[0]), result_in(job.results[1]), parameters.radii
     with _told(f"{clip.name} {result.choice.phrase}: no video"):
         made = made_again(clip, result, radii, shared=parameters.shared)
-        if clip.rest_body is None:
+        if isinstance(made, Reconstruction):
             build_scene(made, parameters.stage)
         else:
-            build_body_scene(made, parameters.stage, radii.of(clip.rest_body.joints))
+            build_body_scene(made, parameters.stage, radii.of(clip.whole_body.joints))
         save_blend(job.folder / BLEND)
 
 
@@ -270,7 +272,7 @@ def render(job: Job, parameters: Frames) -> dict[str, float]:
     """Render some frames of a film. Before: its scene."""
     from rigid_motion_batch.scenes.film import render_piece
 
-    blend, piece = job.before[0] / BLEND, job.folder / PIECE
+    blend, piece = job.results[0] / BLEND, job.folder / PIECE
     with _told(f"{parameters.title}: no video"):
         return {"rendering": render_piece(blend, parameters.first, parameters.last, piece, job.progress)}
 
@@ -280,9 +282,12 @@ def encode(job: Job, parameters: Frames) -> dict[str, float]:
     """Join the pieces of a film. Before: its scene, and the pieces."""
     from rigid_motion_batch.scenes.film import join_pieces
 
-    blend, *pieces = [folder / name for folder, name in zip_longest(job.before, (BLEND,), fillvalue=PIECE)]
+    scene, *others = job.results
+    pieces = [folder / PIECE for folder in others]
     with _told(f"{parameters.title}: no video"):
-        seconds = join_pieces(blend, pieces, job.folder / FILM, lambda *done: job.progress(*done, "encoding"))
+        seconds = join_pieces(
+            scene / BLEND, pieces, job.folder / FILM, lambda done, total: job.progress(done, total, "encoding")
+        )
     return {"rendering": seconds}
 
 
@@ -304,7 +309,7 @@ def subject(job: Job, parameters: Subject) -> None:
     from rigid_motion_batch.scenes.simplified import simplified
 
     with _told("the report shows a drill"):
-        np.savez(job.folder / MESH, **simplified(parameters.requested))
+        np.savez(job.folder / MESH, **cast(dict[str, Any], simplified(parameters.requested)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from concurrent.futures import CancelledError, Future, wait
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import Self
+from typing import Any, Self, cast
 
 from distributed import Client, Security, get_worker
 from distributed.comm import connect
@@ -53,7 +53,7 @@ def do(order: Order) -> Answer:
 @cache
 def _processes(jobs: int) -> ProcessExecutor:
     # Dask's nanny makes daemons of workers, which Python lets have no children.
-    multiprocessing.current_process()._config["daemon"] = False
+    cast(Any, multiprocessing.current_process())._config["daemon"] = False
     return ProcessExecutor(jobs)
 
 
@@ -88,7 +88,7 @@ class DaskExecutor(Executor):
         self._client: Client
 
     @property
-    def capacity(self) -> int:
+    def capacity(self) -> int:  # type: ignore[override]  # it is only read
         """The threads of all workers as they are now. What was done by one that is gone is cancelled."""
         if time.monotonic() - self._looked_at > LOOK:
             self._workers, self._looked_at = self.workers(), time.monotonic()

@@ -46,7 +46,7 @@ class ProcessExecutor(Executor):
     def stop(self) -> None:
         pools, self._pools, self._idle = self._pools, [], []
         for pool in pools:
-            pool.stop()
+            pool.stop()  # type: ignore[no-untyped-call]  # Pebble has no types there
         for pool in pools:
             with suppress(RuntimeError):
                 pool.join()

@@ -12,13 +12,13 @@ import io
 import os
 import shutil
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from rigid_motion_batch.progress import Progress, Stage
 
@@ -123,7 +123,7 @@ def look_through(plan: Plan, store: Store, share: Share = EVERYTHING) -> Iterato
     chosen = share.chooser()
     for task in plan():
         requested, result = chosen(task), store.result(task.key)
-        yield Found(task, requested, result, bool(result) and (not requested or store.is_published(task, result)))
+        yield Found(task, requested, result, result is not None and (not requested or store.is_published(task, result)))
 
 
 @dataclass
@@ -370,7 +370,7 @@ class _Run:
             if index:
                 result = self.store.keep(task, opened.key, Path(made), index)
             else:
-                result = self.store.result(opened.key)
+                result = cast(Result, self.store.result(opened.key))
                 is_new = not self.store.is_published(task, result)
             self.store.publish(task, result)
         except OutputError as error:
@@ -408,7 +408,7 @@ class _Run:
     def _tell(self, opened: _Open, share: float, doing: str) -> None:
         """Tell how far a task is, and with it the whole."""
         opened.share = share
-        weight, by_now = self.weight_done, Counter(self.amounts_done)
+        weight, by_now = self.weight_done, defaultdict[str, float](float, self.amounts_done)
         for one in {opened, *(one for one, _ in self.at_work.values())}:
             weight += one.share * one.task.weight
             by_now[one.task.unit] += one.share * one.task.amount

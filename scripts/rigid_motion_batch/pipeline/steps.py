@@ -16,7 +16,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from rigid_motion_batch import places
 
@@ -58,6 +58,11 @@ class Job:
         self.notes: list[str] = []
         self._tell = tell
 
+    @property
+    def results(self) -> list[Path]:
+        """The folders of the results before it that there are, which are all but in partial steps."""
+        return [folder for folder in self.before if folder]
+
     def progress(self, done: float, total: float = 1.0, doing: str = "") -> None:
         """Say how far it is, and what is being done. Cheap enough to be called often."""
         self._tell(min(done / total, 1.0) if total else 1.0, doing)
@@ -97,7 +102,7 @@ class Step:
         if places.CHECKOUT:
             module = importlib.import_module(self.function.__module__)
             result |= {room: digest_of(place_of_room(room)) for room in self.rooms}
-            result[self.function.__module__] = digest_of(Path(module.__file__))
+            result[self.function.__module__] = digest_of(Path(cast(str, module.__file__)))
         return result
 
     @cached_property

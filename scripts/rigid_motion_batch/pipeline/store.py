@@ -303,8 +303,8 @@ class Store:
             target.parent.mkdir(parents=True, exist_ok=True)
             if not Path(os.path.realpath(target.parent)).is_relative_to(os.path.realpath(self.output)):
                 raise OutputError(f"{target.parent}: this leads out of the output folder; choose another with --output")
-            matches, (_, _, digest) = os.lstat(original), result.index["files"][name]
-            line = {"path": path, "size": matches.st_size, "mtime_ns": matches.st_mtime_ns, "sha256": digest}
+            status, (_, _, digest) = os.lstat(original), result.index["files"][name]
+            line = {"path": path, "size": status.st_size, "mtime_ns": status.st_mtime_ns, "sha256": digest}
             # Killed from here on, what was moved is known to be the program's own.
             append_lines(self._record_of(path), [line])
             beside = self.new_scratch()

@@ -30,7 +30,7 @@ def to_plain(value: Any, arrays: MutableMapping[str, Any] | None = None) -> Any:
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
     if is_dataclass(value):
-        kind = type(value)
+        kind: type = type(value)
         content = {name: to_plain(getattr(value, name), arrays) for name in _names(kind)}
         return {CLASS: f"{kind.__module__}:{kind.__qualname__}", **content}
     if isinstance(value, Mapping):
@@ -54,7 +54,7 @@ def from_plain(plain: Any, arrays: Mapping[str, Any] | None = None) -> Any:
     if not isinstance(plain, dict):
         return plain
     if plain.keys() == {ARRAY}:
-        return arrays[plain[ARRAY]]
+        return (arrays or {})[plain[ARRAY]]
     content = {name: from_plain(inner, arrays) for name, inner in plain.items() if name != CLASS}
     return _class_named(plain[CLASS])(**content) if CLASS in plain else content
 
@@ -94,6 +94,6 @@ def _class_named(name: str) -> type:
     """A class by its module and name. What asks for a value has loaded its class, so a file makes nothing load."""
     module, _, kind = name.partition(":")
     result = getattr(sys.modules.get(module), kind, None)
-    if not is_dataclass(result):
+    if not (isinstance(result, type) and is_dataclass(result)):
         raise ValueError(f"{name} is no class of values")
     return result

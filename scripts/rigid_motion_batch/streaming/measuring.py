@@ -12,6 +12,7 @@ import multiprocessing
 from collections.abc import Iterator
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
+from typing import Any
 
 import numpy as np
 
@@ -112,7 +113,7 @@ def measure(
     return _measured(body, times, poses, tolerance, wire, received)
 
 
-def _answer(pipe: Connection) -> object:
+def _answer(pipe: Connection) -> Any:
     try:
         if not pipe.poll(PATIENCE):
             raise RuntimeError(f"the receiver's process did not answer within {PATIENCE:g} s")
@@ -179,7 +180,7 @@ def _send(link: _Link, sender: Sender, times: np.ndarray, poses: Poses, after: f
 
 def _receive(pipe: Connection, times: np.ndarray, answers: bool) -> None:
     """Show what comes, in a process of its own: whenever a sample's moment is due, draw."""
-    receiver, frames = Receiver(), []
+    receiver, frames = Receiver(), list[tuple[Any, ...] | None]()
     answered, now = 0, float(times[0])
 
     def draw(until: float) -> None:
@@ -191,7 +192,7 @@ def _receive(pipe: Connection, times: np.ndarray, answers: bool) -> None:
                 return
             # Nothing where the motion of that moment was over when the first datagram came.
             shown = next(iter(receiver.show(due).values()), None)
-            frames.append(shown and (shown.moment, due - shown.moment, *shown.poses.values()))
+            frames.append((shown.moment, due - shown.moment, *shown.poses.values()) if shown else None)
 
     with Udp() as socket:
         pipe.send(socket.port)
@@ -206,10 +207,10 @@ def _receive(pipe: Connection, times: np.ndarray, answers: bool) -> None:
                 answered += HEADERS + len(answer)
             pipe.send(len(replies))
         draw(np.inf)
-    frames = [frame for frame in frames if frame]
-    moments, lags = (np.array([frame[number] for frame in frames]) for number in (0, 1))
-    positions = np.array([frame[2].positions for frame in frames])
-    quaternions = np.array([frame[2].quaternions for frame in frames])
+    drawn = [frame for frame in frames if frame]
+    moments, lags = (np.array([frame[number] for frame in drawn]) for number in (0, 1))
+    positions = np.array([frame[2].positions for frame in drawn])
+    quaternions = np.array([frame[2].quaternions for frame in drawn])
     pipe.send((moments, positions, quaternions, lags, answered))
 
 

@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from typing import cast
 
 import numpy as np
 
@@ -66,7 +67,7 @@ class Tracks(dict[tuple[Stream, str], Track]):
         """Add the poses (joints,) of a stream's bodies at a moment."""
         for name, shown in poses.items():
             if (stream, name) not in self:
-                self[stream, name] = Track(str(stream.source), receiver.body(stream, name))
+                self[stream, name] = Track(str(stream.source), cast(Body, receiver.body(stream, name)))
             self[stream, name].add(moment, shown)
 
 
@@ -128,7 +129,7 @@ class Receiving:
         self.room, self.fps, self.margin, self.handing, self.keeps = room, fps, margin, handing, keeps
         self.receiver = Receiver()
         self.shown, self.keys = Tracks(), Tracks()
-        self.datagrams, self.bytes = Counter(), Counter()
+        self.datagrams, self.bytes = Counter[str](), Counter[str]()
         """Counts for each user."""
         self.on_frame: list[Callable[[dict[Stream, Shown]], None]] = []
         """Called with what each frame shows."""
@@ -168,8 +169,8 @@ class Receiving:
 
     def _answer(self, now: float) -> None:
         if now >= self._answer_at:
-            for user, answer in self.receiver.answers():
-                self.room.send(user, ANSWERS, answer)
+            for source, answer in self.receiver.answers():
+                self.room.send(str(source), ANSWERS, answer)
             self._answer_at = now + len(self.receiver.streams) / ANSWERS_A_SECOND
         for user, answer in self.handing.answers() if self.handing else ():
             self.room.send(user, ANSWERS, answer)

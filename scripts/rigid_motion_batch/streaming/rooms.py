@@ -209,8 +209,8 @@ class Room:
         """Take what came: called by Zenoh, in a thread of its own."""
         user, stream, *_ = str(sample.key_expr).removeprefix(f"{self.name}/").split("/")
         gone = str(sample.kind) == "SampleKind.DELETE"
-        datagram = None if gone else sample.payload.to_bytes()
-        if gone or len(datagram) <= LONGEST:
+        datagram: bytes | None = None if gone else sample.payload.to_bytes()
+        if datagram is None or len(datagram) <= LONGEST:
             try:
                 self._came.put_nowait(Came(user, stream, datagram))
             except queue.Full:

@@ -53,7 +53,7 @@ class Udp:
                 return  # As if it had been lost.
 
     def received(self) -> list[bytes]:
-        datagrams = []
+        datagrams: list[bytes] = []
         while True:
             try:
                 datagram, sender = self._socket.recvfrom(LONGEST)

@@ -52,8 +52,8 @@ class Outlet:
     """What sends datagrams to an address. Raises OSError where that is none."""
 
     def __init__(self, to: Address) -> None:
-        family, kind, *_, self._to = socket.getaddrinfo(*to, type=socket.SOCK_DGRAM)[0]
-        self._socket = socket.socket(family, kind)
+        family, kind, *_, address = socket.getaddrinfo(*to, type=socket.SOCK_DGRAM)[0]
+        self._socket, self._to = socket.socket(family, kind), address
         self.datagrams = 0
 
     def __enter__(self) -> Self:
@@ -84,7 +84,7 @@ def play(
     performer = performer_of(clip)
     poses = to_blender(clip.in_metres(clip.poses), clip.axes)
     if performer is not None:
-        poses = Skeleton(clip.rest_body.parents).in_root_space(poses)
+        poses = Skeleton(clip.whole_body.parents).in_root_space(poses)
     moments = clip.times - clip.times[0]
     with Outlet(to) as outlet:
         began, last = time.monotonic(), -np.inf

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TextIO
+from typing import TextIO, cast
 
 import numpy as np
 
@@ -64,7 +64,7 @@ def write_motions(path: Path, motions: Sequence[Motion], fps: float) -> list[Pat
         # A bone ends as far behind its joint as that is behind its parent.
         rest_body = RestBody(body.joints, body.parents, body.rest, from_blender(body.rest, "opengl").positions)
         with replacing(place) as file:
-            write_bvh(file, rest_body, body.sliding, even.times, poses)
+            write_bvh(file, rest_body, cast(np.ndarray, body.sliding), even.times, poses)
     return paths
 
 
