@@ -138,7 +138,8 @@ def joined_keys(costs: Costs, result: list[np.ndarray], budget: int) -> np.ndarr
     best, high = within[0], costs.peak(within[0])
     for some in (result, within[:FEWER]):
         candidates = beside(costs, some, BESIDE[costs.reach])
-        links = _links(costs, candidates, some, *(high * times for times in NEAR), JOINED)
+        good, alive = (high * times for times in NEAR)
+        links = _links(costs, candidates, some, good, alive, JOINED)
         if links is not None:
             break
     else:

@@ -125,7 +125,7 @@ class Fading:
     def show(self, poses: Poses, now: float) -> Poses:
         """Poses (joints,) of the path, with what is left of differences."""
         passed, self._last = max(now - self._last, 0.0), now
-        if self._shown is not None and passed > 0.0:
+        if self._path is not None and passed > 0.0:
             self._slides.fade(poses.positions - self._path.positions, passed)
             self._turns.fade(turns_between(self._path.quaternions, poses.quaternions), passed)
         shown = Poses(poses.positions + self._slides.left, normalise(turned(poses.quaternions, self._turns.left)))

@@ -209,8 +209,10 @@ class _Source:
 
     def _device(self, serial: object) -> int | None:
         """Return the joint of a device; None for what is no name, and for too many."""
+        if not isinstance(serial, str):
+            return None
         if serial not in self._devices:
-            is_name = isinstance(serial, str) and serial != PERFORMER and 0 < len(serial.encode()) <= LONGEST_NAME
+            is_name = serial != PERFORMER and 0 < len(serial.encode()) <= LONGEST_NAME
             if not is_name or len(self._devices) == MOST_DEVICES:
                 return None
             self._devices[serial] = len(JOINTS) + len(self._devices)
