@@ -33,7 +33,7 @@ BUSY = 30.0
 """Seconds that one may take to answer which is connected: where it is gone, that is seen at once."""
 
 LOOK = 0.5
-"""Seconds between two looks at which workers there are, and at whether an order is still wanted."""
+"""Seconds between two looks at which workers there are, and at whether an order is still needed."""
 
 UNREACHABLE = (OSError, RuntimeError, TimeoutError, CancelledError)
 """Errors that Dask raises where its scheduler does not answer."""

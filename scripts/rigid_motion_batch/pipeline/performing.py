@@ -146,7 +146,7 @@ def perform(order: Order, tell: Tell | None = None) -> Answer:
     ----------
     order : Order
     tell : callable, optional
-        Told how far it is, which is written into a file for `progress_of` unless given.
+        Given how far it is, which is written into a file for `progress_of` unless given.
     """
     if order.step.blender and order.blender:
         from .blender import perform_in_blender

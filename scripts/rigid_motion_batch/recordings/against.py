@@ -1,4 +1,4 @@
-"""Somebody else's motion of a clip: read like the clip, matched to it in time and joint by joint."""
+"""Another motion of a clip: read like the clip, matched to it in time and joint by joint."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From recordings to clips: repaired, cut to the part that is wanted, and named."""
+"""From recordings to clips: repaired, cut to the part that is requested, and named."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ class ClipWarning:
 
 @dataclass(frozen=True, eq=False)
 class OtherMotion:
-    """Somebody else's motion of a clip, by its own samples; between these straight lines and SLERP."""
+    """Another motion of a clip, by its own samples; between these straight lines and SLERP."""
 
     name: str
     """The name of the motion, and its id beside those of modes."""

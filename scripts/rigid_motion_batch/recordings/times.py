@@ -1,4 +1,4 @@
-"""Times as seconds: in the unit that a file or a user says, and refused where nobody does and seconds cannot be."""
+"""Times as seconds: in the unit that a file or a user says, and refused where neither does and seconds cannot be."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FASTEST = 5000.0
 """Samples a second. Trackers with markers reach 1000 to 2000; no device for poses has more."""
 
 TOO_SLOW = 0.5
-"""Samples a second. A hand is elsewhere after two seconds: nobody records it so, and times in other units look so."""
+"""Samples a second. A hand is elsewhere after two seconds: no one records it so, and times in other units look so."""
 
 ENOUGH = 2
 """Steps of time that tell a unit. A file of two samples says nothing of it."""
