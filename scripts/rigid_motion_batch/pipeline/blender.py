@@ -1,6 +1,6 @@
 """Orders in a Blender of the user's: one program for each, `BLENDER --background --python worker.py -- ORDER PATH...`.
 
-Order and answer are pickled into a temporary folder that nobody else may enter. The step's modules are found by path;
+Order and answer are pickled into a temporary folder that no one else may enter. The step's modules are found by path;
 they may use the standard library, NumPy and bpy, which is what a Blender has.
 """
 
@@ -30,7 +30,7 @@ STARTING = 120.0
 
 
 def version_of(blender: str) -> str:
-    """The version of a Blender program: "5.2.3". Raises ExecutorError where that cannot be run, or is none."""
+    """Return the version of a Blender program, "5.2.3". Raises ExecutorError if it cannot be run or is no Blender."""
     try:
         ended = subprocess.run(
             [blender, "--version"], capture_output=True, text=True, errors="replace", timeout=STARTING, check=False
@@ -79,7 +79,7 @@ def _is_at_work(process: subprocess.Popen) -> bool:
 
 
 def _of_module(step: Step) -> list[Path]:
-    """What must be on the module path for the module of a step that is not of this package."""
+    """Return what must be on the module path for the module of a step outside this package."""
     name = step.function.__module__
     if name.partition(".")[0] == PACKAGE.name:
         return []

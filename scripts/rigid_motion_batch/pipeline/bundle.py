@@ -20,12 +20,12 @@ from rigid_motion_batch.progress import FARM
 from .steps import version_here
 
 STAGES = ("read", "measure", "build", "render", "encode", "report")
-"""Of a comparison; each begins when all before it have ended."""
+"""Stages of a comparison; each begins when all before it have ended."""
 
 COMPARE = ("-m", "rigid_motion_batch", "compare")
 
 CHECK = ("-m", "rigid_motion_batch.pipeline.bundle")
-"""What fails, and says so, where the version behind it is not that of the program: see `main`."""
+"""Arguments of Python for a check that fails where the version after them is not that of the program: see `main`."""
 
 MOST_PARTS = 1024
 """Values of a parameter, in Open Job Description."""
@@ -77,7 +77,7 @@ def write_bundle(
 
 
 def below_inputs(arguments: Sequence[str]) -> tuple[list[str], Path]:
-    """Arguments with the files that they name, FILE, FILE:BODY or --option=FILE, as the job finds them, and where.
+    """Return arguments with their files, FILE, FILE:BODY or --option=FILE, as the job finds them, and where.
 
     The program of `--blender` is none of the inputs.
     """
@@ -97,7 +97,7 @@ def below_inputs(arguments: Sequence[str]) -> tuple[list[str], Path]:
 
 
 def _file_in(argument: str) -> tuple[str, str, str]:
-    """What stands before the file in an argument, the file, and what is behind it; no file where there is none."""
+    """Return what stands before the file in an argument, the file, and what is behind it; no file if there is none."""
     option, equals, value = argument.partition("=") if argument.startswith("-") else ("", "", argument)
     ends = [len(value), *(place for place in range(len(value) - 1, 0, -1) if value[place] == ":")]
     # A number is no file, whatever lies in the current folder.

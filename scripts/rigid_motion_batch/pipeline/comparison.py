@@ -1,4 +1,4 @@
-"""The plan of a comparison: what is wanted, as one value, and the tasks that make it, clip by clip.
+"""The plan of a comparison: what is requested, as one value, and the tasks that make it, clip by clip.
 
 What the recordings hold is known only when they have been read. So there are two plans: `reading`, and then `tasks`,
 once `look_into` has seen what was read. Both return their tasks one by one.
@@ -40,14 +40,14 @@ from .store import OutputError, Store
 METRICS, JOINT_METRICS, DECIMATED, KEYS_NEEDED = "metrics.csv", "metrics_joints.csv", "decimated.csv", "keys_needed.csv"
 
 ON_ONE_PAGE = 24
-"""So many clips are one page; more have a page each."""
+"""Number of clips up to which all are on one page; more have a page each."""
 
 PIECE = 60
 """Frames of a film that are rendered by one task at most: a long film keeps many processors busy, and little is lost
 where one is interrupted."""
 
 MOST_FRAMES = 216_000
-"""Of a film: an hour at 60 frames a second."""
+"""Frames of a film at most: an hour at 60 frames a second."""
 
 MOST_POSES = 600_000
 """Frames times joints of a film of a body, whose rigs take half a kilobyte for each in every lane."""
@@ -56,13 +56,13 @@ MOST_DECIMATED = 50_000
 """Samples times joints of a body that is set beside Blender's Decimate: minutes for a choice of keys."""
 
 RATE_MARGIN = 0.01
-"""By what share a rate may be above that of a recording: 90 Hz are often 89.9 in truth."""
+"""Share by which a rate may be above that of a recording: 90 Hz are often 89.9 in truth."""
 
 MOST_MODELLED = 100_000
 """Samples times joints of a body that is written as GLB: a minute for a choice of keys."""
 
 TABLE_OF = {"measure": METRICS, "decimate": DECIMATED, "count_keys": KEYS_NEEDED}
-"""What parts of pages are parts of, too."""
+"""Part of a page to the table that it is a part of, too."""
 
 IN_BLENDER = (".blend", ".fbx", ".glb", ".gltf")
 """Recordings that Blender reads."""
@@ -70,10 +70,10 @@ IN_BLENDER = (".blend", ".fbx", ".glb", ".gltf")
 
 @dataclass(frozen=True)
 class Comparison:
-    """What is wanted of which recordings."""
+    """Recordings to compare, and what is requested of them."""
 
     sources: tuple[str, ...]
-    """As the user gave them: FILE, FILE:BODY, FILE:*."""
+    """Sources as the user gave them: FILE, FILE:BODY, FILE:*."""
 
     choices: tuple[Choice, ...]
     modes: tuple[str, ...]
@@ -81,30 +81,30 @@ class Comparison:
     """The source of a motion that is shown beside the modes: somebody else's, of the one clip that there is then."""
 
     axes: str | None = None
-    """Of `axes.AXES`; None for those of each format."""
+    """A name in `axes.AXES`; None for the axes of each format."""
 
     reading: ReadingOptions = AS_THE_FILE_SAYS
     radii: Radii = EVERYWHERE
     form: str = "csv"
-    """Of the tables of poses of rigid bodies, of `metrics.FORMS`."""
+    """The form of the tables of poses of rigid bodies, of `metrics.FORMS`."""
 
     shared: bool = False
-    """Whether the joints of a body have their keys at the same samples where the motion chooses them."""
+    """True if the joints of a body have their keys at the same samples where the motion chooses them."""
 
     count_keys: bool = False
-    """Whether to find how many keys every mode needs."""
+    """True to find how many keys every mode needs."""
 
     fit: bool = False
-    """And how many where they may be fitted."""
+    """True to find, too, how many keys are needed where they may be fitted."""
 
     stage: SceneSettings | None = None
-    """How to make the films; None for a run without."""
+    """The stage of the films; None for a run without films."""
 
     every_film: bool = False
-    """Whether there is a film of every choice of keys, or only of the one with the fewest keys."""
+    """True if there is a film of every choice of keys, otherwise only of the one with the fewest keys."""
 
     about: Settings | None = None
-    """What pages say of the run; None for a run without."""
+    """Facts of the run that pages show; None for a run without pages."""
 
     subject: str = next(iter(MODELS))
     """The object that rigid bodies move, as `place_of_subject` takes it; on pages the first of `MODELS` without
@@ -124,10 +124,10 @@ class Study:
 
     facts: ClipFacts = field(repr=False)
     choices: dict[Choice, tuple[float, float]]
-    """Each with the times of the first and the last key."""
+    """The choices of keys, each with the times of the first and the last key."""
 
     blender: bool
-    """Whether there is one."""
+    """True if there is a Blender."""
 
     @property
     def name(self) -> str:
@@ -155,17 +155,17 @@ class ComparisonPlan:
     def __init__(self, comparison: Comparison, store: Store) -> None:
         self.comparison, self.store = comparison, store
         self.studies: list[Study] = []
-        """What there is to compare, after `look_into`."""
+        """The clips to compare, after `look_into`."""
 
     # -- reading ------------------------------------------------------------------------------------------------------
 
     def reading(self) -> Iterator[Task]:
-        """The tasks that read the sources."""
+        """Yield the tasks that read the sources."""
         yield from {task.key: task for task in self._readers}.values()
 
     @cached_property
     def _readers(self) -> list[Task]:
-        """For every source, in their order; for one that is named twice the same one twice."""
+        """The tasks that read the sources, in their order; for a source that is named twice the same task twice."""
         return [*map(self._reader, self.comparison.sources)]
 
     def _reader(self, source: str) -> Task:
@@ -233,12 +233,12 @@ class ComparisonPlan:
 
     @property
     def _shows_object(self) -> bool:
-        """Whether pages show another object than the one that needs no Blender."""
+        """Return whether pages show another object than the one that needs no Blender."""
         rigid = any(not study.facts.joints for study in self.studies)
         return rigid and self.comparison.subject != Comparison.subject
 
     def _left_out(self, study: Study) -> Iterator[str]:
-        """What is not made of a clip because it is too much, for the user."""
+        """Yield what is not made of a clip because it is too much, for the user."""
         stage, joints, samples = self.comparison.stage, study.facts.joints, study.facts.samples
         if stage and (frames := max(study.frames(choice, stage) for choice in study.choices)) > study.most_frames:
             start, end = next(iter(study.choices.values()))
@@ -263,14 +263,14 @@ class ComparisonPlan:
     # -- comparing ----------------------------------------------------------------------------------------------------
 
     def tasks(self, *, films: bool = True) -> Iterator[Task]:
-        """All tasks, those of numbers first: they take seconds, and are there whatever becomes of the videos.
+        """Yield all tasks, those of numbers first: they take seconds, and are there whatever becomes of the videos.
 
         Without `films` the pages leave room for them.
         """
         read = {study.reader for study in self.studies}
         yield from (task for task in self.reading() if task.key in read)
         keys: dict[Part, str] = {}
-        """Of the tasks whose results pages show."""
+        """Keys of the tasks whose results pages show."""
         tables: dict[str, list[str]] = {}
         """Table to the keys of the tasks that make its parts."""
         for study in self.studies:
@@ -310,19 +310,19 @@ class ComparisonPlan:
         return {table for table, requested in there.items() if requested}
 
     def filmed(self, study: Study) -> list[Choice]:
-        """The choices that there are films of."""
+        """Return the choices that there are films of."""
         stage = self.comparison.stage
         return [choice for choice in self._shown(study) if stage and study.frames(choice, stage) <= study.most_frames]
 
     def modelled(self, study: Study) -> list[Choice]:
-        """The choices that there are GLB files of."""
+        """Return the choices that there are GLB files of."""
         return self._shown(study) if study.facts.samples * max(study.facts.joints, 1) <= MOST_MODELLED else []
 
     def _shown(self, study: Study) -> list[Choice]:
         return list(study.choices) if self.comparison.every_film else fewest_keys(study.choices)
 
     def _numbers(self, study: Study) -> Iterator[tuple[Part, Task]]:
-        """The tasks of a clip's numbers, and what they are to pages."""
+        """Yield the tasks of a clip's numbers, and what they are to pages."""
         comparison, clip, name, after = self.comparison, study.clip, study.name, (study.reader,)
         joints, size = study.facts.joints, study.facts.samples * max(study.facts.joints, 1)
         modes = single_modes(comparison.modes) if joints else comparison.modes
@@ -359,7 +359,7 @@ class ComparisonPlan:
         )
 
     def _film(self, study: Study, choice: Choice, measured: str) -> Iterator[Task]:
-        """The tasks of a film; the last one makes it."""
+        """Yield the tasks of a film; the last one makes it."""
         comparison, stage = self.comparison, cast(SceneSettings, self.comparison.stage)
         seconds = 0.03 + 4e-7 * stage.resolution[0] * stage.resolution[1]
         folder, title = f"{study.name}/{choice.name}", f"{study.name} {choice.phrase}"
@@ -407,7 +407,7 @@ class ComparisonPlan:
     # -- pages --------------------------------------------------------------------------------------------------------
 
     def _pages(self, keys: dict[Part, str], filmed: dict[Part, str], films: bool) -> Iterator[Task]:
-        """The page of a few clips, or a page for each of many and one that leads to them."""
+        """Yield the page of a few clips, or a page for each of many and one that leads to them."""
         comparison, subject = self.comparison, self.comparison.subject
         if comparison.blender and self._shows_object:
             parameters = steps.Subject(subject, comparison.blender)
@@ -443,7 +443,7 @@ class ComparisonPlan:
 
 
 def rates_above(times: np.ndarray, choices: Iterable[Choice]) -> list[str]:
-    """What to say of rates that are above that of a recording with these times, shape (n,)."""
+    """Return what to say of rates that are above that of a recording with these times, shape (n,)."""
     rate = 1.0 / float(np.median(np.diff(times)))
     above = [choice.rate for choice in choices if choice.rate and float(choice.rate) > rate * (1.0 + RATE_MARGIN)]
     return (

@@ -41,7 +41,7 @@ PAGE_DATA = "report_data/"
 
 @contextmanager
 def _told(what: str) -> Iterator[None]:
-    """What Blender cannot do is the task's to say."""
+    """Raise what Blender cannot do as an error of the task."""
     try:
         yield
     except (RuntimeError, SubjectError) as error:
@@ -54,7 +54,7 @@ def _told(what: str) -> Iterator[None]:
 @dataclass(frozen=True)
 class Read:
     source: str
-    """As the user gave it."""
+    """The source as the user gave it."""
 
     axes: str | None
     options: ReadingOptions
@@ -62,10 +62,10 @@ class Read:
     """The version of Blender, for formats that it reads."""
 
     against: str = ""
-    """What somebody else has made of it, as a source."""
+    """Another motion of the same, as a source."""
 
     called: str = ""
-    """What that motion is called."""
+    """The name of that motion."""
 
 
 def _read(job: Job, parameters: Read) -> None:
@@ -105,10 +105,10 @@ class ClipOf:
     """A clip of a source that was read."""
 
     name: str
-    """In this run."""
+    """The name of the clip in this run."""
 
     body: int = 0
-    """Which of the source's, from 0."""
+    """The number of the body in the source, from 0."""
 
     def read(self, folder: Path) -> Clip:
         return replace(values.read(Clip, folder / f"{self.body}"), name=self.name)
@@ -125,7 +125,7 @@ class Measure:
     radii: Radii
     shared: bool = False
     form: str = "csv"
-    """Of the tables of poses."""
+    """The form of the tables of poses."""
 
 
 @step(rooms=ANALYSIS, stage="measure")
@@ -314,30 +314,30 @@ def subject(job: Job, parameters: Subject) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """What a task before a page has made."""
+    """The result of a task before a page."""
 
     what: str
     """The name of its step's function."""
 
     clip: ClipOf = ClipOf("")
     choice: str = ""
-    """Its name."""
+    """The name of the choice of keys."""
 
 
 @dataclass(frozen=True)
 class Page:
     parts: tuple[Part, ...]
-    """Of the tasks before it, clip by clip, and the films last; these may be still to come."""
+    """Parts of the tasks before it, clip by clip, and the films last; these may be still to come."""
 
     settings: Settings
     coming: bool = False
-    """Whether films are still being made."""
+    """True if films are still being made."""
 
     overview: str = ""
     """The way to the page of all clips."""
 
     folder: str = ""
-    """Where the page will be, in the output folder."""
+    """The folder of the page, in the output folder."""
 
     @property
     def clips(self) -> list[str]:
@@ -345,7 +345,7 @@ class Page:
 
 
 def _clips(job: Job, parameters: Page) -> Iterator[ClipResult]:
-    """The results before a page, one clip in memory at a time, without those that could not be made."""
+    """Yield the results before a page, one clip in memory at a time, without those that could not be made."""
     from rigid_motion_batch.analysis.body_decimated import KeysOfBody
     from rigid_motion_batch.analysis.needed import KeysNeeded
     from rigid_motion_batch.analysis.results import clip_result
@@ -409,7 +409,7 @@ def overview(job: Job, parameters: Page) -> None:
 
 
 def _counted(job: Job, parameters: Page) -> Callable[[], None]:
-    """What tells of every clip that it is on the page."""
+    """Return a function that reports of every clip that it is on the page."""
     total = len(parameters.clips)
     done = iter(range(1, total + 1))
     return lambda: job.progress(next(done), total)

@@ -33,14 +33,14 @@ BUSY = 30.0
 """Seconds that one may take to answer which is connected: where it is gone, that is seen at once."""
 
 LOOK = 0.5
-"""Seconds between two looks at which workers there are, and at whether an order is still wanted."""
+"""Seconds between two looks at which workers there are, and at whether an order is still needed."""
 
 UNREACHABLE = (OSError, RuntimeError, TimeoutError, CancelledError)
-"""What Dask raises where its scheduler does not answer."""
+"""Errors that Dask raises where its scheduler does not answer."""
 
 
 def do(order: Order) -> Answer:
-    """On a worker: do an order in a process of its own, which ends with the worker, or where the order is cancelled."""
+    """Do an order on a worker, in a process of its own, which ends with the worker, or where the order is cancelled."""
     worker = get_worker()
     key, future = worker.get_current_task(), _processes(worker.state.nthreads).submit(order)
     while not wait([future], LOOK).done:
@@ -80,10 +80,10 @@ class DaskExecutor(Executor):
         self._fit: dict[str, bool] = {}
         """The workers that were asked, by their addresses."""
         self._workers: dict[str, int] = {}
-        """Those that fit when it was looked last, and how many threads each has."""
+        """The workers that fit at the last look, and how many threads each has."""
         self._looked_at = 0.0
         self._alone = False
-        """Whether it was said that there is no worker."""
+        """True if it was reported that there is no worker."""
         self._at_work: dict[Future[Answer], str] = {}
         self._client: Client
 
@@ -110,7 +110,7 @@ class DaskExecutor(Executor):
             future.cancel()
 
     def workers(self) -> dict[str, int]:
-        """Those that fit, by address, and how many threads each has. Raises ExecutorError where there are none ever."""
+        """Return the threads of each worker that fits, by address. Raises ExecutorError where there is none ever."""
         threads = self._threads()
         for address in self._fit.keys() - threads.keys():
             if self._fit.pop(address):
@@ -166,7 +166,7 @@ class DaskExecutor(Executor):
             self._client.close(timeout=2.0)
 
     def _threads(self) -> dict[str, int]:
-        """The workers that the scheduler knows, and how many threads each has."""
+        """Return the workers that the scheduler knows, and how many threads each has."""
         with suppress(*UNREACHABLE):
             if self._client.status == "running":
                 result = self._client.sync(self._client.scheduler.identity, n_workers=-1, callback_timeout=BUSY)
@@ -175,14 +175,14 @@ class DaskExecutor(Executor):
 
 
 async def _knock(address: str) -> None:
-    """Raises OSError where nobody answers who speaks Dask's language."""
+    """Raise OSError where nothing answers that speaks Dask's protocol."""
     async with asyncio.timeout(CONNECTING + 1.0):  # Someone else's server may keep it waiting.
         comm = await connect(address, timeout=CONNECTING, **Security().get_connection_args("client"))
     comm.abort()
 
 
 def _asker(requested: str, folder: str) -> Callable[[], str]:
-    """What a worker answers where it does not fit, in a function that is sent whole: it may not have this program."""
+    """Return a function that answers why a worker does not fit. It is sent whole: one may not have the program."""
 
     def ask() -> str:
         if not os.path.isdir(folder):

@@ -62,7 +62,7 @@ class ProcessExecutor(Executor):
 
 
 def _begin(command: str) -> None:
-    """Begin a worker: it ends with its parent, and nobody sees what libraries print in it."""
+    """Begin a worker: it ends with its parent, and no one sees what libraries print in it."""
     end_with_parent()
     join_session(command)
     # Where Blender is loaded in the parent, its own modules hide what brings them.

@@ -1,4 +1,4 @@
-"""Why a task would be done: never done, or its parameters, inputs, rooms, or steps before it have changed."""
+"""Reasons why a task would be done: never done, or its parameters, inputs, modules, or steps before it have changed."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from .steps import Task
 from .store import OutputError, Result, Store
 
 MOST = 3
-"""Of several changes, how many are named."""
+"""Number of changes that are named, of several."""
 
 
 def explain(plan: Plan, store: Store, share: Share = EVERYTHING) -> Iterator[tuple[Task, str]]:
-    """The tasks of a share of a plan that a run would do, and why. Nothing is written."""
+    """Yield the tasks of a share of a plan that a run would do, and why. Nothing is written."""
     latest = store.latest()
     changed: dict[str, str] = {}
     """Key to name, of tasks that would be done."""
@@ -30,7 +30,7 @@ def explain(plan: Plan, store: Store, share: Share = EVERYTHING) -> Iterator[tup
 
 
 def _reason(task: Task, earlier: Result | None, changed: Mapping[str, str]) -> str:
-    """Why a task without a result would be done, by what its last result was made of."""
+    """Return why a task without a result would be done, by what its last result was made of."""
     if earlier is None or not isinstance(before := earlier.index.get("made_of"), dict):
         return "never done"
     now = task.made_of
@@ -46,7 +46,7 @@ def _reason(task: Task, earlier: Result | None, changed: Mapping[str, str]) -> s
 
 
 def _differences(before: Any, now: Any, values: bool = True, name: str = "") -> list[str]:
-    """What differs between two pieces of plain data, by its names: "fps: 24 -> 30"."""
+    """Return what differs between two pieces of plain data, by its names: "fps: 24 -> 30"."""
     if isinstance(before, dict) and isinstance(now, Mapping):
         prefix = f"{name}." if name else ""
         names = [key for key in {**before, **now} if key != "$"]

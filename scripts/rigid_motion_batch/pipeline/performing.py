@@ -34,7 +34,7 @@ INTERVAL = 0.2
 """Seconds between two messages about how far a task is."""
 
 Tell = Callable[[float, str], object]
-"""Takes the share of a task that is done, and what is being done."""
+"""A function that takes the share of a task that is done, and what is being done."""
 
 
 @dataclass(frozen=True)
@@ -52,49 +52,49 @@ class Order:
 
     output: str
     folder: str
-    """Where to write; not there yet."""
+    """The folder to write into; not there yet."""
 
     blender: str = ""
     """The program that does it, if that is not to be this one."""
 
     here: str = field(default_factory=os.getcwd)
-    """Where relative paths start."""
+    """The folder where relative paths start."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What came of an order."""
+    """Result of an order."""
 
     index: Mapping[str, Any] | None = None
-    """Of the files that are in its folder now; None where nothing was made."""
+    """Index of the files that are in its folder now; None where nothing was made."""
 
     problem: str = ""
-    """Why not, in one line."""
+    """The reason why nothing was made, in one line."""
 
     details: str = ""
-    """Where in the program, for an error that nobody foresaw."""
+    """The place in the program, for an error that was not foreseen."""
 
     fatal: bool = False
-    """Whether the others will fail for the same reason: the disk is full."""
+    """True if the others will fail for the same reason: the disk is full."""
 
     lost: bool = False
-    """Whether whoever did it is gone; nothing is known of the task itself, so it may be tried again."""
+    """True if whoever did it is gone; nothing is known of the task itself, so it may be tried again."""
 
     notes: Sequence[str] = ()
 
 
 class ExecutorError(Exception):
-    """Why nothing can be done by these means, and the way out, in one line."""
+    """Error that says why nothing can be done by these means, and the way out, in one line."""
 
 
 class Executor:
-    """Who does orders: this class at once, in this process. A context; may be used again after `stop`."""
+    """Executor of orders: this class at once, in this process. A context; may be used again after `stop`."""
 
     capacity = 1
-    """How many orders it takes at a time."""
+    """Number of orders that it takes at a time."""
 
     def submit(self, order: Order, tell: Tell) -> Future[Answer]:
-        """Begin an order; `answer_of` tells what came of it. How far it is, is told, or written for `progress_of`."""
+        """Begin an order, whose result `answer_of` returns. Its progress is reported, or written for `progress_of`."""
         future: Future[Answer] = Future()
         future.set_result(perform(order, tell))
         return future
@@ -110,12 +110,12 @@ class Executor:
 
 
 def processors() -> int:
-    """How many this process may use."""
+    """Return how many processors this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def answer_of(future: Future[Answer], order: Order) -> Answer:
-    """What came of an order that was submitted."""
+    """Return what came of an order that was submitted."""
     try:
         return future.result()
     except (CancelledError, Exception) as error:  # Of whoever was to do it; not of the task's.
@@ -127,12 +127,12 @@ def answer_of(future: Future[Answer], order: Order) -> Answer:
 
 
 def log_of(order: Order) -> Path:
-    """Where a worker prints what libraries print while it does an order."""
+    """Return the file into which a worker prints what libraries print while it does an order."""
     return Path(f"{order.folder}.log")
 
 
 def last_words(log: Path) -> str:
-    """The last line of a log, behind a colon; nothing where there is none."""
+    """Return the last line of a log, behind a colon; nothing where there is none."""
     with suppress(OSError):
         said = [line.strip() for line in log.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()]
         return f": {said[-1][:200]}" if said else ""
@@ -146,7 +146,7 @@ def perform(order: Order, tell: Tell | None = None) -> Answer:
     ----------
     order : Order
     tell : callable, optional
-        Told how far it is, which is written into a file for `progress_of` unless given.
+        Given how far it is, which is written into a file for `progress_of` unless given.
     """
     if order.step.blender and order.blender:
         from .blender import perform_in_blender
@@ -190,7 +190,7 @@ def perform(order: Order, tell: Tell | None = None) -> Answer:
 
 
 def progress_of(order: Order) -> tuple[float, str] | None:
-    """How far an order is that is done elsewhere, and what is being done; None where nothing is known."""
+    """Return how far an order is that is done elsewhere, and what is being done; None where nothing is known."""
     try:
         share, doing = json.loads(Path(f"{order.folder}.progress").read_text(encoding="utf-8"))
         return float(share), str(doing)
@@ -199,7 +199,7 @@ def progress_of(order: Order) -> tuple[float, str] | None:
 
 
 def _writing(order: Order) -> Tell:
-    """What writes how far a task is for `progress_of`, not too often."""
+    """Return a function that writes how far a task is for `progress_of`, not too often."""
     said_at = 0.0
 
     def tell(share: float, doing: str) -> None:
@@ -221,7 +221,7 @@ def _changed(one: Input) -> bool:
 
 
 def _state_of(path: Path) -> tuple[int, int, str]:
-    """Size, time of change and digest of a file."""
+    """Return size, time of change and digest of a file."""
     result = path.lstat()
     if not stat.S_ISREG(result.st_mode):
         raise TaskError(f"{path.name}: this was to be a file")
@@ -229,7 +229,7 @@ def _state_of(path: Path) -> tuple[int, int, str]:
 
 
 def _shown(result: str | bytes | int, order: Order) -> str:
-    """A path as the user knows it: the folder of a task at work is nobody's business."""
+    """Return a path as the user knows it: the folder of a task at work is left out."""
     path = str(result)
     name = Path(path).relative_to(order.folder).as_posix() if path.startswith(order.folder + os.sep) else ""
     # What takes a file's place when it is whole has a name that ends in the file's.

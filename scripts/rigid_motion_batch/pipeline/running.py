@@ -29,14 +29,14 @@ from .store import OutputError, Result, Store, not_written
 Plan = Callable[[], Iterable[Task]]
 
 RETRIES = 2
-"""How often a task is begun anew whose process died."""
+"""Number of times that a task is begun anew whose process died."""
 
 LOOK = 0.2
 """Seconds between two looks at how far tasks are."""
 
 
 class State(enum.Enum):
-    """What became of a task. The values are what people read."""
+    """State of a task. The values are what people read."""
 
     DONE = "done"
     UP_TO_DATE = "up to date"
@@ -49,23 +49,23 @@ class State(enum.Enum):
 
 @dataclass
 class Outcome:
-    """What became of a run."""
+    """Outcome of a run."""
 
     counts: Counter[State] = field(default_factory=Counter)
     failures: dict[str, str] = field(default_factory=dict)
     """Task to what was wrong, in one line."""
 
     details: dict[str, str] = field(default_factory=dict)
-    """And to what Python said of it; empty where that is known."""
+    """Task to what Python said of its failure; empty where the reason is known."""
 
     interrupted: bool = False
-    """By Ctrl-C."""
+    """True if the run was interrupted by Ctrl-C."""
 
     problem: str = ""
-    """Why nothing more could be done, in one line; empty where everything was tried."""
+    """The reason why nothing more could be done, in one line; empty where everything was tried."""
 
     def later(self) -> Outcome:
-        """To begin a later run with, which finds done what this one has done."""
+        """Return the outcome to begin a later run with, which finds done what this one has done."""
         done = self.counts[State.DONE]
         return Outcome(Counter({State.DONE: done, State.UP_TO_DATE: -done}), self.failures, self.details)
 
@@ -77,7 +77,7 @@ class Outcome:
             store.note("failures.json", failures)
 
     def __str__(self) -> str:
-        """How many of each: "12 done, 3 up to date, 1 failed"."""
+        """Return how many tasks are in each state: "12 done, 3 up to date, 1 failed"."""
         return ", ".join(f"{self.counts[state]} {state.value}" for state in State if self.counts[state]) or (
             "nothing to do"
         )
@@ -88,13 +88,13 @@ class Share:
     """A part of a plan, for one of several workers: tasks of some stages, and of their groups every `of`-th."""
 
     stages: frozenset[str] = frozenset()
-    """Empty for all."""
+    """The stages; empty for all."""
 
     number: int = 1
     of: int = 1
 
     def chooser(self) -> Callable[[Task], bool]:
-        """What says of every task of a plan, asked in their order, whether it is in the share."""
+        """Return a function that says of every task of a plan, asked in their order, whether it is in the share."""
         groups: dict[str, int] = {}
 
         def chosen(task: Task) -> bool:
@@ -119,7 +119,7 @@ class Found:
 
 
 def look_through(plan: Plan, store: Store, share: Share = EVERYTHING) -> Iterator[Found]:
-    """All tasks of a plan."""
+    """Yield all tasks of a plan."""
     chosen = share.chooser()
     for task in plan():
         requested, result = chosen(task), store.result(task.key)
@@ -128,7 +128,7 @@ def look_through(plan: Plan, store: Store, share: Share = EVERYTHING) -> Iterato
 
 @dataclass
 class Survey:
-    """What there is to do."""
+    """Tasks that there are to do."""
 
     weight: float = 0.0
     tasks: int = 0
@@ -224,7 +224,7 @@ class _Open:
     """The keys of the tasks that it waits for, and perhaps of others that are settled."""
 
     key: str = ""
-    """Under which its result is kept: that of the task, but for a partial one where something failed."""
+    """The key under which its result is kept: that of the task, but for a partial one where something failed."""
 
     share: float = 0.0
     losses: int = 0
@@ -312,7 +312,7 @@ class _Run:
         return []
 
     def _before(self, task: Task) -> list[str | None]:
-        """The keys of the results of the tasks before one, also of earlier plans; None where there is none."""
+        """Return the keys of the results of the tasks before one, also of earlier plans; None where there is none."""
         for key in task.after:
             if key not in self.settled:
                 self.settled[key] = key if self.store.result(key) else None
@@ -396,7 +396,7 @@ class _Run:
         self.store.withdraw(task.publish.values())
 
     def _close(self, opened: _Open, state: State) -> None:
-        """An open task has come to its end: those after it may begin."""
+        """Close an open task that has come to its end: those after it may begin."""
         task = opened.task
         self.open.discard(task.key)
         self.settled[task.key] = opened.key if state in (State.DONE, State.UP_TO_DATE) else None
@@ -406,7 +406,7 @@ class _Run:
         self.outcome.counts[state] += 1
 
     def _tell(self, opened: _Open, share: float, doing: str) -> None:
-        """Tell how far a task is, and with it the whole."""
+        """Report how far a task is, and with it the whole."""
         opened.share = share
         weight, by_now = self.weight_done, defaultdict[str, float](float, self.amounts_done)
         for one in {opened, *(one for one, _ in self.at_work.values())}:

@@ -23,14 +23,14 @@ from rigid_motion_batch import places
 from .values import to_plain
 
 DIGITS = 32
-"""Of SHA-256, in a key: 128 bits, and short enough for the paths of Windows."""
+"""Digits of SHA-256 in a key: 128 bits, and short enough for the paths of Windows."""
 
 OWN = ".rigid-motion"
 """The folder in an output folder where the pipeline keeps its own files."""
 
 
 class TaskError(Exception):
-    """What is wrong with the input of a task, and what to do about it, in one line."""
+    """Error that says what is wrong with the input of a task, and what to do about it, in one line."""
 
 
 class Job:
@@ -85,19 +85,19 @@ class Step:
     """The part of the work that it belongs to, for `--only`."""
 
     partial: bool = False
-    """Goes on with what there is where some of the tasks before it failed."""
+    """True if it goes on with what there is where some of the tasks before it failed."""
 
     blender: bool = False
-    """Needs bpy: done by the Blender that the user names, if any."""
+    """True if it needs bpy: done by the Blender that the user names, if any."""
 
     @property
     def name(self) -> str:
-        """Package.module:function, which finds it again."""
+        """The name package.module:function, which finds it again."""
         return f"{self.function.__module__}:{self.function.__name__}"
 
     @cached_property
     def versions(self) -> Mapping[str, str]:
-        """Of the program, and in a checkout of every room and of the function's own module."""
+        """The versions of the program, and in a checkout of the packages it may use and the function's own module."""
         result = {"program": places.manifest()["version"]}
         if places.CHECKOUT:
             module = importlib.import_module(self.function.__module__)
@@ -107,7 +107,7 @@ class Step:
 
     @cached_property
     def digest(self) -> str:
-        """Of its name and versions."""
+        """The digest of its name and versions."""
         return _digest([self.name, self.versions])
 
     def __reduce__(self) -> tuple[Callable[[str], Step], tuple[str]]:
@@ -120,7 +120,7 @@ def step(**options: Any) -> Callable[[Callable[[Job, Any], Mapping[str, Any] | N
 
 
 def step_named(name: str) -> Step:
-    """The step of a name. Raises ValueError where there is none."""
+    """Return the step of a name. Raises ValueError where there is none."""
     module, _, function = name.partition(":")
     result = getattr(importlib.import_module(module), function, None)
     if not isinstance(result, Step):
@@ -134,7 +134,7 @@ class Input:
 
     path: str
     sha256: str
-    """Of its content; empty where it is missing or no file."""
+    """The digest of its content; empty where it is missing or no file."""
 
     size: int = -1
     mtime_ns: int = 0
@@ -149,7 +149,7 @@ class Task:
     """A frozen dataclass."""
 
     name: str
-    """What it is about, for people and from one plan to the next: "measure hand/10"."""
+    """The subject of the task, for people and from one plan to the next: "measure hand/10"."""
 
     after: tuple[str, ...] = ()
     """The keys of tasks whose results it reads."""
@@ -157,18 +157,18 @@ class Task:
     inputs: tuple[Input, ...] = ()
 
     spends: tuple[str, ...] = ()
-    """The keys of those before it whose results are for it alone, and go when it is done."""
+    """The keys of the tasks before it whose results are for it alone, and are deleted when it is done."""
 
     publish: Mapping[str, str] = field(default_factory=dict)
     """Files of the result to where they go in the output folder, with slashes; "FOLDER/" stands for all files below."""
 
     title: str = ""
     weight: float = 1.0
-    """About how many seconds it takes."""
+    """The seconds that it takes, roughly."""
 
     amount: int = 0
     unit: str = ""
-    """What is counted over all tasks, and how many it makes: 120 "frame"."""
+    """The unit that is counted over all tasks, and how many it makes: 120 "frame"."""
 
     group: str = ""
     """Tasks of one group are the share of one worker, where a job is split."""
@@ -181,13 +181,13 @@ class Task:
         object.__setattr__(self, "key", self.key_after(self.after))
 
     def key_after(self, after: Iterable[str | None]) -> str:
-        """Its key where the tasks before it had these keys; None for one that failed."""
+        """Return its key where the tasks before it had these keys; None for one that failed."""
         inputs = [one.sha256 for one in self.inputs]
         return _digest([self.step.digest, to_plain(self.parameters), list(after), inputs])[:DIGITS]
 
     @property
     def made_of(self) -> dict[str, Any]:
-        """What its result depends on, for people; `explain` compares it."""
+        """Return what its result depends on, for people; `explain` compares it."""
         return {
             "step": self.step.name,
             "versions": dict(self.step.versions),
@@ -197,7 +197,7 @@ class Task:
         }
 
     def published(self, files: Iterable[str] = ()) -> Iterator[tuple[str, str]]:
-        """Each file that is published and where it goes, of a result with these files."""
+        """Yield each file that is published and where it goes, of a result with these files."""
         for name, path in self.publish.items():
             if name.endswith("/"):
                 yield from ((one, path + one.removeprefix(name)) for one in files if one.startswith(name))
@@ -226,20 +226,20 @@ def require_inside(path: str) -> None:
 
 
 def place_of_room(room: str) -> Path:
-    """The file or folder of a room."""
+    """Return the file or folder of a package or module."""
     own = places.PACKAGE / room
     return own if own.exists() else places.place_of(room)
 
 
 @cache
 def digest_of(place: Path) -> str:
-    """Of the content of a file, or of all files of a folder, once in the life of this process."""
+    """Return the digest of the content of a file, or of all files of a folder, once in the life of this process."""
     files = sorted(path for path in place.rglob("*") if _is_source(path)) if place.is_dir() else [place]
     return _digest([[path.relative_to(place).as_posix(), sha256_of(path)] for path in files])[:12]
 
 
 def version_here() -> str:
-    """What all who work at one plan must have, as it was when this process asked first."""
+    """Return the version that all who work at one plan must have, as it was when this process asked first."""
     result = [f"program {places.manifest()['version']} {digest_of(places.PACKAGE)} {digest_of(places.EXTENSION)}"]
     for module in ("numpy", "bpy"):
         with suppress(importlib.metadata.PackageNotFoundError):

@@ -34,7 +34,7 @@ from rigid_motion_batch.files import append_lines, lines_of, write_text
 from .steps import OWN, Input, Task, sha256_of
 
 INDEX = ".index.json"
-"""Of a result: its files with size, time of change and digest; what it was made of, in how long, and facts."""
+"""Index of a result: its files with size, time of change and digest; what it was made of, in how long, and facts."""
 
 UNSETTLED = 2.0
 """Seconds since its last change, by which a file that was hashed may have changed again without a trace in its time."""
@@ -54,12 +54,12 @@ class FolderInUse(Exception):
 
 
 class OutputError(Exception):
-    """What must not be replaced or read, and the way out, in one line."""
+    """Error that says what must not be replaced or read, and the way out, in one line."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """What a task made."""
+    """Result of a task."""
 
     folder: Path
     index: Mapping[str, Any]
@@ -91,9 +91,9 @@ class Store:
         self._missing = [folder for folder in (self.output, *self.output.parents) if not folder.exists()]
         self._cache = _inputs_known(self.output)
         self._identities: dict[tuple[int, int], str] = {}
-        """Of inputs, in the file system, to their paths."""
+        """Identities of inputs in the file system, to their paths."""
         self._real = cache(os.path.realpath)
-        """Of folders: asking the system for those of all inputs takes long."""
+        """Real paths of folders: asking the system for those of all inputs takes long."""
         self.scratch = self._scratch / (ALONE if alone else uuid.uuid4().hex[:8])
         """The folder of this process for what is being made."""
         self._number = 0
@@ -134,7 +134,7 @@ class Store:
                 break
 
     def new_scratch(self) -> Path:
-        """A path for the result of a task that is begun; nothing is there."""
+        """Return a path for the result of a task that is begun; nothing is there."""
         self._number += 1
         return self.scratch / str(self._number)
 
@@ -150,7 +150,7 @@ class Store:
     # -- inputs -------------------------------------------------------------------------------------------------------
 
     def input(self, path: Path | str) -> Input:
-        """A file as it is now.
+        """Return a file as it is now.
 
         Raises
         ------
@@ -194,7 +194,7 @@ class Store:
     # -- results ------------------------------------------------------------------------------------------------------
 
     def result(self, key: str, *, thoroughly: bool = False) -> Result | None:
-        """What the task of a key made; None where it is not there, or damaged.
+        """Return what the task of a key made; None where it is not there, or damaged.
 
         With `thoroughly` the content of all files is looked at, otherwise of those that changed since they were made.
         """
@@ -212,7 +212,7 @@ class Store:
         return Result(Path(folder), index)
 
     def folder_of(self, key: str) -> Path:
-        """Where the result of a key is, if it is there."""
+        """Return the folder where the result of a key is, if it is there."""
         return self._results / key
 
     def keep(self, task: Task, key: str, made: Path, index: Mapping[str, Any]) -> Result:
@@ -258,7 +258,7 @@ class Store:
                 self.discard(entry.name)
 
     def latest(self) -> dict[str, Result]:
-        """Task to its last result, of all that are kept."""
+        """Return the last result of each task, by the task's name, of all that are kept."""
         results = sorted(self._results.glob("*"), key=lambda folder: folder.stat().st_mtime)
         matches = (self.result(folder.name) for folder in results)
         return {result.index["name"]: result for result in matches if result}
@@ -266,12 +266,12 @@ class Store:
     # -- published files ----------------------------------------------------------------------------------------------
 
     def is_published(self, task: Task, result: Result) -> bool:
-        """Whether all files that a task publishes are in place, and are those of this result."""
+        """Return whether all files that a task publishes are in place, and are those of this result."""
         files = task.published(result.index["files"])
         return all(self._is_same(f"{result.folder}/{name}", path) for name, path in files)
 
     def strangers(self, task: Task, result: Result | None) -> list[str]:
-        """The paths where a task would replace a file that this program has not written, or that was edited since.
+        """Return paths where a task would replace a file that this program has not written, or that was edited since.
 
         Raises
         ------
@@ -319,7 +319,7 @@ class Store:
                 raise OSError(error.errno, error.strerror, os.fspath(target)) from None
 
     def withdraw(self, paths: Iterable[str]) -> None:
-        """Delete files of this program that nobody wants any more, and folders that are empty then."""
+        """Delete files of this program that are needed no more, and folders that are empty then."""
         for path in paths:
             with suppress(OSError, OutputError):
                 if not self._is_set_here(path) or not (self.output / path).is_file():
@@ -330,7 +330,7 @@ class Store:
                         break
 
     def _is_same(self, original: str, path: str) -> bool:
-        """Whether a published file is that of a result: the same, or a copy."""
+        """Return whether a published file is that of a result: the same, or a copy."""
         try:
             requested, result = os.lstat(original), os.lstat(f"{self.output}/{path}")
         except OSError:
@@ -340,7 +340,7 @@ class Store:
         )
 
     def _is_set_here(self, path: str) -> bool:
-        """Whether at a path there is nothing, or what this program wrote. Raises OutputError for what always stays."""
+        """Return whether a path has nothing, or what this program wrote. Raises OutputError for what always stays."""
         target = f"{self.output}/{path}"
         try:
             result = os.lstat(target)
@@ -361,12 +361,12 @@ class Store:
         return bool(lines) and sha256_of(target) in {line["sha256"] for line in lines}
 
     def _record_of(self, path: str) -> Path:
-        """The file of the record of what was published into the same folder."""
+        """Return the file of the record of what was published into the same folder."""
         folder = path.rpartition("/")[0].casefold()
         return self.own / "published" / f"{uuid.uuid5(uuid.NAMESPACE_URL, folder).hex[:16]}.jsonl"
 
     def _published(self, path: str) -> Iterator[dict[str, Any]]:
-        """What was ever published at a path, on file systems that ignore case under names that differ in it alone."""
+        """Yield what was ever published at a path, or at one that differs in case, which file systems may ignore."""
         requested = {"path": str, "size": int, "mtime_ns": int, "sha256": str}
         for line in lines_of(self._record_of(path)):
             is_whole = all(isinstance(line.get(name), kind) for name, kind in requested.items())
@@ -375,7 +375,7 @@ class Store:
 
 
 def not_written(paths: list[str]) -> str:
-    """What to say of files in the way that this program has not written."""
+    """Return what to say of files in the way that this program has not written."""
     some = ", ".join(paths[:3]) + (f" and {len(paths) - 3} more" if len(paths) > 3 else "")
     were, them = ("was", "it") if len(paths) == 1 else ("were", "them")
     return (

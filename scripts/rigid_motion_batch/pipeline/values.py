@@ -19,7 +19,7 @@ CLASS, ARRAY = "$", "array"
 
 
 def to_plain(value: Any, arrays: MutableMapping[str, Any] | None = None) -> Any:
-    """A value as plain data for JSON.
+    """Return a value as plain data for JSON.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def to_plain(value: Any, arrays: MutableMapping[str, Any] | None = None) -> Any:
 
 
 def from_plain(plain: Any, arrays: Mapping[str, Any] | None = None) -> Any:
-    """The value of `to_plain`; lists are tuples now. ValueError for a class that is not loaded, or no dataclass."""
+    """Return the value of `to_plain`, lists as tuples. ValueError for a class not loaded, or no dataclass."""
     if isinstance(plain, list):
         return tuple(from_plain(inner, arrays) for inner in plain)
     if not isinstance(plain, dict):
@@ -91,7 +91,7 @@ def _names(kind: type) -> tuple[str, ...]:
 
 
 def _class_named(name: str) -> type:
-    """A class by its module and name. What asks for a value has loaded its class, so a file makes nothing load."""
+    """Return a class by its module and name. What asks for a value has loaded its class: a file loads nothing."""
     module, _, kind = name.partition(":")
     result = getattr(sys.modules.get(module), kind, None)
     if not (isinstance(result, type) and is_dataclass(result)):

@@ -27,7 +27,7 @@ LARGEST_FILE = 1 << 28
 
 
 def read(path: Path, selection: Selection) -> list[Trajectory]:
-    """The devices that were on. A recording of one device has the file's name."""
+    """Read the devices that were on. A recording of one device has the file's name."""
     text = read_text(path, LARGEST_FILE)
     try:
         content = json.loads(text)
@@ -41,7 +41,7 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
 
 
 def _devices(path: Path, content: Any) -> dict[str, list]:
-    """The poses of each device that has any."""
+    """Return the poses of each device that has any."""
     if isinstance(content, list):
         content = {"poses": content}
     if isinstance(content, dict):
@@ -71,7 +71,7 @@ def _trajectory(path: Path, name: str, samples: list) -> Trajectory:
 
 
 def _numbers(path: Path, device: str, samples: list, fields: list[tuple]) -> np.ndarray:
-    """The numbers in these fields of all samples, shape (samples, fields). null is JavaScript's NaN."""
+    """Return the numbers in these fields of all samples, shape (samples, fields). null is JavaScript's NaN."""
     try:
         return _gather(samples, fields)
     except _MALFORMED:

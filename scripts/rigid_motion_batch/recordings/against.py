@@ -1,4 +1,4 @@
-"""Somebody else's motion of a clip: read like the clip, matched to it in time and joint by joint."""
+"""Another motion of a clip: read like the clip, matched to it in time and joint by joint."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ROUNDED = 6e-4
 
 
 def with_against(clip: Clip, source: str, name: str, axes: str | None, options: ReadingOptions) -> tuple[Clip, str]:
-    """A clip beside another motion, cut to the time that both have, and notes on that, which may be empty.
+    """Return a clip beside another motion, cut to the time that both have, and notes on that, which may be empty.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def _span(times: np.ndarray) -> str:
 
 
 def _as_in(clip: Clip, other: Clip, source: str) -> Poses:
-    """The poses of another clip in the axes, the unit and, of a whole body, the joints of a clip."""
+    """Return the poses of another clip in the axes, the unit and, of a whole body, the joints of a clip."""
     own, theirs = clip.rest_body, other.rest_body
     poses = from_blender(to_blender(other.in_metres(other.poses), other.axes), clip.axes)
     poses = Poses(poses.positions / clip.metres_per_unit, poses.quaternions, poses.scales)

@@ -57,7 +57,7 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
 
 
 def reading_options(options: argparse.Namespace) -> ReadingOptions:
-    """What the options of that group say. Raises ValueError for some that do not go together."""
+    """Return what the options of that group say. Raises ValueError for some that do not go together."""
     if options.degrees and not options.euler:
         raise ValueError("--degrees is for Euler angles: add their order, such as --euler YXZ")
     return ReadingOptions(**{field.name: getattr(options, field.name) for field in fields(ReadingOptions)})
@@ -72,7 +72,7 @@ def _columns(text: str) -> tuple[tuple[str, str], ...]:
 
 
 def _field(name: str, convert: Callable[[str], object]) -> Callable[[str], object]:
-    """Return what reads one field of `ReadingOptions`."""
+    """Return a function that reads one field of `ReadingOptions`."""
     return lambda text: getattr(_checked(**{name: convert(text)}), name)
 
 

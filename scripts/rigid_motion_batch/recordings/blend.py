@@ -30,18 +30,18 @@ if TYPE_CHECKING:
     import bpy
 
 OF_BONES = "pose.bones["
-"""How the data paths of everything begin that a driver may drive in a bone."""
+"""The beginning of the data paths of everything that a driver may drive in a bone."""
 
 FEW = 5
-"""Bones of a rig that are told where one has to be named."""
+"""Bones of a rig that are listed where one has to be named."""
 
 STEADY = 1e-4
-"""By what share a scale may differ that is one and the same: single precision, through a chain of bones."""
+"""Share by which a scale may differ that is one and the same: single precision, through a chain of bones."""
 
 
 @dataclass(frozen=True)
 class Body:
-    """What is followed: an object, or a bone of its pose."""
+    """Object that is followed, or a bone of its pose."""
 
     obj: bpy.types.Object
     bone: str | None = None
@@ -51,7 +51,7 @@ class Body:
         return self.obj.name if self.bone is None else f"{self.obj.name}/{self.bone}"
 
     def frames_of_keys(self) -> tuple[float, float] | None:
-        """The first and last frame of what moves it in the object's Action and NLA strips. None where it has neither.
+        """Return the first and last frame of what moves it in the object's Action and NLA strips, None for neither.
 
         What moves any bone of a rig counts for all of them, which hang on one another by parents and constraints.
         """
@@ -70,7 +70,7 @@ class Body:
 
 
 def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE_SAYS) -> list[Trajectory]:
-    """The first, by their names, of the animated objects and the rigs whose bones have keys; or all animated objects.
+    """Read the first, by name, of the animated objects and the rigs whose bones have keys; or all animated objects.
 
     Any other object, and any bone, can be had by its name.
     """
@@ -108,14 +108,14 @@ def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE
 
 
 def _bones_of(objects: dict[str, bpy.types.Object]) -> Iterator[str]:
-    """The bones of all armatures, as OBJECT/BONE."""
+    """Yield the bones of all armatures, as OBJECT/BONE."""
     for name, obj in objects.items():
         if obj.type == "ARMATURE":
             yield from (f"{name}/{bone}" for bone in armature_of(obj).bones.keys())  # noqa: SIM118 - it runs over bones
 
 
 def _bone_called(path: Path, requested: str, objects: dict[str, bpy.types.Object]) -> Body | None:
-    """The bone called OBJECT/BONE, of which either may have slashes in its name. None where there is no such object.
+    """Return the bone called OBJECT/BONE, either of which may have slashes. None if there is no such object.
 
     Raises
     ------
@@ -152,7 +152,7 @@ def _bone_called(path: Path, requested: str, objects: dict[str, bpy.types.Object
 
 
 def _nearest(requested: str, names: list[str]) -> list[str]:
-    """A few of the names: those that are most like the one that was wanted, whatever their case."""
+    """Return a few of the names: those that are most like the one that was requested, whatever their case."""
     likeness = SequenceMatcher(b=requested.casefold(), autojunk=False)
 
     def unlike(name: str) -> float:
@@ -188,7 +188,7 @@ def _sample_whole(path: Path, rig: bpy.types.Object, scenes: list[bpy.types.Scen
 
 
 def _moments(path: Path, body: Body, scenes: list[bpy.types.Scene], name: str = "") -> tuple[Moments, float]:
-    """When a body is looked at, and the metres of a unit."""
+    """Return when a body is looked at, and the metres of a unit."""
     scene = next((scene for scene in scenes if scene in body.obj.users_scene), scenes[0])
     keyed = body.frames_of_keys()
     first, last = keyed if keyed and keyed[0] < keyed[1] else (scene.frame_start, scene.frame_end)
@@ -207,7 +207,7 @@ def _moments(path: Path, body: Body, scenes: list[bpy.types.Scene], name: str = 
 
 
 def _remark(body: Body, poses: Poses) -> str:
-    """Of a bone, what its rig's size does to it."""
+    """Return what the size of its rig does to a bone."""
     if body.bone is None or poses.scales is None:
         return ""
     if not np.allclose(poses.scales, poses.scales[0], rtol=STEADY, atol=0.0):
@@ -217,7 +217,7 @@ def _remark(body: Body, poses: Poses) -> str:
 
 
 def _bones_are_moved(obj: bpy.types.Object) -> bool:
-    """Whether drivers or constraints may move the bones of what may be an armature."""
+    """Return whether drivers or constraints may move the bones of what may be an armature."""
     if obj.type != "ARMATURE" or not obj.pose:
         return False
     data = obj.animation_data
@@ -228,7 +228,7 @@ def _bones_are_moved(obj: bpy.types.Object) -> bool:
 
 
 def _bones_with_keys(obj: bpy.types.Object) -> list[str]:
-    """The bones that the object's Action or NLA strips move, in the order of the armature."""
+    """Return the bones that the object's Action or NLA strips move, in the order of the armature."""
     from bpy.utils import unescape_identifier
 
     data = obj.animation_data
@@ -246,7 +246,7 @@ def _bones_with_keys(obj: bpy.types.Object) -> list[str]:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[tuple[dict[str, bpy.types.Object], list[bpy.types.Scene]]]:
-    """The objects by name, and the scenes, of the file: linked for as long as this lasts, or those of the open file.
+    """Yield the objects by name, and the scenes, of the file: linked while this lasts, or those of the open file.
 
     Objects that the file itself links are among them where a scene has them; its own go before others of their name.
     """
@@ -276,7 +276,7 @@ def _opened(path: Path) -> Iterator[tuple[dict[str, bpy.types.Object], list[bpy.
 
 
 def _by_name(own: list[bpy.types.Object], scenes: list[bpy.types.Scene]) -> dict[str, bpy.types.Object]:
-    """The objects of the file, and then those of libraries, each in the order of their names."""
+    """Return the objects of the file, and then those of libraries, each in the order of their names."""
     # A scene of a damaged file may come without its collection.
     linked = (obj for scene in scenes if scene.collection for obj in scene.collection.all_objects)
     objects = {obj.name: obj for obj in sorted(own, key=lambda obj: obj.name)}
@@ -287,7 +287,7 @@ def _by_name(own: list[bpy.types.Object], scenes: list[bpy.types.Scene]) -> dict
 
 @contextmanager
 def _without_scripts() -> Iterator[None]:
-    """No Python of the file runs. The preference also switches off what Blender was started with (`-y`)."""
+    """Keep the file's Python from running. The preference also switches off what Blender was started with (`-y`)."""
     import bpy
 
     preferences = cast("bpy.types.Preferences", bpy.context.preferences).filepaths

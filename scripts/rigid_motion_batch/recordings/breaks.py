@@ -1,4 +1,4 @@
-"""Where a recording is no continuous motion: a T-pose in front of it, gaps without samples, and jumps.
+"""Breaks in the motion of a recording: a T-pose in front of it, gaps without samples, and jumps.
 
 Times are strictly rising and poses are repaired, as `rigid_motion.motion.repair` gives them. What is said in texts
 counts from the first sample, as the options `--start` and `--end` do.
@@ -21,31 +21,31 @@ IDENTICAL = 5
 """Samples in front that may hold the same T-pose."""
 
 SAME = 1e-3
-"""By what part of its size a body may move and still hold a pose."""
+"""Part of its size by which a body may move and still hold a pose."""
 
 JUMPS = 0.1
-"""What part of its size a joint moves, at least, from a T-pose to the motion."""
+"""Part of its size that a joint moves, at least, from a T-pose to the motion."""
 
 FASTER = 5.0
-"""How many times farther that is than any joint moves in any sample afterwards."""
+"""Factor by which that is farther than any joint moves in any sample afterwards."""
 
 STARTLED = 10.0
-"""The same where the first pose is neither a T-pose nor that at rest, and more than `HIGHEST_SPEED`."""
+"""Such a factor where the first pose is neither a T-pose nor that at rest, and more than `HIGHEST_SPEED`."""
 
 SOON = 60
 """Samples that are looked at for that."""
 
 AT_REST = 0.02
-"""By what part of its size any joint may be away from where it is at rest."""
+"""Part of its size by which any joint may be away from where it is at rest."""
 
 BROAD, FLAT = 0.75, 0.4
-"""Of a T-pose: the least that its arms reach, and the most that it is deep, as parts of its largest extent."""
+"""The least that the arms of a T-pose reach, and the most that it is deep, as parts of its largest extent."""
 
 GAP = 0.2
 """Seconds: the longest time between keys of a comparison at 5 keys a second. In a longer gap there is no key at all."""
 
 ISOLATED = 10.0
-"""How many times farther a jump goes than the samples around it."""
+"""Factor by which a jump goes farther than the samples around it."""
 
 AROUND = 8
 """Samples before and after a jump that it is compared with."""
@@ -65,7 +65,7 @@ LEAVE_OUT = "take a part without it: --start and --end"
 def calibration_pose(
     times: np.ndarray, poses: Poses, rest_body: RestBody, metres: float
 ) -> tuple[int, ClipWarning | None]:
-    """Tell a pose in front of a whole body's motion that is no part of it.
+    """Find a pose in front of a whole body's motion that is no part of it.
 
     Returns
     -------
@@ -100,7 +100,7 @@ def calibration_pose(
 
 
 def _kind(places: np.ndarray, rest_body: RestBody, size: float) -> str:
-    """What pose these places (joints, 3) are: a T-pose in any axes, or that at rest; empty for any other."""
+    """Return what pose these places (joints, 3) are: a T-pose in any axes, or that at rest; empty for any other."""
     smallest, middle, largest = np.sort(np.ptp(places, axis=0))
     if middle > BROAD * largest and smallest < FLAT * largest:
         return "a T-pose"
@@ -145,7 +145,7 @@ def _jumps(times: np.ndarray, steps: np.ndarray, lengths: np.ndarray, begin: flo
 
 
 def _lengths(poses: Poses, rest_body: RestBody | None) -> Iterator[np.ndarray]:
-    """How far a body, or any joint of it, gets from each sample to the next, block by block."""
+    """Yield how far a body, or any joint of it, gets from each sample to the next, block by block."""
     count = poses.shape[-1]
     for first in range(0, count - 1, BLOCK):
         part = poses[..., first : first + BLOCK + 1]

@@ -34,13 +34,13 @@ from .vector_cells import is_number
 CHANNELS = {f"{axis}{kind}": (axis.upper(), kind) for kind in ("position", "rotation") for axis in "xyz"}
 
 MOST_JOINTS = 3000
-"""Of a body, three times what the most detailed rigs have. With more, what follows takes minutes."""
+"""Joints of a body, three times what the most detailed rigs have. With more, what follows takes minutes."""
 
 DEEPEST = 500
 """Joints that hang on one another: five times what the longest tails have."""
 
 MOST_POSES = 50_000_000
-"""Of all joints together: a file may hold any number of joints and frames in little space."""
+"""Poses of all joints together: a file may hold any number of joints and frames in little space."""
 
 LONGEST_NAME = 100
 """Words of a joint's name."""
@@ -63,7 +63,7 @@ class Joint:
 
 
 def read(path: Path, selection: Selection) -> list[Trajectory]:
-    """The whole body; or joints that are named, or all, in the order of the file. A single joint is no body."""
+    """Read the whole body; or joints that are named, or all, in the order of the file. A single joint is no body."""
     joints, motion = _read_hierarchy(path)
     names = [joint.name for joint in joints]
     as_body = selection.requested is None and len(joints) > 1
@@ -84,7 +84,7 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
 
 
 def rest_body_of(joints: list[Joint]) -> RestBody:
-    """The body of a hierarchy at rest, where no joint is turned: every bone ends in the middle of its children."""
+    """Return the body of a hierarchy at rest, no joint being turned: every bone ends in the middle of its children."""
     parents = np.array([-1 if joint.parent is None else joint.parent for joint in joints])
     offsets = np.array([joint.offset for joint in joints])
     places, tails, ends = offsets.copy(), np.zeros_like(offsets), np.zeros(len(joints))
@@ -102,7 +102,7 @@ def rest_body_of(joints: list[Joint]) -> RestBody:
 
 
 def world_poses(joints: list[Joint], values: np.ndarray, requested: Iterable[str]) -> dict[str, Poses]:
-    """Forward kinematics: the world poses of some joints.
+    """Return the world poses of some joints, by forward kinematics.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def world_poses(joints: list[Joint], values: np.ndarray, requested: Iterable[str
 
 
 def _needed(joints: list[Joint], requested: set[str]) -> Iterator[int | None]:
-    """The parent of each joint that is wanted or carries a wanted one, once for each such joint."""
+    """Yield the parent of each joint that is requested or carries a requested one, once for each such joint."""
     carrying = [joint.name in requested for joint in joints]
     for index in reversed(range(len(joints))):
         if carrying[index]:
@@ -145,7 +145,7 @@ def _needed(joints: list[Joint], requested: set[str]) -> Iterator[int | None]:
 
 
 def _local_poses(joints: list[Joint], values: np.ndarray) -> Poses:
-    """All joints in their parents' space, shape (joints, n), from values of shape (n, channels of all joints).
+    """Return all joints in their parents' space, shape (joints, n), from values of shape (n, channels of all joints).
 
     The signs of quaternions that Euler angles give say nothing, and are aligned.
     """
@@ -157,12 +157,12 @@ def _local_poses(joints: list[Joint], values: np.ndarray) -> Poses:
 
 
 def _begins(joints: list[Joint]) -> list[int]:
-    """The first column of each joint, and the end of the last one."""
+    """Return the first column of each joint, and the end of the last one."""
     return np.cumsum([0, *(len(joint.channels) for joint in joints)]).tolist()
 
 
 def _local(joint: Joint, own: np.ndarray) -> Poses:
-    """A joint's poses in its parent's space, from its own channels (n, channels)."""
+    """Return a joint's poses in its parent's space, from its own channels (n, channels)."""
     positions = np.tile(joint.offset, (len(own), 1))
     turns = []
     for column, (axis, kind) in enumerate(joint.channels):
@@ -216,7 +216,7 @@ class _Words:
 
 
 def _read_hierarchy(path: Path) -> tuple[list[Joint], int]:
-    """The joints with unique names, and the line of the word MOTION."""
+    """Read the joints with unique names, and the line of the word MOTION."""
     words = _Words(path)
     first = words.next("HIERARCHY")
     if first.upper() != "HIERARCHY":
@@ -276,7 +276,7 @@ def _read_channels(words: _Words) -> list[tuple[str, str]]:
 
 
 def _read_motion(path: Path, motion: int, joints: list[Joint]) -> tuple[np.ndarray, float, tuple[ClipWarning, ...]]:
-    """What is behind the line `motion`.
+    """Read what is behind the line `motion`.
 
     Returns
     -------
@@ -314,7 +314,7 @@ def _read_motion(path: Path, motion: int, joints: list[Joint]) -> tuple[np.ndarr
 
 
 def _finished(lines: Iterable[tuple[int, str]], unfinished: list[tuple[int, str]]) -> Iterator[tuple[int, str]]:
-    """Lines with their numbers, without blank ones and blanks around them; a last one without an end goes to a list."""
+    """Yield numbered lines, without blank ones and blanks around them; a last one without an end goes to a list."""
     before = None
     for number, line in lines:
         if before:
@@ -325,13 +325,13 @@ def _finished(lines: Iterable[tuple[int, str]], unfinished: list[tuple[int, str]
 
 
 def _is_cut_off(row: str, width: int) -> bool:
-    """Whether a row lacks numbers at its end, or a part of the last one, and is sound as far as it goes."""
+    """Return whether a row lacks numbers at its end, or a part of the last one, and is sound as far as it goes."""
     *cells, last = row.split()
     return all(map(is_number, cells)) and len(cells) < width and (len(cells) < width - 1 or not is_number(last))
 
 
 def _read_setting(path: Path, row: list[tuple[int, str]], name: str, motion: int) -> float:
-    """The positive number behind `name` in a row, which is empty where the file has ended at the line `motion`."""
+    """Read the positive number behind `name` in a row, which is empty where the file has ended at the line `motion`."""
     number, text = row[0] if row else (motion, "")
     label, _, value = text.partition(":")
     try:

@@ -1,4 +1,4 @@
-"""From recordings to clips: repaired, cut to the part that is wanted, and named."""
+"""From recordings to clips: repaired, cut to the part that is requested, and named."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LONGEST_NAME = 80
 """Characters of a clip's name: folders below folders have to fit what file systems allow."""
 
 MOST_BYTES = 240
-"""Of a clip's name in UTF-8, in which some characters have four: file systems allow 255."""
+"""Bytes of a clip's name in UTF-8, in which some characters have four: file systems allow 255."""
 
 NOT_FOLDERS = {
     *("metrics.csv", "metrics_joints.csv", "decimated.csv", "keys_needed.csv", "report.html", "manifest.json"),
@@ -72,7 +72,7 @@ def read_clips(
 
 
 def read_source(source: str, axes: str | None, options: ReadingOptions = AS_THE_FILE_SAYS) -> tuple[list[Clip], str]:
-    """The clips of one source, repaired but not yet told apart by their names, and a note on it, which may be empty.
+    """Read the clips of one source, repaired, with names that need not be unique, and a note on it, which may be empty.
 
     Of several bodies those are left out, with a note, that there are no two poses of. Raises TrajectoryError where the
     source cannot be read, or nothing of it is left.
@@ -106,7 +106,7 @@ def make_clip(
     *,
     measured: bool = True,
 ) -> Clip:
-    """A trajectory, repaired and cut. Raises TrajectoryError where fewer than two poses are left of it.
+    """Return a trajectory, repaired and cut. Raises TrajectoryError where fewer than two poses are left of it.
 
     `measured` is whether devices recorded it: gaps and jumps of an animation are meant.
     """
@@ -144,7 +144,7 @@ def make_clip(
 
 
 def _part(source: str, seconds: np.ndarray, options: ReadingOptions) -> slice:
-    """The samples from start to end, of times in seconds since the first. Raises TrajectoryError for fewer than two."""
+    """Return the samples from start to end, in seconds since the first. Raises TrajectoryError for fewer than two."""
     first, last = options.start or 0.0, math.inf if options.end is None else options.end
     part = slice(int(np.searchsorted(seconds, first)), int(np.searchsorted(seconds, last, "right")))
     if part.stop - part.start < 2:
@@ -157,7 +157,7 @@ def _part(source: str, seconds: np.ndarray, options: ReadingOptions) -> slice:
 
 
 def clip_names(requested: Sequence[tuple[str, str]]) -> list[str]:
-    """Names for clips, as `folder_names` gives them, of what each would like to be called and of its body.
+    """Return names for clips, as `folder_names` gives them, of what each would like to be called and of its body.
 
     The body, empty where the user named none, is part of the name only where several would like to be called the same.
     """
@@ -170,7 +170,7 @@ def clip_names(requested: Sequence[tuple[str, str]]) -> list[str]:
 
 
 def folder_names(requested: Iterable[str]) -> list[str]:
-    """Names like those wanted that are safe for folders on every system, each unlike all before it.
+    """Return names like those requested that are safe for folders on every system, each unlike all before it.
 
     Letters and digits of any script stay, and so do dots, dashes and underscores inside. Case makes no difference, nor
     does how a letter with an accent is spelled in Unicode. No name begins with what spreadsheets take for a formula.
@@ -193,7 +193,7 @@ def folder_names(requested: Iterable[str]) -> list[str]:
 
 
 def _safe(name: str) -> str:
-    """A name like the one wanted that is safe for a folder."""
+    """Return a name like the one requested that is safe for a folder."""
     safe = re.sub(r"[^\w.-]+", "_", unicodedata.normalize("NFC", name)).strip("._-")[:LONGEST_NAME]
     safe = safe.encode()[:MOST_BYTES].decode(errors="ignore").strip("._-") or "clip"
     return f"clip-{safe}" if safe.casefold().split(".")[0] in DEVICES else safe

@@ -16,12 +16,12 @@ from rigid_motion_batch.recordings.rest_bodies import RestBody
 
 @dataclass(frozen=True)
 class ClipWarning:
-    """What changes the meaning of the numbers, and what to do about it. As a string it is a sentence."""
+    """Warning of what changes the meaning of the numbers, and what to do about it. As a string it is a sentence."""
 
     text: str
     way_out: str = ""
     start_s: float | None = None
-    """Where in the recording that is, in seconds of its times; None where it is everywhere."""
+    """The place in the recording, in seconds of its times; None where it is everywhere."""
 
     end_s: float | None = None
 
@@ -31,19 +31,19 @@ class ClipWarning:
 
 @dataclass(frozen=True, eq=False)
 class OtherMotion:
-    """Somebody else's motion of a clip, by its own samples; between these straight lines and SLERP."""
+    """Another motion of a clip, by its own samples; between these straight lines and SLERP."""
 
     name: str
-    """What it is called, and its id beside those of modes."""
+    """The name of the motion, and its id beside those of modes."""
 
     times: np.ndarray
     """Seconds of the clip's clock, strictly rising, shape (m,)."""
 
     poses: Poses
-    """As those of the clip, shape (m,) or (joints, m)."""
+    """Poses like those of the clip, shape (m,) or (joints, m)."""
 
     def at(self, times: np.ndarray) -> Poses:
-        """The poses at any times (n,), shape (n,) or (joints, n)."""
+        """Return the poses at any times (n,), shape (n,) or (joints, n)."""
         return interpolate(self.times, self.poses, times, "lerp_slerp")
 
 
@@ -52,10 +52,10 @@ class Clip:
     """One body of one recording, of n samples."""
 
     name: str
-    """Unique among the clips of a run, and safe as the name of a folder."""
+    """A name that is unique among the clips of a run, and safe as the name of a folder."""
 
     source: str
-    """What the user gave: the file, and the body where one was named."""
+    """The source that the user gave: the file, and the body where one was named."""
 
     axes: str
     """The convention of the recording: a name in `rigid_motion_batch.axes.AXES`."""
@@ -64,10 +64,10 @@ class Clip:
     """Seconds, strictly rising, shape (n,)."""
 
     poses: Poses
-    """Shape (n,), signs aligned. Of a figure shape (joints, n), each joint's in its parent's space."""
+    """Poses of shape (n,), signs aligned. Of a figure shape (joints, n), each joint's in its parent's space."""
 
     repairs: tuple[str, ...]
-    """What is hard to believe of the recording, and what had to be repaired in it, a sentence each."""
+    """Sentences on what is hard to believe of the recording, and on what had to be repaired in it."""
 
     metres_per_unit: float = 1.0
     """The length of the recording's unit. Errors, and what Blender shows, are in metres."""
@@ -76,19 +76,19 @@ class Clip:
     """The body that the user asked for by name. It becomes part of the clip's where another clip has the same."""
 
     rest_body: RestBody | None = None
-    """What a whole body is made of; None for a single rigid body."""
+    """The rest body of a whole body; None for a single rigid body."""
 
     rate: float | None = None
     """Samples a second, where there may be more between these."""
 
     warnings: tuple[ClipWarning, ...] = ()
-    """Those of the repairs that change the meaning of the numbers, with the way out."""
+    """Warnings on the repairs that change the meaning of the numbers, with the way out."""
 
     calibration: int = 0
     """Samples of a T-pose or the like before the motion, which are left out."""
 
     against: OtherMotion | None = None
-    """What the user compares with it beside the modes."""
+    """The motion that the user compares with it beside the modes."""
 
     @property
     def samples_a_second(self) -> float:
@@ -102,7 +102,7 @@ class Clip:
         return self.rest_body
 
     def in_metres(self, poses: Poses) -> Poses:
-        """Poses of this clip with positions in metres."""
+        """Return poses of this clip with positions in metres."""
         if self.metres_per_unit == 1.0:
             return poses
         return Poses(poses.positions * self.metres_per_unit, poses.quaternions, poses.scales)
@@ -122,14 +122,14 @@ class ClipFacts:
     repairs: tuple[str, ...]
 
     joint_names: tuple[str, ...] = ()
-    """Of a whole body; none of a single rigid one."""
+    """The names of the joints of a whole body; none of a single rigid one."""
 
     warnings: tuple[ClipWarning, ...] = ()
     body: str = ""
-    """As the user named it."""
+    """The body as the user named it."""
 
     against: str = ""
-    """What the motion is called that the modes are compared with, if any."""
+    """The name of the motion that the modes are compared with, if any."""
 
     @property
     def joints(self) -> int:

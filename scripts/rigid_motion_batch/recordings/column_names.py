@@ -1,4 +1,4 @@
-"""What the name of a column in somebody's log says: what it holds, of which axis, in which unit, of which body.
+"""Names of columns in other people's logs: what each holds, of which axis, in which unit, of which body.
 
 Loggers write `t`, `timestamp_ms` and `Time (s)`, `x`, `px`, `PosX`, `pos_x_cm` and `position.x`, `qw`, `rot_w` and
 `Rotation W`; with several bodies in a row `left_pos_x` and `LeftHand.position.x`. A name is cut into words, at dots,
@@ -46,7 +46,7 @@ KINDS = {
     "rotation": "r rot rots rotation rotations ori orient orientation att attitude",
     "euler": "euler eulers angle angles rpy",
 }
-"""What axes are of, and how it is written. A rotation is a quaternion where it has a w, and Euler angles otherwise."""
+"""Kinds of axes, and how each is written. A rotation is a quaternion where it has a w, and Euler angles otherwise."""
 
 KIND_OF = {word: kind for kind, words in KINDS.items() for word in words.split()}
 
@@ -69,7 +69,7 @@ TIME = frozenset(_WORDS["time"].split())
 """Words for time."""
 
 WITH_TIME = TIME | frozenset(_WORDS["beside time"].split())
-"""And those that may stand with them, and change nothing. `delta` and `frame` do."""
+"""Words for time, and those that may stand with them and change nothing. `delta` and `frame` change the meaning."""
 
 FRAMES = frozenset(_WORDS["frames"].split())
 """Words for a count of frames."""
@@ -96,7 +96,7 @@ AXIS = re.compile(rf"({'|'.join(sorted(KIND_OF, key=len, reverse=True))})?([xyzw
 
 @dataclass(frozen=True)
 class ColumnName:
-    """What a name says."""
+    """Meaning of a column's name."""
 
     kind: str
     """"time", "frame", "scale", "device", or one of `KINDS`."""
@@ -108,12 +108,12 @@ class ColumnName:
     """One of `UNITS`, or what stood in brackets; empty where nothing is said."""
 
     body: str = ""
-    """As it was written."""
+    """The body as it was written."""
 
 
 @lru_cache(maxsize=4096)
 def column_name(text: str) -> ColumnName | None:
-    """What the name of a column says; None where that is nothing known."""
+    """Return what the name of a column says; None where that is nothing known."""
     if len(text) > LONGEST_NAME:
         return None
     text, unit = _without_brackets(text)
@@ -134,14 +134,14 @@ def column_name(text: str) -> ColumnName | None:
 
 
 def unit_in(text: str) -> str:
-    """The unit that a name ends with, whatever else it says; empty where it has none."""
+    """Return the unit that a name ends with, whatever else it says; empty where it has none."""
     text, unit = _without_brackets(text[-LONGEST_NAME:])
     words = WORD.findall(text)
     return unit or (UNIT_OF.get(words[-1].lower(), "") if len(words) > 1 else "")
 
 
 def _without_brackets(text: str) -> tuple[str, str]:
-    """A name without the unit in brackets, and the unit. An axis in brackets stays."""
+    """Return a name without the unit in brackets, and the unit. An axis in brackets stays."""
     text, unit = text.strip().replace("\u00b5", "u").replace("\u03bc", "u"), ""
     for match in BRACKETS.finditer(text):
         content = match[1].lower()
@@ -165,7 +165,7 @@ def _time(words: list[str], unit: str) -> ColumnName | None:
 
 
 def _pose(words: list[str], unit: str, taken: set[int]) -> ColumnName | None:
-    """What the name of a position or rotation says; the places of the words that say it become those in `taken`."""
+    """Return what the name of a position or rotation says; the places of the words that say it are left in `taken`."""
     taken.clear()
     for place, word in enumerate(words):
         # A single letter in between is rather part of a name.
@@ -192,7 +192,7 @@ def _pose(words: list[str], unit: str, taken: set[int]) -> ColumnName | None:
 
 
 def _body(text: str, words: list[str], spans: list[tuple[int, int]], taken: set[int]) -> str:
-    """What is left of a name: as it was written, where it stands together."""
+    """Return what is left of a name: as it was written, where it stands together."""
     left = [place for place, word in enumerate(words) if place not in taken and word not in WITHOUT_MEANING]
     if not left:
         return ""

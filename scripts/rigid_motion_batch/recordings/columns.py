@@ -1,4 +1,4 @@
-"""Which columns of a header are which body's time, position and rotation, and what there is to say where they are not.
+"""Columns of a header: which are which body's time, position and rotation, and what there is to say where they are not.
 
 A row may hold several bodies, each with a name of its own in front of its columns (`left_x`, `right_x`), or one body
 of several, which another column names (`device`).
@@ -20,50 +20,51 @@ QUATERNION = ("qx", "qy", "qz", "qw")
 EULER = ("rx", "ry", "rz")
 
 KNOWN = "t, time, timestamp_ms; x, px, pos_x, position.x; qw, rot_w, rotation.w"
-"""What an error says of the names that are known."""
+"""Text of an error on the names that are known."""
 
 MOST_FOUND = 12
 """Columns that an error names."""
 
 
 class ColumnProblem(ValueError):
-    """Why a header does not do."""
+    """Error that says why a header does not do."""
 
     def __init__(self, problem: str, way_out: str, known: int, kind: type[TrajectoryError] = TrajectoryError) -> None:
         self.problem, self.way_out, self.kind = problem, way_out, kind
         self.known = known
-        """How many columns mean something: of the lines that could be the header, that with the most is believed."""
+        """Columns that mean something: of the lines that could be the header, the one with the most is taken."""
 
     def at(self, path: Path, line: int) -> TrajectoryError:
-        """The same of a line of a file, for the user."""
+        """Return the error for a line of a file, for the user."""
         return self.kind(path, self.problem, self.way_out, line)
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Where everything is in a row, as indices."""
+    """Layout of a row: where everything is, as indices."""
 
     time: int
     time_unit: str
-    """As the file or the user says it, which need not be one of `TICKS`; empty where nothing does."""
+    """The unit as the file or the user says it, which need not be one of `TICKS`; empty where neither does."""
 
     bodies: Mapping[str, Mapping[str, int]]
-    """Of each body by name, empty where its columns have none in front: `POSITION`, then `QUATERNION` or `EULER`, and
-    maybe `scale`."""
+    """The columns of each body by name, empty where its columns have none in front: `POSITION`, then `QUATERNION` or
+    `EULER`, and maybe `scale`.
+    """
 
     units: Mapping[int, str]
-    """Of columns that tell theirs: a name in `column_names.METRES`, "deg" or "rad"."""
+    """Units of the columns that tell theirs: a name in `column_names.METRES`, "deg" or "rad"."""
 
     devices: tuple[int, ...] = ()
     """Columns that may tell whose the row is, the likeliest first."""
 
 
 Found = dict[str, list[int]]
-"""Of a body each meaning to all columns that could be it, by their names."""
+"""Meanings in a body, each to all columns that could be it, by their names."""
 
 
 def layout_of(cells: Sequence[str], options: ReadingOptions) -> Layout:
-    """Tell what the columns of a header are.
+    """Return what the columns of a header are.
 
     Raises
     ------
@@ -115,7 +116,7 @@ def layout_of(cells: Sequence[str], options: ReadingOptions) -> Layout:
 
 
 def _explicit(cells: Sequence[str], options: ReadingOptions, known: int) -> dict[str, int]:
-    """The columns that the user named."""
+    """Return the columns that the user named."""
     written = [cell.lower() for cell in cells]
     explicit = {}
     for meaning, column in options.columns:
@@ -131,7 +132,7 @@ def _explicit(cells: Sequence[str], options: ReadingOptions, known: int) -> dict
 
 
 def _bodies(names: Sequence[ColumnName | None], explicit: set[int]) -> dict[str, Found]:
-    """The columns of positions, rotations and scales, by the name of the body in front, whatever its case."""
+    """Return the columns of positions, rotations and scales, by the name of the body in front, whatever its case."""
     bodies: dict[str, Found] = {"": {}}
     labels: dict[str, str] = {"": ""}
     with_w = {name.body.lower() for name in names if name and name.kind == "rotation" and name.axis == "w"}
@@ -156,7 +157,7 @@ def _missing(
     explicit: Mapping[str, int],
     known: int,
 ) -> ColumnProblem:
-    """What is missing to a header of which nobody is whole: of the body that lacks the least."""
+    """Return what is missing to a header of which no body is whole: of the body that lacks the least."""
     label, nearest = max(bodies.items(), key=lambda body: sum(one in body[1] for one in needed))
     if not nearest.keys() >= set(POSITION):
         # Something by chance ends like an axis.
@@ -199,7 +200,7 @@ def _missing(
 
 
 def columns_found(cells: Sequence[str]) -> str:
-    """The columns that a file has, for an error."""
+    """Return the columns that a file has, for an error."""
     names = [cell if len(cell) <= 24 else f"{cell[:24]}..." for cell in dict.fromkeys(cells) if cell]
     return listed(names, limit=MOST_FOUND) or "none"
 
@@ -212,7 +213,7 @@ def require_time_unit(layout: Layout) -> None:
 
 
 def metres_of(layout: Layout, columns: Mapping[str, int], options: ReadingOptions) -> list[float]:
-    """The metres of a unit in each of the columns x, y and z, of which those are metres that say nothing.
+    """Return the metres of a unit in each of the columns x, y and z, of which those are metres that say nothing.
 
     Raises ColumnProblem for a unit of length that is not known.
     """

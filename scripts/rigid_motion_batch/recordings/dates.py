@@ -28,7 +28,7 @@ MOMENT = re.compile(
 """Day, hour, minute, second, fraction and offset. Java leaves out seconds that are 0, and Python a digit of hours."""
 
 LIKE_A_DATE = re.compile(r"\d[:/]\d|\d[-.]\d\d?[-.]\d|\d{8}T\d", re.ASCII)
-"""In dates as other standards and countries have them."""
+"""Pattern of dates as other standards and countries have them."""
 
 MIDNIGHT = datetime(1970, 1, 1, tzinfo=UTC)
 
@@ -43,7 +43,7 @@ FURTHEST = 2**61 // 10**9
 then a whole number of nanoseconds that fits 64 bits."""
 
 MISSING = -1
-"""Instead of nanoseconds, where a row has no time."""
+"""Value instead of nanoseconds, where a row has no time."""
 
 LONGEST_SHOWN = 40
 """Characters of a time in an error: as long as any is."""
@@ -51,7 +51,7 @@ LONGEST_SHOWN = 40
 
 @dataclass(frozen=True)
 class Kind:
-    """What times are written as: dates or clock times, and whether with an offset from UTC."""
+    """Kind of times: dates or clock times, and whether with an offset from UTC."""
 
     dated: bool
     offset: bool
@@ -62,7 +62,7 @@ class Kind:
 
 
 def kind_of_times(table: Table) -> Kind | None:
-    """What the times in column t of a table are, by the first that there is; None for numbers.
+    """Return what the times in column t of a table are, by the first that there is; None for numbers.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def kind_of_times(table: Table) -> Kind | None:
 
 
 def seconds_of_dates(table: Table, kind: Kind) -> np.ndarray:
-    """The times in column t of a table.
+    """Return the times in column t of a table.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def seconds_of_dates(table: Table, kind: Kind) -> np.ndarray:
 
 
 def _moments(table: Table, kind: Kind) -> Iterator[tuple[int, int]]:
-    """Of every row the seconds since some midnight in UTC, and the nanoseconds besides."""
+    """Yield the seconds of every row since some midnight in UTC, and the nanoseconds besides."""
     way_out = "correct or delete the line"
     for number, cell in table.cells("t"):
         match = MOMENT.fullmatch(cell)
@@ -140,13 +140,13 @@ def _moments(table: Table, kind: Kind) -> Iterator[tuple[int, int]]:
 
 @lru_cache(maxsize=1024)
 def _minute(day: str | None, hour: str, minute: str, offset: str | None) -> int:
-    """Seconds from some midnight in UTC to the beginning of a minute. Raises ValueError where there is none such."""
+    """Return seconds from some midnight in UTC to the beginning of a minute. Raises ValueError for no such minute."""
     moment = datetime.fromisoformat(f"{day or '2000-01-01'}T{hour:0>2}:{minute}{(offset or 'Z').upper()}")
     return (moment - MIDNIGHT) // timedelta(seconds=1)
 
 
 def _through_midnights(seconds: np.ndarray) -> np.ndarray:
-    """Clock times of shape (n,) as seconds since the first midnight, also those that come back from the next day."""
+    """Return clock times (n,) as seconds since the first midnight, also those that come back from the next day."""
     seconds = seconds % DAY  # An offset from UTC may lead out of the day.
     steps = np.diff(seconds)
     days = np.cumsum((steps < -DAY // 2).astype(np.int64) - (steps > DAY // 2))

@@ -8,7 +8,7 @@ from rigid_motion.motion.quaternions import multiply
 
 
 def quaternions_from_intrinsic_eulers(angles: np.ndarray, order: str) -> np.ndarray:
-    """The rotations R1 R2 ... of turns about the axes in `order`, each about the axis as the earlier ones left it.
+    """Return rotations R1 R2 ... of turns about the axes in `order`, each about the axis as the earlier ones left it.
 
     Parameters
     ----------

@@ -25,12 +25,12 @@ NAMES = {
 
 
 def recognises(head: list[str]) -> bool:
-    """Whether the first line is EuRoC's header, and whole."""
+    """Return whether the first line is EuRoC's header, and whole."""
     return sorted(filter(None, _names(head[0].lstrip("# ").split(",")))) == sorted(NAMES.values())
 
 
 def read(path: Path, selection: Selection) -> list[Trajectory]:
-    """The one body of the file, which has the file's name."""
+    """Read the one body of the file, which has the file's name."""
     header, options = next(header_lines(path)), replace(AS_THE_FILE_SAYS, time_unit="ns")
     header = replace(header, cells=_names(header.cells))
     layout = layout_of(header.cells, options)

@@ -22,14 +22,14 @@ ADDON = "io_scene_fbx"
 
 
 def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE_SAYS) -> list[Trajectory]:
-    """The whole skeleton; or bones that are named, or all."""
+    """Read the whole skeleton; or bones that are named, or all."""
     refuse_too_large(path)
     refuse_damaged(path)
     return read_imported(path, selection, lambda: _import(path), ADDON, _rate, options.scale)
 
 
 def _rate(fps: float, keys: float | None) -> float:
-    """That of the file, unless there are more keys than frames."""
+    """Return the rate of the file, unless there are more keys than frames."""
     return max(fps, keys or 0.0)
 
 
@@ -49,7 +49,7 @@ def _import(path: Path) -> None:
 
 @contextmanager
 def _without_images() -> Iterator[None]:
-    """Images are not opened, wherever a stranger's file says that they are: the importer gets empty ones."""
+    """Keep images from being opened, wherever a stranger's file says that they are: the importer gets empty ones."""
     import bpy
     from bpy_extras import image_utils
 

@@ -19,10 +19,10 @@ from .tables import LARGEST_FILE
 MAGIC = b"Kaydara FBX Binary  \x00\x1a\x00"
 
 FIRST = len(MAGIC) + 4
-"""Where the records begin, behind the version."""
+"""Byte where the records begin, behind the version."""
 
 SINCE_WIDE = 7500
-"""Since this version places and numbers have 8 bytes each, and not 4."""
+"""Version since which places and numbers have 8 bytes each, and not 4."""
 
 DEEPEST = 100
 """Records within records; importers go 10 deep."""
@@ -34,7 +34,7 @@ ITEMS = {b"b": 1, b"c": 1, b"i": 4, b"l": 8, b"f": 4, b"d": 8}
 """Bytes of a number in those that are many."""
 
 DENSEST = 1032
-"""As many bytes zlib makes of one at most."""
+"""Bytes that zlib makes of one at most."""
 
 HARMLESS = 1 << 24
 """Bytes. What cannot become more is not unpacked to see."""
@@ -107,7 +107,7 @@ class _Records:
         return place
 
     def _refuse_false_size(self, place: int, requested: int, size: int, packed: bool) -> None:
-        """Whether so many bytes at a place can be what they are said to be, unpacked where they are packed."""
+        """Refuse numbers at a place that cannot take as many bytes, unpacked if they are packed, as the file says."""
         self.unpacked += requested
         if self.unpacked > LARGEST_FILE:
             problem = f"its numbers are more than {LARGEST_FILE} bytes"

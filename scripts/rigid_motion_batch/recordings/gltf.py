@@ -40,26 +40,26 @@ WITHOUT_A_RATE = 60.0
 """Frames a second where keys come too seldom or too often to tell."""
 
 FPS = 120
-"""Of the scene: keys at 24, 30 or 60 a second are on whole frames of it."""
+"""Frames a second of the scene: keys at 24, 30 or 60 a second are on whole frames of it."""
 
 PARTS = {
     *("asset", "scene", "scenes", "nodes", "meshes", "skins", "animations", "accessors", "bufferViews", "buffers"),
     *("extensionsUsed", "extensionsRequired"),
 }
-"""What makes a skeleton that moves, and its skin."""
+"""Parts of a document that make a skeleton that moves, and its skin."""
 
 COMPRESSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression", "KHR_draco_mesh_compression")
 """Extensions without which the numbers cannot be read."""
 
 MOST_NODES = 10_000
-"""Of a file, with all that is no joint: Blender takes seconds for so many, and four times as long for twice as many."""
+"""Nodes of a file, also those that are no joints: Blender takes seconds, four times as long for twice as many."""
 
 MOST_CHANNELS = 100_000
-"""Of all takes together: each becomes up to four F-curves."""
+"""Channels of all takes together: each becomes up to four F-curves."""
 
 
 def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE_SAYS) -> list[Trajectory]:
-    """The whole skeleton; or bones that are named, or all."""
+    """Read the whole skeleton; or bones that are named, or all."""
     refuse_too_large(path)
     content = path.read_bytes()
     try:
@@ -83,7 +83,7 @@ def _rate(_: float, keys: float | None) -> float:
 
 
 def _buffers(path: Path, document: dict[str, Any]) -> dict[int, Path]:
-    """The files that buffers are in, by their numbers, all of them in the folder of the file or below."""
+    """Return the files that buffers are in, by their numbers, all of them in the folder of the file or below."""
     buffers = document.get("buffers")
     uris = [
         buffer.get("uri") if isinstance(buffer, dict) else None
@@ -129,7 +129,7 @@ def _objects(part: Any) -> list[dict[str, Any]]:
 
 
 def _depth(nodes: list[dict[str, Any]]) -> int:
-    """How many nodes hang on one another at most; `DEEPEST` and one more where they hang on themselves."""
+    """Return how many nodes hang on one another at most; `DEEPEST` and one more where they hang on themselves."""
     children = [node.get("children") for node in nodes]
     below = [
         [child for child in own if isinstance(child, int) and child in range(len(nodes))]
@@ -146,7 +146,7 @@ def _depth(nodes: list[dict[str, Any]]) -> int:
 def _copy(
     folder: Path, document: dict[str, Any], binary: bytes | None, others: dict[int, Path]
 ) -> tuple[Path, np.ndarray]:
-    """What Blender is to import, in a folder, and the times of keys in it that are in no track of the file."""
+    """Return what Blender is to import, in a folder, and the times of keys in it that are in no track of the file."""
     plain = {name: _plain(part) for name, part in document.items() if name in PARTS}
     for number, other in others.items():
         plain["buffers"][number]["uri"] = name = f"buffer{number}.bin"
@@ -171,7 +171,7 @@ def _bytes_of(folder: Path, buffer: dict[str, Any]) -> bytes:
 
 
 def _plain(part: Any) -> Any:
-    """A part of the document without materials, extras, and extensions that do more than compress."""
+    """Return a part of the document without materials, extras, and extensions that do more than compress."""
     if isinstance(part, list):
         return [_plain(one) for one in part]
     if not isinstance(part, dict):

@@ -18,22 +18,22 @@ from rigid_motion.gltf.accessors import COMPONENTS, KINDS, denormalised
 from rigid_motion.motion.repair import LARGEST
 
 WIDEST = np.radians(25.0)
-"""A turn that is wider from key to key gets keys between: a line of quaternions is then off by 0.3 milliradians."""
+"""Widest turn from key to key that gets no keys between: a line of quaternions is then off by 0.3 milliradians."""
 
 OF_A_BONE = 1e-3
-"""How far off lines may be from a spline of places, of the length of a usual bone."""
+"""Part of the length of a usual bone that lines may be off from a spline of places."""
 
 OF_A_TURN = 2.5e-4
-"""The same of quaternions and scales."""
+"""Distance that lines may be off from a spline of quaternions or scales."""
 
 MOST_PARTS = 64
-"""Of a part of a spline."""
+"""Parts of a segment of a spline."""
 
 MOST_KEYS = 200_000
-"""Of a track that is made; one with more is left to Blender."""
+"""Keys of a track that is made; one with more is left to Blender."""
 
 DAMAGED = (KeyError, IndexError, TypeError, ValueError, AttributeError, ArithmeticError)
-"""What damaged files lead to: Blender's importer says what is wrong with them."""
+"""Errors that damaged files lead to: Blender's importer says what is wrong with them."""
 
 
 def straightened(document: dict[str, Any], bytes_of: Callable[[int], bytes]) -> tuple[bytes, np.ndarray]:
@@ -86,7 +86,7 @@ class _Made:
         self._times: list[np.ndarray] = []
 
     def sampler(self, sampler: dict[str, Any], path: str) -> dict[str, Any]:
-        """The same, or one with more keys."""
+        """Return the same sampler, or one with more keys."""
         kind, times = sampler.get("interpolation", "LINEAR"), self._read(sampler["input"])[:, 0]
         self._known.append(times)
         if kind == "STEP" or (kind == "LINEAR" and path != "rotation"):
@@ -113,7 +113,7 @@ class _Made:
         }
 
     def finish(self) -> tuple[bytes, np.ndarray]:
-        """What has come to the document, which it gets a buffer for, and the times that are new."""
+        """Return what has come to the document, which it gets a buffer for, and the times that are new."""
         if not self._data:
             return b"", np.empty(0)
         self._document["buffers"].append({"byteLength": len(self._data)})
@@ -121,7 +121,7 @@ class _Made:
         return bytes(self._data), np.setdiff1d(times, known).astype(np.float64)
 
     def _read(self, number: int) -> np.ndarray:
-        """The numbers of an accessor, shape (n, components). Raises ValueError for one that is kept in other ways."""
+        """Read the numbers of an accessor, shape (n, components). Raises ValueError for one that is kept otherwise."""
         accessor = self._document["accessors"][number]
         view = self._document["bufferViews"][accessor["bufferView"]]
         if "sparse" in accessor or view.get("extensions"):
@@ -150,7 +150,7 @@ class _Made:
 
 
 def _usual_length(document: dict[str, Any]) -> float:
-    """How far joints are from their parents, as a rule: the median."""
+    """Return how far joints are from their parents, as a rule: the median."""
     try:
         joints = {joint for skin in document["skins"] for joint in skin["joints"]}
         lengths = [math.hypot(*document["nodes"][joint].get("translation", ())) for joint in joints]
@@ -161,7 +161,7 @@ def _usual_length(document: dict[str, Any]) -> float:
 
 
 def _of_spline(times: np.ndarray, rows: np.ndarray, tolerance: float, turns: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Keys on a spline whose rows (n, 3, components) are the tangent before a key, its value, and the tangent after."""
+    """Return keys on a spline of rows (n, 3, components): tangent before a key, its value, and tangent after."""
     steps = np.diff(times)
     begin, end = rows[:-1, 1], rows[1:, 1]
     out, into = rows[:-1, 2] * steps[:, None], rows[1:, 0] * steps[:, None]
@@ -179,7 +179,7 @@ def _of_spline(times: np.ndarray, rows: np.ndarray, tolerance: float, turns: boo
 
 
 def _of_turns(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Keys of quaternions (n, 4), and more on even turns between those that are far apart."""
+    """Return keys of quaternions (n, 4), and more on even turns between those that are far apart."""
     values = values / np.linalg.norm(values, axis=-1, keepdims=True)
     a, b = values[:-1], values[1:]
     dots = np.sum(a * b, axis=-1)
@@ -196,6 +196,6 @@ def _of_turns(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _split(parts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of segments in so many parts: the segment in which each part begins, and how far along it."""
+    """Return the segment in which each part begins, and how far along it, of segments in so many parts."""
     segment = np.repeat(np.arange(len(parts)), parts)
     return segment, (np.arange(len(segment)) - (np.cumsum(parts) - parts)[segment]) / parts[segment]

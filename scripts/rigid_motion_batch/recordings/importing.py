@@ -31,24 +31,24 @@ if TYPE_CHECKING:
     import bpy
 
 FASTEST, SLOWEST = 240.0, 5.0
-"""Keys a second that are believed to be the rate of the file."""
+"""Keys a second that are taken to be the rate of the file."""
 
 ROUND = 2e-4
-"""By what share a rate may be off a whole number that is one: 29.97 is none."""
+"""Share by which a rate may be off a whole number that is one: 29.97 is none."""
 
 ON_A_FRAME = 1e-4
-"""What is as near to a whole frame is on it."""
+"""Distance from a whole frame within which a key is on it."""
 
 FINE = 1e-3
-"""By how much less fine that is for each frame from the first: F-curves keep frames in single precision."""
+"""Share by which that is less fine for each frame from the first: F-curves keep frames in single precision."""
 
 NONE = np.empty(0)
 
 MULTIPLE = 0.05
-"""By how much of the least gap between keys others may miss its multiples."""
+"""Share of the least gap between keys by which others may miss its multiples."""
 
 THINNED = 4.0
-"""How many samples a key may stand for where keys were thinned."""
+"""Number of samples that a key may stand for where keys were thinned."""
 
 FEW = 5
 """Names of a kind that a remark tells."""
@@ -78,7 +78,7 @@ def read_imported(
     fps: int = 24,
     made: np.ndarray = NONE,
 ) -> list[Trajectory]:
-    """The whole skeleton of a file; or bones that are named, or all.
+    """Read the whole skeleton of a file; or bones that are named, or all.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def read_imported(
     addon : str
         The add-on of Blender that it is in.
     rate_of : callable
-        Given the frames a second of the scene, and how many keys there are in one where that can be believed: the
+        Given the frames a second of the scene, and how many keys there are in one where that is plausible: the
         rate to sample at.
     scale : float or None
         Metres of a unit, where the user says them.
@@ -160,7 +160,7 @@ def _read(
 def _requested(
     rigs: dict[str, bpy.types.Object], moving: Mapping[str, object], requested: str | None
 ) -> tuple[str, str | None]:
-    """The armature that is meant and its bone, or None for the whole."""
+    """Return the armature that is meant and its bone, or None for the whole."""
     largest = max(moving, key=lambda name: len(armature_of(rigs[name]).bones))
     if requested in (None, ALL):
         return largest, None
@@ -179,7 +179,7 @@ def _requested(
 def _remarks(
     scene: bpy.types.Scene, rig: bpy.types.Object, name: str, rigs: list[str], *, several: bool
 ) -> Iterator[str]:
-    """What is left of the file."""
+    """Yield remarks on what is left of the file."""
     if several and len(rigs) > 1:
         others = listed([other for other in rigs if other != name], FEW)
         yield f"took {name} of {len(rigs)} armatures; others: {others}"
@@ -196,7 +196,7 @@ def _with_remarks(trajectory: Trajectory, *remarks: str) -> Trajectory:
 
 
 def _keys_of_curves(rig: bpy.types.Object) -> list[np.ndarray]:
-    """The frames of the keys, rising, of each curve that moves the bones, the armature, or what it hangs on."""
+    """Return the frames of the keys, rising, of each curve that moves the bones, the armature, or what it hangs on."""
     keys = []
     for obj in with_parents(rig):
         if data := obj.animation_data:
@@ -206,13 +206,13 @@ def _keys_of_curves(rig: bpy.types.Object) -> list[np.ndarray]:
 
 
 def _frames_of_keys(rig: bpy.types.Object) -> tuple[float, float] | None:
-    """The first and last frame of what moves an armature. None where nothing does."""
+    """Return the first and last frame of what moves an armature. None where nothing does."""
     keys = _keys_of_curves(rig)
     return (min(own[0] for own in keys), max(own[-1] for own in keys)) if keys else None
 
 
 def _rate_of_keys(rig: bpy.types.Object, fps: float, made: np.ndarray) -> float | None:
-    """How many keys a second the densest curve has; None where that is no rate that anything is recorded at.
+    """Return how many keys a second the densest curve has; None where that is no rate that anything is recorded at.
 
     A curve with even gaps, or a thinned one whose gaps are multiples of the least, goes before uneven ones.
     """
@@ -229,12 +229,12 @@ def _rate_of_keys(rig: bpy.types.Object, fps: float, made: np.ndarray) -> float 
 
 
 def _less(keys: np.ndarray, made: np.ndarray) -> np.ndarray:
-    """Frames of keys without those that were made."""
+    """Return frames of keys without those that were made."""
     return keys[away(keys, made) > ON_A_FRAME * (1.0 + FINE * np.abs(keys))]
 
 
 def _moments(rig: bpy.types.Object, first: float, last: float, fps: float, step: float, made: np.ndarray) -> Moments:
-    """Even frames from the first key to the last one, and all keys between."""
+    """Return even frames from the first key to the last one, and all keys between."""
     even = first + step * np.arange(int((last - first) / step + SAME) + 1)
     if last - even[-1] > SAME * step:
         even = np.append(even, last)
@@ -246,7 +246,7 @@ def _moments(rig: bpy.types.Object, first: float, last: float, fps: float, step:
 
 
 def _other_takes(rig: bpy.types.Object, own: bpy.types.Action, scene: bpy.types.Scene) -> list[str]:
-    """Other Actions that move its bones, of those that the importer has made after the scene."""
+    """Return other Actions that move its bones, of those that the importer has made after the scene."""
     import bpy
 
     bones, result = set(armature_of(rig).bones.keys()), []
@@ -266,7 +266,7 @@ def _other_takes(rig: bpy.types.Object, own: bpy.types.Action, scene: bpy.types.
 def _imported(
     path: Path, importer: Callable[[], None], addon: str, fps: int
 ) -> Iterator[tuple[bpy.types.Scene, dict[bpy.types.Object, str]]]:
-    """A scene with what was imported, and its objects with their names; all of it gone afterwards."""
+    """Yield a scene with what was imported, and its objects with their names; all of it gone afterwards."""
     import bpy
 
     before = {block.session_uid for block in bpy.data.user_map()}
@@ -306,7 +306,7 @@ def _import(path: Path, importer: Callable[[], None]) -> None:
 
 
 def _reason(path: Path, error: Exception) -> str:
-    """What an importer says: in its own words, or the last line of a traceback."""
+    """Return what an importer says: in its own words, or the last line of a traceback."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     if not lines:
         return type(error).__name__
@@ -324,7 +324,7 @@ def _reason(path: Path, error: Exception) -> str:
 
 @contextmanager
 def enabled(path: Path, addon: str) -> Iterator[None]:
-    """An add-on of Blender's own, switched on for as long as this lasts."""
+    """Switch on an add-on of Blender's own for as long as this lasts."""
     import addon_utils
 
     _, loaded = addon_utils.check(addon)
@@ -342,7 +342,7 @@ def enabled(path: Path, addon: str) -> Iterator[None]:
 
 
 def _only_its_action(obj: bpy.types.Object) -> None:
-    """An object with the Action that it has, or else that of its first strip, and without what else is in its NLA."""
+    """Keep the Action that an object has, or else that of its first strip, and nothing else of its NLA."""
     data = obj.animation_data
     if data is None:
         return
@@ -356,6 +356,6 @@ def _only_its_action(obj: bpy.types.Object) -> None:
 
 
 def _own_name(name: str, taken: set[str]) -> str:
-    """What the file calls an object that was numbered, for there is one of that name in what is open."""
+    """Return what the file calls an object that was numbered, for there is one of that name in what is open."""
     numbered = NUMBERED.fullmatch(name)
     return numbered["name"] if numbered and numbered["name"] in taken else name

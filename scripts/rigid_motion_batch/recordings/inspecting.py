@@ -1,4 +1,4 @@
-"""What is in a recording: its bodies, units, axes, times and motion, and what looks wrong with it.
+"""Contents of a recording: its bodies, units, axes, times and motion, and what looks wrong with it.
 
 Nothing is printed here, and nothing but the recording read. Lengths are in metres, times in seconds, angles in degrees;
 x, y and z are the recording's own axes.
@@ -24,7 +24,7 @@ from .recordings import ALL, Recording, Trajectory, TrajectoryError
 UNIT_NAMES = {"m": "metres", "cm": "centimetres", "mm": "millimetres", "in": "inches", "ft": "feet"}
 
 EVEN = 0.1
-"""By what part of the median the middle nine tenths of all intervals differ, at most, where samples are even."""
+"""Part of the median by which the middle nine tenths of all intervals differ, at most, where samples are even."""
 
 ABOVE_THE_FLOOR = 0.3, 2.5
 """Metres, where hands, heads and cameras of people are."""
@@ -37,12 +37,12 @@ class Unit:
     metres: float
     name: str
     known_from: str
-    """Where that is from, and so how sure."""
+    """The origin of the unit, and so how sure it is."""
 
 
 @dataclass(frozen=True)
 class Timing:
-    """When the samples are that can be used."""
+    """Timing of the samples that can be used."""
 
     samples: int
     recorded: int
@@ -66,7 +66,7 @@ class Timing:
 
 @dataclass(frozen=True)
 class Size:
-    """How large a motion is; of a whole body, that of all its joints, and the turns of its first root."""
+    """Size of a motion; of a whole body, that of all its joints, and the turns of its first root."""
 
     lowest: tuple[float, float, float]
     highest: tuple[float, float, float]
@@ -90,23 +90,23 @@ class Size:
 
 @dataclass(frozen=True)
 class Contents:
-    """What is known of a body."""
+    """Contents of a body."""
 
     name: str
     joints: tuple[str, ...]
-    """Of a whole body; none for a single rigid one."""
+    """The joints of a whole body; none for a single rigid one."""
 
     unit: Unit
     timing: Timing
     size: Size
     scaled: bool
-    """Whether it grows or shrinks."""
+    """True if it grows or shrinks."""
 
     up: str
     """The axis that seems to be up, or empty."""
 
     repairs: tuple[str, ...]
-    """What was repaired, a sentence each."""
+    """Sentences on what was repaired."""
 
     warnings: tuple[ClipWarning, ...]
 
@@ -120,12 +120,12 @@ class Axes:
 
     known_from: str
     others: tuple[str, ...] = ()
-    """Those that the motion speaks for, where that is another one."""
+    """Other conventions that the motion speaks for."""
 
 
 @dataclass(frozen=True)
 class Inspection:
-    """What is in a recording."""
+    """Contents of a recording."""
 
     source: str
     format: str
@@ -139,7 +139,7 @@ class Inspection:
     """Bodies that there are no two poses of, and why."""
 
     note: str = ""
-    """What there is to say of what was taken and left: takes, armatures, guessed units."""
+    """A note on what was taken and left: takes, armatures, guessed units."""
 
 
 def inspect(source: str, axes: str | None = None, options: ReadingOptions = AS_THE_FILE_SAYS) -> Inspection:
@@ -184,7 +184,7 @@ def inspect(source: str, axes: str | None = None, options: ReadingOptions = AS_T
 
 
 def _note_of(recording: Recording) -> str:
-    """What is said of the bodies; not that of the others, which are listed."""
+    """Return what is said of the bodies; not that of the others, which are listed."""
     return "; ".join(one.remark for one in recording.trajectories if one.remark)
 
 
@@ -254,7 +254,7 @@ def _size(clip: Clip) -> Size:
 
 
 def _up(clip: Clip) -> str:
-    """The axis that is up, by where people are above the floor, or how they stand; empty where nothing tells it."""
+    """Return the axis that is up, by where people are above the floor, or how they stand; empty if unclear."""
     if clip.rest_body is not None:
         places = clip.rest_body.skeleton.in_root_space(clip.poses[:, :1]).positions[:, 0]
         extents = np.ptp(places, axis=0)

@@ -1,4 +1,4 @@
-"""When the keys come that move an object or the bones of a rig: of its Action, its NLA strips and its parents.
+"""Frames of the keys that move an object or the bones of a rig: of its Action, its NLA strips and its parents.
 
 Frames are those of the scene: keys in strips are where the strips put them, scaled, repeated and reversed.
 """
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import bpy
 
 TRANSFORMS = ("location", "rotation_", "scale", "delta_")
-"""How the data paths of the channels begin that move an object."""
+"""Beginnings of the data paths of the channels that move an object."""
 
 BONE_CHANNEL = re.compile(r'pose\.bones\["(?P<name>(?:\\.|[^"\\])*)"\]\.(?:location|rotation_|scale)', re.DOTALL)
 """The data paths of the channels that move a pose bone, whose name is escaped in them."""
@@ -25,11 +25,11 @@ CONSTANT, LINEAR = 0, 1
 """Blender's numbers of the interpolations of keys."""
 
 MOST_KEYS = 1_000_000
-"""Of a strip with all of its repeats; keys of one with more are left to looking between samples."""
+"""Keys of a strip with all of its repeats; keys of one with more are left to looking between samples."""
 
 
 NOISE = 1e-5
-"""By how much values may differ that are one and the same: of the largest of a curve, or of 1."""
+"""Share by which values may differ that are one and the same: of the largest of a curve, or of 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,11 +43,11 @@ class Keys:
     """Shape (n,): whether the curve jumps to that key, from a constant value before it to another one."""
 
     straight: bool
-    """Whether there are straight lines or constant values between them."""
+    """True if there are straight lines or constant values between them."""
 
 
 def fcurves_of(action: bpy.types.Action | None, slot: bpy.types.ActionSlot | None) -> Iterator[bpy.types.FCurve]:
-    """What an Action has for one of its slots."""
+    """Yield the F-curves that an Action has for one of its slots."""
     from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
     if action is not None and slot is not None:
@@ -58,14 +58,14 @@ def fcurves_of(action: bpy.types.Action | None, slot: bpy.types.ActionSlot | Non
 def curves_that_move(
     action: bpy.types.Action | None, slot: bpy.types.ActionSlot | None, *, bones: bool
 ) -> Iterator[bpy.types.FCurve]:
-    """The F-curves of a slot that move its object, and with `bones` those that move the bones of its pose."""
+    """Yield the F-curves of a slot that move its object, and with `bones` those that move the bones of its pose."""
     for fcurve in fcurves_of(action, slot):
         if fcurve.data_path.startswith(TRANSFORMS) or (bones and BONE_CHANNEL.match(fcurve.data_path)):
             yield fcurve
 
 
 def keys_of(fcurve: bpy.types.FCurve) -> Keys:
-    """The keys of an F-curve, by their frames."""
+    """Return the keys of an F-curve, by their frames."""
     points = fcurve.keyframe_points
     places, kinds = np.empty(2 * len(points), dtype=np.float32), np.empty(len(points), dtype=np.int32)
     points.foreach_get("co", places)
@@ -79,7 +79,7 @@ def keys_of(fcurve: bpy.types.FCurve) -> Keys:
 
 
 def with_parents(obj: bpy.types.Object) -> Iterator[bpy.types.Object]:
-    """An object, and what it hangs on."""
+    """Yield an object, and what it hangs on."""
     one: bpy.types.Object | None = obj
     while one is not None:
         yield one
@@ -87,7 +87,7 @@ def with_parents(obj: bpy.types.Object) -> Iterator[bpy.types.Object]:
 
 
 def moments_of(obj: bpy.types.Object, lead: float) -> tuple[np.ndarray, bool]:
-    """The frames at which a curve may bend or jump that moves an object, its bones or its parents.
+    """Return the frames at which a curve may bend or jump that moves an object, its bones or its parents.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def _of_strips(strips: Iterable[bpy.types.NlaStrip], lead: float) -> Iterator[np
 
 
 def _in_strip(strip: bpy.types.NlaStrip, keys: Keys, lead: float) -> np.ndarray:
-    """Where a strip puts the keys of its Action, in each of its repeats, which begin with a jump as a rule."""
+    """Return where a strip puts the keys of its Action, in each of its repeats, which begin with a jump as a rule."""
     first, last, scale = strip.action_frame_start, strip.action_frame_end, abs(strip.scale)
     length = (last - first) * scale
     rows = (keys.frames >= first) & (keys.frames <= last)

@@ -30,7 +30,7 @@ ROTATION_TYPES = {"quaternion": "wxyz"} | {"".join(order): "".join(order) for or
 """Rotation Type to the axes of its columns, in the order of `Poses` or of the turns."""
 
 MOST_HEADER_ROWS = 20
-"""What is still no sample after so many rows will not be one. Motive writes about eight."""
+"""Rows after which what is still no sample will not be one. Motive writes about eight."""
 
 
 @dataclass(frozen=True)
@@ -42,16 +42,16 @@ class _Header:
     contents: list[str]
     axes: list[str]
     line: int
-    """Of the last row of the header."""
+    """The line of the last row of the header."""
 
 
 def recognises(head: list[str]) -> bool:
-    """Whether the first line begins as Motive's does."""
+    """Return whether the first line begins as Motive's does."""
     return head[0].lstrip('"').startswith("Format Version")
 
 
 def read(path: Path, selection: Selection) -> list[Trajectory]:
-    """The rigid bodies of the take."""
+    """Read the rigid bodies of the take."""
     header = _read_header(path)
     metres = METRES[_setting(path, header, "Length Units", "Meters", METRES)]
     usual = "Quaternion" if "w" in header.axes else "XYZ"
@@ -99,7 +99,7 @@ def _mentions_types(row: Iterable[str]) -> bool:
 
 
 def _bodies(path: Path, header: _Header, requested: list[tuple[str, str]]) -> dict[str, dict[tuple[str, str], int]]:
-    """Each rigid body's columns: what it holds and the axis, to the index."""
+    """Return each rigid body's columns: what it holds and the axis, to the index."""
     result: dict[tuple[str, str], dict[tuple[str, str], int]] = {}
     for index, (kind, name, identity, content, axis) in enumerate(
         zip(header.types, header.names, header.ids, header.contents, header.axes, strict=False)
@@ -118,7 +118,7 @@ def _bodies(path: Path, header: _Header, requested: list[tuple[str, str]]) -> di
 
 
 def _setting(path: Path, header: _Header, name: str, usual: str, known: Iterable[str]) -> str:
-    """A setting of the take in lower case, which has to be one of those known."""
+    """Return a setting of the take in lower case, which has to be one of those known."""
     value = header.settings.get(name) or usual
     if value.lower() not in known:
         raise TrajectoryError(path, f"{name} is {shown(value)}", f"export with one of {', '.join(known)}", 1)

@@ -47,18 +47,18 @@ class _Body:
 
     name: str
     prefix: str
-    """What its columns have in front."""
+    """The prefix of its columns."""
 
     columns: Mapping[str, int]
     rows: np.ndarray | slice
 
     def label(self, meaning: str) -> str:
-        """What errors call a column."""
+        """Return what errors call a column."""
         return f"{self.prefix} {meaning}".strip()
 
 
 def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
-    """The bodies that are wanted. One without a name of its own has the file's."""
+    """Read the requested bodies. One without a name of its own has the file's."""
     header, layout = _find_header(path, options)
     way_out = f"name the column that tells them apart, --columns device=NAME (found {columns_found(header.cells)})"
     return read_below(path, selection, options, header, layout, f"{way_out}, or split the file")
@@ -67,7 +67,7 @@ def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Traj
 def read_below(
     path: Path, selection: Selection, options: ReadingOptions, header: HeaderLine, layout: Layout, way_out: str
 ) -> list[Trajectory]:
-    """The bodies that are wanted, of the rows below a header; `way_out` is what to do with devices that are mixed."""
+    """Read the requested bodies of the rows below a header; `way_out` is what to do with devices that are mixed."""
     try:
         return _read(path, selection, options, header, layout, way_out)
     except ColumnProblem as problem:
@@ -108,7 +108,7 @@ def _read(
 
 
 def _find_header(path: Path, options: ReadingOptions) -> tuple[HeaderLine, Layout]:
-    """The line that names all that is needed: one of the first, or the only one further down that numbers follow.
+    """Find the line that names all that is needed: one of the first, or the only one further down that numbers follow.
 
     Where none does, TrajectoryError says what the nearest lacks.
     """
@@ -138,7 +138,7 @@ def _find_header(path: Path, options: ReadingOptions) -> tuple[HeaderLine, Layou
 
 
 def _bodies(path: Path, header: HeaderLine, layout: Layout, named: bool) -> list[_Body]:
-    """All bodies of the file, in the order of its columns and rows; `named` is whether the user named their column."""
+    """Return all bodies in the order of columns and rows; `named` is whether the user named their column."""
     columns = {f"device {index}": index for index in layout.devices}
     groups = _devices(header.table(path, columns), named)
     bodies = [
@@ -151,7 +151,7 @@ def _bodies(path: Path, header: HeaderLine, layout: Layout, named: bool) -> list
 
 
 def _devices(table: Table, named: bool) -> dict[str, np.ndarray | slice]:
-    """The rows of each device: of the first column that tells several apart, or else that tells the one there is."""
+    """Return the rows of each device, by the first column that tells several apart, or else that tells one."""
     only = ""
     for column in table.columns:
         codes, of_rows = _codes(table.cells(column))
@@ -169,7 +169,7 @@ def _devices(table: Table, named: bool) -> dict[str, np.ndarray | slice]:
 
 
 def _codes(cells: Iterator[tuple[int, str]]) -> tuple[dict[str, int], np.ndarray]:
-    """A number for each text, of up to so many as there may be devices and one more, and those of the rows."""
+    """Return a number for each text, of up to so many as there may be devices and one more, and those of the rows."""
     codes: dict[str, int] = {}
     rows = takewhile(lambda _: len(codes) <= MOST_DEVICES, cells)
     return codes, np.fromiter((codes.setdefault(text, len(codes)) for _, text in rows), np.int64)
@@ -196,7 +196,7 @@ def _trajectory(
 def _radians(
     angles: np.ndarray, units: Sequence[str], options: ReadingOptions
 ) -> tuple[np.ndarray, tuple[ClipWarning, ...]]:
-    """Angles of shape (n, 3) as radians, and what is hard to believe of them."""
+    """Return angles of shape (n, 3) as radians, and what is hard to believe of them."""
     largest = float(np.nanmax(np.abs(angles), initial=0.0, where=np.isfinite(angles)))
     warnings: tuple[ClipWarning, ...] = ()
     if options.degrees and len(angles) and 0.0 < largest <= SMALLEST_DEGREES:

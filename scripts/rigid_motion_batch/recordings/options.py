@@ -1,4 +1,4 @@
-"""What a user says of a recording: names of columns, units, the order of Euler angles, and which part of it to take.
+"""Options for reading a recording: names of columns, units, the order of Euler angles, and which part to take.
 
 Everything is plain data, so that it travels with a task as JSON.
 """
@@ -12,18 +12,18 @@ TICKS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 """Units of time, and how many there are in a second."""
 
 MEANINGS = ("t", "x", "y", "z", "qw", "qx", "qy", "qz", "rx", "ry", "rz", "scale", "device")
-"""What a column can hold: time, position, quaternion, Euler angles about x, y and z, scale, and whose the row is."""
+"""Meanings of columns: time, position, quaternion, Euler angles about x, y and z, scale, and whose the row is."""
 
 
 @dataclass(frozen=True)
 class ReadingOptions:
-    """How to read a recording; what is left as it is, the file has to say. ValueError where a value is none."""
+    """Options for reading a recording; what is left as it is, the file has to say. ValueError where a value is none."""
 
     columns: tuple[tuple[str, str], ...] = ()
     """Pairs of a name in `MEANINGS` and the column's name in the file. They go before what names are taken to mean."""
 
     time_unit: str | None = None
-    """A name in `TICKS`; times are believed to be in it, whatever the file says of them."""
+    """A name in `TICKS`; times are taken to be in it, whatever the file says of them."""
 
     scale: float | None = None
     """Metres for each unit of the positions, whatever the file says of them."""
@@ -33,7 +33,7 @@ class ReadingOptions:
     (intrinsic), "zxy" about those of the world (extrinsic). The two are the same rotation."""
 
     degrees: bool = False
-    """Whether angles are degrees, whatever their names say. Otherwise those are radians whose names do not say."""
+    """True if angles are degrees, whatever their names say. Otherwise those are radians whose names do not say."""
 
     frame_rate: float | None = None
     """Frames a second, where the file counts frames instead of seconds."""
@@ -85,4 +85,4 @@ class ReadingOptions:
 
 
 AS_THE_FILE_SAYS = ReadingOptions()
-"""Nothing said."""
+"""Options of which none is set."""

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def probe() -> Iterator[bpy.types.Object]:
-    """An object that is shown in the current scene, which is a new one; whatever its constraints follow is evaluated.
+    """Yield an object that is shown in the current scene, which is new; whatever its constraints follow is evaluated.
 
     Both are gone afterwards.
     """

@@ -26,7 +26,7 @@ LOOKED_AT = 64
 """Samples at once among which the first without damage is looked for."""
 
 HEAD = 65536
-"""How many bytes of a file are looked at to tell its format."""
+"""Bytes of a file that are looked at to tell its format."""
 
 
 @dataclass(frozen=True)
@@ -36,26 +36,26 @@ class Format:
     label: str
     extensions: tuple[str, ...]
     read: Callable[..., list[Trajectory]]
-    """Given the path, the bodies that are wanted and, where it honours any, the options."""
+    """A function of the path, the bodies that are requested and, where it honours any, the options."""
 
     recognises: Callable[[list[str]], bool] | None = None
-    """Given the first lines. None where the extension is enough."""
+    """A function of the first lines. None where the extension is enough."""
 
     honours: tuple[str, ...] = ()
     """The options that it takes: for what its files do not say themselves. The scale is applied to all formats, and
     the part to take when clips are made."""
 
     measured: bool = True
-    """Whether it holds what devices measured, and not what was animated, which may go at any speed."""
+    """True if it holds what devices measured, and not what was animated, which may go at any speed."""
 
     axes: str = "blender"
-    """The convention of its files, where nobody says otherwise: a name in `axes.AXES`."""
+    """The convention of its files, where nothing says otherwise: a name in `axes.AXES`."""
 
     in_metres: bool = True
-    """Whether its files say, or are bound, how long the unit of a body is. It may be wrong nevertheless."""
+    """True if its files say how long the unit of a body is, or the format prescribes it. It may still be wrong."""
 
     says_unit: bool = True
-    """Whether it has a unit for lengths, or its files always say theirs."""
+    """True if it has a unit for lengths, or its files always say theirs."""
 
 
 # Of the formats that share an extension the first that recognises the content reads it. The last one needs not: it
@@ -139,7 +139,7 @@ def _read(result: Format, path: Path, selection: Selection, options: ReadingOpti
 
 
 def _sized(path: Path, trajectory: Trajectory, *, told: bool) -> Trajectory:
-    """A whole body in the unit that it is likely to be in by its size, where that is not told or cannot be."""
+    """Return a whole body in the unit that it is likely to be in by its size, where that is not given or cannot be."""
     if trajectory.rest_body is None:
         return trajectory
     places = _first_whole(trajectory.rest_body.skeleton, trajectory.poses)
@@ -162,7 +162,7 @@ def _sized(path: Path, trajectory: Trajectory, *, told: bool) -> Trajectory:
 
 
 def _first_whole(skeleton: Skeleton, poses: Poses) -> np.ndarray | None:
-    """Where the joints of a body (joints, n) are in the first sample without damage, shape (joints, 3)."""
+    """Return where the joints of a body (joints, n) are in the first sample without damage, shape (joints, 3)."""
     for first in range(0, poses.shape[1], LOOKED_AT):
         # What is not finite, or far beyond all measure, is for the repair to say.
         with np.errstate(invalid="ignore", over="ignore"):
@@ -180,7 +180,7 @@ def _doubted(trajectory: Trajectory, time_unit: bool) -> Trajectory:
 
 
 def files_of(source: str) -> list[str]:
-    """What a source stands for: of a folder the files in it that may be recordings, in the order of their names."""
+    """Return what a source stands for: of a folder the files that may be recordings, in the order of their names."""
     try:
         if not os.path.isdir(source):
             return [source]
@@ -192,7 +192,7 @@ def files_of(source: str) -> list[str]:
 
 
 def split_source(source: str) -> tuple[Path, str | None]:
-    """The file and the body. Files and bodies may have colons in their names, and a Windows path begins with one.
+    """Return the file and the body. Both may have colons in their names, and a Windows path begins with a drive's.
 
     Raises
     ------
@@ -212,7 +212,7 @@ def split_source(source: str) -> tuple[Path, str | None]:
 
 
 def _what_is_no_file(path: str) -> tuple[str, str] | None:
-    """What is at a path where there is no file, and the way out; None for nothing. It is looked at, and not opened."""
+    """Return what is at a path that is no file, and the way out; None for nothing. It is looked at, and not opened."""
     try:
         mode = os.stat(path).st_mode
     except OSError as error:
@@ -234,7 +234,7 @@ def _what_is_no_file(path: str) -> tuple[str, str] | None:
 
 
 def format_of(path: Path) -> Format:
-    """The format that reads a file, by its name and, where several share that, by how it begins."""
+    """Return the format that reads a file, by its name and, where several share that, by how it begins."""
     candidates = [known for known in FORMATS if path.suffix.lower() in known.extensions]
     if not candidates:
         extensions = dict.fromkeys(extension for known in FORMATS for extension in known.extensions)

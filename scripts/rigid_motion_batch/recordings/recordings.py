@@ -1,4 +1,4 @@
-"""What reading gives: the trajectories of the bodies that were asked for, the names of the others, or one clear error.
+"""Results of reading: the trajectories of the bodies that were asked for, the names of the others, or one clear error.
 
 Times are seconds; positions are in the unit of the file; quaternions are w, x, y, z with the signs of the file.
 """
@@ -18,7 +18,7 @@ from .clips import ClipWarning
 from .rest_bodies import RestBody
 
 ALL = "*"
-"""Asks for every body of a file."""
+"""Name that asks for every body of a file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,16 +40,16 @@ class Trajectory:
     """The length of one unit of the positions, where the file tells it; 1 otherwise."""
 
     remark: str = ""
-    """What whoever asked for this body should know of it."""
+    """A remark for whoever asked for this body."""
 
     warnings: tuple[ClipWarning, ...] = ()
-    """What is hard to believe of this recording."""
+    """Warnings on what is hard to believe of this recording."""
 
     dated: bool = False
-    """Whether its times were dates or clock times, whose unit nobody can mistake."""
+    """True if its times were dates or clock times, whose unit no one can mistake."""
 
     rest_body: RestBody | None = None
-    """Of a whole body, what it is made of."""
+    """The rest body of a whole body."""
 
     rate: float | None = None
     """Samples a second, where there may be more between these."""
@@ -62,7 +62,7 @@ class Trajectory:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What was read of a file."""
+    """Trajectories that were read of a file, and what there is to say of them."""
 
     path: Path
 
@@ -73,8 +73,9 @@ class Recording:
     """The names of the bodies that were left."""
 
     note: str = ""
-    """For a file of several bodies of which none was named: what was taken, what is left, how to name it. And what
-    there is to say of those that were taken."""
+    """A note for a file of several bodies of which none was named: what was taken, what is left, how to name it. And
+    what there is to say of those that were taken.
+    """
 
     body: str = ""
     """The body that was asked for by name; empty where the first was, or all."""
@@ -83,11 +84,11 @@ class Recording:
     """The convention of its format: a name in `axes.AXES`."""
 
     measured: bool = True
-    """Whether its format holds what devices measured, and not what was animated."""
+    """True if its format holds what devices measured, and not what was animated."""
 
 
 class TrajectoryError(ValueError):
-    """Why a recording cannot be read, in one line: `FILE:LINE: what is wrong; way out`."""
+    """Error that says why a recording cannot be read, in one line: `FILE:LINE: what is wrong; way out`."""
 
     def __init__(self, path: Path | str, problem: str, way_out: str, line: int | None = None) -> None:
         where = f"{path}:{line}" if line else f"{path}"
@@ -96,11 +97,11 @@ class TrajectoryError(ValueError):
 
 
 class NoMotion(TrajectoryError):
-    """Why a file holds no recording, which need not be wrong: a table of other things, or a body that stands still."""
+    """Error of a file without a recording, which need not be wrong: a table of other things, or a body at rest."""
 
 
 class Selection:
-    """Which bodies of a file are wanted: the first, all, or one by name."""
+    """Selection of the bodies of a file: the first, all, or one by name."""
 
     def __init__(self, path: Path, requested: str | None) -> None:
         self.path = path
@@ -108,7 +109,7 @@ class Selection:
         self.names: tuple[str, ...] = ()
 
     def of(self, names: Sequence[str], unlisted: Sequence[str] = (), more: int = 0) -> list[str]:
-        """The wanted ones among the bodies of the file.
+        """Return the requested ones among the bodies of the file.
 
         Parameters
         ----------
@@ -141,7 +142,7 @@ class Selection:
         return [self.requested]
 
     def match(self, names: Iterable[str]) -> None:
-        """Take the name in the file for the one that is wanted, where they differ in their case alone.
+        """Take the name in the file for the one that is requested, where they differ in their case alone.
 
         Raises
         ------
@@ -158,7 +159,7 @@ class Selection:
         self.requested = alike[0] if alike else requested
 
     def recording(self, trajectories: Sequence[Trajectory]) -> Recording:
-        """The result, with what there is to say about the bodies that were taken, and those that were not."""
+        """Return the result, with what there is to say about the bodies that were taken, and those that were not."""
         taken = {trajectory.name for trajectory in trajectories}
         others = tuple(name for name in self.names if name not in taken)
         notes = [trajectory.remark for trajectory in trajectories if trajectory.remark]
@@ -172,7 +173,7 @@ class Selection:
 
 
 def unique(names: Sequence[str]) -> list[str]:
-    """The names, a repeated one numbered as Blender does: Hand, Hand.001, Hand.002."""
+    """Return the names, a repeated one numbered as Blender does: Hand, Hand.001, Hand.002."""
     result: list[str] = []
     unavailable = set(names)
     numbers: dict[str, int] = {}
@@ -189,11 +190,11 @@ def unique(names: Sequence[str]) -> list[str]:
 
 
 def listed(names: Sequence[str], limit: int = 30, more: int = 0) -> str:
-    """The names with commas, cut off where they become too many to read; `more` there are that are not among them."""
+    """Return the names with commas, cut off where they become too many to read; `more` are not among them."""
     shown_names, left = ", ".join(names[:limit]), max(len(names) - limit, 0) + more
     return f"{shown_names} and {left} more" if left else shown_names
 
 
 def shown(text: str, limit: int = 24) -> str:
-    """A piece of a file, in quotes and short enough for a line of error."""
+    """Return a piece of a file, in quotes and short enough for a line of error."""
     return repr(text if len(text) <= limit else f"{text[:limit]}...")

@@ -23,10 +23,10 @@ UNITS = (
     ("feet", 0.3048),
     ("decimetres", 0.1),
 )
-"""What files are in that do not say so, the likelier first, and their lengths in metres."""
+"""Units of files that do not say theirs, the likelier first, and their lengths in metres."""
 
 IN_METRES = 0.2, 5.0
-"""A body that would be as large as that in metres is believed to be in metres: the smallest and the largest."""
+"""Smallest and largest size, in metres, of a body that is assumed to be in metres."""
 
 GROWN_UP = 0.9, 2.3
 """Metres that most bodies measure: a unit that makes a body as large is taken to be the file's."""
@@ -72,10 +72,10 @@ class RestBody:
     """Shape (joints,): the number of each joint's parent, lower than its own, -1 for roots."""
 
     rest: Poses
-    """Where the joints are at rest, shape (joints,), in the world and not in their parents' space."""
+    """Poses of the joints at rest, shape (joints,), in the world and not in their parents' space."""
 
     tails: np.ndarray
-    """Where the bone of each joint ends, in its own space, shape (joints, 3)."""
+    """Ends of the bones of all joints, each in the joint's own space, shape (joints, 3)."""
 
     skin: Skin | None = None
 
@@ -85,7 +85,7 @@ class RestBody:
 
 
 def repaired(rest_body: RestBody) -> tuple[RestBody, tuple[str, ...]]:
-    """A figure all of whose numbers are some, and what was done for that, a sentence each, as in `repair`.
+    """Return a figure with finite numbers alone, and what was done for that, a sentence each, as in `repair`.
 
     Where a joint is at rest, and where its bone ends, decides about nothing but how it is drawn.
     """
@@ -104,13 +104,13 @@ def repaired(rest_body: RestBody) -> tuple[RestBody, tuple[str, ...]]:
 
 
 def carrying(parents: np.ndarray) -> np.ndarray:
-    """Which joints are roots that carry a single child about, shape (joints,): they may be wherever it was left."""
+    """Return which joints are roots that carry a single child about, shape (joints,): they may be anywhere."""
     children = np.bincount(parents[parents >= 0], minlength=len(parents))
     return (parents < 0) & (children == 1)
 
 
 def size_of(parents: np.ndarray, places: np.ndarray) -> float:
-    """The largest extent along any axis of joints at these places (joints, 3).
+    """Return the largest extent along any axis of joints at these places (joints, 3).
 
     Joints that only carry the rest of the body about, from the ground or from wherever they were left, are no part of
     it: it begins where a joint first has several children.
@@ -127,7 +127,7 @@ def size_of(parents: np.ndarray, places: np.ndarray) -> float:
 
 
 def unit_of(size: float) -> tuple[str, float]:
-    """The unit that a body of this size is likely to be in: what it is called, and its length in metres."""
+    """Return the unit that a body of this size is likely to be in: what it is called, and its length in metres."""
     if size < NOTHING or IN_METRES[0] <= size <= IN_METRES[1]:
         return UNITS[0]
     for name, length in UNITS:
@@ -137,7 +137,7 @@ def unit_of(size: float) -> tuple[str, float]:
 
 
 def sureness(size: float, length: float) -> str:
-    """How sure it is that the unit of a body of this size is so many metres long, which the size alone says."""
+    """Return how sure it is that the unit of a body of this size is so many metres long, which the size alone says."""
     fitting = [(name, size * metres) for name, metres in UNITS if GROWN_UP[0] <= size * metres <= GROWN_UP[1]]
     others = [f"{name} ({metres:.3g} m)" for name, metres in fitting if metres != size * length]
     if others:
@@ -148,6 +148,6 @@ def sureness(size: float, length: float) -> str:
 
 
 def short_names(joints: Sequence[str]) -> list[str]:
-    """The names of joints without a namespace that they all have: "mixamorig:Hips" is told from others by "Hips"."""
+    """Return the names of joints without a namespace that they all have: "mixamorig:Hips" becomes "Hips"."""
     spaces = {name.rpartition(":")[0] for name in joints}
     return [name.rpartition(":")[2] for name in joints] if len(spaces) == 1 else list(joints)

@@ -29,13 +29,13 @@ if TYPE_CHECKING:
     import bpy
 
 LAST_FRAME = 1048574
-"""Blender goes no further; a damaged file could, and would keep it at work for hours."""
+"""Last frame that Blender has; a damaged file could, and would keep it at work for hours."""
 
 BLOCK = 256
 """Frames whose matrices are kept at once."""
 
 SHORTEST_AXIS = 1e-12
-"""An axis that is shorter has no direction: bones are hidden by scaling them to nothing."""
+"""Length below which an axis has no direction: bones are hidden by scaling them to nothing."""
 
 
 @dataclass(frozen=True)
@@ -56,12 +56,12 @@ class Joints:
 
 
 def armature_of(rig: bpy.types.Object) -> bpy.types.Armature:
-    """The data of an object that is an armature."""
+    """Return the data of an object that is an armature."""
     return cast("bpy.types.Armature", rig.data)
 
 
 def joints_of(rig: bpy.types.Object) -> Joints:
-    """The bones that deform, if any do, or else all; parents before their children."""
+    """Return the bones that deform, if any do, or else all; parents before their children."""
     bones = list(armature_of(rig).bones)  # Blender lists the hierarchy from its roots on.
     kept = [bone for bone in bones if bone.use_deform] or bones
     numbers = {bone.name: number for number, bone in enumerate(kept)}
@@ -84,7 +84,7 @@ def whole_body(
     *,
     made_up: bool = False,
 ) -> Trajectory:
-    """The whole skeleton of an armature, and the skin that it carries.
+    """Return the whole skeleton of an armature, and the skin that it carries.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def whole_body(
 def single_joints(
     path: Path, rig: bpy.types.Object, bones: Sequence[str], moments: Moments, scale: float | None = None
 ) -> list[Trajectory]:
-    """The motions of some bones in the world, a trajectory each; otherwise as `whole_body`."""
+    """Return the motions of some bones in the world, a trajectory each; otherwise as `whole_body`."""
     metres = scale or _metres(rig, 1.0)
     with looking(path, rig, bones) as look:
         seen = sampled(moments, look, np.full(len(bones), -1), OF_JOINTS, metres)
@@ -138,7 +138,7 @@ def single_joints(
 
 
 def _metres(rig: bpy.types.Object, metres_per_unit: float) -> float:
-    """The length of the unit that a rig is likely to be in, from where its joints rest."""
+    """Return the length of the unit that a rig is likely to be in, from where its joints rest."""
     joints, there = joints_of(rig), _matrix(rig)
     with np.errstate(invalid="ignore", over="ignore"):
         heads = np.array([armature_of(rig).bones[name].head_local for name in joints.names]) @ there[:3, :3].T
@@ -165,17 +165,17 @@ def looking(
 
 @dataclass(eq=False)
 class _Look:
-    """What is seen of the bones of an armature."""
+    """Look at the bones of an armature."""
 
     path: Path
     rig: bpy.types.Object
     bones: Sequence[str]
     followed: Sequence[bpy.types.Object]
     first: dict[bpy.types.Object, np.ndarray] = field(default_factory=dict)
-    """Where the armature and what else is followed were at first, shape (4, 4) each."""
+    """Matrices of the armature and of what else is followed, as they were at first, shape (4, 4) each."""
 
     def __call__(self, frames: np.ndarray) -> Poses:
-        """The bones on some frames (n,), shape (bones, n): NaN is the quaternion of one that has no direction.
+        """Return the bones on some frames (n,), shape (bones, n): NaN is the quaternion of one that has no direction.
 
         Raises
         ------
@@ -212,7 +212,7 @@ class _Look:
 
 
 def _matrix(obj: bpy.types.Object) -> np.ndarray:
-    """Where an object is in the world, shape (4, 4), in double precision: NumPy takes it as Blender has it."""
+    """Return where an object is in the world, shape (4, 4), in double precision: NumPy takes it as Blender has it."""
     return np.array(obj.matrix_world, dtype=np.float64)
 
 
@@ -227,7 +227,7 @@ def refuse_too_many(path: Path, name: str, joints: int, frames: np.ndarray) -> N
 
 
 def rigid(matrices: np.ndarray) -> Poses:
-    """The rigid poses of matrices (..., 4, 4). NaN is the quaternion of one whose x or y axis is nothing."""
+    """Return the rigid poses of matrices (..., 4, 4). NaN is the quaternion of one whose x or y axis is nothing."""
     x, y = matrices[..., :3, 0], matrices[..., :3, 1]
     with np.errstate(invalid="ignore", over="ignore"):
         y = _unit(y)
@@ -242,7 +242,7 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 
 
 def _filled(poses: Poses) -> Poses:
-    """Poses (bones, n) in which quaternions that are none are the last before, or else the first after, or no turn."""
+    """Return poses (bones, n), each missing quaternion being the last before, else the first after, or no turn."""
     for own in poses.quaternions:
         good = np.isfinite(own).all(axis=-1)
         if good.all():
@@ -256,7 +256,7 @@ def _filled(poses: Poses) -> Poses:
 
 
 def _rows(path: Path, seen: bpy.types.Object, bones: Sequence[str]) -> np.ndarray:
-    """Where these bones are in the list of the pose, which has an order of its own."""
+    """Return where these bones are in the list of the pose, which has an order of its own."""
     places = {bone.name: row for row, bone in enumerate(seen.pose.bones)} if seen.pose else {}
     if missing := [bone for bone in bones if bone not in places]:
         problem = f"the pose of {shown(seen.name)} lacks the bone {shown(missing[0])}"
@@ -265,7 +265,7 @@ def _rows(path: Path, seen: bpy.types.Object, bones: Sequence[str]) -> np.ndarra
 
 
 def _in_parents(world: Poses, parents: np.ndarray) -> Poses:
-    """Poses in the world (joints, n), each in its parent's space and without flips of signs."""
+    """Return poses in the world (joints, n), each in its parent's space and without flips of signs."""
     # Joint by joint: what is whole is large.
     local = Poses(np.empty_like(world.positions), np.empty_like(world.quaternions))
     for joint, parent in enumerate(parents.tolist()):
@@ -294,7 +294,7 @@ def _rest_body(
 
 
 def _shortened(tails: np.ndarray, heads: np.ndarray, parents: np.ndarray, largest: float) -> np.ndarray:
-    """Tails (joints, 3) of bones that reach no farther than to their children, or else as far as from their parents.
+    """Return tails (joints, 3) of bones no longer than the way to their children, or else that from their parents.
 
     Bones up to the largest length stay: longer ones than a body is large are an importer's, where it took other units.
     """

@@ -1,4 +1,4 @@
-"""Which moments of a motion become samples: so many that what lies between them is on a straight way.
+"""Moments of a motion that become samples: so many that what lies between them is on a straight way.
 
 A recording is looked at on even frames, and at every key of every curve. Where Blender then shows something else
 between two samples than lines and even turns (`lerp_slerp`) from the one to the other, the gap between them is halved,
@@ -22,7 +22,7 @@ from .clips import ClipWarning
 from .recordings import Trajectory
 
 WITHIN = 1e-3
-"""Metres: how far off what lies between two samples may be."""
+"""Metres that what lies between two samples may be off."""
 
 OF_JOINTS, OF_OBJECTS = 0.03, 0.1
 """Metres around a joint and an object in which all points count, as in comparisons."""
@@ -31,31 +31,31 @@ SEEN = 0.6
 """The share of that at which a gap is halved: of a cubic curve, the looks see at least three quarters of the most."""
 
 LOOKS = np.array([0.25, 0.75])
-"""Where in a gap is looked. Half-way an ease in and out would seem to be a straight line."""
+"""Places in a gap that are looked at. Half-way an ease in and out would seem to be a straight line."""
 
 HALF_WAY = np.array([0.5])
-"""Where curves of straight lines are looked at: what several of them make together bends to one side."""
+"""Place where curves of straight lines are looked at: what several of them make together bends to one side."""
 
 WIDE = np.radians(20.0)
 """A turn from sample to sample that is wider is looked at as if it were eased: quaternions on a line ease it."""
 
 HALVINGS = 8
-"""How often a gap may be halved."""
+"""Number of times that a gap may be halved."""
 
 CLOSEST = 0.0125
 """Keys that are closer, in steps of the recording, are one: to Blender a hundredth of a frame is none."""
 
 LEAD = 2.0 * CLOSEST
-"""How long a jump takes, in steps."""
+"""Steps that a jump takes."""
 
 SAME = 2e-3
-"""By how much gaps may differ, in steps, that are the same: F-curves keep frames in single precision."""
+"""Steps by which gaps may differ that are the same: F-curves keep frames in single precision."""
 
 LEAST = 1e-6
 """Radians: a smaller turn is divided like a line."""
 
 FLIP = np.radians(60.0)
-"""What is turned farther off between two frames, and back, are angles that jump by a whole turn."""
+"""Turn between two frames, and back, beyond which angles have jumped by a whole turn."""
 
 MOST_ADDED = 20
 """Samples for each that there is without; noise may ask for any number."""
@@ -66,10 +66,10 @@ BLOCK = 256
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """When to look at a recording at first."""
+    """Moments to look at a recording at first."""
 
     frames: np.ndarray
-    """Shape (n,), rising; between whole frames too."""
+    """Frames of shape (n,), rising; between whole frames too."""
 
     fps: float
     """Frames a second."""
@@ -81,15 +81,15 @@ class Moments:
     """Frames between two samples of the recording."""
 
     straight: bool = False
-    """Whether all keys are joined by straight lines or steps."""
+    """True if all keys are joined by straight lines or steps."""
 
     def times(self, frames: np.ndarray) -> np.ndarray:
-        """Seconds."""
+        """Return the times of frames, in seconds."""
         return (frames - self.begin) / self.fps
 
 
 def merged(even: np.ndarray, keys: np.ndarray, step: float) -> np.ndarray:
-    """Even frames (n,), rising, and the keys between the first and the last of them, less those as good as one.
+    """Return even frames (n,), rising, and the keys between the first and the last of them, less those as good as one.
 
     A key that is near to an even frame is on it, and of several near to one another the first is taken.
     """
@@ -102,7 +102,7 @@ def merged(even: np.ndarray, keys: np.ndarray, step: float) -> np.ndarray:
 
 
 def away(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """How far the nearest of others, which rise, is from each of some frames; shape of the frames."""
+    """Return how far the nearest of others, which rise, is from each of some frames; shape of the frames."""
     return np.abs(frames - others[nearest(others, frames)]) if len(others) else np.full(len(frames), np.inf)
 
 
@@ -114,13 +114,13 @@ class Sampled:
     """Shape (n,), rising."""
 
     poses: Poses
-    """In the world, shape (joints, n)."""
+    """Poses in the world, shape (joints, n)."""
 
     added: int = 0
-    """How many samples halved a gap."""
+    """Number of samples that halved a gap."""
 
     off: float = 0.0
-    """How far off what lies between two samples is where halving does not help, in the unit of the poses; else 0."""
+    """Error between two samples where halving does not help, in the unit of the poses; else 0."""
 
     gaps: tuple[float, ...] = ()
     """The frames where these gaps begin."""
@@ -129,7 +129,7 @@ class Sampled:
     """Gaps in which something turns over and back."""
 
     def told(self, trajectory: Trajectory, moments: Moments, metres: float) -> Trajectory:
-        """A trajectory of these samples with its rate and what there is to say; its unit is of so many metres."""
+        """Return a trajectory of these samples with its rate and what there is to say; its unit has so many metres."""
         remarks, warnings = [trajectory.remark], trajectory.warnings
         if self.added:
             remarks.append(f"added {self.added} samples between frames, where it bends by more than a millimetre")
@@ -196,7 +196,7 @@ def sampled(
 
 @dataclass(frozen=True, eq=False)
 class _Gaps:
-    """How far off what lies between samples is."""
+    """Errors of what lies between samples."""
 
     look: Callable[[np.ndarray], Poses]
     skeleton: Skeleton
@@ -204,7 +204,7 @@ class _Gaps:
     straight: bool
 
     def errors(self, frames: np.ndarray, poses: Poses, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of these gaps (n,) between samples, the largest distance and angle of any joint, shape (n,) each."""
+        """Return the largest distance and angle of any joint in these gaps (n,) between samples, shape (n,) each."""
         errors, angles = np.zeros(len(gaps)), np.zeros(len(gaps))
         for first in range(0, len(gaps), BLOCK):
             rows = np.arange(first, min(first + BLOCK, len(gaps)))
@@ -222,7 +222,7 @@ class _Gaps:
     def _off(
         self, first: np.ndarray, last: np.ndarray, begin: Poses, end: Poses, looks: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The same of gaps from the first frames (n,) to the last ones, and from poses (joints, n) to others."""
+        """Return the errors of gaps from the first frames (n,) to the last, and from poses (joints, n) to others."""
         seen = self.look((first[:, None] + (last - first)[:, None] * looks).ravel())
         # What is damaged, or has no direction, is no reason for more samples.
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
@@ -247,7 +247,7 @@ class _Gaps:
 
 
 def _between(a: Poses, b: Poses, looks: np.ndarray) -> Poses:
-    """From poses (joints, n) on lines and even turns to others, so far as the looks (k,) say: shape (joints, n k)."""
+    """Return poses (joints, n k) on lines and even turns from some (joints, n) to others, at the looks (k,)."""
     share = looks[:, None]
     positions = a.positions[..., None, :] + share * (b.positions - a.positions)[..., None, :]
     dots = np.sum(a.quaternions * b.quaternions, axis=-1, keepdims=True)[..., None, :]
@@ -267,7 +267,7 @@ def _scales(poses: Poses) -> np.ndarray:
 
 
 def _with(poses: Poses, places: np.ndarray, more: Poses) -> Poses:
-    """Poses (joints, n) with more of them (joints, k) before these places (k,)."""
+    """Return poses (joints, n) with more of them (joints, k) before these places (k,)."""
     scales = None
     if poses.scales is not None or more.scales is not None:
         scales = np.insert(_scales(poses), places, _scales(more), axis=1)

@@ -1,4 +1,4 @@
-"""Whether a recording makes sense: what no hand, no device and no room has is said, whatever the file claims.
+"""Sense of a recording: what no hand, no device and no room has is said, whatever the file claims.
 
 The limits are wide. Of the recordings by other people that this program is tried on, the fastest, a fast game, has
 95 % of its speeds below 7.1 m/s, and the jumpiest one sample at 19 m/s; all stay within 2.3 m, with 30 to 286 samples
@@ -29,7 +29,7 @@ LOOK_BACK = 8
 """Samples among which those of one device come again, where a few take turns."""
 
 NEARER = 10.0
-"""How many times nearer to an earlier sample than to the last one a sample has to be, not to follow the last. Along
+"""Times nearer to an earlier sample than to the last one that a sample has to be, not to follow the last. Along
 any motion that is sampled well the last one is the nearest."""
 
 SAME_TIME = 0.01
@@ -78,7 +78,7 @@ def require_one_body(trajectory: Trajectory, path: Path | str, way_out: str, lin
 
 
 def doubts(trajectory: Trajectory, *, time_unit: bool = False) -> tuple[ClipWarning, ...]:
-    """What of a recording is hard to believe.
+    """Return what of a recording is hard to believe.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def doubts(trajectory: Trajectory, *, time_unit: bool = False) -> tuple[ClipWarn
 
 
 def _usable(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
-    """The times and positions, in seconds and metres, of the samples where both are no damage; of a body its root's."""
+    """Return times and positions, in seconds and metres, of samples with no damage in both; of a body its root's."""
     rows = np.abs(trajectory.times) < LARGEST
     positions = trajectory.rigid.positions
     rows &= (np.abs(positions) < LARGEST).all(axis=-1)

@@ -20,7 +20,7 @@ CARRIERS = 4
 
 
 def carried_by(rig: bpy.types.Object) -> list[bpy.types.Object]:
-    """The mesh objects that an armature deforms; none where their vertices are too many."""
+    """Return the mesh objects that an armature deforms; none where their vertices are too many."""
     import bpy
 
     meshes = [obj for obj in bpy.data.objects if obj.type == "MESH" and obj.data and _deforms(rig, obj)]
@@ -40,7 +40,7 @@ def _deforms(rig: bpy.types.Object, obj: bpy.types.Object) -> bool:
 def skin_of(
     meshes: Sequence[bpy.types.Object], joints: Sequence[str], matrices: Mapping[bpy.types.Object, np.ndarray]
 ) -> Skin | None:
-    """The skin of some mesh objects, or None where there are no triangles.
+    """Return the skin of some mesh objects, or None where there are no triangles.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def skin_of(
 
 
 def _carriers(mesh: bpy.types.Mesh, joint_of_group: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
-    """The joints (vertices, 4) that carry each vertex most, and by how much of it."""
+    """Return the joints (vertices, 4) that carry each vertex most, and by how much of it."""
     # Blender has no way to hand out all weights at once.
     entries = [
         (vertex.index, joint_of_group[one.group], one.weight)

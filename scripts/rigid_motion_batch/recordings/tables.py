@@ -1,7 +1,7 @@
 """Text files of numbers: lines, named columns and rows.
 
 A file is gone through piece by piece, so that it is the numbers that take memory and not the text, and nothing that
-a file says of itself is believed before it has been read.
+a file says of itself is trusted before it has been read.
 """
 
 from __future__ import annotations
@@ -53,35 +53,35 @@ class Table:
 
     path: Path
     separator: str | None
-    """None means white space."""
+    """Separator of the cells; None means white space."""
 
     columns: dict[str, int]
-    """What a column means, to its index."""
+    """Meaning of a column to its index."""
 
     width: int
-    """How many columns have a name."""
+    """Number of columns that have a name."""
 
     header: int
     """The line before the first row."""
 
     vectors: bool = False
-    """Whether cells hold vectors, which count as several columns."""
+    """True if cells hold vectors, which count as several columns."""
 
     def parse(self, columns: Sequence[str], dtype: type = np.float64) -> np.ndarray:
-        """The numbers in these columns, shape (rows, columns). Empty cells are NaN."""
+        """Return the numbers in these columns, shape (rows, columns). Empty cells are NaN."""
         wanted = {name: self.columns[name] for name in columns}
         needed = max(self.columns.values()) + 1
         return parse_rows(self.path, self.rows(), self.separator, wanted, self.width, dtype, needed=needed)
 
     def cells(self, column: str) -> Iterator[tuple[int, str]]:
-        """The cells of a column, without quotes, with their lines; empty where a row is too short."""
+        """Yield the cells of a column, without quotes, with their lines; empty where a row is too short."""
         index = self.columns[column]
         for number, line in self.rows():
             cells = split_row(line, self.separator)
             yield number, cells[index].strip() if index < len(cells) else ""
 
     def rows(self) -> Iterator[tuple[int, str]]:
-        """The lines of the rows with their numbers, without blank ones and comments."""
+        """Yield the lines of the rows with their numbers, without blank ones and comments."""
         for number, line in lines_of(self.path, after=self.header):
             line = line.strip(" ")
             if line and not line.isspace() and line[0] != "#":
@@ -89,12 +89,12 @@ class Table:
 
 
 def encoding_of(head: bytes) -> str:
-    """UTF-8 or, where the byte order mark says so, UTF-16."""
+    """Return UTF-8 or, where the byte order mark says so, UTF-16."""
     return "utf-16" if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8-sig"
 
 
 def read_text(path: Path, largest: int = LARGEST_FILE) -> str:
-    """The text of the file, its line ends made `\\n`.
+    r"""Read the text of the file, its line ends made `\n`.
 
     Raises
     ------
@@ -105,7 +105,7 @@ def read_text(path: Path, largest: int = LARGEST_FILE) -> str:
 
 
 def lines_of(path: Path, after: int = 0) -> Iterator[tuple[int, str]]:
-    """The lines of the file, without their ends, and their numbers: all, or those after one.
+    """Yield the lines of the file, without their ends, and their numbers: all, or those after one.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def lines_of(path: Path, after: int = 0) -> Iterator[tuple[int, str]]:
 
 
 def _pieces(path: Path, largest: int) -> Iterator[str]:
-    """The text of the file piece by piece, its line ends made `\\n`."""
+    r"""Yield the text of the file piece by piece, its line ends made `\n`."""
     lines = 0
     with path.open("rb") as file:
         size = path.stat().st_size
@@ -154,7 +154,7 @@ def _pieces(path: Path, largest: int) -> Iterator[str]:
 
 
 def cells_of(path: Path, number: int, line: str, separator: str | None) -> list[str]:
-    """The cells of a header's line, without quotes and surrounding blanks."""
+    """Return the cells of a header's line, without quotes and surrounding blanks."""
     if line.count(separator or " ") >= MOST_COLUMNS:
         raise TrajectoryError(path, f"more than {MOST_COLUMNS} columns", "export fewer bodies", number)
     if separator is None:
@@ -174,7 +174,7 @@ class HeaderLine:
     cells: list[str]
 
     vectors: bool = False
-    """Whether cells of the rows hold vectors, and the names of the header are those of their numbers."""
+    """True if cells of the rows hold vectors, and the names of the header are those of their numbers."""
 
     @classmethod
     def of(cls, path: Path, number: int, text: str) -> HeaderLine:
@@ -196,7 +196,7 @@ class HeaderLine:
 
 
 def header_lines(path: Path) -> Iterator[HeaderLine]:
-    """The lines that may name the columns: comments, as `numpy.savetxt` and EuRoC have it, and the first line behind.
+    """Yield lines that may name the columns: comments, as `numpy.savetxt` and EuRoC have it, and the first line behind.
 
     The last one is that line, without cells where there are only comments. Blank lines are skipped, and so is what
     tells spreadsheets the separator (`sep=;`). Raises TrajectoryError where the file is empty.
@@ -215,7 +215,7 @@ def header_lines(path: Path) -> Iterator[HeaderLine]:
 
 
 def lines_above_numbers(path: Path) -> Iterator[HeaderLine]:
-    """The lines near the beginning that a row of numbers with as many cells follows, and that hold none themselves.
+    """Yield lines near the beginning that a row of numbers with as many cells follows, and that hold none themselves.
 
     A row is one of numbers where more than half of the cells that are not empty are some. Blank lines are skipped.
     """
@@ -235,7 +235,7 @@ def lines_above_numbers(path: Path) -> Iterator[HeaderLine]:
 
 
 def split_row(line: str, separator: str | None) -> list[str]:
-    """The cells of a row, without quotes."""
+    """Return the cells of a row, without quotes."""
     if '"' in line:
         return (
             next(csv.reader([line], delimiter=separator, skipinitialspace=True))
@@ -255,7 +255,7 @@ def parse_rows(
     *,
     needed: int = 0,
 ) -> np.ndarray:
-    """The numbers of some columns.
+    """Return the numbers of some columns.
 
     Parameters
     ----------
@@ -267,11 +267,11 @@ def parse_rows(
     columns : mapping from name to index
         Which columns, in which order.
     width : int
-        How many cells a row may have. Empty ones beyond are no matter; too few matter where a wanted one is missing.
+        How many cells a row may have. Empty ones beyond are no matter; too few matter where a requested one is missing.
     dtype : type
         Of the result.
     needed : int
-        How many cells a row has to have; all up to the last wanted one in any case.
+        How many cells a row has to have; all up to the last requested one in any case.
 
     Returns
     -------
@@ -323,7 +323,7 @@ def _whole(cell: str) -> np.int64:
 def _number(
     path: Path, line: int, name: str, cell: str, convert: Callable[[str], float | np.int64]
 ) -> float | np.int64:
-    """The number in a cell, which may be empty or have a decimal comma in quotes."""
+    """Return the number in a cell, which may be empty or have a decimal comma in quotes."""
     try:
         if not cell.strip(" ") and convert is float:
             return np.nan

@@ -1,4 +1,4 @@
-"""Times as seconds: in the unit that a file or a user says, and refused where nobody does and seconds cannot be."""
+"""Times as seconds: in the unit that a file or a user says, and refused where neither does and seconds cannot be."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ FASTEST = 5000.0
 """Samples a second. Trackers with markers reach 1000 to 2000; no device for poses has more."""
 
 TOO_SLOW = 0.5
-"""Samples a second. A hand is elsewhere after two seconds: nobody records it so, and times in other units look so."""
+"""Samples a second. A hand is elsewhere after two seconds: no one records it so, and times in other units look so."""
 
 ENOUGH = 2
 """Steps of time that tell a unit. A file of two samples says nothing of it."""
 
 EXACT = 2.0**53
-"""Beyond this a float64 leaves out whole numbers, such as nanoseconds since 1970."""
+"""Number beyond which a float64 leaves out whole numbers, such as nanoseconds since 1970."""
 
 LARGEST_WHOLE = 2.0**62
-"""Beyond this the difference of two whole numbers might be none that fits 64 bits."""
+"""Number beyond which the difference of two whole numbers might be none that fits 64 bits."""
 
 WILD = 10.0
-"""How many times further from the median than half of all others a wild time is; of even times all are within two."""
+"""Times further from the median than half of all others that a wild time is; of even times all are within two."""
 
 LONG_NAMES = {"ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 
 
 def typical_interval(times: np.ndarray) -> float:
-    """The median of the steps forward in times of shape (n,), whatever else is among them; NaN where none is.
+    """Return the median of the steps forward in times of shape (n,), whatever else is among them; NaN where none is.
 
     One wild time stamp, a clock that is set back and times that come twice make no difference to it.
     """
@@ -51,7 +51,7 @@ def _steps_forward(times: np.ndarray) -> np.ndarray:
 
 
 def seconds_of(table: Table, ticks: np.ndarray, unit: str) -> np.ndarray:
-    """The times of a table as seconds.
+    """Return the times of a table as seconds.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def seconds_of(table: Table, ticks: np.ndarray, unit: str) -> np.ndarray:
 
 
 def earliest(ticks: np.ndarray) -> float:
-    """The earliest time, without wild ones."""
+    """Return the earliest time, without wild ones."""
     usable = ticks[np.abs(ticks) < LARGEST]
     if not len(usable):
         return 0.0
@@ -88,7 +88,7 @@ def earliest(ticks: np.ndarray) -> float:
 
 
 def require_seconds(table: Table, times: np.ndarray, time_unit: str) -> None:
-    """Refuse times that nobody says the unit of, and that seconds cannot be.
+    """Refuse times whose unit nothing says, and that cannot be seconds.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """TUM trajectories: `timestamp tx ty tz qx qy qz qw` in every line, seconds, separated by white space, `#` comments.
 
 Source: https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats. Where a comment names the columns in another
-order, the names are believed.
+order, the names are used.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ NAMES = ["t", "x", "y", "z", "qx", "qy", "qz", "qw"]
 
 
 def recognises(head: list[str]) -> bool:
-    """Whether the first row begins with two numbers that only white space separates."""
+    """Return whether the first row begins with two numbers that only white space separates."""
     rows = (line for line in head if line.strip() and not line.lstrip().startswith("#"))
     try:
         timestamp, tx, *_ = next(rows, "").split()
@@ -29,7 +29,7 @@ def recognises(head: list[str]) -> bool:
 
 
 def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
-    """The one body of the file, which has the file's name."""
+    """Read the one body of the file, which has the file's name."""
     header = _header(path, options)
     line, row = next(header.table(path, {}).rows(), (0, ""))
     if len(row.split()) == 4:
@@ -41,7 +41,7 @@ def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Traj
 
 
 def _header(path: Path, options: ReadingOptions) -> HeaderLine:
-    """The line that names the columns, or one before the first row with the usual names."""
+    """Return the line that names the columns, or one before the first row with the usual names."""
     for line in header_lines(path):
         try:
             layout_of(line.cells, options)

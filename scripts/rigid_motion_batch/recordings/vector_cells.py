@@ -11,13 +11,13 @@ from collections.abc import Sequence
 
 CELL = re.compile(r'"?[(\[{]([^()\[\]{}"]*)[)\]}]"?|"([^"]*)"')
 NAMED = re.compile(r"^[xyzw]\s*[=:]\s*", re.IGNORECASE)
-"""In front of a number, as Unreal writes it: X=0.1 Y=0.2 Z=0.3."""
+"""Pattern of what is in front of a number, as Unreal writes it: X=0.1 Y=0.2 Z=0.3."""
 
 AXES = "xyzw"
 
 
 def flattened(line: str, separator: str | None) -> str:
-    """A row in which every number has a cell of its own, and no other cell a separator inside."""
+    """Return a row in which every number has a cell of its own, and no other cell a separator inside."""
     between = separator or " "
 
     def flat(match: re.Match[str]) -> str:
@@ -27,7 +27,7 @@ def flattened(line: str, separator: str | None) -> str:
 
 
 def expanded(names: Sequence[str], line: str, separator: str | None) -> list[str] | None:
-    """The names of the columns of a row once it is flattened; None where none of its cells holds several numbers."""
+    """Return the names of a row's columns once it is flattened; None where none of its cells holds several numbers."""
     sizes: list[int] = []
 
     def mark(match: re.Match[str]) -> str:
@@ -46,7 +46,7 @@ def expanded(names: Sequence[str], line: str, separator: str | None) -> list[str
 
 
 def _numbers(match: re.Match[str]) -> list[str]:
-    """The number in a cell, or the three or four of them; none where it holds anything else."""
+    """Return the number in a cell, or the three or four of them; none where it holds anything else."""
     text = (match[1] if match[1] is not None else match[2]).strip()
     if ";" in text:
         parts = text.split(";")
@@ -59,7 +59,7 @@ def _numbers(match: re.Match[str]) -> list[str]:
 
 
 def is_number(cell: str) -> bool:
-    """Whether a cell is a number."""
+    """Return whether a cell is a number."""
     try:
         float(cell)
     except ValueError:
