@@ -58,7 +58,7 @@ class _Shown(Exception):
 def parser_of_module(module: str) -> argparse.ArgumentParser | None:
     """The parser of a command, which makes it to show its help; None where it cannot be made here."""
 
-    def show(parser: argparse.ArgumentParser, file: object = None) -> None:
+    def show(parser: argparse.ArgumentParser, file: object = None) -> None:  # noqa: ARG001 - as that of argparse
         raise _Shown(parser)
 
     before, argparse.ArgumentParser.print_help = argparse.ArgumentParser.print_help, show

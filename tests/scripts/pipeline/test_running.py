@@ -326,7 +326,7 @@ def test_a_disk_that_fills_up_while_files_are_published_ends_the_run(
     replace = os.replace
 
     def full(source: str, target: str) -> None:
-        if os.path.basename(target) == "b.txt":
+        if Path(target).name == "b.txt":
             raise OSError(28, os.strerror(28), target)
         replace(source, target)
 
