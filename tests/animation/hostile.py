@@ -12,7 +12,7 @@ import numpy as np
 
 from rigid_motion import animation
 from rigid_motion.animation import MODE_IDS, channelbag_of, modes_of, problem_of, set_mode
-from tests.animation.oracle import WIDTHS, curves_of
+from tests.animation.keyed import WIDTHS, curves_of
 from tests.animation.scenes import FRAMES, key, new_object
 from tests.blank import blank
 

@@ -10,7 +10,7 @@ import numpy as np
 from rigid_motion.animation import bake_poses, read_poses
 from rigid_motion.motion import Poses, interpolate, repair, shell_error
 from rigid_motion_batch.recordings import read_trajectories
-from tests.animation.oracle import curves_of
+from tests.animation.keyed import curves_of
 from tests.animation.scenes import new_object
 
 ASSETS = Path(__file__).resolve().parents[2] / "assets"

@@ -32,7 +32,8 @@ from tests.animation.hostile import (
     reopened,
     use,
 )
-from tests.animation.oracle import WIDTHS, assert_shown, curves_of, expected_worlds, shown_worlds, snapshot
+from tests.animation.keyed import WIDTHS, curves_of, snapshot
+from tests.animation.oracle import assert_shown, expected_worlds, shown_worlds
 from tests.animation.scenes import FRAMES
 from tests.thoroughness import sample
 

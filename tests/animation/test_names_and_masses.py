@@ -21,7 +21,8 @@ from tests.animation.hostile import (
     soon,
     use,
 )
-from tests.animation.oracle import WIDTHS, assert_shown, curves_of
+from tests.animation.keyed import WIDTHS, curves_of
+from tests.animation.oracle import assert_shown
 from tests.thoroughness import sample
 
 pytestmark = pytest.mark.usefixtures("following")

@@ -30,7 +30,7 @@ from rigid_motion.animation.baking import fewer_keys
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate, interpolate_by_segments, shell_error, twists
 from rigid_motion.motion.quaternions import multiply
 from tests.animation.bones.rigs import in_turn
-from tests.animation.oracle import curves_of, rotation_path, snapshot
+from tests.animation.keyed import curves_of, rotation_path, snapshot
 from tests.animation.reduced import RADIUS, TOLERANCE, keys_of, motion, off, recorded
 from tests.animation.scenes import give_own_deltas, key, new_object
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import Refused, reduce_keys_of, reduction_of, write_channel
-from tests.animation.oracle import curves_of, snapshot
+from tests.animation.keyed import curves_of, snapshot
 from tests.animation.reduced import recorded
 from tests.animation.scenes import key, new_object
 
