@@ -7,7 +7,6 @@ because an older Blender cannot open what a newer one has written; with another 
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 import tempfile
 import zlib
@@ -40,7 +39,7 @@ def write(path: Path, fill: Callable[[Path], None]) -> None:
     with tempfile.TemporaryDirectory(prefix=".making-", dir=path.parent) as folder:
         whole = Path(folder) / path.name
         fill(whole)
-        os.replace(whole, path)
+        whole.replace(path)
     print(f"{path}  {path.stat().st_size / 1000:.0f} kB")
 
 

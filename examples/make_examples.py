@@ -100,7 +100,8 @@ def run(words: list[str], folder: Path) -> str:
     (program, *options), _ = bootstrap.COMMANDS[command]
     if Path(program).is_relative_to(HERE):
         program = folder / HERE.name / Path(program).name
-    rest = [result for word in rest for result in (sorted(glob.glob(word, root_dir=folder)) or [word])]
+    # Not those of pathlib, which refuse absolute words.
+    rest = [result for word in rest for result in (sorted(glob.glob(word, root_dir=folder)) or [word])]  # noqa: PTH207
     paths = [folder, ROOT, ROOT / "addon", ROOT / "scripts"]
     done = subprocess.run(
         [sys.executable, str(program), *options, *rest, *QUICK.get(command, ())],

@@ -24,7 +24,7 @@ def main(name: str, *subcommands: str) -> None:
         runpy.run_module(name, run_name="__main__")
 
 
-def print_description(parser: argparse.ArgumentParser, file: object = None) -> None:
+def print_description(parser: argparse.ArgumentParser, file: object = None) -> None:  # noqa: ARG001 - as of argparse
     """In place of the help for people, and the end of the program."""
     formatter = argparse.HelpFormatter(prog=parser.prog, width=100)
     print(

@@ -183,7 +183,7 @@ def _bar(stream: TextIO, line: Callable[[], str]) -> Any:
 
         max_refresh = 0.5
 
-        def render(self, task: object) -> Text:
+        def render(self, task: object) -> Text:  # noqa: ARG002 - Rich gives it
             return Text(line(), overflow="crop", no_wrap=True)
 
     console = Console(file=stream, soft_wrap=True, highlight=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
 
 import bpy
 import pytest
@@ -21,3 +22,10 @@ def live_file(empty_file, caplog: pytest.LogCaptureFixture) -> bpy.types.Context
     finally:
         animation.unregister()
     assert complaints(caplog) == []
+
+
+@pytest.fixture
+def following(live_file: bpy.types.Context) -> Iterator[None]:
+    """Errors that handlers log make the test fail, see `live_file`."""
+    yield
+    animation.set_enabled(True)

@@ -8,32 +8,33 @@ Matrices are (m, 4, 4), frames are the scene's.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
-from bpy_extras.anim_utils import action_get_channelbag_for_slot
 from mathutils import Euler, Quaternion
 
 from rigid_motion.motion import KEYFRAME_MODES, Poses, in_betweens, interpolate, twists
 from rigid_motion.motion.quaternions import multiply, normalise
+from tests.animation.keyed import (
+    WIDTHS,
+    Carrier,
+    curve_of,
+    curves_of,
+    key_frames,
+    mode_at,
+    rotation_path,
+    transform_paths,
+    turns_at,
+)
 from tests.animation.modified import acting, held_frames, without_modifiers
 from tests.animation.path_oracle import DEPENDS_ON_KEYS, beside_path, lies_on_path
 from tests.animation.smooth_oracle import share_of, with_tangents
 from tests.animation.spin_oracle import Spin, spin_and_end
+from tests.animation.timing_oracle import progress
 
-Carrier = bpy.types.Object | bpy.types.PoseBone
-"""What has location, rotation and scale. Pose bones have no delta transforms of their own."""
-
-MODE_IDS = ("BLENDER", *KEYFRAME_MODES)
 SMOOTH = {name for name, mode in KEYFRAME_MODES.items() if mode.is_smooth}
-WIDTHS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "scale": 3}
-KEY_FIELDS = (
-    *("interpolation", "easing", "back", "amplitude", "period", "type"),
-    *("handle_left_type", "handle_right_type"),
-)
 
 
 @dataclass(frozen=True)
@@ -43,71 +44,6 @@ class Own:
     location: tuple[float, ...] = (0.0, 0.0, 0.0)
     quaternion: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
     scale: tuple[float, ...] = (1.0, 1.0, 1.0)
-
-
-def curves_of(carrier: Carrier) -> dict[tuple[str, int], bpy.types.FCurve]:
-    """The F-curves of an object's slot, or those of a pose bone in it. Data paths are from object or bone on."""
-    channelbag, prefix = _channelbag(carrier), _prefix(carrier)
-    curves = () if channelbag is None else ((curve.data_path, curve) for curve in channelbag.fcurves)
-    return {(path.removeprefix(prefix), c.array_index): c for path, c in curves if path.startswith(prefix)}
-
-
-def curve_of(carrier: Carrier, path: str, index: int = 0) -> bpy.types.FCurve | None:
-    """One of them, which Blender finds much sooner than all."""
-    channelbag = _channelbag(carrier)
-    return None if channelbag is None else channelbag.fcurves.find(f"{_prefix(carrier)}{path}", index=index)
-
-
-def _channelbag(carrier: Carrier) -> bpy.types.ActionChannelbag | None:
-    data = carrier.id_data.animation_data
-    if data is None or data.action is None or data.action_slot is None:
-        return None
-    return action_get_channelbag_for_slot(data.action, data.action_slot)
-
-
-def _prefix(carrier: Carrier) -> str:
-    """What the data paths of a pose bone begin with."""
-    return "" if isinstance(carrier, bpy.types.Object) else f"{carrier.path_from_id()}."
-
-
-def rotation_path(obj: Carrier) -> str:
-    return "rotation_quaternion" if obj.rotation_mode == "QUATERNION" else "rotation_euler"
-
-
-def transform_paths(obj: Carrier) -> tuple[str, str, str]:
-    return "location", rotation_path(obj), "scale"
-
-
-def snapshot(obj: Carrier) -> dict[tuple[str, int], tuple]:
-    """All that the animator keyed, to the last handle: every channel but the in-betweens."""
-    return {
-        name: (
-            fcurve.extrapolation,
-            fcurve.mute,
-            tuple((modifier.type, modifier.mute) for modifier in fcurve.modifiers),
-            tuple(
-                (*key.co, *key.handle_left, *key.handle_right, *(getattr(key, field) for field in KEY_FIELDS))
-                for key in fcurve.keyframe_points
-            ),
-        )
-        for name, fcurve in curves_of(obj).items()
-        if not name[0].startswith("delta_") and 'constraints["Rigid Motion' not in name[0]
-    }
-
-
-def key_frames(obj: Carrier) -> np.ndarray:
-    """Where any transform channel has a key; keys less than a hundredth of a frame apart are one."""
-    curves = (curve_of(obj, path, index) for path in transform_paths(obj) for index in range(WIDTHS[path]))
-    frames = sorted({key.co[0] for curve in curves if curve and not curve.mute for key in curve.keyframe_points})
-    return np.array([frame for i, frame in enumerate(frames) if i == 0 or frame - frames[i - 1] > 0.01])
-
-
-def mode_at(obj: Carrier, frame: float) -> str:
-    """The mode of the segment that begins on this frame."""
-    fcurve = curve_of(obj, "rigid_motion.mode")
-    if fcurve is None or fcurve.mute or not len(fcurve.keyframe_points):
-        return obj.rigid_motion.mode
-    return MODE_IDS[round(fcurve.evaluate(frame + 0.002))]
 
 
 def expected_bases(
@@ -249,20 +185,12 @@ def _spin_and_end(
     obj: Carrier, first: float, last: float, own: Own, *, channel: bool = True, whole: bool = False
 ) -> tuple[Spin, np.ndarray]:
     """The turns more from one key to the next, and where the body turns to without them."""
-    ends, turns = np.array((first, last)), _turns(obj, first) if channel else 0.0
+    ends, turns = np.array((first, last)), turns_at(obj, first) if channel else 0.0
     by_angles = {}
     if obj.rotation_mode != "QUATERNION":
         by_angles = {"angles": _channels(obj, "rotation_euler", ends), "order": obj.rotation_mode}
     quaternions = _key_poses(obj, ends, own, False).quaternions
     return spin_and_end(quaternions, turns, **by_angles, own=own.quaternion, whole=whole)
-
-
-def _turns(obj: Carrier, first: float) -> float:
-    """The turns of the channel in the segment that begins on this frame."""
-    fcurve = curve_of(obj, "rigid_motion.turns")
-    if fcurve is None or fcurve.mute or mode_at(obj, first) == "BLENDER":
-        return 0.0
-    return next((key.co[1] for key in reversed(fcurve.keyframe_points) if key.co[0] < first + 0.005), 0.0)
 
 
 def _smooth(
@@ -366,44 +294,6 @@ def expected_worlds(
     return expected_worlds(obj.parent, frames, owns) @ np.array(obj.matrix_parent_inverse) @ bases
 
 
-def progress(obj: Carrier, first: float, last: float, frames: np.ndarray) -> np.ndarray:
-    """How far the channels have come between two keys: the share of the chord that they make up together."""
-    done, whole = np.zeros(len(frames)), 0.0
-    for path in transform_paths(obj):
-        weight = 4.0 if path == "rotation_quaternion" else 1.0
-        for index in range(WIDTHS[path]):
-            fcurve = curve_of(obj, path, index)
-            if fcurve is not None and len(fcurve.keyframe_points) and not fcurve.mute:
-                begin, end, *values = _timing(fcurve, [first, last, *frames])
-                done += weight * (end - begin) * (np.array(values) - begin)
-                whole += weight * (end - begin) ** 2
-    if whole > 0.0:
-        return done / whole
-    return _counted(obj, first, last, frames) if _turns(obj, first) else done
-
-
-def _counted(obj: Carrier, first: float, last: float, frames: np.ndarray) -> np.ndarray:
-    """The same where the body spins and no channel changes: of a value that goes up by one from key to key.
-
-    It has the keys of the first channel that turns, with flat handles.
-    """
-    curves = (curve_of(obj, rotation_path(obj), index) for index in range(WIDTHS[rotation_path(obj)]))
-    like = next(curve for curve in curves if curve is not None and len(curve.keyframe_points) and not curve.mute)
-    with spare_curve() as fcurve:
-        fcurve.extrapolation = like.extrapolation
-        fcurve.keyframe_points.add(len(like.keyframe_points))
-        for number, (made, key) in enumerate(zip(fcurve.keyframe_points, like.keyframe_points, strict=True)):
-            made.co = key.co[0], number
-            for field in ("interpolation", "easing", "back", "amplitude", "period"):
-                setattr(made, field, getattr(key, field))
-            made.handle_left_type = made.handle_right_type = "FREE"
-            made.handle_left, made.handle_right = (key.handle_left[0], number), (key.handle_right[0], number)
-        begin, end, *values = (fcurve.evaluate(frame) for frame in (first, last, *frames))
-    if begin == end:
-        return (frames - first) / (last - first)
-    return (np.array(values) - begin) / (end - begin)
-
-
 def matrices(location: np.ndarray, quaternion: np.ndarray, scale: np.ndarray) -> np.ndarray:
     """Scaled first, then turned, then moved, shape (m, 4, 4)."""
     w, x, y, z = normalise(quaternion).T
@@ -496,39 +386,6 @@ def _channels(obj: Carrier, path: str, frames: np.ndarray) -> np.ndarray:
         keyed = fcurve is not None and len(fcurve.keyframe_points) and not fcurve.mute
         values[:, index] = [fcurve.evaluate(frame) for frame in frames] if keyed else rest
     return values
-
-
-def _timing(fcurve: bpy.types.FCurve, frames: Sequence[float]) -> list[float]:
-    """The channel's values; elastic segments as a curve from 0 to 1 with the same keys has them, stretched."""
-    values = [fcurve.evaluate(frame) for frame in frames]
-    keys = fcurve.keyframe_points
-    for first, last in itertools.pairwise(keys):
-        if first.interpolation == "ELASTIC":
-            inside = [place for place, frame in enumerate(frames) if first.co[0] <= frame <= last.co[0]]
-            share = _elastic(first, last.co[0], [frames[place] for place in inside])
-            for place, part in zip(inside, share, strict=True):
-                values[place] = first.co[1] + part * (last.co[1] - first.co[1])
-    return values
-
-
-def _elastic(key: bpy.types.Keyframe, end: float, frames: Sequence[float]) -> list[float]:
-    """Blender's own elastic easing from 0 to 1."""
-    with spare_curve() as fcurve:
-        fcurve.keyframe_points.insert(key.co[0], 0.0)
-        fcurve.keyframe_points.insert(end, 1.0)
-        start = fcurve.keyframe_points[0]
-        for field in ("interpolation", "easing", "back", "amplitude", "period"):
-            setattr(start, field, getattr(key, field))
-        return [fcurve.evaluate(frame) for frame in frames]
-
-
-@contextmanager
-def spare_curve() -> Iterator[bpy.types.FCurve]:
-    """An F-curve of an Action that nothing uses."""
-    action = bpy.data.actions.new("Timing")
-    strip = action.layers.new("Layer").strips.new(type="KEYFRAME")
-    yield strip.channelbag(action.slots.new("OBJECT", "Timing"), ensure=True).fcurves.new("location")
-    bpy.data.actions.remove(action)
 
 
 def _scales_evenly(obj: Carrier, keys: np.ndarray) -> bool:

@@ -10,7 +10,8 @@ import bpy
 import numpy as np
 
 from rigid_motion.animation import write_channel
-from tests.animation.oracle import WIDTHS, Own, as_quaternion, rotation_path, unit
+from tests.animation.keyed import WIDTHS, rotation_path
+from tests.animation.oracle import Own, as_quaternion, unit
 
 FRAMES = (1.0, 11.0, 24.0, 40.0)
 

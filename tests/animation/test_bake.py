@@ -11,7 +11,8 @@ from rigid_motion.animation import bake, bake_poses, read_poses, set_mode, unbak
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
 from rigid_motion.motion.eulers import ORDERS
 from rigid_motion.motion.quaternions import angle_between
-from tests.animation.oracle import assert_shown, curves_of, expected_worlds, shown_worlds, snapshot
+from tests.animation.keyed import curves_of, snapshot
+from tests.animation.oracle import assert_shown, expected_worlds, shown_worlds
 from tests.animation.scenes import FRAMES, key, new_object
 
 

@@ -10,7 +10,8 @@ from rigid_motion.animation import set_exact, set_mode
 from tests.animation.bones.poses import shown_poses
 from tests.animation.bones.rig_editing import own_constraints
 from tests.animation.bones.rigs import key_all, new_rig, pose_mode, select_only
-from tests.animation.oracle import curves_of, shown_worlds
+from tests.animation.keyed import curves_of
+from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import give_own_deltas, key, new_object, push_down, tweak
 
 PLAYED = np.arange(1.0, 41.0)

@@ -10,17 +10,8 @@ from mathutils import Matrix, Quaternion
 from rigid_motion.animation import Breakdowns, Refused, breakdown, set_mode, set_turns, write_channel
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
 from tests.animation.bones.rigs import in_turn, new_rig
-from tests.animation.oracle import (
-    Own,
-    as_quaternion,
-    assert_shown,
-    curves_of,
-    key_frames,
-    matrices,
-    shown_worlds,
-    snapshot,
-    unit,
-)
+from tests.animation.keyed import curves_of, key_frames, snapshot
+from tests.animation.oracle import Own, as_quaternion, assert_shown, matrices, shown_worlds, unit
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, random_values
 
 FACTORS = (-0.3, 0.0, 0.35, 1.0, 1.25)

@@ -8,7 +8,8 @@ import pytest
 
 from rigid_motion.animation import modes_of, problem_of, refresh, set_mode, write_channel
 from rigid_motion.motion import KEYFRAME_MODES
-from tests.animation.oracle import assert_shown, curves_of, key_frames, rotation_path, snapshot
+from tests.animation.keyed import curves_of, key_frames, rotation_path, snapshot
+from tests.animation.oracle import assert_shown
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own_deltas, random_values
 
 PLAYED = np.arange(-3.0, 46.0)

@@ -11,15 +11,8 @@ import pytest
 from rigid_motion.animation import set_mode, write_channel
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
 from tests.animation.bones.rigs import in_turn
-from tests.animation.oracle import (
-    curves_of,
-    expected_bases,
-    key_frames,
-    matrices,
-    mode_at,
-    shown_worlds,
-    snapshot,
-)
+from tests.animation.keyed import curves_of, key_frames, mode_at, snapshot
+from tests.animation.oracle import expected_bases, matrices, shown_worlds
 from tests.animation.scenes import key, new_object, random_values
 
 CYCLES = ("NONE", "REPEAT", "REPEAT_OFFSET", "MIRROR")

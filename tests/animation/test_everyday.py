@@ -8,7 +8,8 @@ import pytest
 
 from rigid_motion import animation
 from rigid_motion.animation import key_frames, modes_of, problem_of, read_poses, refresh, set_mode
-from tests.animation.oracle import Own, assert_shown, curves_of
+from tests.animation.keyed import curves_of
+from tests.animation.oracle import Own, assert_shown
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own_deltas
 
 PLAYED = np.arange(-2.0, 44.0)

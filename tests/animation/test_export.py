@@ -12,7 +12,8 @@ import pytest
 
 from rigid_motion.animation import refresh, set_exact, set_mode
 from rigid_motion.motion import KEYFRAME_MODES
-from tests.animation.oracle import assert_shown, expected_worlds, matrices, shown_worlds, snapshot
+from tests.animation.keyed import snapshot
+from tests.animation.oracle import assert_shown, expected_worlds, matrices, shown_worlds
 from tests.animation.scenes import FRAMES, enabled, give_own_deltas, key, new_object
 
 PLAYED = np.arange(FRAMES[0], FRAMES[-1] + 1.0)

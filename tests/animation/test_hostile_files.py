@@ -7,140 +7,37 @@ object there is always a whole one, which gets its in-betweens whatever is wrong
 from __future__ import annotations
 
 import re
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
 from rigid_motion import animation
-from rigid_motion.animation import MODE_IDS, channelbag_of, modes_of, problem_of, set_mode
-from tests.animation.oracle import WIDTHS, assert_shown, curves_of, expected_worlds, shown_worlds, snapshot
-from tests.animation.scenes import FRAMES, key, new_object
-from tests.blank import blank
+from rigid_motion.animation import MODE_IDS, channelbag_of, problem_of, set_mode
+from tests.animation.hostile import (
+    INF,
+    LARGEST,
+    LOCATION_Y,
+    NAN,
+    SEEN,
+    TRANSFORMS,
+    TURN_W,
+    Damage,
+    each,
+    everywhere,
+    make,
+    mode_key,
+    numbers,
+    own_properties,
+    reopened,
+    use,
+)
+from tests.animation.keyed import WIDTHS, curves_of, snapshot
+from tests.animation.oracle import assert_shown, expected_worlds, shown_worlds
+from tests.animation.scenes import FRAMES
 from tests.thoroughness import sample
 
-SEEN = range(-2, 46)
-
-SECONDS = 10.0
-"""Far more than any file here needs, and far less than an animator would wait for."""
-
-NAN, INF = float("nan"), float("inf")
-LARGEST = float(np.finfo(np.float32).max)
-
-TRANSFORMS = ("location", "rotation_quaternion", "scale")
-LOCATION_Y, TURN_W, MODE = ("location", 1), ("rotation_quaternion", 0), ("rigid_motion.mode", 0)
-
-Damage = Callable[[bpy.types.Object], None]
-
-
-@pytest.fixture(autouse=True)
-def following(live_file: bpy.types.Context) -> Iterator[None]:
-    """Errors that handlers log make the test fail, see `live_file`."""
-    yield
-    animation.set_enabled(True)
-
-
-# Files and what happens to them
-
-
-def make(damage: Damage, mode: str = "dq_sclerp", name: str = "Broken") -> None:
-    """A new file with an object that gets damaged, and one that does not."""
-    animation.set_enabled(True)
-    blank()
-    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 40
-    broken, whole = key(new_object(name), seed=1, scale="even"), key(new_object("Whole"), seed=2)
-    set_mode(broken, mode)
-    set_mode(whole, mode, FRAMES)
-    animation.set_enabled(False)
-    damage(broken)
-
-
-def reopened(folder: Path, *, followed: bool = True) -> tuple[bpy.types.Object, bpy.types.Object]:
-    """The damaged and the whole object of the file, saved and opened again; followed by the extension or not."""
-    path = str(folder / "scene.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    animation.set_enabled(followed)
-    with soon():
-        bpy.ops.wm.open_mainfile(filepath=path)
-        bpy.context.view_layer.update()
-    whole = bpy.data.objects["Whole"]
-    return next(obj for obj in bpy.data.objects if obj != whole), whole
-
-
-@contextmanager
-def soon() -> Iterator[None]:
-    began = time.perf_counter()
-    yield
-    assert time.perf_counter() - began < SECONDS
-
-
-def use(obj: bpy.types.Object) -> None:
-    """What an animator does next, and what the panel asks for."""
-    with soon():
-        for (path, _), fcurve in curves_of(obj).items():
-            if path in ("location", "rigid_motion.mode") and len(fcurve.keyframe_points):
-                fcurve.keyframe_points[-1].select_control_point = True
-                fcurve.keyframe_points[-1].co_ui.y += 1.0
-                fcurve.update()
-        bpy.context.view_layer.update()
-        obj.location.x += 1.0
-        bpy.context.view_layer.update()
-        for frame in (5, 30, 12):
-            bpy.context.scene.frame_set(frame)
-        assert set(modes_of(obj, np.array(FRAMES))) <= set(MODE_IDS)
-        problem_of(obj)
-        animation.refresh()
-
-
-def own_properties(block: bpy.types.ID) -> object:
-    """What properties of extensions are kept in, open to any value."""
-    return block.bl_system_properties_get() if bpy.app.version >= (5, 0) else block
-
-
-# Damage
-
-
-def numbers(channel: tuple[str, int], field: str, value: float, *at: int) -> Damage:
-    """One number of these keys of a channel is another, of all without any; nothing else follows."""
-    name, _, axis = field.partition(".")
-
-    def damage(obj: bpy.types.Object) -> None:
-        points = curves_of(obj)[channel].keyframe_points
-        width, dtype = (2, np.float32) if axis else (1, np.int32 if name in ("interpolation", "easing") else np.float32)
-        result = np.empty(width * len(points), dtype)
-        points.foreach_get(name, result)
-        result.reshape(-1, width)[list(at) or slice(None), int(axis == "y")] = value
-        points.foreach_set(name, result)
-
-    return damage
-
-
-def everywhere(field: str, value: float) -> Damage:
-    return each(*(numbers((path, index), field, value) for path in TRANSFORMS for index in range(WIDTHS[path])))
-
-
-def each(*damages: Damage) -> Damage:
-    def damage(obj: bpy.types.Object) -> None:
-        for one in damages:
-            one(obj)
-
-    return damage
-
-
-def mode_key(value: float) -> Damage:
-    """A mode channel whose second key has this value."""
-
-    def damage(obj: bpy.types.Object) -> None:
-        fcurve = channelbag_of(obj).fcurves.new("rigid_motion.mode")
-        for frame in FRAMES[:-1]:
-            fcurve.keyframe_points.insert(frame, 1.0).interpolation = "CONSTANT"
-        numbers(MODE, "co.y", value, 1)(obj)
-
-    return damage
+pytestmark = pytest.mark.usefixtures("following")
 
 
 def easing_setting(name: str, interpolation: str, value: float) -> Damage:
@@ -414,134 +311,4 @@ def test_without_keys_an_object_rests_with_its_own_delta_transforms(tmp_path, da
     assert tuple(broken.delta_location) == (1.0, 2.0, 3.0)
     assert not any(broken.rigid_motion.filled)
     assert_shown([whole], SEEN)
-    use(broken)
-
-
-# Names
-
-
-@pytest.mark.parametrize(
-    "name",
-    sample(
-        [
-            *(
-                '"',
-                "'",
-                "\\",
-                "]",
-                '["x"]',
-                "a\nb",
-                "\t",
-                " ",
-                "%s{0}",
-                "../..",
-                "\N{PILE OF POO}" * 15,
-                "x" * 63,
-                "\u202e",
-            ),
-            *("Ä" * 31, "OBBroken", "rigid_motion.mode", "\x7f\x01"),
-        ]
-    ),
-    ids=repr,
-)
-def test_odd_names_change_nothing(tmp_path, name):
-    def rename(obj: bpy.types.Object) -> None:
-        obj.animation_data.action.name = obj.animation_data.action_slot.name_display = name
-
-    make(rename, name=name)
-    objects = reopened(tmp_path)
-    assert objects[0].name == name
-    assert_shown(objects, SEEN)
-    use(objects[0])
-    assert_shown(objects, SEEN)
-    numbers(LOCATION_Y, "co.y", NAN, 1)(objects[0])
-    assert problem_of(objects[0]).startswith(name)
-
-
-# Masses
-
-
-def keys_on(frames: np.ndarray, *channels: tuple[str, int]) -> Damage:
-    """Very many keys: Blender itself takes its time where they are not all alike."""
-
-    def damage(obj: bpy.types.Object) -> None:
-        for (path, index), fcurve in curves_of(obj).items():
-            if (path, index) in (channels or [(path, index) for path in TRANSFORMS for index in range(WIDTHS[path])]):
-                points = fcurve.keyframe_points
-                points.clear()
-                points.add(len(frames))
-                values = np.sin(frames * 0.01 + index) + 1.5
-                points.foreach_set("co", np.stack((frames, values), axis=1).astype(np.float32).ravel())
-                points.foreach_set("interpolation", np.ones(len(frames), np.int32))
-
-    return damage
-
-
-MILLION = np.arange(1e6)
-
-
-def test_a_million_keys_in_a_few_frames_are_taken_as_they_are(tmp_path):
-    make(keys_on(1.0 + MILLION * 39e-6, LOCATION_Y))
-    objects = reopened(tmp_path)
-    with soon():
-        assert problem_of(objects[0]) == ""
-    assert_shown(objects[1:], SEEN)
-    use(objects[0])
-
-
-def test_a_million_keys_on_one_frame_are_none_too_many(tmp_path):
-    make(keys_on(np.full(10**6, 11.0), LOCATION_Y))
-    objects = reopened(tmp_path)
-    assert_shown(objects[1:], SEEN)
-    use(objects[0])
-
-
-def test_keys_over_a_million_frames_are_too_many(tmp_path):
-    make(keys_on(MILLION, LOCATION_Y))
-    broken, whole = reopened(tmp_path)
-    with soon():
-        assert problem_of(broken).startswith("Broken has keys over 999999 frames, at most 250000 can be filled in")
-    assert not [path for path, _ in curves_of(broken) if path.startswith("delta_")]
-    assert_shown([whole], SEEN)
-    use(broken)
-
-
-def test_a_motion_that_goes_on_for_a_million_frames_is_too_long(tmp_path):
-    def damage(obj: bpy.types.Object) -> None:
-        bpy.context.scene.frame_end = 1_000_000
-        for fcurve in curves_of(obj).values():
-            fcurve.extrapolation = "LINEAR"
-
-    make(damage)
-    broken, whole = reopened(tmp_path)
-    assert problem_of(broken).startswith("Broken goes on outside of its keys")
-    assert_shown([whole], SEEN)
-    use(broken)
-
-
-@pytest.mark.parametrize("frames", [1e-3, 0.02, 1.0])
-def test_a_cycle_of_next_to_no_time_ends(tmp_path, frames):
-    def damage(obj: bpy.types.Object) -> None:
-        bpy.context.scene.frame_end = 50_000
-        keys_on(1.0 + frames * np.arange(4) / 3.0)(obj)
-        for (path, _), fcurve in curves_of(obj).items():
-            if path in TRANSFORMS:
-                fcurve.modifiers.new("CYCLES")
-
-    make(damage)
-    broken, whole = reopened(tmp_path)
-    with soon():
-        assert problem_of(broken) == "" or problem_of(broken).startswith("Broken")
-    assert_shown([whole], SEEN)
-    use(broken)
-
-
-def test_a_million_modes_are_none_too_many(tmp_path):
-    def damage(obj: bpy.types.Object) -> None:
-        mode_key(1.0)(obj)
-        keys_on(1.0 + MILLION * 39e-6, MODE)(obj)
-
-    make(damage)
-    broken, whole = reopened(tmp_path)
-    assert_shown([broken, whole], SEEN)
     use(broken)

@@ -18,17 +18,9 @@ from rigid_motion.animation.curves import Stepped, held
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
 from tests.animation.bones.rigs import key_bone, new_rig
+from tests.animation.keyed import Carrier, curves_of, key_frames, rotation_path, snapshot
 from tests.animation.modified import led_to, without_modifiers
-from tests.animation.oracle import (
-    Carrier,
-    curves_of,
-    expected_bases,
-    expected_off_whole_frames,
-    key_frames,
-    rotation_path,
-    shown_worlds,
-    snapshot,
-)
+from tests.animation.oracle import expected_bases, expected_off_whole_frames, shown_worlds
 from tests.animation.scenes import give_own_deltas, key, new_object, push_down
 
 PLAYED = np.arange(-9.0, 52.0)

@@ -18,7 +18,6 @@ from rigid_motion.animation import (
     is_reduced,
     key_frames,
     modes_of,
-    radius_of,
     read_poses,
     reduce_keys_of,
     reduction_of,
@@ -28,40 +27,12 @@ from rigid_motion.animation import (
     write_channel,
 )
 from rigid_motion.animation.baking import fewer_keys
-from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate, interpolate_by_segments, repair, shell_error, twists
+from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate, interpolate_by_segments, shell_error, twists
 from rigid_motion.motion.quaternions import multiply
-from rigid_motion_batch.recordings import read_trajectories
 from tests.animation.bones.rigs import in_turn
-from tests.animation.oracle import curves_of, rotation_path, snapshot
+from tests.animation.keyed import curves_of, rotation_path, snapshot
+from tests.animation.reduced import RADIUS, TOLERANCE, keys_of, motion, off, recorded
 from tests.animation.scenes import give_own_deltas, key, new_object
-
-ASSETS = Path(__file__).resolve().parents[2] / "assets"
-RADIUS = 0.1
-TOLERANCE = 0.005
-
-
-def motion(name: str = "reach", rate: float = 30.0) -> tuple[np.ndarray, Poses]:
-    """One of the clips in assets/, imported with a pose on every frame."""
-    trajectory = read_trajectories(str(ASSETS / f"{name}.csv")).trajectories[0]
-    times, poses, _ = repair(trajectory.times, trajectory.poses)
-    frames = np.arange(np.floor((times[-1] - times[0]) * rate) + 1.0)
-    return 1.0 + frames, interpolate(times - times[0], poses, frames / rate, "lerp_slerp")
-
-
-def recorded(name: str = "reach", rotation_mode: str = "QUATERNION", obj: bpy.types.Object | None = None):
-    """An object that moves as recorded."""
-    obj = obj or new_object(rotation_mode=rotation_mode)
-    bake_poses(obj, *motion(name))
-    return obj
-
-
-def off(obj: bpy.types.Object, frames: np.ndarray, truth: Poses, radius: float = RADIUS) -> float:
-    """The largest shell error of what Blender shows on these frames."""
-    return float(shell_error(read_poses(obj, frames), truth, radius).max())
-
-
-def keys_of(obj: bpy.types.Object, path: str, index: int = 0) -> list[float]:
-    return [point.co.x for point in curves_of(obj)[path, index].keyframe_points]
 
 
 @pytest.mark.parametrize(
@@ -460,137 +431,3 @@ def test_what_was_done_last_is_taken_back_first(live_file):
     restore_keys(obj)
     assert (snapshot(obj), is_baked(obj), is_reduced(obj)) == (dense, False, False)
     assert len(bpy.data.actions) == 1
-
-
-def moved_by_a_simulation():
-    mesh = bpy.data.meshes.new("Stone")
-    mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], [], [(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)])
-    obj = new_object(data=mesh)
-    bpy.context.view_layer.objects.active = obj
-    obj.select_set(True)
-    bpy.ops.rigidbody.object_add(type="ACTIVE")
-    return obj
-
-
-def with_(change):
-    def make():
-        obj = recorded()
-        change(obj)
-        return obj
-
-    return make
-
-
-def driven(obj):
-    obj.driver_add("location", 2)
-    return obj
-
-
-def tweak(obj):
-    action = obj.animation_data.action
-    obj.animation_data.action = None
-    track = obj.animation_data.nla_tracks.new()
-    track.strips.new("Strip", 1, action)
-    track.select = True
-    obj.animation_data.nla_tracks.active = track
-    obj.animation_data.use_tweak_mode = True
-
-
-def moved_by_bones():
-    obj = new_object(data=bpy.data.armatures.new("Rig"))
-    bpy.context.view_layer.objects.active = obj
-    bpy.ops.object.mode_set(mode="EDIT")
-    obj.data.edit_bones.new("Hand").tail = (0.0, 0.0, 1.0)
-    bpy.ops.object.mode_set(mode="OBJECT")
-    write_channel(obj, 'pose.bones["Hand"].location', np.arange(1.0, 9.0), np.zeros((8, 3)))
-    return obj
-
-
-def solved():
-    obj = new_object(data=bpy.data.cameras.new("Camera"))
-    obj.constraints.new("CAMERA_SOLVER")
-    return obj
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (new_object, "Tool has no keys of location, rotation or scale: there is nothing to reduce"),
-        (moved_by_a_simulation, r"Tool has no keys.*Object > Rigid Body > Bake to Keyframes"),
-        (lambda: key(moved_by_a_simulation(), [1.0]), r"Tool has 1 key of.*a simulation moves it"),
-        (lambda: driven(new_object()), r"Tool has no keys.*drivers move it"),
-        (moved_by_bones, r"Tool has no keys.*its bones have"),
-        (solved, r"Tool has no keys.*Constraint to F-Curve"),
-        (with_(driven), r"Tool: Location Z is driven"),
-        (with_(tweak), r"Tool: leave the strip that is being edited first"),
-        (with_(lambda obj: setattr(obj, "rotation_mode", "AXIS_ANGLE")), r"Tool turns by axis and angle"),
-        (
-            with_(lambda obj: curves_of(obj)["location", 1].modifiers.new("NOISE")),
-            r"Tool has Stepped modifiers, or such",
-        ),
-        (with_(lambda obj: curves_of(obj)["location", 1].convert_to_samples(1, 50)), r"Samples to Keys"),
-        (lambda: key(new_object(), [1.0]), "Tool has 1 key of location, rotation or scale: there is nothing to reduce"),
-        (
-            lambda: key(new_object(), [1.0, 9.0]),
-            "Tool has 2 keys of location, rotation or scale: there is nothing to reduce",
-        ),
-        (lambda: key(new_object(), [1.0, 5.0, 9.0]), "Tool needs its 3 keys to stay within the tolerance"),
-        (lambda: key(new_object(), np.arange(1.0, 30.0), scale="uneven"), r"its scale changes differently"),
-    ],
-)
-def test_where_nothing_can_be_reduced_it_says_why_and_the_way_out_and_changes_nothing(live_file, make, message):
-    obj = make()
-    before, actions = snapshot(obj), list(bpy.data.actions)
-    with pytest.raises(Refused, match=message):
-        reduce_keys_of(obj)
-    assert snapshot(obj) == before
-    assert list(bpy.data.actions) == actions
-    assert not len(obj.rigid_motion.bakes)
-    assert reduction_of(obj) is None
-
-
-@pytest.mark.parametrize("tolerance", [0.0, -1.0, float("nan"), float("inf")])
-def test_a_tolerance_that_is_none_is_refused(live_file, tolerance):
-    with pytest.raises(Refused, match="the tolerance has to be a number above zero"):
-        reduce_keys_of(recorded(), tolerance=tolerance)
-
-
-def test_linked_keys_are_refused(live_file, tmp_path):
-    recorded()
-    bpy.data.libraries.write(str(tmp_path / "library.blend"), {bpy.data.objects["Tool"]})
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, here):
-        here.objects = ["Tool"]
-    bpy.context.scene.collection.objects.link(here.objects[0])
-    with pytest.raises(Refused, match="Tool is linked from another file: make it local first"):
-        reduce_keys_of(bpy.data.objects["Tool"])
-
-
-def box(obj_size: float) -> bpy.types.Mesh:
-    mesh = bpy.data.meshes.new("Box")
-    mesh.from_pydata([(0, 0, 0), (obj_size, 2 * obj_size, 2 * obj_size)], [(0, 1)], [])
-    return mesh
-
-
-def test_the_radius_is_how_far_an_object_reaches_from_its_origin(live_file):
-    obj = new_object(data=box(1.0))
-    assert radius_of(obj) == pytest.approx(3.0)
-    obj.scale = (2.0, 2.0, 2.0)
-    root = new_object("Root")
-    root.scale = (3.0, 3.0, 3.0)
-    obj.parent = root
-    assert radius_of(obj) == pytest.approx(18.0)
-
-
-def test_empties_and_cameras_are_as_large_as_they_are_drawn(live_file):
-    empty, camera = new_object("Empty"), new_object("Camera", data=bpy.data.cameras.new("Camera"))
-    empty.empty_display_size, camera.data.display_size = 0.25, 0.5
-    empty.scale = (2.0, 2.0, 2.0)
-    assert (radius_of(empty), radius_of(camera)) == (pytest.approx(0.5), pytest.approx(0.5))
-
-
-def test_what_has_no_size_counts_as_ten_centimetres(live_file):
-    light = new_object("Lamp", data=bpy.data.lights.new("Lamp", "POINT"))
-    assert radius_of(light) == pytest.approx(0.1)
-    bpy.context.scene.unit_settings.scale_length = 0.01
-    assert radius_of(light) == pytest.approx(10.0)

@@ -16,7 +16,8 @@ from rigid_motion import animation
 from rigid_motion.animation import is_baked, modes_of, refresh, set_enabled, set_mode
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.farm import on_a_farm, played_on_a_farm
-from tests.animation.oracle import Own, assert_shown, curves_of, expected_worlds, shown_worlds, snapshot
+from tests.animation.keyed import curves_of, snapshot
+from tests.animation.oracle import Own, assert_shown, expected_worlds, shown_worlds
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own_deltas
 from tests.thoroughness import sample
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import bake, key_frames, problem_of, refresh, set_mode, unbake
-from tests.animation.oracle import Own, curves_of, expected_bases, shown_worlds
+from tests.animation.keyed import curves_of
+from tests.animation.oracle import Own, expected_bases, shown_worlds
 from tests.animation.scenes import give_own_deltas, key, new_object, new_strip, own_deltas, push_down, tweak
 
 KEYS = (1.0, 11.0, 21.0, 41.0)

@@ -11,7 +11,8 @@ from hypothesis.stateful import precondition, rule
 
 from rigid_motion import animation
 from tests.animation.editing import Editing, seeds, shares
-from tests.animation.oracle import assert_shown, curves_of, expected_bases, key_frames, rotation_path, snapshot
+from tests.animation.keyed import curves_of, key_frames, rotation_path, snapshot
+from tests.animation.oracle import assert_shown, expected_bases
 
 
 class WithTools(Editing):

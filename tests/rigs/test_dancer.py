@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from rigid_motion import animation
-from tests.rigs.dancer import BONES, FPS, FRAMES, dancer
+from tests.rigs.dance_plan import BONES
+from tests.rigs.dancer import FPS, FRAMES, dancer
 
 LAST = 60.0
 

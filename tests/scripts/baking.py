@@ -12,7 +12,7 @@ import pytest
 from rigid_motion import animation
 from rigid_motion.animation import set_mode
 from rigid_motion_batch.cli import bake
-from tests.animation.oracle import curves_of
+from tests.animation.keyed import curves_of
 from tests.animation.scenes import key, new_object
 from tests.blank import blank
 

@@ -2,9 +2,62 @@
 
 from __future__ import annotations
 
+import csv
+import json
 from pathlib import Path
 
+import numpy as np
+import pytest
+
+from rigid_motion.motion import Poses
+from rigid_motion_batch.cli import compare
+from rigid_motion_batch.pipeline.steps import OWN
+
 ROOT = Path(__file__).resolve().parents[2]
+
+COLUMNS = (
+    "clip,mode,rate_hz,keys,samples,duration_s,bytes_per_s,rms_shell_m,p95_shell_m,max_shell_m,"
+    "rms_position_m,rms_rotation_deg,rms_velocity_m_s,decimation,tolerance_m,keys_per_s,"
+    "joints,key_frames,worst_joint,foot_slide_m,recorded_slide_m"
+)
+SMALL = ["--resolution", "160x90", "--fps", "6"]
+
+
+def tasks_of(capsys: pytest.CaptureFixture) -> dict[str, int]:
+    """What became of the tasks of a run with --json."""
+    return json.loads(capsys.readouterr().out)["tasks"]
+
+
+def run(*arguments: object) -> int:
+    """Run the program in this process, which is quicker for a little work."""
+    return compare.main(["--jobs", "0", *map(str, arguments)])
+
+
+def shown(folder: Path) -> list[Path]:
+    """What lies in an output folder for people."""
+    return sorted(path for path in folder.iterdir() if path.name != OWN)
+
+
+def exit_code(*arguments: object) -> int:
+    with pytest.raises(SystemExit) as ended:
+        run(*arguments)
+    return ended.value.code
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
+
+
+def table(path: Path) -> dict[str, np.ndarray]:
+    rows = rows_of(path)
+    return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+
+
+def poses_of(columns: dict[str, np.ndarray]) -> Poses:
+    return Poses(
+        np.stack([columns[name] for name in ("x", "y", "z")], axis=-1),
+        np.stack([columns[name] for name in ("qw", "qx", "qy", "qz")], axis=-1),
+    )
 
 
 def write_toss(path: Path, samples: int = 60) -> Path:

@@ -14,7 +14,7 @@ from rigid_motion.motion.quaternions import normalise
 from rigid_motion_batch.cli import reduce
 from rigid_motion_batch.pipeline.steps import OWN
 from tests.animation.farm import on_a_farm, played_on_a_farm
-from tests.animation.oracle import curves_of
+from tests.animation.keyed import curves_of
 from tests.animation.scenes import new_object
 from tests.recordings import RECORDINGS
 from tests.scripts.baking import new_file, save

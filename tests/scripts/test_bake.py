@@ -17,7 +17,8 @@ from rigid_motion import animation
 from rigid_motion.animation import is_baked, set_mode
 from rigid_motion_batch.keying import jobs
 from tests.animation.farm import played_on_a_farm
-from tests.animation.oracle import curves_of, expected_worlds, shown_worlds, snapshot
+from tests.animation.keyed import curves_of, snapshot
+from tests.animation.oracle import expected_worlds, shown_worlds
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object
 from tests.scripts.baking import (
     LAST,

@@ -12,7 +12,8 @@ import pytest
 from rigid_motion import animation
 from rigid_motion.animation import is_baked, set_mode
 from tests.animation.farm import played_on_a_farm
-from tests.animation.oracle import curves_of, shown_worlds, snapshot
+from tests.animation.keyed import curves_of, snapshot
+from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import FRAMES, key, new_object
 from tests.scripts.baking import baked_name, extension, new_file, open_again, run, save
 

@@ -21,7 +21,7 @@ import pytest
 from rigid_motion import animation
 from rigid_motion_batch import supervising
 from rigid_motion_batch.keying import blend_files
-from tests.animation.oracle import curves_of
+from tests.animation.keyed import curves_of
 from tests.scripts.baking import baked_name, frames_of_keys, one_object_file, open_again, run, with_version
 from tests.scripts.reducing import listed
 

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import os
-import re
-import shlex
 import shutil
 import signal
 import subprocess
@@ -18,58 +15,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rigid_motion.motion import KEYFRAME_MODES, MODES, Poses, interpolate, shell_error
+from rigid_motion.motion import KEYFRAME_MODES, interpolate, shell_error
 from rigid_motion_batch.cli import compare, tasks
 from rigid_motion_batch.pipeline.steps import OWN
 from rigid_motion_batch.scenes import film
 from tests.balls import largest_displacements
-from tests.scripts.comparing import write_toss
-
-ROOT = Path(__file__).resolve().parents[2]
-
-COLUMNS = (
-    "clip,mode,rate_hz,keys,samples,duration_s,bytes_per_s,rms_shell_m,p95_shell_m,max_shell_m,"
-    "rms_position_m,rms_rotation_deg,rms_velocity_m_s,decimation,tolerance_m,keys_per_s,"
-    "joints,key_frames,worst_joint,foot_slide_m,recorded_slide_m"
-)
-SMALL = ["--resolution", "160x90", "--fps", "6"]
-
-
-def tasks_of(capsys: pytest.CaptureFixture) -> dict[str, int]:
-    """What became of the tasks of a run with --json."""
-    return json.loads(capsys.readouterr().out)["tasks"]
-
-
-def run(*arguments: object) -> int:
-    """Run the program in this process, which is quicker for a little work."""
-    return compare.main(["--jobs", "0", *map(str, arguments)])
-
-
-def shown(folder: Path) -> list[Path]:
-    """What lies in an output folder for people."""
-    return sorted(path for path in folder.iterdir() if path.name != OWN)
-
-
-def exit_code(*arguments: object) -> int:
-    with pytest.raises(SystemExit) as ended:
-        run(*arguments)
-    return ended.value.code
-
-
-def rows_of(path: Path) -> list[dict[str, str]]:
-    return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
-
-
-def table(path: Path) -> dict[str, np.ndarray]:
-    rows = rows_of(path)
-    return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
-
-
-def poses_of(columns: dict[str, np.ndarray]) -> Poses:
-    return Poses(
-        np.stack([columns[name] for name in ("x", "y", "z")], axis=-1),
-        np.stack([columns[name] for name in ("qw", "qx", "qy", "qz")], axis=-1),
-    )
+from tests.scripts.comparing import COLUMNS, ROOT, SMALL, poses_of, rows_of, run, shown, table, tasks_of, write_toss
 
 
 @pytest.fixture(scope="module")
@@ -250,64 +201,6 @@ def test_what_is_repaired_is_said(short_clip, tmp_path, capsys):
     assert "length zero" in (tmp_path / "out" / "report.html").read_text()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "complaint"),
-    [
-        (["--rates", "0"], "rate"),
-        (["--rates", "../../x"], "rate"),
-        (["--rates", "1e3"], "rate"),
-        (["--rates", ""], "rate"),
-        (["--modes", "bezier"], "lerp_slerp"),
-        (["--radius", "-1"], "above 0"),
-        (["--slow-motion", "nan"], "above 0"),
-        (["--resolution", "161x90"], "even"),
-        (["--resolution", "big"], "1280x720"),
-        (["--fps", "0"], "1 to 240"),
-        (["--axes", "maya"], "unity"),
-        (["--output", ""], "'' is no folder"),
-        (["--output", "a\0b"], "is no folder"),
-        (["--jobs", "-1"], "no number of processes"),
-        (["--jobs", "many"], "no number of processes"),
-        (["--decimate", "uniform", "--tolerance", "5mm"], "leave out --decimate uniform"),
-        (["--decimate", "uniform", "--budget", "10"], "leave out --decimate uniform"),
-        (["--fit"], "--fit is for keys that are chosen by the motion: add --tolerance, --budget or --decimate"),
-        (["--modes", "motor_splin"], "did you mean motor_spline?"),
-        (["--tolerence", "5mm"], "did you mean --tolerance?"),
-        (["--axes", "untiy"], "did you mean unity?"),
-        (["--decimate", "adaptive", "--tolerance", "5mm", "--budget", "10"], "exclude one another"),
-        (["--decimate", "adaptive", "--tolerance", "5 inches"], "give a length such as 5mm"),
-        (["--decimate", "adaptive", "--tolerance", "0"], "give a length such as 5mm"),
-        (["--decimate", "adaptive", "--tolerance", ","], "give a length such as 5mm"),
-        (["--decimate", "adaptive", "--budget", "5mm"], "give numbers such as 5,7.5,10"),
-        (["--decimate", "cleverly"], "adaptive"),
-        (["--columns", "when"], "write t=timestamp_ms,x=pos_x,..."),
-        (["--degrees"], "--degrees is for Euler angles: add their order"),
-    ],
-)
-def test_a_wrong_option_ends_with_code_2_and_a_way_out(arguments, complaint, capsys):
-    assert exit_code(*arguments) == 2
-    assert complaint in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("content", "complaint"),
-    [
-        ("t,x,y,z\n1,2,3,4\n", "qx"),
-        ("t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,0,zero,0,0,0,0,1\n", ":3:"),
-        ("t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,0\n1,0,0,0,0,0,0,0\n", "0 usable poses"),
-        ("", "line.csv"),
-    ],
-)
-def test_a_wrong_file_ends_with_code_2_and_one_line(tmp_path, capsys, content, complaint):
-    path = tmp_path / "line.csv"
-    path.write_text(content)
-    assert run(path, "--no-video", "--output", tmp_path / "out") == 2
-    said = [line for line in capsys.readouterr().err.splitlines() if "compare.py:" in line]
-    assert len(said) == 1
-    assert complaint in said[0]
-    assert not (tmp_path / "out").exists()
-
-
 def test_an_object_that_is_not_there_is_said_before_any_work(short_clip, tmp_path, capsys):
     assert run(short_clip, "--output", tmp_path / "out", "--object", "nowhere.blend:Cube") == 2
     assert "nowhere.blend" in capsys.readouterr().err
@@ -324,45 +217,6 @@ def test_clips_too_short_for_every_rate_end_with_code_2(short_clip, tmp_path, ca
     assert run(short_clip, "--no-video", "--output", tmp_path, "--rates", "0.5") == 2
     assert "give higher --rates" in capsys.readouterr().err
     assert not (tmp_path / "report.html").exists()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "folders"),
-    [
-        (["--rates", "5,7.5,5.0,05"], ["5", "7.5"]),
-        (["--decimate", "adaptive", "--budget", "10.0,10"], ["budget-10.0"]),
-        (["--decimate", "adaptive", "--tolerance", "5mm,0.5cm,0.005m,0.005"], ["tolerance-5mm", "tolerance-0.005"]),
-    ],
-)
-def test_the_same_amount_written_in_two_ways_is_one_choice(arguments, folders):
-    assert [choice.name for choice in compare.parse(arguments).choices] == folders
-
-
-def test_the_help_names_every_mode_there_is(capsys):
-    assert exit_code("--help") == 0
-    said = " ".join(capsys.readouterr().out.partition("--modes MODE")[2].partition("--output")[0].split())
-    assert [mode for mode in (*MODES, "all", "best_of") if mode not in said] == []
-
-
-EXAMPLE = re.compile(
-    r"^ +(?:blender --background --python scripts/compare\.py --"
-    r"|python scripts/(?:compare\.py|bootstrap\.py compare))(?P<arguments>.*)$",
-    re.MULTILINE,
-)
-"""A line of a page, or of the help, that calls the program."""
-
-
-@pytest.mark.parametrize("page", ["--help", "README.md", "docs/comparing.md", "docs/farm.md"])
-def test_the_printed_examples_work_as_printed(page, capsys):
-    if page == "--help":
-        assert exit_code("--help") == 0
-    else:
-        print((ROOT / page).read_text(encoding="utf-8"))
-    examples = EXAMPLE.findall(capsys.readouterr().out)
-    assert examples
-    for example in examples:
-        options = compare.parse(shlex.split(example, comments=True))
-        assert options.choices
 
 
 def rendering(output: Path) -> bool:
@@ -505,14 +359,6 @@ def test_the_best_of_each_segment_is_compared_with_the_modes_it_is_made_of(short
     assert keys[-1]["mode"] == ""
     # Which keys a mode needs is a question to single modes.
     assert "best_of" not in {row["mode"] for row in rows_of(tmp_path / "keys_needed.csv")}
-
-
-@pytest.mark.parametrize("modes", ["best_of", "best_of,dq_sclerp"])
-def test_the_best_of_fewer_than_two_modes_is_refused(modes, capsys):
-    assert exit_code("--modes", modes) == 2
-    assert "best_of chooses among the other modes that are named: name two or more, or all,best_of" in (
-        capsys.readouterr().err
-    )
 
 
 def test_an_object_that_the_viewer_cannot_have_leaves_the_report(tmp_path, capsys):

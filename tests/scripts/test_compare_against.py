@@ -13,8 +13,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from rigid_motion_batch.analysis.modes import BEST_OF, name_of_other
 from tests.balls import largest_displacements
-from tests.scripts.comparing import ROOT, write_toss
-from tests.scripts.test_compare import SMALL, poses_of, rows_of, run, table
+from tests.scripts.comparing import ROOT, SMALL, poses_of, rows_of, run, table, write_toss
 
 FAST = ("--no-video", "--rates", "10")
 

@@ -15,10 +15,9 @@ from rigid_motion_batch.cli import compare
 from rigid_motion_batch.recordings import read_trajectories
 from tests.blank import blank
 from tests.scripts.analysis.test_body_metrics import HEADER
-from tests.scripts.comparing import ROOT, write_toss
+from tests.scripts.comparing import COLUMNS, ROOT, write_toss
 from tests.scripts.recordings.skeletons import body, export
 from tests.scripts.recordings.test_damaged_bvh_bodies import seed
-from tests.scripts.test_compare import COLUMNS
 from tests.thoroughness import sample
 
 MODES = ("lerp_slerp", "dq_sclerp")

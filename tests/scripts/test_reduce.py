@@ -15,7 +15,7 @@ import pytest
 from rigid_motion import animation
 from rigid_motion.animation import key_frames, modes_of
 from rigid_motion_batch.keying import blend_files, recordings
-from tests.animation.oracle import curves_of
+from tests.animation.keyed import curves_of
 from tests.animation.scenes import new_object
 from tests.scripts.baking import extension, open_again, save
 from tests.scripts.reducing import (

@@ -212,15 +212,15 @@ def test_processes_do_the_same_as_one_and_a_bad_file_stops_nobody(tmp_path):
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=120)
     assert done.returncode == 1
     made = ["a-reduced.glb", "b-reduced.glb", "c-reduced.glb", "d-reduced.glb", "hand-keys.csv"]
-    assert done.stdout.splitlines() == [os.path.join("two", name) for name in made]
+    assert done.stdout.splitlines() == [str(Path("two", name)) for name in made]
     assert listed(tmp_path / "two") == listed(tmp_path / "one") == made
     for name in made:
         assert (tmp_path / "two" / name).read_bytes() == (tmp_path / "one" / name).read_bytes()
     lines = done.stderr.splitlines()
-    bad = os.path.join("in", "bad.glb")
+    bad = Path("in", "bad.glb")
     assert lines[-2:] == [f"Failed: {bad}", "1 object and 4 clips reduced; 6 files: 5 written, 1 failed."]
     own = [
-        [place for place, line in enumerate(lines) if line.startswith(os.path.join("in", f"{name}.glb"))]
+        [place for place, line in enumerate(lines) if line.startswith(str(Path("in", f"{name}.glb")))]
         for name in "abcd"
     ]
     for places in own:

@@ -11,7 +11,7 @@ import pytest
 from rigid_motion.animation import key_frames, modes_of
 from rigid_motion.motion import interpolate
 from tests.animation.farm import played_on_a_farm
-from tests.animation.oracle import curves_of
+from tests.animation.keyed import curves_of
 from tests.scripts.baking import extension, open_again
 from tests.scripts.bvh_bodies import write_body
 from tests.scripts.recordings.glbs import curved, mixed_rates, soldier

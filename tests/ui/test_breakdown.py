@@ -12,7 +12,7 @@ from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate
 from rigid_motion.ui.breakdown import CLASSES
 from rigid_motion.ui.slider import WAY, Slider
-from tests.animation.oracle import snapshot
+from tests.animation.keyed import snapshot
 from tests.ui.conftest import FRAMES
 
 operators = bpy.ops.rigid_motion

@@ -6,18 +6,10 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import (
-    MODE_IDS,
-    bake_poses,
-    is_baked,
-    key_frames,
-    modes_of,
-    read_poses,
-    reduction_of,
-)
+from rigid_motion.animation import MODE_IDS, bake_poses, is_baked, key_frames, modes_of, read_poses, reduction_of
 from rigid_motion.motion import MODES, Poses, interpolate, shell_error
 from rigid_motion.ui import CLASSES, gltf_export, live, pose_operators
-from tests.animation.oracle import curves_of
+from tests.animation.keyed import curves_of
 from tests.animation.scenes import new_object
 from tests.ui.conftest import FRAMES, keyed, select_keys
 

@@ -10,7 +10,7 @@ from rigid_motion.animation import key_frames, set_mode
 from rigid_motion.animation.live.follower import show_seen_in_channels
 from rigid_motion.animation.transforms import transform_of
 from tests.animation.bones.rigs import Rest, key_all, new_rig, pose_mode, select_bones
-from tests.animation.oracle import rotation_path
+from tests.animation.keyed import rotation_path
 
 BETWEEN, OTHER = 15, 33
 SIDES = [Rest(f"Hand.{side}", (x, 0.0, 1.0), (2 * x, 0.1, 1.2)) for side, x in (("L", 0.3), ("R", -0.3))]

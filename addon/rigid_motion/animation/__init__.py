@@ -30,7 +30,7 @@ from .baking.reducing import (
     total_reduction,
 )
 from .baking.sizes import radius_of
-from .compute.sources import MODE_IDS
+from .compute.modes import MODE_IDS
 from .edits.breakdowns import Breakdowns, breakdown
 from .edits.exactness import error_between_frames, set_exact
 from .edits.mode_keys import set_mode, set_turns

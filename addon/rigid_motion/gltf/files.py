@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import os
 import secrets
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -83,7 +82,7 @@ def reduce_file(path: Path, output: Path, options: Options) -> Report:
         beside = output.with_name(f".{secrets.token_hex(4)}{output.suffix}")
         try:
             beside.write_bytes(content)
-            os.replace(beside, output.with_name(name))
+            beside.replace(output.with_name(name))
         finally:
             beside.unlink(missing_ok=True)
     return report

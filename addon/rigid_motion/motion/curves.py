@@ -61,7 +61,7 @@ def screw(segments: Segments) -> Curves:
 def motor_lerp(segments: Segments) -> Curves:
     """Return the normalised blend of two motors: of PGA, of CGA without scale, or of dual quaternions."""
 
-    def basis(s: np.ndarray, parameters: list[np.ndarray], narrow: bool) -> Rows:
+    def basis(s: np.ndarray, parameters: list[np.ndarray], _narrow: bool) -> Rows:
         rows = np.empty((5, s.size))
         _lerp(s, parameters[0], rows[:2])
         rows[2] = 1.0
@@ -227,7 +227,7 @@ def similarity_lerp(segments: Segments) -> Curves:
     if segments.scales is None:
         return motor_lerp(segments)
 
-    def basis(s: np.ndarray, parameters: list[np.ndarray], narrow: bool) -> Rows:
+    def basis(s: np.ndarray, parameters: list[np.ndarray], _narrow: bool) -> Rows:
         cosine, last, *roots = parameters
         s = np.clip(s, -last, last)
         # A versor of scale k has 1 / sqrt(k) for the weight of its translation, and the mean of that and its inverse

@@ -172,7 +172,7 @@ def render(options: argparse.Namespace) -> None:
     ):
         render_still(build(), folder / f"{name}.png")
     if not options.no_video:
-        render_film(caught(film=True), folder / "catching.mp4", lambda done, of: None)
+        render_film(caught(film=True), folder / "catching.mp4", lambda *_: None)
 
 
 def _asset(name: str) -> Clip:

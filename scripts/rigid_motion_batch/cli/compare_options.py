@@ -355,7 +355,7 @@ def _modes(text: str) -> Modes:
     return Modes((*modes, BEST_OF), share)
 
 
-def _whole(pattern: str, what: str, fits: Callable[..., bool] = lambda *numbers: True) -> Callable[[str], Any]:
+def _whole(pattern: str, what: str, fits: Callable[..., bool] = lambda *_: True) -> Callable[[str], Any]:
     """Return how whole numbers are read: those in the groups of a pattern, or the single one."""
 
     def parse_whole(text: str) -> int | tuple[int, ...]:

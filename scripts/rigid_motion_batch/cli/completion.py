@@ -59,7 +59,7 @@ class _Shown(Exception):
 def parser_of_module(module: str) -> argparse.ArgumentParser | None:
     """Return the parser of a command, which makes it to show its help; None where it cannot be made here."""
 
-    def show(parser: argparse.ArgumentParser, file: object = None) -> None:
+    def show(parser: argparse.ArgumentParser, file: object = None) -> None:  # noqa: ARG001 - as that of argparse
         raise _Shown(parser)
 
     parsers: Any = argparse.ArgumentParser

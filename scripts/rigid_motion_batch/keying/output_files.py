@@ -20,7 +20,7 @@ class Unreadable(FileProblem):
 def changed_at(path: Path) -> int | None:
     """Return when a file was changed last, in nanoseconds; None where there is none."""
     try:
-        return os.stat(path).st_mtime_ns
+        return path.stat().st_mtime_ns
     except OSError:
         return None
 

@@ -118,7 +118,7 @@ def _is_among(path: Path, name: str, lines: Iterable[Mapping[str, Any]]) -> bool
 def _lines_of(file: Path) -> Sequence[dict[str, Any]]:
     """Return the lines of a record, read anew when it has grown."""
     try:
-        return _read(file, os.stat(file).st_size)
+        return _read(file, file.stat().st_size)
     except OSError:
         return ()
 

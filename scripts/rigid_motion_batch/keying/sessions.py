@@ -291,7 +291,7 @@ class _Session:
         self._at_work[place] = key
         self._show(stage)
         stop_if_asked()
-        self._futures[self._executor.submit(order, lambda share, doing: None)] = place, order
+        self._futures[self._executor.submit(order, lambda *_: None)] = place, order
 
     def _end(self, place: int, answer: Answer) -> None:
         """Take what came of an input."""
@@ -319,7 +319,7 @@ def _inputs(job: Job) -> tuple[steps.Input, ...]:
     try:
         if job.in_place or not job.file.is_file():
             return ()
-        result = os.stat(job.file)
+        result = job.file.stat()
         return (steps.Input(os.fspath(job.file), steps.sha256_of(job.file), result.st_size, result.st_mtime_ns),)
     except (OSError, ValueError):
         return ()

@@ -52,7 +52,7 @@ class Job:
         folder: Path,
         before: Sequence[Path | None] = (),
         inputs: Sequence[Path] = (),
-        tell: Callable[[float, str], object] = lambda share, doing: None,
+        tell: Callable[[float, str], object] = lambda *_: None,
     ) -> None:
         self.folder, self.before, self.inputs = folder, tuple(before), tuple(inputs)
         self.notes: list[str] = []
@@ -248,7 +248,7 @@ def version_here() -> str:
 
 
 def sha256_of(path: Path | str) -> str:
-    with open(path, "rb") as stream:
+    with open(path, "rb") as stream:  # noqa: PTH123 - a path may be text as it was given, "/" at its end and all
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 

@@ -159,7 +159,7 @@ class Store:
         """
         shown = os.fspath(path)
         try:
-            result, link = os.stat(path), os.lstat(path)
+            result, link = os.stat(path), os.lstat(path)  # noqa: PTH116 - it may be text, and "" no folder
         except (OSError, ValueError):
             return Input(shown, "")
         place = os.path.abspath(path)
@@ -221,14 +221,14 @@ class Store:
         (made / INDEX).write_text(json.dumps(content), encoding="utf-8")
         target = self._results / key
         try:
-            os.rename(made, target)
+            made.rename(target)
         except OSError:
             if self.result(key):  # Another worker was quicker.
                 shutil.rmtree(made, ignore_errors=True)
             else:
                 self.discard(key)
                 self._results.mkdir(exist_ok=True)  # A worker that made nothing may have taken it away.
-                os.rename(made, target)
+                made.rename(target)
         return Result(target, content)
 
     def discard(self, key: str) -> None:
@@ -237,7 +237,7 @@ class Store:
         if not os.path.lexists(place):
             return
         with suppress(FileNotFoundError):
-            os.rename(place, away)
+            place.rename(away)
         shutil.rmtree(away, ignore_errors=True)
         with suppress(OSError):
             away.unlink()
@@ -313,7 +313,7 @@ class Store:
             except OSError:  # This file system has no links.
                 shutil.copy2(original, beside)
             try:
-                os.replace(beside, target)
+                beside.replace(target)
             except OSError as error:
                 beside.unlink(missing_ok=True)
                 raise OSError(error.errno, error.strerror, os.fspath(target)) from None

@@ -53,7 +53,7 @@ def _without_images() -> Iterator[None]:
     import bpy
     from bpy_extras import image_utils
 
-    def empty_image(imagepath: str, *_: object, **__: object) -> bpy.types.Image:
+    def empty_image(imagepath: str, *_: object, **__: object) -> bpy.types.Image:  # noqa: ARG001 - as Blender's own
         return bpy.data.images.new("Image", 1, 1)
 
     load_image = image_utils.load_image

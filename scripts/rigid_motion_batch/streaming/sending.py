@@ -134,7 +134,7 @@ def play(
     poses: Poses,
     delay: float,
     stopped: Sequence[int],
-    reach: Callable[[float], None] = lambda done: None,
+    reach: Callable[[float], None] = lambda _: None,
 ) -> float:
     """Send samples (n,) of poses (joints, n) when they are due, and return the seconds that were sent."""
     began = time.monotonic() - float(moments[0])

@@ -75,7 +75,7 @@ def play(
     clip: Clip,
     to: Address,
     stopped: Sequence[int] = (),
-    reach: Callable[[float], None] = lambda done: None,
+    reach: Callable[[float], None] = lambda _: None,
 ) -> int:
     """Play a recording in real time, and return how many datagrams were sent.
 

@@ -8,7 +8,8 @@ import pytest
 
 from rigid_motion.animation import bake, problem_of, set_mode
 from tests.animation.bones.rigs import key_all, new_rig
-from tests.animation.oracle import curves_of, shown_worlds, snapshot
+from tests.animation.keyed import curves_of, snapshot
+from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import key, new_object
 
 FRAMES = np.arange(1.0, 41.0)

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import Refused, bake, problem_of, refresh, set_mode
-from tests.animation.oracle import assert_shown, curves_of, expected_bases, shown_worlds, snapshot
+from tests.animation.keyed import curves_of, snapshot
+from tests.animation.oracle import assert_shown, expected_bases, shown_worlds
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object
 
 PLAYED = np.arange(-2.0, 44.0)

@@ -17,7 +17,8 @@ from collections.abc import Iterable, Sequence
 import bpy
 import numpy as np
 
-from tests.animation.oracle import expected_bases, key_frames, shortest_quaternion, shown_worlds
+from tests.animation.keyed import key_frames
+from tests.animation.oracle import expected_bases, shortest_quaternion, shown_worlds
 
 TOLERANCE = 1e-5
 

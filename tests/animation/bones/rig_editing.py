@@ -13,16 +13,10 @@ from rigid_motion import animation
 from tests.animation.bones.poses import shown_poses
 from tests.animation.bones.rigs import CONSTRAINT, Rest
 from tests.animation.edit_steps import TakenAway
-from tests.animation.editing import Editing, goes_on
-from tests.animation.oracle import (
-    WIDTHS,
-    curves_of,
-    expected_bases,
-    key_frames,
-    mode_at,
-    shortest_quaternion,
-    transform_paths,
-)
+from tests.animation.editing import Editing
+from tests.animation.keyed import WIDTHS, curves_of, key_frames, mode_at, transform_paths
+from tests.animation.machine import goes_on
+from tests.animation.oracle import expected_bases, shortest_quaternion
 
 BONES = (
     Rest("Body", (0.1, -0.2, 0.9), (0.15, -0.1, 1.4), roll=0.4),

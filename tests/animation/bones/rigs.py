@@ -12,7 +12,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rigid_motion.animation import set_mode, write_channel
-from tests.animation.oracle import WIDTHS, expected_bases, rotation_path
+from tests.animation.keyed import WIDTHS, rotation_path
+from tests.animation.oracle import expected_bases
 from tests.thoroughness import THOROUGH
 
 FRAMES = (1.0, 11.0, 24.0, 40.0)

@@ -11,7 +11,7 @@ import pytest
 from rigid_motion.animation import problem_of, set_mode, write_channel
 from tests.animation.bones.poses import assert_same_poses, shown_poses
 from tests.animation.bones.rigs import FRAMES, ORDERS, PLAYED, in_turn, key_all, key_desired, new_rig, twin_of
-from tests.animation.oracle import curves_of
+from tests.animation.keyed import curves_of
 from tests.animation.scenes import key, new_object
 
 Constrain = Callable[[bpy.types.Object, bpy.types.Object], None]

@@ -11,7 +11,7 @@ from rigid_motion.animation import refresh, set_mode
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import expected_poses, shown_poses
 from tests.animation.bones.rigs import ORDERS, Rest, in_turn, key_all, moving_rig, new_rig, write_bone
-from tests.animation.oracle import curves_of, rotation_path
+from tests.animation.keyed import curves_of, rotation_path
 from tests.animation.scenes import push_down
 
 PROMISE = 1e-4

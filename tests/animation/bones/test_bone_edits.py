@@ -21,7 +21,7 @@ from tests.animation.bones.rigs import (
     with_edit_bones,
     write_bone,
 )
-from tests.animation.oracle import curves_of, snapshot
+from tests.animation.keyed import curves_of, snapshot
 
 Edit = Callable[[bpy.types.Object], None]
 

@@ -16,7 +16,7 @@ from rigid_motion.animation import bake, reduce_keys_of, refresh, set_mode
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
 from tests.animation.bones.rigs import ARM, FRAMES, PLAYED, Rest, key_all, key_desired, new_rig, wanted_bases
-from tests.animation.oracle import snapshot
+from tests.animation.keyed import snapshot
 from tests.animation.scenes import enabled, push_down
 
 EXPORTED = np.arange(FRAMES[0], FRAMES[-1] + 1.0)

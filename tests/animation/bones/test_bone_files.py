@@ -11,17 +11,9 @@ import pytest
 from rigid_motion.animation import bake, is_baked, modes_of, problem_of, refresh, set_mode, unbake
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import assert_posed, assert_same_poses, expected_poses, names_of
-from tests.animation.bones.rigs import (
-    FRAMES,
-    INHERIT_SCALES,
-    ORDERS,
-    PLAYED,
-    key_all,
-    moving_rig,
-    new_rig,
-)
+from tests.animation.bones.rigs import FRAMES, INHERIT_SCALES, ORDERS, PLAYED, key_all, moving_rig, new_rig
 from tests.animation.farm import on_a_farm
-from tests.animation.oracle import curves_of, snapshot
+from tests.animation.keyed import curves_of, snapshot
 from tests.thoroughness import sample
 
 PLAY_BONES = """

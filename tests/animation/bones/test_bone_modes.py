@@ -24,13 +24,8 @@ from tests.animation.bones.rigs import (
     wanted_bases,
     with_edit_bones,
 )
-from tests.animation.oracle import (
-    assert_shown,
-    curves_of,
-    key_frames,
-    shown_worlds,
-    snapshot,
-)
+from tests.animation.keyed import curves_of, key_frames, snapshot
+from tests.animation.oracle import assert_shown, shown_worlds
 from tests.animation.scenes import key, new_object
 from tests.thoroughness import sample
 

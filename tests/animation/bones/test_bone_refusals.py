@@ -12,7 +12,7 @@ import pytest
 from rigid_motion.animation import Refused, bake, problem_of, refresh, set_mode
 from tests.animation.bones.poses import assert_posed, shown_poses
 from tests.animation.bones.rigs import PLAYED, key_all, moving_rig, new_rig
-from tests.animation.oracle import curves_of, snapshot
+from tests.animation.keyed import curves_of, snapshot
 
 Hinder = Callable[[bpy.types.PoseBone], None]
 

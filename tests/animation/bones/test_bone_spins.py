@@ -13,7 +13,7 @@ from rigid_motion.animation import set_mode, set_turns
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import assert_posed, shown_poses
 from tests.animation.bones.rigs import FRAMES, PLAYED, in_turn, key_all, moving_rig, new_rig, write_bone
-from tests.animation.oracle import curve_of
+from tests.animation.keyed import curve_of
 
 MODES = tuple(KEYFRAME_MODES)
 

@@ -13,16 +13,9 @@ import pytest
 
 from rigid_motion.animation import refresh, set_mode
 from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
-from tests.animation.bones.rigs import (
-    ORDERS,
-    in_turn,
-    key_all,
-    key_desired,
-    moving_rig,
-    new_rig,
-    twin_of,
-)
-from tests.animation.oracle import curves_of, expected_bases
+from tests.animation.bones.rigs import ORDERS, in_turn, key_all, key_desired, moving_rig, new_rig, twin_of
+from tests.animation.keyed import curves_of
+from tests.animation.oracle import expected_bases
 from tests.animation.scenes import new_strip, push_down
 
 KEYS = (1.0, 11.0, 21.0, 41.0)

@@ -8,16 +8,8 @@ import pytest
 
 from rigid_motion.animation import problem_of, set_mode
 from tests.animation.bones.poses import assert_posed
-from tests.animation.bones.rigs import (
-    ARM,
-    PLAYED,
-    key_bone,
-    moving_rig,
-    new_rig,
-    own_constraints,
-    write_bone,
-)
-from tests.animation.oracle import curves_of
+from tests.animation.bones.rigs import ARM, PLAYED, key_bone, moving_rig, new_rig, own_constraints, write_bone
+from tests.animation.keyed import curves_of
 from tests.animation.scenes import new_object, push_down
 
 

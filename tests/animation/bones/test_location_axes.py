@@ -13,7 +13,7 @@ from mathutils import Euler, Matrix, Vector
 from rigid_motion import animation
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.rigs import in_turn, with_edit_bones
-from tests.animation.oracle import curves_of
+from tests.animation.keyed import curves_of
 from tests.rigs import scenes
 
 POSES = (

@@ -13,7 +13,7 @@ from rigid_motion.animation.transforms import transform_of
 from rigid_motion.animation.transforms.posing import Hierarchy
 from rigid_motion.motion.affine import AffineMaps
 from tests.animation.bones.random_rigs import LAST, RIGS, RigCase, build
-from tests.animation.oracle import curves_of
+from tests.animation.keyed import curves_of
 from tests.blank import blank
 from tests.thoroughness import tried
 

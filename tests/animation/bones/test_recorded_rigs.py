@@ -16,7 +16,7 @@ from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
 from tests.animation.bones.rigs import in_turn
 from tests.animation.bones.test_rig_reducing import largest, matrices
-from tests.animation.oracle import curves_of
+from tests.animation.keyed import curves_of
 from tests.animation.scenes import enabled
 from tests.recordings import RECORDINGS
 from tests.thoroughness import sample, tried

@@ -23,7 +23,7 @@ from tests.animation.bones.rigs import (
     select_only,
     with_edit_bones,
 )
-from tests.animation.oracle import curves_of
+from tests.animation.keyed import curves_of
 from tests.animation.scenes import push_down
 
 Edit = Callable[[bpy.types.Object], None]

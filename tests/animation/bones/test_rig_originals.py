@@ -23,7 +23,8 @@ from tests.animation.bones.poses import assert_posed, assert_same_poses, shown_p
 from tests.animation.bones.rigs import ARM, PLAYED, Rest, key_all, key_bone, moving_rig, new_rig, select_only
 from tests.animation.bones.test_rig_edits import RENAMINGS, assert_nothing_stale
 from tests.animation.bones.test_slots_of_rigs import separate_slots_of
-from tests.animation.oracle import curves_of, shown_worlds, snapshot
+from tests.animation.keyed import curves_of, snapshot
+from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import editor, key, new_object, new_strip, push_down
 
 Change = tuple[bpy.types.Object, Callable[[], None]]

@@ -20,7 +20,7 @@ from rigid_motion.animation import (
 )
 from rigid_motion.ui.wording import reduction_summary
 from tests.animation.bones.rigs import in_turn
-from tests.animation.oracle import curves_of
+from tests.animation.keyed import curves_of
 from tests.animation.scenes import new_object
 from tests.balls import largest_displacements
 from tests.rigs.recorded import FRAMES, NAMES, recorded_rig

@@ -12,20 +12,11 @@ import pytest
 from rigid_motion import animation
 from rigid_motion.animation import constraint_trouble, modes_of, refresh, set_enabled, set_mode
 from tests.animation.bones.poses import assert_posed, assert_same_poses, expected_poses
-from tests.animation.bones.rigs import (
-    FRAMES,
-    PLAYED,
-    Rest,
-    key_all,
-    moving_rig,
-    new_rig,
-    own_constraints,
-    select_only,
-)
+from tests.animation.bones.rigs import FRAMES, PLAYED, Rest, key_all, moving_rig, new_rig, own_constraints, select_only
 from tests.animation.bones.test_bone_files import SAVE_AS, posed_on_a_farm, reopened, save
 from tests.animation.bones.test_rig_edits import assert_nothing_stale
 from tests.animation.farm import on_a_farm
-from tests.animation.oracle import curves_of
+from tests.animation.keyed import curves_of
 
 HANDS = (
     Rest("Body", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),

@@ -9,11 +9,12 @@ import pytest
 from rigid_motion.animation import modes_of, refresh, set_mode
 from rigid_motion.animation.actions.records import recorded_mode
 from rigid_motion.animation.actions.slots import places_of
-from rigid_motion.animation.compute.sources import MODE_NAMES
+from rigid_motion.animation.compute.modes import MODE_NAMES
 from rigid_motion.animation.transforms import transform_of
 from tests.animation.bones.poses import assert_posed
 from tests.animation.bones.rigs import ARM, FRAMES, PLAYED, Rest, key_all, moving_rig, new_rig, own_constraints
-from tests.animation.oracle import assert_shown, curves_of
+from tests.animation.keyed import curves_of
+from tests.animation.oracle import assert_shown
 from tests.animation.scenes import key, new_object
 
 SIDES = (

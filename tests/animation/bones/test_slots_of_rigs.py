@@ -10,7 +10,8 @@ from rigid_motion.animation import modes_of, refresh, set_enabled, set_mode
 from tests.animation.bones.poses import assert_posed, assert_same_poses, shown_poses
 from tests.animation.bones.rigs import FRAMES, PLAYED, key_all, moving_rig, new_rig, own_constraints, select_only
 from tests.animation.bones.test_rig_edits import assert_nothing_stale
-from tests.animation.oracle import assert_shown, curves_of, snapshot
+from tests.animation.keyed import curves_of, snapshot
+from tests.animation.oracle import assert_shown
 from tests.animation.scenes import editor, key, new_object, new_strip
 
 

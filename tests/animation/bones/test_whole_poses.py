@@ -12,7 +12,7 @@ from mathutils import Matrix
 
 from rigid_motion.animation import key_frames, set_mode
 from tests.animation.bones.rigs import key_all, new_rig, pose_mode
-from tests.animation.oracle import curves_of, rotation_path
+from tests.animation.keyed import curves_of, rotation_path
 
 BETWEEN = 15
 ORDERS = ("QUATERNION", "XYZ")

@@ -12,7 +12,8 @@ from rigid_motion.animation.actions.slots import slot_transforms_of
 from rigid_motion.animation.compute.differences import in_betweens
 from rigid_motion.animation.transforms import transform_of
 from tests.animation.bones.rigs import in_turn
-from tests.animation.oracle import curves_of, matrices, shown_worlds
+from tests.animation.keyed import curves_of
+from tests.animation.oracle import matrices, shown_worlds
 from tests.animation.scenes import new_object
 
 INTERPOLATIONS = [item.identifier for item in bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items]

@@ -12,7 +12,8 @@ from rigid_motion.animation import set_mode
 from rigid_motion.animation.compute.source_cache import cache_source, changed_range
 from rigid_motion.animation.queries.keyed import source_of
 from rigid_motion.animation.writers import filling
-from tests.animation.oracle import WIDTHS, assert_shown, curves_of
+from tests.animation.keyed import WIDTHS, curves_of
+from tests.animation.oracle import assert_shown
 from tests.animation.scenes import key, new_object
 
 KEYS = (1.0, 20.0, 41.0, 60.0, 81.0, 100.0)

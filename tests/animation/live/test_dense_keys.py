@@ -6,7 +6,8 @@ import bpy
 import pytest
 
 from rigid_motion.animation import key_frames, set_mode
-from tests.animation.oracle import curves_of, shown_worlds
+from tests.animation.keyed import curves_of
+from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import editor, key, new_object
 
 FRAMES = range(1, 41)

@@ -14,7 +14,7 @@ from rigid_motion.animation.live import between_frames, follower
 from rigid_motion.animation.writers import drafts
 from tests.animation.bones.rigs import moving_rig
 from tests.animation.bones.test_between_frames import EIGHTHS, PROMISE, largest_error
-from tests.animation.oracle import curves_of
+from tests.animation.keyed import curves_of
 from tests.animation.scenes import push_down
 
 WHOLE = np.arange(1.0, 41.0)

@@ -11,7 +11,8 @@ from mathutils import Euler, Matrix
 
 from rigid_motion.animation import key_frames, set_mode, write_channel
 from rigid_motion.animation.compute.source_cache import MOST_BYTES, known, size_of
-from tests.animation.oracle import curves_of, expected_bases, rotation_path
+from tests.animation.keyed import curves_of, rotation_path
+from tests.animation.oracle import expected_bases
 from tests.animation.scenes import key, new_object, push_down, random_values, tweak
 
 

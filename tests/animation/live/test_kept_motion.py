@@ -14,7 +14,8 @@ from rigid_motion.animation.actions.slots import slot_transforms_of
 from rigid_motion.animation.compute.differences import in_betweens
 from rigid_motion.animation.transforms import transform_of
 from tests.animation.bones.rigs import in_turn, new_rig
-from tests.animation.oracle import MODE_IDS, curves_of, matrices, shown_worlds, snapshot
+from tests.animation.keyed import MODE_IDS, curves_of, snapshot
+from tests.animation.oracle import matrices, shown_worlds
 from tests.animation.scenes import new_object, push_down, tweak
 
 FRAMES = (1.0, 17.0, 25.0, 49.0, 60.0)

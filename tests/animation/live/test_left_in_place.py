@@ -13,7 +13,7 @@ from rigid_motion import animation
 from rigid_motion.animation import set_exact, set_mode
 from tests.animation.bones.rig_editing import own_constraints
 from tests.animation.bones.rigs import in_turn, key_all, new_rig, pose_mode, select_only
-from tests.animation.oracle import curves_of
+from tests.animation.keyed import curves_of
 from tests.animation.scenes import editor, give_own_deltas, key, new_object, own_deltas
 
 BETWEEN = 15

@@ -13,39 +13,27 @@ from mathutils import Euler, Matrix
 
 from rigid_motion import animation
 from tests.animation.edit_steps import TakenAway
-from tests.animation.editing import LAST, ORDERS, frames_in, goes_on, seeds, shares
+from tests.animation.editing import LAST, ORDERS, frames_in, seeds, shares
+from tests.animation.keyed import MODE_IDS, WIDTHS, curves_of, key_frames, mode_at, snapshot, transform_paths
+from tests.animation.live.exchanging import Exchanging
+from tests.animation.machine import goes_on
 from tests.animation.oracle import (
-    MODE_IDS,
-    WIDTHS,
     Own,
     as_quaternion,
     assert_shown,
-    curves_of,
     expected_bases,
     expected_off_whole_frames,
     expected_worlds,
-    key_frames,
-    mode_at,
     shortest_quaternion,
     shown_worlds,
-    snapshot,
-    transform_paths,
     unit,
 )
 from tests.animation.scenes import give_own_deltas, key, new_object, own_deltas, random_values
-from tests.animation.tool_steps import WithTools
 from tests.thoroughness import THOROUGH
 
 
-class EditingObjects(TakenAway, WithTools):
+class EditingObjects(TakenAway, Exchanging):
     """An animator at work on a few objects, by their names."""
-
-    KEPT = (*WithTools.KEPT, "turned")
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.turned: dict[str, tuple] = {}
-        """The delta rotations of their own, as quaternions and Euler angles."""
 
     @initialize(
         orders=st.lists(st.sampled_from(ORDERS), min_size=1, max_size=3),
@@ -83,9 +71,6 @@ class EditingObjects(TakenAway, WithTools):
         # Blender itself bakes the delta transforms of Euler angles wrongly.
         is_turned = np.abs(np.abs(self.owns[name].quaternion) - (1.0, 0.0, 0.0, 0.0)).max() > 1e-6
         return self._found(name).rotation_mode == "QUATERNION" or not is_turned
-
-    def _object(self, share: float) -> bpy.types.Object:
-        return self._found(self._named(share))
 
     def _basis(self, obj: bpy.types.Object) -> np.ndarray:
         depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -178,137 +163,6 @@ class EditingObjects(TakenAway, WithTools):
         assert len(key_frames(bpy.data.objects[name])) < before
         self._edit(lambda: animation.restore_keys(bpy.data.objects[name]))
         assert snapshot(bpy.data.objects[name]) == keyed
-
-    # Actions that go and come
-
-    def _sharing(self, name: str) -> set[str]:
-        """The objects that move by the same slot as this one, itself among them."""
-        data = bpy.data.objects[name].animation_data
-        if data is None or data.action is None:
-            return {name}
-        return {
-            other
-            for other in self.names
-            if (theirs := bpy.data.objects[other].animation_data) is not None
-            and (theirs.action, theirs.action_slot_handle) == (data.action, data.action_slot_handle)
-        }
-
-    def _is_free(self, name: str) -> bool:
-        """Whether its Action may be exchanged without losing a bake's way back, or leaving others behind."""
-        return name not in self.before_bake and self._sharing(name) == {name}
-
-    @precondition(lambda self: self.on)
-    @rule(who=shares, updated=st.booleans(), there=frames_in)
-    def unlink_the_action_and_choose_it_again(self, who, updated, there):
-        obj = self._object(who)
-        if not self._is_free(obj.name):
-            return
-        action, slot = self._linked(obj)
-        self._link(obj, None, None)
-        if updated:
-            bpy.context.view_layer.update()
-            assert not any(obj.rigid_motion.filled)
-            assert np.abs(np.subtract(obj.delta_location, self.owns[obj.name].location)).max() < 1e-6
-            bpy.context.scene.frame_set(int(there + self.shift))
-        self._link(obj, action, slot)
-        bpy.context.view_layer.update()
-
-    @precondition(lambda self: self.on and len(self.names) > 1)
-    @rule(who=shares, other=shares)
-    def swap_the_actions_of_two(self, who, other):
-        names = [self._object(share).name for share in (who, other)]
-        alike = len({bpy.data.objects[name].rotation_mode for name in names}) == 1
-        if names[0] == names[1] or not alike or not all(map(self._is_free, names)):
-            return
-
-        def swap() -> None:
-            first, second = (bpy.data.objects[name] for name in names)
-            of_first, of_second = self._linked(first), self._linked(second)
-            self._link(first, *of_second)
-            self._link(second, *of_first)
-
-        self._edit(swap)
-
-    @precondition(lambda self: self.on and len(self.names) > 1)
-    @rule(who=shares, other=shares)
-    def share_an_action_or_make_it_single_user(self, who, other):
-        name, source = (self._object(share).name for share in (who, other))
-        if len(self._sharing(name)) > 1:
-
-            def change() -> None:
-                obj = bpy.data.objects[name]
-                slot = obj.animation_data.action_slot.identifier
-                self._link(obj, obj.animation_data.action.copy(), None)
-                obj.animation_data.action_slot = obj.animation_data.action.slots[slot]
-
-        else:
-            alike = (
-                bpy.data.objects[name].rotation_mode == bpy.data.objects[source].rotation_mode
-                and self.owns[name] == self.owns[source]
-                and self._rests_alike(name, source)
-            )
-            if not alike or name in self.before_bake or source in self.before_bake:
-                return
-
-            def change() -> None:
-                self._link(bpy.data.objects[name], *self._linked(bpy.data.objects[source]))
-
-        self._edit(change)
-
-    def _rests_alike(self, name: str, source: str) -> bool:
-        """Whether two objects have the same where the source's Action keys nothing."""
-        obj, other = bpy.data.objects[name], bpy.data.objects[source]
-        keyed = {channel for channel, fcurve in curves_of(other).items() if len(fcurve.keyframe_points)}
-        return all(
-            (path, index) in keyed or getattr(obj, path)[index] == value
-            for path in transform_paths(other)[1:]
-            for index, value in enumerate(getattr(other, path))
-        )
-
-    @precondition(lambda self: self.on and len(self.names) < 4)
-    @rule(who=shares, copied=st.booleans(), seed=seeds)
-    def reuse_an_action_on_a_fresh_object(self, who, copied, seed):
-        source = self._object(who)
-        if source.name in self.before_bake or source.animation_data is None or source.animation_data.action is None:
-            return
-        name, self.fresh = f"Fresh {self.fresh}", self.fresh + 1
-        self.owns[name], self.turned[name] = Own(), ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-        if self.owns[source.name] != Own() and not copied:
-            return
-        self.names.append(name)
-
-        def make() -> None:
-            obj = new_object(name, source.rotation_mode)
-            for path in transform_paths(source):
-                setattr(obj, path, getattr(source, path))
-            action, slot = self._linked(source)
-            if copied:
-                identifier = slot.identifier
-                action = action.copy()
-                slot = action.slots[identifier]
-            self._link(obj, action, slot)
-
-        self._edit(make)
-
-    @precondition(lambda self: self.on)
-    @rule(who=shares, start=st.integers(-10, 60))
-    def push_down_and_delete_the_strip(self, who, start):
-        obj = self._object(who)
-        action, slot = self._linked(obj)
-        if action is None or not self._is_free(obj.name):
-            return
-        self._link(obj, None, None)
-        track = obj.animation_data.nla_tracks.new()
-        strip = track.strips.new("Strip", start, action)
-        strip.action_slot = slot
-        bpy.context.view_layer.update()
-        bpy.context.scene.frame_set(start + 5)
-        obj.animation_data.nla_tracks.remove(track)
-        bpy.context.view_layer.update()
-        assert not any(obj.rigid_motion.filled)
-        assert np.abs(np.subtract(obj.delta_location, self.owns[obj.name].location)).max() < 1e-6
-        self._link(obj, action, slot)
-        bpy.context.view_layer.update()
 
     @precondition(lambda self: self.on)
     @rule(who=shares, order=st.sampled_from(ORDERS), rekeyed=st.booleans(), seed=seeds)

@@ -11,7 +11,7 @@ import pytest
 
 from rigid_motion.animation.live import raw_keys
 from rigid_motion.animation.live.raw_keys import key_reader
-from tests.animation.oracle import curves_of
+from tests.animation.keyed import curves_of
 from tests.animation.scenes import key, new_object
 
 WARNING = "not in memory as expected"

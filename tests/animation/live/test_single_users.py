@@ -8,7 +8,8 @@ import pytest
 
 from rigid_motion.animation import set_mode
 from tests.animation.bones.rigs import key_all, new_rig, select_only
-from tests.animation.oracle import curves_of, expected_bases
+from tests.animation.keyed import curves_of
+from tests.animation.oracle import expected_bases
 from tests.animation.scenes import FRAMES, key, new_object
 
 BETWEEN = 15

@@ -14,7 +14,7 @@ from rigid_motion.animation.live import raw_keys
 from rigid_motion.animation.live.follower import follower
 from rigid_motion.animation.live.snapshots import Snapshots
 from tests.animation.bones.rigs import key_all, new_rig
-from tests.animation.oracle import curves_of
+from tests.animation.keyed import curves_of
 
 EVERYTHING = {"", "Body", "Upper", "Lower", "Hand"}
 

@@ -14,7 +14,8 @@ from rigid_motion.animation import set_mode, set_turns, write_channel
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion.motion.eulers import ORDERS
 from tests.animation.bones.rigs import in_turn
-from tests.animation.oracle import assert_shown, curve_of, rotation_path, shown_worlds
+from tests.animation.keyed import curve_of, rotation_path
+from tests.animation.oracle import assert_shown, shown_worlds
 from tests.animation.scenes import give_own_deltas, new_object
 
 FRAMES = (1.0, 13.0, 25.0, 37.0, 49.0, 61.0, 73.0)

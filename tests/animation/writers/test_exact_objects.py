@@ -9,7 +9,8 @@ import pytest
 from rigid_motion.animation import error_between_frames, refresh, set_exact, set_mode
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.rigs import ORDERS, in_turn
-from tests.animation.oracle import Own, curves_of, expected_worlds, shown_worlds
+from tests.animation.keyed import curves_of
+from tests.animation.oracle import Own, expected_worlds, shown_worlds
 from tests.animation.scenes import give_own_deltas, key, new_object, own_deltas, push_down
 
 PROMISE = 1e-4

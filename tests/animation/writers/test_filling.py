@@ -6,7 +6,7 @@ import bpy
 import pytest
 
 from rigid_motion.animation import problem_of, refresh, set_mode
-from tests.animation.oracle import curves_of, snapshot
+from tests.animation.keyed import curves_of, snapshot
 from tests.animation.scenes import key, new_object
 
 

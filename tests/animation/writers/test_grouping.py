@@ -11,7 +11,8 @@ import pytest
 from rigid_motion.animation import problem_of, refresh, set_mode
 from tests.animation.bones.poses import assert_posed
 from tests.animation.bones.rigs import Rest, key_all, moving_rig, new_rig
-from tests.animation.oracle import assert_shown, curves_of
+from tests.animation.keyed import curves_of
+from tests.animation.oracle import assert_shown
 from tests.animation.scenes import give_own_deltas, key, new_object, own_deltas
 
 PLAYED = np.arange(-3.0, 46.0)

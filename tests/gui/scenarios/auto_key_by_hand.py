@@ -8,7 +8,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from tests.animation.oracle import assert_shown, curves_of, key_frames
+from tests.animation.keyed import curves_of, key_frames
+from tests.animation.oracle import assert_shown
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 from tests.gui.scenarios.edits_by_hand import ALIKE, FRAMES, SCREW, WHOLE, assert_on_the_screw, cube, key_the_cube

@@ -12,7 +12,8 @@ from contextlib import contextmanager
 import bpy
 import numpy as np
 
-from tests.animation.oracle import curves_of, expected_bases
+from tests.animation.keyed import curves_of
+from tests.animation.oracle import expected_bases
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 

@@ -6,7 +6,8 @@ import bpy
 import numpy as np
 
 from rigid_motion.motion import Poses, interpolate
-from tests.animation.oracle import as_quaternion, snapshot
+from tests.animation.keyed import snapshot
+from tests.animation.oracle import as_quaternion
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 from tests.gui.scenarios.bones_by_hand import ALIKE, SCREW, hand_bone, key_frames, now, pose_the_rig, rig

@@ -10,7 +10,8 @@ import math
 import bpy
 import numpy as np
 
-from tests.animation.oracle import assert_shown, curves_of, expected_worlds, key_frames, shown_worlds, snapshot
+from tests.animation.keyed import curves_of, key_frames, snapshot
+from tests.animation.oracle import assert_shown, expected_worlds, shown_worlds
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 

@@ -7,7 +7,8 @@ import numpy as np
 
 from rigid_motion.animation import key_frames, modes_of
 from rigid_motion.motion import Poses, interpolate_by_segments
-from tests.animation.oracle import curves_of, shown_worlds
+from tests.animation.keyed import curves_of
+from tests.animation.oracle import shown_worlds
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 

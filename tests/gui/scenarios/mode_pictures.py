@@ -13,7 +13,8 @@ import bpy
 import numpy as np
 from mathutils import Euler, Matrix, Quaternion, Vector
 
-from tests.animation.oracle import assert_shown, curves_of, shown_worlds
+from tests.animation.keyed import curves_of
+from tests.animation.oracle import assert_shown, shown_worlds
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 

@@ -9,7 +9,8 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from tests.animation.oracle import assert_shown, curve_of, shown_worlds
+from tests.animation.keyed import curve_of
+from tests.animation.oracle import assert_shown, shown_worlds
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 

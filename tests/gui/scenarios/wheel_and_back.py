@@ -8,7 +8,8 @@ import math
 import bpy
 import numpy as np
 
-from tests.animation.oracle import assert_shown, curve_of, curves_of, shown_worlds, snapshot
+from tests.animation.keyed import curve_of, curves_of, snapshot
+from tests.animation.oracle import assert_shown, shown_worlds
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 from tests.gui.scenarios.exact_between_frames import PROMISED, WORTH_OFFERING, error_of

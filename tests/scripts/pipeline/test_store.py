@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -21,14 +18,8 @@ from rigid_motion_batch.pipeline.store import FolderInUse, OutputError, Store
 from tests.scripts.pipeline import steps
 from tests.scripts.pipeline.plans import contents, joining, run_in, states, task, writing
 from tests.scripts.pipeline.steps import FILE, Nothing, Write
-from tests.thoroughness import THOROUGH
 
 ROOT = Path(__file__).resolve().parents[3]
-
-
-@pytest.fixture
-def output(tmp_path: Path) -> Path:
-    return tmp_path / "out"
 
 
 def whole() -> tuple[Task, Task, Task]:
@@ -311,98 +302,6 @@ def test_two_runs_in_one_folder_are_refused(output: Path) -> None:
 def test_workers_with_a_part_are_not_refused(output: Path) -> None:
     with Store(output):
         assert states(run_in(output, writing("a"), alone=False)) == {"done": 1}
-
-
-KILLED = """
-import os, sys, time
-from pathlib import Path
-from rigid_motion_batch.pipeline.executors import ProcessExecutor
-from tests.scripts.pipeline.plans import joining, run_in, writing
-from tests.scripts.pipeline import steps
-from tests.scripts.pipeline.plans import task
-from tests.scripts.pipeline.steps import Write
-
-if __name__ == "__main__":
-    tasks = [task(str(n), steps.write, Write(str(n), seconds=float(sys.argv[2]))) for n in range(20)]
-    run_in(Path(sys.argv[1]), *tasks, joining("all", *tasks), executor=ProcessExecutor(2))
-"""
-
-MOMENTS = int(os.environ.get("RIGID_MOTION_KILLS", "20" if THOROUGH else "5"))
-
-
-@contextmanager
-def started(folder: Path, output: Path, seconds: float) -> Iterator[subprocess.Popen]:
-    (folder / "killed.py").write_text(KILLED)
-    process = subprocess.Popen([sys.executable, folder / "killed.py", output, str(seconds)])
-    try:
-        yield process
-    finally:
-        process.kill()
-        process.wait()
-
-
-def children(process: int) -> list[int]:
-    result = [path.read_text().split() for path in Path(f"/proc/{process}/task").glob("*/children")]
-    return [int(child) for some in result for child in some]
-
-
-def alive(process: int) -> bool:
-    try:
-        return "State:\tZ" not in Path(f"/proc/{process}/status").read_text()
-    except (ProcessLookupError, FileNotFoundError):
-        return False
-
-
-@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes where Linux shows them")
-def test_a_run_that_was_killed_again_and_again_ends_like_one_that_was_not(output: Path, tmp_path: Path) -> None:
-    expected = {f"{n}.txt": f"{n}" for n in range(20)} | {"all.txt": "".join(f"{n}" for n in range(20))}
-    results = 0
-    for number in range(MOMENTS):
-        with started(tmp_path, output, 0.05) as process:
-            ends = time.monotonic() + 30.0
-            while (
-                len(list(output.glob("*.txt"))) <= min(results, 20)
-                and time.monotonic() < ends
-                and process.poll() is None
-            ):
-                time.sleep(0.01)
-            time.sleep(0.01 * (number % 5))
-            workers = children(process.pid)
-            process.kill()
-            process.wait()
-        result = contents(output)
-        results = len(result)
-        assert result.items() <= expected.items()
-        ends = time.monotonic() + 5.0
-        while any(map(alive, workers)) and time.monotonic() < ends:
-            time.sleep(0.01)
-        assert not any(map(alive, workers))
-    with started(tmp_path, output, 0.05) as process:
-        assert process.wait(60) == 0
-    assert contents(output) == expected
-    assert not (output / OWN / "scratch").exists()
-
-
-@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes where Linux shows them")
-def test_whichever_worker_is_killed_the_files_are_the_same(output: Path, tmp_path: Path) -> None:
-    with started(tmp_path, output, 0.3) as process:
-        killed = 0
-        while process.poll() is None:
-            time.sleep(0.5)
-            workers = [child for child in children(process.pid) if b"spawn_main" in command_of(child)]
-            if workers and killed < 4:
-                os.kill(workers[killed % len(workers)], 9)
-                killed += 1
-        assert process.returncode == 0
-    assert killed
-    assert contents(output)["all.txt"] == "".join(f"{n}" for n in range(20))
-
-
-def command_of(process: int) -> bytes:
-    try:
-        return Path(f"/proc/{process}/cmdline").read_bytes()
-    except OSError:
-        return b""
 
 
 # -- many clips -------------------------------------------------------------------------------------------------------

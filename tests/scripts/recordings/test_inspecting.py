@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def test_a_log_is_described(write) -> None:
     result = inspect(source := write("hand.csv", log()))
     (hand,) = result.contents
     assert (result.source, result.format, result.bodies) == (source, "CSV with named columns", ("hand",))
-    assert result.bytes == os.path.getsize(source)
+    assert result.bytes == Path(source).stat().st_size
     assert (hand.joints, hand.scaled, hand.repairs, hand.warnings) == ((), False, (), ())
     timing, size = hand.timing, hand.size
     assert (timing.samples, timing.recorded, timing.even, timing.gaps) == (300, 300, True, 0)

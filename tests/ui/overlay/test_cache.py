@@ -9,7 +9,7 @@ import pytest
 from rigid_motion.animation import set_mode
 from rigid_motion.ui.overlay import cache
 from rigid_motion.ui.overlay.cache import SPARE, keep_only, notice_selection, path_of
-from tests.animation.oracle import curves_of
+from tests.animation.keyed import curves_of
 from tests.animation.scenes import key, new_object
 
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from ..compute.sources import MODE_NUMBERS
+from ..compute.modes import MODE_NUMBERS
 from ..transforms import Refused
 from .reading import read
 from .records import has_mode, recorded_digest

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from ..compute.sources import MODE_NAMES, MODE_NUMBERS
+from ..compute.modes import MODE_NAMES, MODE_NUMBERS
 from ..transforms import Transform
 from .duplicates import mode_before_move, original_of
 from .records import (

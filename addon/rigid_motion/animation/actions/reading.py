@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ..compute.components import PART_OF, REST
-from ..compute.sources import Source, rows_left_to
+from ..compute.components import PART_OF, REST, rows_left_to
+from ..compute.sources import Source
 from ..curves import Keys
 from ..transforms import Channel, Refused, Transform
 from .influences import influence_of

@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import bpy
 
-from ..compute.sources import MODE_NAMES, MODE_NUMBERS, SCREW_AXIS, UNKNOWN
+from ..compute.modes import MODE_NAMES, MODE_NUMBERS, UNKNOWN
+from ..compute.sources import SCREW_AXIS
 from .slots import Slot, SlotTransform
 
 

@@ -11,7 +11,8 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ..compute.sources import MODE_NAMES, UNKNOWN, Source
+from ..compute.modes import MODE_NAMES, UNKNOWN
+from ..compute.sources import Source
 from ..curves import LARGEST, Keys, TooManyRounds
 from ..transforms import GROUP, LINKED, Channel, Refused, Transform
 from .key_reading import read_steps

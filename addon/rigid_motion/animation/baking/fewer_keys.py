@@ -19,7 +19,8 @@ from ...motion.best_of import least_errors
 from ..actions.slots import SlotTransform
 from ..compute.components import ROWS, SCALE
 from ..compute.differences import in_betweens
-from ..compute.sources import MODE_NUMBERS, SAME_FRAME, Source, distinct
+from ..compute.modes import MODE_NUMBERS
+from ..compute.sources import SAME_FRAME, Source, distinct
 from ..curves import CODE, CONSTANT, LINEAR, Keys
 from ..transforms import Channel, Refused, Transform
 from ..writers.channel_values import channel_values

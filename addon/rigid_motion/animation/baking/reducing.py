@@ -23,7 +23,8 @@ from ...motion.modes import no_such_mode
 from ..actions.channels import replace_keys
 from ..actions.refusals import refuse_drivers, refuse_modified
 from ..actions.slots import SlotTransform, places_of, slots_of, transforms_in
-from ..compute.sources import MODE_NAMES, distinct
+from ..compute.modes import MODE_NAMES
+from ..compute.sources import distinct
 from ..edits.apply import Readings, Target, Targets, apply_edit, readable, transforms_of
 from ..edits.mode_keys import set_whole
 from ..live.segment_keys import set_mode_in

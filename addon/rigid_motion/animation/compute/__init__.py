@@ -1,6 +1,7 @@
 """From what is keyed to the differences between Blender's in-betweens and those of the modes: NumPy alone.
 
 components       the rows of arrays: location, rotation, scale
+modes            the numbers of modes, and their names
 sources          what is keyed, as arrays with a digest
 source_cache     the sources of earlier edits, and what has changed since
 channel_rows     the channels' own values, of many sources at once

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 LOCATION, ROTATION, SCALE = "location", "rotation", "scale"
@@ -13,3 +15,9 @@ PART_OF = tuple(name for name, own in ROWS.items() for _ in range(own.start, own
 
 REST = np.array((0, 0, 0, 1, 0, 0, 0, 1, 1, 1), dtype=np.float64)
 """The components of something that is not moved. Rotations are quaternions where they are not channels."""
+
+
+def rows_left_to(driven: Collection[int]) -> set[int]:
+    """The rows of components that are left to drivers of these: with one of a rotation or a scale go all of it."""
+    parts = {PART_OF[row] for row in driven} - {LOCATION}
+    return {row for row, part in enumerate(PART_OF) if row in driven or part in parts}

@@ -28,10 +28,11 @@ from .components import LOCATION, REST, ROTATION, ROWS, SCALE
 from .ends import Ends, measured_in
 from .influences import blended, undo_blending
 from .key_speeds import MEASURED, corrected
+from .modes import MODE_NAMES, MODE_NUMBERS
 from .neighbours import packed
 from .progress import are_idle, progress_weights
 from .samples import kept_rows, range_of_each
-from .sources import MODE_NAMES, MODE_NUMBERS, Source
+from .sources import Source
 
 AT_ONCE = 131072
 """Samples that are prepared for at once."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,22 +16,8 @@ import numpy as np
 
 from ...motion import KEYFRAME_MODES
 from ..curves import BEZIER, CONSTANT, ELASTIC, LINEAR, Keys, Stepped, cycled, cyclic_times, evaluate, held
-from .components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
-
-MODE_NUMBERS = {"BLENDER": 0, **{name: mode.number for name, mode in KEYFRAME_MODES.items()}}
-"""The modes, and what the mode channel and saved files have for each. 0 is Blender's own in-betweens."""
-
-MODE_IDS = tuple(MODE_NUMBERS)
-"""The names of the modes."""
-
-MODE_NAMES = {number: name for name, number in MODE_NUMBERS.items()}
-"""From the number of a mode to its name."""
-
-DEPENDS_ON_KEYS = [MODE_NUMBERS[name] for name in ("pga_lerp", "cga_lerp", "motor_spline")]
-"""The modes whose path would be another one with a key more on it."""
-
-UNKNOWN = -1
-"""The mode of something from a file that is damaged, or of a later version."""
+from .components import PART_OF, REST, ROTATION, ROWS, SCALE
+from .modes import DEPENDS_ON_KEYS, MODE_NAMES
 
 LAYOUT = b"3"
 """The layout of in-betweens in F-curves. With another number, those of older files are made anew."""
@@ -57,14 +43,6 @@ SAME_FRAME = 0.01
 def distinct(frames: np.ndarray) -> np.ndarray:
     """Return rising frames of keys, those that are one key to Blender once."""
     return frames[np.diff(frames, prepend=-np.inf) > SAME_FRAME]
-
-
-def rows_left_to(driven: Collection[int]) -> set[int]:
-    """Return the rows of components that are left to drivers of these:
-    with one of a rotation or a scale go all of it.
-    """
-    parts = {PART_OF[row] for row in driven} - {LOCATION}
-    return {row for row, part in enumerate(PART_OF) if row in driven or part in parts}
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,8 @@ from ..actions.refusals import refuse_linked
 from ..actions.slots import SlotTransform
 from ..compute.bodies import body_poses
 from ..compute.differences import in_betweens
-from ..compute.sources import DEPENDS_ON_KEYS, MODE_NAMES, MODE_NUMBERS, SAME_FRAME, Source
+from ..compute.modes import DEPENDS_ON_KEYS, MODE_NAMES, MODE_NUMBERS
+from ..compute.sources import SAME_FRAME, Source
 from ..compute.turning import needs_turning
 from ..live import follower
 from ..live.inserted_keys import set_key

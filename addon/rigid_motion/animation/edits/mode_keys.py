@@ -23,7 +23,8 @@ from ..actions.records import record_mode, record_turns_axis
 from ..actions.refusals import MOST_TURNS, refuse_linked, refuse_numbers
 from ..actions.renaming import follow_renamed
 from ..actions.slots import SlotTransform, slot_transforms_of
-from ..compute.sources import MODE_NUMBERS, TURN_AXES
+from ..compute.modes import MODE_NUMBERS
+from ..compute.sources import TURN_AXES
 from ..live import follower
 from ..live.segment_keys import set_mode_in, set_turns_in
 from ..queries.keyed import active_place, frames_in, modes_in

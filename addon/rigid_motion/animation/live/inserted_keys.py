@@ -34,9 +34,9 @@ import numpy as np
 
 from ..actions.modifiers import added_values
 from ..actions.slots import SlotTransform
-from ..compute.components import PART_OF
+from ..compute.components import PART_OF, rows_left_to
 from ..compute.source_cache import cached_source
-from ..compute.sources import SAME_FRAME, Source, rows_left_to, values_of
+from ..compute.sources import SAME_FRAME, Source, values_of
 from ..compute.turning import needs_turning
 from ..queries.visible_pose import shown_components, visible_components
 from ..transforms import Transform

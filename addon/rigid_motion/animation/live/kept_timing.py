@@ -18,7 +18,8 @@ import numpy as np
 
 from ..compute.components import PART_OF, ROTATION
 from ..compute.differences import progress_at
-from ..compute.sources import DEPENDS_ON_KEYS, SAME_FRAME, Source, values_of
+from ..compute.modes import DEPENDS_ON_KEYS
+from ..compute.sources import SAME_FRAME, Source, values_of
 from ..curves.fitting import GOOD, cubics_in_time, fit_together
 from ..curves.solvers import bezier_cubics, solve_cubics
 

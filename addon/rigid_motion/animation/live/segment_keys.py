@@ -15,8 +15,9 @@ from ..actions.records import recorded_digest
 from ..actions.slots import SlotTransform
 from ..compute.components import LOCATION, ROWS
 from ..compute.differences import in_betweens
+from ..compute.modes import MODE_NAMES, MODE_NUMBERS
 from ..compute.source_cache import cached_source
-from ..compute.sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, WHOLE_TURN, Source
+from ..compute.sources import SAME_FRAME, WHOLE_TURN, Source
 from ..compute.turning import Turning, needs_turning, shortest_turns, turning_in
 from ..queries.keyed import frames_in, modes_in, turns_in
 from ..transforms import Channel

@@ -12,7 +12,8 @@ from ..actions.reading import keyed_in, read
 from ..actions.records import recorded_mode
 from ..actions.refusals import refuse_numbers
 from ..actions.slots import SlotTransform, places_of, slot_transforms_of
-from ..compute.sources import MODE_NAMES, SAME_FRAME, UNKNOWN, Source, distinct
+from ..compute.modes import MODE_NAMES, UNKNOWN
+from ..compute.sources import SAME_FRAME, Source, distinct
 from ..transforms import WIDTHS, Refused, Transform, transform_of
 
 

@@ -13,7 +13,8 @@ import numpy as np
 from ..actions.records import recorded_digest
 from ..actions.slots import places_of
 from ..compute.components import PART_OF
-from ..compute.sources import MODE_NAMES, SAME_FRAME, Source
+from ..compute.modes import MODE_NAMES
+from ..compute.sources import SAME_FRAME, Source
 from ..compute.turning import turning_in
 from ..curves import cycled
 from ..transforms import Transform, transform_of

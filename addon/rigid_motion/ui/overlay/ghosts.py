@@ -12,7 +12,8 @@ import bpy
 import numpy as np
 
 from ...animation.baking.channel_maps import shown
-from ...animation.compute.sources import MODE_NUMBERS, Source
+from ...animation.compute.modes import MODE_NUMBERS
+from ...animation.compute.sources import Source
 from ...animation.transforms import Transform
 from ...motion.affine import AffineMaps
 from .parents import Parents

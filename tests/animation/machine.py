@@ -1,0 +1,204 @@
+"""What a machine of edits does around them: undo steps, files, the extension on and off."""
+
+from __future__ import annotations
+
+import logging
+import tempfile
+from collections.abc import Callable, Hashable
+from pathlib import Path
+from typing import ClassVar
+
+import bpy
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
+
+from rigid_motion import animation
+from tests.animation.edit_steps import LAST, Complaints, Edit, shares
+from tests.animation.keyed import WIDTHS, Carrier, curves_of, key_frames, snapshot
+from tests.animation.oracle import Own
+from tests.blank import blank
+
+Name = Hashable
+"""What the carriers of keys are told apart by, in a machine."""
+
+
+def goes_on(obj: Carrier) -> bool:
+    """Whether any of its channels goes on at its slope outside of its keys."""
+    curves = curves_of(obj).items()
+    return any(
+        fcurve.extrapolation == "LINEAR"
+        for (path, _), fcurve in curves
+        if path in WIDTHS and len(fcurve.keyframe_points) and not fcurve.mute
+    )
+
+
+class Machine(RuleBasedStateMachine):
+    """Carriers of keys that are edited. What they are, and how, machines say that are derived from it."""
+
+    KEPT: ClassVar[tuple[str, ...]] = ("names", "owns", "before_bake")
+    """What is remembered with each undo step, beside the keys."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        blank()
+        bpy.utils.register_class(Edit)
+        animation.register()
+        self.on = True
+        self.complaints = Complaints()
+        logging.getLogger("rigid_motion.animation").addHandler(self.complaints)
+        self.folder = tempfile.TemporaryDirectory()
+        self.names: list[Name] = []
+        self.owns: dict[Name, Own] = {}
+        self.shift = 0.0
+        self.fresh = 0
+        self.before_bake: dict[Name, dict] = {}
+        self.history: list[tuple[dict, dict]] = []
+        self.place = -1
+
+    def teardown(self) -> None:
+        if self.on:
+            animation.unregister()
+        bpy.utils.unregister_class(Edit)
+        logging.getLogger("rigid_motion.animation").removeHandler(self.complaints)
+        self.folder.cleanup()
+
+    # What machines say of their carriers
+
+    def _found(self, name: Name) -> Carrier:
+        raise NotImplementedError
+
+    def _basis(self, carrier: Carrier) -> np.ndarray:
+        """How it is shown now, in its parent's space."""
+        raise NotImplementedError
+
+    def _sharing(self, name: Name) -> set[Name]:
+        """The names of what moves by the same channels as this one, itself among them."""
+        raise NotImplementedError
+
+    def _named(self, share: float) -> Name:
+        return self.names[int(share * len(self.names))]
+
+    @staticmethod
+    def _linked(obj: bpy.types.Object) -> tuple:
+        data = obj.animation_data
+        return (None, None) if data is None or data.action is None else (data.action, data.action_slot)
+
+    @staticmethod
+    def _link(obj: bpy.types.Object, action: bpy.types.Action | None, slot: bpy.types.ActionSlot | None) -> None:
+        data = obj.animation_data_create()
+        data.action = action
+        if action is not None:
+            data.action_slot = slot
+
+    # What the machine does with an edit
+
+    def _start_history(self) -> None:
+        bpy.ops.ed.undo_push(message="Begin")
+        self.history = [self._remembered()]
+        self.place = 0
+
+    def _remembered(self) -> tuple[dict, dict]:
+        return self._keyed(), {kept: getattr(self, kept).copy() for kept in self.KEPT}
+
+    def _keyed(self) -> dict[Name, dict]:
+        return {name: snapshot(self._found(name)) for name in self.names}
+
+    def _edit(self, change: Callable[[], None], settle: Callable[[dict, dict], None] | None = None) -> None:
+        """Do it, and let the handlers see it: they leave keys as the edit made them, unless `settle` says otherwise."""
+        made: dict[str, dict] = {}
+
+        def noted() -> None:
+            change()
+            made.update(self._keyed())
+
+        Edit.change = noted
+        bpy.ops.test.edit("EXEC_DEFAULT", True)
+        after = self._keyed()
+        if settle is None:
+            for name in self.names:
+                assert after[name] == made[name], f"the keys of {name} were changed"
+        else:
+            settle(made, after)
+        if self.on:
+            self.history[self.place + 1 :] = [self._remembered()]
+            self.place += 1
+
+    # Undo, redo, un-bake, files, on and off
+
+    @precondition(lambda self: self.on and self.place > 0)
+    @rule(steps=st.integers(1, 3))
+    def undo(self, steps):
+        for _ in range(min(steps, self.place)):
+            assert bpy.ops.ed.undo() == {"FINISHED"}
+            self.place -= 1
+        self._is_as_remembered()
+
+    @precondition(lambda self: self.on and self.place < len(self.history) - 1)
+    @rule(steps=st.integers(1, 3))
+    def redo(self, steps):
+        for _ in range(min(steps, len(self.history) - 1 - self.place)):
+            assert bpy.ops.ed.redo() == {"FINISHED"}
+            self.place += 1
+        self._is_as_remembered()
+
+    def _is_as_remembered(self) -> None:
+        keyed, notes = self.history[self.place]
+        for kept, then in notes.items():
+            setattr(self, kept, then.copy())
+        for name in self.names:
+            assert snapshot(self._found(name)) == keyed[name], f"the keys of {name} are not what they were"
+
+    @precondition(lambda self: self.on and self.before_bake)
+    @rule(who=shares)
+    def unbake(self, who):
+        name = sorted(self.before_bake)[int(who * len(self.before_bake))]
+        keyed = self.before_bake.pop(name)
+
+        def change() -> None:
+            animation.unbake(self._found(name))
+
+        self._edit(change)
+        assert snapshot(self._found(name)) == keyed
+        assert not animation.is_baked(self._found(name))
+
+    @rule()
+    def save_and_reload(self):
+        keyed = self._keyed()
+        path = str(Path(self.folder.name) / "scene.blend")
+        bpy.ops.wm.save_as_mainfile(filepath=path, compress=False)
+        bpy.ops.wm.open_mainfile(filepath=path)
+        assert self._keyed() == keyed
+        self._start_history()
+
+    @precondition(lambda self: self.on)
+    @rule()
+    def switch_the_extension_off(self):
+        animation.unregister()
+        self.on = False
+
+    @precondition(lambda self: not self.on)
+    @rule()
+    def switch_the_extension_on(self):
+        keyed = self._keyed()
+        animation.register()
+        bpy.context.view_layer.update()
+        bpy.context.scene.frame_set(bpy.context.scene.frame_current)
+        self.on = True
+        assert self._keyed() == keyed
+        self._start_history()
+
+    def _frames_that_are_seen(self, objects: list[Carrier]) -> range:
+        """Where curves go on outside of their keys, in-betweens do so from there to the frame range of the scene."""
+        first, last = int(self.shift) - 1, int(self.shift) + LAST + 5
+        for obj in filter(goes_on, objects):
+            keys = key_frames(obj)
+            first = max(first, min(bpy.context.scene.frame_start, int(np.floor(keys[0]))))
+            last = min(last, max(bpy.context.scene.frame_end, int(np.ceil(keys[-1]))))
+        return range(first, last + 1)
+
+    # What holds all the time
+
+    @invariant()
+    def nothing_failed_in_a_handler(self):
+        assert self.complaints.found == []

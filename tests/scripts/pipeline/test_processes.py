@@ -1,0 +1,65 @@
+"""Tasks in processes of their own: how many there are, and what happens when one dies."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from rigid_motion_batch.pipeline.executors import ProcessExecutor
+from rigid_motion_batch.pipeline.running import run
+from rigid_motion_batch.pipeline.store import Store
+from tests.scripts.pipeline import steps
+from tests.scripts.pipeline.plans import Listener, contents, joining, run_in, states, task, writing
+from tests.scripts.pipeline.steps import Die, Write
+
+needs_signals = pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")
+
+
+def test_tasks_are_done_by_as_many_processes_as_there_are_jobs(output: Path) -> None:
+    tasks = [task(name, steps.process_id, Write(name, seconds=0.4)) for name in "abcd"]
+    run_in(output, *tasks, executor=ProcessExecutor(2))
+    workers = set(contents(output).values())
+    assert len(workers) == 2
+    assert str(os.getpid()) not in workers
+
+
+@needs_signals
+def test_a_worker_that_dies_is_replaced_and_its_task_done_again(output: Path, tmp_path: Path) -> None:
+    dying = task("b", steps.die, Die(str(tmp_path / "marker"), 2))
+    listener = Listener()
+    tasks = [writing("a"), dying, joining("c", dying)]
+    assert states(run_in(output, *tasks, executor=ProcessExecutor(2), progress=listener)) == {"done": 3}
+    assert contents(output)["c.txt"] == "whole"
+    said = "b: its process died (SIGKILL, perhaps for want of memory); trying again"
+    assert listener.notes == [said, said]
+
+
+@needs_signals
+def test_a_task_that_kills_every_worker_is_given_up_and_the_others_go_on(output: Path, tmp_path: Path) -> None:
+    tasks = [task("b", steps.die, Die(str(tmp_path / "marker"), 99)), writing("a")]
+    outcome = run_in(output, *tasks, executor=ProcessExecutor(1))
+    assert states(outcome) == {"failed": 1, "done": 1}
+    assert outcome.failures["b"].startswith("b: its process died (SIGKILL, perhaps for want of memory)")
+    assert outcome.failures["b"].endswith("; given up after 3 attempts")
+    assert contents(output) == {"a.txt": "a"}
+
+
+@needs_signals
+def test_the_last_line_that_a_dying_worker_printed_is_said(output: Path, tmp_path: Path) -> None:
+    dying = task("b", steps.die, Die(str(tmp_path / "marker"), 99, "reading\nno such bone: Hand\n\n"))
+    outcome = run_in(output, dying, executor=ProcessExecutor(1))
+    assert "(SIGKILL, perhaps for want of memory): no such bone: Hand; given up after 3" in outcome.failures["b"]
+
+
+def test_what_is_printed_in_a_worker_does_not_get_in_the_way(output: Path, capfd: pytest.CaptureFixture) -> None:
+    run_in(output, task("a", steps.chatter), executor=ProcessExecutor(1))
+    assert capfd.readouterr() == ("", "")
+
+
+def test_an_executor_can_be_used_again_after_it_was_stopped(output: Path) -> None:
+    with Store(output) as store, ProcessExecutor(1) as executor:
+        run(lambda: [writing("a")], store, executor)
+        executor.stop()
+        assert states(run(lambda: [writing("b")], store, executor)) == {"done": 1}
