@@ -18,6 +18,6 @@ REST = np.array((0, 0, 0, 1, 0, 0, 0, 1, 1, 1), dtype=np.float64)
 
 
 def rows_left_to(driven: Collection[int]) -> set[int]:
-    """Return the rows of components that are left to drivers of these: with one of a rotation or a scale go all of it."""
+    """Return the rows of components left to drivers of these: with one of a rotation or a scale go all of it."""
     parts = {PART_OF[row] for row in driven} - {LOCATION}
     return {row for row, part in enumerate(PART_OF) if row in driven or part in parts}
