@@ -171,7 +171,8 @@ class Skeleton:
     def _few_in_root_space(self, poses: Poses) -> Poses:
         turns = poses.quaternions[..., _LEFT] * _LEFT_SIGNS
         for joints in self.levels[1:]:
-            turns[joints] = turns[self.parents[joints]] @ turns[joints]
+            # Equal poses stay equal to the last bit, which a product by @ does not promise.
+            turns[joints] = np.einsum("...ij,...jk->...ik", turns[self.parents[joints]], turns[joints])
         quaternions = turns[..., 0]
         arms = rotate(quaternions[self.parents], poses.positions)
         hanging = (self.parents >= 0).reshape(-1, *(1,) * (arms.ndim - 1))
