@@ -23,6 +23,8 @@ from tests.live.performing import (
 )
 from tests.rigs.human import human
 
+pytestmark = pytest.mark.network
+
 TIMES = np.arange(90) / 60.0
 SINGLE = 2e-6
 """What single precision leaves of metres."""

@@ -15,6 +15,8 @@ from rigid_motion.streams import osc
 from rigid_motion.streams.vmc import ROOT, VmcReceiver
 from tests.live.performing import JOINTS, heads_of, new_rig
 
+pytestmark = pytest.mark.network
+
 
 @pytest.fixture
 def listener(extension):

@@ -11,6 +11,8 @@ import pytest
 
 from rigid_motion.live import receiving, sending, sockets
 
+pytestmark = pytest.mark.network
+
 NO_SOCKETS = """
 import socket
 def refuse(*_, **__):

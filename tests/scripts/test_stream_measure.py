@@ -18,6 +18,8 @@ from rigid_motion_batch.streaming.packed import WAYS, errors, smallest_three
 from rigid_motion_batch.streaming.written import write_bvh
 from tests.streams.links import body, dance
 
+pytestmark = pytest.mark.network
+
 
 @pytest.fixture(scope="module")
 def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:

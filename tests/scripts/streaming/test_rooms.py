@@ -29,6 +29,8 @@ from rigid_motion_batch.streaming.written import write_bvh
 from tests.scripts.streaming.motions import swinging
 from tests.streams.links import body, dance
 
+pytestmark = pytest.mark.network
+
 ROOT = Path(__file__).resolve().parents[3]
 COMMAND = (sys.executable, str(ROOT / "scripts" / "stream.py"))
 

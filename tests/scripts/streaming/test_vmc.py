@@ -19,6 +19,8 @@ from rigid_motion_batch.streaming.vmc import Performers, ToVmc, play
 from tests.live.performing import BODY, JOINTS, TIMES_OF_A_SECOND, dance, frames_of_vmc, in_world
 from tests.scripts.streaming.test_rooms import HERE, PATIENCE, free_port, running
 
+pytestmark = pytest.mark.network
+
 BVH = """HIERARCHY
 ROOT Hips
 {
