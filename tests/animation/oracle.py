@@ -96,7 +96,7 @@ def _components(
     quaternion = multiply(np.array(own.quaternion), quaternion)
     scale = scale * own.scale
     keys = key_frames(obj) if keys is None else keys
-    scaled = _scales_evenly(obj, keys)
+    scaled, shaping = _scales_evenly(obj, keys), shaping_keys(obj, keys)
     for first, last in itertools.pairwise(keys):
         mode = mode_at(obj, first)
         inside = (frames > first if first > keys[0] else frames != first) & (frames < last if last < keys[-1] else True)
@@ -104,7 +104,7 @@ def _components(
         if mode == "BLENDER" or not inside.any():
             continue
         share = progress(obj, first, last, frames[inside])
-        path = Path(obj, keys, first, mode, own, scaled)
+        path = Path(obj, shaping, first, mode, own, scaled)
         if (path.first, path.last) != (first, last):
             poses = beside_path(path, _key_poses(obj, np.array((first, last)), own, scaled), share)
         else:
@@ -115,12 +115,17 @@ def _components(
     return location, quaternion, scale
 
 
+def shaping_keys(obj: Carrier, keys: np.ndarray) -> np.ndarray:
+    """The keys that shape a path: no breakdowns on the way, where it would matter."""
+    return np.array([key for number, key in enumerate(keys) if not _is_passed(obj, keys, number)])
+
+
 class Path:
-    """What a mode makes of the segment between keys that shape it: no breakdowns on the way, where it would matter."""
+    """What a mode makes of the segment between keys that shape it."""
 
     def __init__(self, obj: Carrier, keys: np.ndarray, frame: float, mode: str, own: Own, scaled: bool) -> None:
         self.obj, self.mode, self.own, self.scaled = obj, mode, own, scaled
-        self.keys = np.array([key for number, key in enumerate(keys) if not _is_passed(obj, keys, number)])
+        self.keys = keys
         self.first, self.last = self.keys[self.keys <= frame][-1], self.keys[self.keys > frame][0]
 
     def poses(self, share: np.ndarray, elapsed: np.ndarray | None = None) -> Poses:
