@@ -1,7 +1,6 @@
-"""Compare interpolation modes on recorded trajectories: the program that people run.
+"""Compare interpolation modes on recorded trajectories: the program that people run, and what it shows in the end.
 
-Its options are in `compare_options`, its tasks in `pipeline.comparison`; here they are done, in an output folder, and
-what they come to is shown.
+Its options are in `compare_options`, its tasks in `pipeline.comparison`.
 """
 
 from __future__ import annotations
@@ -35,7 +34,6 @@ from rigid_motion_batch.pipeline.comparison import (
     Comparison,
     ComparisonPlan,
 )
-from rigid_motion_batch.pipeline.comparison_steps import PAGE
 from rigid_motion_batch.pipeline.executors import ProcessExecutor
 from rigid_motion_batch.pipeline.explain import explain
 from rigid_motion_batch.pipeline.performing import Executor, ExecutorError, processors
@@ -304,8 +302,8 @@ class _Run:
                 return self._end()
             self._show_numbers()
             report(summary="Stopped. The report holds what was ready; the same command goes on from here.")
-            report(written=os.fspath(self.store.output / PAGE))
-            self._note(f"All numbers are there, and films come as they are made: {self.store.output / PAGE}")
+            report(written=os.fspath(self.store.output / steps.PAGE))
+            self._note(f"All numbers are there, and films come as they are made: {self.store.output / steps.PAGE}")
             self._do("Filming", self.plan.tasks)
         else:
             self._do("Comparing", self.plan.tasks)
@@ -397,7 +395,7 @@ class _Run:
 
     def _end(self) -> int:
         """Say what came of it, and last the path of the report; the exit code."""
-        outcome, page = self.outcome, self.store.output / PAGE
+        outcome, page = self.outcome, self.store.output / steps.PAGE
         there = self.page and page.exists() and not self.options.only
         report(ended=True)
         if outcome.problem:

@@ -1,7 +1,6 @@
 """The plan of a comparison: what is requested, as one value, and the tasks that make it, clip by clip.
 
-What the recordings hold is known only when they have been read. So there are two plans: `reading`, and then `tasks`,
-once `look_into` has seen what was read. Both return their tasks one by one.
+There are two plans, for what recordings hold is known only when they are read: `reading`, `look_into`, then `tasks`.
 """
 
 from __future__ import annotations
