@@ -122,7 +122,8 @@ class BudgetSearch(Search):
             keys = self.refined(self.densified(self.measured(best), aim), aim)
             result.append(keys.indices)
             result += self._moved_together(self.thinned(keys, math.inf, self.budget).indices, AGAIN)
-        return joined_keys(self.costs, result, self.budget)
+        joined = self._filled(self.measured(joined_keys(self.costs, result, self.budget))).indices
+        return min(best, joined, key=self.costs.peak)
 
     def _moved_together(self, samples: np.ndarray, steps: slice) -> list[np.ndarray]:
         """As many keys as the budget, these among them, and what moving them together makes of them step by step."""

@@ -221,6 +221,8 @@ def moved_together(costs: Costs, keys: np.ndarray, ways: int, part: int) -> np.n
     """
     reach, count = costs.reach, costs.keys
     _, peak = costs.of_keys(keys)
+    if not peak.any():
+        return keys
     between, step = np.diff(keys), np.zeros(len(keys), dtype=np.int64)
     step[1:-1] = np.maximum(np.minimum(between[1:], between[:-1]) // part, 1)
     step[1:-1] *= np.where(peak[1:] < peak[:-1], -1, 1)

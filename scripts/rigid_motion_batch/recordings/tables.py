@@ -10,6 +10,7 @@ import codecs
 import csv
 import io
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 from operator import itemgetter
@@ -236,13 +237,10 @@ def lines_above_numbers(path: Path) -> Iterator[HeaderLine]:
 
 def split_row(line: str, separator: str | None) -> list[str]:
     """Return the cells of a row, without quotes."""
-    if '"' in line:
-        return (
-            next(csv.reader([line], delimiter=separator, skipinitialspace=True))
-            if separator
-            else line.replace('"', "").split()
-        )
-    return line.split(separator)
+    if '"' in line and separator:
+        with suppress(csv.Error):  # a cell that is larger than any number
+            return next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+    return line.replace('"', "").split(separator)
 
 
 def parse_rows(
