@@ -289,7 +289,7 @@ def _draw_path(pen: _Pen, path: Path, settings: RigidMotionOverlay) -> None:
         pen.dot(batches.ticks("native_ticks", chosen.native_ticks), OUTLINE, TICK, look.native_color, 1.25)
     if batches.desired is not None:
         pen.outlined_line(batches.desired, look.mode_color, look.line_width)
-        pen.dot(batches.ticks("wanted_ticks", chosen.desired_ticks), look.tick_color, TICK)
+        pen.dot(batches.ticks("desired_ticks", chosen.desired_ticks), look.tick_color, TICK)
     diameter = KEY if len(path.keys) <= TICKS else TICK
     pen.dot(batches.keys, WHITE, diameter)
     pen.dot(batches.selected, look.key_color, diameter)
