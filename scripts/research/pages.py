@@ -140,7 +140,7 @@ def filled(path: Path, templates: jinja2.Environment) -> str:
         return templates.get_template(path.name).render()
     page = path.read_text(encoding="utf-8")
     return QUOTE.sub(
-        lambda result: f"{result[1]}{templates.from_string(f'{{{{ {result[2]} }}}}').render()}{result[4]}", page
+        lambda match: f"{match[1]}{templates.from_string(f'{{{{ {match[2]} }}}}').render()}{match[4]}", page
     )
 
 

@@ -51,11 +51,6 @@ def write_rows(path: Path, kind: type[Row], rows: Iterable[Row]) -> None:
 READERS: dict[str, Callable[[str], Any]] = {"str": meant, "int": int, "float": float}
 
 
-def read_all_rows(paths: Iterable[Path], kind: type[Row]) -> list[Row]:
-    """Return the rows of several files, one after the other."""
-    return [row for path in paths for row in read_rows(path, kind)]
-
-
 def read_rows(path: Path, kind: type[Row]) -> list[Row]:
     """Read what `write_rows` wrote."""
     with path.open(encoding="utf-8", newline="") as stream:

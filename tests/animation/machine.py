@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import tempfile
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from pathlib import Path
 from typing import ClassVar
 
@@ -90,6 +90,13 @@ class Machine(RuleBasedStateMachine):
         data.action = action
         if action is not None:
             data.action_slot = slot
+
+    def _swap_actions(self, names: Sequence[str]) -> None:
+        """Two objects by their names, each with the Action and slot of the other."""
+        first, second = (bpy.data.objects[name] for name in names)
+        of_first, of_second = self._linked(first), self._linked(second)
+        self._link(first, *of_second)
+        self._link(second, *of_first)
 
     # What the machine does with an edit
 

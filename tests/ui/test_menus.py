@@ -50,9 +50,6 @@ def test_every_menu_offers_every_mode(tool, menu):
     assert sorted(offered) == sorted(MODE_IDS)
 
 
-PIES = [menus.RIGID_MOTION_MT_pie_object, menus.RIGID_MOTION_MT_pie_pose, menus.RIGID_MOTION_MT_pie_keys]
-
-
 def test_the_mode_that_is_chosen_is_ticked(tool):
     bpy.ops.rigid_motion.set_mode(mode="pga_lerp")
     ticked = {p.mode: icon for name, icon, p in drawn(menus.RIGID_MOTION_MT_object) if name == "rigid_motion.set_mode"}

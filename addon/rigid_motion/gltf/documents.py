@@ -262,7 +262,7 @@ def bytes_of_uri(uri: str) -> bytes:
 def unquoted(uri: str) -> str:
     """Return a path as it is on a disk, of a URI in which signs may be %20 and the like."""
     return re.sub(
-        b"%([0-9A-Fa-f]{2})", lambda result: bytes.fromhex(result[1].decode()), uri.encode(errors="replace")
+        b"%([0-9A-Fa-f]{2})", lambda match: bytes.fromhex(match[1].decode()), uri.encode(errors="replace")
     ).decode(errors="replace")
 
 

@@ -66,21 +66,20 @@ class OfBody:
         return [(keys, error)]
 
     def _best_of(self, budget: int, mode: str) -> tuple[np.ndarray, float]:
-        """So many key poses at most, and their error."""
+        """Return so many key poses at most, and their error."""
         if budget >= len(self.clip.times):
-            keys = np.arange(len(self.clip.times))
-        else:
-            radii = self.radii / self.clip.metres_per_unit
-            result = reduce_skeleton_keys(
-                self.clip.times,
-                self.clip.poses,
-                self.clip.whole_body.parents,
-                mode,
-                radius=radii,
-                budget=max(budget, 2),
-                shared=True,
-            )
-            keys = max(cast(tuple[np.ndarray, ...], result), key=len)
+            every = np.arange(len(self.clip.times))
+            return every, self.error(every, mode)
+        result = reduce_skeleton_keys(
+            self.clip.times,
+            self.clip.poses,
+            self.clip.whole_body.parents,
+            mode,
+            radius=self.radii / self.clip.metres_per_unit,
+            budget=max(budget, 2),
+            shared=True,
+        )
+        keys = max(cast(tuple[np.ndarray, ...], result), key=len)
         # Keys with the smallest largest error may have a larger RMS error than evenly spaced ones.
         evenly = evenly_spaced(self.clip, max(budget, 2) - 1)
         return min(((some, self.error(some, mode)) for some in (keys, evenly)), key=itemgetter(1))

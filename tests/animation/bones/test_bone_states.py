@@ -316,13 +316,7 @@ class EditingBones(ComingAndGoing):
         if turning[0] != turning[1] or not all(map(self._is_free, names)):
             return
 
-        def swap() -> None:
-            first, second = (bpy.data.objects[name] for name in names)
-            of_first, of_second = self._linked(first), self._linked(second)
-            self._link(first, *of_second)
-            self._link(second, *of_first)
-
-        self._edit(swap)
+        self._edit(lambda: self._swap_actions(names))
 
     @precondition(lambda self: self.on)
     @rule(

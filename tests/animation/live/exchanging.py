@@ -67,13 +67,7 @@ class Exchanging(WithTools):
         if names[0] == names[1] or not alike or not all(map(self._is_free, names)):
             return
 
-        def swap() -> None:
-            first, second = (bpy.data.objects[name] for name in names)
-            of_first, of_second = self._linked(first), self._linked(second)
-            self._link(first, *of_second)
-            self._link(second, *of_first)
-
-        self._edit(swap)
+        self._edit(lambda: self._swap_actions(names))
 
     @precondition(lambda self: self.on and len(self.names) > 1)
     @rule(who=shares, other=shares)

@@ -213,7 +213,7 @@ def _summed(entries: _Entries, of_bones: _Entries, segments: dict[str, int]) -> 
     """
     if not entries:
         return None
-    rig = max((_whole_rig(entry) for entry in of_bones), key=lambda result: result.frames, default=None)
+    rig = max((_whole_rig(entry) for entry in of_bones), key=lambda reduction: reduction.frames, default=None)
     return Reduction(
         sum(entry.keys_before for entry in entries),
         sum(entry.keys_after for entry in entries),
