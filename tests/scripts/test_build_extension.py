@@ -17,7 +17,7 @@ from rigid_motion_batch.places import EXTENSION, LICENSE
 ROOT = Path(__file__).resolve().parents[2]
 
 LIFE_OF_AN_EXTENSION = """
-import importlib, json, os, pkgutil, sys
+import importlib, json, pkgutil, sys
 import bpy
 
 MODULE = "bl_ext.user_default.rigid_motion"
@@ -52,9 +52,6 @@ repositories = [repository.module for repository in preferences.extensions.repos
 extensions.package_uninstall(repo_index=repositories.index("user_default"), pkg_id="rigid_motion")
 seen["uninstalled"] = MODULE not in preferences.addons
 print(json.dumps(seen))
-if bpy.app.version < (5, 0):  # taking Blender 4.5's module down can wait forever
-    sys.stdout.flush()
-    os._exit(0)
 """
 
 

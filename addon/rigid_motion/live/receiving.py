@@ -252,7 +252,7 @@ def _on_frame(*_: object) -> None:
 
 HANDLERS = {"undo_post": _on_undo, "redo_post": _on_undo, "frame_change_post": _on_frame}
 
-running: Ticking[Listening] = Ticking("What came over the network cannot be shown", HANDLERS)
+running = Ticking("What came over the network cannot be shown", HANDLERS)
 
 
 def listening() -> Listening | None:
@@ -262,7 +262,8 @@ def listening() -> Listening | None:
 
 def start(host: str, port: int, settings: Callable[[], Settings], pairs: Pairs) -> Listening:
     """Listen to a port, and to nothing else any more. Raises OSError where it is taken, and NotAllowed."""
-    return running.start(lambda: Listening(host, port, settings, pairs))
+    running.start(lambda: Listening(host, port, settings, pairs))
+    return running.thing
 
 
 def stop() -> None:

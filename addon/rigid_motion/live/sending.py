@@ -63,7 +63,7 @@ def _bones(obj: bpy.types.Object) -> Poses:
     return unscaled(np.array(obj.matrix_world) @ matrices)
 
 
-running: Ticking[Sending] = Ticking("What is selected cannot be sent")
+running = Ticking("What is selected cannot be sent")
 
 
 def sending() -> Sending | None:
@@ -73,7 +73,8 @@ def sending() -> Sending | None:
 
 def start(host: str, port: int, objects: Iterable[bpy.types.Object]) -> Sending:
     """Send objects, and nothing else any more. Raises OSError where the address is none, and NotAllowed."""
-    return running.start(lambda: Sending(host, port, objects))
+    running.start(lambda: Sending(host, port, objects))
+    return running.thing
 
 
 def stop() -> None:

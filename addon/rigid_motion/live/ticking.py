@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Mapping
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Protocol
 
 import bpy
 from bpy.app.handlers import persistent
@@ -26,14 +26,15 @@ class Ticks(Protocol):
     def close(self) -> None: ...
 
 
-Ticked = TypeVar("Ticked", bound=Ticks)
+class Ticking:
+    """What is ticked. `failure` says what is wrong where it fails; `handlers` are called while there is something.
 
-
-class Ticking(Generic[Ticked]):
-    """What is ticked. `failure` says what is wrong where it fails; `handlers` are called while there is something."""
+    It is no generic class: with one that is bound to `Ticks`, Blender 4.5 waits forever when it quits.
+    """
 
     def __init__(self, failure: str, handlers: Mapping[str, Callable] | None = None) -> None:
-        self.thing: Ticked | None = None
+        self.thing: Any = None
+        """Ticks, or None."""
         self.trouble = ""
         """The reason why it ended by itself."""
         self._failure = failure
@@ -45,13 +46,12 @@ class Ticking(Generic[Ticked]):
         self._handlers = {"load_pre": on_load, **(handlers or {})}
         self._timer = self.look
 
-    def start(self, make: Callable[[], Ticked]) -> Ticked:
+    def start(self, make: Callable[[], Ticks]) -> None:
         """Tick what is made, and nothing else any more."""
         self.stop()
         self.thing, self.trouble = make(), ""
         append_handlers(self._handlers)
         bpy.app.timers.register(self._timer)
-        return self.thing
 
     def stop(self) -> None:
         """Tick no more, and close it."""
