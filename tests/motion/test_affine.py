@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigid_motion.motion import Poses, shell_error
 from rigid_motion.motion.affine import AffineMaps, ball_displacement, displacement_bound
-from rigid_motion.motion.quaternions import matrices, normalise
+from rigid_motion.motion.quaternions import normalise
 
 COUNT = 400
 RADIUS = 0.7
@@ -46,18 +45,3 @@ def test_no_point_of_a_ball_is_off_by_more_and_some_point_is_off_by_as_much(kind
     bound = displacement_bound(AffineMaps(turns, offsets), none, radii)
     assert np.all(bound >= largest * (1.0 - 1e-12))
     assert np.all(bound <= 1.8 * largest + 1e-12)
-
-
-def test_of_rigid_poses_and_those_with_even_scale_it_is_the_shell_error():
-    random = np.random.default_rng(9)
-    one, other = (
-        Poses(
-            random.normal(size=(COUNT, 3)), normalise(random.normal(size=(COUNT, 4))), random.uniform(0.2, 3.0, COUNT)
-        )
-        for _ in range(2)
-    )
-    maps = [
-        AffineMaps(np.moveaxis(matrices(poses.quaternions), -1, 0) * poses.scales[:, None, None], poses.positions)
-        for poses in (one, other)
-    ]
-    np.testing.assert_allclose(ball_displacement(*maps, np.full(COUNT, RADIUS)), shell_error(one, other, RADIUS))

@@ -243,12 +243,6 @@ def test_what_has_the_wrong_type_is_refused_by_name(use, message):
         use()
 
 
-def test_a_body_may_have_a_radius_for_each_joint():
-    shown = BODY[:, ::-1]
-    of_joints = [measure(TIMES, shown[joint], BODY[joint], radius).shell for joint, radius in enumerate((0.1, 0.4))]
-    assert measure(TIMES, shown, BODY, radius=[[0.1], [0.4]]).shell.tolist() == np.stack(of_joints).tolist()
-
-
 WITH_NUMBERS = [
     ("times", lambda rows: best_modes(rows, POSES, KEYS)),
     ("times", lambda rows: decimate(rows, 5.0)),

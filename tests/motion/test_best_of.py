@@ -122,13 +122,6 @@ def test_a_mode_that_passes_the_tolerance_is_out_though_it_is_nearer_on_the_whol
     assert least_errors(errors, keys, tolerance=1.0).tolist() == [1]
 
 
-def test_samples_outside_of_the_keys_do_not_count():
-    times, poses = wandering(300, 8)
-    keys = np.arange(40, 260, 20)
-    inner = slice(40, 241)
-    assert best_modes(times, poses, keys) == best_modes(times[inner], poses[inner], keys - 40)
-
-
 @pytest.mark.parametrize(("tolerance", "mode"), [(0.01, "motor_spline"), (0.01, "lerp_slerp"), (0.01, "dq_sclerp")])
 def test_a_segment_at_the_very_tolerance_does_not_fall_for_a_mode_that_passes_it(tolerance, mode):
     """Where another mode is nearer on the whole, and passes it. The keys' own may be off by rounding more than it."""

@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import MODES, Poses, reduce_keys
-from rigid_motion.motion.key_links import traded_keys
-from rigid_motion.motion.key_search import Recording, Search
 from tests.motion.test_reduction import RADIUS, shell_errors, wandering
 
 MEMORYLESS = [name for name, mode in MODES.items() if not mode.is_smooth]
@@ -60,35 +58,6 @@ def test_smooth_keys_are_as_few_as_any_that_keep_to_the_tolerance():
         assert fewest <= result <= fewest + 1
         as_few += result == fewest
     assert as_few >= 5
-
-
-def least_square_of_a_programme(search: Search, keys: int) -> float:
-    """The least sum of squares that so many keys leave, where a segment costs what it costs by itself."""
-    count = len(search.recording.times)
-    pairs = np.array(list(itertools.combinations(range(count), 2)))
-    of_pairs = np.full((count, count), np.inf)
-    of_pairs[tuple(pairs.T)] = search.costs.of(pairs)[0]
-    least = np.where(np.arange(count) == 0, 0.0, np.inf)
-    for _ in range(keys - 1):
-        least = (least[:, None] + of_pairs).min(axis=0)
-    return float(least[-1])
-
-
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("mode", ["lerp_slerp", "dq_sclerp"])
-def test_keys_with_a_price_are_the_best_of_their_number(mode, seed):
-    """A price leaves the least error of all sets of as many keys; there is not one for every number of them."""
-    times, poses = wandering(40, seed, 0.01, 40.0)
-    search = Search(Recording(times, poses, mode, RADIUS, TOLERANCES[1]), rms=True)
-    samples = np.arange(len(times))
-    best = search.within(0)
-    keys = traded_keys(search.costs, [best, samples, np.array((0, len(times) - 1))])
-    assert search.measured(keys).cost.sum() <= len(times)
-    assert 2 < len(keys) <= len(best)
-    if len(keys) < len(best):
-        fewest = least_square_of_a_programme(search, len(keys))
-        assert search.measured(keys).cost.sum() == pytest.approx(fewest)
-    assert least_square_of_a_programme(search, len(keys) - 2) > len(times)
 
 
 @pytest.mark.parametrize("mode", ["lerp_slerp", "motor_spline"])
