@@ -1,7 +1,5 @@
 """How far the points of balls get off that are turned, scaled unevenly, mirrored or sheared."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -4,8 +4,6 @@ Positions agree to 1e-12 of their own size, for turns of 1e-9 rad as for turns o
 unit quaternions neither is ill-conditioned, only the choice between two shortest ways at exactly 180 degrees is.
 """
 
-from __future__ import annotations
-
 import kingdon
 import numpy as np
 import pytest

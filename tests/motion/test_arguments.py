@@ -1,7 +1,5 @@
 """What callers give in the wrong form: taken where it has one meaning, else refused by name, with a way out."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The best mode of each segment: never worse than a single mode, right where the answer is known, no change in vain."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

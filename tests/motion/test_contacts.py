@@ -1,7 +1,5 @@
 """Which joints stand on the ground, and how far they slide, on motions where that is known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Uniform decimation to a rate."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """What is public says what it takes, gives and refuses, and its examples are true."""
 
-from __future__ import annotations
-
 import doctest
 import inspect
 import re

@@ -1,7 +1,5 @@
 """Euler angles against mathutils, and their continuity."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Keys that are fitted: never worse than recorded poses, and near the truth where the recording is noisy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """What segments between keys cost, recomputed apart from the search."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

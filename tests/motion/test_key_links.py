@@ -1,7 +1,5 @@
 """The shortest way from key to key, against all ways there are."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

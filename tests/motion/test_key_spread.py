@@ -1,7 +1,5 @@
 """Keys of a budget, laid out and moved, against all that there are to choose from."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The measures of error, on motions whose errors are known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

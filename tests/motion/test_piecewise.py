@@ -1,7 +1,5 @@
 """Piecewise functions: both ways to put them together agree, wherever the samples are."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """Poses and arrays of quaternions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -1,7 +1,5 @@
 """What every mode promises, whatever the keys."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings

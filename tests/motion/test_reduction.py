@@ -1,7 +1,5 @@
 """Key reduction: what it promises of its keys, recomputed apart from it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

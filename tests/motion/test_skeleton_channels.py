@@ -1,7 +1,5 @@
 """Keys of rotations and of locations apart, recomputed by slerp of SciPy, np.interp and matrices down the chains."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """Key reduction of whole bodies: what it promises, recomputed by matrices down the chains and singular values."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

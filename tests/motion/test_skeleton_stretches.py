@@ -1,7 +1,5 @@
 """Long recordings of bodies in stretches: what they promise, recomputed apart from the program."""
 
-from __future__ import annotations
-
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 

@@ -1,7 +1,5 @@
 """Skeletons, against matrices multiplied up each joint's own chain."""
 
-from __future__ import annotations
-
 import tracemalloc
 
 import numpy as np

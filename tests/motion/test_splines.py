@@ -1,7 +1,5 @@
 """What the motor spline promises beside what every mode does: no corners, no say of far keys, rests that rest."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

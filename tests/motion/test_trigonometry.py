@@ -1,7 +1,5 @@
 """Sines and cosines, by the tangent of half the angle and by the polynomial: whichever the processor has."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Exponentials and logarithms of twists, against SciPy's of matrices."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.linalg import expm

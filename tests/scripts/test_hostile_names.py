@@ -1,7 +1,5 @@
 """Files and bodies with hostile names: all they can do is be called so, in the output folder and in the report."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re

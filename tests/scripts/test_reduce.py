@@ -1,11 +1,7 @@
 """reduce.py on .blend files, as people run it: what it plays, what it leaves alone, what it says."""
 
-from __future__ import annotations
-
 import re
 import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import bpy
@@ -35,8 +31,6 @@ from tests.scripts.reducing import (
     swing,
     write_csv,
 )
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.mark.parametrize("mode", ["motor_spline", "dq_sclerp", "lerp_slerp"])
@@ -358,18 +352,6 @@ def test_a_stop_between_bodies_tells_of_the_files_that_are_complete(tmp_path, ca
 def test_a_wrong_option_ends_with_code_2_and_a_way_out(arguments, complaint, capsys):
     assert exit_code(*arguments) == 2
     assert complaint in capsys.readouterr().err
-
-
-def test_as_a_program_it_ends_by_itself_and_prints_the_path_alone(tmp_path):
-    object_file(tmp_path / "shot.blend")
-    done = subprocess.run(
-        [sys.executable, ROOT / "scripts" / "reduce.py", "shot.blend"],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        cwd=tmp_path,
-    )
-    assert (done.returncode, done.stdout) == (0, "shot-reduced.blend\n"), done.stderr
 
 
 def test_key_poses_are_few_where_no_tolerance_is_given(tmp_path, capsys):

@@ -1,7 +1,5 @@
 """`reduce.py` gives glTF files back as they are, with fewer keys, and needs no Blender for that."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess
@@ -89,12 +87,6 @@ def test_a_file_whose_clips_need_their_keys_is_left_alone(tmp_path, capsys):
     assert "Take0: stays as it was, 3 keys in 48 bytes: fewer keys would take more bytes" in said.err
     assert "nothing could be reduced; left alone" in said.err
     assert (said.out, listed(tmp_path)) == ("", ["walk.glb"])
-
-
-def test_key_poses_are_so_many_frames_of_all_joints(tmp_path):
-    source = walk().write(tmp_path / "walk.glb")
-    assert run(source, "--key-poses", "9") == 0
-    assert len(File(tmp_path / "walk-reduced.glb").moments(0)) == 9
 
 
 def test_a_file_that_vanishes_while_it_is_read_is_said(tmp_path, monkeypatch, capsys):

@@ -1,7 +1,5 @@
 """Scenes to be saved and read again: objects and rigs, with keys."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

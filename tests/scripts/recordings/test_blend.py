@@ -1,7 +1,5 @@
 """Animated objects of .blend files, which bpy makes here."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pose bones of .blend files, against matrices that are worked out here."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -248,9 +246,3 @@ def test_a_rig_whose_bones_are_still_is_an_object(saved) -> None:
     path = saved()
     for source in (path, f"{path}:Rig", f"{path}:*"):
         assert read(source).rest_body is None
-
-
-@pytest.mark.parametrize("expected", ["rig/hand.l", "RIG/Hand.L"])
-def test_objects_and_bones_have_their_names_in_any_case(saved, expected: str) -> None:
-    rig("Rig", {"Hand.L": ((0, 0, 0), (0, 1, 0), None), "Hand.R": ((1, 0, 0), (1, 1, 0), None)})
-    assert read_trajectories(f"{saved()}:{expected}").trajectories[0].name == "Rig/Hand.L"

@@ -1,7 +1,5 @@
 """What the names of columns say."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -11,35 +9,6 @@ from rigid_motion_batch.recordings import ReadingOptions
 from rigid_motion_batch.recordings.column_names import ColumnName, column_name, unit_in
 from rigid_motion_batch.recordings.columns import layout_of
 from tests.scripts.recordings import logs
-
-
-@pytest.mark.parametrize("unit", logs.TIMES)
-def test_times_are_known_with_their_unit(unit: str) -> None:
-    for name in logs.spellings(logs.TIMES[unit]):
-        result = column_name(name)
-        assert result is not None, name
-        assert result.kind == "time"
-        assert result.unit == unit or (unit == "s" and not result.unit), name
-
-
-@pytest.mark.parametrize(
-    ("templates", "kinds", "axes"),
-    [
-        (logs.POSITIONS, {"position"}, "xyz"),
-        (logs.QUATERNIONS, {"quaternion", "rotation"}, "xyzw"),
-        (logs.EULERS, {"euler", "rotation"}, "xyz"),
-    ],
-    ids=["positions", "quaternions", "Euler angles"],
-)
-@pytest.mark.parametrize("prefix", ["", "left_", "Left Hand.", "tracker 1 ", "L_"])
-def test_positions_and_rotations_are_known_with_their_body(templates, kinds, axes, prefix):
-    for template in logs.spellings(templates):
-        for axis in axes:
-            name = f"{prefix}{logs.spelled(template, axis)}"
-            result = column_name(name)
-            assert result is not None, name
-            assert result.kind in kinds, name
-            assert (result.axis, result.body) == (axis, prefix.strip(" _.")), name
 
 
 @pytest.mark.parametrize(
@@ -63,11 +32,6 @@ def test_units_are_known_behind_names_and_in_brackets(name: str, unit: str) -> N
 def test_feet_and_hands_are_bodies() -> None:
     assert column_name("left_foot_pos_x") == ColumnName("position", "x", "", "left_foot")
     assert column_name("r_hand_qw") == ColumnName("quaternion", "w", "", "r_hand")
-
-
-@pytest.mark.parametrize("name", logs.spellings(logs.DEVICES))
-def test_devices_are_known(name: str) -> None:
-    assert column_name(name).kind == "device"
 
 
 @pytest.mark.parametrize(("name", "body"), [("s", ""), ("Scale", ""), ("left_scale", "left")])

@@ -1,7 +1,5 @@
 """What is said to be in a recording is in it, and what is wrong with it comes with the way out."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Logs in the spellings that people have: each is the motion that was recorded, or says what is to be done."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -26,14 +24,6 @@ def read_one(source: str, **options: object) -> object:
 
 
 # -- names and units --------------------------------------------------------------------------------------------------
-
-
-def test_axes_in_units_of_their_own_become_metres(write) -> None:
-    motion = MOTIONS["left"]
-    poses = logs.pose_texts(motion, np.array((1.0, 0.01, 0.001)), motion.turns.as_quat())
-    rows = [[time, *pose] for time, pose in zip(logs.time_texts("s", 0), poses, strict=True)]
-    source = write("take.csv", logs.written(["t", "x", "y_cm", "z [mm]", "qx", "qy", "qz", "qw"], rows))
-    assert_is_the_motion(read_one(source), motion)
 
 
 def test_a_line_that_tells_spreadsheets_the_separator_is_no_header(write) -> None:
@@ -102,13 +92,6 @@ def euler_log(header: Sequence[str], order: str, degrees: bool) -> str:
     return logs.written(header, [[time, *pose] for time, pose in rows])
 
 
-@pytest.mark.parametrize("order", ["XYZ", "YXZ", "ZYX", "zxy", "xyz", "yzx"])
-@pytest.mark.parametrize("degrees", [False, True])
-def test_euler_angles_are_read_in_the_order_that_is_said_as_scipy_has_it(write, order: str, degrees: bool) -> None:
-    source = write("take.csv", euler_log(names("t", "{}", "rot_{}", "xyz"), order, degrees))
-    assert_is_the_motion(read_one(source, euler=order, degrees=degrees), MOTIONS["left"])
-
-
 def test_roll_pitch_and_yaw_are_read_where_it_is_said_which_is_which(write, refusal) -> None:
     source = write("take.csv", euler_log(["t", "x", "y", "z", "roll", "pitch", "yaw"], "ZYX", False))
     which = [("rx", "roll"), ("ry", "pitch"), ("rz", "yaw")]
@@ -166,13 +149,6 @@ def assert_holds_both(source: str, bodies: Sequence[str], **options: object) -> 
         assert trajectory.name == body
         assert_is_the_motion(trajectory, motion)
     assert [body.name for body in read_trajectories(f"{source}:*", ReadingOptions(**options)).trajectories] == bodies
-
-
-@pytest.mark.parametrize("device", spellings(logs.DEVICES))
-def test_a_column_tells_devices_apart(write, device: str) -> None:
-    source = write("log.csv", long_log(device))
-    assert_holds_both(source, ["left", "right"])
-    assert read_trajectories(source).note.startswith(f"{source} holds 2 bodies; took left; others: right; name one")
 
 
 @pytest.mark.parametrize(
@@ -334,12 +310,6 @@ def test_a_rate_of_frames_goes_before_a_column_of_times_where_there_are_both(wri
     source = write("take.csv", "\n".join([",".join(header), *(f"{9 * row},{text}" for row, text in enumerate(rows))]))
     assert_is_the_motion(read_one(source), MOTIONS["left"])
     np.testing.assert_allclose(read_one(source, frame_rate=90.0).times, np.arange(len(rows)) / 10.0)
-
-
-def test_a_running_number_is_no_device(write) -> None:
-    rows = log(["t", "x", "y", "z", "qx", "qy", "qz", "qw"]).splitlines()
-    text = "\n".join([f"id,{rows[0]}", *(f"{number},{row}" for number, row in enumerate(rows[1:]))])
-    assert read_one(write("log.csv", text)).name == "log"
 
 
 def test_a_device_that_is_alone_is_asked_for_by_its_name(write) -> None:

@@ -51,13 +51,6 @@ def test_the_rigid_bodies_are_found_among_markers_and_bones(write, labels: bool,
     np.testing.assert_array_equal(head.poses.quaternions[2], [-0.5, 0.5, 0.5, 0.5])
 
 
-def test_a_body_that_was_lost_is_nan_for_that_while(write) -> None:
-    (head,) = read_trajectories(write("take.csv", export()) + ":Head, left").trajectories
-    np.testing.assert_array_equal(np.isnan(head.poses.positions).all(axis=1), [False, True, False])
-    np.testing.assert_array_equal(np.isnan(head.poses.quaternions).all(axis=1), [False, True, False])
-    np.testing.assert_array_equal(head.times, [0.0, 0.008333, 0.016667])
-
-
 @pytest.mark.parametrize(
     ("unit", "metres"), [("Meters", 1.0), ("Centimeters", 0.01), ("Millimeters", 0.001), ("Inches", 0.0254)]
 )

@@ -1,7 +1,5 @@
 """Vectors and quaternions in one cell, as programs print them."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The object of a film as few triangles."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import bpy
@@ -10,7 +8,7 @@ import pytest
 
 from rigid_motion_batch.report.mesh import MOST_TRIANGLES as MOST_IN_A_PAGE
 from rigid_motion_batch.report.mesh import Mesh
-from rigid_motion_batch.scenes.settings import MODELS, SubjectError
+from rigid_motion_batch.scenes.settings import MODELS
 from rigid_motion_batch.scenes.simplified import MOST_TRIANGLES, simplified
 from rigid_motion_batch.scenes.subject import load_subject, vertices_of
 
@@ -58,8 +56,3 @@ def test_triangles_that_hang_on_nothing_are_kept_within_the_budget(models):
     result = simplified(f"{models}:Dust")
     assert 0 < len(result["triangles"]) <= MOST_TRIANGLES
     assert result["triangles"].max() < len(result["vertices"])
-
-
-def test_an_object_that_is_not_there_is_named(models):
-    with pytest.raises(SubjectError, match="has no object 'Box'"):
-        simplified(f"{models}:Box")

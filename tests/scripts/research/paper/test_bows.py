@@ -1,7 +1,5 @@
 """How much of the screw's bow a path has, and that this decides."""
 
-from __future__ import annotations
-
 import pytest
 
 from research.paper.bows import RATES, bows_of
