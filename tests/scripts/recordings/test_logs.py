@@ -15,19 +15,10 @@ from tests.scripts.recordings import logs
 from tests.scripts.recordings.logs import MOTIONS, assert_is_the_motion, log, names, spellings
 from tests.thoroughness import tried
 
-POSITION, QUATERNION = "pos_{}", "rot_{}"
-
 
 def read_one(source: str, **options: object) -> object:
     (trajectory,) = read_trajectories(source, ReadingOptions(**options)).trajectories
     return trajectory
-
-
-# -- names and units --------------------------------------------------------------------------------------------------
-
-
-def test_a_line_that_tells_spreadsheets_the_separator_is_no_header(write) -> None:
-    assert_is_the_motion(read_one(write("take.csv", "sep=,\n" + log(names("t", "{}", "q{}")))), MOTIONS["left"])
 
 
 # -- what the user says -----------------------------------------------------------------------------------------------
@@ -134,34 +125,6 @@ def long_log(device: str, header: Sequence[str] = ("t", "x", "y", "z", "qx", "qy
     lines = [log(header, unit, side=side).splitlines()[1:] for side in MOTIONS]
     rows = [f"{row},{side}" for both in zip(*lines, strict=True) for row, side in zip(both, MOTIONS, strict=True)]
     return "\n".join([f"{','.join(header)},{device}", *rows])
-
-
-def wide_log(prefixes: Sequence[str]) -> str:
-    """Two bodies in every row."""
-    left, right = (log(names("t", POSITION, QUATERNION), side=side).splitlines()[1:] for side in MOTIONS)
-    rows = (f"{one},{other.partition(',')[2]}" for one, other in zip(left, right, strict=True))
-    return "\n".join([",".join(names("t", POSITION, QUATERNION, prefixes=prefixes)), *rows])
-
-
-def assert_holds_both(source: str, bodies: Sequence[str], **options: object) -> None:
-    for body, motion in zip(bodies, MOTIONS.values(), strict=True):
-        trajectory = read_one(f"{source}:{body}", **options)
-        assert trajectory.name == body
-        assert_is_the_motion(trajectory, motion)
-    assert [body.name for body in read_trajectories(f"{source}:*", ReadingOptions(**options)).trajectories] == bodies
-
-
-@pytest.mark.parametrize(
-    ("prefixes", "bodies"),
-    [
-        (["left_", "right_"], ["left", "right"]),
-        (["LeftHand.", "RightHand."], ["LeftHand", "RightHand"]),
-        (["tracker 1 ", "tracker 2 "], ["tracker 1", "tracker 2"]),
-        (["", "head "], ["log", "head"]),
-    ],
-)
-def test_columns_of_several_bodies_are_told_by_what_is_in_front(write, prefixes: list[str], bodies: list[str]) -> None:
-    assert_holds_both(write("log.csv", wide_log(prefixes)), bodies)
 
 
 @pytest.mark.parametrize("name", ["log.csv", "log.tum"])

@@ -37,6 +37,7 @@ SPELLINGS = {
     "decimal commas": f"{HEADER}\n{ROWS}".replace(",", ";").replace(".", ","),
     "blanks around the commas": f"{HEADER}\n{ROWS}".replace(",", " , "),
     "commas at the line ends": f"{HEADER},\n{ROWS}".replace("\n0", ",\n0").replace("0.4\n", "0.4,\n"),
+    "a line that tells spreadsheets the separator": f"sep=,\n{HEADER}\n{ROWS}",
     "units in the names": "Time [s],X [m],Y [m],Z [m],qx,qy,qz,qw\n" + ROWS,
     "quotes": (
         '"t","x","y","z","qx","qy","qz","qw"\n"0.0","1","2","3","0.1","0.2","0.3","0.9"\n0.1,4,5,6,0.4,0.5,0.6,0.4\n'

@@ -7,11 +7,10 @@ import pytest
 
 from rigid_motion.motion import Poses, interpolate
 from rigid_motion_batch.recordings import Trajectory, read_trajectories
-from tests.scripts.recordings.blends import FPS, empty, key
+from tests.scripts.recordings.blends import FPS, empty, fcurves, key, linear
 from tests.scripts.recordings.glbs import Body, Track, chain, curved, mixed_rates, turning
 
 bpy = pytest.importorskip("bpy")
-anim_utils = pytest.importorskip("bpy_extras.anim_utils")
 
 SINGLE = 2e-5
 """Metres: single precision in files and in Blender, through a chain of 20 joints."""
@@ -129,11 +128,7 @@ def test_keys_off_whole_frames_are_samples(saved) -> None:
     tool = empty("Tool")
     for frame, x in ((1, 0), (2.4, 1), (2.7, -1), (6, 0)):
         key(tool, frame, location=(x, 0, 0))
-    for fcurve in anim_utils.action_get_channelbag_for_slot(
-        tool.animation_data.action, tool.animation_data.action_slot
-    ).fcurves:
-        for point in fcurve.keyframe_points:
-            point.interpolation = "LINEAR"
+    linear(tool)
     result = read(saved())
     np.testing.assert_allclose(result.times * FPS, [1, 2, 2.4, 2.7, 3, 4, 5, 6], atol=1e-6)
     np.testing.assert_allclose(result.poses.positions[2:4, 0], [1, -1], atol=1e-6)
@@ -143,11 +138,7 @@ def test_angles_that_flip_between_frames_are_no_motion(saved) -> None:
     tool = empty("Tool")
     for frame in range(1, 21):
         key(tool, frame, rotation_euler=(0, 0, np.radians((170 + 2 * frame + 180) % 360 - 180)))
-    for fcurve in anim_utils.action_get_channelbag_for_slot(
-        tool.animation_data.action, tool.animation_data.action_slot
-    ).fcurves:
-        for point in fcurve.keyframe_points:
-            point.interpolation = "LINEAR"
+    linear(tool)
     recording = read_trajectories(saved())
     assert len(recording.trajectories[0].times) == 20
     assert "taken to go the short way" in recording.note
@@ -157,8 +148,7 @@ def test_what_swings_too_fast_is_warned_of_with_how_far_it_is_off(saved) -> None
     tool = empty("Tool")
     for frame in (1, 11):
         key(tool, frame, location=(frame, 0, 0))
-    channels = anim_utils.action_get_channelbag_for_slot(tool.animation_data.action, tool.animation_data.action_slot)
-    noise = channels.fcurves[0].modifiers.new("FNGENERATOR")
+    noise = fcurves(tool)[0].modifiers.new("FNGENERATOR")
     noise.function_type, noise.amplitude, noise.phase_multiplier, noise.use_additive = "SIN", 0.5, 400.0, True
     result = read(saved())
     (warning,) = result.warnings

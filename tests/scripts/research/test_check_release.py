@@ -64,25 +64,23 @@ def test_stand_ins_for_addresses_are_no_release(ready):
     assert "maintainer@example.org" in mail
 
 
-def test_the_buttons_open_what_the_manifest_names(ready):
-    change(ready, MANUAL, WEBSITE, "https://motion.dev/other")
-    (finding,) = check_release.addresses(ready)
-    assert finding.startswith(f"{MANUAL}: WEBSITE is https://motion.dev/other")
-
-
-def test_a_version_without_a_day_is_no_release(ready):
-    change(ready, CHANGELOG, " - 2026-12-01", " - unreleased")
-    assert list(check_release.version(ready)) == [f"{CHANGELOG}: 0.1.0 is unreleased: give it the day of the release"]
+@pytest.mark.parametrize(
+    ("name", "old", "new", "told"),
+    [
+        (MANUAL, WEBSITE, "https://motion.dev/other", f"{MANUAL}: WEBSITE is https://motion.dev/other"),
+        (CHANGELOG, " - 2026-12-01", " - unreleased", "0.1.0 is unreleased: give it the day of the release"),
+        (MANIFEST, 'version = "0.1.0"\nname', 'version = "9.9.9"\nname', "no entry of 9.9.9"),
+        (CHANGELOG, "2026-12-01", "2026-12-02", f"{CHANGELOG} is not committed"),
+    ],
+)
+def test_what_is_not_ready_is_told(ready, capsys, name, old, new, told):
+    change(ready, name, old, new)
+    assert told in missing(capsys)
 
 
 def test_a_version_that_has_its_tag_was_released(ready, capsys):
     git(ready, "tag", "v0.1.0")
     assert "the tag v0.1.0 is there already" in missing(capsys)
-
-
-def test_what_is_not_committed_is_not_released(ready, capsys):
-    change(ready, CHANGELOG, "2026-12-01", "2026-12-02")
-    assert f"{CHANGELOG} is not committed" in missing(capsys)
 
 
 def test_pictures_are_there_in_their_size(ready):

@@ -38,45 +38,20 @@ def places(poses: Poses) -> np.ndarray:
 # -- names -------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("joint", "limb"),
-    [
-        ("LeftHand", "hands"),
-        ("mixamorig:RightHand", "hands"),
-        ("Lefthand", "hands"),
-        ("Bip01 L Hand", "hands"),
-        ("hand.L", "hands"),
-        ("hand_r", "hands"),
-        ("RHand", "hands"),
-        ("Foot_Right", "feet"),
-        ("rig:LeftFoot", "feet"),
-        ("Head", "heads"),
-        ("bip01_head", "heads"),
-    ],
-)
-def test_hands_feet_and_heads_are_told_by_their_names(joint: str, limb: str) -> None:
-    result = bodies.limbs_of(named("Hips", joint))
-    assert [(one.kind, one.joint) for one in result] == [(limb, 1)]
+LIMBS = {
+    "hands": "LeftHand;mixamorig:RightHand;Lefthand;Bip01 L Hand;hand.L;hand_r;RHand",
+    "feet": "Foot_Right;rig:LeftFoot",
+    "heads": "Head;bip01_head",
+    "": "LeftHandIndex1;HeadTop_End;Bip01HeadNub;LeftFootThumb1;Hand;LeftForeArm;;手;|`\n;L;5",
+}
 
 
-@pytest.mark.parametrize(
-    "joint",
-    [
-        "LeftHandIndex1",
-        "HeadTop_End",
-        "Bip01HeadNub",
-        "LeftFootThumb1",
-        "Hand",
-        "LeftForeArm",
-        "",
-        "手",
-        "|`\n",
-        "L",
-        "5",
-    ],
-)
-def test_what_is_near_a_hand_is_none(joint: str) -> None:
-    assert bodies.limbs_of(named("Hips", joint)) == []
+@pytest.mark.parametrize("limb", LIMBS)
+def test_hands_feet_and_heads_are_told_by_their_names_and_the_plainest_is_taken(limb: str) -> None:
+    for joint in LIMBS[limb].split(";"):
+        result = bodies.limbs_of(named("Hips", joint))
+        assert [(one.kind, one.joint) for one in result] == ([(limb, 1)] if limb else []), joint
+    assert [one.joint for one in bodies.limbs_of(named("Hips", "IK_LeftHand", "LeftHand", "Left_Hand"))] == [2]
 
 
 def test_a_limb_says_how_many_moving_joints_carry_it() -> None:
