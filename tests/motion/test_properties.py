@@ -239,29 +239,6 @@ def test_no_times_give_no_poses(mode):
 GOOD = ([0.0, 1.0, 2.0], np.zeros((3, 3)), np.eye(4)[[0, 0, 0]], None)
 
 
-def spoilt(field: int, row: int, value) -> tuple:
-    parts = [np.array(part, dtype=float) if part is not None else np.ones(3) for part in GOOD]
-    parts[field][row] = value
-    return tuple(parts)
-
-
-@pytest.mark.parametrize(
-    ("parts", "complaint"),
-    [
-        (spoilt(0, 1, np.nan), "key 1 has a time"),
-        (spoilt(0, 2, 1.0), "key 2 is not later"),
-        (spoilt(1, 2, np.inf), "key 2 has a position"),
-        (spoilt(2, 1, 0.0), "key 1 has a quaternion of length zero"),
-        (spoilt(2, 1, np.nan), "key 1 has a quaternion that is not finite"),
-        (spoilt(3, 0, -1.0), "key 0 has a scale"),
-    ],
-)
-def test_a_bad_key_is_named(parts, complaint):
-    key_times, positions, quaternions, scales = parts
-    with pytest.raises(ValueError, match=complaint):
-        interpolate(key_times, Poses(positions, quaternions, scales), [0.5])
-
-
 def test_a_bad_key_among_many_objects_is_named_with_its_object():
     positions = np.zeros((4, 3, 3))
     positions[2, 1, 0] = np.nan

@@ -41,14 +41,6 @@ def test_few_poses_get_where_many_do(count):
     np.testing.assert_allclose(few.quaternions, many.quaternions, atol=1e-12)
 
 
-def test_the_poses_that_are_given_stay_as_they_are():
-    poses = some_poses(1, 5, 4, scaled=True)
-    before = poses.positions.copy(), poses.quaternions.copy(), poses.scales.copy()
-    Skeleton([3, -1, 1, 1, 0]).in_root_space(poses)
-    for now, then in zip((poses.positions, poses.quaternions, poses.scales), before, strict=True):
-        assert np.array_equal(now, then)
-
-
 @settings(max_examples=tried(60))
 @given(st.integers(1, 14), st.integers(0, 2**16))
 def test_depths_levels_and_what_hangs_below_are_those_of_the_chains(joints, seed):

@@ -64,15 +64,6 @@ def test_a_key_has_a_say_in_no_more_segments_than_the_table_tells(mode):
     assert changed.min() < first + 0.05 * (times[6] - first)
 
 
-@given(st.integers(0, 2**16), st.integers(2, 8))
-def test_what_streams_are_shown_needs_no_key_after_the_next(seed, known):
-    times, keys = motion(10, seed)
-    moments = np.linspace(times[0], times[known], 301)
-    whole = interpolate(times, keys, moments, CAUSAL)
-    so_far = interpolate(times[: known + 1], keys[: known + 1], moments, CAUSAL)
-    assert_same(whole, so_far, 1e-12)
-
-
 @every_spline
 @pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])
 def test_where_a_key_repeats_the_body_rests(mode, scaled):
