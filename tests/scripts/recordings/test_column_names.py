@@ -12,28 +12,11 @@ from tests.scripts.recordings import logs
 
 
 @pytest.mark.parametrize(
-    ("name", "unit"),
-    [
-        *((f"pos_x{suffix}", unit) for unit, suffixes in logs.LENGTHS.items() for suffix in suffixes.split(";")[1:]),
-        *((f"rot_x{suffix}", unit) for unit, suffixes in logs.ANGLES.items() for suffix in suffixes.split(";")),
-        ("PosXCm", "cm"),
-        ("pos_cm_x", "cm"),
-        ("X (ft)", "ft"),
-        ("x [furlongs]", "furlongs"),
-        ("qw []", ""),
-        ("yaw (\u00b0)", "deg"),
-        ("left_foot_x", ""),
-    ],
-)
-def test_units_are_known_behind_names_and_in_brackets(name: str, unit: str) -> None:
-    assert column_name(name).unit == unit
-
-
-@pytest.mark.parametrize(
     ("names", "meant"),
     [
         ("left_foot_pos_x", ColumnName("position", "x", "", "left_foot")),
         ("r_hand_qw", ColumnName("quaternion", "w", "", "r_hand")),
+        ("tracker 1 q_w;tracker 1 quat_w", ColumnName("quaternion", "w", "", "tracker 1")),
         ("s;Scale", ColumnName("scale")),
         ("left_scale", ColumnName("scale", body="left")),
         ("frame;Frame;frameNumber;frame_id;Frame No.;sample index;samples", ColumnName("frame")),

@@ -267,14 +267,6 @@ def test_any_spelling_any_unit_any_order_and_any_layout_is_the_motion(tmp_path_f
         assert_is_the_motion(trajectory, MOTIONS[trajectory.name], start=start, unit=unit)
 
 
-def test_a_rate_of_frames_goes_before_a_column_of_times_where_there_are_both(write) -> None:
-    header = ["frame", *names("t", "{}", "q{}")]
-    rows = log(header[1:]).splitlines()[1:]
-    source = write("take.csv", "\n".join([",".join(header), *(f"{9 * row},{text}" for row, text in enumerate(rows))]))
-    assert_is_the_motion(read_one(source), MOTIONS["left"])
-    np.testing.assert_allclose(read_one(source, frame_rate=90.0).times, np.arange(len(rows)) / 10.0)
-
-
 def test_a_device_that_is_alone_is_asked_for_by_its_name(write) -> None:
     rows = log(["t", "x", "y", "z", "qx", "qy", "qz", "qw"]).splitlines()
     text = "\n".join([f"hand,{rows[0]}", *(f"left,{row}" for row in rows[1:])])
