@@ -230,17 +230,6 @@ def test_an_error_that_nobody_foresaw_is_told_and_the_others_go_on(tmp_path, cap
 # What is left alone, and what is kept
 
 
-def test_a_file_that_is_there_is_left_alone_unless_it_may_be_overwritten(tmp_path, capsys):
-    path = one_object_file(tmp_path / "shot.blend")
-    baked_name(path).write_text("precious")
-    assert run(path) == 1
-    assert "is there already: add --overwrite" in capsys.readouterr().err
-    assert baked_name(path).read_text() == "precious"
-    assert run(path, "--overwrite") == 0
-    open_again(baked_name(path))
-    assert len(frames_of_keys(bpy.data.objects["Tool"])) == 40
-
-
 def test_in_place_the_file_is_saved_and_the_one_before_kept_by_blender(tmp_path, capsys):
     path = one_object_file(tmp_path / "shot.blend")
     before = path.read_bytes()

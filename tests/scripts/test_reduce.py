@@ -92,9 +92,10 @@ def test_a_rig_with_keys_of_its_own_plays_within_the_tolerance_in_the_world(tmp_
     assert 0.0 < displacement(played(reduced_name(path), *probes), played(path, *probes), at_ends) <= 5e-3 + ROUNDING
 
 
-def test_key_poses_are_on_the_same_frames_for_all_bones(tmp_path):
+def test_key_poses_are_few_and_on_the_same_frames_for_all_bones(tmp_path, capsys):
     path = rig_file(tmp_path / "shot.blend")
-    assert run(path, "--tolerance", "1cm", "--shared") == 0
+    assert run(path, "--shared") == 0
+    assert "(12 mm allowed)" in capsys.readouterr().err
     open_again(reduced_name(path))
     frames = [
         [point.co.x for point in curves_of(bone)["location", 0].keyframe_points]
@@ -352,9 +353,3 @@ def test_a_stop_between_bodies_tells_of_the_files_that_are_complete(tmp_path, ca
 def test_a_wrong_option_ends_with_code_2_and_a_way_out(arguments, complaint, capsys):
     assert exit_code(*arguments) == 2
     assert complaint in capsys.readouterr().err
-
-
-def test_key_poses_are_few_where_no_tolerance_is_given(tmp_path, capsys):
-    path = rig_file(tmp_path / "shot.blend")
-    assert run(path, "--shared") == 0
-    assert "(12 mm allowed)" in capsys.readouterr().err

@@ -89,6 +89,12 @@ def test_a_file_whose_clips_need_their_keys_is_left_alone(tmp_path, capsys):
     assert (said.out, listed(tmp_path)) == ("", ["walk.glb"])
 
 
+def test_key_poses_are_so_many_frames_of_all_joints(tmp_path):
+    source = walk().write(tmp_path / "walk.glb")
+    assert run(source, "--key-poses", "9") == 0
+    assert len(File(tmp_path / "walk-reduced.glb").moments(0)) == 9
+
+
 def test_a_file_that_vanishes_while_it_is_read_is_said(tmp_path, monkeypatch, capsys):
     source = walk().write(tmp_path / "walk.glb")
     before = gltf_files.reduced
