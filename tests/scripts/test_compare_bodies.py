@@ -11,7 +11,6 @@ import pytest
 from rigid_motion_batch.cli import compare
 from rigid_motion_batch.recordings import read_trajectories
 from tests.blank import blank
-from tests.scripts.analysis.test_body_metrics import HEADER
 from tests.scripts.comparing import COLUMNS, ROOT, write_toss
 from tests.scripts.recordings.skeletons import body, export
 from tests.scripts.recordings.test_damaged_bvh_bodies import seed
@@ -82,22 +81,6 @@ def test_the_table_has_a_row_for_every_body_choice_and_mode(written: tuple[Path,
         assert 0.0 < float(row["rms_shell_m"]) <= float(row["p95_shell_m"]) <= float(row["max_shell_m"]) < 1.0
         if row["decimation"] == "adaptive":
             assert float(row["max_shell_m"]) <= 0.01 * (1.0 + 1e-9)
-
-
-def test_the_table_of_joints_has_a_row_for_every_joint_of_these(written: tuple[Path, Path]) -> None:
-    walk, output = written
-    joints = joints_in(walk)
-    assert (output / "metrics_joints.csv").read_text().splitlines()[0] == HEADER
-    rows = rows_of(output / "metrics_joints.csv")
-    assert len(rows) == len(joints) * len(MODES) * 3
-    assert {row["clip"] for row in rows} == {"walk"}
-    for whole in (row for row in rows_of(output / "metrics.csv") if row["clip"] == "walk"):
-        own = [row for row in rows if all(row[name] == whole[name] for name in ("mode", "rate_hz", "decimation"))]
-        assert [row["joint"] for row in own] == list(joints)
-        assert max(float(row["max_shell_m"]) for row in own) == float(whole["max_shell_m"])
-        assert sum(int(row["keys"]) for row in own) == int(whole["keys"])
-        (worst,) = (row for row in own if row["joint"] == whole["worst_joint"])
-        assert worst["max_shell_m"] == whole["max_shell_m"]
 
 
 def test_a_radius_of_its_own_changes_the_errors_of_that_joint_alone(written: tuple[Path, Path], tmp_path: Path) -> None:

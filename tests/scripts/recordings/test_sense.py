@@ -134,8 +134,3 @@ def test_of_nanoseconds_since_1970_none_is_lost_in_a_csv(write) -> None:
     text = csv_of([str(1_403_636_580_838_555_648 + 5_000_001 * row) for row in range(4)]).replace("t,", "t [ns],", 1)
     (trajectory,) = read_trajectories(write("take.csv", text)).trajectories
     np.testing.assert_array_equal(trajectory.times, np.arange(4) * 5_000_001 / 1e9)
-
-
-def test_times_that_count_up_by_one_may_be_frames() -> None:
-    way_out = doubts(hand(rate=1.0), time_unit=True)[0].way_out
-    assert way_out.startswith("if it counts frames, --frame-rate 90, or how many there were a second; if its times are")

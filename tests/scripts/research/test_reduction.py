@@ -58,21 +58,6 @@ def test_of_a_skeleton_the_root_is_read(tmp_path):
     assert shell_error(whole.poses, root.poses, RADIUS).max() < 1e-9
 
 
-def test_means_are_geometric(clip):
-    def outcome(frames, largest):
-        return reduction.Outcome(10.0, frames, 80, largest)
-
-    rows = [
-        reduction.row(clip, outcome(10, 1.0), outcome(frames, 1.0), outcome(10, ratio))
-        for frames, ratio in ((20, 2.0), (80, 8.0))
-    ]
-    rows.append(reduction.row(clip, outcome(10, 1.0), None, None))
-    assert (rows[-1]["decimate"], rows[-1]["few_mm"]) == (None, None)
-    assert reduction.means(rows) == pytest.approx(
-        {"frames": 4.0, "key_count": 1.0, "numbers": 1.0, "error_mm": 1.0, "few_mm": 4.0}
-    )
-
-
 def test_a_recording_of_too_few_poses_is_refused(tmp_path):
     path = tmp_path / "still.csv"
     path.write_text("t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n0,0,0,0,0,0,0,1\n", encoding="utf-8")

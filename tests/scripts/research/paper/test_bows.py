@@ -13,10 +13,6 @@ def test_a_pivot_has_all_of_the_bow_and_the_screw_no_error():
     assert all(share == pytest.approx(1.0, abs=1e-9) and error < 1e-9 for share, error in result.values())
 
 
-def test_a_circle_that_turns_the_other_way_has_less_than_none_of_it():
-    assert all(share < 0.0 and error > 1.0 for share, error in bows_of(circling(turns=-1.0)).values())
-
-
 def test_a_body_that_flies_straight_has_no_error_to_compare():
     assert bows_of(spinning_straight()) == {}
 

@@ -5,7 +5,6 @@ import pytest
 
 from research.paper import table
 from research.paper.claims import UPDATES
-from rigid_motion.motion import MODES
 from rigid_motion_batch.recordings.clips import Clip
 from tests.scripts.research.paper.clips import circling
 
@@ -52,16 +51,6 @@ def test_a_spline_of_a_circle_needs_far_fewer_updates_than_chords():
     for name in ("motor_spline", f"motor_spline{table.CHOSEN}"):
         assert set(own[name]) == set(UPDATES)
         assert max(own[name].values()) < 0.6
-
-
-def test_modes_that_are_not_in_the_table_are_the_motion_of_one_that_is():
-    clip = circling(turns=0.5, rate=60.0)
-    keys = table.senders(clip, 10.0)
-    errors = {mode: table.point(clip, mode, keys)[1] for mode in MODES}
-    assert errors["pga_slerp"] == pytest.approx(errors["dq_sclerp"], rel=1e-9)
-    assert errors["cga_slerp"] == pytest.approx(errors["dq_sclerp"], rel=1e-9)
-    assert errors["cga_lerp"] == pytest.approx(errors["pga_lerp"], rel=1e-9)
-    assert errors["lerp_slerp"] != pytest.approx(errors["dq_sclerp"], rel=1e-3)
 
 
 def test_senders_begin_one_after_the_other_within_an_interval():
