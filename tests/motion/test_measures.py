@@ -66,14 +66,6 @@ def test_no_point_of_the_ball_is_off_by_more_and_one_is_off_by_as_much(growing):
     assert np.all(inside.max(axis=1) <= error * (1.0 + 1e-12) + 1e-15)
 
 
-@pytest.mark.parametrize("growing", [False, True])
-def test_a_radius_for_each_pose(growing):
-    poses, truth = pairs(50, 7, growing)
-    radii = np.random.default_rng(8).uniform(0.0, 2.0, 50)
-    each = [shell_error(poses[[i]], truth[[i]], radius)[0] for i, radius in enumerate(radii)]
-    assert shell_error(poses, truth, radii) == pytest.approx(each, rel=1e-14)
-
-
 def test_velocity_error_is_the_drift_per_second():
     times = np.array([0.0, 0.5, 1.5])
     truth = Poses(np.zeros((3, 3)), [IDENTITY] * 3)

@@ -216,14 +216,6 @@ def test_many_objects_at_once_are_the_objects_one_by_one(mode, scaled, own_key_t
             assert np.array_equal(together.scales[row], alone.scales)
 
 
-def test_clock_times_of_ten_digits_lose_nothing():
-    keys = Poses([[0, 0, 0], [1, 0, 0]], [[1, 0, 0, 0], [1, 0, 0, 0]])
-    start, end = 1305031098.6659, 1305031098.7659
-    moment = start + 0.25 * (end - start)
-    expected = (moment - start) / (end - start)
-    assert interpolate([start, end], keys, [moment], "dq_sclerp").positions[0, 0] == pytest.approx(expected, abs=1e-12)
-
-
 @every_mode
 def test_one_key_is_a_rest(mode):
     key = Poses([[1, 2, 3]], [[2, 0, 0, 0]])

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from rigid_motion.motion import Poses, Skeleton
 from rigid_motion.motion.poses import inverse, placed
-from rigid_motion.motion.skeletons import FEW
 from tests.motion.bodies import in_root_space, matrices, random_parents
 from tests.motion.cases import random_quaternions
 from tests.thoroughness import tried
@@ -29,16 +28,6 @@ def test_joints_get_where_matrices_take_them(joints, seed, scaled):
     there = matrices(Skeleton(parents).in_root_space(poses))
     expected = in_root_space(poses, parents)
     assert np.abs(there - expected).max() <= 1e-13 * max(1.0, np.abs(expected).max())
-
-
-@pytest.mark.parametrize("count", [1, FEW, FEW + 1])
-def test_few_poses_get_where_many_do(count):
-    parents = random_parents(np.random.default_rng(3), 40)
-    rng, skeleton = np.random.default_rng(4), Skeleton(parents)
-    poses = Poses(rng.normal(size=(40, 3 * FEW, 3)), random_quaternions(rng, 40, 3 * FEW))
-    few, many = skeleton.in_root_space(poses[:, :count]), skeleton.in_root_space(poses)[:, :count]
-    np.testing.assert_allclose(few.positions, many.positions, atol=1e-12)
-    np.testing.assert_allclose(few.quaternions, many.quaternions, atol=1e-12)
 
 
 @settings(max_examples=tried(60))

@@ -6,26 +6,9 @@ import numpy as np
 import pytest
 
 from rigid_motion_batch.recordings import read_trajectories
-from tests.scripts.recordings.blends import FPS, empty, fcurves, key, on_frames
+from tests.scripts.recordings.blends import empty, fcurves, key
 
 bpy = pytest.importorskip("bpy")
-
-
-def test_an_object_is_sampled_on_every_frame_of_its_action(saved) -> None:
-    drill = empty("Drill", rotation_mode="QUATERNION")
-    key(drill, 11, location=(0, 0, 0), rotation_quaternion=(1, 0, 0, 0))
-    key(drill, 21, location=(0, 10, 0), rotation_quaternion=(0, 0, 0, 1))
-    expected = []
-    for frame in range(11, 22):
-        bpy.context.scene.frame_set(frame)
-        expected.append(drill.location[1])
-    (trajectory,) = map(on_frames, read_trajectories(saved()).trajectories)
-    assert trajectory.name == "Drill"
-    np.testing.assert_allclose(trajectory.times, np.arange(11, 22) / FPS, rtol=1e-15)
-    np.testing.assert_allclose(trajectory.poses.positions[:, 1], expected, atol=1e-6)
-    np.testing.assert_allclose(np.abs(trajectory.poses.quaternions[[0, -1]]), [[1, 0, 0, 0], [0, 0, 0, 1]], atol=1e-6)
-    assert trajectory.poses.scales is None
-    assert 0.0 < trajectory.poses.positions[1, 1] < 0.9, "eased, as Blender's curves are"
 
 
 def test_the_animated_objects_are_told_and_still_ones_are_not(saved) -> None:

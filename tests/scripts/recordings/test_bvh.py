@@ -21,21 +21,17 @@ def test_without_a_name_it_is_the_whole_body_each_joint_in_its_parents_space(wri
     (body,) = recording.trajectories
     assert (body.name, recording.others, recording.note, recording.axes) == ("arm", (), "", "opengl")
     assert body.rest_body.joints == ("Shoulder", "Elbow")
+    np.testing.assert_array_equal(body.times, [0.0, 0.04])
     np.testing.assert_array_equal(body.rest_body.parents, [-1, 0])
+    np.testing.assert_array_equal(body.rest_body.rest.positions, [[0, 0, 0], [2, 0, 0]])
+    np.testing.assert_array_equal(body.rest_body.rest.quaternions, [[1, 0, 0, 0]] * 2)
+    np.testing.assert_array_equal(body.rest_body.tails[0], [2, 0, 0])
+    assert np.linalg.norm(body.rest_body.tails[1]) > 0.0  # Its end site.
     np.testing.assert_allclose(body.poses.positions, [[[0, 0, 0], [1, 2, 0]], [[2, 0, 0]] * 2], atol=1e-15)
     there = body.rest_body.skeleton.in_root_space(body.poses)
     for joint, alone in enumerate(read_trajectories(str(recording.path) + ":*").trajectories):
         np.testing.assert_allclose(there[joint].positions, alone.poses.positions, atol=1e-15)
         assert angle_between(there[joint].quaternions, alone.poses.quaternions).max() < 1e-15
-
-
-def test_a_body_rests_where_no_joint_is_turned_and_its_bones_end_at_their_children(write) -> None:
-    (body,) = read_trajectories(write("arm.bvh", ARM)).trajectories
-    np.testing.assert_array_equal(body.times, [0.0, 0.04])
-    np.testing.assert_array_equal(body.rest_body.rest.positions, [[0, 0, 0], [2, 0, 0]])
-    np.testing.assert_array_equal(body.rest_body.rest.quaternions, [[1, 0, 0, 0]] * 2)
-    np.testing.assert_array_equal(body.rest_body.tails[0], [2, 0, 0])
-    assert np.linalg.norm(body.rest_body.tails[1]) > 0.0  # Its end site.
 
 
 @pytest.mark.parametrize(

@@ -128,9 +128,3 @@ def test_times_that_are_no_seconds_are_refused_with_their_unit(write, refusal, n
     np.testing.assert_array_equal(trajectory.times - trajectory.times[0], [row * 11 / 1000 for row in range(9)])
     (trajectory,) = read_trajectories(source, ReadingOptions(time_unit="s")).trajectories
     assert typical_interval(trajectory.times) == pytest.approx(11 * ticks / 1000, rel=0.05)
-
-
-def test_of_nanoseconds_since_1970_none_is_lost_in_a_csv(write) -> None:
-    text = csv_of([str(1_403_636_580_838_555_648 + 5_000_001 * row) for row in range(4)]).replace("t,", "t [ns],", 1)
-    (trajectory,) = read_trajectories(write("take.csv", text)).trajectories
-    np.testing.assert_array_equal(trajectory.times, np.arange(4) * 5_000_001 / 1e9)
