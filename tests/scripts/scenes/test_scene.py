@@ -256,6 +256,12 @@ def test_a_clip_shorter_than_a_frame_is_one_frame():
     assert len(evaluated_points(bpy.data.objects["Time"]))
 
 
+@pytest.mark.parametrize("engine", ["workbench", "eevee", "cycles"])
+def test_every_engine_can_be_chosen(engine):
+    made = reconstruct(swinging_clip(seconds=0.6), "5", ("dq_sclerp",))
+    assert engine in build_scene(made, dataclasses.replace(SETTINGS, engine=engine)).render.engine.lower()
+
+
 def test_an_object_that_would_be_lost_on_its_path_is_shown_larger_and_says_so():
     build_scene(reconstruct(changed(swinging_clip(seconds=1.0), 100.0), "5", TWO), SETTINGS)
     assert "object shown" in bpy.data.curves["Legend"].body
