@@ -1,7 +1,5 @@
 """The largest displacement of any point of a ball, by singular values: apart from the program's own formula."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

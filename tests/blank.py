@@ -1,7 +1,5 @@
 """A new file without objects at factory settings, as often as tests ask for one."""
 
-from __future__ import annotations
-
 import bpy
 
 Settings = list[tuple[str, str, object]]

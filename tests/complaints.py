@@ -1,7 +1,5 @@
 """What the program logs as an error where it must not raise one, as in handlers: Blender would swallow it."""
 
-from __future__ import annotations
-
 import logging
 
 import pytest

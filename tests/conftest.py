@@ -5,8 +5,6 @@ Nothing here needs Blender: `tests/motion` runs with NumPy and pytest alone. Wha
 `pytest_cmdline_main`.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 from importlib.util import find_spec

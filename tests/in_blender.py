@@ -1,7 +1,5 @@
 """What tests in Blender share: `bpy` is imported first, since `mathutils` comes with it. A plugin of pytest."""
 
-from __future__ import annotations
-
 import os
 import sys
 from pathlib import Path

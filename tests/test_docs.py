@@ -1,7 +1,5 @@
 """What was measured of the recordings that pages speak of, and what it was compared with."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

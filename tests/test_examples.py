@@ -1,7 +1,5 @@
 """The examples: what their READMEs say is typed as it stands there, and what it makes is measured."""
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Callable, Sequence
@@ -17,7 +15,7 @@ from examples.camera import make as camera
 from examples.dancer import make as dancer
 from examples.lid import make as lid
 from examples.sword import make as sword
-from rigid_motion.motion import Poses, reduce_keys, shell_error
+from rigid_motion.motion import Poses, shell_error
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from tests.scripts.comparing import outputs
 
@@ -180,16 +178,6 @@ def test_a_camera_keeps_within_the_tolerance_of_its_solution_with_few_keys(make:
     assert keys_of("Smooth") == int(rows["motor_spline"])
     assert len(measured(tmp_path / "renders" / "camera-keys" / "solve-keys.csv")) == int(rows["motor_spline"])
     assert keys_of("Solved") == len(clip.times)
-
-
-def test_a_tolerance_below_what_a_solver_is_off_by_takes_as_many_keys_as_the_page_says(tmp_path: Path) -> None:
-    path = tmp_path / "solve.csv"
-    path.write_text(camera.solution(), encoding="utf-8")
-    (clip,), _ = read_clips([str(path)], "blender")
-    tolerance, count = re.search(
-        r"`TOLERANCE` in `make\.py` to ([\d.]+).*?takes (\d+) of them", readme("camera"), re.S
-    ).groups()
-    assert len(reduce_keys(clip.times, clip.poses, camera.MODE, float(tolerance), camera.RADIUS)) == int(count)
 
 
 def test_a_job_for_a_farm_makes_the_same_as_one_machine(make: Callable, tmp_path: Path) -> None:

@@ -1,7 +1,5 @@
 """The glossary lists what it explains, and links between the pages of the checkout lead somewhere."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

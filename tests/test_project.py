@@ -1,7 +1,5 @@
 """What holds for the whole checkout: one style, one version, a manifest that Blender takes, one way to the network."""
 
-from __future__ import annotations
-
 import ast
 import itertools
 import re

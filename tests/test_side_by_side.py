@@ -1,7 +1,5 @@
 """Tests in workers: what goes wrong in one of them makes the whole run red, and nothing else does."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The documentation site: it builds without a warning, is complete in itself, and opens without a network."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections import defaultdict
@@ -138,12 +136,6 @@ def test_every_command_says_its_options(command, site, pages):
     page = pages[site / "commands.html"]
     module = COMMANDS[command].module.removesuffix(".__main__").lstrip(".")
     assert f"{module}-help" in page.anchors
-
-
-def test_the_search_knows_sclerp(site):
-    index = (site / "searchindex.js").read_text(encoding="utf-8")
-    known = json.loads(index.removeprefix("Search.setIndex(").rstrip(");"))
-    assert "sclerp" in {**known["terms"], **known["titleterms"]}
 
 
 def test_the_search_has_the_text_of_every_page_for_its_excerpts(site):

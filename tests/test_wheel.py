@@ -1,7 +1,5 @@
 """What pip installs: one wheel, in an environment that has nothing of the checkout."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -21,14 +19,6 @@ BESIDES = (
     *("shtab", "vl-convert-python"),
 )
 """What the extra `blender` brings along, and the dependencies. The environment of these tests lends it."""
-
-WITHOUT_BLENDER = """
-import sys
-from rigid_motion.motion import Poses, interpolate
-poses = interpolate([0.0, 1.0], Poses([[0, 0, 0], [1, 0, 0]], [[1, 0, 0, 0], [0, 0, 0, 1]]), [0.5], "dq_sclerp")
-assert poses.quaternions.shape == (1, 4)
-print(sorted({name.split(".")[0] for name in sys.modules} & {"bpy", "mathutils", "scipy", "rigid_motion_batch"}))
-"""
 
 
 @pytest.fixture(scope="module")
@@ -108,11 +98,6 @@ def test_help_shows_every_command_as_it_is_typed(command: str, installed: Path) 
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith(f"usage: rigid-motion {command}")
     assert "python scripts/" not in done.stdout.replace("python scripts/bootstrap.py tasks", "")
-
-
-def test_the_mathematics_needs_numpy_alone(installed: Path) -> None:
-    done = run(installed / "python", "-W", "error", "-c", WITHOUT_BLENDER)
-    assert (done.returncode, done.stdout.strip()) == (0, "[]"), done.stderr
 
 
 def test_a_command_that_there_is_not_is_said(installed: Path) -> None:

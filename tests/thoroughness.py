@@ -1,7 +1,5 @@
 """How much is tried by tests that try many cases: a fair sample by default, all of them in continuous integration."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The assets are what their script makes, and what they claim to be."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +15,7 @@ from research.making.motions import (
     TIP,
 )
 from rigid_motion.motion import Poses
-from rigid_motion.motion.quaternions import angle_between, rotate
+from rigid_motion.motion.quaternions import rotate
 
 ASSETS = Path(make_assets.__file__).parent
 
@@ -70,22 +68,6 @@ def test_a_clip_has_the_timer_of_a_90_hz_device(name):
     assert np.mean(steps > 0.0125) > 0.02
 
 
-@pytest.mark.parametrize("name", MOTIONS)
-def test_a_clip_has_unit_quaternions_without_sign_flips(name):
-    _, poses = recorded(name)
-    np.testing.assert_allclose(np.linalg.norm(poses.quaternions, axis=1), 1.0, atol=2e-6)
-    assert np.einsum("ni,ni->n", poses.quaternions[1:], poses.quaternions[:-1]).min() > 0.9
-
-
-@pytest.mark.parametrize("name", MOTIONS)
-def test_a_clip_moves_at_the_speeds_of_hands(name):
-    times, poses = recorded(name)
-    speeds = np.linalg.norm(np.diff(poses.positions, axis=0), axis=1) / np.diff(times)
-    rates = np.degrees(angle_between(poses.quaternions[:-1], poses.quaternions[1:])) / np.diff(times)
-    assert 0.4 < speeds.max() < 4.0
-    assert 150.0 < rates.max() < 800.0
-
-
 def test_the_pivot_keeps_its_tip_in_place_while_the_handle_moves():
     _, poses = recorded("pivot")
     tip = place_of(TIP, poses)
@@ -105,9 +87,6 @@ def test_the_screw_advances_by_its_pitch_with_every_turn():
     advance = (tip - tip[0]) @ forward
     assert advance[-1] == pytest.approx(PITCH * (turns[-1] - turns[0]), abs=1e-3)
     assert np.polyfit(turns, advance, 1)[0] == pytest.approx(PITCH, rel=0.15)
-
-
-# ---- what clips are made of ------------------------------------------------------------------------------------------
 
 
 # ---- what models are made of -----------------------------------------------------------------------------------------

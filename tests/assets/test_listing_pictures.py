@@ -1,7 +1,5 @@
 """The pictures of the extension's page: what they show is what happens, and they can be shown anywhere."""
 
-from __future__ import annotations
-
 import struct
 
 import bpy

@@ -1,7 +1,5 @@
 """The notebook is what its script makes, and shows what the program says today."""
 
-from __future__ import annotations
-
 import ast
 import contextlib
 import io

@@ -1,7 +1,5 @@
 """glTF files of every feature that animations may have, made by hand."""
 
-from __future__ import annotations
-
 import base64
 import json
 import struct

@@ -1,7 +1,5 @@
 """Where the nodes of a glTF file are, by matrices and the specification alone: nothing here is the program's own."""
 
-from __future__ import annotations
-
 import base64
 import json
 import struct

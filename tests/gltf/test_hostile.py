@@ -1,7 +1,5 @@
 """Damaged and hostile glTF files: one line each that says what is wrong and what to do, and nothing is written."""
 
-from __future__ import annotations
-
 import json
 import os
 import struct

@@ -1,7 +1,5 @@
 """Long clips, stretch by stretch: the promise holds across, feet stand across, and memory stays flat."""
 
-from __future__ import annotations
-
 import tracemalloc
 from pathlib import Path
 

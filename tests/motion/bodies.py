@@ -1,7 +1,5 @@
 """Bodies for tests: random skeletons that move, and how far off they are, by matrices and apart from the program."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 

@@ -1,7 +1,5 @@
 """Pairs of poses for tests: ordinary ones, and the corners where formulas break."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from rigid_motion.motion import Poses

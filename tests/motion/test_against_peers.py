@@ -4,19 +4,14 @@ Positions agree to 1e-12 of their own size, for turns of 1e-9 rad as for turns o
 unit quaternions neither is ill-conditioned, only the choice between two shortest ways at exactly 180 degrees is.
 """
 
-from __future__ import annotations
-
-import warnings
-
 import kingdon
 import numpy as np
 import pytest
 from pytransform3d.trajectories import dual_quaternions_from_pqs, dual_quaternions_sclerp, pqs_from_dual_quaternions
-from scipy.linalg import expm, logm
 from scipy.spatial.transform import Rotation, Slerp
 
 from rigid_motion.motion import MODES, Poses, interpolate
-from tests.motion.cases import PAIRS, as_keys, assert_same, corners, pair, shares, size_of
+from tests.motion.cases import PAIRS, as_keys, assert_same, corners, shares, size_of
 
 CORNERS = list(corners())
 SCREWS = ["dq_sclerp", "pga_slerp", "cga_slerp"]
@@ -115,36 +110,6 @@ def test_blends_with_scale_take_the_origin_where_the_plain_lerp_takes_it(corner,
     near = [cga_versor(in_units_of(unit, p)) for p in (first, second)]
     origin = unit * carried_by(near[0] * (1 - u) + near[1] * u, np.zeros((PAIRS, 3)))
     assert_same(poses, Poses(origin, np.stack((w, -e23, e13, -e12), axis=-1), (1 + k) / (1 - k)), tolerance=1e-11)
-
-
-@ways
-def test_blends_of_scale_alone_follow_the_stated_law(way):
-    first = Poses(np.zeros((PAIRS, 3)), np.tile((1.0, 0, 0, 0), (PAIRS, 1)), np.ones(PAIRS))
-    second = Poses(first.positions, first.quaternions, np.full(PAIRS, 4.0))
-    quarter = np.full(PAIRS, 0.25)
-    assert evaluate("cga_lerp", way, first, second, quarter).scales == pytest.approx(1.25 / 0.875, rel=1e-14)
-    assert evaluate("cga_slerp", way, first, second, quarter).scales == pytest.approx(np.sqrt(2.0), rel=1e-14)
-
-
-def as_matrix(poses: Poses, row: int) -> np.ndarray:
-    matrix = np.eye(4)
-    matrix[:3, :3] = Rotation.from_quat(poses.quaternions[row], scalar_first=True).as_matrix() * poses.scales[row]
-    matrix[:3, 3] = poses.positions[row]
-    return matrix
-
-
-@ways
-def test_similarities_follow_the_matrix_logarithm(way):
-    # Up to 170 degrees: SciPy's `logm` loses digits towards 180.
-    first, second = pair(np.random.default_rng(3).uniform(0.0, 2.97, PAIRS), scaled=True)
-    poses = evaluate("cga_slerp", way, first, second, shares())
-    for row in range(0, PAIRS, 10):
-        start, end = as_matrix(first, row), as_matrix(second, row)
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "logm result may be inaccurate")
-            logarithm = logm(np.linalg.inv(start) @ end).real
-        expected = start @ expm(shares()[row] * logarithm)
-        assert np.abs(as_matrix(poses, row) - expected).max() < 1e-11 * np.abs(expected).max()
 
 
 @ways

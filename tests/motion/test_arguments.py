@@ -1,7 +1,5 @@
 """What callers give in the wrong form: taken where it has one meaning, else refused by name, with a way out."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -33,6 +31,7 @@ POSES = Poses(
     np.random.default_rng(0).normal(size=(COUNT, 3)).cumsum(axis=0), random_quaternions(np.random.default_rng(1), COUNT)
 )
 BODY = Poses(np.stack((POSES.positions,) * 2), np.stack((POSES.quaternions,) * 2))
+GROWING = Poses(BODY.positions, BODY.quaternions, np.tile(1.0 + TIMES, (2, 1)))
 KEYS = [0, 4, 11]
 MASK = np.isin(np.arange(COUNT), KEYS)
 
@@ -130,8 +129,8 @@ def reduced(**options):
     return reduce_keys(TIMES, POSES, **{"tolerance": 0.1, **options})
 
 
-def body_reduced(**options):
-    return reduce_skeleton_keys(TIMES, BODY, [-1, 0], **{"tolerance": 0.1, **options})
+def body_reduced(poses=BODY, **options):
+    return reduce_skeleton_keys(TIMES, poses, [-1, 0], **{"tolerance": 0.1, **options})
 
 
 def errors_of_body(**options):
@@ -165,7 +164,10 @@ BROKEN.positions[7] = np.nan
         (lambda: decimate([0.0, np.nan, 1.0], 5.0), "sample 1 has a time that is not finite"),
         (lambda: decimate(TIMES, 0.0), "rate"),
         (lambda: decimate(TIMES, np.inf), "rate"),
-        (lambda: fit_keys(TIMES, POSES, KEYS, "bezier"), "no mode 'bezier'"),
+        (
+            lambda: fit_keys(TIMES, POSES, KEYS, "bezier"),
+            "there is no mode 'bezier'; the modes are lerp_slerp, dq_",
+        ),
         (lambda: fit_keys(TIMES, POSES, KEYS, radius=0.0), "radius of 0.0"),
         (lambda: fit_keys(TIMES, POSES, KEYS, radius=np.nan), "radius of nan"),
         (lambda: fit_keys(TIMES, BROKEN, KEYS), "sample 7 is not finite"),
@@ -206,6 +208,16 @@ BROKEN.positions[7] = np.nan
         (lambda: errors_of_body(radius=[0.1] * 3), r"radius of shape \(3,\)"),
         (lambda: errors_of_body(stored=BODY[:, :4]), "stored poses of shape"),
         (lambda: errors_of_body(keys=[SeparateKeys(KEYS, KEYS)] * 2, mode="dq_sclerp"), "dq_sclerp is none"),
+        (lambda: body_reduced(separate=True, poses=GROWING, **STRAIGHT), "the scale of joint [01] changes"),
+        (
+            lambda: interpolate(TIMES, Poses(POSES.positions, 0.0 * POSES.quaternions), TIMES),
+            "key 0 has a quaternion of",
+        ),
+        (
+            lambda: interpolate(TIMES, Poses(POSES.positions, POSES.quaternions, -np.ones(12)), TIMES),
+            "key 0 has a scale",
+        ),
+        (lambda: interpolate(TIMES[[0, 1, 1]], POSES[:3], TIMES), "key 2 is not later"),
         (lambda: repair(TIMES[:5], POSES), r"times of shape \(5,\) do not fit"),
         (lambda: standing(TIMES, POSES.positions), r"need the shape \(joints, 12, 3\)"),
         (lambda: Skeleton([-1]).in_root_space(BODY), "do not fit 1 joints, which come first"),
@@ -241,12 +253,6 @@ def test_what_makes_no_sense_is_refused_in_words(use, message):
 def test_what_has_the_wrong_type_is_refused_by_name(use, message):
     with pytest.raises(TypeError, match=message):
         use()
-
-
-def test_a_body_may_have_a_radius_for_each_joint():
-    shown = BODY[:, ::-1]
-    of_joints = [measure(TIMES, shown[joint], BODY[joint], radius).shell for joint, radius in enumerate((0.1, 0.4))]
-    assert measure(TIMES, shown, BODY, radius=[[0.1], [0.4]]).shell.tolist() == np.stack(of_joints).tolist()
 
 
 WITH_NUMBERS = [

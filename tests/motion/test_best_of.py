@@ -1,7 +1,5 @@
 """The best mode of each segment: never worse than a single mode, right where the answer is known, no change in vain."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -120,13 +118,6 @@ def test_a_mode_that_passes_the_tolerance_is_out_though_it_is_nearer_on_the_whol
     assert least_errors(errors, keys, tolerance=2.5).tolist() == [0]
     # Where all pass it, the nearest is still to be preferred.
     assert least_errors(errors, keys, tolerance=1.0).tolist() == [1]
-
-
-def test_samples_outside_of_the_keys_do_not_count():
-    times, poses = wandering(300, 8)
-    keys = np.arange(40, 260, 20)
-    inner = slice(40, 241)
-    assert best_modes(times, poses, keys) == best_modes(times[inner], poses[inner], keys - 40)
 
 
 @pytest.mark.parametrize(("tolerance", "mode"), [(0.01, "motor_spline"), (0.01, "lerp_slerp"), (0.01, "dq_sclerp")])

@@ -1,7 +1,5 @@
 """What is public says what it takes, gives and refuses, and its examples are true."""
 
-from __future__ import annotations
-
 import doctest
 import inspect
 import re
@@ -12,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from rigid_motion import motion
-from rigid_motion.motion import MODES, Skeleton, best_modes
+from rigid_motion.motion import MODES, Skeleton
 
 ADDON = Path(__file__).resolve().parents[2] / "addon"
 CALLABLES = sorted(name for name in motion.__all__ if callable(getattr(motion, name)))
@@ -66,10 +64,6 @@ def test_errors_are_described(name):
 @pytest.mark.parametrize("name", CALLABLES)
 def test_what_to_see_also_is_public(name):
     assert set(entries(sections(name)["See Also"])) <= set(motion.__all__) - {name}
-
-
-def test_the_modes_to_choose_from_are_named_in_the_signature():
-    assert inspect.signature(best_modes).parameters["modes"].default == tuple(motion.KEYFRAME_MODES)
 
 
 @pytest.mark.parametrize("value", [*MODES.values(), Skeleton([-1, 0])], ids=str)

@@ -1,12 +1,9 @@
 """Euler angles against mathutils, and their continuity."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np
 import pytest
-from mathutils import Euler
 from scipy.spatial.transform import Rotation
 
 from rigid_motion.motion import Poses, interpolate
@@ -34,13 +31,6 @@ def test_angles_of_any_size_give_scipys_rotations(order):
     quaternions = quaternions_from_extrinsic_eulers(angles, order)
     assert np.abs(np.linalg.norm(quaternions, axis=1) - 1.0).max() < 1e-15
     assert np.abs(quaternions - expected * np.sign(np.sum(quaternions * expected, axis=1))[:, None]).max() < 1e-13
-
-
-@in_every_order
-def test_mathutils_has_the_same_order_and_axes(order):
-    quaternions = random_quaternions(np.random.default_rng(1), 50)
-    for angles, quaternion in zip(extrinsic_eulers_from_quaternions(quaternions, order), quaternions, strict=True):
-        assert abs(Euler(angles, order).to_quaternion().dot(quaternion)) == pytest.approx(1.0, abs=1e-6)
 
 
 @in_every_order

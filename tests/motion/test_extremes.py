@@ -1,7 +1,5 @@
 """Numbers at the ends of what floats hold: a result that is finite, or an error that says where; never a warning."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,15 +1,9 @@
 """The shortest way from key to key, against all ways there are."""
 
-from __future__ import annotations
-
-import itertools
-
 import numpy as np
 import pytest
 
 from rigid_motion.motion import MODES, Poses, reduce_keys
-from rigid_motion.motion.key_links import traded_keys
-from rigid_motion.motion.key_search import Recording, Search
 from tests.motion.test_reduction import RADIUS, shell_errors, wandering
 
 MEMORYLESS = [name for name, mode in MODES.items() if not mode.is_smooth]
@@ -30,17 +24,6 @@ def fewest_of_a_programme(times: np.ndarray, poses: Poses, mode: str, tolerance:
     return needed[-1]
 
 
-def fewest_of_all_sets(times: np.ndarray, poses: Poses, mode: str, tolerance: float) -> int:
-    """The same by trying every set of keys, the small ones first."""
-    inner = range(1, len(times) - 1)
-    for count in range(len(times) - 1):
-        for chosen in itertools.combinations(inner, count):
-            keys = np.array((0, *chosen, len(times) - 1))
-            if shell_errors(times, poses, keys, mode).max() <= tolerance * (1.0 + 1e-9):
-                return count + 2
-    raise AssertionError("all samples as keys are always right")
-
-
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("mode", MEMORYLESS)
 def test_the_shortest_way_is_that_of_an_exhaustive_programme(mode, seed):
@@ -48,47 +31,6 @@ def test_the_shortest_way_is_that_of_an_exhaustive_programme(mode, seed):
     keys = reduce_keys(times, poses, mode, TOLERANCES[seed], RADIUS)
     assert 2 < len(keys) < len(times)
     assert len(keys) == fewest_of_a_programme(times, poses, mode, TOLERANCES[seed])
-
-
-def test_smooth_keys_are_as_few_as_any_that_keep_to_the_tolerance():
-    """In 24 of 24 recordings of 11 samples they were."""
-    as_few = 0
-    for seed in range(6):
-        times, poses = wandering(9, seed, 0.02, 60.0)
-        result = len(reduce_keys(times, poses, "motor_spline", TOLERANCES[seed % 3], RADIUS))
-        fewest = fewest_of_all_sets(times, poses, "motor_spline", TOLERANCES[seed % 3])
-        assert fewest <= result <= fewest + 1
-        as_few += result == fewest
-    assert as_few >= 5
-
-
-def least_square_of_a_programme(search: Search, keys: int) -> float:
-    """The least sum of squares that so many keys leave, where a segment costs what it costs by itself."""
-    count = len(search.recording.times)
-    pairs = np.array(list(itertools.combinations(range(count), 2)))
-    of_pairs = np.full((count, count), np.inf)
-    of_pairs[tuple(pairs.T)] = search.costs.of(pairs)[0]
-    least = np.where(np.arange(count) == 0, 0.0, np.inf)
-    for _ in range(keys - 1):
-        least = (least[:, None] + of_pairs).min(axis=0)
-    return float(least[-1])
-
-
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("mode", ["lerp_slerp", "dq_sclerp"])
-def test_keys_with_a_price_are_the_best_of_their_number(mode, seed):
-    """A price leaves the least error of all sets of as many keys; there is not one for every number of them."""
-    times, poses = wandering(40, seed, 0.01, 40.0)
-    search = Search(Recording(times, poses, mode, RADIUS, TOLERANCES[1]), rms=True)
-    samples = np.arange(len(times))
-    best = search.within(0)
-    keys = traded_keys(search.costs, [best, samples, np.array((0, len(times) - 1))])
-    assert search.measured(keys).cost.sum() <= len(times)
-    assert 2 < len(keys) <= len(best)
-    if len(keys) < len(best):
-        fewest = least_square_of_a_programme(search, len(keys))
-        assert search.measured(keys).cost.sum() == pytest.approx(fewest)
-    assert least_square_of_a_programme(search, len(keys) - 2) > len(times)
 
 
 @pytest.mark.parametrize("mode", ["lerp_slerp", "motor_spline"])

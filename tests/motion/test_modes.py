@@ -1,13 +1,6 @@
 """The table of modes, as files know it."""
 
-import re
-
-import pytest
-
-from rigid_motion.motion import MODES, Poses, interpolate, prepare
-from rigid_motion.motion.modes import mode_named
-
-KEYS = Poses([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], [[1.0, 0.0, 0.0, 0.0]] * 2)
+from rigid_motion.motion import MODES
 
 
 def test_the_numbers_that_files_store_never_change():
@@ -21,13 +14,3 @@ def test_the_numbers_that_files_store_never_change():
         "motor_spline": 7,
         "motor_spline_causal": 8,
     }
-
-
-@pytest.mark.parametrize(
-    "use",
-    [mode_named, lambda mode: interpolate([0.0, 1.0], KEYS, [0.5], mode), lambda mode: prepare([0.0, 1.0], KEYS, mode)],
-    ids=["named", "interpolate", "prepare"],
-)
-def test_a_name_of_no_mode_is_answered_with_those_there_are(use):
-    with pytest.raises(ValueError, match=re.escape(f"there is no mode 'bezier'; the modes are {', '.join(MODES)}")):
-        use("bezier")

@@ -1,15 +1,10 @@
 """Piecewise functions: both ways to put them together agree, wherever the samples are."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
-from hypothesis import strategies as st
 
 from rigid_motion.motion import MODES, Poses, in_betweens, prepare
-from tests.motion.cases import random_quaternions
-
-few = st.lists(st.sampled_from((0, 1, 3, 5)), max_size=4)
+from tests.motion.cases import assert_same, random_quaternions
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -22,8 +17,7 @@ def test_a_segment_without_samples_may_lie_between_long_ones(mode):
         counts = np.zeros(3, dtype=int)
         counts[place] = 50_000
         alone = in_betweens(np.arange(4.0), keys, counts, u, mode)
-        np.testing.assert_allclose(both[some].positions, alone.positions, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(both[some].quaternions, alone.quaternions, rtol=0, atol=1e-12)
+        assert_same(both[some], alone)
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -38,9 +32,7 @@ def test_prepared_segments_give_the_same_a_few_at_a_time_and_past_their_keys(mod
     for first, last in ((0, 3), (3, 6), (6, 8)):
         samples = slice(bounds[first], bounds[last])
         few = segments(counts.ravel()[first:last], progress[samples], slice(first, last))
-        np.testing.assert_allclose(few.positions, expected.positions[samples], rtol=0, atol=1e-12)
-        np.testing.assert_allclose(few.quaternions, expected.quaternions[samples], rtol=0, atol=1e-12)
-        np.testing.assert_allclose(few.scales, expected.scales[samples], rtol=0, atol=1e-12)
+        assert_same(few, expected[samples])
 
 
 def test_prepared_segments_refuse_what_does_not_fit_them():

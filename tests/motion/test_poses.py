@@ -1,7 +1,5 @@
 """Poses and arrays of quaternions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -89,19 +87,6 @@ def test_the_length_is_that_of_the_first_axis_and_so_is_what_a_loop_runs_over():
 def test_a_single_pose_has_no_length_and_nothing_in_it(use):
     with pytest.raises(TypeError, match="a single pose"):
         use(ONE[0])
-
-
-def test_an_index_beyond_the_leading_axes_is_refused():
-    for index in (4, (0, 0), ([True] * 3,), "positions", 1.5):
-        with pytest.raises(IndexError):
-            ONE[index]
-
-
-def test_a_slice_is_a_view_and_a_list_of_numbers_is_a_copy():
-    poses = ONE.copy()
-    poses[1:].positions[0] = -1.0
-    poses[[2]].positions[0] = -1.0
-    assert poses.positions.tolist() == [[0, 1, 2], [-1, -1, -1], [6, 7, 8], [9, 10, 11]]
 
 
 def test_matrices_of_poses_give_these_poses_back():

@@ -1,7 +1,5 @@
 """What every mode promises, whatever the keys."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -218,14 +216,6 @@ def test_many_objects_at_once_are_the_objects_one_by_one(mode, scaled, own_key_t
             assert np.array_equal(together.scales[row], alone.scales)
 
 
-def test_clock_times_of_ten_digits_lose_nothing():
-    keys = Poses([[0, 0, 0], [1, 0, 0]], [[1, 0, 0, 0], [1, 0, 0, 0]])
-    start, end = 1305031098.6659, 1305031098.7659
-    moment = start + 0.25 * (end - start)
-    expected = (moment - start) / (end - start)
-    assert interpolate([start, end], keys, [moment], "dq_sclerp").positions[0, 0] == pytest.approx(expected, abs=1e-12)
-
-
 @every_mode
 def test_one_key_is_a_rest(mode):
     key = Poses([[1, 2, 3]], [[2, 0, 0, 0]])
@@ -239,29 +229,6 @@ def test_no_times_give_no_poses(mode):
 
 
 GOOD = ([0.0, 1.0, 2.0], np.zeros((3, 3)), np.eye(4)[[0, 0, 0]], None)
-
-
-def spoilt(field: int, row: int, value) -> tuple:
-    parts = [np.array(part, dtype=float) if part is not None else np.ones(3) for part in GOOD]
-    parts[field][row] = value
-    return tuple(parts)
-
-
-@pytest.mark.parametrize(
-    ("parts", "complaint"),
-    [
-        (spoilt(0, 1, np.nan), "key 1 has a time"),
-        (spoilt(0, 2, 1.0), "key 2 is not later"),
-        (spoilt(1, 2, np.inf), "key 2 has a position"),
-        (spoilt(2, 1, 0.0), "key 1 has a quaternion of length zero"),
-        (spoilt(2, 1, np.nan), "key 1 has a quaternion that is not finite"),
-        (spoilt(3, 0, -1.0), "key 0 has a scale"),
-    ],
-)
-def test_a_bad_key_is_named(parts, complaint):
-    key_times, positions, quaternions, scales = parts
-    with pytest.raises(ValueError, match=complaint):
-        interpolate(key_times, Poses(positions, quaternions, scales), [0.5])
 
 
 def test_a_bad_key_among_many_objects_is_named_with_its_object():

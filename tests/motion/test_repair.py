@@ -1,7 +1,5 @@
 """The repair of recordings: what is done is right, and is said."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import example, given

@@ -1,7 +1,5 @@
 """Power series: where there are many samples they stand for the curve, and nobody can tell."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

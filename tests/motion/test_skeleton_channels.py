@@ -1,7 +1,5 @@
 """Keys of rotations and of locations apart, recomputed by slerp of SciPy, np.interp and matrices down the chains."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -120,17 +118,3 @@ def test_a_budget_is_of_rotations_and_locations(count, joints, seed, more):
 
 
 TIMES, BODY, PARENTS = wandering_body(20, 3, 1, resting=0.0, scaled=True)
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"mode": "dq_sclerp"}, "do not depend on one another, lerp_slerp, and dq_sclerp is none"),
-        ({"shared": True}, "give one of shared=True and separate=True, not both"),
-        ({"poses": BODY}, "the scale of joint [012] changes"),
-    ],
-)
-def test_what_channels_apart_cannot_do_is_refused(options, message):
-    given = {"times": TIMES, "poses": Poses(BODY.positions, BODY.quaternions), "parents": PARENTS}
-    with pytest.raises(ValueError, match=message):
-        reduce_skeleton_keys(**{**given, "mode": "lerp_slerp", "tolerance": 0.1, "separate": True, **options})

@@ -1,7 +1,5 @@
 """Errors of bodies between samples, recomputed by SciPy's slerp, NumPy's interp and matrices down the chains."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """Key reduction of whole bodies: what it promises, recomputed by matrices down the chains and singular values."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,10 +7,8 @@ from hypothesis import strategies as st
 
 from rigid_motion.motion import MODES, Poses, reduce_skeleton_keys
 from rigid_motion.motion.quaternions import multiply, rotate
-from rigid_motion_batch.recordings import read_trajectories
 from tests.motion.bodies import body_errors, in_root_space, wandering_body
 from tests.motion.cases import random_quaternions
-from tests.recordings import RECORDINGS
 from tests.thoroughness import tried
 
 TWO_WAYS = pytest.mark.parametrize("shared", [False, True])
@@ -65,24 +61,6 @@ def test_keys_of_their_own_are_no_more_than_key_poses(joints, seed, tolerance, m
 
 
 @TWO_WAYS
-def test_a_joint_of_weight_two_keeps_to_half_the_tolerance(shared):
-    strict = 0
-    for seed in range(2):
-        times, poses, parents = wandering_body(80, 5, seed, resting=0.0)
-        options = {"tolerance": 0.02, "shared": shared}
-        plain = reduce_skeleton_keys(times, poses, parents, **options)
-        off = body_errors(times, poses, parents, plain, "motor_spline", np.full(5, 0.03)).max(axis=1)
-        strict += np.count_nonzero(off > 0.01)
-        for joint in range(5):
-            weights = np.where(np.arange(5) == joint, 2.0, 1.0)
-            keys = reduce_skeleton_keys(times, poses, parents, weights=weights, **options)
-            errors = body_errors(times, poses, parents, keys, "motor_spline", np.full(5, 0.03)).max(axis=1)
-            assert errors[joint] <= 0.01 * (1.0 + 1e-9)
-            assert errors.max() <= 0.02 * (1.0 + 1e-9)
-    assert strict > 4
-
-
-@TWO_WAYS
 def test_weights_may_change_with_time(shared):
     times, poses, parents = wandering_body(80, 4, 1, resting=0.0)
     weights = np.ones((4, 80))
@@ -122,24 +100,6 @@ def test_a_budget_is_kept(count, joints, seed, more, mode):
     shared = reduce_skeleton_keys(*body, mode, budget=2 + more, shared=True)
     check_keys(shared, joints, count, True)
     assert len(shared[0]) == min(2 + more, count)
-
-
-@TWO_WAYS
-@pytest.mark.parametrize("mode", ["lerp_slerp", "motor_spline"])
-def test_a_larger_budget_buys_a_smaller_error(mode, shared):
-    for seed in range(2):
-        times, poses, parents = wandering_body(40, 3, seed)
-        budgets = (3, 7, 15, 30) if shared else (6, 14, 30, 70)
-        errors = [
-            body_errors(
-                *(times, poses, parents),
-                reduce_skeleton_keys(times, poses, parents, mode, budget=budget, shared=shared),
-                *(mode, np.full(3, 0.03)),
-            ).max()
-            for budget in budgets
-        ]
-        assert errors == sorted(errors, reverse=True)
-        assert errors[-1] < 0.2 * errors[0]
 
 
 @TWO_WAYS
@@ -232,38 +192,6 @@ def test_what_is_sound_by_itself_and_too_large_in_the_root_space_is_named(shared
     poses = Poses(BODY.positions, BODY.quaternions, np.full((3, 20), 1e30))
     with pytest.raises(ValueError, match="joint 1, in the root's space, sample 0 "):
         reduce_skeleton_keys(TIMES, poses, CHAIN, tolerance=0.1, shared=shared)
-
-
-BODIES = {
-    "beat_saber_body": RECORDINGS / "beat_saber_body.bvh",
-    "cmu_01_01": RECORDINGS.parent / "rigs" / "cmu_01_01.bvh",
-    "freebvh": RECORDINGS.parent / "rigs" / "freebvh.bvh",
-}
-
-
-def recorded_body(name: str, most: int = 80) -> tuple[np.ndarray, Poses, np.ndarray]:
-    """Times, joints in their parents' space and parents of a real body, 1.7 m tall, at a few of its samples."""
-    (body,) = read_trajectories(str(BODIES[name])).trajectories
-    samples = np.arange(0, len(body.times), max(1, round(1.0 / 30.0 / body.times[1])))[:most]
-    poses, parents = body.poses[:, samples], body.rest_body.parents
-    spots = in_root_space(poses, parents)[..., :3, 3]
-    world = [alone.poses.positions[samples] for alone in read_trajectories(f"{BODIES[name]}:*").trajectories]
-    assert np.abs(spots - world).max() <= 1e-9 * np.abs(spots).max()
-    size = 1.7 / np.ptp(spots[:, 0, 1])
-    return body.times[samples], Poses(size * poses.positions, poses.quaternions), parents
-
-
-@pytest.mark.recordings
-@TWO_WAYS
-@pytest.mark.parametrize("mode", ["lerp_slerp", "motor_spline"])
-@pytest.mark.parametrize("name", BODIES)
-def test_real_bodies_keep_to_the_tolerance_with_fewer_keys(name, mode, shared):
-    times, poses, parents = recorded_body(name)
-    keys = reduce_skeleton_keys(times, poses, parents, mode, tolerance=0.01, radius=0.03, shared=shared)
-    check_keys(keys, len(parents), len(times), shared)
-    errors = body_errors(times, poses, parents, keys, mode, np.full(len(parents), 0.03))
-    assert errors.max() <= 0.01 * (1.0 + 1e-9)
-    assert sum(map(len, keys)) < len(parents) * len(times)
 
 
 def test_a_chain_of_any_length_has_key_poses_and_one_that_is_too_long_no_keys_of_its_own():

@@ -1,7 +1,5 @@
 """Long recordings of bodies in stretches: what they promise, recomputed apart from the program."""
 
-from __future__ import annotations
-
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 
@@ -95,11 +93,3 @@ def test_stretches_side_by_side_are_those_one_by_one(separate):
         return map(*(pickle.loads(pickle.dumps(one)) for one in (function, list(arguments))))
 
     assert as_lists(reduce_skeleton_keys(*body, **options, run=elsewhere)) == here
-
-
-@TWO_WAYS
-def test_what_is_not_longer_than_a_stretch_is_searched_as_without(separate):
-    body = wandering_body(60, 4, 6)
-    options = {"mode": "lerp_slerp", "tolerance": 0.002, "separate": separate}
-    here, there = (reduce_skeleton_keys(*body, **options, stretch=stretch) for stretch in (None, 59))
-    assert as_lists(here) == as_lists(there)

@@ -1,7 +1,5 @@
 """What the motor spline promises beside what every mode does: no corners, no say of far keys, rests that rest."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np
@@ -13,13 +11,12 @@ from scipy.linalg import expm, logm
 from rigid_motion.motion import MODES, Poses, in_betweens, interpolate, twists
 from rigid_motion.motion.quaternions import angle_between, multiply, rotate
 from tests.motion.cases import assert_same, random_quaternions
-from tests.motion.test_properties import assert_close, motions, placed, reseated
+from tests.motion.test_properties import assert_close, reseated
 from tests.motion.test_twists import pose_matrix
 
 SMOOTH = [name for name, mode in MODES.items() if mode.is_smooth]
 CAUSAL = "motor_spline_causal"
 every_spline = pytest.mark.parametrize("mode", SMOOTH)
-every_spline_with_foresight = pytest.mark.parametrize("mode", [name for name in SMOOTH if MODES[name].ahead])
 
 
 def motion(count: int = 9, seed: int = 0, scaled: bool = False) -> tuple[np.ndarray, Poses]:
@@ -65,40 +62,6 @@ def test_a_key_has_a_say_in_no_more_segments_than_the_table_tells(mode):
     assert changed.min() > first
     assert changed.max() < last
     assert changed.min() < first + 0.05 * (times[6] - first)
-
-
-@given(st.integers(0, 2**16), st.integers(2, 8))
-def test_what_streams_are_shown_needs_no_key_after_the_next(seed, known):
-    times, keys = motion(10, seed)
-    moments = np.linspace(times[0], times[known], 301)
-    whole = interpolate(times, keys, moments, CAUSAL)
-    so_far = interpolate(times[: known + 1], keys[: known + 1], moments, CAUSAL)
-    assert_same(whole, so_far, 1e-12)
-
-
-@every_spline
-@given(st.integers(0, 2**16))
-def test_neither_the_axes_of_the_world_nor_those_of_the_body_matter(mode, seed):
-    times, keys = motion(6, seed)
-    random = np.random.default_rng(seed + 1)
-    world, body = (Poses(random.normal(size=3), random_quaternions(random)) for _ in range(2))
-    moments = np.linspace(times[0], times[-1], 61)
-    path = interpolate(times, keys, moments, mode)
-    assert_close(interpolate(times, placed(world, keys), moments, mode), placed(world, path))
-    assert_close(interpolate(times, reseated(keys, body), moments, mode), reseated(path, body))
-
-
-@every_spline_with_foresight
-@given(motions())
-def test_backwards_it_is_the_same_motion(mode, drawn):
-    times, keys = drawn
-    turns = angle_between(keys.quaternions[1:], keys.quaternions[:-1])
-    if np.any(turns > np.pi - 1e-3):
-        return
-    moments = np.linspace(times[0], times[-1], 41)
-    there = interpolate(times, keys, moments, mode)
-    back = interpolate(-times[::-1], keys[::-1], -moments[::-1], mode)[::-1]
-    assert_close(back, there, 1e-6)
 
 
 @every_spline
@@ -177,17 +140,6 @@ def test_the_motor_spline_is_that_of_matrix_exponentials(seed, mode):
     expected = slow_spline(times, keys, moments, mode)
     for pose, matrix in zip(zip(path.quaternions, path.positions, strict=True), expected, strict=True):
         np.testing.assert_allclose(pose_matrix(*pose), matrix, rtol=0, atol=1e-8)
-
-
-@every_spline
-def test_a_screw_with_even_keys_stays_one(mode):
-    """Along one screw, at one speed, whatever the times of the keys."""
-    times, _ = motion(7)
-    random = np.random.default_rng(9)
-    turn, advance = twists.exponential(np.outer(random.normal(size=6), 0.5 * (times - times[0])))
-    keys = Poses(advance.T, turn.T)
-    moments = np.linspace(times[0], times[-1], 200)
-    assert_close(interpolate(times, keys, moments, mode), interpolate(times, keys, moments, "dq_sclerp"), 1e-12)
 
 
 @every_spline

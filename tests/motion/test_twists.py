@@ -1,13 +1,10 @@
 """Exponentials and logarithms of twists, against SciPy's of matrices."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
-from scipy.linalg import expm, logm
+from scipy.linalg import expm
 
 from rigid_motion.motion import twists
-from tests.motion.cases import random_quaternions
 
 ANGLES = [0.0, 1e-12, 1e-6, 1e-3, 0.02999, 0.03001, 0.5, 2.0, 3.1, np.pi - 1e-9]
 
@@ -54,13 +51,3 @@ def test_a_logarithm_leads_back(angle, sign):
     result = twists.logarithm(sign * quaternions, translations)
     # Near half a turn the axis is known to the rounding of w, and counts twice.
     np.testing.assert_allclose(result, given, rtol=0, atol=1e-12)
-
-
-def test_logarithms_are_those_of_matrices():
-    random = np.random.default_rng(4)
-    quaternions = random_quaternions(random, 30)
-    translations = random.normal(size=(30, 3))
-    result = twists.logarithm(quaternions.T, translations.T)
-    for twist, quaternion, translation in zip(result.T, quaternions, translations, strict=True):
-        matrix = logm(pose_matrix(quaternion, translation)).real
-        np.testing.assert_allclose(matrix_of(twist), matrix, rtol=0, atol=1e-8)

@@ -1,7 +1,5 @@
 """What the tests of bake.py share: running it, and files to run it on."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path

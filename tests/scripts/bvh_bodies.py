@@ -1,7 +1,5 @@
 """A small body as a file, BVH, for tests of programs that read it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

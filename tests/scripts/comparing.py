@@ -1,7 +1,5 @@
 """Runs of compare.py in tests: a recording that is done in no time, and what two output folders must have in common."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path

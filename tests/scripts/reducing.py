@@ -1,7 +1,5 @@
 """What the tests of reduce.py share: running it, what to run it on, and how far what it made is off."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import bpy

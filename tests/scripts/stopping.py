@@ -1,7 +1,5 @@
 """What the tests of stopped commands share: starting one that gets stuck where Python cannot interrupt it."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

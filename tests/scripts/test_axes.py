@@ -29,15 +29,6 @@ def test_a_rotation_becomes_the_one_of_the_changed_matrix(poses: Poses, axes: st
     np.testing.assert_allclose(matrices(to_blender(poses, axes)), change @ matrices(poses) @ change.T, atol=1e-14)
 
 
-@pytest.mark.parametrize("axes", AXES)
-def test_every_point_of_the_body_moves_along(poses: Poses, axes: str) -> None:
-    change, changed = AXES[axes], to_blender(poses, axes)
-    for point in np.random.default_rng(6).normal(size=(5, 3)):
-        there = poses.positions + poses.scales[:, None] * (matrices(poses) @ point)
-        here = changed.positions + changed.scales[:, None] * (matrices(changed) @ (change @ point))
-        np.testing.assert_allclose(here, there @ change.T, atol=1e-14)
-
-
 @pytest.mark.parametrize(
     ("axes", "up", "forward", "right"),
     [

@@ -1,7 +1,5 @@
 """bake.py on rigs: bones are baked and given back beside objects, chosen by name, and told of rig by rig."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
@@ -81,21 +79,6 @@ def test_a_baked_rig_plays_in_any_blender_as_the_live_one_does_with_the_extensio
         expected = shown_worlds([bpy.data.objects[name] for name in ("Rig", *probes())], PLAYED)
     _, played = played_on_a_farm(baked_name(path), ("Rig", *probes()), PLAYED)
     np.testing.assert_allclose(played, expected, atol=1e-4)
-
-
-def test_every_bone_with_a_mode_has_keys_on_every_frame_and_the_others_their_own(tmp_path):
-    path = rig_file(tmp_path / "shot.blend")
-    assert run(path) == 0
-    with extension():
-        open_again(baked_name(path))
-        rig = bpy.data.objects["Rig"]
-        assert is_baked(rig)
-        assert baked_bones(rig) == [name for name in NAMES if name != "Thumb"]
-        for bone in rig.pose.bones:
-            curve = curves_of(rig)[bone.path_from_id("location"), 0]
-            frames = [point.co.x for point in curve.keyframe_points]
-            assert frames == list(FRAMES if bone.name == "Thumb" else np.arange(1.0, 41.0))
-            assert not len(bone.constraints)
 
 
 def test_un_baking_gives_back_exactly_the_keys_the_modes_and_the_motion(tmp_path):

@@ -1,7 +1,5 @@
 """bake.py on files that link to others: what is missing is named and counts, what is there is found again."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,14 +1,11 @@
 """bake.py when something is wrong: broken files, places that cannot be written, keys that are none, an end half-way."""
 
-from __future__ import annotations
-
 import ctypes
 import math
 import os
 import re
 import resource
 import shutil
-import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -20,7 +17,6 @@ import pytest
 
 from rigid_motion import animation
 from rigid_motion_batch import supervising
-from rigid_motion_batch.keying import blend_files
 from tests.animation.keyed import curves_of
 from tests.scripts.baking import baked_name, frames_of_keys, one_object_file, open_again, run, with_version
 from tests.scripts.reducing import listed
@@ -234,44 +230,6 @@ def test_an_infinite_key_is_named_with_its_object_its_channel_and_the_way_out(tm
 
 
 # Stopped half-way
-
-
-@pytest.mark.parametrize(("stopped_by", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_run_that_is_stopped_leaves_whole_files_only(tmp_path, stopped_by, code):
-    first = one_object_file(tmp_path / "000.blend")
-    paths = [first, *(tmp_path / f"{number:03}.blend" for number in range(1, 200))]
-    for path in paths[1:]:
-        os.link(first, path)
-    farm = tmp_path / "farm"
-    with subprocess.Popen([*COMMAND, *paths, "--output", farm], stderr=subprocess.PIPE, stdout=subprocess.PIPE) as ran:
-        while b": written to " not in (line := ran.stderr.readline()):
-            assert line, "it ended before the first file"
-        ran.send_signal(stopped_by)
-        printed, said = ran.communicate(timeout=60)
-    assert ran.returncode == code, said
-    written = [farm / name for name in listed(farm)]
-    assert 0 < len(written) < len(paths)
-    assert printed.decode().split() == [str(path) for path in written], "no name but those of files that are whole"
-    assert f"{len(paths) - len(written)} not reached." in said.decode()
-    for path in written:
-        open_again(path)
-        assert len(frames_of_keys(bpy.data.objects["Tool"])) == 40
-
-
-@pytest.mark.parametrize("options", [(), ("--in-place",)])
-def test_ctrl_c_while_a_file_is_written_leaves_it_as_it_was(tmp_path, monkeypatch, options):
-    path = one_object_file(tmp_path / "shot.blend")
-    before, real = path.read_bytes(), blend_files.refuse_cut_off
-
-    def press_and_check(written: Path) -> None:
-        assert written.is_file()
-        signal.raise_signal(signal.SIGINT)
-        real(written)
-
-    monkeypatch.setattr(blend_files, "refuse_cut_off", press_and_check)
-    assert run(path, *options) == 130
-    assert listed(tmp_path) == ["shot.blend"]
-    assert path.read_bytes() == before
 
 
 def test_ctrl_c_while_blender_is_loaded_ends_it_at_once(tmp_path):

@@ -1,7 +1,5 @@
 """The set-up in one command: what it installs, and what it says where it cannot."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

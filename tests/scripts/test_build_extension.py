@@ -1,7 +1,5 @@
 """The zip that users install: what is in it, and that every Blender takes it, runs it and gives it back."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """The arguments that are meant for a script, whoever runs it, and the command that they make."""
 
-from __future__ import annotations
-
 import sys
 
 import pytest

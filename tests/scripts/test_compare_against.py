@@ -1,7 +1,5 @@
 """compare --against: somebody else's motion of a clip, in all that a comparison shows."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

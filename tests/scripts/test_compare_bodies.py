@@ -1,20 +1,16 @@
 """compare.py on whole bodies: what it writes of them, and what becomes of the others where one cannot be read."""
 
-from __future__ import annotations
-
 import csv
 import os
 import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from rigid_motion_batch.cli import compare
 from rigid_motion_batch.recordings import read_trajectories
 from tests.blank import blank
-from tests.scripts.analysis.test_body_metrics import HEADER
 from tests.scripts.comparing import COLUMNS, ROOT, write_toss
 from tests.scripts.recordings.skeletons import body, export
 from tests.scripts.recordings.test_damaged_bvh_bodies import seed
@@ -85,40 +81,6 @@ def test_the_table_has_a_row_for_every_body_choice_and_mode(written: tuple[Path,
         assert 0.0 < float(row["rms_shell_m"]) <= float(row["p95_shell_m"]) <= float(row["max_shell_m"]) < 1.0
         if row["decimation"] == "adaptive":
             assert float(row["max_shell_m"]) <= 0.01 * (1.0 + 1e-9)
-
-
-def test_the_table_of_joints_has_a_row_for_every_joint_of_these(written: tuple[Path, Path]) -> None:
-    walk, output = written
-    joints = joints_in(walk)
-    assert (output / "metrics_joints.csv").read_text().splitlines()[0] == HEADER
-    rows = rows_of(output / "metrics_joints.csv")
-    assert len(rows) == len(joints) * len(MODES) * 3
-    assert {row["clip"] for row in rows} == {"walk"}
-    for whole in (row for row in rows_of(output / "metrics.csv") if row["clip"] == "walk"):
-        own = [row for row in rows if all(row[name] == whole[name] for name in ("mode", "rate_hz", "decimation"))]
-        assert [row["joint"] for row in own] == list(joints)
-        assert max(float(row["max_shell_m"]) for row in own) == float(whole["max_shell_m"])
-        assert sum(int(row["keys"]) for row in own) == int(whole["keys"])
-        (worst,) = (row for row in own if row["joint"] == whole["worst_joint"])
-        assert worst["max_shell_m"] == whole["max_shell_m"]
-
-
-def test_keys_are_in_a_table_for_all_modes_or_one_for_each_and_shared_by_the_joints(written: tuple[Path, Path]) -> None:
-    walk, output = written
-    folders = {path.name: path for path in (output / "walk").iterdir()}
-    assert set(folders) == {"5", "10", "tolerance-1cm"}
-    assert [path.name for path in folders["10"].iterdir()] == ["keys.csv"]
-    assert sorted(path.name for path in folders["5"].iterdir()) == ["comparison.glb", "keys.csv"]
-    tables = [f"{mode}.keys.csv" for mode in MODES]
-    assert sorted(path.name for path in folders["tolerance-1cm"].iterdir()) == sorted(["comparison.glb", *tables])
-    for path in output.glob("walk/*/*.csv"):
-        moments = {}
-        for row in rows_of(path):
-            moments.setdefault(row["joint"], []).append(float(row["t"]))
-        assert tuple(moments) == joints_in(walk)
-        assert len({tuple(own) for own in moments.values()}) == 1
-        if path.parent.name == "10":
-            np.testing.assert_allclose(np.diff(moments["Hips"]), 0.1, atol=1e-4)
 
 
 def test_a_radius_of_its_own_changes_the_errors_of_that_joint_alone(written: tuple[Path, Path], tmp_path: Path) -> None:
@@ -214,13 +176,3 @@ def test_a_damaged_body_is_told_in_one_line_and_the_others_go_on(fbx, tmp_path, 
         assert "; " in line
     assert {row["clip"] for row in rows_of(output / "metrics.csv")} == {"walk", "deadly"}
     blank()
-
-
-@pytest.mark.parametrize("jobs", [0, 1])
-def test_where_nothing_can_be_read_the_code_is_2(tmp_path: Path, capfd: pytest.CaptureFixture[str], jobs: int) -> None:
-    path = tmp_path / "torn.bvh"
-    path.write_text(seed("ZXY", 5).partition("MOTION")[0], encoding="utf-8")
-    assert run(path, *QUICK, "--output", tmp_path / "output", jobs=jobs) == 2
-    (line,) = lines_about(capfd.readouterr().err, path)
-    assert line.endswith("the file ends where MOTION is expected; export the BVH again")
-    assert not (tmp_path / "output" / "metrics.csv").exists()

@@ -1,7 +1,5 @@
 """compare.py replaces nothing but what it has written: no input, no file of another program, no other comparison."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Options of compare.py: what is refused, amounts that are the same, and the help and its examples."""
 
-from __future__ import annotations
-
 import re
 import shlex
 

@@ -1,7 +1,5 @@
 """Completion in a shell: what Bash offers, and that every shell that is named gets a script."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from pathlib import Path

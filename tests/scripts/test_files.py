@@ -1,15 +1,8 @@
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
 
 from rigid_motion_batch.files import replacing, write_text, written_beside
-
-
-def test_a_text_is_written_as_utf_8_with_lf_line_ends_and_folders_on_the_way_are_made(tmp_path: Path) -> None:
-    write_text(tmp_path / "a" / "b.csv", "grüße\nx\n")
-    assert (tmp_path / "a" / "b.csv").read_bytes() == "grüße\nx\n".encode()
 
 
 def test_a_failure_leaves_the_old_file_and_nothing_beside_it(tmp_path: Path) -> None:

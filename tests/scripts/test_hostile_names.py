@@ -1,7 +1,5 @@
 """Files and bodies with hostile names: all they can do is be called so, in the output folder and in the report."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re
@@ -18,7 +16,6 @@ from rigid_motion_batch.cli import compare
 from rigid_motion_batch.pipeline.comparison import ON_ONE_PAGE
 from rigid_motion_batch.recordings import TrajectoryError, read_trajectories
 from rigid_motion_batch.recordings.clip_reading import DEVICES, NOT_FOLDERS, folder_names
-from rigid_motion_batch.rows import meant
 from tests.scripts.recordings.seeds import SEEDS
 
 FORMULAS = "=+-@\t\r"
@@ -136,33 +133,6 @@ def test_a_comparison_stays_in_its_folder_and_names_do_not_change_its_report(tmp
     assert whole.code == as_plain.code
     for link in whole.links:
         assert link.startswith(("#", "data:")) or (output / unquote(link)).is_file(), link
-
-
-def test_joints_of_any_name_are_in_the_tables_and_do_not_change_the_report(tmp_path: Path) -> None:
-    # A blank or a bracket ends a name in BVH, and there it has to be there.
-    names = [name for name in NAMES if name and not re.search(r"[\s\0\x1c-\x1f{}\udcff]", name)]
-
-    def in_a_body(folder: Path, joints: Sequence[str]) -> list[str]:
-        inner = "End Site\n{\nOFFSET 0 1 0\n}\n"
-        for number, joint in reversed(list(enumerate(joints))):
-            kind = "JOINT" if number else "ROOT"
-            inner = f"{kind} {joint}\n{{\nOFFSET 0 0.03 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n{inner}}}\n"
-        rows = [" ".join(f"{0.3 * (frame * joint % 7)}" for joint in range(3 * len(joints))) for frame in range(30)]
-        path = folder / "walk.bvh"
-        text = "\n".join([f"HIERARCHY\n{inner}MOTION", "Frames: 30", "Frame Time: 0.02", *rows, ""])
-        path.write_text(text, encoding="utf-8")
-        return [str(path)]
-
-    plain = compared(tmp_path / "plain", in_a_body, [f"joint{number}" for number in range(len(names))])
-    output = compared(tmp_path / "hostile", in_a_body, names)
-    assert {path.name for path in tmp_path.iterdir()} == {"plain", "hostile"}
-    for table in ("metrics_joints.csv", "walk/20/keys.csv"):
-        with (output / table).open(encoding="utf-8", newline="") as stream:
-            joints = list(dict.fromkeys(row["joint"] for row in csv.DictReader(stream)))
-        assert [meant(joint) for joint in joints] == names
-        assert not any(joint.startswith(tuple(FORMULAS)) for joint in joints)
-    whole, as_plain = (Structure((root / "report.html").read_text(encoding="utf-8")) for root in (output, plain))
-    assert (whole.tags, whole.code) == (as_plain.tags, as_plain.code)
 
 
 def test_names_of_folders_are_legal_and_different_everywhere() -> None:

@@ -1,7 +1,5 @@
 """compare.py in a Blender whose Python lacks its libraries: it runs in a Python that has them, or says how."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """job_bundle.py: a comparison as a job of a render farm; tests/scripts/pipeline/test_bundle.py runs such a job."""
 
-from __future__ import annotations
-
 import json
 import shlex
 import subprocess

@@ -4,8 +4,6 @@ Source: "Guidelines" and "Canned Responses" of the moderators, https://developer
 and Blender's manual, "Creating Extensions".
 """
 
-from __future__ import annotations
-
 import ast
 import re
 import subprocess

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np
@@ -53,11 +51,6 @@ def test_modes_stand_out_from_what_they_stand_before(mode, theme):
 def test_words_can_be_read(theme, word, ground):
     lights = sorted(XYZ[1] @ palette.linear(getattr(theme, name)) + 0.05 for name in (word, ground))
     assert lights[1] / lights[0] > 4.5
-
-
-def test_a_mode_of_the_future_has_a_colour_that_stays():
-    assert palette.colour_of("se3_cubic") == palette.colour_of("se3_cubic")
-    assert palette.colour_of("se3_cubic") not in palette.MODE_COLOURS.values()
 
 
 def test_colours_are_linear_for_blender():

@@ -1,7 +1,5 @@
 """reduce.py on folders and many files: which are done, by how many processes, and what is left when it is run again."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal

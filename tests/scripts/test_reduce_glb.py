@@ -1,7 +1,5 @@
 """`reduce.py --glb`: .blend files, FBX files and recordings as GLB files, by Blender's exporter and then reduced."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 
@@ -13,7 +11,6 @@ from rigid_motion_batch.recordings.clip_reading import read_source
 from rigid_motion_batch.recordings.clips import Clip
 from tests.animation.farm import played_on_a_farm
 from tests.gltf.oracle import File, off
-from tests.scripts.baking import new_file, save
 from tests.scripts.reducing import FRAMES, WALK, exit_code, hand_made, rig_file, run, worlds_of, write_csv
 
 MM = 1e-3
@@ -130,13 +127,6 @@ def test_a_file_that_cannot_be_read_is_named_and_nothing_is_written(tmp_path, ca
     assert run(path, "--glb") == 2
     assert f"{path}: " in capsys.readouterr().err
     assert not list(tmp_path.glob("*.glb"))
-
-
-def test_a_file_without_animation_is_told(tmp_path, capsys):
-    new_file()
-    path = save(tmp_path / "still.blend")
-    assert run(path, "--glb") == 2
-    assert f"{path}: no animation moves a node" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

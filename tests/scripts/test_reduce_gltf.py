@@ -1,7 +1,5 @@
 """`reduce.py` gives glTF files back as they are, with fewer keys, and needs no Blender for that."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """reduce.py on recordings: how near tables, objects and rigs are to what was recorded."""
 
-from __future__ import annotations
-
 import re
 
 import bpy

@@ -1,7 +1,5 @@
 """What the rooms that a worker in Blender uses may import."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

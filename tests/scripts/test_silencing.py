@@ -1,7 +1,5 @@
 """What is written by Python, by the system and by C is kept off the streams, and nothing else."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import sys

@@ -1,7 +1,5 @@
 """Commands whose output nobody reads, has no place, or cannot be shown: one line or silence, and no traceback."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

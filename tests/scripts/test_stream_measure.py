@@ -1,7 +1,5 @@
 """`stream measure`: what a recording costs, and what was shown of it, by another process."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,13 +1,9 @@
 """Whole bodies under few keys: which keys there are, and that errors do not depend on how they are worked out."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from rigid_motion.motion import KEYFRAME_MODES, Poses
 from rigid_motion_batch.analysis import bodies
@@ -96,29 +92,9 @@ def test_keys_that_the_motion_chooses_keep_every_joint_within_the_tolerance(mode
     assert all(own[0] == 0 and own[-1] == len(made.clip.times) - 1 for own in moved)
 
 
-def test_key_poses_are_no_more_keys_than_a_budget_has_and_a_joints_own_are_worth_as_many() -> None:
-    clip = swinging_body()
-    for shared in (False, True):
-        made = reconstruct_body(clip, Budget("6"), ("lerp_slerp",), RADII, shared=shared)
-        keys = made.keys["lerp_slerp"]
-        assert sum(map(len, keys)) <= 13 * len(JOINTS)
-        if shared:
-            assert max(map(len, keys)) == 13
-
-
 @pytest.mark.parametrize("choice", [Uniform("0.3"), Budget("0.3")], ids=str)
 def test_a_body_too_short_for_two_keys_is_not_reconstructed(choice: Choice) -> None:
     assert reconstruct_body(swinging_body(), choice, MODES, RADII) is None
-
-
-@pytest.mark.parametrize("samples", [2, 3, 5, 8, 12])
-@pytest.mark.parametrize("choice", [Uniform("30"), Budget("30"), Tolerance("1mm")], ids=str)
-def test_bodies_of_a_few_samples_have_keys_too(samples: int, choice: Choice) -> None:
-    clip = swinging_body()
-    few = replace(clip, times=clip.times[:samples], poses=clip.poses[:, 30 : 30 + samples])
-    made = reconstruct_body(few, choice, MODES, RADII)
-    for mode in MODES:
-        assert measured(made, mode).shell.max() <= 1e-3
 
 
 # -- errors -----------------------------------------------------------------------------------------------------------
@@ -144,27 +120,6 @@ def test_blocks_of_any_size_give_the_same_numbers(block: int, monkeypatch: pytes
     assert np.array_equal(of_pieces.joints, ground.joints)
     assert np.array_equal(of_pieces.stands, ground.stands)
     assert rms_of_body(made, "lerp_slerp", RADII) == pytest.approx(np.sqrt(np.mean(whole.shell**2)), rel=1e-12)
-
-
-@given(seed=st.integers(0, 2**16), rate=st.sampled_from(["2", "3.5", "7", "15"]), mode=st.sampled_from(MODES))
-def test_at_key_poses_there_is_no_error_and_with_every_sample_none_anywhere(seed: int, rate: str, mode: str) -> None:
-    clip = swinging_body(seed=seed, seconds=1.0)
-    made = evenly(clip, rate, (mode,))
-    at_keys = made.keys[mode][0] - made.samples.start
-    errors = measured(made, mode)
-    assert errors.shell[:, at_keys].max() < 1e-9
-    assert errors.shell.max() > 1e-6
-    assert measured(evenly(clip, "30", (mode,)), mode).shell.max() < 1e-9
-
-
-@given(seed=st.integers(0, 2**16), power=st.integers(-3, 3))
-def test_errors_are_in_metres_whatever_the_unit(seed: int, power: int) -> None:
-    clip = swinging_body(seed=seed, seconds=1.0)
-    poses = Poses(clip.poses.positions * 10.0**power, clip.poses.quaternions)
-    other = replace(clip, poses=poses, metres_per_unit=clip.metres_per_unit / 10.0**power)
-    one, same = measured(evenly(clip)), measured(evenly(other))
-    np.testing.assert_allclose(same.shell, one.shell, rtol=1e-6, atol=1e-12)
-    assert same.slide == pytest.approx(one.slide, rel=1e-6)
 
 
 @pytest.mark.parametrize("mode", KEYFRAME_MODES)

@@ -1,7 +1,5 @@
 """The numbers of whole bodies as rows and tables: what they are of, and that names of any kind survive."""
 
-from __future__ import annotations
-
 import csv
 import re
 from dataclasses import astuple
@@ -14,15 +12,12 @@ from rigid_motion_batch.analysis.bodies import Ground, measure_body, reconstruct
 from rigid_motion_batch.analysis.body_metrics import (
     MeasuredBody,
     join_tables,
-    key_samples,
     measure_modes,
-    numbers_of,
     write_joint_metrics,
     write_key_tables,
 )
 from rigid_motion_batch.analysis.choices import Choice, Tolerance, Uniform
 from rigid_motion_batch.analysis.metrics import body_table_names
-from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.rows import meant
 from tests.scripts.clips.bodies import JOINTS, swinging_body
 
@@ -107,31 +102,6 @@ def test_a_joint_that_stays_as_it_is_sends_nothing() -> None:
     assert row.keys_per_s == pytest.approx(5.0)
     assert row.bytes_per_s == pytest.approx(5.0 * moving * 56)
     assert row.key_frames == 11
-
-
-@pytest.mark.parametrize("seconds", [0.4, 2.0, 15.0])
-def test_what_is_shown_has_the_largest_errors_and_where_the_joints_are_then(seconds: float) -> None:
-    clip = swinging_body(seconds=seconds)
-    made = reconstruct_body(clip, Uniform("5"), ("lerp_slerp",), RADII)
-    shown = measure_modes(made, RADII).errors["lerp_slerp"]
-    errors = measure_body(made, "lerp_slerp", RADII, Ground.of(made)).shell
-    joint, sample = shown.worst
-    assert errors.max() == errors[joint, sample] == shown.shell.max()
-    np.testing.assert_array_equal(shown.shell, errors)
-    truth = to_blender(clip.rest_body.skeleton.in_root_space(clip.poses[:, made.samples])[:, sample], clip.axes)
-    away = np.linalg.norm(shown.places[:, sample] - 0.01 * truth.positions, axis=-1)
-    assert away.max() <= errors[:, sample].max()
-    assert away.max() == pytest.approx(shown.largest[0, sample], abs=1e-6)
-
-
-def test_how_many_numbers_keys_take_counts_times_turns_and_places_that_vary() -> None:
-    shared, own = (measured(CHOICES[1], ("lerp_slerp",), shared=shared).made for shared in (True, False))
-    poses = len(key_samples(shared.keys["lerp_slerp"]))
-    # The hips move and turn, the glove does neither, and the others turn.
-    assert numbers_of(shared, "lerp_slerp") == poses * (1 + 7 + 4 * (len(JOINTS) - 2))
-    counts = dict(zip(JOINTS, map(len, own.keys["lerp_slerp"]), strict=True))
-    hips, _ = counts.pop("Hips"), counts.pop("Glove")
-    assert numbers_of(own, "lerp_slerp") == 8 * hips + 5 * sum(counts.values())
 
 
 # -- tables -----------------------------------------------------------------------------------------------------------

@@ -1,14 +1,11 @@
 """Key poses needed by whole bodies: they reach what they have to, and no fewer do."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from rigid_motion.motion import Poses
 from rigid_motion_batch.analysis.body_needed import OfBody
-from rigid_motion_batch.analysis.metrics import NOTHING
-from rigid_motion_batch.analysis.needed import RATES, KeysNeeded, evenly_spaced, keys_needed
+from rigid_motion_batch.analysis.needed import RATES, KeysNeeded, keys_needed
 from tests.motion.bodies import body_errors
 from tests.scripts.clips.bodies import JOINTS, PARENTS, swinging_body
 
@@ -44,11 +41,6 @@ def test_the_reference_is_evenly_spaced_and_modes_that_are_one_motion_are_one(re
     assert result.reference_keys.tolist() == [40, 27, 20, 16, 11, 7]
 
 
-def test_with_every_sample_a_key_there_is_nothing_to_be_as_good_as(result: KeysNeeded) -> None:
-    assert result.targets[0] < NOTHING
-    assert np.isnan(result.keys[..., 0]).all()
-
-
 def test_the_keys_needed_are_as_good_and_those_of_the_motion_are_no_more(result: KeysNeeded) -> None:
     for place in range(1, len(RATES)):
         uniform, adaptive = result.keys[:, 0, place], result.keys[:, 1, place]
@@ -56,14 +48,3 @@ def test_the_keys_needed_are_as_good_and_those_of_the_motion_are_no_more(result:
         finite = np.isfinite(result.keys[..., place])
         assert (result.reached[..., place][finite] <= result.targets[place] * (1.0 + 1e-9)).all()
         assert (adaptive[np.isfinite(uniform)] <= uniform[np.isfinite(uniform)]).all()
-
-
-def test_evenly_one_key_fewer_is_not_as_good(result: KeysNeeded) -> None:
-    for row, (mode, *_) in list(enumerate(result.groups))[1:]:
-        for place in range(1, len(RATES)):
-            keys = result.keys[row, 0, place]
-            if np.isfinite(keys) and keys > 2:
-                last = round(result.durations[place] * 30.0)
-                stretch = WAYS.between(0, last)
-                fewer = evenly_spaced(stretch.clip, int(keys) - 2)
-                assert stretch.error(fewer, mode) > result.targets[place]

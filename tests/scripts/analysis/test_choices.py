@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -61,16 +59,6 @@ def test_a_budget_is_as_many_keys_as_a_sender_at_that_rate_has_and_better_ones(s
 @pytest.mark.parametrize("choice", [Uniform("0.2"), Budget("0.2")])
 def test_a_clip_too_short_for_two_keys_is_not_reconstructed(choice: Choice) -> None:
     assert reconstruct(swinging_clip(), choice, KEYFRAME_MODES, 0.1) is None
-
-
-def test_a_reconstruction_keeps_the_keys_of_each_mode_apart_but_those_of_one_motion_together() -> None:
-    clip = swinging_clip()
-    made = reconstruct(clip, Tolerance("5mm"), KEYFRAME_MODES, 0.1)
-    assert tuple(made.keys) == tuple(made.poses) == tuple(made.errors) == tuple(KEYFRAME_MODES)
-    assert np.array_equal(made.keys["dq_sclerp"], made.keys["cga_slerp"])
-    assert len(made.keys["motor_spline"]) < len(made.keys["dq_sclerp"])
-    for mode, keys in made.keys.items():
-        assert made.errors[mode].shell.max() == pytest.approx(shell_errors(clip, keys, mode).max(), rel=1e-9)
 
 
 @pytest.mark.parametrize("written", ["0mm", "-5mm", "5in", "5 m m", "1e-3", "nan", "", "mm", "5MM", "../x", "5mm\n"])

@@ -1,7 +1,5 @@
 """What a comparison finds of a clip agrees with the recording and with what was measured of it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -43,8 +41,3 @@ def test_of_a_body_the_joint_that_is_farthest_off_counts() -> None:
         assert np.array_equal(motion.errors[0], motion.joint_errors.max(axis=0))
         assert motion.errors[0].max() == motion.metrics[0].max_shell_m
     assert len(result.joints) == len(MODES) * len(whole.facts.joint_names)
-
-
-def test_a_clip_that_is_too_short_for_two_keys_has_no_result() -> None:
-    (clip,), _ = read_source(str(ASSETS / "reach.csv"), None)
-    assert compare_clip(clip, Uniform("0.01"), MODES, Radii(), shared=False) is None

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import csv
 from dataclasses import replace
 from pathlib import Path
@@ -76,14 +74,6 @@ def test_evenly_spaced_keys_reach_it_and_one_segment_fewer_do_not(swing: Clip, r
             )
             assert enough <= result.targets[place] * (1.0 + 1e-9) < fewer
             assert result.reached[row, 0, place] == pytest.approx(enough, rel=1e-9)
-
-
-def test_the_reference_needs_its_own_keys_and_shares_are_counted_from_them(result: KeysNeeded) -> None:
-    assert (result.shares[0, 0] == 1.0).all()
-    assert np.array_equal(result.keys[0, 0], result.reference_keys)
-    assert np.allclose(result.shares * result.reference_keys, result.keys)
-    assert np.allclose(result.keys_per_s * result.durations, result.keys - 1.0)
-    assert (result.shares[3, 1] < result.shares[0, 1]).all()
 
 
 def test_fitted_keys_reach_it_and_are_fewer(swing: Clip, result: KeysNeeded) -> None:

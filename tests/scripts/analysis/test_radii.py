@@ -1,7 +1,5 @@
 """Radii: numbers, and tables with a line for each joint; what is wrong is told with the file and the line."""
 
-from __future__ import annotations
-
 import os
 import re
 import string

@@ -1,7 +1,5 @@
 """Reading sources: of several bodies the good ones stay, and the others are named."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

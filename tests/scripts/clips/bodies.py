@@ -1,7 +1,5 @@
 """Whole bodies for the tests of the comparison: small, in centimetres with y upwards, and different for every seed."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

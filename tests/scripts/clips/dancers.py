@@ -1,7 +1,5 @@
 """Bodies that dance: clips of whole figures, made up."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Recordings of a swinging tool for the tests: small, smooth, and different for every seed."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from rigid_motion.motion import KEYFRAME_MODES, Poses, decimate, interpolate, measure

@@ -1,7 +1,5 @@
 """Scenes to be saved and read again: objects and rigs, with keys."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -11,6 +9,7 @@ import pytest
 from rigid_motion_batch.recordings import Trajectory
 
 bpy = pytest.importorskip("bpy")
+anim_utils = pytest.importorskip("bpy_extras.anim_utils")
 
 FPS = 50
 
@@ -45,6 +44,19 @@ def key(animated: bpy.types.Object | bpy.types.PoseBone, frame: float, **channel
     for channel, value in channels.items():
         setattr(animated, channel, value)
         animated.keyframe_insert(channel, frame=frame)
+
+
+def fcurves(obj: bpy.types.Object) -> bpy.types.ActionChannelbagFCurves:
+    """Those of its Action."""
+    data = obj.animation_data
+    return anim_utils.action_get_channelbag_for_slot(data.action, data.action_slot).fcurves
+
+
+def linear(obj: bpy.types.Object) -> None:
+    """Let the keys of an Action be joined by straight lines."""
+    for fcurve in fcurves(obj):
+        for point in fcurve.keyframe_points:
+            point.interpolation = "LINEAR"
 
 
 def on_frames(trajectory: Trajectory) -> Trajectory:

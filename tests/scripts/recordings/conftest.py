@@ -1,7 +1,5 @@
 """Small recordings and scenes made on the spot, and the check that an error is the one line that was promised."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path

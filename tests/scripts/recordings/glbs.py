@@ -1,7 +1,5 @@
 """GLB files of a chain of joints, and where the glTF specification puts these joints."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass

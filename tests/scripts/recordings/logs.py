@@ -1,7 +1,5 @@
 """Logs as programs and people write them: the same motion under many spellings of its columns, in many units."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

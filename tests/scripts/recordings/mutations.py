@@ -3,8 +3,6 @@
 Every mutation is a function from the bytes of a file, and a source of chance, to other bytes.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from random import Random

@@ -3,8 +3,6 @@
 Every one holds the same handful of samples of a body that turns while it moves, so that damage is near what matters.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 

@@ -1,7 +1,5 @@
 """A small body that moves, with a skin, made in the open scene and exported as FBX and glTF."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import warnings

@@ -1,49 +1,14 @@
 """Animated objects of .blend files, which bpy makes here."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rigid_motion_batch.recordings import read_trajectories
-from tests.scripts.recordings.blends import FPS, empty, key, on_frames
+from tests.scripts.recordings.blends import empty, fcurves, key
 
 bpy = pytest.importorskip("bpy")
-anim_utils = pytest.importorskip("bpy_extras.anim_utils")
-
-
-def test_an_object_is_sampled_on_every_frame_of_its_action(saved) -> None:
-    drill = empty("Drill", rotation_mode="QUATERNION")
-    key(drill, 11, location=(0, 0, 0), rotation_quaternion=(1, 0, 0, 0))
-    key(drill, 21, location=(0, 10, 0), rotation_quaternion=(0, 0, 0, 1))
-    expected = []
-    for frame in range(11, 22):
-        bpy.context.scene.frame_set(frame)
-        expected.append(drill.location[1])
-    (trajectory,) = map(on_frames, read_trajectories(saved()).trajectories)
-    assert trajectory.name == "Drill"
-    np.testing.assert_allclose(trajectory.times, np.arange(11, 22) / FPS, rtol=1e-15)
-    np.testing.assert_allclose(trajectory.poses.positions[:, 1], expected, atol=1e-6)
-    np.testing.assert_allclose(np.abs(trajectory.poses.quaternions[[0, -1]]), [[1, 0, 0, 0], [0, 0, 0, 1]], atol=1e-6)
-    assert trajectory.poses.scales is None
-    assert 0.0 < trajectory.poses.positions[1, 1] < 0.9, "eased, as Blender's curves are"
-
-
-def test_parents_constraints_and_hidden_objects_are_evaluated(saved) -> None:
-    parent = empty("Parent")
-    key(parent, 1, rotation_euler=(0, 0, 0), hide_viewport=True)
-    key(parent, 30, rotation_euler=(0, 0, np.pi / 2), hide_viewport=True)
-    child = empty("Child", parent=parent, location=(2, 0, 0))
-    empty("Follower").constraints.new("COPY_TRANSFORMS").target = child
-    path = saved()
-    for name in ("Child", "Follower"):
-        (trajectory,) = map(on_frames, read_trajectories(f"{path}:{name}").trajectories)
-        assert len(trajectory.times) == 30, "the scene's frames, for want of an Action of its own"
-        np.testing.assert_allclose(trajectory.poses.positions[[0, -1]], [[2, 0, 0], [0, 2, 0]], atol=1e-6)
-    (trajectory,) = read_trajectories(f"{path}:Parent").trajectories
-    np.testing.assert_allclose(trajectory.poses.quaternions[-1], [np.sqrt(0.5), 0, 0, np.sqrt(0.5)], atol=1e-6)
 
 
 def test_the_animated_objects_are_told_and_still_ones_are_not(saved) -> None:
@@ -131,8 +96,7 @@ def test_a_key_where_no_frame_is_costs_no_hours(saved, refusal, frame: float) ->
     drill = empty("Drill")
     key(drill, 1, location=(0, 0, 0))
     key(drill, 9, location=(1, 0, 0))
-    slot = anim_utils.action_get_channelbag_for_slot(drill.animation_data.action, drill.animation_data.action_slot)
-    slot.fcurves[0].keyframe_points[0 if frame < 0.0 else 1].co.x = frame
+    fcurves(drill)[0].keyframe_points[0 if frame < 0.0 else 1].co.x = frame
     _, message = refusal(saved())
     assert message.startswith("'Drill' moves from frame ")
     assert message.endswith("where Blender does not go; delete the keys that are far off")

@@ -1,16 +1,13 @@
 """Pose bones of .blend files, against matrices that are worked out here."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from rigid_motion_batch.recordings import Trajectory, read_trajectories
-from tests.scripts.recordings.blends import FPS, empty, key, on_frames, rig
+from tests.scripts.recordings.blends import FPS, empty, key, linear, on_frames, rig
 
 bpy = pytest.importorskip("bpy")
-anim_utils = pytest.importorskip("bpy_extras.anim_utils")
 
 ARM = {"Upper": ((0, 0, 0), (0, 1, 0), None), "Lower": ((0, 1, 0), (0, 2, 0), "Upper")}
 """Along y, which makes their axes those of the armature."""
@@ -24,18 +21,6 @@ def matrix(position: object = (0, 0, 0), axis: str = "z", degrees: float = 0.0, 
     made[:3, :3] = scale * Rotation.from_euler(axis, degrees, degrees=True).as_matrix()
     made[:3, 3] = position
     return made
-
-
-def linear(obj: bpy.types.Object) -> None:
-    """Let the keys of an Action be joined by straight lines."""
-    for fcurve in fcurves(obj):
-        for point in fcurve.keyframe_points:
-            point.interpolation = "LINEAR"
-
-
-def fcurves(obj: bpy.types.Object) -> bpy.types.ActionChannelbagFCurves:
-    data = obj.animation_data
-    return anim_utils.action_get_channelbag_for_slot(data.action, data.action_slot).fcurves
 
 
 def read(source: str) -> Trajectory:
@@ -248,9 +233,3 @@ def test_a_rig_whose_bones_are_still_is_an_object(saved) -> None:
     path = saved()
     for source in (path, f"{path}:Rig", f"{path}:*"):
         assert read(source).rest_body is None
-
-
-@pytest.mark.parametrize("expected", ["rig/hand.l", "RIG/Hand.L"])
-def test_objects_and_bones_have_their_names_in_any_case(saved, expected: str) -> None:
-    rig("Rig", {"Hand.L": ((0, 0, 0), (0, 1, 0), None), "Hand.R": ((1, 0, 0), (1, 1, 0), None)})
-    assert read_trajectories(f"{saved()}:{expected}").trajectories[0].name == "Rig/Hand.L"

@@ -3,8 +3,6 @@
 Memory is Python's own and NumPy's, as `tracemalloc` has it.
 """
 
-from __future__ import annotations
-
 import time
 import tracemalloc
 from collections.abc import Callable

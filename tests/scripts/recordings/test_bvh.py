@@ -4,7 +4,6 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from rigid_motion.motion.quaternions import angle_between
 from rigid_motion_batch.recordings import ReadingOptions, read_trajectories
@@ -17,46 +16,22 @@ Frame Time: 0.04
 """
 
 
-def test_a_joint_is_carried_by_its_parents(write) -> None:
-    shoulder, elbow = read_trajectories(write("arm.bvh", ARM) + ":*").trajectories
-    assert (shoulder.name, elbow.name) == ("Shoulder", "Elbow")
-    np.testing.assert_array_equal(elbow.times, [0.0, 0.04])
-    np.testing.assert_allclose(elbow.poses.positions, [[2, 0, 0], [1, 7, 0]], atol=1e-15)
-    np.testing.assert_allclose(elbow.poses.quaternions, [[1, 0, 0, 0]] * 2, atol=1e-15)
-    np.testing.assert_allclose(shoulder.poses.quaternions[1], [np.sqrt(0.5), 0, 0, np.sqrt(0.5)], atol=1e-15)
-
-
 def test_without_a_name_it_is_the_whole_body_each_joint_in_its_parents_space(write) -> None:
     recording = read_trajectories(write("arm.bvh", ARM.replace("1 5 0  90", "1 2 0  90")))
     (body,) = recording.trajectories
     assert (body.name, recording.others, recording.note, recording.axes) == ("arm", (), "", "opengl")
     assert body.rest_body.joints == ("Shoulder", "Elbow")
+    np.testing.assert_array_equal(body.times, [0.0, 0.04])
     np.testing.assert_array_equal(body.rest_body.parents, [-1, 0])
+    np.testing.assert_array_equal(body.rest_body.rest.positions, [[0, 0, 0], [2, 0, 0]])
+    np.testing.assert_array_equal(body.rest_body.rest.quaternions, [[1, 0, 0, 0]] * 2)
+    np.testing.assert_array_equal(body.rest_body.tails[0], [2, 0, 0])
+    assert np.linalg.norm(body.rest_body.tails[1]) > 0.0  # Its end site.
     np.testing.assert_allclose(body.poses.positions, [[[0, 0, 0], [1, 2, 0]], [[2, 0, 0]] * 2], atol=1e-15)
     there = body.rest_body.skeleton.in_root_space(body.poses)
     for joint, alone in enumerate(read_trajectories(str(recording.path) + ":*").trajectories):
         np.testing.assert_allclose(there[joint].positions, alone.poses.positions, atol=1e-15)
         assert angle_between(there[joint].quaternions, alone.poses.quaternions).max() < 1e-15
-
-
-def test_a_body_rests_where_no_joint_is_turned_and_its_bones_end_at_their_children(write) -> None:
-    (body,) = read_trajectories(write("arm.bvh", ARM)).trajectories
-    np.testing.assert_array_equal(body.rest_body.rest.positions, [[0, 0, 0], [2, 0, 0]])
-    np.testing.assert_array_equal(body.rest_body.rest.quaternions, [[1, 0, 0, 0]] * 2)
-    np.testing.assert_array_equal(body.rest_body.tails[0], [2, 0, 0])
-    assert np.linalg.norm(body.rest_body.tails[1]) > 0.0  # Its end site.
-
-
-@pytest.mark.parametrize("order", ["".join(order) for order in permutations("XYZ")])
-def test_angles_are_applied_in_the_order_of_the_channels(write, order: str) -> None:
-    channels = " ".join(f"{axis}rotation" for axis in order)
-    text = ARM.replace("Zrotation Xrotation Yrotation", channels).replace("90 0 0  -90 0 0", "10 20 30  40 50 60")
-    shoulder, elbow = read_trajectories(write("arm.bvh", text) + ":*").trajectories
-    first = Rotation.from_euler(order, [10, 20, 30], degrees=True)
-    both = first * Rotation.from_euler(order, [40, 50, 60], degrees=True)
-    expected = np.array([first.as_quat(), both.as_quat()])[:, [3, 0, 1, 2]]
-    result = np.array([shoulder.poses.quaternions[1], elbow.poses.quaternions[1]])
-    assert angle_between(result, expected).max() < 1e-14
 
 
 @pytest.mark.parametrize(
@@ -79,13 +54,6 @@ def test_spelling_and_spacing_do_not_matter(write, text: str) -> None:
 def test_names_of_joints_are_those_that_blender_makes_of_them(write, name: str, read: str) -> None:
     (body,) = read_trajectories(write("arm.bvh", ARM.replace("Elbow", name))).trajectories
     assert body.rest_body.joints == ("Shoulder", read)
-
-
-def test_position_channels_take_the_place_of_the_offset(write) -> None:
-    text = ARM.replace("CHANNELS 3", "CHANNELS 6 Zposition Yposition Xposition").replace("-90 0 0", "3 2 1 -90 0 0")
-    text = text.replace("0 0 0  0 0 0  0 0 0", "0 0 0  0 0 0  3 2 1  0 0 0")
-    _, elbow = read_trajectories(write("arm.bvh", text) + ":*").trajectories
-    np.testing.assert_allclose(elbow.poses.positions, [[1, 2, 3], [1 - 2, 5 + 1, 3]], atol=1e-15)
 
 
 @pytest.mark.parametrize("count", [1, 3, 60])

@@ -1,7 +1,5 @@
 """Damaged FBX and glTF files: each is refused in one line or read, in a process that may be lost, and only that."""
 
-from __future__ import annotations
-
 import os
 import struct
 from collections.abc import Callable, Iterator

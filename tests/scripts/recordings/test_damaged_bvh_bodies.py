@@ -1,7 +1,5 @@
 """BVH files of whole bodies with several limbs and roots: they are read, measured and shown in every mode."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import astuple
 from pathlib import Path

@@ -1,14 +1,9 @@
 """Dates and clock times in the column of time."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from datetime import UTC, datetime, timedelta, timezone
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from rigid_motion_batch.recordings import read_trajectories
 
@@ -54,37 +49,9 @@ def test_a_fraction_may_have_a_decimal_comma_where_commas_do_not_separate(write)
     np.testing.assert_array_equal(times_of(write("log.csv", f"{head.replace(',', ';')}\n{rows}")), [0.0, 0.25])
 
 
-def test_numbers_go_before_dates_that_say_the_same_again(write) -> None:
-    rows = "".join(f"2026-11-22T10:00:0{time},{time},{POSE}\n" for time in (5, 6))
-    np.testing.assert_array_equal(times_of(write("log.csv", f"datetime,t,x,y,z,qx,qy,qz,qw\n{rows}")), [5.0, 6.0])
-
-
-@given(
-    st.datetimes(datetime(1990, 1, 1), datetime(2090, 1, 1)),
-    st.lists(st.tuples(st.integers(0, 86_400_000_000), st.integers(0, 999), st.integers(-840, 840)), min_size=1),
-)
-def test_nanoseconds_and_offsets_are_exact(tmp_path_factory, start: datetime, later: list) -> None:
-    start = start.replace(tzinfo=UTC)
-    cells, expected = [start.isoformat()], [0]
-    for microseconds, nanoseconds, minutes in later:
-        moment = start + timedelta(microseconds=microseconds)
-        local = moment.astimezone(timezone(timedelta(minutes=minutes))).isoformat(timespec="microseconds")
-        cells.append(f"{local[:26]}{nanoseconds:03}{local[26:]}")
-        expected.append(1000 * microseconds + nanoseconds)
-    path = tmp_path_factory.getbasetemp() / "dates.csv"
-    path.write_text(log(cells))
-    times, nanoseconds = times_of(str(path)), np.array(expected)
-    earliest = nanoseconds[np.flatnonzero(times == 0.0)[0]]  # Without those that are wild beside the others.
-    np.testing.assert_array_equal(times, (nanoseconds - earliest) / 1e9)
-
-
 def test_a_clock_that_comes_back_from_the_next_day_is_of_the_day_before(write) -> None:
     times = ["23:59:59.5", "00:00:00", "23:59:59.75", "00:00:00.25"]
     np.testing.assert_array_equal(times_of(write("log.csv", log(times))), [0.0, 0.5, 0.25, 0.75])
-
-
-def test_a_pause_of_more_than_half_a_day_is_one(write) -> None:
-    np.testing.assert_array_equal(times_of(write("log.csv", log(["01:00:00", "14:00:00"]))), [0.0, 13 * 3600.0])
 
 
 def test_a_row_without_a_time_is_kept_for_the_repair(write) -> None:

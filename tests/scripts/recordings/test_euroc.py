@@ -22,17 +22,3 @@ def test_not_a_nanosecond_is_lost(write, header: str) -> None:
     np.testing.assert_array_equal(trajectory.times, np.array([0, 5_000_001, 10_000_004]) / 1e9)
     np.testing.assert_array_equal(trajectory.poses.positions[0], [4.688319, -1.786938, 0.783338])
     np.testing.assert_array_equal(trajectory.poses.quaternions[0], [0.534108, -0.153029, -0.827383, -0.082152])
-
-
-@pytest.mark.parametrize(
-    ("text", "line", "problem"),
-    [
-        (f"{HEADER}\n", None, "'data' has 0 samples"),
-        ("#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m]\n1,2,3,4\n", 1, "no column named x, y, z, qx, qy, qz"),
-        (f"{HEADER}\n{ROWS}1,0,0,0,up,0,0,0,0,0,0\n", 5, "qw is 'up', not a number"),
-    ],
-)
-def test_a_wrong_file_is_told_with_its_line(write, refusal, text: str, line: int | None, problem: str) -> None:
-    told_line, message = refusal(write("data.csv", text))
-    assert message.startswith(problem)
-    assert told_line == line

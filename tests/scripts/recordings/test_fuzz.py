@@ -4,8 +4,6 @@ RIGID_MOTION_FUZZ=20000 damages so many files of each format, instead of the few
 for. A failure names its case; RIGID_MOTION_FUZZ_FROM begins there.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

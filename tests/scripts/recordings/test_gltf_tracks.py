@@ -1,7 +1,5 @@
 """Tracks of glTF animations made straight: what is kept in other ways than floats, and what is damaged."""
 
-from __future__ import annotations
-
 import copy
 import json
 import struct

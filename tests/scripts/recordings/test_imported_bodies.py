@@ -1,7 +1,5 @@
 """Whole bodies of FBX and glTF files: made and exported here, and other people's, against matrices of Blender's."""
 
-from __future__ import annotations
-
 import base64
 import json
 import os
@@ -118,22 +116,6 @@ def test_the_skin_moves_with_its_joints_as_in_blender(scene, tmp_path: Path, end
     np.testing.assert_allclose(np.sort(skin.weights, axis=1), [[0.0, 0.0, 0.25, 0.75]] * len(skin.weights), atol=1e-6)
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
-def test_single_joints_are_where_they_are_in_the_whole(exported, ending: str) -> None:
-    path, seen = exported(ending)
-    world = in_world(walk := whole(path))
-    for source in ("Hand", "Body/Hand"):
-        (hand,) = map(on_frames, read_trajectories(f"{path}:{source}").trajectories)
-        assert (hand.name, hand.rest_body) == (source, None)
-        np.testing.assert_allclose(hand.poses.positions, seen[-1], atol=SINGLE)
-    everything = [*map(on_frames, read_trajectories(f"{path}:*").trajectories)]
-    assert tuple(one.name for one in everything) == walk.rest_body.joints
-    for joint, one in enumerate(everything):
-        np.testing.assert_allclose(one.poses.positions, world.positions[joint], atol=1e-12)
-        alike = np.abs(np.einsum("ni,ni->n", one.poses.quaternions, world.quaternions[joint]))
-        np.testing.assert_allclose(alike, 1.0, atol=1e-12)
-
-
 @pytest.mark.parametrize("ending", [".glb", ".blend"])
 def test_a_body_is_as_large_as_its_joints_wherever_an_importer_has_its_bones_end(scene, tmp_path: Path, ending) -> None:
     path = soldier().write(tmp_path / "soldier.glb")
@@ -186,9 +168,6 @@ def test_one_of_several_takes_is_taken_and_the_others_told(scene, tmp_path: Path
     other = ({*seen} - {taken}).pop()
     assert other in recording.note.partition("others: ")[2]
     np.testing.assert_allclose(places(result), seen[taken], atol=SINGLE)
-
-
-# -- other people's ---------------------------------------------------------------------------------------------------
 
 
 # -- what is open stays -----------------------------------------------------------------------------------------------

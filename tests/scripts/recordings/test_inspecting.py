@@ -1,7 +1,5 @@
 """What is said to be in a recording is in it, and what is wrong with it comes with the way out."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -75,15 +73,6 @@ def test_all_devices_of_a_log_are_described_and_those_without_poses_named(write)
     assert [one.name for one in result.contents] == ["left", "right"]
     assert result.unreadable[0][0] == "spare"
     assert [one.name for one in inspect(f"{source}:RIGHT").contents] == ["right"]
-
-
-def test_what_looks_wrong_comes_with_the_way_out(write) -> None:
-    (hand,) = inspect(write("hand.csv", log(scale=100.0))).contents
-    assert [warning.way_out.partition(",")[0] for warning in hand.warnings] == ["if its lengths are centimetres"]
-    text = "\n".join([line for row, line in enumerate(log().splitlines()) if not 90 < row < 130])
-    (hand,) = inspect(write("gap.csv", text)).contents
-    assert "no samples from" in hand.warnings[0].text
-    assert hand.timing.gaps == 1
 
 
 def test_the_command_says_it_in_words(write, capsys) -> None:

@@ -1,7 +1,5 @@
 """Logs in the spellings that people have: each is the motion that was recorded, or says what is to be done."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,27 +15,10 @@ from tests.scripts.recordings import logs
 from tests.scripts.recordings.logs import MOTIONS, assert_is_the_motion, log, names, spellings
 from tests.thoroughness import tried
 
-POSITION, QUATERNION = "pos_{}", "rot_{}"
-
 
 def read_one(source: str, **options: object) -> object:
     (trajectory,) = read_trajectories(source, ReadingOptions(**options)).trajectories
     return trajectory
-
-
-# -- names and units --------------------------------------------------------------------------------------------------
-
-
-def test_axes_in_units_of_their_own_become_metres(write) -> None:
-    motion = MOTIONS["left"]
-    poses = logs.pose_texts(motion, np.array((1.0, 0.01, 0.001)), motion.turns.as_quat())
-    rows = [[time, *pose] for time, pose in zip(logs.time_texts("s", 0), poses, strict=True)]
-    source = write("take.csv", logs.written(["t", "x", "y_cm", "z [mm]", "qx", "qy", "qz", "qw"], rows))
-    assert_is_the_motion(read_one(source), motion)
-
-
-def test_a_line_that_tells_spreadsheets_the_separator_is_no_header(write) -> None:
-    assert_is_the_motion(read_one(write("take.csv", "sep=,\n" + log(names("t", "{}", "q{}")))), MOTIONS["left"])
 
 
 # -- what the user says -----------------------------------------------------------------------------------------------
@@ -102,13 +83,6 @@ def euler_log(header: Sequence[str], order: str, degrees: bool) -> str:
     return logs.written(header, [[time, *pose] for time, pose in rows])
 
 
-@pytest.mark.parametrize("order", ["XYZ", "YXZ", "ZYX", "zxy", "xyz", "yzx"])
-@pytest.mark.parametrize("degrees", [False, True])
-def test_euler_angles_are_read_in_the_order_that_is_said_as_scipy_has_it(write, order: str, degrees: bool) -> None:
-    source = write("take.csv", euler_log(names("t", "{}", "rot_{}", "xyz"), order, degrees))
-    assert_is_the_motion(read_one(source, euler=order, degrees=degrees), MOTIONS["left"])
-
-
 def test_roll_pitch_and_yaw_are_read_where_it_is_said_which_is_which(write, refusal) -> None:
     source = write("take.csv", euler_log(["t", "x", "y", "z", "roll", "pitch", "yaw"], "ZYX", False))
     which = [("rx", "roll"), ("ry", "pitch"), ("rz", "yaw")]
@@ -151,41 +125,6 @@ def long_log(device: str, header: Sequence[str] = ("t", "x", "y", "z", "qx", "qy
     lines = [log(header, unit, side=side).splitlines()[1:] for side in MOTIONS]
     rows = [f"{row},{side}" for both in zip(*lines, strict=True) for row, side in zip(both, MOTIONS, strict=True)]
     return "\n".join([f"{','.join(header)},{device}", *rows])
-
-
-def wide_log(prefixes: Sequence[str]) -> str:
-    """Two bodies in every row."""
-    left, right = (log(names("t", POSITION, QUATERNION), side=side).splitlines()[1:] for side in MOTIONS)
-    rows = (f"{one},{other.partition(',')[2]}" for one, other in zip(left, right, strict=True))
-    return "\n".join([",".join(names("t", POSITION, QUATERNION, prefixes=prefixes)), *rows])
-
-
-def assert_holds_both(source: str, bodies: Sequence[str], **options: object) -> None:
-    for body, motion in zip(bodies, MOTIONS.values(), strict=True):
-        trajectory = read_one(f"{source}:{body}", **options)
-        assert trajectory.name == body
-        assert_is_the_motion(trajectory, motion)
-    assert [body.name for body in read_trajectories(f"{source}:*", ReadingOptions(**options)).trajectories] == bodies
-
-
-@pytest.mark.parametrize("device", spellings(logs.DEVICES))
-def test_a_column_tells_devices_apart(write, device: str) -> None:
-    source = write("log.csv", long_log(device))
-    assert_holds_both(source, ["left", "right"])
-    assert read_trajectories(source).note.startswith(f"{source} holds 2 bodies; took left; others: right; name one")
-
-
-@pytest.mark.parametrize(
-    ("prefixes", "bodies"),
-    [
-        (["left_", "right_"], ["left", "right"]),
-        (["LeftHand.", "RightHand."], ["LeftHand", "RightHand"]),
-        (["tracker 1 ", "tracker 2 "], ["tracker 1", "tracker 2"]),
-        (["", "head "], ["log", "head"]),
-    ],
-)
-def test_columns_of_several_bodies_are_told_by_what_is_in_front(write, prefixes: list[str], bodies: list[str]) -> None:
-    assert_holds_both(write("log.csv", wide_log(prefixes)), bodies)
 
 
 @pytest.mark.parametrize("name", ["log.csv", "log.tum"])
@@ -326,20 +265,6 @@ def test_any_spelling_any_unit_any_order_and_any_layout_is_the_motion(tmp_path_f
     assert {trajectory.name for trajectory in trajectories} == set(MOTIONS)
     for trajectory in trajectories:
         assert_is_the_motion(trajectory, MOTIONS[trajectory.name], start=start, unit=unit)
-
-
-def test_a_rate_of_frames_goes_before_a_column_of_times_where_there_are_both(write) -> None:
-    header = ["frame", *names("t", "{}", "q{}")]
-    rows = log(header[1:]).splitlines()[1:]
-    source = write("take.csv", "\n".join([",".join(header), *(f"{9 * row},{text}" for row, text in enumerate(rows))]))
-    assert_is_the_motion(read_one(source), MOTIONS["left"])
-    np.testing.assert_allclose(read_one(source, frame_rate=90.0).times, np.arange(len(rows)) / 10.0)
-
-
-def test_a_running_number_is_no_device(write) -> None:
-    rows = log(["t", "x", "y", "z", "qx", "qy", "qz", "qw"]).splitlines()
-    text = "\n".join([f"id,{rows[0]}", *(f"{number},{row}" for number, row in enumerate(rows[1:]))])
-    assert read_one(write("log.csv", text)).name == "log"
 
 
 def test_a_device_that_is_alone_is_asked_for_by_its_name(write) -> None:

@@ -44,28 +44,14 @@ def test_the_rigid_bodies_are_found_among_markers_and_bones(write, labels: bool,
     recording = read_trajectories(write("take.csv", export(labels=labels, parents=parents)) + ":*")
     drill, head = recording.trajectories
     assert (drill.name, head.name) == ("Drill", "Head, left")
+    assert drill.metres_per_unit == 0.001
+    inches = export(SETTINGS.replace("Millimeters", "Inches"))
+    assert read_trajectories(write("take.csv", inches)).trajectories[0].metres_per_unit == 0.0254
     np.testing.assert_array_equal(drill.times, [0.0, 0.008333, 0.016667])
     np.testing.assert_array_equal(drill.poses.positions, [[0, 20, 30], [1, 20, 30], [2, 20, 30]])
     np.testing.assert_array_equal(drill.poses.quaternions[:, 1], [0.0, 0.1, 0.2])
     np.testing.assert_array_equal(drill.poses.quaternions[0], [0.9, 0.0, 0.2, 0.3])
     np.testing.assert_array_equal(head.poses.quaternions[2], [-0.5, 0.5, 0.5, 0.5])
-
-
-def test_a_body_that_was_lost_is_nan_for_that_while(write) -> None:
-    (head,) = read_trajectories(write("take.csv", export()) + ":Head, left").trajectories
-    np.testing.assert_array_equal(np.isnan(head.poses.positions).all(axis=1), [False, True, False])
-    np.testing.assert_array_equal(np.isnan(head.poses.quaternions).all(axis=1), [False, True, False])
-    np.testing.assert_array_equal(head.times, [0.0, 0.008333, 0.016667])
-
-
-@pytest.mark.parametrize(
-    ("unit", "metres"), [("Meters", 1.0), ("Centimeters", 0.01), ("Millimeters", 0.001), ("Inches", 0.0254)]
-)
-def test_positions_stay_in_the_unit_of_the_export_which_is_told(write, unit: str, metres: float) -> None:
-    text = export(SETTINGS.replace("Millimeters", unit))
-    (drill,) = read_trajectories(write("take.csv", text)).trajectories
-    np.testing.assert_array_equal(drill.poses.positions[0], [0, 20, 30])
-    assert drill.metres_per_unit == metres
 
 
 @pytest.mark.parametrize("order", ["XYZ", "ZYX", "YZX", ""], ids=str)

@@ -1,7 +1,5 @@
 """What a user says of recordings: checked when it is said, and the same when it has travelled with a task."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from dataclasses import asdict
@@ -21,31 +19,9 @@ def parsed(*arguments: str) -> ReadingOptions:
     return reading_options(parser.parse_args(arguments))
 
 
-def test_a_command_line_says_all_of_them() -> None:
-    assert parsed(*SAID) == MEANT
-    assert parsed() == ReadingOptions()
-
-
-def test_they_are_the_same_after_a_journey_as_json() -> None:
-    for options in (MEANT, ReadingOptions()):
-        assert ReadingOptions(**json.loads(json.dumps(asdict(options)))) == options
-
-
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        (("--start", "3", "--end", "2.5"), "--end 2.5 leaves nothing: it has to be later than --start 3"),
-        (("--time-unit", "ms", "--frame-rate", "90"), "--time-unit and --frame-rate exclude one another"),
-    ],
-)
-def test_what_does_not_go_together_is_refused(arguments: tuple[str, ...], told: str) -> None:
-    with pytest.raises(ValueError, match=told):
-        parsed(*arguments)
-
-
-@pytest.mark.parametrize(("order", "intrinsic"), [("XYZ", "XYZ"), ("zxy", "YXZ"), ("YZX", "YZX"), ("xzy", "YZX")])
-def test_turns_about_fixed_axes_are_turns_about_moved_ones_in_the_opposite_order(order: str, intrinsic: str) -> None:
-    assert ReadingOptions(euler=order).intrinsic_order == intrinsic
+@pytest.mark.parametrize(("said", "meant"), [(SAID, MEANT), ((), ReadingOptions())])
+def test_a_command_line_says_all_of_them_and_they_are_the_same_after_a_journey_as_json(said, meant):
+    assert parsed(*said) == ReadingOptions(**json.loads(json.dumps(asdict(meant)))) == meant
 
 
 @pytest.mark.parametrize(
@@ -65,9 +41,11 @@ def test_turns_about_fixed_axes_are_turns_about_moved_ones_in_the_opposite_order
         (["--end", "soon"], "--end cannot be nan: give seconds"),
         (["--end", "0"], "--end 0 leaves nothing: it has to be later than --start 0"),
         (["--euler", "xYz"], "'xYz' is no order of Euler angles"),
+        (["--start", "3", "--end", "2.5"], "--end 2.5 leaves nothing: it has to be later than --start 3"),
+        (["--time-unit", "ms", "--frame-rate", "90"], "--time-unit and --frame-rate exclude one another"),
     ],
 )
 def test_what_cannot_be_meant_is_refused_at_once(capsys, arguments, told):
-    with pytest.raises(SystemExit):
+    with pytest.raises((SystemExit, ValueError)) as ended:
         parsed(*arguments)
-    assert told in capsys.readouterr().err
+    assert told in f"{capsys.readouterr().err}{ended.value}"

@@ -1,7 +1,5 @@
 """Figures: what is repaired of them, apart from how they move."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which moments of FBX, glTF and .blend files become samples: every key of every curve, and more where it bends."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +7,10 @@ import pytest
 
 from rigid_motion.motion import Poses, interpolate
 from rigid_motion_batch.recordings import Trajectory, read_trajectories
-from tests.scripts.recordings.blends import FPS, empty, key, rig
+from tests.scripts.recordings.blends import FPS, empty, fcurves, key, linear
 from tests.scripts.recordings.glbs import Body, Track, chain, curved, mixed_rates, turning
 
 bpy = pytest.importorskip("bpy")
-anim_utils = pytest.importorskip("bpy_extras.anim_utils")
 
 SINGLE = 2e-5
 """Metres: single precision in files and in Blender, through a chain of 20 joints."""
@@ -52,37 +49,12 @@ def test_the_densest_curve_says_the_rate(tmp_path: Path) -> None:
     assert result.warnings == ()
 
 
-def test_keys_between_the_even_ones_are_samples(tmp_path: Path) -> None:
-    parents, offsets = chain(3, 0.5)
-    even, odd = np.arange(31) / 30, np.array([0.0, 0.21, 0.215, 0.5123, 1.0])
-    tracks = [
-        Track(0, "rotation", even, turning(even, 0.2 * np.sin(3 * even))),
-        Track(1, "rotation", odd, turning(odd, np.array([0.0, 0.6, -0.2, 0.7, 0.0]), (1, 0, 0))),
-    ]
-    body = Body(parents, offsets, tracks)
-    result = read(body.write(tmp_path / "odd.glb"))
-    assert np.abs(result.times - odd[:, None]).min(axis=1).max() < 1e-6
-    assert off(result, body, odd) < SINGLE
-    assert off(result, body, body.moments) < WITHIN
-
-
 @pytest.mark.parametrize("size", [1.0, 0.01])
 def test_splines_are_read_with_their_tangents(tmp_path: Path, size: float) -> None:
     body = curved(size)
     result = read(body.write(tmp_path / "curved.glb"))
     assert off(result, body, body.moments) < WITHIN
     assert (result.rate, result.warnings) == (60.0, ()), "two keys a second tell no rate"
-
-
-def test_wide_turns_are_even(tmp_path: Path) -> None:
-    parents, offsets = chain(4, 0.4)
-    times = np.arange(4) / 2
-    tracks = [
-        Track(joint, "rotation", times, turning(times, 2.5 * np.sin(2 * times + joint), np.eye(3)[joint % 3]))
-        for joint in range(4)
-    ]
-    body = Body(parents, offsets, tracks)
-    assert off(read(body.write(tmp_path / "wide.glb")), body, body.moments) < WITHIN
 
 
 def test_a_step_is_two_samples_and_is_told(tmp_path: Path) -> None:
@@ -156,42 +128,17 @@ def test_keys_off_whole_frames_are_samples(saved) -> None:
     tool = empty("Tool")
     for frame, x in ((1, 0), (2.4, 1), (2.7, -1), (6, 0)):
         key(tool, frame, location=(x, 0, 0))
-    for fcurve in anim_utils.action_get_channelbag_for_slot(
-        tool.animation_data.action, tool.animation_data.action_slot
-    ).fcurves:
-        for point in fcurve.keyframe_points:
-            point.interpolation = "LINEAR"
+    linear(tool)
     result = read(saved())
     np.testing.assert_allclose(result.times * FPS, [1, 2, 2.4, 2.7, 3, 4, 5, 6], atol=1e-6)
     np.testing.assert_allclose(result.poses.positions[2:4, 0], [1, -1], atol=1e-6)
-
-
-def test_keys_on_every_frame_are_all_that_is_read(saved) -> None:
-    arm = rig("Rig", {"Upper": ((0, 0, 0), (0, 0, 0.4), None), "Hand": ((0, 0, 0.4), (0, 0, 0.8), "Upper")})
-    for frame in range(1, 41):
-        for number, bone in enumerate(arm.pose.bones):
-            bone.rotation_mode = "QUATERNION"
-            half = 0.3 * np.sin(0.2 * frame + number)
-            key(bone, frame, rotation_quaternion=(np.cos(half), np.sin(half), 0, 0))
-    for fcurve in anim_utils.action_get_channelbag_for_slot(
-        arm.animation_data.action, arm.animation_data.action_slot
-    ).fcurves:
-        for point in fcurve.keyframe_points:
-            point.interpolation = "LINEAR"
-    recording = read_trajectories(saved())
-    np.testing.assert_allclose(recording.trajectories[0].times * FPS, np.arange(1, 41))
-    assert recording.note == ""
 
 
 def test_angles_that_flip_between_frames_are_no_motion(saved) -> None:
     tool = empty("Tool")
     for frame in range(1, 21):
         key(tool, frame, rotation_euler=(0, 0, np.radians((170 + 2 * frame + 180) % 360 - 180)))
-    for fcurve in anim_utils.action_get_channelbag_for_slot(
-        tool.animation_data.action, tool.animation_data.action_slot
-    ).fcurves:
-        for point in fcurve.keyframe_points:
-            point.interpolation = "LINEAR"
+    linear(tool)
     recording = read_trajectories(saved())
     assert len(recording.trajectories[0].times) == 20
     assert "taken to go the short way" in recording.note
@@ -201,8 +148,7 @@ def test_what_swings_too_fast_is_warned_of_with_how_far_it_is_off(saved) -> None
     tool = empty("Tool")
     for frame in (1, 11):
         key(tool, frame, location=(frame, 0, 0))
-    channels = anim_utils.action_get_channelbag_for_slot(tool.animation_data.action, tool.animation_data.action_slot)
-    noise = channels.fcurves[0].modifiers.new("FNGENERATOR")
+    noise = fcurves(tool)[0].modifiers.new("FNGENERATOR")
     noise.function_type, noise.amplitude, noise.phase_multiplier, noise.use_additive = "SIN", 0.5, 400.0, True
     result = read(saved())
     (warning,) = result.warnings

@@ -1,7 +1,5 @@
 """What no hand, no device and no clock does is refused or said; what people record is neither."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -56,10 +54,6 @@ def test_one_device_is_not_refused(scale: float, rate: float, rounded_to: float)
     positions = scale * one.poses.positions
     positions = np.round(positions / rounded_to) * rounded_to if rounded_to else positions
     require_one_body(replace(one, poses=Poses(positions, one.poses.quaternions)), "log.csv", "", 1)
-
-
-def test_hands_are_not_doubted() -> None:
-    assert doubts(hand()) == ()
 
 
 @pytest.mark.parametrize(
@@ -134,19 +128,3 @@ def test_times_that_are_no_seconds_are_refused_with_their_unit(write, refusal, n
     np.testing.assert_array_equal(trajectory.times - trajectory.times[0], [row * 11 / 1000 for row in range(9)])
     (trajectory,) = read_trajectories(source, ReadingOptions(time_unit="s")).trajectories
     assert typical_interval(trajectory.times) == pytest.approx(11 * ticks / 1000, rel=0.05)
-
-
-def test_a_sample_a_second_is_read_and_said(write) -> None:
-    (trajectory,) = read_trajectories(write("take.csv", csv_of(["0", "1", "2", "3"]))).trajectories
-    assert str(trajectory.warnings[0]).startswith("only 1 samples a second")
-
-
-def test_of_nanoseconds_since_1970_none_is_lost_in_a_csv(write) -> None:
-    text = csv_of([str(1_403_636_580_838_555_648 + 5_000_001 * row) for row in range(4)]).replace("t,", "t [ns],", 1)
-    (trajectory,) = read_trajectories(write("take.csv", text)).trajectories
-    np.testing.assert_array_equal(trajectory.times, np.arange(4) * 5_000_001 / 1e9)
-
-
-def test_times_that_count_up_by_one_may_be_frames() -> None:
-    way_out = doubts(hand(rate=1.0), time_unit=True)[0].way_out
-    assert way_out.startswith("if it counts frames, --frame-rate 90, or how many there were a second; if its times are")

@@ -39,12 +39,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_a_path_alone_asks_for_no_body(folder: Path) -> None:
-    (folder / "take.csv").write_text(CSV)
-    assert split_source("take.csv") == (Path("take.csv"), None)
-    assert split_source(str(folder / "take.csv")) == (folder / "take.csv", None)
-
-
 @pytest.mark.parametrize("body", ["Drill", "*", "mixamorig:Hips", "", "C:\\x", "a/b"])
 def test_what_follows_the_file_and_a_colon_is_the_body(folder: Path, body: str) -> None:
     (folder / "take.csv").write_text(CSV)
@@ -81,11 +75,6 @@ def test_a_missing_file_is_told(folder: Path, source: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_a_folder_is_told(folder: Path) -> None:
-    with pytest.raises(TrajectoryError, match="a folder without recordings; name a file"):
-        read_trajectories(str(folder))
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="no such files there")
 @pytest.mark.parametrize("body", ["", ":left", ":*"])
 def test_what_is_no_file_is_told_and_never_opened(folder: Path, body: str) -> None:
@@ -116,16 +105,6 @@ def test_a_body_with_colons_in_its_name_is_found(write) -> None:
     (spine,) = read_trajectories(write("walk.bvh", BVH) + ":mixamorig:Spine").trajectories
     assert spine.name == "mixamorig:Spine"
     np.testing.assert_array_equal(spine.poses.positions, [[0, 1, 0]] * 2)
-
-
-HANDS = {"left": -1.0, "right": 1.0}
-
-
-def test_the_note_tells_how_to_get_the_others(write) -> None:
-    rows = "".join(f"{step * 0.01},{device},{x},0,0,0,0,0,1\n" for step in range(9) for device, x in HANDS.items())
-    path = write("log.csv", f"t,device,x,y,z,qx,qy,qz,qw\n{rows}")
-    note = f"{path} holds 2 bodies; took left; others: right; name one with {path}:NAME, all with {path}:*"
-    assert read_trajectories(path).note == note
 
 
 def test_a_name_from_a_file_cannot_reach_the_terminal(write) -> None:

@@ -1,7 +1,5 @@
 """Vectors and quaternions in one cell, as programs print them."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
@@ -54,15 +52,6 @@ def test_unreal_names_its_components(write) -> None:
     (trajectory,) = read_trajectories(write("log.csv", "Time,Location,Rotation\n" + rows)).trajectories
     assert trajectory.poses.positions.tolist() == [[0.5, 2, -3], [1.5, 2, -3], [2.5, 2, -3]]
     assert trajectory.poses.quaternions.tolist() == [[1, 0, 0, 0]] * 3
-
-
-def test_several_bodies_and_other_cells_stay_apart(write) -> None:
-    header = "Time,Left Position,Left Rotation,Note,Right Position,Right Rotation"
-    row = '(1.0, 2.0, 3.0),(0, 0, 0, 1),"a, b",(4.0, 5.0, 6.0),(0, 0, 1, 0)'
-    source = write("log.csv", f"{header}\n0,{row}\n.1,{row}\n")
-    left, right = read_trajectories(f"{source}:*").trajectories
-    assert (left.name, left.poses.positions.tolist()) == ("Left", [[1, 2, 3]] * 2)
-    assert (right.name, right.poses.quaternions.tolist()) == ("Right", [[0, 0, 0, 1]] * 2)
 
 
 def test_three_numbers_in_a_cell_of_rotations_are_euler_angles_and_ask_for_their_order(write, refusal) -> None:

@@ -1,7 +1,5 @@
 """A headless Chromium, driven through its pipe for debugging: pages are opened, looked at and used as by hand."""
 
-from __future__ import annotations
-
 import base64
 import json
 import os

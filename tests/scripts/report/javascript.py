@@ -1,7 +1,5 @@
 """The viewer's modules run without a page: by Node where there is one, otherwise in a headless Chromium."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

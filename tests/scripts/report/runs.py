@@ -1,7 +1,5 @@
 """Results of a comparison for the tests of the report."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The page in a browser: it draws, plays and is steered as by hand, complains of nothing and asks for nothing."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from dataclasses import replace

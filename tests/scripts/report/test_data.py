@@ -1,15 +1,11 @@
 """What Python packs is what the viewer reads, and the viewer's mathematics is that of the program."""
 
-from __future__ import annotations
-
 import json
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import rotate
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.results import ClipResult
@@ -53,11 +49,6 @@ def test_packed_numbers_are_read_to_half_a_step(width: int) -> None:
     )
     # Differences wrap around where they are larger than the width has room for.
     np.testing.assert_allclose(result, values, atol=0.51 * described[3], rtol=1e-6)
-
-
-def test_the_same_numbers_are_the_same_text() -> None:
-    texts = {json.dumps(clip_data(result_of(swinging_clip(), TEN), str, drill())) for _ in range(2)}
-    assert len(texts) == 1
 
 
 def test_times_errors_and_keys_of_a_clip_are_those_of_the_analysis() -> None:
@@ -127,32 +118,6 @@ def test_a_long_recording_keeps_the_worst_moments_in_view_and_chart(monkeypatch:
         worst = clip.times[result.first + motion.errors[0].argmax()] - clip.times[0]
         assert np.abs(np.array(matches["moments"]) - worst).min() < 1e-6
         assert max(errors) == pytest.approx(1e3 * motion.errors[0].max(), rel=1e-4)
-
-
-def test_hours_far_from_the_origin_are_as_exact_as_they_need_to_be() -> None:
-    swing = swinging_clip(seconds=60.0, rate=2.0)
-    far = Poses(swing.poses.positions + np.array((5e5, 5.6e6, 110.0)), swing.poses.quaternions)
-    clip = result_of(replace(swing, times=3600.0 * np.arange(len(swing.times)), poses=far), (Uniform("0.0001"),))
-    result = read(clip, "{ times: recording.times, places: recording.places }")
-    np.testing.assert_allclose(result["times"], clip.times, atol=1e-3)
-    np.testing.assert_allclose(np.transpose(result["places"]), clip.truth.positions - middle_of(clip), atol=2e-5)
-
-
-def test_deviations_are_magnified_until_they_can_be_seen() -> None:
-    clip = result_of(swinging_clip(), (*TEN, Uniform("30")))
-    coarse, fine = clip_data(clip, str, drill())["choices"]
-    assert fine["factor"] > coarse["factor"] >= 1
-    for choice in (coarse, fine):
-        assert choice["factor"] == 1 or choice["factor"] * choice["worst"] < 0.34 * drill().size
-
-
-def test_a_curve_of_many_samples_keeps_its_extremes() -> None:
-    values = np.random.default_rng(1).random(1000).tolist()
-    points = value_of(f"polyline({values}, 100, 900, 60)", "data")
-    assert len(points) <= 62
-    assert points == sorted(points)
-    assert {max(values[100:901]), min(values[100:901])} <= {value for _, value in points}
-    assert value_of(f"polyline({values}, 3, 6, 60)", "data") == [[k, values[k]] for k in range(3, 7)]
 
 
 @pytest.mark.parametrize(("low", "high", "expected", "texts"), [

@@ -1,7 +1,5 @@
 """`comparison.glb`: where its lanes are, by matrices and the specification, against what the modes were measured by."""
 
-from __future__ import annotations
-
 import itertools
 from pathlib import Path
 

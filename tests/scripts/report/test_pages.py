@@ -1,13 +1,10 @@
 """The page is one file that needs no network, says all numbers without a script too, and trusts no name."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json
 import re
 from base64 import b64decode
-from collections.abc import Iterator
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -17,10 +14,9 @@ import pytest
 
 from rigid_motion.motion import Poses
 from rigid_motion_batch.analysis.body_decimated import DECIMATE, OWN, KeysOfBody
-from rigid_motion_batch.analysis.choices import Budget, Tolerance, Uniform
+from rigid_motion_batch.analysis.choices import Tolerance, Uniform
 from rigid_motion_batch.analysis.metrics import Metrics
 from rigid_motion_batch.analysis.results import ClipResult
-from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import ClipWarning
 from rigid_motion_batch.report import pages
 from rigid_motion_batch.report.numbers import ERROR, KEYS, Gathering
@@ -31,7 +27,6 @@ from tests.scripts.clips.bodies import swinging_body
 from tests.scripts.clips.recordings import swinging_clip
 from tests.scripts.report.runs import MODES, result_of
 
-ASSETS = Path(__file__).resolve().parents[3] / "assets"
 SETTINGS = Settings(0.1, "Rigid Motion 1.0", "compare reach.csv")
 TEN = (Uniform("10"),)
 
@@ -72,15 +67,6 @@ def all_text(page: Page) -> str:
 def written(path: Path, *clips: ClipResult, **more: object) -> Page:
     write_report(path, clips, replace(SETTINGS, **more))
     return Page(path)
-
-
-def test_a_run_on_the_assets_is_one_small_file(tmp_path: Path) -> None:
-    clips, _ = read_clips([str(ASSETS / f"{name}.csv") for name in ("pivot", "reach", "screw", "throw")], None)
-    path = tmp_path / "report.html"
-    files = write_report(path, map(result_of, clips), SETTINGS)
-    assert files == [path]
-    assert list(tmp_path.iterdir()) == [path]
-    assert path.stat().st_size < 1_500_000
 
 
 def test_the_page_asks_for_nothing(tmp_path: Path) -> None:
@@ -218,18 +204,6 @@ def test_a_picture_of_joints_has_a_row_for_each_and_the_worst_is_red() -> None:
     assert content == png(np.pad(np.array([[0], [23], [0]], dtype=np.uint8), ((0, 0), (120, 119))), content[41:113])
 
 
-@pytest.mark.parametrize(
-    "choices",
-    [TEN, (Tolerance("20mm"),), (Budget("5"), Budget("10")), (Uniform("5"), Budget("5"), Tolerance("1cm"))],
-    ids=["one rate", "a tolerance", "budgets", "all kinds"],
-)
-@pytest.mark.parametrize("modes", [MODES, ("motor_spline",)], ids=["all modes", "one mode"])
-def test_a_page_is_made_of_any_choices_and_modes(tmp_path: Path, choices, modes) -> None:
-    page = written(tmp_path / "report.html", result_of(swinging_clip(), choices, modes))
-    assert len(page.texts["h1"]) >= 1
-    assert len([one for one in page.attributes("input", "name") if one == "choice"]) == len(choices)
-
-
 @pytest.mark.parametrize("size", [1e30, 1e-30, 0.0])
 def test_a_page_is_made_of_motions_of_any_size(tmp_path: Path, size: float) -> None:
     swing = swinging_clip()
@@ -262,13 +236,6 @@ def test_the_overview_has_what_matters_first_and_leads_to_every_page(tmp_path: P
     assert table.index("doubtful") < table.index("loud") < table.index("quiet")
     assert "1 of 3 clips have something to check" in text
     assert {"quiet/page%201.html", "doubtful/report.html"} <= set(page.attributes("a", "href"))
-
-
-def many(count: int) -> Iterator[ClipResult]:
-    """Clips that come one at a time."""
-    clip = result_of(swinging_clip(), TEN)
-    for number in range(count):
-        yield replace(clip, facts=replace(clip.facts, name=f"clip-{number:05}"), times=clip.times.copy())
 
 
 # -- sources ----------------------------------------------------------------------------------------------------------

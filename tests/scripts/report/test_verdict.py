@@ -1,7 +1,5 @@
 """The verdict is one true sentence with a number, whatever a run comes to."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -137,11 +135,6 @@ TWO = numbers((TEN,), {REF: (4,), SMOOTH: (1,)})
 )
 def test_the_keys_needed_come_first_where_they_were_looked_for(needed: KeysNeeded, expected: str) -> None:
     assert str(verdict(TWO, [needed])) == expected
-
-
-def test_without_any_rate_that_the_reference_had_keys_at_the_errors_speak() -> None:
-    nothing = keys_needed({REF: (np.nan, np.nan), SMOOTH: (np.nan, np.nan)})
-    assert str(verdict(TWO, [nothing])).startswith("Smooth Screw has 75 % less error")
 
 
 def facts(run: Numbers) -> list[str]:

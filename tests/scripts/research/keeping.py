@@ -1,7 +1,5 @@
 """Whether a study writes what the pages read: figures of the same names, in the same places, as those that are kept."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

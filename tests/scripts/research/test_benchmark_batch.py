@@ -1,7 +1,5 @@
 """The benchmark of many clips: its clips are recordings, and it sees what processes take."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import sys
@@ -12,28 +10,7 @@ import pytest
 from research import benchmark_batch
 from rigid_motion_batch.pipeline.steps import OWN
 from rigid_motion_batch.pipeline.store import INDEX
-from rigid_motion_batch.recordings import read_trajectories
 from tests.scripts.research.keeping import written
-
-
-def test_its_clips_are_recordings_of_which_none_is_like_another(tmp_path):
-    seen = set()
-    for number, text in enumerate(benchmark_batch.pieces(9)):
-        path = tmp_path / f"{number}.csv"
-        path.write_text(text, encoding="utf-8")
-        (clip,) = read_trajectories(str(path)).trajectories
-        assert clip.times[-1] - clip.times[0] == pytest.approx(benchmark_batch.SECONDS, abs=0.1)
-        assert np.isfinite(clip.poses.positions).all()
-        seen.add(clip.poses.positions.tobytes())
-    assert len(seen) == 9
-
-
-def test_its_long_clip_has_as_many_samples_as_it_says(tmp_path):
-    path = tmp_path / "long.csv"
-    path.write_text(benchmark_batch.wandering(540), encoding="utf-8")
-    (clip,) = read_trajectories(str(path)).trajectories
-    assert len(clip.times) == 540
-    np.testing.assert_allclose(np.linalg.norm(clip.poses.quaternions, axis=1), 1.0, atol=1e-12)
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux tells")

@@ -1,7 +1,5 @@
 """The figures of whole bodies: on a small one, a hip that walks and turns with an arm of two bones."""
 
-from __future__ import annotations
-
 import itertools
 from pathlib import Path
 
@@ -68,20 +66,6 @@ def test_a_body_is_where_blender_shows_it(tmp_path):
         assert np.allclose(body.truth.positions[:, sample], places, atol=1e-4)
 
 
-def test_a_body_is_scaled_and_its_channels_are_counted(body):
-    assert body.extent == pytest.approx(1.7)
-    assert body.joints == ("Hip", "Knee", "Foot")
-    assert body.moving.tolist() == [1, 0, 0]
-    assert body.turning.min() == 0
-    assert body.rate == pytest.approx(30.0, abs=0.01)
-
-
-def test_a_long_recording_is_cut_off(tmp_path):
-    rig = import_rig(made_up(tmp_path), most_frames=10)
-    assert rig.body().frames == 10
-    assert max(max(keys) for keys in rig.keys().values()) == 10.0
-
-
 def test_a_file_without_an_armature_is_refused(tmp_path):
     path = tmp_path / "none.fbx"
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -109,18 +93,6 @@ def test_the_optimum_is_the_fewest_of_all_choices(body, mode):
     assert best <= len(body_reduction.greedy(few, mode, tolerance))
 
 
-def test_an_optimum_is_of_modes_that_depend_on_two_keys(body):
-    with pytest.raises(ValueError, match="depends on others"):
-        body_reduction.optimum(body, "motor_spline")
-
-
-def test_greedy_keys_keep_to_the_tolerance_and_none_can_go(body):
-    keys = body_reduction.greedy(body, "lerp_slerp")
-    assert body.errors(body.shown_by_key_poses(keys, "lerp_slerp")).max() <= TOLERANCE
-    for key in keys[1:-1]:
-        assert body.errors(body.shown_by_key_poses(keys[keys != key], "lerp_slerp")).max() > TOLERANCE
-
-
 def test_decimate_is_as_good_and_leaves_the_rig_as_it_was(tmp_path):
     rig = import_rig(made_up(tmp_path))
     body = rig.body().of_size(1.7)
@@ -133,15 +105,6 @@ def test_decimate_is_as_good_and_leaves_the_rig_as_it_was(tmp_path):
     assert decimated.numbers == 6 * decimated.keys < 6 * imported.keys
     assert shared.numbers == shared.frames * (1 + varying)
     assert own.keys <= shared.keys
-
-
-def test_tracks_are_counted_apart(body):
-    keys = body_reduction.reduced(body)
-    hip, knee, _ = (len(own) for own in keys)
-    # The hip moves and turns, the knee turns; the foot does neither, and is not at its identity.
-    varying, constant = body_reduction.track_keys(body, keys)
-    assert varying == 2 * hip + knee
-    assert 0 < constant <= 3
 
 
 def test_a_foot_that_stands_is_found_and_its_slide_measured(body):

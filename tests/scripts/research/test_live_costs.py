@@ -1,7 +1,5 @@
 """Models of game engines, on a link that does nothing but take its time; and the study that has them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

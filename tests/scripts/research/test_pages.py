@@ -1,7 +1,5 @@
 """Pages have the figures of their studies."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
@@ -31,15 +29,11 @@ def test_every_page_has_the_figures_of_the_studies(path: Path):
 @pytest.mark.parametrize("path", pages(), ids=lambda path: path.name)
 def test_every_quote_ends_and_none_begins_a_line_of_a_paragraph(path: Path):
     page = path.read_text(encoding="utf-8")
+    assert not re.findall(r"[^\w.\N{EN DASH}][-\N{MINUS SIGN}]\d+(?:\.\d+)? ?%", page), "a negative percentage"
     assert page.count("<!--= ") == page.count("<!-- end -->") == len(QUOTE.findall(page))
     for line in page.splitlines():
         # Markdown takes such a line for HTML, and leaves what follows on it as it is.
         assert not re.match(r"\s*(?:[-*] )?<!-- ?(?:= .+?|end) -->.", line), line
-
-
-@pytest.mark.parametrize("path", pages(), ids=lambda path: path.name)
-def test_no_page_says_a_negative_percentage(path: Path):
-    assert not re.findall(r"[^\w.\N{EN DASH}][-\N{MINUS SIGN}]\d+(?:\.\d+)? ?%", path.read_text(encoding="utf-8"))
 
 
 def test_every_template_and_every_file_of_figures_is_used():

@@ -1,7 +1,5 @@
 """The figures of reduced keys and of Blender's Decimate are those of what Blender shows."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -52,11 +50,6 @@ def test_decimated_curves_are_measured_in_the_scene(live, clip):
     assert one.keys < 0.3 * len(clip.frames)
 
 
-def test_an_imported_recording_shows_its_poses(live, clip):
-    obj = reduction.import_recording(clip, "XYZ")
-    assert shell_error(animation.read_poses(obj, clip.frames), clip.poses, RADIUS).max() < 1e-6
-
-
 def test_of_a_skeleton_the_root_is_read(tmp_path):
     path = tmp_path / "walk.bvh"
     path.write_text(seed("ZXY", 60), encoding="utf-8")
@@ -65,28 +58,8 @@ def test_of_a_skeleton_the_root_is_read(tmp_path):
     assert shell_error(whole.poses, root.poses, RADIUS).max() < 1e-9
 
 
-def test_means_are_geometric(clip):
-    def outcome(frames, largest):
-        return reduction.Outcome(10.0, frames, 80, largest)
-
-    rows = [
-        reduction.row(clip, outcome(10, 1.0), outcome(frames, 1.0), outcome(10, ratio))
-        for frames, ratio in ((20, 2.0), (80, 8.0))
-    ]
-    rows.append(reduction.row(clip, outcome(10, 1.0), None, None))
-    assert (rows[-1]["decimate"], rows[-1]["few_mm"]) == (None, None)
-    assert reduction.means(rows) == pytest.approx(
-        {"frames": 4.0, "key_count": 1.0, "numbers": 1.0, "error_mm": 1.0, "few_mm": 4.0}
-    )
-
-
 def test_a_recording_of_too_few_poses_is_refused(tmp_path):
     path = tmp_path / "still.csv"
     path.write_text("t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n0,0,0,0,0,0,0,1\n", encoding="utf-8")
     with pytest.raises(TrajectoryError, match=r"still\.csv: 1 usable poses are left"):
         reduction.read(path, 60.0)
-
-
-def test_all_clips_of_the_project_are_measured():
-    assert [path.name for path in reduction.files(None)] == ["pivot.csv", "reach.csv", "screw.csv", "throw.csv"]
-    assert np.all(np.diff(reduction.read(reduction.ASSETS / "pivot.csv", 60.0).frames) == 1.0)

@@ -1,7 +1,5 @@
 """Stills of a scene, and their pixels."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import bpy

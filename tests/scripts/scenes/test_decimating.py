@@ -1,7 +1,5 @@
 """Whole bodies beside Blender's Decimate: on a leg that swings as it goes, with a foot that is fixed to it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import bpy

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -57,13 +55,3 @@ def test_what_gets_far_from_the_recording_is_cut_and_does_not_make_it_small():
     assert (alone.cut, beside.cut) == (False, True)
     assert (beside.size < 2.0 * alone.size).all()
     assert not framing.extent(still, [still]).cut
-
-
-def test_what_gets_less_far_from_the_recording_is_seen_whole():
-    still, off = (
-        Solid(moving(np.linspace((0.0, 0.0, 0.0), (x, 0.0, 0.0), 50)), CUBE) for x in (0.01, 0.4 * np.ptp(CUBE[:, 0]))
-    )
-    framing = Framing.of(still, smoothing=10.0)
-    extent, alone = framing.extent(still, [off]), framing.extent(off)
-    assert not extent.cut
-    assert (extent.high >= alone.high).all()

@@ -1,11 +1,8 @@
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np
 import pytest
 
-from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import rotate
 from rigid_motion_batch.scenes import layout
 
@@ -38,20 +35,3 @@ def test_the_broad_side_of_the_motion_faces_the_camera():
     seen = rotate(layout.yaw_quaternion(layout.heading(turned)), turned)
     assert np.std(seen[:, 0]) == pytest.approx(np.std(points[:, 0]), rel=0.01)
     assert np.allclose(seen[:, 2], points[:, 2])
-
-
-def test_the_outermost_points_span_all_points():
-    random = np.random.default_rng(2)
-    cloud = random.normal(size=(20_000, 3)) * (1.0, 0.2, 3.0)
-    few = layout.outermost(cloud)
-    directions = random.normal(size=(300, 3))
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    lost = (cloud @ directions.T).max(axis=0) - (few @ directions.T).max(axis=0)
-    assert len(few) < 1000
-    assert lost.max() < 0.003 * np.ptp(cloud, axis=0).max()
-
-
-def test_swept_points_turn_move_and_grow_with_the_poses():
-    quarter = np.sqrt(0.5)
-    poses = Poses([(0, 0, 0), (1, 2, 3)], [(1, 0, 0, 0), (quarter, 0, 0, quarter)], [1.0, 2.0])
-    assert np.allclose(layout.swept_points(poses, np.array([(0.5, 0.0, 0.0)])), [(0.5, 0, 0), (1, 3, 3)])

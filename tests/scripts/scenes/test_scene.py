@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterable
 
@@ -260,9 +258,8 @@ def test_a_clip_shorter_than_a_frame_is_one_frame():
 
 @pytest.mark.parametrize("engine", ["workbench", "eevee", "cycles"])
 def test_every_engine_can_be_chosen(engine):
-    reconstruction = reconstruct(swinging_clip(seconds=0.6), "5", ("dq_sclerp",))
-    scene = build_scene(reconstruction, dataclasses.replace(SETTINGS, engine=engine))
-    assert engine in scene.render.engine.lower()
+    made = reconstruct(swinging_clip(seconds=0.6), "5", ("dq_sclerp",))
+    assert engine in build_scene(made, dataclasses.replace(SETTINGS, engine=engine)).render.engine.lower()
 
 
 def test_an_object_that_would_be_lost_on_its_path_is_shown_larger_and_says_so():

@@ -1,9 +1,6 @@
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
-from rigid_motion.motion import interpolate
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.modes import BEST_OF
 from rigid_motion_batch.analysis.reconstructions import reconstruct as choose
@@ -23,25 +20,6 @@ def test_the_film_runs_from_the_first_key_to_the_last(swing):
     assert times[0] == swing.times[0]
     assert 0.0 <= swing.times[-1] - times[-1] < 1.0 / 30.0
     assert np.allclose(np.diff(times), 1.0 / 30.0)
-
-
-def test_times_and_frames_lead_to_one_another(swing):
-    timeline = Timeline.of(swing, 25, 2.5)
-    assert np.allclose(timeline.frames_of(timeline.times_of(timeline.fine_frames)), timeline.fine_frames)
-    assert np.array_equal(timeline.fine_frames[:: timeline.steps], timeline.frames)
-
-
-def test_every_mode_has_its_own_in_betweens_and_meets_the_keys(swing):
-    timeline = Timeline.of(swing, 30, 1.0)
-    motion = ShownMotion.of(swing, timeline)
-    clip, times = swing.clip, timeline.times_of(timeline.fine_frames)
-    for mode, poses in motion.modes.items():
-        kept = swing.keys[mode]
-        expected = interpolate(clip.times[kept], clip.poses[kept], times, mode)
-        assert np.allclose(poses.positions + motion.centre, expected.positions, atol=1e-12)
-        assert np.allclose(poses.quaternions, expected.quaternions, atol=1e-12)
-        assert np.allclose(timeline.times_of(motion.key_frames[mode]), clip.times[kept])
-        assert np.allclose(motion.keys[mode].positions + motion.centre, clip.poses[kept].positions)
 
 
 def test_the_best_of_each_segment_is_shown_by_the_mode_that_was_best_there():

@@ -1,7 +1,5 @@
 """Made-up clips of which it is known what should come out, and the throw of the assets."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

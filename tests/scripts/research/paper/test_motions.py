@@ -1,13 +1,11 @@
 """Which recordings count, found out by measuring."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from research.paper.motions import REST, assets, read_motion, recordings_in
+from research.paper.motions import REST, read_motion, recordings_in
 from research.paper.study import read_all
 from rigid_motion_batch.recordings import TrajectoryError, read_trajectories
 from tests.recordings import RECORDINGS as FOLDER
@@ -21,13 +19,6 @@ def write(path: Path, positions: np.ndarray) -> None:
 
 def swinging(amplitude: float) -> np.ndarray:
     return amplitude * np.sin(np.linspace(0.0, 9.0, 200))[:, None] * (1.0, 0.0, 0.0)
-
-
-def test_a_body_that_moves_counts(tmp_path: Path):
-    write(tmp_path / "moves.csv", swinging(3.0 * REST))
-    clip = read_motion(tmp_path / "moves.csv")
-    assert (clip.name, len(clip.times)) == ("moves", 200)
-    assert clip.samples_a_second == pytest.approx(50.0)
 
 
 def test_a_body_that_stays_within_a_centimetre_of_its_mean_is_at_rest(tmp_path: Path):
@@ -59,17 +50,6 @@ def test_a_file_that_is_no_recording_is_left_out_and_says_why_without_its_folder
     assert [clip.name for clip in result] == ["moves"]
     assert list(left_out) == ["notes"]
     assert str(tmp_path) not in left_out["notes"]
-
-
-def test_a_folder_without_recordings_is_refused(tmp_path: Path):
-    with pytest.raises(TrajectoryError, match="no recording in this folder"):
-        recordings_in(tmp_path)
-    with pytest.raises(TrajectoryError, match="no such folder"):
-        recordings_in(tmp_path / "missing")
-
-
-def test_the_assets_are_four_motions():
-    assert [clip.name for clip in assets()] == ["pivot", "reach", "screw", "throw"]
 
 
 @pytest.mark.recordings

@@ -1,11 +1,8 @@
 """`python scripts/research paper`, as people run it, and what a stream costs."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from research.paper import sending, study, table
@@ -78,14 +75,3 @@ def test_a_stream_is_that_which_another_process_shows() -> None:
     assert datagrams == pytest.approx((cost.bytes_a_second_with_headers - cost.bytes_a_second) / HEADERS)
     assert size == pytest.approx(cost.bytes_a_second_with_headers)
     assert error == pytest.approx(1e-3 * cost.rms_mm, rel=0.05)
-
-
-def test_a_packing_is_off_by_no_more_than_its_steps() -> None:
-    result = sending.packings(CLIP)
-    exact, single, small = result.values()
-    assert exact == {"bytes": 56, "error": 0.0}
-    assert (single["bytes"], small["bytes"]) == (28, 10)
-    assert 0.0 < single["error"] < 1e-6
-    # Half a step in each of three coordinates and of three components.
-    step, turn = 8.0 / (2**16 - 1), np.sqrt(2.0) / (2**10 - 2)
-    assert 0.1 * step < small["error"] < np.sqrt(3.0) * step / 2.0 + 0.1 * 4.0 * np.sqrt(3.0) * turn / 2.0

@@ -1,15 +1,12 @@
 """The table on clips of which the answer is known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from research.paper import table
 from research.paper.claims import UPDATES
-from rigid_motion.motion import MODES
 from rigid_motion_batch.recordings.clips import Clip
-from tests.scripts.research.paper.clips import circling, spinning_straight
+from tests.scripts.research.paper.clips import circling
 
 FIRST = next(iter(table.YARDSTICKS))
 
@@ -30,16 +27,6 @@ def test_the_lowest_rate_is_the_first_that_is_good_enough_also_where_a_higher_on
     assert table.lowest(rates, errors, 2.0) == pytest.approx(5.0 * 2.0**0.5)
     assert table.lowest(rates, errors, 0.4) == np.inf
     assert table.lowest(rates[::-1], errors[::-1], 9.0) == 5.0
-
-
-def test_a_mode_with_a_quarter_of_the_error_needs_half_the_updates():
-    rates = np.array((5.0, 10.0, 15.0, 30.0, 40.0))
-    assert table.lowest(rates, 0.25 / rates**2, 1.0 / 20.0**2) == pytest.approx(10.0)
-
-
-def test_the_state_of_the_art_needs_what_it_has():
-    for own in needed(circling(turns=0.5)).values():
-        assert own["lerp_slerp"] == pytest.approx(dict.fromkeys(UPDATES, 1.0), rel=1e-6)
 
 
 def test_on_a_pivot_a_screw_is_as_good_at_the_lowest_rate_that_is_tried():
@@ -64,24 +51,6 @@ def test_a_spline_of_a_circle_needs_far_fewer_updates_than_chords():
     for name in ("motor_spline", f"motor_spline{table.CHOSEN}"):
         assert set(own[name]) == set(UPDATES)
         assert max(own[name].values()) < 0.6
-
-
-def test_modes_that_are_not_in_the_table_are_the_motion_of_one_that_is():
-    clip = circling(turns=0.5, rate=60.0)
-    keys = table.senders(clip, 10.0)
-    errors = {mode: table.point(clip, mode, keys)[1] for mode in MODES}
-    assert errors["pga_slerp"] == pytest.approx(errors["dq_sclerp"], rel=1e-9)
-    assert errors["cga_slerp"] == pytest.approx(errors["dq_sclerp"], rel=1e-9)
-    assert errors["cga_lerp"] == pytest.approx(errors["pga_lerp"], rel=1e-9)
-    assert errors["lerp_slerp"] != pytest.approx(errors["dq_sclerp"], rel=1e-3)
-
-
-def test_a_recording_with_fewer_than_two_samples_to_an_update_tells_nothing_of_that_rate():
-    assert set(needed(circling(turns=0.5, rate=30.0))[FIRST]["dq_sclerp"]) == {15, 12}
-
-
-def test_a_motion_without_errors_needs_nothing():
-    assert not any(shares for own in needed(spinning_straight()).values() for shares in own.values())
 
 
 def test_senders_begin_one_after_the_other_within_an_interval():
