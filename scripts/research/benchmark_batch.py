@@ -24,31 +24,25 @@ from typing import Any
 
 import numpy as np
 
-from research.publishing import publish, say, study_parser
+from research.studies import publish, report, study_parser
+from rigid_motion.motion.quaternions import normalise
 from rigid_motion_batch.pipeline.steps import OWN
 from rigid_motion_batch.pipeline.store import INDEX
 from rigid_motion_batch.places import ASSETS, PACKAGE
 
-SECONDS = 2.0
-"""How long a clip is."""
-
-RATE = 90.0
-"""Samples a second of the clip whose length grows."""
-
-FEW = 20
-"""Clips to compare the memory with."""
-
-POLL = 0.05
-"""Seconds between two looks at the memory of the processes."""
+SECONDS = 2.0  # of a clip
+RATE = 90.0  # samples a second of the clip whose length grows
+FEW = 20  # clips to compare the memory with
+POLL = 0.05  # seconds between two looks at the memory of the processes
 
 
 @dataclass(frozen=True)
 class Run:
-    """What a run of `compare.py` took."""
+    """What a run of `compare` took."""
 
     seconds: float
 
-    own: int
+    program: int
     """The most memory of the program itself, in bytes; 0 where that cannot be told."""
 
     worker: int
@@ -58,56 +52,58 @@ class Run:
     """What Blender's renderer takes of the seconds of all tasks together."""
 
 
+def text_of(head: str, rows: np.ndarray) -> str:
+    """Return a table (n, columns) as CSV."""
+    return "\n".join((head, *(",".join(map(repr, row)) for row in rows.tolist()))) + "\n"
+
+
 def pieces(count: int) -> Iterator[str]:
-    """Clips as text: a piece of an asset, moved elsewhere."""
+    """Yield clips as text: a piece of an asset, moved elsewhere."""
     random = np.random.default_rng(7)
     recordings = [path.read_text(encoding="utf-8").splitlines() for path in sorted(ASSETS.glob("*.csv"))]
     for number in range(count):
         head, *rows = recordings[number % len(recordings)]
-        table = np.array([row.split(",") for row in rows], dtype=float)
+        table = np.loadtxt(rows, delimiter=",")
         first = random.uniform(table[0, 0], table[-1, 0] - SECONDS)
         table = table[(table[:, 0] >= first) & (table[:, 0] <= first + SECONDS)]
         table[:, 1:4] += random.normal(size=3)
-        yield "\n".join((head, *(",".join(map(repr, row)) for row in table.tolist()))) + "\n"
+        yield text_of(head, table)
 
 
 def wandering(samples: int) -> str:
-    """One long clip as text."""
+    """Return one long clip as text."""
     random = np.random.default_rng(8)
     times = np.arange(samples) / RATE
     rows = [np.sin(times * rate + phase) for rate, phase in random.uniform(0.5, 3.0, size=(7, 2))]
-    quaternions = np.stack((rows[3] + 3.0, *rows[4:]), axis=1)
-    quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
-    table = np.column_stack((times, *rows[:3], quaternions))
-    return "t,x,y,z,qw,qx,qy,qz\n" + "\n".join(",".join(map(repr, row)) for row in table.tolist()) + "\n"
+    quaternions = normalise(np.stack((rows[3] + 3.0, *rows[4:]), axis=1))
+    return text_of("t,x,y,z,qw,qx,qy,qz", np.column_stack((times, *rows[:3], quaternions)))
 
 
 def compare(clips: Sequence[Path], folder: Path, jobs: int, *options: str, alone: bool = False) -> Run:
-    """Run `compare.py` on some clips, on a single processor if it is to be alone, into a new folder in that one."""
+    """Run `compare` on some clips, on a single processor if it is to be alone, into a new folder in that one."""
     output = Path(tempfile.mkdtemp(dir=folder))
     command = [sys.executable, "-m", "rigid_motion_batch", "compare", *clips, "--output", output, "--jobs", str(jobs)]
-    started, own, worker = time.perf_counter(), 0, 0
+    started, program, worker = time.perf_counter(), 0, 0
     tasks: dict[str, dict[str, Any]] = {}
     with (
-        tempfile.TemporaryFile() as said,
-        subprocess.Popen([*command, *options], stdout=subprocess.DEVNULL, stderr=said, cwd=PACKAGE.parent) as process,
+        tempfile.TemporaryFile() as errors,
+        subprocess.Popen([*command, *options], stdout=subprocess.DEVNULL, stderr=errors, cwd=PACKAGE.parent) as process,
     ):
         if alone:
             os.sched_setaffinity(process.pid, {min(os.sched_getaffinity(0))})
         while process.poll() is None:
-            own = max(own, peak_memory_of(process.pid))
+            program = max(program, peak_memory_of(process.pid))
             worker = max([worker, *map(peak_memory_of, children_of(process.pid))])
             note_tasks(output, tasks)
             time.sleep(POLL)
         seconds = time.perf_counter() - started
         if process.returncode:
-            said.seek(0)
-            raise RuntimeError(
-                f"compare ended with {process.returncode}: {said.read().decode(errors='replace')[-2000:]}"
-            )
+            errors.seek(0)
+            end = errors.read().decode(errors="replace")[-2000:]
+            raise RuntimeError(f"compare ended with {process.returncode}: {end}")
     note_tasks(output, tasks)
     rendering = sum(task["facts"].get("rendering", 0.0) for task in tasks.values())
-    return Run(seconds, own, worker, rendering / sum(task["seconds"] for task in tasks.values()))
+    return Run(seconds, program, worker, rendering / sum(task["seconds"] for task in tasks.values()))
 
 
 def note_tasks(output: Path, tasks: dict[str, dict[str, Any]]) -> None:
@@ -118,33 +114,35 @@ def note_tasks(output: Path, tasks: dict[str, dict[str, Any]]) -> None:
                 tasks[path.parent.name] = json.loads(path.read_text(encoding="utf-8"))
 
 
-def peak_memory_of(process: int) -> int:
-    """Return the most memory, in bytes, that a process has had; 0 where it is gone, or the system does not tell."""
+def _of_process(pid: int, name: str) -> str:
+    """Return what Linux says of a process; nothing where it is gone, or the system is another."""
     try:
-        status = Path(f"/proc/{process}/status").read_text(encoding="ascii", errors="replace")
+        return Path(f"/proc/{pid}/{name}").read_text(encoding="ascii", errors="replace")
     except OSError:
-        return 0
-    return next((int(line.split()[1]) << 10 for line in status.splitlines() if line.startswith("VmHWM:")), 0)
+        return ""
+
+
+def peak_memory_of(pid: int) -> int:
+    """Return the most memory, in bytes, that a process has had; 0 where that cannot be told."""
+    lines = _of_process(pid, "status").splitlines()
+    return next((int(line.split()[1]) << 10 for line in lines if line.startswith("VmHWM:")), 0)
 
 
 def children_of(pid: int) -> list[int]:
-    """The processes that a process has started; none where the system does not tell."""
-    try:
-        return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()]
-    except OSError:
-        return []
+    """Return the processes that a process has started; none where that cannot be told."""
+    return [int(child) for child in _of_process(pid, f"task/{pid}/children").split()]
 
 
 def workers(clips: Sequence[Path], folder: Path, rounds: int, *options: str) -> list[dict[str, Any]]:
-    """One worker beside two, and beside one that has a single processor."""
+    """Return what one worker takes beside two, and beside one that has a single processor."""
     runs: dict[tuple[int, bool], list[Run]] = {(1, False): [], (2, False): []}
     if hasattr(os, "sched_setaffinity"):
         runs[1, True] = []
     for _ in range(rounds):
-        for (jobs, alone), made in runs.items():
-            say(f"{len(clips)} clips, {jobs} at work{' on one processor' if alone else ''}")
-            made.append(compare(clips, folder, jobs, *options, alone=alone))
-    best = {way: min(made, key=lambda run: run.seconds) for way, made in runs.items()}
+        for (jobs, alone), results in runs.items():
+            report(f"{len(clips)} clips, {jobs} at work{' on one processor' if alone else ''}")
+            results.append(compare(clips, folder, jobs, *options, alone=alone))
+    best = {way: min(results, key=lambda run: run.seconds) for way, results in runs.items()}
     return [
         {
             "workers": jobs,
@@ -159,16 +157,16 @@ def workers(clips: Sequence[Path], folder: Path, rounds: int, *options: str) -> 
 
 
 def memory(folder: Path, clips: Sequence[Path], minutes: Sequence[int]) -> dict[str, list[dict[str, float]]]:
-    """What the program takes over the number of clips, and its workers over the length of one."""
+    """Return what the program takes over the number of clips, and its workers over the length of one."""
     options = ("--no-video", "--rates", "10")
     programs, long = [], []
     for count in (FEW, len(clips)):
-        say(f"memory over {count} clips")
-        programs.append({"clips": count, "mb": compare(clips[:count], folder, 2, *options).own / 1e6})
+        report(f"memory over {count} clips")
+        programs.append({"clips": count, "mb": compare(clips[:count], folder, 2, *options).program / 1e6})
     path, rest = folder / "long.csv", 0
     for length in (0, *minutes):
         samples = int(length * 60 * RATE) or 10
-        say(f"memory over {length} minutes")
+        report(f"memory over {length} minutes")
         path.write_text(wandering(samples), encoding="utf-8")
         run = compare([path], folder, 1, *options)
         rest = rest or run.worker
@@ -186,8 +184,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--minutes", default="6,60", metavar="N,...", help="lengths of the long clip (%(default)s)")
     parser.add_argument("--rounds", type=int, default=3, help="of one worker and two in turns (%(default)s)")
     options = parser.parse_args(arguments)
-    with tempfile.TemporaryDirectory() as made:
-        folder = Path(made)
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
         clips = [folder / f"clip_{number:04}.csv" for number in range(max(options.clips, options.films))]
         for path, text in zip(clips, pieces(len(clips)), strict=True):
             path.write_text(text, encoding="utf-8")

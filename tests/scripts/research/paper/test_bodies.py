@@ -10,6 +10,7 @@ import pytest
 
 from research.paper import bodies
 from research.paper.bodies import ALONE, BODY, THROUGH, Limb
+from research.studies import files_in
 from rigid_motion.motion import MODES as ALL_MODES
 from rigid_motion.motion import Poses, interpolate, rms, shell_error
 from rigid_motion_batch.analysis.bodies import moving
@@ -42,50 +43,14 @@ def places(poses: Poses) -> np.ndarray:
 # -- names -------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("joint", "limb"),
-    [
-        ("LeftHand", "hands"),
-        ("mixamorig:RightHand", "hands"),
-        ("Lefthand", "hands"),
-        ("Bip01 L Hand", "hands"),
-        ("hand.L", "hands"),
-        ("hand_r", "hands"),
-        ("RHand", "hands"),
-        ("Foot_Right", "feet"),
-        ("rig:LeftFoot", "feet"),
-        ("Head", "heads"),
-        ("bip01_head", "heads"),
-    ],
-)
-def test_hands_feet_and_heads_are_told_by_their_names(joint: str, limb: str) -> None:
-    result = bodies.limbs_of(named("Hips", joint))
-    assert [(one.kind, one.joint) for one in result] == [(limb, 1)]
-
-
-@pytest.mark.parametrize(
-    "joint",
-    [
-        "LeftHandIndex1",
-        "HeadTop_End",
-        "Bip01HeadNub",
-        "LeftFootThumb1",
-        "Hand",
-        "LeftForeArm",
-        "",
-        "手",
-        "|`\n",
-        "L",
-        "5",
-    ],
-)
-def test_what_is_near_a_hand_is_none(joint: str) -> None:
-    assert bodies.limbs_of(named("Hips", joint)) == []
-
-
-def test_of_several_the_plainest_name_is_taken() -> None:
-    result = bodies.limbs_of(named("Hips", "IK_LeftHand", "LeftHand", "Left_Hand"))
-    assert [one.joint for one in result] == [2]
+def test_hands_feet_and_heads_are_told_by_their_names() -> None:
+    clip = named("Hips", "mixamorig:RightHand", "hand.L", "Foot_Right", "Head", "LeftHandIndex1", "LeftForeArm")
+    assert [(limb.kind, limb.joint) for limb in bodies.limbs_of(clip)] == [
+        ("hands", 2),
+        ("hands", 1),
+        ("feet", 3),
+        ("heads", 4),
+    ]
 
 
 def test_a_limb_says_how_many_moving_joints_carry_it() -> None:
@@ -196,17 +161,17 @@ def test_of_a_long_body_the_beginning_is_searched(monkeypatch: pytest.MonkeyPatc
 
 
 def test_means_are_geometric_and_leave_out_what_no_keys_reach() -> None:
-    mean = bodies._mean([(0.5, np.nan), (2.0, np.nan), (np.inf, np.inf)])
+    mean = bodies.means([(0.5, np.nan), (2.0, np.nan), (np.inf, np.inf)])
     assert mean["saved"][0] == pytest.approx(0.0)
     assert (mean["reached"].tolist(), mean["asked"].tolist()) == ([2, 0], [3, 1])
 
 
-def test_a_study_says_everything_of_each_body() -> None:
+def test_the_figures_say_everything_of_each_body() -> None:
     short = swinging_body("short", seconds=1.0, rate=30.0, seed=4, joints=NAMES)
-    result = bodies.study([(BODY_CLIP, 0), (short, 1)])
+    result = bodies.measure([(BODY_CLIP, 0), (short, 1)])
     assert result["bodies"]["short"]["skipped"] == 1
     assert result["bodies"]["walk"]["limbs"] == ["LeftHand", "RightFoot", "Head"]
-    assert set(result["needed"]) == {BODY, *bodies.LIMBS}
+    assert tuple(result["needed"]) == bodies.KINDS
     assert result["chains"]["hands"] == [4, 4]
     assert result["errors"][BODY][THROUGH]["pga_lerp"][5]["velocity"] > 0.0
     errors = [result["by_body"][name]["lerp_slerp"][10] for name in ("walk", "short")]
@@ -224,14 +189,8 @@ def test_every_mode_studied_is_one() -> None:
 def test_a_folder_stands_for_the_bodies_in_it_and_each_file_comes_once(tmp_path: Path) -> None:
     for name in ("b.bvh", "a.FBX", "notes.txt", "hand.csv"):
         (tmp_path / name).touch()
-    assert [path.name for path in bodies.body_files([tmp_path, tmp_path / "b.bvh"])] == ["a.FBX", "b.bvh"]
-
-
-def test_what_is_missing_is_named(tmp_path: Path) -> None:
-    with pytest.raises(TrajectoryError, match="no such file or folder"):
-        bodies.body_files([tmp_path / "nowhere.bvh"])
-    with pytest.raises(TrajectoryError, match="no recording in this folder that may hold a body"):
-        bodies.body_files([tmp_path])
+    files = files_in([tmp_path, tmp_path / "b.bvh"], bodies.EXTENSIONS)
+    assert [path.name for path in files] == ["a.FBX", "b.bvh"]
 
 
 def test_a_rigid_body_is_no_whole_one(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from research.paper import timing
-from research.paper.claims import PAPER, UPDATES
+from research.paper.table import PAPER, UPDATES
 from research.paper.timing import Work
 from rigid_motion.motion import MODES
 from tests.scripts.research.paper.clips import circling
