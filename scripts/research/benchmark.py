@@ -10,7 +10,6 @@ All ways of computing take turns, round by round, and the fastest round counts. 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -21,6 +20,7 @@ from pytransform3d.trajectories import dual_quaternions_from_pqs, dual_quaternio
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import RigidTransform, Rotation, RotationSpline, Slerp
 
+from research.in_betweens import Case
 from research.studies import publish, report, seconds_in_turns, study_parser
 from rigid_motion.motion import MODES, Poses, interpolate, reduce_keys, shell_error, twists
 from rigid_motion.motion.poses import reshaped
@@ -33,34 +33,6 @@ ENOUGH = 2.0  # seconds after which one way of computing a case has been measure
 
 Way = tuple[str, str]
 """A mode, and what computes it."""
-
-
-@dataclass(frozen=True, eq=False)
-class Case:
-    """Objects (b) with keys (n), looked at m times each; and the same as a list of pairs, as the peers want it."""
-
-    title: str
-    key_times: np.ndarray
-    keys: Poses
-    times: np.ndarray
-
-    @property
-    def in_betweens(self) -> int:
-        return self.keys.shape[0] * self.times.shape[-1]
-
-    def pairs(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the first key of each in-between among all keys of all objects, and the share u of the way on."""
-        objects, n = self.keys.shape
-        times = np.broadcast_to(self.times, (objects, self.times.shape[-1]))
-        segment = np.clip(np.searchsorted(self.key_times, times, side="right") - 1, 0, n - 2)
-        u = (times - self.key_times[segment]) / (self.key_times[segment + 1] - self.key_times[segment])
-        return (segment + n * np.arange(objects)[:, None]).ravel(), u.ravel()
-
-    def ends(self) -> tuple[Poses, Poses, np.ndarray]:
-        """Return both keys of each in-between, and u."""
-        first, u = self.pairs()
-        keys = reshaped(self.keys, -1)
-        return keys[first], keys[first + 1], u
 
 
 def cases(count: int) -> Iterator[Case]:
@@ -147,7 +119,7 @@ def ways(case: Case) -> dict[Way, Callable[[], object]]:
     """Return all ways to compute a case."""
     result: dict[Way, Callable[[], object]] = {}
     for mode in MODES:
-        result[mode, PROGRAM] = partial(interpolate, case.key_times, case.keys, case.times, mode)
+        result[mode, PROGRAM] = partial(case.filled_in, mode)
         if not MODES[mode].is_smooth:
             result[mode, "NumPy, in the algebra"] = partial(in_the_algebra, case, mode)
     for mode in ("lerp_slerp", "dq_sclerp", "pga_lerp"):

@@ -1,4 +1,4 @@
-"""What many clips cost: how much two workers are quicker than one, how much is Blender's rendering, and the memory.
+"""What many clips cost: how much two workers are quicker than one, and the memory.
 
     python scripts/research benchmark_batch
     python scripts/research benchmark_batch --clips 40 --films 4 --rounds 1
@@ -10,8 +10,6 @@ to make new ones.
 
 from __future__ import annotations
 
-import contextlib
-import json
 import os
 import subprocess
 import sys
@@ -24,11 +22,12 @@ from typing import Any
 
 import numpy as np
 
+from research.making.tracking import table
+from research.paper.motions import assets
 from research.studies import publish, report, study_parser
+from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import normalise
-from rigid_motion_batch.pipeline.steps import OWN
-from rigid_motion_batch.pipeline.store import INDEX
-from rigid_motion_batch.places import ASSETS, PACKAGE
+from rigid_motion_batch.places import PACKAGE
 
 SECONDS = 2.0  # of a clip
 RATE = 90.0  # samples a second of the clip whose length grows
@@ -48,26 +47,16 @@ class Run:
     worker: int
     """The most memory of any process that it started."""
 
-    rendering: float
-    """What Blender's renderer takes of the seconds of all tasks together."""
-
-
-def text_of(head: str, rows: np.ndarray) -> str:
-    """Return a table (n, columns) as CSV."""
-    return "\n".join((head, *(",".join(map(repr, row)) for row in rows.tolist()))) + "\n"
-
 
 def pieces(count: int) -> Iterator[str]:
     """Yield clips as text: a piece of an asset, moved elsewhere."""
-    random = np.random.default_rng(7)
-    recordings = [path.read_text(encoding="utf-8").splitlines() for path in sorted(ASSETS.glob("*.csv"))]
+    random, clips = np.random.default_rng(7), list(assets().values())
     for number in range(count):
-        head, *rows = recordings[number % len(recordings)]
-        table = np.loadtxt(rows, delimiter=",")
-        first = random.uniform(table[0, 0], table[-1, 0] - SECONDS)
-        table = table[(table[:, 0] >= first) & (table[:, 0] <= first + SECONDS)]
-        table[:, 1:4] += random.normal(size=3)
-        yield text_of(head, table)
+        clip = clips[number % len(clips)]
+        first = random.uniform(clip.times[0], clip.times[-1] - SECONDS)
+        part = (clip.times >= first) & (clip.times <= first + SECONDS)
+        poses = clip.poses[part]
+        yield table(clip.times[part], Poses(poses.positions + random.normal(size=3), poses.quaternions))
 
 
 def wandering(samples: int) -> str:
@@ -75,8 +64,7 @@ def wandering(samples: int) -> str:
     random = np.random.default_rng(8)
     times = np.arange(samples) / RATE
     rows = [np.sin(times * rate + phase) for rate, phase in random.uniform(0.5, 3.0, size=(7, 2))]
-    quaternions = normalise(np.stack((rows[3] + 3.0, *rows[4:]), axis=1))
-    return text_of("t,x,y,z,qw,qx,qy,qz", np.column_stack((times, *rows[:3], quaternions)))
+    return table(times, Poses(np.stack(rows[:3], axis=1), normalise(np.stack((rows[3] + 3.0, *rows[4:]), axis=1))))
 
 
 def compare(clips: Sequence[Path], folder: Path, jobs: int, *options: str, alone: bool = False) -> Run:
@@ -84,34 +72,17 @@ def compare(clips: Sequence[Path], folder: Path, jobs: int, *options: str, alone
     output = Path(tempfile.mkdtemp(dir=folder))
     command = [sys.executable, "-m", "rigid_motion_batch", "compare", *clips, "--output", output, "--jobs", str(jobs)]
     started, program, worker = time.perf_counter(), 0, 0
-    tasks: dict[str, dict[str, Any]] = {}
-    with (
-        tempfile.TemporaryFile() as errors,
-        subprocess.Popen([*command, *options], stdout=subprocess.DEVNULL, stderr=errors, cwd=PACKAGE.parent) as process,
-    ):
+    with subprocess.Popen([*command, *options], cwd=PACKAGE.parent, stdout=subprocess.DEVNULL) as process:
         if alone:
             os.sched_setaffinity(process.pid, {min(os.sched_getaffinity(0))})
         while process.poll() is None:
             program = max(program, peak_memory_of(process.pid))
             worker = max([worker, *map(peak_memory_of, children_of(process.pid))])
-            note_tasks(output, tasks)
             time.sleep(POLL)
         seconds = time.perf_counter() - started
-        if process.returncode:
-            errors.seek(0)
-            end = errors.read().decode(errors="replace")[-2000:]
-            raise RuntimeError(f"compare ended with {process.returncode}: {end}")
-    note_tasks(output, tasks)
-    rendering = sum(task["facts"].get("rendering", 0.0) for task in tasks.values())
-    return Run(seconds, program, worker, rendering / sum(task["seconds"] for task in tasks.values()))
-
-
-def note_tasks(output: Path, tasks: dict[str, dict[str, Any]]) -> None:
-    """Add the tasks that are done, while their results are there: those of pieces of a film go when it is whole."""
-    for path in output.glob(f"{OWN}/results/*/{INDEX}"):
-        if path.parent.name not in tasks:
-            with contextlib.suppress(OSError, ValueError):
-                tasks[path.parent.name] = json.loads(path.read_text(encoding="utf-8"))
+    if process.returncode:
+        raise subprocess.CalledProcessError(process.returncode, process.args)
+    return Run(seconds, program, worker)
 
 
 def _of_process(pid: int, name: str) -> str:
@@ -150,7 +121,6 @@ def workers(clips: Sequence[Path], folder: Path, rounds: int, *options: str) -> 
             "seconds": run.seconds,
             "clips_a_minute": 60.0 * len(clips) / run.seconds,
             "speedup": best[1, False].seconds / run.seconds,
-            "rendering": run.rendering or None,
         }
         for (jobs, alone), run in best.items()
     ]

@@ -59,8 +59,7 @@ class Size:
 
 SIZES = {
     "scene": Size(100, 10, 1000),  # one key of it is edited
-    "many": Size(400, 10, 1000),  # all get a mode
-    "shot": Size(300, 20, 2000),  # all are edited, and saved
+    "shot": Size(300, 20, 2000),  # all get a mode, are edited, and saved
     "rig": Size(100, 10, 1000, vertices=20_000),
 }
 LONG, LONG_FRAMES = 200, (50_000, 100_000)  # the keys of an object that is baked, and its frames
@@ -319,25 +318,19 @@ def everyday(size: Size, rotation: str, rounds: int) -> list[dict[str, Any]]:
     return rows
 
 
-def choosing(objects: list[bpy.types.Object], rounds: int) -> list[dict[str, Any]]:
-    """Measure a mode chosen for many objects, beside Blender's baking of the same."""
-    chosen, updated = choose(objects, rounds)
-    baked = NativeBaking(objects).seconds(min(3, rounds))
-    return [
-        row("`set_mode` for all in one call", chosen, "`bake_action_objects`", baked),
-        row("the same, and the view updated", updated, "`bake_action_objects`", baked),
-    ]
-
-
 def shot(size: Size, rotation: str, motion: str, rounds: int) -> dict[str, Any]:
     """Measure a mode chosen for all objects, an edit of each, and the file."""
     objects = scene_of(size, rotation, MOTIONS[motion])
     without = file_sizes()
-    rows = choosing(objects, rounds)
+    (chosen, updated), baking = choose(objects, rounds), NativeBaking(objects).seconds(min(3, rounds))
     live = file_sizes()
     sampled = sum(len(f.sampled_points) > 0 for obj in objects for f in animation.channelbag_of(obj).fcurves)
     edited, native = with_and_without(partial(edit, middle_keys(objects, size.keys // 2)), rounds, 1)
-    rows.append(row("the view updated after an edit of each", edited, "Blender's own update", native))
+    rows = [
+        row("`set_mode` for all in one call", chosen, "`bake_action_objects`", baking),
+        row("the same, and the view updated", updated, "`bake_action_objects`", baking),
+        row("the view updated after an edit of each", edited, "Blender's own update", native),
+    ]
     animation.set_enabled(False)
     NativeBaking(objects).bake()
     baked = file_sizes()
@@ -411,12 +404,11 @@ def long_baking(size: Size, rounds: int) -> dict[str, Any]:
 def measure(rounds: int, scale: float) -> dict[str, Any]:
     """Return all figures, of scenes with a part of their objects, frames and vertices."""
     few, sizes = max(3, rounds // 8), {name: size.scaled(scale) for name, size in SIZES.items()}
-    figures: dict[str, Any] = {"everyday": {}, "choosing": {}, "shots": [], "baking_keys": LONG}
+    figures: dict[str, Any] = {"everyday": {}, "shots": [], "baking_keys": LONG}
     figures |= {name: size.figures for name, size in sizes.items()}
     for rotation in ROTATION_MODES:
-        report(f"everyday work and choosing a mode, {rotation}")
+        report(f"everyday work, {rotation}")
         figures["everyday"][rotation] = everyday(sizes["scene"], rotation, rounds)
-        figures["choosing"][rotation] = choosing(scene_of(sizes["many"], rotation), few)
     for motion in MOTIONS:
         for rotation in ROTATION_MODES:
             report(f"a shot, {rotation}, {motion}")

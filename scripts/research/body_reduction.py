@@ -13,7 +13,7 @@ import numpy as np
 
 from research.bodies import RADIUS, Body, Keys, Rig, UnusableRigError, import_rig
 from research.studies import report, seconds_in_turns
-from rigid_motion.motion import MODES, Poses, interpolate, reduce_keys, reduce_skeleton_keys, shell_error
+from rigid_motion.motion import MODES, Poses, interpolate, reduce_skeleton_keys, shell_error
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.scenes.decimated_bodies import FREE, STRAIGHT, Decimations, Left, left_of_fcurves
 
@@ -25,7 +25,6 @@ KEYS = ((SINGLE, False), (SHARED, True))  # the ways to have keys
 
 TRIALS = 12  # of Decimate's error margins
 LONG = "cmu_01_01"  # the file that is timed uncut
-SAMPLES, RECORDING = 900, {"tolerance": 0.005, "radius": 0.1}  # of a single recording that is timed
 
 OZZ_BODY, OZZ_KEYS, OZZ_LARGEST, OZZ_RADIUS = "pab_walk", 901, 0.00225, 0.1
 """What ozz-animation's optimizer leaves of 8241 keys of this file; the largest error and its distance, in metres."""
@@ -39,8 +38,8 @@ WEIGHT = 4.0  # what feet count for, where they have a weight
 BATCH = 2**11  # pairs of keys looked at in one go
 
 
-def figures(paths: Sequence[Path], recordings: list[tuple[str, float, Poses]]) -> dict[str, Any]:
-    """Return all that is measured of the bodies in files; of recordings (name, frames a second, poses), the time."""
+def figures(paths: Sequence[Path]) -> dict[str, Any]:
+    """Return all that is measured of the bodies in files."""
     imported: dict[str, Body] = {}
     decimated: dict[str, list[Left]] = {}
     for path in paths:
@@ -68,7 +67,6 @@ def figures(paths: Sequence[Path], recordings: list[tuple[str, float, Poses]]) -
         "ozz": beside_ozz(imported[OZZ_BODY]) if OZZ_BODY in imported else [],
         "feet": [row for body in bodies for row in slides(body)],
         "timing": [row for body in uncut or bodies for row in timing(body)],
-        "timing_single": [timing_single(*recording) for recording in recordings],
     }
 
 
@@ -277,15 +275,3 @@ def timing(body: Body) -> list[dict[str, Any]]:
     seconds = {how: min(spent) for how, spent in seconds_in_turns(runs | {"": lambda: greedy(body)}, 2).items()}
     about = {"name": body.name, "joints": len(body.joints), "frames": body.frames}
     return [{**about, "how": how, "seconds": seconds[how], "of_greedy": seconds[how] / seconds[""]} for how in runs]
-
-
-def timing_single(name: str, rate: float, poses: Poses) -> dict[str, Any]:
-    """Return what the first samples of a recording take at so many frames a second."""
-    poses = poses[:SAMPLES]
-    times, joints = np.arange(len(poses)) / rate, Poses(poses.positions[None], poses.quaternions[None])
-    body = Body(name, rate, (name,), np.array([-1]), joints, np.array([3]), np.array([4]))
-    runs = {"": lambda: reduce_keys(times, poses, MODE, **RECORDING), "greedy_": lambda: greedy(body, **RECORDING)}
-    result: dict[str, Any] = {"name": name, "samples": len(poses)}
-    for way, spent in seconds_in_turns(runs, 2).items():
-        result |= {f"{way}seconds": min(spent), f"{way}key_count": len(runs[way]())}
-    return result | {"of_greedy": result["seconds"] / result["greedy_seconds"]}

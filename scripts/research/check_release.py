@@ -1,16 +1,15 @@
 """Look whether all is there that a release on extensions.blender.org needs, and say what is not.
 
-That is: real addresses, one version with a dated entry in the changelog and no tag yet, nothing that is not committed,
-the pictures and the text of the page, and a zip that Blender takes. It is for a checkout, and changes nothing in it.
+That is: real addresses, one version with a dated entry in the changelog and no tag yet, and nothing that is not
+committed. Zip, pictures and text of the page are tested with everything else. It is for a checkout, and changes nothing
+in it.
 """
 
 from __future__ import annotations
 
 import re
-import struct
 import subprocess
 import sys
-import tempfile
 import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -18,7 +17,6 @@ from urllib.parse import urlsplit
 
 from research.pages import ROOT
 from rigid_motion_batch.command_line import parser_of, program_of
-from rigid_motion_batch.system_libraries import require_blender
 
 SCRIPT = "research check_release"
 
@@ -29,11 +27,7 @@ example:
 CONTRIBUTING.md has the steps of a release. Exit code: 0 all is there, 1 something is not, which is printed.
 """
 
-MANIFEST, CHANGELOG, LISTING = "blender_manifest.toml", "CHANGELOG.md", "assets/listing"
-MANUAL = "addon/rigid_motion/ui/manual.py"
-
-PICTURES = {"icon.png": (256, 256), "featured.png": (1920, 1080)}  # of the page, in pixels
-WORDS = range(150, 301)  # of the text of the page
+MANIFEST, CHANGELOG, MANUAL = "blender_manifest.toml", "CHANGELOG.md", "addon/rigid_motion/ui/manual.py"
 
 STAND_INS = re.compile(r"(^|\.)(example(\.(org|com|net))?|test|invalid|localhost)$|^$")
 """Names of hosts that are nobody's (RFC 2606), or no names."""
@@ -71,34 +65,7 @@ def commits(checkout: Path) -> Iterator[str]:
         yield f"{line[3:]} is not committed"
 
 
-def listing(checkout: Path) -> Iterator[str]:
-    """Check that icon and featured picture have the sizes that the site asks for, and the length of the text."""
-    for name, requested in PICTURES.items():
-        path = checkout / LISTING / name
-        if not path.is_file():
-            yield f"{LISTING}/{name} is missing: python assets/make_listing.py"
-        elif (size := struct.unpack(">II", path.read_bytes()[16:24])) != requested:
-            yield f"{LISTING}/{name} is {size[0]} x {size[1]} pixels, and has to be {requested[0]} x {requested[1]}"
-    path = checkout / LISTING / "description.md"
-    if not path.is_file():
-        yield f"{LISTING}/description.md is missing"
-    elif (count := len(re.findall(r"[\w'-]+", path.read_text(encoding="utf-8")))) not in WORDS:
-        yield f"{LISTING}/description.md has {count} words, and is to have {WORDS[0]} to {WORDS[-1]}"
-
-
-def package(_checkout: Path) -> Iterator[str]:
-    """Check that the zip can be built, and Blender takes it."""
-    require_blender(SCRIPT)
-    from rigid_motion_batch.cli.build_extension import BuildError, build
-
-    with tempfile.TemporaryDirectory() as folder:
-        try:
-            build(Path(folder))
-        except BuildError as error:
-            yield str(error)
-
-
-CHECKS: tuple[Callable[[Path], Iterator[str]], ...] = (addresses, version, commits, listing, package)
+CHECKS: tuple[Callable[[Path], Iterator[str]], ...] = (addresses, version, commits)
 
 
 def manifest_of(checkout: Path) -> dict:

@@ -162,7 +162,7 @@ def main(arguments: list[str] | None = None) -> int:
             "radius": options.radius,
             "recordings": rows,
             "means": {rotation: means(of_rotation) for rotation, of_rotation in rows.items()},
-            **body_reduction.figures(bodies, [(it.name, options.fps, it.poses) for it in recordings]),
+            **body_reduction.figures(bodies),
         }
     given = f"--tolerance {options.tolerance:g} --radius {options.radius:g} --fps {options.fps:g}"
     more = [f"--{name} ..." for name in ("recordings", "bodies") if getattr(options, name)]

@@ -43,7 +43,12 @@ def report(text: str) -> None:
 
 
 def seconds_in_turns(
-    runs: Mapping[Name, Callable[[], object]], rounds: int, *, warm: bool = False, most: float = float("inf")
+    runs: Mapping[Name, Callable[[], object]],
+    rounds: int,
+    *,
+    warm: bool = False,
+    most: float = float("inf"),
+    clock: Callable[[], float] = time.perf_counter,
 ) -> dict[Name, list[float]]:
     """Return the seconds of every round of each, all taking turns, so that a machine that slows down slows all.
 
@@ -55,9 +60,9 @@ def seconds_in_turns(
             if sum(seconds[name]) < most:
                 if warm:
                     run()
-                start = time.perf_counter()
+                start = clock()
                 run()
-                seconds[name].append(time.perf_counter() - start)
+                seconds[name].append(clock() - start)
     return seconds
 
 

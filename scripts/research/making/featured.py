@@ -18,7 +18,7 @@ from rigid_motion import animation
 from rigid_motion_batch.palette import linear
 from rigid_motion_batch.scenes.materials import ink, surface
 
-from .rendering import add, empty_scene, look_from, render
+from .rendering import add, empty_scene, look_from, render, tubes
 
 SIZE, UNITS = (1920, 1080), 19.2  # pixels, and how wide the picture is in the scene
 
@@ -142,12 +142,8 @@ def swing(hammer: bpy.types.Object, hand: Vector, mode: str | None) -> list[Matr
 
 
 def _path(name: str, points: list[Vector], radius: float, material: bpy.types.Material) -> None:
-    curve = bpy.data.curves.new(name, "CURVE")
-    curve.dimensions, curve.bevel_depth, curve.use_fill_caps = "3D", radius, True
-    spline = curve.splines.new("POLY")
-    spline.points.add(len(points) - 1)
-    for point, place in zip(spline.points, points, strict=True):
-        point.co = (*place, 1.0)
+    curve = tubes(name, [points], radius)
+    curve.use_fill_caps = True
     _flat(name, curve, material)
 
 

@@ -6,6 +6,8 @@ import struct
 from pathlib import Path
 
 import bpy
+import numpy as np
+from numpy.typing import ArrayLike
 
 SIGNATURE = 8
 """The bytes that every PNG file begins with; chunks follow, each with its length, its kind and a checksum."""
@@ -26,6 +28,18 @@ def add(name: str, data: bpy.types.ID | None, *materials: bpy.types.Material) ->
     obj = bpy.data.objects.new(name, data)
     bpy.context.scene.collection.objects.link(obj)
     return obj
+
+
+def tubes(name: str, paths: ArrayLike, radius: float, *, closed: bool = False) -> bpy.types.Curve:
+    """Return a new curve along polylines (k, m, 3), as thick as twice the radius."""
+    curve = bpy.data.curves.new(name, "CURVE")
+    curve.dimensions, curve.bevel_depth = "3D", radius
+    for path in np.asarray(paths):
+        spline = curve.splines.new("POLY")
+        spline.points.add(len(path) - 1)
+        spline.points.foreach_set("co", np.pad(path, ((0, 0), (0, 1)), constant_values=1.0).ravel())
+        spline.use_cyclic_u = closed
+    return curve
 
 
 def look_from(place: tuple[float, float, float], turn: tuple[float, float, float], width: float) -> None:

@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 
 from research.making.motions import HAND, THERE
+from research.making.rendering import add
 from rigid_motion.animation import bake_poses
 from rigid_motion.motion import MODES, Poses, interpolate, measure, rms
 from rigid_motion.motion.poses import joined
@@ -205,7 +206,7 @@ class _Cast:
         bake_poses(obj, self.frames, poses)
 
     def _trace(self, name: str, poses: Poses, radius: float, colour: str) -> None:
-        obj = self.sheet.stand(name, trails.polyline(name, self.frames, poses.positions))
+        obj = add(name, trails.polyline(name, self.frames, poses.positions))
         window = TRAIL_SECONDS * FPS * SLOWER
         apply_group(obj, self.trail, Past=window, Ahead=0.0, Radius=radius, Taper=0.6, Material=self.sheet.ink(colour))
 

@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Quaternion
 
+from research.making.rendering import add, tubes
 from rigid_motion.motion import Poses
 from rigid_motion_batch.scenes import captions, layout
 from rigid_motion_batch.scenes.materials import ink
@@ -89,37 +90,24 @@ class Sheet:
             self.words(text, x + 1.35 * size, y, points)
             x += (2.6 + captions.width_of(text)) * size
 
-    def stand(self, name: str, data: bpy.types.ID) -> bpy.types.Object:
-        """Return a new object in the world."""
-        obj = bpy.data.objects.new(name, data)
-        self.scene.collection.objects.link(obj)
-        return obj
-
     def lines(self, name: str, paths: np.ndarray, radius: float, colour: str, *, closed: bool = False) -> None:
         """Draw tubes along polylines, shape (k, m, 3), of a radius in metres."""
-        curve = bpy.data.curves.new(name, "CURVE")
-        curve.dimensions, curve.bevel_depth, curve.bevel_resolution = "3D", radius, 2
-        curve.materials.append(self.ink(colour))
-        for path in paths:
-            spline = curve.splines.new("POLY")
-            spline.points.add(len(path) - 1)
-            spline.points.foreach_set("co", np.pad(path, ((0, 0), (0, 1)), constant_values=1.0).ravel())
-            spline.use_cyclic_u = closed
-        self.stand(name, curve)
+        curve = tubes(name, paths, radius, closed=closed)
+        curve.bevel_resolution = 2
+        add(name, curve, self.ink(colour))
 
     def faces(self, name: str, polygons: np.ndarray, material: bpy.types.Material) -> None:
         """Draw flat polygons, shape (k, m, 3)."""
         mesh = bpy.data.meshes.new(name)
         corners = np.arange(polygons.shape[0] * polygons.shape[1]).reshape(polygons.shape[:2])
         mesh.from_pydata(polygons.reshape(-1, 3).tolist(), [], corners.tolist())
-        mesh.materials.append(material)
-        self.stand(name, mesh)
+        add(name, mesh, material)
 
     def solid(
         self, name: str, mesh: bpy.types.Mesh, pose: Poses, material: bpy.types.Material, *, whole: bool
     ) -> bpy.types.Object:
         """Return an object at a pose, shape (); its tinted parts, or the whole of it, are of a material."""
-        obj = self.stand(name, mesh)
+        obj = add(name, mesh)
         obj.matrix_world = Matrix.LocRotScale(pose.positions.tolist(), Quaternion(pose.quaternions.tolist()), None)
         for slot in range(len(mesh.materials)) if whole else tinted_slots(mesh):
             obj.material_slots[slot].link = "OBJECT"

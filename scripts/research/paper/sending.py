@@ -106,7 +106,7 @@ def costs(clips: list[Clip]) -> dict[str, Any]:
             "saved_datagrams": 1.0 - datagrams / UPDATES,
             "saved_bytes": {name: 1.0 - size / of_even for name, of_even in even.items()},
         }
-    return {"seconds": SECONDS, "clips": list(of_clips), "even": even, "needed": needed, "by_clip": of_clips}
+    return {"seconds": SECONDS, "clips": list(of_clips), "even": even, "needed": needed}
 
 
 def packings(clip: Clip) -> dict[str, dict[str, float]]:

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import os
-import shutil
 import sys
 
 import numpy as np
 import pytest
 
 from research import benchmark_batch
-from rigid_motion_batch.pipeline.steps import OWN
-from rigid_motion_batch.pipeline.store import INDEX
 from rigid_motion_batch.recordings import read_trajectories
 from tests.scripts.research.keeping import written
 
@@ -33,7 +30,7 @@ def test_its_long_clip_has_as_many_samples_as_it_says(tmp_path):
     path.write_text(benchmark_batch.wandering(540), encoding="utf-8")
     (clip,) = read_trajectories(str(path)).trajectories
     assert len(clip.times) == 540
-    np.testing.assert_allclose(np.linalg.norm(clip.poses.quaternions, axis=1), 1.0, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(clip.poses.quaternions, axis=1), 1.0, atol=2e-6)
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux tells")
@@ -50,22 +47,10 @@ def test_two_workers_are_measured_beside_one(tmp_path, monkeypatch):
     took = {(1, False): 20.0, (2, False): 10.0, (1, True): 21.0}
 
     def compare(clips, folder, jobs, *options, alone=False):
-        return benchmark_batch.Run(took[jobs, alone], 10**8, 2 * 10**8, 0.75 if "--rates" in options else 0.0)
+        return benchmark_batch.Run(took[jobs, alone], 10**8, 2 * 10**8)
 
     monkeypatch.setattr(benchmark_batch, "compare", compare)
     assert benchmark_batch.main(["--clips", "4", "--films", "2", "--minutes", "1", "--root", str(tmp_path)]) == 0
     result = written(tmp_path, "benchmark_batch")
     assert [row["clips_a_minute"] for row in result["numbers"][:2]] == [12.0, 24.0]
     assert [row["speedup"] for row in result["videos"][:2]] == [1.0, 2.0]
-    assert [row["rendering"] for row in result["numbers"] + result["videos"]][1::3] == [None, 0.75]
-
-
-def test_tasks_are_noted_before_their_results_go(tmp_path):
-    folder = tmp_path / OWN / "results" / "a"
-    folder.mkdir(parents=True)
-    (folder / INDEX).write_text('{"seconds": 2.0, "facts": {"rendering": 1.5}}', encoding="utf-8")
-    tasks = {}
-    benchmark_batch.note_tasks(tmp_path, tasks)
-    shutil.rmtree(folder)
-    benchmark_batch.note_tasks(tmp_path, tasks)
-    assert tasks == {"a": {"seconds": 2.0, "facts": {"rendering": 1.5}}}

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from research import check_release
-from research.check_release import CHANGELOG, LISTING, MANIFEST, MANUAL
+from research.check_release import CHANGELOG, MANIFEST, MANUAL
 
 ROOT = Path(__file__).resolve().parents[3]
 WEBSITE = "https://motion.dev/rigid"
@@ -29,10 +29,9 @@ def change(folder: Path, name: str, old: str, new: str) -> None:
 @pytest.fixture
 def ready(tmp_path, monkeypatch) -> Path:
     """A checkout of which nothing is missing: this one, with addresses and a day."""
-    for name in (MANIFEST, CHANGELOG, MANUAL, LISTING):
+    for name in (MANIFEST, CHANGELOG, MANUAL):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
-        copy(ROOT / name, tmp_path / name)
+        shutil.copy(ROOT / name, tmp_path / name)
     manifest = check_release.manifest_of(ROOT)
     change(tmp_path, MANIFEST, manifest["website"], WEBSITE)
     change(tmp_path, MANUAL, manifest["website"], WEBSITE)
@@ -98,32 +97,3 @@ def test_a_version_that_has_its_tag_was_released(ready, capsys):
 def test_what_is_not_committed_is_not_released(ready, capsys):
     change(ready, CHANGELOG, "2026-12-01", "2026-12-02")
     assert f"{CHANGELOG} is not committed" in missing(capsys)
-
-
-def test_pictures_are_there_in_their_size(ready):
-    (ready / LISTING / "icon.png").unlink()
-    shutil.copy(ROOT / LISTING / "icon.png", ready / LISTING / "featured.png")
-    icon, featured = check_release.listing(ready)
-    assert "icon.png is missing" in icon
-    assert "featured.png is 256 x 256 pixels, and has to be 1920 x 1080" in featured
-
-
-@pytest.mark.parametrize("words", [0, 149, 301])
-def test_the_text_is_as_long_as_people_read(words, ready):
-    (ready / LISTING / "description.md").write_text("word " * words)
-    (finding,) = check_release.listing(ready)
-    assert f"has {words} words" in finding
-
-
-def test_a_zip_that_blender_refuses_is_no_release(ready, monkeypatch, capsys):
-    from rigid_motion_batch.cli import build_extension
-
-    def refused(folder: Path) -> Path:
-        raise build_extension.BuildError("Blender refuses the extension")
-
-    monkeypatch.setattr(build_extension, "build", refused)
-    assert "Blender refuses the extension" in missing(capsys)
-
-
-def test_the_pictures_and_the_text_of_this_checkout_are_ready():
-    assert list(check_release.listing(ROOT)) == []
