@@ -32,6 +32,9 @@ from rigid_motion_batch.places import PACKAGE
 SECONDS = 2.0  # of a clip
 RATE = 90.0  # samples a second of the clip whose length grows
 FEW = 20  # clips to compare the memory with
+MAIN = "import sys; from rigid_motion_batch.cli.commands import main; sys.exit(main(sys.argv[1:]))"
+"""The program in the process that is started; `-m rigid_motion_batch` does the work in a child of that."""
+
 POLL = 0.05  # seconds between two looks at the memory of the processes
 
 
@@ -70,7 +73,7 @@ def wandering(samples: int) -> str:
 def compare(clips: Sequence[Path], folder: Path, jobs: int, *options: str, alone: bool = False) -> Run:
     """Run `compare` on some clips, on a single processor if it is to be alone, into a new folder in that one."""
     output = Path(tempfile.mkdtemp(dir=folder))
-    command = [sys.executable, "-m", "rigid_motion_batch", "compare", *clips, "--output", output, "--jobs", str(jobs)]
+    command = [sys.executable, "-c", MAIN, "compare", *clips, "--output", output, "--jobs", str(jobs)]
     started, program, worker = time.perf_counter(), 0, 0
     with subprocess.Popen([*command, *options], cwd=PACKAGE.parent, stdout=subprocess.DEVNULL) as process:
         if alone:
