@@ -28,9 +28,9 @@ DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("addon", "scripts")]
 
 from research.pages import ROOT, write_figures
-from research.paper.motions import read_motion, recordings_in
-from research.paper.study import read_all
+from research.paper.motions import read_all, read_motion
 from research.paper.table import RADIUS, SAMPLES_AN_UPDATE
+from research.studies import files_in
 from rigid_motion.motion import KEYFRAME_MODES, curves, decimate
 from rigid_motion.motion.segments import Curves, Segments
 from rigid_motion_batch.analysis.choices import Uniform
@@ -101,7 +101,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--recordings", type=Path, metavar="FOLDER", required=True)
     parser.add_argument("--root", type=Path, default=ROOT, help="write ROOT/docs/figures (this checkout)")
     options = parser.parse_args(arguments)
-    chosen = dict(_counting(recordings_in(options.recordings)))
+    chosen = dict(_counting(files_in([options.recordings])))
     clips, paths = list(chosen.values()), list(chosen)
     figures = {
         "recordings": {clip.name: len(clip.times) for clip in clips},

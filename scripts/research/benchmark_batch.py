@@ -1,4 +1,4 @@
-"""What many clips cost: how much two workers are quicker than one, how much is Blender's rendering, and the memory.
+"""What many clips cost: how much two workers are quicker than one, and the memory.
 
     python scripts/research benchmark_batch
     python scripts/research benchmark_batch --clips 40 --films 4 --rounds 1
@@ -10,8 +10,6 @@ to make new ones.
 
 from __future__ import annotations
 
-import contextlib
-import json
 import os
 import subprocess
 import sys
@@ -24,127 +22,101 @@ from typing import Any
 
 import numpy as np
 
-from research.publishing import publish, say, study_parser
-from rigid_motion_batch.pipeline.steps import OWN
-from rigid_motion_batch.pipeline.store import INDEX
-from rigid_motion_batch.places import ASSETS, PACKAGE
+from research.making.tracking import table
+from research.paper.motions import assets
+from research.studies import publish, report, study_parser
+from rigid_motion.motion import Poses
+from rigid_motion.motion.quaternions import normalise
+from rigid_motion_batch.places import PACKAGE
 
-SECONDS = 2.0
-"""How long a clip is."""
+SECONDS = 2.0  # of a clip
+RATE = 90.0  # samples a second of the clip whose length grows
+FEW = 20  # clips to compare the memory with
+MAIN = "import sys; from rigid_motion_batch.cli.commands import main; sys.exit(main(sys.argv[1:]))"
+"""The program in the process that is started; `-m rigid_motion_batch` does the work in a child of that."""
 
-RATE = 90.0
-"""Samples a second of the clip whose length grows."""
-
-FEW = 20
-"""Clips to compare the memory with."""
-
-POLL = 0.05
-"""Seconds between two looks at the memory of the processes."""
+POLL = 0.05  # seconds between two looks at the memory of the processes
 
 
 @dataclass(frozen=True)
 class Run:
-    """What a run of `compare.py` took."""
+    """What a run of `compare` took."""
 
     seconds: float
 
-    own: int
+    program: int
     """The most memory of the program itself, in bytes; 0 where that cannot be told."""
 
     worker: int
     """The most memory of any process that it started."""
 
-    rendering: float
-    """What Blender's renderer takes of the seconds of all tasks together."""
-
 
 def pieces(count: int) -> Iterator[str]:
-    """Clips as text: a piece of an asset, moved elsewhere."""
-    random = np.random.default_rng(7)
-    recordings = [path.read_text(encoding="utf-8").splitlines() for path in sorted(ASSETS.glob("*.csv"))]
+    """Yield clips as text: a piece of an asset, moved elsewhere."""
+    random, clips = np.random.default_rng(7), list(assets().values())
     for number in range(count):
-        head, *rows = recordings[number % len(recordings)]
-        table = np.array([row.split(",") for row in rows], dtype=float)
-        first = random.uniform(table[0, 0], table[-1, 0] - SECONDS)
-        table = table[(table[:, 0] >= first) & (table[:, 0] <= first + SECONDS)]
-        table[:, 1:4] += random.normal(size=3)
-        yield "\n".join((head, *(",".join(map(repr, row)) for row in table.tolist()))) + "\n"
+        clip = clips[number % len(clips)]
+        first = random.uniform(clip.times[0], clip.times[-1] - SECONDS)
+        part = (clip.times >= first) & (clip.times <= first + SECONDS)
+        poses = clip.poses[part]
+        yield table(clip.times[part], Poses(poses.positions + random.normal(size=3), poses.quaternions))
 
 
 def wandering(samples: int) -> str:
-    """One long clip as text."""
+    """Return one long clip as text."""
     random = np.random.default_rng(8)
     times = np.arange(samples) / RATE
     rows = [np.sin(times * rate + phase) for rate, phase in random.uniform(0.5, 3.0, size=(7, 2))]
-    quaternions = np.stack((rows[3] + 3.0, *rows[4:]), axis=1)
-    quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
-    table = np.column_stack((times, *rows[:3], quaternions))
-    return "t,x,y,z,qw,qx,qy,qz\n" + "\n".join(",".join(map(repr, row)) for row in table.tolist()) + "\n"
+    return table(times, Poses(np.stack(rows[:3], axis=1), normalise(np.stack((rows[3] + 3.0, *rows[4:]), axis=1))))
 
 
 def compare(clips: Sequence[Path], folder: Path, jobs: int, *options: str, alone: bool = False) -> Run:
-    """Run `compare.py` on some clips, on a single processor if it is to be alone, into a new folder in that one."""
+    """Run `compare` on some clips, on a single processor if it is to be alone, into a new folder in that one."""
     output = Path(tempfile.mkdtemp(dir=folder))
-    command = [sys.executable, "-m", "rigid_motion_batch", "compare", *clips, "--output", output, "--jobs", str(jobs)]
-    started, own, worker = time.perf_counter(), 0, 0
-    tasks: dict[str, dict[str, Any]] = {}
-    with (
-        tempfile.TemporaryFile() as said,
-        subprocess.Popen([*command, *options], stdout=subprocess.DEVNULL, stderr=said, cwd=PACKAGE.parent) as process,
-    ):
+    command = [sys.executable, "-c", MAIN, "compare", *clips, "--output", output, "--jobs", str(jobs)]
+    started, program, worker = time.perf_counter(), 0, 0
+    with subprocess.Popen([*command, *options], cwd=PACKAGE.parent, stdout=subprocess.DEVNULL) as process:
         if alone:
             os.sched_setaffinity(process.pid, {min(os.sched_getaffinity(0))})
         while process.poll() is None:
-            own = max(own, peak_memory_of(process.pid))
+            program = max(program, peak_memory_of(process.pid))
             worker = max([worker, *map(peak_memory_of, children_of(process.pid))])
-            note_tasks(output, tasks)
             time.sleep(POLL)
         seconds = time.perf_counter() - started
-        if process.returncode:
-            said.seek(0)
-            raise RuntimeError(
-                f"compare ended with {process.returncode}: {said.read().decode(errors='replace')[-2000:]}"
-            )
-    note_tasks(output, tasks)
-    rendering = sum(task["facts"].get("rendering", 0.0) for task in tasks.values())
-    return Run(seconds, own, worker, rendering / sum(task["seconds"] for task in tasks.values()))
+    if process.returncode:
+        raise subprocess.CalledProcessError(process.returncode, process.args)
+    return Run(seconds, program, worker)
 
 
-def note_tasks(output: Path, tasks: dict[str, dict[str, Any]]) -> None:
-    """Add the tasks that are done, while their results are there: those of pieces of a film go when it is whole."""
-    for path in output.glob(f"{OWN}/results/*/{INDEX}"):
-        if path.parent.name not in tasks:
-            with contextlib.suppress(OSError, ValueError):
-                tasks[path.parent.name] = json.loads(path.read_text(encoding="utf-8"))
-
-
-def peak_memory_of(process: int) -> int:
-    """Return the most memory, in bytes, that a process has had; 0 where it is gone, or the system does not tell."""
+def _of_process(pid: int, name: str) -> str:
+    """Return what Linux says of a process; nothing where it is gone, or the system is another."""
     try:
-        status = Path(f"/proc/{process}/status").read_text(encoding="ascii", errors="replace")
+        return Path(f"/proc/{pid}/{name}").read_text(encoding="ascii", errors="replace")
     except OSError:
-        return 0
-    return next((int(line.split()[1]) << 10 for line in status.splitlines() if line.startswith("VmHWM:")), 0)
+        return ""
+
+
+def peak_memory_of(pid: int) -> int:
+    """Return the most memory, in bytes, that a process has had; 0 where that cannot be told."""
+    lines = _of_process(pid, "status").splitlines()
+    return next((int(line.split()[1]) << 10 for line in lines if line.startswith("VmHWM:")), 0)
 
 
 def children_of(pid: int) -> list[int]:
-    """The processes that a process has started; none where the system does not tell."""
-    try:
-        return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()]
-    except OSError:
-        return []
+    """Return the processes that a process has started; none where that cannot be told."""
+    return [int(child) for child in _of_process(pid, f"task/{pid}/children").split()]
 
 
 def workers(clips: Sequence[Path], folder: Path, rounds: int, *options: str) -> list[dict[str, Any]]:
-    """One worker beside two, and beside one that has a single processor."""
+    """Return what one worker takes beside two, and beside one that has a single processor."""
     runs: dict[tuple[int, bool], list[Run]] = {(1, False): [], (2, False): []}
     if hasattr(os, "sched_setaffinity"):
         runs[1, True] = []
     for _ in range(rounds):
-        for (jobs, alone), made in runs.items():
-            say(f"{len(clips)} clips, {jobs} at work{' on one processor' if alone else ''}")
-            made.append(compare(clips, folder, jobs, *options, alone=alone))
-    best = {way: min(made, key=lambda run: run.seconds) for way, made in runs.items()}
+        for (jobs, alone), results in runs.items():
+            report(f"{len(clips)} clips, {jobs} at work{' on one processor' if alone else ''}")
+            results.append(compare(clips, folder, jobs, *options, alone=alone))
+    best = {way: min(results, key=lambda run: run.seconds) for way, results in runs.items()}
     return [
         {
             "workers": jobs,
@@ -152,23 +124,22 @@ def workers(clips: Sequence[Path], folder: Path, rounds: int, *options: str) -> 
             "seconds": run.seconds,
             "clips_a_minute": 60.0 * len(clips) / run.seconds,
             "speedup": best[1, False].seconds / run.seconds,
-            "rendering": run.rendering or None,
         }
         for (jobs, alone), run in best.items()
     ]
 
 
 def memory(folder: Path, clips: Sequence[Path], minutes: Sequence[int]) -> dict[str, list[dict[str, float]]]:
-    """What the program takes over the number of clips, and its workers over the length of one."""
+    """Return what the program takes over the number of clips, and its workers over the length of one."""
     options = ("--no-video", "--rates", "10")
     programs, long = [], []
     for count in (FEW, len(clips)):
-        say(f"memory over {count} clips")
-        programs.append({"clips": count, "mb": compare(clips[:count], folder, 2, *options).own / 1e6})
+        report(f"memory over {count} clips")
+        programs.append({"clips": count, "mb": compare(clips[:count], folder, 2, *options).program / 1e6})
     path, rest = folder / "long.csv", 0
     for length in (0, *minutes):
         samples = int(length * 60 * RATE) or 10
-        say(f"memory over {length} minutes")
+        report(f"memory over {length} minutes")
         path.write_text(wandering(samples), encoding="utf-8")
         run = compare([path], folder, 1, *options)
         rest = rest or run.worker
@@ -186,8 +157,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--minutes", default="6,60", metavar="N,...", help="lengths of the long clip (%(default)s)")
     parser.add_argument("--rounds", type=int, default=3, help="of one worker and two in turns (%(default)s)")
     options = parser.parse_args(arguments)
-    with tempfile.TemporaryDirectory() as made:
-        folder = Path(made)
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
         clips = [folder / f"clip_{number:04}.csv" for number in range(max(options.clips, options.films))]
         for path, text in zip(clips, pieces(len(clips)), strict=True):
             path.write_text(text, encoding="utf-8")

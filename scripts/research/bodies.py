@@ -19,42 +19,25 @@ from rigid_motion.motion.quaternions import align_signs
 from rigid_motion_batch.scenes.decimated_bodies import Curve, key_frames_of, values_of, varying
 from rigid_motion_batch.silencing import silenced
 
-RADIUS = 0.03
-"""Of the ball at every joint, in metres."""
-
-IMPORTERS = {".bvh", ".fbx"}
-
-MOST_FRAMES = 1200
-"""Longer recordings are cut off."""
-
+RADIUS = 0.03  # of the ball at every joint, in metres
+MOST_FRAMES = 1200  # longer recordings are cut off
 
 Keys = Sequence[np.ndarray]
-"""The samples that are keys, for each joint."""
+"""The samples that are keys, for each joint; those of key poses are one array."""
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A body with a pose on every frame."""
+    """A body with a pose on every frame, each joint in its parent's space; z is up in that of roots. In metres."""
 
     name: str
-    rate: float
-    """Frames a second."""
-
+    rate: float  # frames a second
     joints: tuple[str, ...]
-    parents: np.ndarray
-    """Shape (joints,), -1 for roots."""
-
-    poses: Poses
-    """Shape (joints, n), each in its parent's space; z is up in that of roots. In metres."""
-
-    moving: np.ndarray
-    """How many channels of each joint's location ever change, shape (joints,)."""
-
-    turning: np.ndarray
-    """How many of its rotation."""
-
-    enlarged: float = 1.0
-    """How many times larger than in the file."""
+    parents: np.ndarray  # shape (joints,), -1 for roots
+    poses: Poses  # shape (joints, n)
+    moving: np.ndarray  # how many channels of each joint's location ever change, shape (joints,)
+    turning: np.ndarray  # how many of its rotation
+    enlarged: float = 1.0  # how many times larger than in the file
 
     @property
     def frames(self) -> int:
@@ -79,24 +62,22 @@ class Body:
         return float(np.ptp(self.truth.positions[:, 0], axis=0).max())
 
     def of_size(self, extent: float) -> Body:
-        """The same body, larger or smaller."""
+        """Return the same body, larger or smaller."""
         factor = extent / self.extent
         poses = Poses(factor * self.poses.positions, self.poses.quaternions)
         return replace(self, poses=poses, enlarged=factor * self.enlarged)
 
     def shown(self, keys: Keys, mode: str) -> Poses:
-        """Where the joints are by their keys, shape (joints, n)."""
+        """Return where the joints are by their keys, or by key poses (k,), shape (joints, n)."""
+        if isinstance(keys, np.ndarray):
+            return self.skeleton.in_root_space(interpolate(self.times[keys], self.poses[:, keys], self.times, mode))
         shown = self.poses.copy()
-        for joint, own in enumerate(keys):
-            shown[joint] = interpolate(self.times[own], self.poses[joint][own], self.times, mode)
+        for joint, samples in enumerate(keys):
+            shown[joint] = interpolate(self.times[samples], self.poses[joint][samples], self.times, mode)
         return self.skeleton.in_root_space(shown)
 
-    def shown_by_key_poses(self, keys: np.ndarray, mode: str) -> Poses:
-        """The same where all joints have keys at the same samples."""
-        return self.skeleton.in_root_space(interpolate(self.times[keys], self.poses[:, keys], self.times, mode))
-
     def errors(self, shown: Poses, radius: float = RADIUS) -> np.ndarray:
-        """The largest displacement of any point in the balls, shape (joints, n)."""
+        """Return the largest displacement of any point in the balls, shape (joints, n)."""
         return shell_error(shown, self.truth, radius)
 
 
@@ -105,7 +86,7 @@ class UnusableRigError(ValueError):
 
 
 class Rig:
-    """An armature in the open file; it is a joint itself where it carries the body along."""
+    """An armature in the open file, on some of its frames; it is a joint itself where it carries the body along."""
 
     def __init__(self, name: str, obj: bpy.types.Object, frames: np.ndarray) -> None:
         self.name, self.obj, self.frames = name, obj, frames
@@ -120,7 +101,7 @@ class Rig:
         self.parents = np.array([*[-1][:carries], *above])
 
     def body(self) -> Body:
-        """As it was imported, in metres."""
+        """Return it as it was imported, in metres."""
         prefixes = ["" if joint == self.obj else prefix_of(joint.name) for joint in self.joints]
         moving, turning = (
             np.array([sum(path.startswith(prefix + channel) for path, _ in self.varying) for prefix in prefixes])
@@ -130,7 +111,7 @@ class Rig:
         return Body(self.name, render.fps / render.fps_base, names, self.parents, self.poses(), moving, turning)
 
     def poses(self) -> Poses:
-        """What Blender shows now, shape (joints, n), each joint in its parent's space."""
+        """Return what Blender shows now, shape (joints, n), each joint in its parent's space."""
         shown = np.empty((len(self.joints), len(self.frames), 4, 4))
         for number, frame in enumerate(self.frames.tolist()):
             bpy.context.scene.frame_set(int(frame))
@@ -144,12 +125,12 @@ class Rig:
         return Poses(poses.positions, align_signs(poses.quaternions))
 
     def keys(self) -> dict[Curve, list[float]]:
-        """The frames of the keys of all F-curves that vary in the recording."""
+        """Return the frames of the keys of all F-curves that vary in the recording."""
         return key_frames_of(self.obj, self.varying)
 
 
 def import_rig(path: Path, most_frames: int = MOST_FRAMES) -> Rig:
-    """The armature of a file, alone in a new Blender file, imported as users do; of BVH, turned by quaternions.
+    """Import the armature of a file into a new Blender file, with its first frames; of BVH, turned by quaternions.
 
     Raises
     ------
@@ -165,23 +146,13 @@ def import_rig(path: Path, most_frames: int = MOST_FRAMES) -> Rig:
     rigs = [obj for obj in bpy.data.objects if obj.type == "ARMATURE" and obj.animation_data]
     if not rigs:
         raise UnusableRigError(f"{path.name}: it has no armature that is animated")
-    return rig_of(path.stem, max(rigs, key=lambda obj: len(obj.pose.bones)), most_frames)
-
-
-def rig_of(name: str, obj: bpy.types.Object, most_frames: int = MOST_FRAMES) -> Rig:
-    """An armature of the open file, with the first so many of its frames."""
-    first, last = obj.animation_data.action.frame_range
+    rig = max(rigs, key=lambda obj: len(obj.pose.bones))
+    first, last = rig.animation_data.action.frame_range
     frames = np.arange(np.ceil(first), np.floor(last) + 1.0)
     if len(frames) > most_frames:
         frames = frames[:most_frames]
-        for fcurve in animation.channelbag_of(obj).fcurves:
+        for fcurve in animation.channelbag_of(rig).fcurves:
             keys = np.array([key.co for key in fcurve.keyframe_points])
             keys = keys[keys[:, 0] <= frames[-1]]
             replace_keys(fcurve, keys[:, 0], keys[:, 1])
-    return Rig(name, obj, frames)
-
-
-def body_files(paths: list[Path]) -> list[Path]:
-    """The bodies among files and in folders."""
-    result = [inside for path in paths for inside in (sorted(path.iterdir()) if path.is_dir() else [path])]
-    return [path for path in result if path.suffix.lower() in IMPORTERS]
+    return Rig(path.stem, rig, frames)

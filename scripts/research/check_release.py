@@ -1,27 +1,24 @@
 """Look whether all is there that a release on extensions.blender.org needs, and say what is not.
 
-That is: real addresses, one version with a dated entry in the changelog and no tag yet, nothing that is not committed,
-the pictures and the text of the page, and a zip that Blender takes. It is for a checkout, and changes nothing in it.
+That is: real addresses, one version with a dated entry in the changelog and no tag yet, and nothing that is not
+committed. Zip, pictures and text of the page are tested with everything else. It is for a checkout, and changes nothing
+in it.
 """
 
 from __future__ import annotations
 
 import re
-import struct
 import subprocess
 import sys
-import tempfile
 import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from research.pages import ROOT
 from rigid_motion_batch.command_line import parser_of, program_of
-from rigid_motion_batch.places import CHECKOUT
-from rigid_motion_batch.system_libraries import require_blender
 
 SCRIPT = "research check_release"
-PROGRAM = program_of(SCRIPT)
 
 EPILOG = """
 example:
@@ -30,29 +27,19 @@ example:
 CONTRIBUTING.md has the steps of a release. Exit code: 0 all is there, 1 something is not, which is printed.
 """
 
-MANIFEST, CHANGELOG = "blender_manifest.toml", "CHANGELOG.md"
-MANUAL = "addon/rigid_motion/ui/manual.py"
-LISTING = "assets/listing"
+MANIFEST, CHANGELOG, MANUAL = "blender_manifest.toml", "CHANGELOG.md", "addon/rigid_motion/ui/manual.py"
 
-PICTURES = {"icon.png": (256, 256), "featured.png": (1920, 1080)}
-"""The pictures of the page, and their widths and heights in pixels."""
-
-WORDS = range(150, 301)
-"""How many words the text of the page may have."""
-
-STAND_INS = re.compile(r"(^|\.)(example(\.(org|com|net))?|test|invalid|localhost)$")
-"""Names of hosts that are nobody's (RFC 2606)."""
-
-Check = Callable[[Path], Iterator[str]]
+STAND_INS = re.compile(r"(^|\.)(example(\.(org|com|net))?|test|invalid|localhost)$|^$")
+"""Names of hosts that are nobody's (RFC 2606), or no names."""
 
 
 def addresses(checkout: Path) -> Iterator[str]:
-    """Website and maintainer can be reached, and the program opens what the manifest names."""
-    manifest = _manifest(checkout)
+    """Check that website and maintainer can be reached, and the program opens what the manifest names."""
+    manifest = manifest_of(checkout)
     website, mail = manifest.get("website", ""), manifest["maintainer"].rpartition("<")[2].rstrip(">")
-    if _is_stand_in(urlsplit(website).hostname or ""):
+    if STAND_INS.search(urlsplit(website).hostname or ""):
         yield f"{MANIFEST}: the website is {website or 'not there'}: set it to the project's, and WEBSITE in {MANUAL}"
-    if "@" not in mail or _is_stand_in(mail.rpartition("@")[2]):
+    if "@" not in mail or STAND_INS.search(mail.rpartition("@")[2]):
         yield f"{MANIFEST}: the maintainer's address is {mail}: set it to one that is read"
     opened = re.search(r'^WEBSITE = "(.*)"$', (checkout / MANUAL).read_text(encoding="utf-8"), re.MULTILINE)
     if opened is None or opened[1] != website:
@@ -60,8 +47,8 @@ def addresses(checkout: Path) -> Iterator[str]:
 
 
 def version(checkout: Path) -> Iterator[str]:
-    """The version has a dated entry in the changelog, and was not released before."""
-    number = _manifest(checkout)["version"]
+    """Check that the version has a dated entry in the changelog, and was not released before."""
+    number = manifest_of(checkout)["version"]
     changelog = (checkout / CHANGELOG).read_text(encoding="utf-8")
     entry = re.search(rf"^## {re.escape(number)} - (.*)$", changelog, re.MULTILINE)
     if entry is None:
@@ -73,56 +60,16 @@ def version(checkout: Path) -> Iterator[str]:
 
 
 def commits(checkout: Path) -> Iterator[str]:
-    """What is released is what is committed."""
+    """Check that what is released is committed."""
     for line in _git(checkout, "status", "--porcelain", "--untracked-files=no").splitlines():
         yield f"{line[3:]} is not committed"
 
 
-def pictures(checkout: Path) -> Iterator[str]:
-    """Icon and featured picture have the sizes that the site asks for."""
-    for name, requested in PICTURES.items():
-        path = checkout / LISTING / name
-        if not path.is_file():
-            yield f"{LISTING}/{name} is missing: python assets/make_listing.py"
-        elif (size := size_of_png(path)) != requested:
-            yield f"{LISTING}/{name} is {size[0]} x {size[1]} pixels, and has to be {requested[0]} x {requested[1]}"
+CHECKS: tuple[Callable[[Path], Iterator[str]], ...] = (addresses, version, commits)
 
 
-def text(checkout: Path) -> Iterator[str]:
-    """The text of the page is as long as people read."""
-    path = checkout / LISTING / "description.md"
-    if not path.is_file():
-        yield f"{LISTING}/description.md is missing"
-    elif (count := len(re.findall(r"[\w'-]+", path.read_text(encoding="utf-8")))) not in WORDS:
-        yield f"{LISTING}/description.md has {count} words, and is to have {WORDS[0]} to {WORDS[-1]}"
-
-
-def package(_checkout: Path) -> Iterator[str]:
-    """The zip can be built, and Blender takes it."""
-    require_blender(SCRIPT)
-    from rigid_motion_batch.cli.build_extension import BuildError, build
-
-    with tempfile.TemporaryDirectory() as folder:
-        try:
-            build(Path(folder))
-        except BuildError as error:
-            yield str(error)
-
-
-CHECKS: tuple[Check, ...] = (addresses, version, commits, pictures, text, package)
-
-
-def size_of_png(path: Path) -> tuple[int, int]:
-    """Width and height of a PNG file, in pixels."""
-    return struct.unpack(">II", path.read_bytes()[16:24])
-
-
-def _manifest(checkout: Path) -> dict:
+def manifest_of(checkout: Path) -> dict:
     return tomllib.loads((checkout / MANIFEST).read_text(encoding="utf-8"))
-
-
-def _is_stand_in(host: str) -> bool:
-    return not host or STAND_INS.search(host) is not None
 
 
 def _git(checkout: Path, *arguments: str) -> str:
@@ -131,14 +78,10 @@ def _git(checkout: Path, *arguments: str) -> str:
 
 def main(arguments: list[str]) -> int:
     """Look at everything, and return the exit code."""
-    parser = parser_of(SCRIPT, __doc__, EPILOG)
-    parser.parse_args(arguments)
-    if CHECKOUT is None:
-        print(f"{PROGRAM}: this is no checkout, and releases are made from one", file=sys.stderr)
-        return 1
-    missing = [finding for check in CHECKS for finding in check(CHECKOUT)]
+    parser_of(SCRIPT, __doc__, EPILOG).parse_args(arguments)
+    missing = [finding for check in CHECKS for finding in check(ROOT)]
     for finding in missing:
-        print(f"{PROGRAM}: {finding}", file=sys.stderr)
+        print(f"{program_of(SCRIPT)}: {finding}", file=sys.stderr)
     if not missing:
         print("All is there for a release.")
     return 1 if missing else 0

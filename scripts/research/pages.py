@@ -14,7 +14,7 @@ import argparse
 import json
 import platform
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -29,10 +29,7 @@ FIGURES, TEMPLATES = "docs/figures", "docs/templates"
 QUOTE = re.compile(r"(<!--= (.+?) -->)(.*?)(<!-- end -->)", re.DOTALL)
 
 
-# -- figures -----------------------------------------------------------------------------------------------------------
-
-
-def write_figures(name: str, figures: dict[str, Any], command: str, root: Path = ROOT, **versions: object) -> Path:
+def write_figures(name: str, figures: Any, command: str, root: Path = ROOT, **versions: object) -> Path:
     """Write what a study found to docs/figures/NAME.json, and return its path.
 
     Parameters
@@ -41,41 +38,39 @@ def write_figures(name: str, figures: dict[str, Any], command: str, root: Path =
     figures : dict
         Numbers, texts, and lists and dictionaries of them. Numbers get six significant digits; NaN becomes null.
     command : str
-        What made them.
+        What made them; folders are left out of its paths.
     root : Path
         The checkout.
     **versions
         Of what they depend on beside Python and NumPy.
     """
-    used = {**versions, "Python": platform.python_version(), "NumPy": np.__version__}
-    on = ", ".join([*(f"{one} {version}" for one, version in used.items()), platform.system()])
-    # Where somebody's folders lie is no matter of others.
+    versions |= {"Python": platform.python_version(), "NumPy": np.__version__}
+    machine = [*(f"{program} {version}" for program, version in versions.items()), platform.system()]
     words = (Path(word).name if word.startswith(("/", "..")) else word for word in command.split(" "))
-    document = {"made_by": f"`{' '.join(words)}`: {on} {platform.machine()}", **plain(figures)}
+    made_by = f"`{' '.join(words)}`: {', '.join(machine)} {platform.machine()}"
     path = root / FIGURES / f"{name}.json"
-    write_text(path, json.dumps(document, indent=1, allow_nan=False) + "\n")
+    write_text(path, json.dumps({"made_by": made_by, **as_json(figures)}, indent=1, allow_nan=False) + "\n")
     return path
 
 
-def plain(value: Any) -> Any:
+def as_json(value: Any) -> Any:
     """Return a value as JSON has it."""
     if isinstance(value, dict):
-        return {str(key): plain(one) for key, one in value.items()}
+        return {str(key): as_json(item) for key, item in value.items()}
     if isinstance(value, list | tuple | np.ndarray):
-        return [plain(one) for one in value]
+        return [as_json(item) for item in value]
     if isinstance(value, float | np.floating):
         return float(f"{value:.6g}") if np.isfinite(value) else None
     return value.item() if isinstance(value, np.generic) else value
 
 
-# -- how figures are written -------------------------------------------------------------------------------------------
+# -- filters: how pages write figures ----------------------------------------------------------------------------------
 
 
 def spread(values: Iterable[float], decimals: int = 0, factor: float = 1.0) -> str:
     """Return the least and the largest, times a factor: "4 to 7"; one number where they are written alike."""
     values = [factor * value for value in values]
-    low, high = f"{min(values):.{decimals}f}", f"{max(values):.{decimals}f}"
-    return low if low == high else f"{low} to {high}"
+    return " to ".join(dict.fromkeys(f"{value:.{decimals}f}" for value in (min(values), max(values))))
 
 
 def rest(shares: Iterable[float | None]) -> list[float | None]:
@@ -101,10 +96,7 @@ def each(values: Iterable[float], form: str = "{:.2f}", factor: float = 1.0) -> 
     return ["\N{EN DASH}" if value is None else form.format(factor * value) for value in values]
 
 
-def table(rows: Iterable[Sequence[object]], *head: str) -> str:
-    """Return a Markdown table, its first column to the left and the others to the right."""
-    lines = [head, ["---", *["---:"] * (len(head) - 1)], *rows]
-    return "\n".join("| " + " | ".join(map(str, cells)) + " |" for cells in lines)
+FILTERS = (alike, digits, each, less, listed, percent, rest, spread)
 
 
 # -- pages -------------------------------------------------------------------------------------------------------------
@@ -119,10 +111,9 @@ def environment(root: Path = ROOT) -> jinja2.Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    result.filters |= {one.__name__: one for one in (alike, digits, each, less, listed, percent, rest, spread, table)}
-    result.globals |= {
-        path.stem: json.loads(path.read_text(encoding="utf-8")) for path in (root / FIGURES).glob("*.json")
-    }
+    result.filters |= {function.__name__: function for function in FILTERS}
+    for path in (root / FIGURES).glob("*.json"):
+        result.globals[path.stem] = json.loads(path.read_text(encoding="utf-8"))
     if (root / TEMPLATES / "quotes.md").exists():
         result.globals["quotes"] = result.get_template("quotes.md").module
     return result

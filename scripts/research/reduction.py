@@ -18,54 +18,31 @@ import bpy
 import numpy as np
 
 from research import body_reduction
-from research.bodies import body_files
-from research.publishing import publish, say, study_parser
+from research.body_reduction import figures_of
+from research.studies import EXTENSIONS, files_in, publish, registered, report, study_parser
 from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate, repair, shell_error
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings import TrajectoryError, read_trajectories
-from rigid_motion_batch.recordings.reading import FORMATS
-from rigid_motion_batch.scenes.decimated_bodies import decimate
+from rigid_motion_batch.scenes.decimated_bodies import FREE, Left, decimate
 
 ROTATION_MODES = ("QUATERNION", "XYZ")
-
-TRIALS = 14
-"""Error margins tried until Decimate is as good as the reduced poses."""
-
-MARGINS = (1e-6, 1.0)
-"""The smallest and the largest of them, in the units of the channels."""
+TRIALS = 14  # error margins tried until Decimate is as good as the reduced poses
+MARGINS = (1e-6, 1.0)  # the smallest and the largest of them, in the units of the channels
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A motion with a pose on every frame."""
+    """A motion with a pose on every frame (n,), from 1 on."""
 
     name: str
     frames: np.ndarray
-    """Shape (n,), from 1 on."""
-
     poses: Poses
-    """Shape (n,)."""
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What is left of the keys, and how far off the motion is."""
-
-    keys: float
-    """In a channel, on average."""
-
-    frames: int
-    """With a key in any channel."""
-
-    numbers: int
-    largest: float
-    """Error, in metres."""
 
 
 def read(path: Path, rate: float) -> Recording:
-    """The first body of a file, at so many frames a second, between samples by the shortest way; a skeleton's root."""
+    """Read the first body of a file at so many frames a second, straight between samples; of a skeleton the root."""
     trajectory = read_trajectories(str(path)).trajectories[0]
     times, poses, _ = repair(trajectory.times, trajectory.rigid)
     if len(times) < 2:
@@ -76,7 +53,7 @@ def read(path: Path, rate: float) -> Recording:
 
 
 def import_recording(recording: Recording, rotation_mode: str) -> bpy.types.Object:
-    """An empty with a key on every frame, alone in a new file, selected."""
+    """Return an empty with a key on every frame, alone in a new file, selected."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     obj = bpy.data.objects.new(recording.name, None)
     obj.rotation_mode = rotation_mode
@@ -87,35 +64,34 @@ def import_recording(recording: Recording, rotation_mode: str) -> bpy.types.Obje
     return obj
 
 
-def outcome(obj: bpy.types.Object, recording: Recording, truth: Poses, radius: float) -> Outcome:
-    """What an object has now for keys, and shows."""
+def outcome(obj: bpy.types.Object, recording: Recording, truth: Poses, radius: float) -> Left:
+    """Return what an object has now for keys, in a channel on average, and how far off it is shown."""
     curves = [
         [key.co.x for key in fcurve.keyframe_points]
         for fcurve in animation.channelbag_of(obj).fcurves
         if fcurve.data_path.startswith(("location", "rotation"))
     ]
     frames, count = len(set().union(*curves)), sum(map(len, curves))
-    numbers = frames * (1 + len(curves)) if animation.is_reduced(obj) else 6 * count
+    numbers = frames * (1 + len(curves)) if animation.is_reduced(obj) else FREE * count
     error = shell_error(animation.read_poses(obj, recording.frames), truth, radius)
-    return Outcome(count / len(curves), frames, numbers, float(error.max()))
+    return Left(recording.name, frames, count / len(curves), numbers, float(error.max()))
 
 
 def measure(
     recording: Recording, rotation_mode: str, tolerance: float, radius: float
-) -> tuple[Outcome, Outcome | None, Outcome | None]:
-    """Of reducing to poses; of Decimate as good as that, and with keys on as few frames; None where it cannot be."""
+) -> tuple[Left, Left | None, Left | None]:
+    """Reduce to poses, and decimate to be as good, and to have keys on as few frames; None where that cannot be."""
     obj = import_recording(recording, rotation_mode)
     truth = animation.read_poses(obj, recording.frames)
     animation.reduce_keys_of(obj, "motor_spline", tolerance, radius)
     reduced = outcome(obj, recording, truth, radius)
 
-    def decimated(**options: object) -> Outcome:
+    def decimated(**options: object) -> Left:
         obj = import_recording(recording, rotation_mode)
         decimate(obj, **options)
         return outcome(obj, recording, truth, radius)
 
-    as_few = None
-    fewest, most = 2, round(reduced.keys)
+    as_few, fewest, most = None, 2, round(reduced.keys)
     while fewest < most:
         keys = (fewest + most + 1) // 2
         tried = decimated(mode="RATIO", factor=1.0 - keys / len(recording.frames))
@@ -136,39 +112,27 @@ def measure(
     return reduced, as_good, as_few
 
 
-def rest_bodies_of(one: Outcome | None) -> dict[str, float] | None:
-    """An outcome as figures; None where there is none."""
-    if one is None:
-        return None
-    return {"frames": one.frames, "key_count": one.keys, "numbers": one.numbers, "error_mm": 1e3 * one.largest}
-
-
-def row(recording: Recording, reduced: Outcome, as_good: Outcome | None, as_few: Outcome | None) -> dict[str, Any]:
-    """The figures of a recording."""
+def row(recording: Recording, reduced: Left, as_good: Left | None, as_few: Left | None) -> dict[str, Any]:
+    """Return the figures of a recording."""
     return {
         "name": recording.name,
         "frames": len(recording.frames),
-        "reduced": rest_bodies_of(reduced),
-        "decimate": rest_bodies_of(as_good),
+        "reduced": figures_of(reduced),
+        "decimate": as_good and figures_of(as_good),
         "few_mm": as_few and 1e3 * as_few.largest,
     }
 
 
 def means(rows: list[dict[str, Any]]) -> dict[str, float]:
-    """What Decimate has in multiples of reduced poses: geometric means over the recordings."""
-    both = [(row["reduced"], row["decimate"]) for row in rows if row["decimate"]]
-    result = {
-        name: geometric_mean(np.array([theirs[name] / ours[name] for ours, theirs in both])) for name in both[0][0]
-    }
+    """Return what Decimate has in multiples of reduced poses: geometric means over the recordings."""
+    ratios = [
+        {name: row["decimate"][name] / reduced for name, reduced in row["reduced"].items()}
+        for row in rows
+        if row["decimate"]
+    ]
     few = [row["few_mm"] / row["reduced"]["error_mm"] for row in rows if row["few_mm"]]
+    result = {name: geometric_mean(np.array([ratio[name] for ratio in ratios])) for name in ratios[0]}
     return {**result, "few_mm": geometric_mean(np.array(few))}
-
-
-def files(folder: Path | None) -> list[Path]:
-    """The clips in assets/, and recordings in a folder, but for files that need Blender to read."""
-    extensions = {extension for kind in FORMATS if kind.label != "Blender file" for extension in kind.extensions}
-    others = folder.iterdir() if folder else ()
-    return [*sorted(ASSETS.glob("*.csv")), *sorted(path for path in others if path.suffix.lower() in extensions)]
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -181,28 +145,25 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--fps", type=float, default=60.0, help="frames a second (%(default)g)")
     options = parser.parse_args(arguments)
     try:
-        recordings = [read(path, options.fps) for path in files(options.recordings)]
-        bodies = body_files(options.bodies)
+        others = files_in([options.recordings], EXTENSIONS - {".blend"}) if options.recordings else []
+        recordings = [read(path, options.fps) for path in [*sorted(ASSETS.glob("*.csv")), *others]]
+        bodies = files_in(options.bodies, (".bvh", ".fbx"))
     except (TrajectoryError, OSError) as error:
         parser.error(str(error))
-    rows: dict[str, list[dict[str, Any]]] = {}
-    animation.register()
-    try:
-        for rotation in ROTATION_MODES:
-            rows[rotation] = []
+    rows: dict[str, list[dict[str, Any]]] = {rotation: [] for rotation in ROTATION_MODES}
+    with registered():
+        for rotation, of_rotation in rows.items():
             for recording in recordings:
-                say(f"{recording.name}, {rotation}")
-                rows[rotation].append(row(recording, *measure(recording, rotation, options.tolerance, options.radius)))
-        singles = [(one.name, options.fps, one.poses) for one in recordings]
+                report(f"{recording.name}, {rotation}")
+                outcomes = measure(recording, rotation, options.tolerance, options.radius)
+                of_rotation.append(row(recording, *outcomes))
         result = {
             "tolerance_mm": 1e3 * options.tolerance,
             "radius": options.radius,
             "recordings": rows,
-            "means": {rotation: means(of_one) for rotation, of_one in rows.items()},
-            **body_reduction.figures(bodies, singles),
+            "means": {rotation: means(of_rotation) for rotation, of_rotation in rows.items()},
+            **body_reduction.figures(bodies),
         }
-    finally:
-        animation.unregister()
     given = f"--tolerance {options.tolerance:g} --radius {options.radius:g} --fps {options.fps:g}"
     more = [f"--{name} ..." for name in ("recordings", "bodies") if getattr(options, name)]
     return publish("reduction", result, options, given, *more, Blender=bpy.app.version_string)

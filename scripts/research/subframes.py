@@ -15,36 +15,30 @@ from typing import Any
 import bpy
 import numpy as np
 
-from research.publishing import publish, say, study_parser
+from research.studies import publish, registered, report, study_parser
 from rigid_motion import animation
 from rigid_motion.animation.compute.differences import in_betweens
 from rigid_motion.animation.queries.keyed import source_of
 from rigid_motion.motion import KEYFRAME_MODES, Poses, shell_error
 from rigid_motion.motion.eulers import extrinsic_eulers_from_quaternions
 from rigid_motion.motion.measures import rms
-from rigid_motion.motion.quaternions import align_signs, angle_between, multiply
+from rigid_motion.motion.quaternions import align_signs, angle_between, multiply, normalise
 
 SEGMENTS = 24
-
 ROTATION_MODES = ("QUATERNION", "XYZ")
 
-QUARTERS = np.array((0.25, 0.5, 0.75))
-"""Where motion blur with a few steps looks."""
-
-THIRTY_SECONDS = np.arange(1, 32) / 32.0
-"""Between samples wherever these lie."""
-
-EIGHTHS = np.array((0.125, 0.375, 0.625, 0.875))
-"""Half-way between keys that are baked on every quarter of a frame."""
+QUARTERS = np.array((0.25, 0.5, 0.75))  # where motion blur with a few steps looks
+THIRTY_SECONDS = np.arange(1, 32) / 32.0  # between samples wherever these lie
+EIGHTHS = np.array((0.125, 0.375, 0.625, 0.875))  # half-way between keys that are baked on every quarter of a frame
 
 
 @dataclass(frozen=True)
 class Motion:
-    """What happens between two keys: an angle in degrees, a distance in metres, a duration in frames."""
+    """What happens between two keys."""
 
     name: str
-    turn: float
-    distance: float
+    turn: float  # degrees
+    distance: float  # metres
     frames: int
 
     @property
@@ -69,9 +63,8 @@ class Deviation:
 
 
 def key_poses(motion: Motion) -> Poses:
-    """Poses a turn and a step apart, in directions drawn at random."""
-    random = np.random.default_rng(11)
-    axes, steps = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in random.normal(size=(2, SEGMENTS, 3)))
+    """Return poses a turn and a step apart, in directions drawn at random."""
+    axes, steps = normalise(np.random.default_rng(11).normal(size=(2, SEGMENTS, 3)))
     half = 0.5 * np.radians(motion.turn)
     quaternions = [np.array((0.5, 0.5, -0.5, 0.5))]
     for axis in axes:
@@ -81,57 +74,55 @@ def key_poses(motion: Motion) -> Poses:
 
 
 def keyed_object(motion: Motion, rotation_mode: str) -> bpy.types.Object:
-    """An empty in the scene with these keys, eased as Blender eases them."""
+    """Return an empty in the scene with these keys, eased as Blender eases them."""
     obj = bpy.data.objects.new(motion.name, None)
     obj.rotation_mode = rotation_mode
     bpy.context.collection.objects.link(obj)
-    poses, frames = key_poses(motion), motion.key_frames
-    animation.write_channel(obj, "location", frames, poses.positions, interpolation="BEZIER")
-    if rotation_mode == "QUATERNION":
-        animation.write_channel(obj, "rotation_quaternion", frames, poses.quaternions, interpolation="BEZIER")
-    else:
-        angles = extrinsic_eulers_from_quaternions(poses.quaternions, rotation_mode)
-        animation.write_channel(obj, "rotation_euler", frames, angles, interpolation="BEZIER")
+    poses, channel = key_poses(motion), "rotation_quaternion"
+    rotations = poses.quaternions
+    if rotation_mode != "QUATERNION":
+        channel, rotations = "rotation_euler", extrinsic_eulers_from_quaternions(rotations, rotation_mode)
+    for path, values in (("location", poses.positions), (channel, rotations)):
+        animation.write_channel(obj, path, motion.key_frames, values, interpolation="BEZIER")
     return obj
 
 
 def between(motion: Motion, fractions: np.ndarray) -> np.ndarray:
-    """The sub-frames from the first key to the last."""
+    """Return the sub-frames from the first key to the last."""
     first, last = motion.key_frames[[0, -1]]
     return (np.arange(first, last)[:, None] + fractions).ravel()
 
 
 def deviation(obj: bpy.types.Object, frames: np.ndarray, requested: Poses, radius: float) -> Deviation:
-    """How far Blender shows an object from where it should be."""
+    """Return how far Blender shows an object from where it should be."""
     shown = animation.read_poses(obj, frames)
     shell = shell_error(shown, requested, radius)
-    return Deviation(
-        float(shell.max()), rms(shell), float(angle_between(shown.quaternions, requested.quaternions).max())
-    )
+    turned = angle_between(shown.quaternions, requested.quaternions)
+    return Deviation(float(shell.max()), rms(shell), float(turned.max()))
 
 
 def measure(motion: Motion, mode: str, rotation_mode: str, radius: float) -> list[Deviation]:
-    """Of live in-betweens, of exact ones, of those baked on every quarter of a frame, and on every whole frame."""
+    """Measure live in-betweens, exact ones, those baked on every quarter of a frame, and on every whole frame."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     obj = keyed_object(motion, rotation_mode)
     animation.set_mode(obj, mode)
-    source = source_of(obj)
-    quarters, eighths = (between(motion, fractions) for fractions in (QUARTERS, EIGHTHS))
-    at_quarters, at_eighths = (in_betweens(source, frames).desired for frames in (quarters, eighths))
-    live = deviation(obj, quarters, at_quarters, radius)
+    quarters, finest, eighths = (
+        (frames, in_betweens(source_of(obj), frames).desired, radius)
+        for frames in (between(motion, fractions) for fractions in (QUARTERS, THIRTY_SECONDS, EIGHTHS))
+    )
+    live = deviation(obj, *quarters)
     animation.set_exact(obj)
-    finest = between(motion, THIRTY_SECONDS)
-    exact = deviation(obj, finest, in_betweens(source, finest).desired, radius)
+    exact = deviation(obj, *finest)
     animation.set_exact(obj, False)
     animation.bake(obj, step=0.25)
-    finely = deviation(obj, eighths, at_eighths, radius)
+    finely = deviation(obj, *eighths)
     animation.unbake(obj)
     animation.bake(obj)
-    return [live, exact, finely, deviation(obj, quarters, at_quarters, radius)]
+    return [live, exact, finely, deviation(obj, *quarters)]
 
 
-def rest_bodies_of(motion: Motion, radius: float) -> dict[str, Any]:
-    """The figures of one motion, for every mode and rotation mode."""
+def figures_of(motion: Motion, radius: float) -> dict[str, Any]:
+    """Return the figures of one motion, for every mode and rotation mode."""
     rows = []
     for mode in KEYFRAME_MODES:
         for rotation_mode in ROTATION_MODES:
@@ -155,13 +146,10 @@ def main(arguments: list[str] | None = None) -> int:
     parser = study_parser("subframes", __doc__)
     parser.add_argument("--radius", type=float, default=0.1, help="of the shell, in metres (%(default)s)")
     options = parser.parse_args(arguments)
-    result = []
-    animation.register()
-    try:
+    motions = []
+    with registered():
         for motion in MOTIONS:
-            say(motion.name)
-            result.append(rest_bodies_of(motion, options.radius))
-    finally:
-        animation.unregister()
-    figures = {"radius": options.radius, "motions": result}
+            report(motion.name)
+            motions.append(figures_of(motion, options.radius))
+    figures = {"radius": options.radius, "motions": motions}
     return publish("subframes", figures, options, f"--radius {options.radius:g}", Blender=bpy.app.version_string)

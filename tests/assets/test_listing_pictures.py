@@ -1,5 +1,6 @@
-"""The pictures of the extension's page: what they show is what happens, and they can be shown anywhere."""
+"""The extension's page: what its pictures show is what happens, and they can be shown anywhere."""
 
+import re
 import struct
 
 import bpy
@@ -63,3 +64,12 @@ def test_notes_in_a_picture_are_found():
     note = struct.pack(">I4s", 4, b"tEXt") + b"a\0b!" + b"sum!"
     picture = (LISTING / "icon.png").read_bytes()
     assert without_notes(picture[:33] + note + picture[33:]) == picture
+
+
+@pytest.mark.parametrize(("name", "size"), [("icon.png", (256, 256)), ("featured.png", (1920, 1080))])
+def test_pictures_have_the_sizes_that_the_site_asks_for(name: str, size: tuple[int, int]):
+    assert struct.unpack(">II", (LISTING / name).read_bytes()[16:24]) == size
+
+
+def test_the_text_is_as_long_as_people_read():
+    assert 150 <= len(re.findall(r"[\w'-]+", (LISTING / "description.md").read_text(encoding="utf-8"))) <= 300

@@ -16,37 +16,33 @@ from __future__ import annotations
 
 import heapq
 from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from rigid_motion.motion import Poses, rms, shell_error
+from rigid_motion.motion.poses import joined
 from rigid_motion.motion.quaternions import align_signs, conjugate, normalise, rotate
 from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.paths import Path, turned, turns_between
+from rigid_motion_batch.streaming.transports import HEADERS
 
 RATE, FPS, TICK = 30.0, 72.0, 1.0 / 60.0
 """Poses a second that an engine sends, pictures a second, and Godot's physics tick."""
 
 RADIUS = 0.1
-
-GRIP = np.array((0.0, 0.3, 0.0))
-"""The tool's middle in the hand's space."""
-
-SETTLED = 3.0
-"""Seconds after which it counts what is shown."""
+GRIP = np.array((0.0, 0.3, 0.0))  # the tool's middle in the hand's space
+SETTLED = 3.0  # seconds after which it counts what is shown
 
 MOVES, STANDS, FROZEN = 0.2, 0.1, 0.1
 """A hand that moves by more than this (m/s) is frozen where it is shown with less than this part of it for so long."""
 
-BACK = 0.005
-"""Metres against the way of the hand from one picture to the next: a jump back."""
-
+BACK = 0.005  # metres against the way of the hand from one picture to the next: a jump back
 LAGS = np.arange(0.0, 0.8, 0.005)
 
 Pose = tuple[np.ndarray, np.ndarray]
-"""Place (3,) and turn (4,)."""
+"""Position (3,) and quaternion (4,)."""
 
 Arrivals = list[tuple[float, float, Pose]]
 """Arrival, time of the sender, and pose, in the order of arrivals."""
@@ -79,21 +75,42 @@ class Seen:
     """The 98th percentile of how far the tool's middle is from its place in the hand."""
 
 
+# -- engines -----------------------------------------------------------------------------------------------------------
+
+
 def mix(first: Pose, second: Pose, share: float) -> Pose:
-    """Between two poses or beyond: straight, and about one axis."""
+    """Return a pose between two or beyond: straight, and about one axis."""
     turn = turned(first[1], share * turns_between(first[1], second[1]))
     return first[0] + share * (second[0] - first[0]), normalise(turn)
 
 
+def arriving(arrivals: Arrivals, moments: np.ndarray) -> Iterator[tuple[float, Arrivals]]:
+    """Yield each moment, and what has arrived since the one before."""
+    ends = np.searchsorted([arrival for arrival, _, _ in arrivals], moments, side="right").tolist()
+    for moment, begin, end in zip(moments.tolist(), [0, *ends], ends, strict=False):
+        yield moment, arrivals[begin:end]
+
+
+def newest_of(arrivals: Arrivals, moments: np.ndarray) -> Iterator[tuple[float, Arrivals]]:
+    """Yield the same without what was overtaken."""
+    newest = -np.inf
+    for moment, come in arriving(arrivals, moments):
+        kept = []
+        for arrived in come:
+            if arrived[1] > newest:
+                newest = arrived[1]
+                kept.append(arrived)
+        yield moment, kept
+
+
 def mirror(arrivals: Arrivals, frames: np.ndarray) -> list[Pose]:
-    """Snapshot interpolation with dynamic adjustment."""
+    """Show by snapshot interpolation with dynamic adjustment."""
     interval, buffer, shown = 1.0 / RATE, [], []
-    local, scale, multiple, last_arrival = 0.0, 1.0, 2.0, None
-    drift, taken, came = _Average(RATE), _Average(2.0 * RATE), 0
-    for frame, now in enumerate(frames):
-        while came < len(arrivals) and arrivals[came][0] <= now:
-            arrival, sent, pose = arrivals[came]
-            came += 1
+    local, scale, multiple, last_arrival, before = 0.0, 1.0, 2.0, None, frames[0]
+    drift, taken = _Average(RATE), _Average(2.0 * RATE)
+    for now, come in arriving(arrivals, frames):
+        elapsed, before = now - before, now
+        for arrival, sent, pose in come:
             if not buffer:
                 local = sent - interval * multiple
             at = bisect_right(buffer, sent, key=lambda known: known[0])
@@ -112,7 +129,7 @@ def mirror(arrivals: Arrivals, frames: np.ndarray) -> list[Pose]:
         if not buffer:
             shown.append(arrivals[0][2])
             continue
-        local += scale * (frames[frame] - frames[max(frame - 1, 0)])
+        local += scale * elapsed
         at = bisect_right(buffer, local, key=lambda known: known[0])
         if 0 < at < len(buffer):
             (begin, first), (end, second) = buffer[at - 1 : at + 1]
@@ -144,40 +161,29 @@ class _Average:
 
 
 def netcode(arrivals: Arrivals, frames: np.ndarray) -> list[Pose]:
-    """Lerp of lerp."""
+    """Show by lerp of lerp."""
     offset = float(np.mean([arrival - sent for arrival, sent, _ in arrivals])) + 0.05 + 1.0 / RATE
-    waiting, came, newest = [], 0, -np.inf
-    start = end = (0.0, arrivals[0][2])
-    current, shown, before = arrivals[0][2], [], frames[0]
-    for now in frames:
-        while came < len(arrivals) and arrivals[came][0] <= now:
-            _, sent, pose = arrivals[came]
-            came += 1
-            if sent > newest:
-                newest = sent
-                waiting.append((sent, pose))
+    waiting, shown, before = [], [], frames[0]
+    current = arrivals[0][2]
+    start = end = (0.0, current)
+    for now, come in newest_of(arrivals, frames):
+        waiting += [(sent, pose) for _, sent, pose in come]
         render = now - offset
         while waiting and render >= end[0]:
             start, end = end, waiting.pop(0)
         span = end[0] - start[0]
         share = max((render - start[0]) / span, 0.0) if span > 0.0 else 1.0
         aim = mix(start[1], end[1], share if share <= 3.0 else 1.0)
-        current = mix(current, aim, min((now - before) / 0.1, 1.0))
-        before = now
+        current, before = mix(current, aim, min((now - before) / 0.1, 1.0)), now
         shown.append(current)
     return shown
 
 
 def godot(arrivals: Arrivals, frames: np.ndarray) -> list[Pose]:
-    """The newest at each physics tick, and between the last two ticks."""
-    came, newest, ticks = 0, -np.inf, []
-    pose = arrivals[0][2]
-    for tick in np.arange(frames[0] - 2.0 * TICK, frames[-1] + TICK, TICK):
-        while came < len(arrivals) and arrivals[came][0] <= tick:
-            _, sent, arrived = arrivals[came]
-            came += 1
-            if sent > newest:
-                newest, pose = sent, arrived
+    """Show the newest at each physics tick, and between the last two ticks."""
+    pose, ticks = arrivals[0][2], []
+    for tick, come in newest_of(arrivals, np.arange(frames[0] - 2.0 * TICK, frames[-1] + TICK, TICK)):
+        pose = come[-1][2] if come else pose
         ticks.append((tick, pose))
     shown = []
     for now in frames:
@@ -194,43 +200,41 @@ ENGINES: dict[str, Callable[[Arrivals, np.ndarray], list[Pose]]] = {
 }
 
 
+# -- what comes out ----------------------------------------------------------------------------------------------------
+
+
 def truth_of(times: np.ndarray, hand: Poses) -> Path:
-    """The hand (n,) and the tool in it, as two joints."""
-    tool = Poses(hand.positions + rotate(hand.quaternions, GRIP), hand.quaternions)
-    still = np.zeros((2, 3))
-    places = np.stack((hand.positions, tool.positions), axis=1)
-    turns = align_signs(np.stack((hand.quaternions, tool.quaternions))).swapaxes(0, 1)
-    return Path(times - times[0], places, turns, still, still)
+    """Return the hand (n,) and the tool in it, as two joints."""
+    tool = hand.positions + rotate(hand.quaternions, GRIP)
+    turns = align_signs(np.stack((hand.quaternions, hand.quaternions))).swapaxes(0, 1)
+    return Path(times - times[0], np.stack((hand.positions, tool), axis=1), turns, *np.zeros((2, 2, 3)))
 
 
 def by_engine(engine: str, truth: Path, way: Way, frames: np.ndarray) -> Poses:
-    """What an engine shows at each frame (n,), shape (2, n)."""
+    """Return what an engine shows at each frame (n,), shape (2, n)."""
     rng, shown = np.random.default_rng(7), []
     sent = np.arange(0.0, truth.moments[-1], 1.0 / RATE)
-    poses = truth.at(sent)
-    for body in range(2):
-        come = [
-            (way.arrival(time, rng), time, (poses.positions[body, row], poses.quaternions[body, row]))
-            for row, time in enumerate(sent.tolist())
-        ]
-        come = sorted((one for one in come if np.isfinite(one[0])), key=lambda one: one[0])
-        shown.append(ENGINES[engine](come, frames))
-    return Poses(np.array([[p for p, _ in own] for own in shown]), np.array([[q for _, q in own] for own in shown]))
+    for body in truth.at(sent):
+        poses = zip(body.positions, body.quaternions, strict=True)
+        arrivals = [(way.arrival(time, rng), time, pose) for time, pose in zip(sent.tolist(), poses, strict=True)]
+        arrivals = sorted((it for it in arrivals if np.isfinite(it[0])), key=lambda arrived: arrived[0])
+        shown.append(ENGINES[engine](arrivals, frames))
+    return Poses(*(np.array([[pose[part] for pose in body] for body in shown]) for part in (0, 1)))
 
 
 def by_codec(truth: Path, way: Way, frames: np.ndarray, tolerance: float, delay: float) -> tuple[Poses, float]:
-    """What a receiver shows of one sender of both bodies, and the bytes a second with headers."""
+    """Return what a receiver shows of one sender of both bodies, and the bytes a second with headers."""
     rng = np.random.default_rng(7)
     bodies = [Body.rigid("hand", radius=RADIUS), Body.rigid("tool", radius=RADIUS)]
     sender, receiver = Sender(bodies, tolerance, delay), Receiver()
     pending, count, size = [], 0, 0
-    first = truth.at(frames[:1])[:, 0]
-    samples, shown = truth.at(truth.moments), []
+    samples = truth.at(truth.moments)
+    current, shown = truth.at(frames[:1])[:, 0], []
 
     def post(datagrams: list[bytes], now: float, back: bool = False) -> None:
         nonlocal count, size
         for datagram in datagrams:
-            size += 0 if back else len(datagram) + 28
+            size += 0 if back else len(datagram) + HEADERS
             count += 1
             if np.isfinite(arrival := way.arrival(now, rng)):
                 heapq.heappush(pending, (arrival, count, back, datagram))
@@ -252,33 +256,26 @@ def by_codec(truth: Path, way: Way, frames: np.ndarray, tolerance: float, delay:
         come(now)
         if frame:
             for it in receiver.show(now).values():
-                first = Poses(
-                    np.concatenate([part.positions for part in it.poses.values()]),
-                    np.concatenate([part.quaternions for part in it.poses.values()]),
-                )
-            shown.append(first)
+                current = joined(list(it.poses.values()))
+            shown.append(current[:, None])
         else:
             post(sender.add(now, samples[:, row]), now)
-    poses = Poses(
-        np.stack([own.positions for own in shown], axis=1), np.stack([own.quaternions for own in shown], axis=1)
-    )
-    return poses, size / float(truth.moments[-1])
+    return joined(shown, axis=1), size / float(truth.moments[-1])
 
 
 def seen(shown: Poses, truth: Path, frames: np.ndarray) -> Seen:
     """Compare what was shown at frames (n,) with the truth."""
     kept = frames > SETTLED
     shown, frames = shown[:, kept], frames[kept]
-    errors = [shell_error(shown[0], truth.at(frames - lag)[0], RADIUS) for lag in LAGS]
-    best = int(np.argmin([rms(own) for own in errors]))
-    true = truth.at(frames - LAGS[best])[0].positions
-    went, goes = np.diff(shown[0].positions, axis=0), np.diff(true, axis=0)
-    true_speed = np.linalg.norm(goes, axis=-1)
-    moving = true_speed * FPS > MOVES
-    stands = moving & (np.linalg.norm(went, axis=-1) < STANDS * true_speed)
-    along = np.einsum("ij,ij->i", went, goes) / np.maximum(true_speed, 1e-9)
-    runs = np.diff(np.flatnonzero(np.diff(np.concatenate(((0,), stands.astype(int), (0,))))))[::2]
     hand, tool = shown[0], shown[1]
+    errors = [shell_error(hand, truth.at(frames - lag)[0], RADIUS) for lag in LAGS]
+    best = int(np.argmin([rms(error) for error in errors]))
+    went, goes = (np.diff(it.positions, axis=0) for it in (hand, truth.at(frames - LAGS[best])[0]))
+    speed = np.linalg.norm(goes, axis=-1)
+    moving = speed * FPS > MOVES
+    stands = moving & (np.linalg.norm(went, axis=-1) < STANDS * speed)
+    along = np.einsum("ij,ij->i", went, goes) / np.maximum(speed, 1e-9)
+    runs = np.diff(np.flatnonzero(np.diff(np.pad(stands, 1).astype(int))))[::2]
     slips = np.linalg.norm(rotate(conjugate(hand.quaternions), tool.positions - hand.positions) - GRIP, axis=-1)
     return Seen(
         delay=float(LAGS[best]),

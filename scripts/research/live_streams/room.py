@@ -12,13 +12,9 @@ from multiprocessing.connection import Connection
 
 import numpy as np
 
-RATE = 20.0
-"""Datagrams a second of each user."""
-
+RATE = 20.0  # datagrams a second of each user
 STAMP = struct.Struct("<d")
-
-SETTLING = 5.0
-"""Seconds in which all have to hear of one another, and that do not count."""
+SETTLING = 5.0  # seconds in which all have to hear of one another, and that do not count
 
 
 @dataclass(frozen=True)
@@ -32,31 +28,28 @@ class Room:
     median_ms: float
     p99_ms: float
     router: float
-    users: float
+    listeners: float
 
 
-def figures(users: int, seconds: float) -> Room:
+def measured(users: int, seconds: float) -> Room:
     """Play a room for so many seconds."""
     context = multiprocessing.get_context("spawn")
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         place = f"tcp/127.0.0.1:{free.getsockname()[1]}"
-    datagrams = _datagrams()
-    ends = []
+    datagrams, pipes = _datagrams(), []
     for user in (None, *range(users)):
         here, there = context.Pipe()
-        process = context.Process(target=_run, args=(there, user, place, datagrams, seconds), daemon=True)
-        process.start()
-        ends.append((here, process))
+        context.Process(target=_run, args=(there, user, place, datagrams, seconds), daemon=True).start()
+        pipes.append(here)
         here.recv()
     start = time.time() + 1.0
-    for here, _ in ends:
-        here.send(start)
-    result = [here.recv() for here, _ in ends]
-    for _, process in ends:
+    for pipe in pipes:
+        pipe.send(start)
+    (router, _), *listeners = [pipe.recv() for pipe in pipes]
+    for process in multiprocessing.active_children():
         process.join()
-    (router, _), *people = result
-    latencies = np.concatenate([own[1] for own in people])
+    latencies = np.concatenate([latencies for _, latencies in listeners])
     return Room(
         bytes=float(np.mean([len(datagram) for datagram in datagrams])),
         heard=len(latencies),
@@ -65,31 +58,35 @@ def figures(users: int, seconds: float) -> Room:
         median_ms=1e3 * float(np.median(latencies)),
         p99_ms=1e3 * float(np.percentile(latencies, 99.0)),
         router=router / seconds,
-        users=sum(own[0] for own in people) / seconds,
+        listeners=sum(spent for spent, _ in listeners) / seconds,
     )
 
 
 def _datagrams() -> list[bytes]:
-    """Of a hand that swings, said anew at every sample."""
+    """Return those of a hand that swings, said anew at every sample."""
     from rigid_motion.motion import Poses
     from rigid_motion.streams import Body, Sender
 
     times = np.arange(400) / RATE
     sender, result = Sender([Body.rigid("hand")], 0.002, 0.1, RATE, keepalive=0.9 / RATE), []
-    for time_, place in zip(times.tolist(), np.sin(times[:, None] * (3.0, 4.1, 2.3)), strict=True):
-        result += sender.add(time_, Poses(place[None], np.array(((1.0, 0.0, 0.0, 0.0),))))
+    for moment, position in zip(times.tolist(), np.sin(times[:, None] * (3.0, 4.1, 2.3)), strict=True):
+        result += sender.add(moment, Poses(position[None], np.array(((1.0, 0.0, 0.0, 0.0),))))
     return [datagram for datagram in result if len(datagram) < 200]
 
 
 def _run(pipe: Connection, user: int | None, place: str, datagrams: list[bytes], seconds: float) -> None:
-    """A user, or the router, in a process of its own."""
+    """Be a user, or the router, in a process of its own."""
     import zenoh
 
+    role, side = ("router", "listen") if user is None else ("client", "connect")
     config = zenoh.Config()
-    config.insert_json5("mode", json.dumps("client" if user is not None else "router"))
-    config.insert_json5("connect/endpoints" if user is not None else "listen/endpoints", json.dumps([place]))
-    config.insert_json5("scouting/multicast/enabled", "false")
-    config.insert_json5("transport/link/tx/queue/size/data", "16")
+    for key, value in {
+        "mode": role,
+        f"{side}/endpoints": [place],
+        "scouting/multicast/enabled": False,
+        "transport/link/tx/queue/size/data": 16,
+    }.items():
+        config.insert_json5(key, json.dumps(value))
     taken: list[tuple[float, float]] = []
 
     def hear(sample: zenoh.Sample) -> None:
@@ -112,6 +109,5 @@ def _run(pipe: Connection, user: int | None, place: str, datagrams: list[bytes],
         spent = time.process_time() - begun
         time.sleep(2.0)
         times = np.array(taken).reshape(-1, 2)
-        latencies = (times[:, 0] - times[:, 1])[times[:, 1] >= start + SETTLING]
-        pipe.send((spent, latencies))
+        pipe.send((spent, (times[:, 0] - times[:, 1])[times[:, 1] >= start + SETTLING]))
         time.sleep(2.0)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .shells import Shell, X, curve, lathe, loft, merged, oval, pad, rounded_ends, slab
+from .shells import Shell, X, curve, lathe, loft, merged, oval, pad, rounded_ends, slab, unit
 
 FACE_CENTRE = np.array((0.0, 40.0, 18.0))
 FACE = np.array((0.0, -0.17, 0.985))
@@ -17,7 +17,7 @@ FACE_AHEAD = np.array((0.0, 0.985, 0.17))
 
 
 def controller() -> Shell:
-    """The whole controller."""
+    """Return the whole controller."""
     return merged([*_handle(), *_head(), *_trigger(), *_ring()])
 
 
@@ -79,20 +79,19 @@ def _head() -> list[Shell]:
     ]
 
 
+# y, z, half width, half thickness: from under the head forward and down, hollow for the finger
+_TRIGGER = (
+    (38.0, 8.0, 10.0, 9.0),
+    (48.0, 0.0, 9.6, 7.6),
+    (52.5, -8.0, 9.0, 5.4),
+    (55.0, -15.0, 8.4, 4.0),
+    (59.0, -20.5, 7.6, 3.0),
+)
+
+
 def _trigger() -> list[Shell]:
-    # y, z, half width, half thickness: from under the head forward and down, hollow for the finger
-    path = curve(
-        (
-            (38.0, 8.0, 10.0, 9.0),
-            (48.0, 0.0, 9.6, 7.6),
-            (52.5, -8.0, 9.0, 5.4),
-            (55.0, -15.0, 8.4, 4.0),
-            (59.0, -20.5, 7.6, 3.0),
-        ),
-        12,
-    )
-    ahead = np.gradient(path[:, :2], axis=0)
-    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    path = curve(_TRIGGER, 12)
+    ahead = unit(np.gradient(path[:, :2], axis=0))
     path[-1, 2:] -= 1.4
     rings = [
         slab((0.0, y, z), a * X, b * np.array((0.0, -s, c)), 0.75 * b)
@@ -107,7 +106,7 @@ RING_AHEAD = np.array((0.0, 0.929, -0.37))
 
 
 def _ring() -> list[Shell]:
-    """The tracking ring: a band that is broad in front, where it grows out of the head, and its lights."""
+    """Return the tracking ring: a band that is broad in front, where it grows out of the head, and its lights."""
 
     def out(angle: float) -> np.ndarray:
         return np.cos(angle) * X + np.sin(angle) * RING_AHEAD

@@ -17,7 +17,7 @@ BIT_END = 1e3 * TIP[1]
 
 
 def drill() -> Shell:
-    """The whole drill."""
+    """Return the whole drill."""
     return merged([*_barrel(), *_chuck(), _bit(), *_grip(), *_triggers(), *_battery(), *_left(), *_right()])
 
 
@@ -93,7 +93,7 @@ def _chuck() -> list[Shell]:
 
 
 def _bit() -> Shell:
-    """A twist drill: two flutes that wind to the right, and a point of 118 degrees."""
+    """Return a twist drill: two flutes that wind to the right, and a point of 118 degrees."""
     radius, points, shank_end, lead = 2.8, 10, 115.0, 24.0
     angle = 2.0 * np.pi * np.arange(points) / points
     tip_start = BIT_END - radius / np.tan(np.radians(59.0))
@@ -140,7 +140,7 @@ def _grip() -> list[Shell]:
 
 def _triggers() -> list[Shell]:
     def trigger(middle: float, half: float, width: float, back: float, front: float, material: str) -> Shell:
-        """A button across the front of the grip, hollow for the finger."""
+        """Return a button across the front of the grip, hollow for the finger."""
         rings = []
         for along, inset in ((-1.0, 1.6), (-0.88, 0.3), (-0.4, 0.0), (0.0, 0.0), (0.4, 0.0), (0.88, 0.3), (1.0, 1.6)):
             reach = front + 2.4 * along**2 - inset

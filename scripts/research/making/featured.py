@@ -11,39 +11,27 @@ from pathlib import Path
 
 import bmesh
 import bpy
-from bpy_extras.anim_utils import action_get_channelbag_for_slot
 from mathutils import Matrix, Quaternion, Vector
 
+from research.studies import registered
 from rigid_motion import animation
 from rigid_motion_batch.palette import linear
 from rigid_motion_batch.scenes.materials import ink, surface
 
-from .rendering import empty_scene, look_from, render
+from .rendering import add, empty_scene, look_from, render, tubes
 
-SIZE = (1920, 1080)
-UNITS = 19.2
-"""How wide the picture is in the scene."""
+SIZE, UNITS = (1920, 1080), 19.2  # pixels, and how wide the picture is in the scene
 
-LENGTH = 4.3
-"""From the hammer's origin, in its head, to where the hand holds it."""
-
-GRIP = Vector((0.0, 0.0, -LENGTH))
-"""Where that is on the hammer."""
-
-SWING = math.radians(62.0)
-"""How far a key leans to its side."""
-
-FIRST, LAST, BETWEEN = 1, 61, 3
-"""The frames of the keys, and how many ghosts are between them."""
-
-HAND = -1.85
-"""The height of the hand."""
+LENGTH = 4.3  # from the hammer's origin, in its head, to where the hand holds it
+GRIP = Vector((0.0, 0.0, -LENGTH))  # where that is on the hammer
+SWING = math.radians(62.0)  # how far a key leans to its side
+FIRST, LAST, BETWEEN = 1, 61, 3  # the frames of the keys, and how many ghosts are between them
+HAND = -1.85  # the height of the hand
 
 HEAD = ((0.0, 0.34, 0.7), (0.42, 0.25, 0.3), (0.66, 0.38, 0.3), (-0.42, 0.25, 0.3), (-0.66, 0.38, 0.3))
 """The parts of its head along x: middle, radius and length."""
 
-BACKGROUND = "#303030"
-WOOD, STEEL = "#B98A54", "#C9CED6"
+BACKGROUND, WOOD, STEEL = "#303030", "#B98A54", "#C9CED6"
 NATIVE, NATIVE_GHOST = "#F08A3C", "#A05F33"
 RIGID, RIGID_GHOST = "#38B6FF", "#2A7CAD"
 WORDS, FAINT = "#E6E6E6", "#9A9A9A"
@@ -52,8 +40,7 @@ WORDS, FAINT = "#E6E6E6", "#9A9A9A"
 def make(path: Path, samples: int = 32) -> None:
     """Render the picture into a file."""
     empty_scene()
-    animation.register()
-    try:
+    with registered():
         _lane(-4.75, None, (NATIVE, NATIVE_GHOST), "Blender", "each channel for itself")
         _lane(4.75, "dq_sclerp", (RIGID, RIGID_GHOST), "Rigid Motion", "one body, one motion")
         _write("the grip leaves the hand", (-1.95, 0.0, -3.5), 0.34, NATIVE)
@@ -62,12 +49,10 @@ def make(path: Path, samples: int = 32) -> None:
         _surroundings(bpy.context.scene)
         look_from((0.0, -20.0, 0.0), (math.radians(90.0), 0.0, 0.0), UNITS)
         render(path, SIZE, samples, denoise=True)
-    finally:
-        animation.unregister()
 
 
 def _lane(x: float, mode: str | None, colours: tuple[str, str], title: str, says: str) -> None:
-    """A hammer with two keys, its poses on the way, the paths of its head and its grip, and the hand."""
+    """Draw a hammer with two keys, its poses on the way, the paths of its head and its grip, and the hand."""
     colour, faint = colours
     hand = Vector((x, 0.0, HAND))
     poses = swing(hammer := _hammer(title), hand, mode)
@@ -86,51 +71,47 @@ def _lane(x: float, mode: str | None, colours: tuple[str, str], title: str, says
     if max((grip - grips[0]).length for grip in grips) > 0.1:
         _path(f"Grip of {title}", grips, 0.03, line)
     for pose in (poses[0], poses[-1]):
-        _dot(pose.translation + Vector((0.0, -0.8, 0.0)), 0.15, ink("Key", "#FFC033"))
-    _ring(hand + Vector((0.0, -0.75, 0.0)), ink("Hand", WORDS))
+        key = bmesh.new()
+        bmesh.ops.create_uvsphere(key, u_segments=32, v_segments=16, radius=0.15)
+        place = pose.translation + Vector((0.0, -0.8, 0.0))
+        _flat("Key", _mesh("Key", key), ink("Key", "#FFC033")).location = place
+    turns, middle = (math.radians(angle) for angle in range(0, 361, 5)), hand + Vector((0.0, -0.75, 0.0))
+    ring = [middle + 0.42 * Vector((math.cos(turn), 0.0, math.sin(turn))) for turn in turns]
+    _path("Hand", ring, 0.05, ink("Hand", WORDS))
     _write(title, (x, 0.0, 4.22), 0.78, colour)
     _write(says, (x, 0.0, 3.52), 0.36, WORDS)
 
 
 def _hammer(name: str, material: bpy.types.Material | None = None) -> bpy.types.Object:
-    """A hammer that hangs from its head, where its origin is; of one material, or of wood and steel."""
+    """Return a hammer that hangs from its head, where its origin is; of one material, or of wood and steel."""
     mesh = bmesh.new()
-    handle = bmesh.ops.create_cone(
-        mesh,
-        cap_ends=True,
-        segments=32,
-        radius1=0.19,
-        radius2=0.135,
-        depth=LENGTH + 0.4,
-        matrix=Matrix.Translation((0.0, 0.0, -0.5 * LENGTH - 0.1)),
-    )["verts"]
-    of_handle = {face for vert in handle for face in vert.link_faces}
+
+    def cone(segments: int, radii: tuple[float, float], depth: float, matrix: Matrix) -> set[bmesh.types.BMFace]:
+        ends = {"radius1": radii[0], "radius2": radii[1]}
+        made = bmesh.ops.create_cone(mesh, cap_ends=True, segments=segments, depth=depth, matrix=matrix, **ends)
+        return {face for vert in made["verts"] for face in vert.link_faces}
+
+    wooden = cone(32, (0.19, 0.135), LENGTH + 0.4, Matrix.Translation((0.0, 0.0, -0.5 * LENGTH - 0.1)))
     across = Matrix.Rotation(math.radians(90.0), 4, "Y")
     for x, radius, depth in HEAD:
-        bmesh.ops.create_cone(
-            mesh,
-            cap_ends=True,
-            segments=48,
-            radius1=radius,
-            radius2=radius,
-            depth=depth,
-            matrix=Matrix.Translation((x, 0.0, 0.0)) @ across,
-        )
-    data = bpy.data.meshes.new(name)
+        cone(48, (radius, radius), depth, Matrix.Translation((x, 0.0, 0.0)) @ across)
     for face in mesh.faces:
-        face.material_index = 0 if face in of_handle else 1
-    mesh.to_mesh(data)
-    mesh.free()
+        face.material_index = 0 if face in wooden else 1
+    data = _mesh(name, mesh)
     wood, steel = surface("Wood", WOOD, roughness=0.55), surface("Steel", STEEL, roughness=0.3)
-    for own in (material or wood, material or steel):
-        data.materials.append(own)
-    obj = bpy.data.objects.new(name, data)
-    bpy.context.scene.collection.objects.link(obj)
+    obj = add(name, data, material or wood, material or steel)
     bevel = obj.modifiers.new("Bevel", "BEVEL")
     bevel.width, bevel.segments, bevel.limit_method = 0.05, 3, "ANGLE"
     data.shade_smooth()
     data.set_sharp_from_angle(angle=math.radians(30.0))
     return obj
+
+
+def _mesh(name: str, mesh: bmesh.types.BMesh) -> bpy.types.Mesh:
+    data = bpy.data.meshes.new(name)
+    mesh.to_mesh(data)
+    mesh.free()
+    return data
 
 
 def swing(hammer: bpy.types.Object, hand: Vector, mode: str | None) -> list[Matrix]:
@@ -148,43 +129,22 @@ def swing(hammer: bpy.types.Object, hand: Vector, mode: str | None) -> list[Matr
         hammer.location = hand - turn @ GRIP
         hammer.keyframe_insert("location", frame=frame)
         hammer.keyframe_insert("rotation_quaternion", frame=frame)
-    data = hammer.animation_data
-    for fcurve in action_get_channelbag_for_slot(data.action, data.action_slot).fcurves:
+    for fcurve in animation.channelbag_of(hammer).fcurves:
         for key in fcurve.keyframe_points:
             key.interpolation = "LINEAR"
     if mode is not None:
         animation.set_mode(hammer, mode)
-    return [_shown(hammer, frame) for frame in range(FIRST, LAST + 1)]
-
-
-def _shown(obj: bpy.types.Object, frame: int) -> Matrix:
-    """Where Blender shows an object."""
-    bpy.context.scene.frame_set(frame)
-    return obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.copy()
+    shown = []
+    for frame in range(FIRST, LAST + 1):
+        bpy.context.scene.frame_set(frame)
+        shown.append(hammer.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.copy())
+    return shown
 
 
 def _path(name: str, points: list[Vector], radius: float, material: bpy.types.Material) -> None:
-    curve = bpy.data.curves.new(name, "CURVE")
-    curve.dimensions, curve.bevel_depth, curve.use_fill_caps = "3D", radius, True
-    spline = curve.splines.new("POLY")
-    spline.points.add(len(points) - 1)
-    for point, place in zip(spline.points, points, strict=True):
-        point.co = (*place, 1.0)
+    curve = tubes(name, [points], radius)
+    curve.use_fill_caps = True
     _flat(name, curve, material)
-
-
-def _ring(place: Vector, material: bpy.types.Material) -> None:
-    turns = (math.radians(angle) for angle in range(0, 361, 5))
-    _path("Hand", [place + 0.42 * Vector((math.cos(turn), 0.0, math.sin(turn))) for turn in turns], 0.05, material)
-
-
-def _dot(place: Vector, radius: float, material: bpy.types.Material) -> None:
-    mesh = bmesh.new()
-    bmesh.ops.create_uvsphere(mesh, u_segments=32, v_segments=16, radius=radius)
-    data = bpy.data.meshes.new("Key")
-    mesh.to_mesh(data)
-    mesh.free()
-    _flat("Key", data, material).location = place
 
 
 def _write(text: str, place: tuple[float, float, float], size: float, colour: str) -> None:
@@ -195,16 +155,14 @@ def _write(text: str, place: tuple[float, float, float], size: float, colour: st
 
 
 def _flat(name: str, data: bpy.types.ID, material: bpy.types.Material) -> bpy.types.Object:
-    """An object that is read rather than seen: it throws no shadow and lights nothing."""
-    data.materials.append(material)
-    obj = bpy.data.objects.new(name, data)
-    bpy.context.scene.collection.objects.link(obj)
+    """Return an object that is read rather than seen: it throws no shadow and lights nothing."""
+    obj = add(name, data, material)
     obj.visible_shadow = obj.visible_diffuse = obj.visible_glossy = False
     return obj
 
 
 def _surroundings(scene: bpy.types.Scene) -> None:
-    """A wall behind, and lights."""
+    """Add a wall behind, and lights."""
     mesh = bpy.data.meshes.new("Wall")
     corners = [(-30.0, 2.2, -20.0), (30.0, 2.2, -20.0), (30.0, 2.2, 20.0), (-30.0, 2.2, 20.0)]
     mesh.from_pydata(corners, [], [(0, 1, 2, 3)])
@@ -218,7 +176,6 @@ def _surroundings(scene: bpy.types.Scene) -> None:
     for name, place, size, power in (("Key", (-7.0, -9.0, 10.0), 7.0, 1500.0), ("Fill", (9.0, -8.0, 2.0), 9.0, 420.0)):
         light = bpy.data.lights.new(name, "AREA")
         light.energy, light.size = power, size
-        obj = bpy.data.objects.new(name, light)
+        obj = add(name, light)
         obj.location = place
         obj.rotation_euler = (-Vector(place)).to_track_quat("-Z", "Y").to_euler()
-        scene.collection.objects.link(obj)

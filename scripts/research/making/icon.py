@@ -16,18 +16,12 @@ from mathutils import Matrix, Vector
 
 from rigid_motion_batch.scenes.materials import ink
 
-from .rendering import empty_scene, look_from, render
+from .rendering import add, empty_scene, look_from, render
 
 SIZE, SAMPLES = 256, 64
 BODY, PATH, KEY, OUTLINE = "#38B6FF", "#F2F2F2", "#FFB52E", "#1B1F24"
-
-RADIUS = 0.66
-"""Of the arc; the picture goes from -1 to 1."""
-
-CENTRE = Vector((0.0, -0.22))
-
-BEGINS, ENDS, BODY_AT = -24, 204, 72
-"""Degrees on the arc: its keys, and where the body is."""
+RADIUS, CENTRE = 0.66, Vector((0.0, -0.22))  # of the arc; the picture goes from -1 to 1
+BEGINS, ENDS, BODY_AT = -24, 204, 72  # degrees on the arc: its keys, and where the body is
 
 Shape = Sequence[Vector]
 
@@ -39,10 +33,8 @@ def make(path: Path) -> None:
     _stroke(arc, 0.24, OUTLINE, 0)
     _stroke(arc, 0.12, PATH, 1)
     for angle in (BEGINS, ENDS):
-        diamond = [_on_arc(angle) + 0.2 * _towards(turn) for turn in (0, 90, 180, 270)]
-        _outlined(diamond, KEY, 4, 0.055)
-    square = [_on_arc(BODY_AT) + 0.4 * _towards(BODY_AT + turn) for turn in (45, 135, 225, 315)]
-    _outlined(square, BODY, 8, 0.055)
+        _outlined([_on_arc(angle) + 0.2 * _towards(turn) for turn in (0, 90, 180, 270)], KEY, 4)
+    _outlined([_on_arc(BODY_AT) + 0.4 * _towards(BODY_AT + turn) for turn in (45, 135, 225, 315)], BODY, 8)
     look_from((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), 2.0)
     render(path, (SIZE, SIZE), SAMPLES, transparent=True)
 
@@ -55,34 +47,25 @@ def _on_arc(degrees: float) -> Vector:
     return CENTRE + RADIUS * _towards(degrees)
 
 
-def _outlined(corners: Shape, colour: str, layer: int, width: float) -> None:
-    """A filled shape with round corners, and its outline below it."""
-    _fill(corners, OUTLINE, layer)
-    _stroke([*corners, corners[0]], 2.0 * width + 0.1, OUTLINE, layer)
-    _fill(corners, colour, layer + 1)
-    _stroke([*corners, corners[0]], 0.1, colour, layer + 1)
+def _outlined(corners: Shape, colour: str, layer: int) -> None:
+    """Draw a filled shape with round corners, and its outline below it."""
+    for colour_of_layer, width, height in ((OUTLINE, 0.21, layer), (colour, 0.1, layer + 1)):
+        _fill(corners, colour_of_layer, height)
+        _stroke([*corners, corners[0]], width, colour_of_layer, height)
 
 
 def _fill(corners: Shape, colour: str, layer: int) -> None:
     mesh = bpy.data.meshes.new("Fill")
     mesh.from_pydata([(*corner, 0.05 * layer) for corner in corners], [], [range(len(corners))])
-    _add(mesh, colour)
+    add("Shape", mesh, bpy.data.materials.get(colour) or ink(colour, colour))
 
 
 def _stroke(points: Shape, width: float, colour: str, layer: int) -> None:
-    """A line with round ends and corners, flat."""
-    disc = [Vector((0.5 * width * math.cos(turn), 0.5 * width * math.sin(turn))) for turn in _turns(32)]
+    """Draw a line with round ends and corners, flat."""
+    turns = [2.0 * math.pi * number / 32 for number in range(32)]
+    disc = [Vector((0.5 * width * math.cos(turn), 0.5 * width * math.sin(turn))) for turn in turns]
     for point in points:
         _fill([point + offset for offset in disc], colour, layer)
     for start, end in pairwise(points):
         across = 0.5 * width * (Matrix.Rotation(math.radians(90.0), 2) @ (end - start).normalized())
         _fill([start - across, end - across, end + across, start + across], colour, layer)
-
-
-def _turns(count: int) -> list[float]:
-    return [2.0 * math.pi * number / count for number in range(count)]
-
-
-def _add(mesh: bpy.types.Mesh, colour: str) -> None:
-    mesh.materials.append(bpy.data.materials.get(colour) or ink(colour, colour))
-    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Shape", mesh))

@@ -13,42 +13,35 @@ from .shells import Shell, corner_normals
 
 MODELS = {"Drill": drill, "Controller": controller}
 
-# linear RGB, metallic, roughness
-MATERIALS = {
+MATERIALS = {  # linear RGB, metallic, roughness
     "Mode": ((0.62, 0.66, 0.70), 0.0, 0.32),
     "Metal": ((0.60, 0.62, 0.65), 0.7, 0.30),
     "Rubber": ((0.035, 0.038, 0.045), 0.0, 0.60),
 }
 
 
-def build_materials() -> dict[str, bpy.types.Material]:
-    """New materials by the names in `MATERIALS`, alike in Workbench (viewport) and in EEVEE and Cycles (nodes)."""
-    materials = {}
-    for name, (colour, metallic, roughness) in MATERIALS.items():
-        material = bpy.data.materials.new(name)
-        if material.node_tree is None:
-            material.use_nodes = True
-        surface = next(node for node in material.node_tree.nodes if node.bl_idname == "ShaderNodeBsdfPrincipled")
-        surface.inputs["Base Color"].default_value = (*colour, 1.0)
-        surface.inputs["Metallic"].default_value = metallic
-        surface.inputs["Roughness"].default_value = roughness
-        material.diffuse_color = (*colour, 1.0)
-        material.metallic = metallic
-        material.roughness = roughness
-        materials[name] = material
-    return materials
+def build_material(name: str) -> bpy.types.Material:
+    """Return a new material of `MATERIALS`, alike in Workbench (viewport) and in EEVEE and Cycles (nodes)."""
+    colour, metallic, roughness = MATERIALS[name]
+    material = bpy.data.materials.new(name)
+    if material.node_tree is None:
+        material.use_nodes = True
+    surface = next(node for node in material.node_tree.nodes if node.bl_idname == "ShaderNodeBsdfPrincipled")
+    for socket, value in (("Base Color", (*colour, 1.0)), ("Metallic", metallic), ("Roughness", roughness)):
+        surface.inputs[socket].default_value = value
+    material.diffuse_color, material.metallic, material.roughness = (*colour, 1.0), metallic, roughness
+    return material
 
 
 def build_mesh(name: str, shell: Shell, materials: dict[str, bpy.types.Material]) -> bpy.types.Mesh:
-    """A new mesh of a shell, in metres, smooth but for its creases."""
+    """Return a new mesh of a shell, in metres, smooth but for its creases."""
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata((1e-3 * shell.vertices).tolist(), [], shell.faces)
     used = [material for material in materials if material in shell.materials]
     for material in used:
         mesh.materials.append(materials[material])
-    mesh.polygons.foreach_set(
-        "material_index", np.array([used.index(name) for name in shell.materials], dtype=np.int32)
-    )
+    numbers = np.array([used.index(name) for name in shell.materials], dtype=np.int32)
+    mesh.polygons.foreach_set("material_index", numbers)
     mesh.polygons.foreach_set("use_smooth", np.ones(len(shell.faces), dtype=bool))
     mesh.normals_split_custom_set(corner_normals(shell).tolist())
     mesh.update()
@@ -56,8 +49,8 @@ def build_mesh(name: str, shell: Shell, materials: dict[str, bpy.types.Material]
 
 
 def build_models() -> list[bpy.types.Object]:
-    """New objects of all models at the origin, in no scene yet."""
-    materials = build_materials()
+    """Return new objects of all models at the origin, in no scene yet."""
+    materials = {name: build_material(name) for name in MATERIALS}
     return [bpy.data.objects.new(name, build_mesh(name, model(), materials)) for name, model in MODELS.items()]
 
 

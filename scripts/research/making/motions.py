@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -42,7 +43,7 @@ class Motion:
 
 
 def strokes(times: np.ndarray, onsets: ArrayLike, durations: ArrayLike, amounts: ArrayLike) -> np.ndarray:
-    """The sum of minimum-jerk strokes at `times` (n,): shape (n,) and the trailing axes of `amounts`.
+    """Return the sum of minimum-jerk strokes at `times` (n,): shape (n,) and the trailing axes of `amounts`.
 
     Parameters
     ----------
@@ -65,7 +66,7 @@ class Knot:
 
 
 def through(knots: list[Knot], times: np.ndarray) -> np.ndarray:
-    """The minimum-jerk motion from knot to knot at `times`, shape (n, d): continuous up to the acceleration.
+    """Return the minimum-jerk motion from knot to knot at `times`, shape (n, d): continuous up to the acceleration.
 
     It rests before the first knot and after the last. Between two knots of free flight it is the parabola.
     """
@@ -79,31 +80,26 @@ def through(knots: list[Knot], times: np.ndarray) -> np.ndarray:
     u = np.clip((times - starts[segment])[:, None] / length, 0.0, 1.0)
     p0, v0, a0 = place[segment], velocity[segment] * length, acceleration[segment] * length**2
     p1, v1, a1 = place[segment + 1], velocity[segment + 1] * length, acceleration[segment + 1] * length**2
-    missing_place = p1 - p0 - v0 - 0.5 * a0
-    missing_velocity = v1 - v0 - a0
-    missing_acceleration = a1 - a0
-    c3 = 10.0 * missing_place - 4.0 * missing_velocity + 0.5 * missing_acceleration
-    c4 = -15.0 * missing_place + 7.0 * missing_velocity - missing_acceleration
-    c5 = 6.0 * missing_place - 3.0 * missing_velocity + 0.5 * missing_acceleration
+    dp, dv, da = p1 - p0 - v0 - 0.5 * a0, v1 - v0 - a0, a1 - a0  # what is missing at the second knot
+    c3 = 10.0 * dp - 4.0 * dv + 0.5 * da
+    c4 = -15.0 * dp + 7.0 * dv - da
+    c5 = 6.0 * dp - 3.0 * dv + 0.5 * da
     return p0 + u * (v0 + u * (0.5 * a0 + u * (c3 + u * (c4 + u * c5))))
 
 
 def about(axis: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Turns by `angles` (n,) about one axis, as quaternions (n, 4)."""
+    """Return turns by `angles` (n,) about one axis, as quaternions (n, 4)."""
     return turn(angles[:, None] * axis)
 
 
 def chain(*turns: np.ndarray) -> np.ndarray:
-    """The product of quaternions, the outermost first."""
-    product = turns[0]
-    for factor in turns[1:]:
-        product = multiply(product, factor)
-    return product
+    """Return the product of quaternions, the outermost first."""
+    return reduce(multiply, turns)
 
 
 def held_by(point: np.ndarray, places: np.ndarray, quaternions: np.ndarray) -> Poses:
-    """The poses of a tool whose `point` (3,), in the tool's axes, is at `places` (n, 3)."""
-    return Poses(places - rotate(quaternions, np.broadcast_to(point, places.shape)), quaternions)
+    """Return the poses of a tool whose `point` (3,), in the tool's axes, is at `places` (n, 3)."""
+    return Poses(places - rotate(quaternions, point), quaternions)
 
 
 # ---- reaching --------------------------------------------------------------------------------------------------------
@@ -130,7 +126,7 @@ REACH_DURATIONS = np.array((0.78, 0.85, 0.70, 0.80, 0.85))
 
 
 def reach(rng: np.random.Generator, times: np.ndarray) -> Poses:
-    """Five reaches of an arm of seven joint angles: shoulder, elbow and wrist."""
+    """Return five reaches of an arm of seven joint angles: shoulder, elbow and wrist."""
     angles = POSTURES[0] + strokes(
         times, REACH_ONSETS[:, None] + JOINT_LAGS, REACH_DURATIONS[:, None], np.diff(POSTURES, axis=0)
     )
@@ -139,15 +135,14 @@ def reach(rng: np.random.Generator, times: np.ndarray) -> Poses:
 
 
 def arm(angles: np.ndarray) -> Poses:
-    """Forward kinematics: the pose of the tool for joint angles (n, 7) as in `POSTURES`; with all 0 the arm hangs."""
+    """Return the pose of the tool for joint angles (n, 7) as in `POSTURES`; with all 0 the arm hangs."""
     azimuth, elevation, rotation, elbow, pronation, flexion, deviation = angles.T
     upper_arm = chain(about(Z, azimuth), about(X, elevation), about(Z, rotation))
     forearm = multiply(upper_arm, about(X, elbow))
     hand = chain(forearm, about(Z, pronation), about(X, flexion), about(Y, deviation))
-    down = np.broadcast_to(-Z, (len(angles), 3))
-    grip = SHOULDER + UPPER_ARM * rotate(upper_arm, down) + FOREARM * rotate(forearm, down) + HAND * rotate(hand, down)
-    # The tool points along the hand, which hangs down where the tool's own forward is level.
-    return Poses(grip, multiply(hand, turn(np.broadcast_to(-0.5 * np.pi * X, (len(angles), 3)))))
+    grip = SHOULDER + UPPER_ARM * rotate(upper_arm, -Z) + FOREARM * rotate(forearm, -Z) + HAND * rotate(hand, -Z)
+    # The tool points along the hand, which hangs down where the tool is level.
+    return Poses(grip, multiply(hand, turn(-0.5 * np.pi * X)))
 
 
 # ---- pivoting about the tip ------------------------------------------------------------------------------------------
@@ -156,7 +151,7 @@ SITE = np.array((0.02, 0.46, 0.98))
 
 
 def pivot(rng: np.random.Generator, times: np.ndarray) -> Poses:
-    """The tip rests on a point while the handle swings, tilts and rolls, in slow sweeps and quick flicks."""
+    """Rest the tip on a point and swing, tilt and roll the handle, in slow sweeps and quick flicks."""
     #         onset, duration, swing, tilt, roll: the last three in degrees
     table = np.array(
         (
@@ -196,7 +191,7 @@ class Throw:
     """Degrees at these moments. Between them the hands turn back for the swing, and on with what they have caught."""
 
     def path(self) -> list[Knot]:
-        """The centre of mass: a hand that lets go, or catches, has the velocity and acceleration of the free body."""
+        """Return the centre of mass: a hand that lets go or catches moves as the free body, up to the acceleration."""
         start, release, catch, rest = self.moments
         held, released, caught, resting = self.centres
         flight = catch - release
@@ -209,19 +204,15 @@ class Throw:
         ]
 
     def turning(self) -> list[Knot]:
-        """The angle about the axis, in radians; its rate is constant in flight."""
+        """Return the angle about the axis, in radians; its rate is constant in flight."""
         start, release, catch, rest = self.moments
         angles = np.radians(self.angles)[:, None]
         rate = (angles[2] - angles[1]) / (catch - release)
-        return [
-            Knot(start, angles[0]),
-            Knot(release, angles[1], rate),
-            Knot(catch, angles[2], rate),
-            Knot(rest, angles[3]),
-        ]
+        thrown, caught = Knot(release, angles[1], rate), Knot(catch, angles[2], rate)
+        return [Knot(start, angles[0]), thrown, caught, Knot(rest, angles[3])]
 
     def airborne(self, times: np.ndarray) -> np.ndarray:
-        """1 in flight, 0 in a hand, with 40 ms of letting go and of closing in between, shape (n,)."""
+        """Return 1 in flight, 0 in a hand, with 40 ms of letting go and of closing in between, shape (n,)."""
         _, release, catch, _ = self.moments
         return strokes(times, [release - 0.04, catch], [0.04, 0.04], [1.0, -1.0])
 
@@ -236,17 +227,15 @@ BACK = Throw(
 
 
 def throw(rng: np.random.Generator, times: np.ndarray) -> Poses:
-    """From the right hand to the left and back: wind-up, release, one tumble in free flight, catch, absorption."""
+    """Throw from the right hand to the left and back: wind-up, release, a tumble in free flight, catch, absorption."""
     places = through(THERE.path() + BACK.path(), times)
-    hold = np.broadcast_to(turn(np.radians(12.0) * X), (len(times), 4))
     turns = [about(way.axis, through(way.turning(), times)[:, 0]) for way in (THERE, BACK)]
-    poses = held_by(CENTRE_OF_MASS, places, chain(*turns, hold))
+    poses = held_by(CENTRE_OF_MASS, places, chain(*turns, turn(np.radians(12.0) * X)))
 
     grasp = 1.0 - THERE.airborne(times) - BACK.airborne(times)
     sway = grasp[:, None] * unsteadiness(rng, times, 6)
-    return Poses(
-        poses.positions + 0.8e-3 * sway[:, :3], multiply(poses.quaternions, turn(np.radians(0.4) * sway[:, 3:]))
-    )
+    turned = multiply(poses.quaternions, turn(np.radians(0.4) * sway[:, 3:]))
+    return Poses(poses.positions + 0.8e-3 * sway[:, :3], turned)
 
 
 # ---- driving a screw -------------------------------------------------------------------------------------------------
@@ -256,7 +245,7 @@ PITCH = 2.75e-3
 
 
 def screw(rng: np.random.Generator, times: np.ndarray) -> Poses:
-    """Six strokes of the wrist drive a screw a little over two turns, with a rest for each new grip."""
+    """Drive a screw a little over two turns by six strokes of the wrist, with a rest for each new grip."""
     onsets = np.array((0.25, 0.98, 1.70, 2.42, 3.12, 3.84))
     durations = np.array((0.56, 0.54, 0.52, 0.54, 0.54, 0.56))
     roll = strokes(times, onsets, durations, np.radians((118.0, 132.0, 140.0, 136.0, 128.0, 112.0)))
@@ -264,13 +253,8 @@ def screw(rng: np.random.Generator, times: np.ndarray) -> Poses:
     # The hand pushes a little beside the axis, so the tool leans, and the lean goes round with the turn.
     lean = np.radians(1.4) * np.stack((np.cos(roll), np.zeros_like(roll), np.sin(roll)), axis=-1)
     lean += np.radians(0.3) * unsteadiness(rng, times, 3) * (1.0, 0.0, 1.0)
-    aim = np.broadcast_to(turn(np.radians(-38.0) * X), (len(times), 4))
-    depth = PITCH * roll / (2.0 * np.pi)
-    return held_by(
-        TIP,
-        SITE + depth[:, None] * rotate(aim[:1], Y[None]),
-        chain(aim, turn(lean), about(Y, roll)),
-    )
+    aim, depth = turn(np.radians(-38.0) * X), PITCH * roll / (2.0 * np.pi)
+    return held_by(TIP, SITE + depth[:, None] * rotate(aim, Y), chain(aim, turn(lean), about(Y, roll)))
 
 
 MOTIONS = {

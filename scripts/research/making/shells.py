@@ -26,7 +26,7 @@ class Shell:
 
 
 def loft(rings: ArrayLike, material: str, *, endless: bool = False) -> Shell:
-    """A solid through rings of shape (k, m, 3), closed by a flat face at each end, or, if endless, by its beginning."""
+    """Return a solid through rings of shape (k, m, 3), closed by a flat face at each end, or by its beginning."""
     rings = np.asarray(rings, dtype=np.float64)
     index = np.arange(rings.shape[0] * rings.shape[1]).reshape(rings.shape[:2])
     ahead, beside, across = np.roll(index, -1, axis=0), np.roll(index, -1, axis=1), np.roll(index, -1, axis=(0, 1))
@@ -44,7 +44,7 @@ def _outward(shell: Shell) -> Shell:
 
 
 def volume(shell: Shell) -> float:
-    """The volume inside; negative where the faces look inward."""
+    """Return the volume inside; negative where the faces look inward."""
     triangles = shell.vertices[[(face[0], a, b) for face in shell.faces for a, b in pairwise(face[1:])]]
     return float(np.linalg.det(triangles).sum() / 6.0)
 
@@ -53,7 +53,7 @@ def volume(shell: Shell) -> float:
 
 
 def oval(centre: ArrayLike, a: ArrayLike, b: ArrayLike, exponent: float = 2.0, points: int = 24) -> np.ndarray:
-    """A superellipse about `centre` with the half axes `a` and `b` (vectors): 2 an ellipse, more is squarer."""
+    """Return a superellipse about `centre` with the half axes `a` and `b` (vectors): 2 an ellipse, more is squarer."""
     angle = 2.0 * np.pi * (np.arange(points) + 0.5) / points
     c, s = np.cos(angle), np.sin(angle)
     stretch = (np.abs(c) ** exponent + np.abs(s) ** exponent) ** (-1.0 / exponent)
@@ -61,7 +61,7 @@ def oval(centre: ArrayLike, a: ArrayLike, b: ArrayLike, exponent: float = 2.0, p
 
 
 def slab(centre: ArrayLike, a: ArrayLike, b: ArrayLike, radius: float, steps: int = 4) -> np.ndarray:
-    """A rectangle about `centre` with the half sides `a` and `b` (vectors) and corners of a radius."""
+    """Return a rectangle about `centre` with the half sides `a` and `b` (vectors) and corners of a radius."""
     a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
     long, wide = np.linalg.norm(a), np.linalg.norm(b)
     turn = np.linspace(0.0, 0.5 * np.pi, steps)
@@ -75,7 +75,7 @@ def slab(centre: ArrayLike, a: ArrayLike, b: ArrayLike, radius: float, steps: in
 
 
 def lathe(centre: ArrayLike, axis: ArrayLike, profile: ArrayLike, material: str, points: int = 24) -> Shell:
-    """A body of revolution about an axis; the profile is a list of (distance along the axis, radius)."""
+    """Return a body of revolution about an axis; the profile is a list of (distance along the axis, radius)."""
     axis, a, b = frame(axis)
     centre = np.asarray(centre)
     return loft([oval(centre + along * axis, r * a, r * b, points=points) for along, r in profile], material)
@@ -84,7 +84,7 @@ def lathe(centre: ArrayLike, axis: ArrayLike, profile: ArrayLike, material: str,
 def block(
     centre: ArrayLike, half: ArrayLike, radius: float, edge: float, material: str, *, axis: int = 2, steps: int = 2
 ) -> Shell:
-    """A box with the half sides `half`, corners of `radius` round the `axis`, and `edge` rounded off at its two ends.
+    """Return a box of half sides `half`, its corners round the `axis` of a radius, its two ends rounded off by `edge`.
 
     `steps` points make a rounding: 2 are a chamfer.
     """
@@ -92,42 +92,35 @@ def block(
     i, j = (axis + 1) % 3, (axis + 2) % 3
     rings = []
     for along, inset in rounded_ends(half[axis], edge, steps):
-        middle = np.asarray(centre) + along * units[axis]
-        rings.append(
-            slab(middle, (half[i] - inset) * units[i], (half[j] - inset) * units[j], radius - 0.6 * inset, steps)
-        )
+        middle, (a, b) = np.asarray(centre) + along * units[axis], ((half[k] - inset) * units[k] for k in (i, j))
+        rings.append(slab(middle, a, b, radius - 0.6 * inset, steps))
     return loft(rings, material)
 
 
 def rounded_ends(half: float, edge: float, steps: int = 4) -> list[tuple[float, float]]:
-    """(distance from the middle, inset) from end to end of a body whose two ends are rounded off by `edge`."""
+    """Return (distance from the middle, inset) from end to end of a body whose two ends are rounded off by `edge`."""
     turn = np.linspace(0.5 * np.pi, 0.0, steps)
     end = np.column_stack((half - edge + edge * np.sin(turn), edge * (1.0 - np.cos(turn))))
     return [*(end * (-1.0, 1.0)).tolist(), *end[::-1].tolist()]
 
 
 def tube(path: ArrayLike, radius: float, material: str, points: int = 10) -> Shell:
-    """A round tube along a path (k, 3) that nowhere runs along the x axis."""
+    """Return a round tube along a path (k, 3) that nowhere runs along the x axis."""
     path = np.asarray(path, dtype=np.float64)
-    ahead = np.gradient(path, axis=0)
-    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
-    across = np.cross(ahead, X)
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    up = np.cross(ahead, across)
-    return loft(
-        [oval(p, radius * a, radius * b, points=points) for p, a, b in zip(path, across, up, strict=True)], material
-    )
+    ahead = unit(np.gradient(path, axis=0))
+    across = unit(np.cross(ahead, X))
+    frames = zip(path, across, np.cross(ahead, across), strict=True)
+    return loft([oval(p, radius * a, radius * b, points=points) for p, a, b in frames], material)
 
 
 def pad(rings: np.ndarray, centres: np.ndarray, first: int, last: int, height: float, material: str) -> Shell:
-    """A pad that lies on a lofted surface: on the points `first` to `last` of its rings (k, m, 3), `height` above them.
+    """Return a pad on a lofted surface: on the points `first` to `last` of its rings (k, m, 3), `height` above them.
 
-    Its walls are steep and sunk into the surface; its underside, which nobody sees, is a plain bottom.
+    Its walls are steep and sunk into the surface; its underside, which nobody sees, is flat.
     """
     patch = _with_walls(_with_walls(rings[:, first : last + 1], axis=0), axis=1)
     middle = _with_walls(centres, axis=0)[:, None]
-    out = patch - middle
-    out /= np.linalg.norm(out, axis=-1, keepdims=True)
+    out = unit(patch - middle)
     lift = np.full(patch.shape[:2], height)
     lift[[0, -1]] = lift[:, [0, -1]] = -0.4
     bottom = patch[:, [-1, 0]] - 3.0 * out[:, [-1, 0]]
@@ -135,7 +128,7 @@ def pad(rings: np.ndarray, centres: np.ndarray, first: int, last: int, height: f
 
 
 def _with_walls(points: np.ndarray, axis: int) -> np.ndarray:
-    """The points and, close to the first and to the last along an axis, one more: a wall stands between the two."""
+    """Return the points and, close to the first and the last along an axis, another: a wall stands between the two."""
     points = np.moveaxis(points, axis, 0)
     width = 0.12
     start = (1.0 - width) * points[:1] + width * points[1:2]
@@ -144,7 +137,7 @@ def _with_walls(points: np.ndarray, axis: int) -> np.ndarray:
 
 
 def curve(points: ArrayLike, count: int) -> np.ndarray:
-    """`count` places on the Catmull-Rom spline through `points` (k, d), which may carry radii beside coordinates."""
+    """Return `count` places on the Catmull-Rom spline through `points` (k, d): coordinates, and maybe radii."""
     points = np.asarray(points, dtype=np.float64)
     padded = np.concatenate((2.0 * points[:1] - points[1:2], points, 2.0 * points[-1:] - points[-2:-1]))
     s = np.linspace(0.0, len(points) - 1.0, count)
@@ -155,32 +148,34 @@ def curve(points: ArrayLike, count: int) -> np.ndarray:
 
 
 def frame(axis: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The unit vector along `axis` and two at right angles to it, right-handed."""
-    axis = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
-    a = np.cross(Z if abs(axis[2]) < 0.9 else X, axis)
-    a /= np.linalg.norm(a)
+    """Return the unit vector along `axis` and two at right angles to it, right-handed."""
+    axis = unit(np.asarray(axis, dtype=np.float64))
+    a = unit(np.cross(Z if abs(axis[2]) < 0.9 else X, axis))
     return axis, a, np.cross(axis, a)
 
 
+def unit(vectors: np.ndarray) -> np.ndarray:
+    """Return vectors (..., d) of length 1."""
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
 def merged(shells: Sequence[Shell]) -> Shell:
-    """All shells as one, each still closed in itself."""
+    """Return all shells as one, each still closed in itself."""
     offsets = np.cumsum([0, *(len(shell.vertices) for shell in shells[:-1])])
-    return Shell(
-        np.concatenate([shell.vertices for shell in shells]),
-        [
-            tuple(i + int(offset) for i in face)
-            for shell, offset in zip(shells, offsets, strict=True)
-            for face in shell.faces
-        ],
-        [name for shell in shells for name in shell.materials],
-    )
+    faces = [
+        tuple(i + int(offset) for i in face)
+        for shell, offset in zip(shells, offsets, strict=True)
+        for face in shell.faces
+    ]
+    vertices = np.concatenate([shell.vertices for shell in shells])
+    return Shell(vertices, faces, [name for shell in shells for name in shell.materials])
 
 
 # ---- shading ---------------------------------------------------------------------------------------------------------
 
 
 def corner_normals(shell: Shell, crease: float = np.radians(38.0)) -> np.ndarray:
-    """A normal for each corner of each face, in the order of the faces, shape (corners, 3).
+    """Return a normal for each corner of each face, in the order of the faces, shape (corners, 3).
 
     The mean, by area, of the faces that meet at the corner and are turned from its own face by less than `crease`: a
     wide flat face stays flat, the rounding beside it is smooth, an edge is an edge.
@@ -194,7 +189,7 @@ def corner_normals(shell: Shell, crease: float = np.radians(38.0)) -> np.ndarray
     # Newell: half the sum of the cross products round a face is its area times its normal.
     crosses = np.cross(shell.vertices[vertex], shell.vertices[vertex[following]])
     areas = 0.5 * np.add.reduceat(crosses, start, axis=0)
-    directions = areas / np.linalg.norm(areas, axis=1, keepdims=True)
+    directions = unit(areas)
 
     order = np.argsort(vertex, kind="stable")
     valence = np.bincount(vertex)
@@ -203,5 +198,4 @@ def corner_normals(shell: Shell, crease: float = np.radians(38.0)) -> np.ndarray
     present = np.arange(valence.max()) < valence[vertex][:, None]
     neighbours = face[order[np.where(present, around, 0)]]
     near = present & (np.einsum("ckx,cx->ck", directions[neighbours], directions[face]) > np.cos(crease))
-    normals = np.einsum("ck,ckx->cx", near, areas[neighbours])
-    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    return unit(np.einsum("ck,ckx->cx", near, areas[neighbours]))

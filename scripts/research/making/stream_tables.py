@@ -1,21 +1,21 @@
-"""The tables of the coder of streams: how often each symbol occurs, on recordings and on motions of our own.
+"""The tables of the coder of streams: how often each symbol occurs, on recordings and on generated motions.
 
     python scripts/research stream_tables FOLDER
 
-counts in every body and every single body of the folder and in the generated motions of assets/, at two delays, with
-receivers that answer soon, later, and not at all, and writes addon/rigid_motion/streams/tables.py. With --held-out it
-writes nothing, and prints what each recording costs by tables that were counted without it, and by the shipped ones.
+counts in every body and every single body of the folder and in the motions of assets/, at two delays, with receivers
+that answer soon, later, and not at all, and writes addon/rigid_motion/streams/tables.py.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from research.pages import ROOT
+from research.studies import files_in, report
 from rigid_motion.motion import Poses
 from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.coding import TOTAL
@@ -35,148 +35,77 @@ from rigid_motion_batch.cli.stream_measure import body_of, samples_of
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.streaming.measuring import even_rate
 
-ROOT = Path(__file__).resolve().parents[3]
-
 SETTINGS = ((0.1, 0.0), (0.2, 0.0), (0.1, 0.06), (0.1, 0.15), (0.2, 0.15), (0.1, None))
 """Delays, and seconds that a datagram takes; None where nobody answers."""
 
-MOST_SECONDS = 15.0
-"""Of a recording, so that long ones do not have all the say."""
-
-RADII = {True: 0.03, False: 0.1}
-"""Of the balls of bodies, and of single bodies."""
-
-PRIOR = 12.0
-"""What a table without any counts is worth beside them: as the mean over the kinds of knots."""
+MOST_SECONDS = 15.0  # of a recording, so that long ones do not have all the say
+BODY_RADIUS, SINGLE_RADIUS = 0.03, 0.1  # of the balls of bodies, and of single bodies
+PRIOR = 12.0  # what a table without any counts is worth beside them: as the mean over the kinds of knots
 
 TABLE_FILE = ROOT / "addon/rigid_motion/streams/tables.py"
-
-Message = tuple
-"""A codec, and what it was given."""
+HEAD = '"""Cumulative frequencies of the coder\'s symbols, in the order of `residuals`: made by stream_tables.py."""'
 
 
-@dataclass(frozen=True, eq=False)
-class Sample:
-    """A motion to count in."""
-
-    name: str
-    body: Body
-    times: np.ndarray
-    poses: Poses
-
-
-def samples(folder: Path) -> Iterator[Sample]:
-    """The motions of a folder, and our own."""
-    paths = sorted(path for path in folder.rglob("*") if path.suffix in {".bvh", ".fbx", ".csv", ".tum"})
-    for path in [*paths, *sorted((ROOT / "assets").glob("*.csv"))]:
-        for clip in read_clips([str(path)])[0]:
-            times, poses = samples_of(clip)
-            kept = times <= times[0] + MOST_SECONDS
-            radius = RADII[clip.rest_body is not None]
-            yield Sample(clip.name, body_of(clip, poses, radius), times[kept], poses[:, kept])
+def samples(folder: Path) -> Iterator[tuple[Body, np.ndarray, Poses]]:
+    """Yield the motions of a folder and of assets/: a body, times (n,) and poses (joints, n)."""
+    paths = [*files_in([folder], (".bvh", ".fbx", ".csv", ".tum")), *sorted((ROOT / "assets").glob("*.csv"))]
+    for clip in (clip for path in paths for clip in read_clips([str(path)])[0]):
+        report(clip.name)
+        times, poses = samples_of(clip)
+        kept = times <= times[0] + MOST_SECONDS
+        yield body_of(clip, poses, BODY_RADIUS if clip.rest_body else SINGLE_RADIUS), times[kept], poses[:, kept]
 
 
-def messages(sample: Sample, delay: float, latency: float | None) -> list[Message]:
-    """What a sender says of a motion."""
-    result: list[Message] = []
-    sender, receiver = Sender([sample.body], 0.005, delay, even_rate(sample.times)), Receiver()
+def count(coder: Counting, body: Body, times: np.ndarray, poses: Poses, delay: float, latency: float | None) -> None:
+    """Count the symbols of what a sender says of a motion."""
+    sender, receiver = Sender([body], 0.005, delay, even_rate(times)), Receiver()
     write = sender.codec.write
 
-    def noted(said: Said, kind: int, state: State, is_late: bool) -> tuple:
-        result.append((sender.codec, said, kind, state, is_late))
+    def counted(said: Said, kind: int, state: State, is_late: bool) -> tuple:
+        sender.codec.through(coder, said, kind, state, is_late)
         return write(said, kind, state, is_late)
 
-    sender.codec.write = noted
+    sender.codec.write = counted
     on_the_way: list[tuple[float, bytes]] = []
-    for number, moment in enumerate(sample.times.tolist()):
+    for number, moment in enumerate(times.tolist()):
         while on_the_way and on_the_way[0][0] <= moment:
             sender.hear(on_the_way.pop(0)[1], moment)
-        for datagram in sender.add(moment, sample.poses[:, number]):
+        for datagram in sender.add(moment, poses[:, number]):
             receiver.take(datagram, moment)
         if latency is not None:
             on_the_way += [(moment + 2.0 * latency, answer) for _, answer in receiver.answers()]
-    return result
 
 
-def counted(all_messages: list[Message]) -> list[np.ndarray]:
-    """How often each symbol of each table occurs."""
-    counts = [[0] * symbols_of(table) for table in range(TABLES)]
-    coder = Counting(counts)
-    for codec, *message in all_messages:
-        codec.through(coder, *message)
-    return [np.array(own, dtype=np.float64) for own in counts]
-
-
-def probabilities(counts: list[np.ndarray]) -> list[np.ndarray]:
-    """Of each symbol of each table: what was counted, and beside it what was counted for all kinds of knots."""
-    result = []
-    for table, own in enumerate(counts):
+def probabilities(counts: list[np.ndarray]) -> Iterator[np.ndarray]:
+    """Yield those of each symbol of each table: what was counted, and beside it what was for all kinds of knots."""
+    for table, counted in enumerate(counts):
         if table < FLAGS:
             alike = range(table % (HISTORIES * NEIGHBOURS), FLAGS, HISTORIES * NEIGHBOURS)
         elif table < KNOT_COUNTS:
             alike = range(FLAGS + (table - FLAGS) % (HISTORIES * SIZES), KNOT_COUNTS, HISTORIES * SIZES)
         else:
             alike = [table]
-        mean = sum(counts[other] for other in alike) + falling(len(own))
-        result.append((own + PRIOR * mean / mean.sum()) / (own.sum() + PRIOR))
-    return result
+        # Of symbols that were never seen ever less are expected.
+        mean = sum(counts[other] for other in alike) + 4.0 * 0.6 ** np.arange(len(counted))
+        yield (counted + PRIOR * mean / mean.sum()) / (counted.sum() + PRIOR)
 
 
-def falling(count: int) -> np.ndarray:
-    """What is expected of symbols that were never seen: ever less."""
-    return 4.0 * 0.6 ** np.arange(count)
-
-
-def table_of(probability: np.ndarray) -> list[int]:
-    """Cumulative frequencies that add up to `TOTAL`, none of them 0."""
+def table_of(probability: np.ndarray) -> tuple[int, ...]:
+    """Return cumulative frequencies that add up to `TOTAL`, none of them 0."""
     frequencies = 1 + np.floor(probability * (TOTAL - len(probability))).astype(int)
     frequencies[np.argmax(frequencies)] += TOTAL - frequencies.sum()
-    return [0, *np.cumsum(frequencies).tolist()]
-
-
-def bits(all_messages: list[Message], tables: list[list[int]]) -> float:
-    """What messages cost by some tables."""
-    counting = Counting([[0] * symbols_of(table) for table in range(TABLES)])
-    for codec, *message in all_messages:
-        codec.through(counting, *message)
-    cost = sum(
-        float(np.dot(counts, -np.log2(np.diff(table) / TOTAL)))
-        for counts, table in zip(counting.counts, tables, strict=True)
-    )
-    return cost + counting.raw
-
-
-def written(tables: list[list[int]]) -> str:
-    rows = "".join(f"    {tuple(table)},\n" for table in tables)
-    head = (
-        '"""Cumulative frequencies of the coder\'s symbols, in the order of `residuals`: made by stream_tables.py."""'
-    )
-    return f"{head}\n\n# fmt: off\nTABLES: tuple[tuple[int, ...], ...] = (\n{rows})\n"
+    return (0, *np.cumsum(frequencies).tolist())
 
 
 def main(arguments: list[str]) -> int:
-    """Count, and write the tables or print what they cost; return the exit code."""
+    """Count, and write the tables; return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--held-out", action="store_true", help="write nothing; tables without each recording in turn")
-    options = parser.parse_args(arguments)
-    motions, said = [], []
-    for motion in samples(options.folder):
-        motions.append(motion)
-        said.append([messages(motion, *setting) for setting in SETTINGS])
-        print(f"{motion.name}: {sum(map(len, said[-1]))} messages", flush=True)
-    counts = [counted([message for some in own for message in some]) for own in said]
-    whole = [sum(table) for table in zip(*counts, strict=True)]
-    if not options.held_out:
-        TABLE_FILE.write_text(written([table_of(own) for own in probabilities(whole)]), encoding="utf-8")
-        return 0
-    shipped = [table_of(own) for own in probabilities(whole)]
-    print(
-        f"{'bytes of payload a second':28}" + "".join(f"{f'{delay} s, {latency}':>20}" for delay, latency in SETTINGS)
-    )
-    for motion, own, counts_of_own in zip(motions, said, counts, strict=True):
-        without = [table_of(rest) for rest in probabilities([a - b for a, b in zip(whole, counts_of_own, strict=True)])]
-        seconds = motion.times[-1] - motion.times[0]
-        costs = [tuple(bits(some, tables) / 8 / seconds for tables in (without, shipped)) for some in own]
-        print(f"{motion.name:28}" + "".join(f"{f'{a:.0f} (shipped {b:.0f})':>20}" for a, b in costs), flush=True)
+    coder = Counting([[0] * symbols_of(table) for table in range(TABLES)])
+    for motion in samples(parser.parse_args(arguments).folder):
+        for setting in SETTINGS:
+            count(coder, *motion, *setting)
+    tables = map(table_of, probabilities([np.array(table, dtype=np.float64) for table in coder.counts]))
+    rows = "".join(f"    {table},\n" for table in tables)
+    TABLE_FILE.write_text(f"{HEAD}\n\n# fmt: off\nTABLES: tuple[tuple[int, ...], ...] = (\n{rows})\n", encoding="utf-8")
     return 0

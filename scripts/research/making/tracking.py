@@ -25,7 +25,7 @@ ROTATION_WANDER, ROTATION_WHITE = np.radians(0.06), np.radians(0.03)
 
 
 def tick(rng: np.random.Generator, duration: float) -> np.ndarray:
-    """The times at which a 90 Hz device reports, from 0 to about `duration`.
+    """Return the times at which a 90 Hz device reports, from 0 to about `duration`.
 
     Each step is a little uneven; one in fourteen is late by 2 to 6 ms, and the step after it makes up for half of that.
     """
@@ -40,7 +40,7 @@ def tick(rng: np.random.Generator, duration: float) -> np.ndarray:
 def wander(
     rng: np.random.Generator, times: np.ndarray, channels: int, band: tuple[float, float], slope: float = 0.0
 ) -> np.ndarray:
-    """Independent random signals, shape (n, channels), of an expected root mean square of 1.
+    """Return independent random signals, shape (n, channels), of an expected root mean square of 1.
 
     Parameters
     ----------
@@ -60,14 +60,14 @@ def wander(
 
 
 def unsteadiness(rng: np.random.Generator, times: np.ndarray, channels: int) -> np.ndarray:
-    """What a held hand does of itself, shape (n, channels), of a root mean square of about 1: slow sway and tremor."""
+    """Return the sway and tremor of a held hand, shape (n, channels), of a root mean square of about 1."""
     return wander(rng, times, channels, (0.3, 3.0), slope=2.0) + 0.10 * wander(rng, times, channels, (8.0, 12.0))
 
 
 def track(
     rng: np.random.Generator, motion: Callable[[np.random.Generator, np.ndarray], Poses], times: np.ndarray
 ) -> Poses:
-    """The poses of `motion` as a device would report them at `times`.
+    """Return the poses of `motion` as a device would report them at `times`.
 
     Each is of a moment a little beside the time it is stamped with, has noise that wanders, and noise that is new with
     every frame.
@@ -82,12 +82,12 @@ def track(
 
 
 def turn(rotation_vectors: np.ndarray) -> np.ndarray:
-    """Unit quaternions (..., 4) of rotation vectors (..., 3): the axis times the angle in radians."""
+    """Return unit quaternions (..., 4) of rotation vectors (..., 3): the axis times the angle in radians."""
     angles = np.linalg.norm(rotation_vectors, axis=-1, keepdims=True)
     return np.concatenate((np.cos(0.5 * angles), 0.5 * np.sinc(angles / (2.0 * np.pi)) * rotation_vectors), axis=-1)
 
 
 def table(times: np.ndarray, poses: Poses) -> str:
-    """A clip as text: seconds (n,), metres, and quaternions with the scalar last."""
+    """Return a clip as text: seconds (n,), metres, and quaternions with the scalar last."""
     rows = np.column_stack((times, poses.positions, np.roll(poses.quaternions, -1, axis=1)))
     return "\n".join([HEADER, *(",".join(f"{value:.6f}" for value in row) for row in rows), ""])

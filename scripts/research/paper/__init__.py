@@ -1,13 +1,12 @@
 """The paper, reproduced: its figures, its table and its example, from this program (`python scripts/research paper`).
 
-claims                       what the paper says
+parts                        all of it, part by part: each writes docs/figures/paper_PART.json
 motions                      the clips that it is tried on
-table, bows                  Table 1, and why a screw wins here and loses there
+table                        Table 1, and why a screw wins here and loses there
 sending                      streams that are sent when needed, and bytes
 bodies                       the same study on whole bodies
 timing                       the running time of a frame
 triangle, strips, catching   the figures that Blender renders, on the sheets of picture
-study                        all of it, part by part: each writes docs/figures/paper_PART.json
 
 Source: Kamarianakis, Lydatakis, Papagiannakis, "Never 'Drop the Ball' in the Operating Room: an efficient hand-based VR
 HMD controller interpolation algorithm for collaborative, networked virtual environments", 2021, arXiv 2107.04875.

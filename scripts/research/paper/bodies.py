@@ -1,13 +1,12 @@
-"""The same study on whole bodies: key poses needed, errors, and what there is of a screw in a joint's own motion.
+"""What the paper asks, of whole bodies: key poses needed, errors, and what there is of a screw in a joint's motion.
 
-A body is studied three times. As a rig has it: every joint is interpolated in its parent's space. As trackers have it:
+A body is measured three times. As a rig has it: every joint is interpolated in its parent's space. As trackers have it:
 hands, feet and head alone, each a single rigid body in the space of the roots, which is that of the recording. And both
 beside each other at the same keys. Errors are in metres, measured in the space of the roots.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from rigid_motion.motion import Poses, decimate, interpolate, rms, shell_error
+from rigid_motion.streams.humanoid import humanoid_bones
 from rigid_motion_batch.analysis.bodies import BodyReconstruction, moving, reconstruct_body
 from rigid_motion_batch.analysis.body_metrics import measure_modes
 from rigid_motion_batch.analysis.body_needed import OfBody
@@ -28,23 +28,19 @@ from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.options import ReadingOptions
-from rigid_motion_batch.recordings.reading import FORMATS, files_of
 
-from .bows import SCREW
-from .table import RADIUS, SAMPLES_AN_UPDATE
+from .table import RADIUS, SAMPLES_AN_UPDATE, SCREW, means
 
 MODES = (REFERENCE, SCREW, "pga_lerp", "motor_spline")
-
-ERROR_RATES = (5, 10)
-"""Key poses a second at which errors are measured."""
+ERROR_RATES = (5, 10)  # key poses a second at which errors are measured
 
 BODY = "body"
 """What is said of a whole body, beside `LIMBS`."""
 
-LIMBS = {"hands": ("hand", True), "feet": ("foot", True), "heads": ("head", False)}
-"""Kinds of joints that a tracker may be on: what their names say, and whether there is one on either side."""
+LIMBS = {"LeftHand": "hands", "RightHand": "hands", "LeftFoot": "feet", "RightFoot": "feet", "Head": "heads"}
+"""Humanoid bones that a tracker may be on, and their kinds."""
 
-SIDES = ("left", "right")
+KINDS = (BODY, *dict.fromkeys(LIMBS.values()))
 
 THROUGH, ALONE = "through", "alone"
 """The ways to interpolate a limb: through the joints that it hangs on, or as a single body."""
@@ -62,33 +58,10 @@ of motion capture may begin with a pose to calibrate by."""
 WHOLE = ReadingOptions(start=0.0)
 """A first sample that is no motion is looked for here, in all bodies alike."""
 
-MAY_HOLD_BODIES = ("BVH", "FBX", "glTF", "Blender file")
-"""Formats that are looked at for a whole body among the recordings."""
+EXTENSIONS = (".bvh", ".fbx", ".glb", ".gltf", ".blend")  # of files that may hold a body
 
 
-# -- what there is to study --------------------------------------------------------------------------------------------
-
-
-def body_files(paths: Iterable[Path]) -> list[Path]:
-    """Return the files that are given, and in folders those that may hold a body, each once.
-
-    Raises
-    ------
-    TrajectoryError
-        Where there is no such file, or no such recording in a folder.
-    """
-    extensions = {extension for known in FORMATS if known.label in MAY_HOLD_BODIES for extension in known.extensions}
-    result: dict[Path, None] = {}
-    for path in paths:
-        if not path.exists():
-            raise TrajectoryError(str(path), "no such file or folder", "check the path")
-        inside = [file for file in map(Path, files_of(str(path))) if file.suffix.lower() in extensions]
-        files = inside if path.is_dir() else [path]
-        if not files:
-            known = ", ".join(sorted(extensions))
-            raise TrajectoryError(str(path), "no recording in this folder that may hold a body", f"known are {known}")
-        result |= dict.fromkeys(files)
-    return list(result)
+# -- what there is to measure ------------------------------------------------------------------------------------------
 
 
 def read_body(path: Path) -> tuple[Clip, int]:
@@ -107,60 +80,30 @@ def read_body(path: Path) -> tuple[Clip, int]:
         raise TrajectoryError(path, "at rest: none of its joints moves", "leave it out")
     places = clip.rest_body.skeleton.in_root_space(clip.poses).positions
     speeds = np.linalg.norm(np.diff(places, axis=1), axis=-1).max(axis=0) / np.diff(clip.times)
-    if len(speeds) < 2 or speeds[0] <= JUMP * speeds[1:].max():
-        return clip, 0
-    return part_of(clip, 1, len(clip.times) - 1), 1
+    skipped = int(len(speeds) >= 2 and speeds[0] > JUMP * speeds[1:].max())
+    return part_of(clip, skipped, len(clip.times) - 1) if skipped else clip, skipped
 
 
 @dataclass(frozen=True)
 class Limb:
-    """A joint that was taken for one that a tracker may be on."""
+    """A joint that a tracker may be on, of a kind of `LIMBS`, and how many joints that move carry it, and are it."""
 
     kind: str
-    """Of `LIMBS`."""
-
     joint: int
-
     chain: int
-    """How many joints that move carry it, itself among them."""
 
 
 def limbs_of(clip: Clip) -> list[Limb]:
-    """Return the joints that move and are hands, feet and head by their names.
-
-    Of several it is the one of the plainest name, and of such the first.
-    """
-    words = [_words(joint) for joint in clip.rest_body.joints]
-    moves = moving(clip)
-    result = []
-    for kind, (part, sided) in LIMBS.items():
-        for side in SIDES if sided else ("",):
-            named = [number for number, own in enumerate(words) if _is(own, part, side)]
-            if named:
-                joint = min(named, key=lambda number: len(words[number]))
-                chain = int(sum(moves[one] for one in _chain(clip.rest_body.parents, joint)))
-                result += [Limb(kind, joint, chain)] if chain else []
+    """Return the joints that move and are hands, feet and head by their names."""
+    moves, parents, result = moving(clip), clip.rest_body.parents, []
+    bones = humanoid_bones(clip.rest_body.joints)
+    for bone, kind in LIMBS.items():
+        joint, chain = bones.get(bone, -1), 0
+        while joint >= 0:
+            chain, joint = chain + int(moves[joint]), int(parents[joint])
+        if chain:
+            result.append(Limb(kind, bones[bone], chain))
     return result
-
-
-def _words(name: str) -> list[str]:
-    """Return what a name is made of: "mixamorig:LeftHand" of mixamorig, left and hand."""
-    parts = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", re.sub(r"[^0-9A-Za-z]+", " ", name))
-    return [part.lower() for part in parts]
-
-
-def _is(words: Sequence[str], part: str, side: str) -> bool:
-    """Return whether these words end in a limb: "left hand", "lefthand", "hand l" and, without sides, "head"."""
-    requested = {f"{a}{b}" for one in ((side, side[0]) if side else ("",)) for a, b in ((one, part), (part, one))}
-    return "".join(words[-1:]) in requested or (len(words) > 1 and bool(side) and "".join(words[-2:]) in requested)
-
-
-def _chain(parents: np.ndarray, joint: int) -> list[int]:
-    chain = []
-    while joint >= 0:
-        chain.append(joint)
-        joint = int(parents[joint])
-    return chain
 
 
 def alone(clip: Clip, joint: int) -> Clip:
@@ -170,10 +113,6 @@ def alone(clip: Clip, joint: int) -> Clip:
 
 # -- what comes of it --------------------------------------------------------------------------------------------------
 
-Shares = dict[str, dict[str, dict[str, list[float]]]]
-"""By what it is of, mode and decimation: of each of `RATES` the keys needed as a share of the reference's; NaN where a
-clip has no two samples to a key, infinite where it takes all samples."""
-
 
 def has_samples_for(clip: Clip, rate: float) -> bool:
     """Return whether a body has two samples to a key pose."""
@@ -181,22 +120,23 @@ def has_samples_for(clip: Clip, rate: float) -> bool:
 
 
 def needed_of(clip: Clip, limbs: Iterable[Limb]) -> list[tuple[str, dict[str, dict[str, list[float]]]]]:
-    """Return the keys that every mode needs, of the whole body and of each limb alone: what it is of, and shares."""
+    """Return the keys that every mode needs, of the whole body and of each limb alone: what it is of, and shares.
+
+    The shares are by mode and decimation: of each of `RATES` the keys needed as a share of the reference's; NaN where
+    the clip has no two samples to a key, infinite where it takes all samples.
+    """
     radii = np.full(len(clip.rest_body.joints), JOINT)
     searched = part_of(clip, 0, int(np.searchsorted(clip.times, clip.times[0] + SEARCHED, side="right")) - 1)
     result = [(BODY, keys_needed(OfBody(searched, radii), MODES))]
     result += [(limb.kind, keys_needed(OfRigidBody(alone(clip, limb.joint), RADIUS), MODES)) for limb in limbs]
-    return [(of, _shares(clip, keys)) for of, keys in result]
+    return [(kind, _shares(clip, keys)) for kind, keys in result]
 
 
 def _shares(clip: Clip, result: KeysNeeded) -> dict[str, dict[str, list[float]]]:
     counted = [has_samples_for(clip, float(rate)) for rate in result.rates]
-    shares = np.where(counted, result.shares, np.nan)
-    return {
-        mode: {DECIMATIONS[way]: shares[row, way].tolist() for way in range(shares.shape[1])}
-        for row, group in enumerate(result.groups)
-        for mode in group
-    }
+    shares = np.where(counted, result.shares, np.nan).tolist()
+    groups = zip(result.groups, shares, strict=True)
+    return {mode: dict(zip(DECIMATIONS, row, strict=False)) for group, row in groups for mode in group}
 
 
 def errors_of(clip: Clip, limbs: Sequence[Limb]) -> list[tuple[str, str, str, int, float, float]]:
@@ -205,22 +145,20 @@ def errors_of(clip: Clip, limbs: Sequence[Limb]) -> list[tuple[str, str, str, in
     What it is of, the way, the mode, the rate, the RMS shell error, and the RMS velocity error of the body.
     """
     rows = []
-    for rate in ERROR_RATES:
-        if not (made := _with_key_poses(clip, rate)):
-            continue
+    for rate, keyed in _with_key_poses(clip):
         rows += [
             (BODY, THROUGH, row.mode, rate, row.rms_shell_m, row.rms_velocity_m_s)
-            for row in measure_modes(made, JOINT).rows
+            for row in measure_modes(keyed, JOINT).rows
         ]
-        keys, truth = decimate(clip.times, rate), made.truth(made.samples)
+        keys, truth = decimate(clip.times, rate), keyed.truth(keyed.samples)
         for mode in MODES:
-            shown = made.shown(mode, made.times)
+            shown = keyed.shown(mode, keyed.times)
             for limb in limbs:
                 single = alone(clip, limb.joint)
-                filled = clip.in_metres(interpolate(clip.times[keys], single.poses[keys], made.times, mode))
+                filled = clip.in_metres(interpolate(clip.times[keys], single.poses[keys], keyed.times, mode))
                 for way, poses in ((THROUGH, shown[limb.joint]), (ALONE, filled)):
                     error = rms(shell_error(poses, truth[limb.joint], RADIUS))
-                    rows.append((limb.kind, way, mode, rate, error, float("nan")))
+                    rows.append((limb.kind, way, mode, rate, error, np.nan))
     return rows
 
 
@@ -231,62 +169,59 @@ def apart_of(clip: Clip) -> dict[int, dict[str, float]]:
     where these are held still: what adds up along a chain; "roots" of the roots; "all" of all joints in that space;
     "error" is how far `lerp_slerp` is from the recording there.
     """
-    result, roots, skeleton = {}, clip.rest_body.parents < 0, clip.rest_body.skeleton
-    for rate in ERROR_RATES:
-        if not (made := _with_key_poses(clip, rate)):
-            continue
-        straight, screw = (made.filled_in(mode, made.times) for mode in (REFERENCE, SCREW))
+    result, roots, in_root_space = {}, clip.rest_body.parents < 0, clip.rest_body.skeleton.in_root_space
+
+    def distances(first: Poses, second: Poses) -> np.ndarray:
+        return np.linalg.norm(first.positions - second.positions, axis=-1).max(axis=-1) * clip.metres_per_unit
+
+    for rate, keyed in _with_key_poses(clip):
+        straight, screw = (keyed.filled_in(mode, keyed.times) for mode in (REFERENCE, SCREW))
         held = screw.copy()
         held[np.flatnonzero(roots)] = straight[roots]
-        shown, carried, whole = (skeleton.in_root_space(poses) for poses in (straight, held, screw))
-        truth = skeleton.in_root_space(clip.poses[:, made.samples])
-        own = _distances(clip, straight, screw)
+        shown = in_root_space(straight)
+        local = distances(straight, screw)
         result[rate] = {
-            "parents": own[~roots].max(initial=0.0),
-            "carried": _distances(clip, shown, carried)[~roots].max(initial=0.0),
-            "roots": own[roots].max(),
-            "all": _distances(clip, shown, whole).max(),
-            "error": _distances(clip, shown, truth).max(),
+            "parents": local[~roots].max(initial=0.0),
+            "carried": distances(shown, in_root_space(held))[~roots].max(initial=0.0),
+            "roots": local[roots].max(),
+            "all": distances(shown, in_root_space(screw)).max(),
+            "error": distances(shown, in_root_space(clip.poses[:, keyed.samples])).max(),
         }
     return result
 
 
-def _with_key_poses(clip: Clip, rate: int) -> BodyReconstruction | None:
-    """Return it with evenly spaced ones; None where the clip has no two samples to each."""
-    return reconstruct_body(clip, Uniform(str(rate)), MODES, JOINT) if has_samples_for(clip, rate) else None
-
-
-def _distances(clip: Clip, first: Poses, second: Poses) -> np.ndarray:
-    """Return how far the origins of joints get from one another, at most, in metres: shape (joints,)."""
-    apart = np.linalg.norm(first.positions - second.positions, axis=-1)
-    return apart.max(axis=-1) * clip.metres_per_unit
+def _with_key_poses(clip: Clip) -> list[tuple[int, BodyReconstruction]]:
+    """Return it with evenly spaced ones at `ERROR_RATES`, where the clip has two samples to each."""
+    rates = [rate for rate in ERROR_RATES if has_samples_for(clip, rate)]
+    bodies = [(rate, reconstruct_body(clip, Uniform(str(rate)), MODES, JOINT)) for rate in rates]
+    return [(rate, body) for rate, body in bodies if body]
 
 
 # -- over all bodies ---------------------------------------------------------------------------------------------------
 
 
-def study(clips: Sequence[tuple[Clip, int]]) -> dict[str, Any]:
+def measure(clips: Sequence[tuple[Clip, int]]) -> dict[str, Any]:
     """Return all of it in numbers, with geometric means over bodies, and over limbs of a kind."""
     limbs = {clip.name: limbs_of(clip) for clip, _ in clips}
-    needed = {clip.name: needed_of(clip, limbs[clip.name]) for clip, _ in clips}
+    needed = [row for clip, _ in clips for row in needed_of(clip, limbs[clip.name])]
     errors = {clip.name: errors_of(clip, limbs[clip.name]) for clip, _ in clips}
-    kinds = [kind for kind in (BODY, *LIMBS) if any(of == kind for own in needed.values() for of, _ in own)]
-    every = [row for own in errors.values() for row in own]
+    kinds = [kind for kind in KINDS if any(of == kind for of, _ in needed)]
+    every = [row for rows in errors.values() for row in rows]
     return {
-        "bodies": {clip.name: _told(clip, skipped, limbs[clip.name]) for clip, skipped in clips},
+        "bodies": {clip.name: _about(clip, skipped, limbs[clip.name]) for clip, skipped in clips},
         "rates": [int(rate) for rate in RATES],
         "needed": {
             kind: {
                 mode: {
-                    way: _mean([shares[mode][way] for own in needed.values() for of, shares in own if of == kind])
-                    for way in DECIMATIONS[:2]
+                    way: means([shares[mode][way] for of, shares in needed if of == kind]) for way in DECIMATIONS[:2]
                 }
                 for mode in MODES
             }
             for kind in kinds
         },
         "chains": {
-            kind: [limb.chain for own in limbs.values() for limb in own if limb.kind == kind] for kind in kinds[1:]
+            kind: [limb.chain for of_body in limbs.values() for limb in of_body if limb.kind == kind]
+            for kind in kinds[1:]
         },
         "errors": {
             kind: {
@@ -297,21 +232,22 @@ def study(clips: Sequence[tuple[Clip, int]]) -> dict[str, Any]:
         },
         "by_body": {
             name: {
-                mode: {rate: _mean_error(own, BODY, THROUGH, mode, rate)["shell"] for rate in ERROR_RATES}
+                mode: {rate: _mean_error(rows, BODY, THROUGH, mode, rate)["shell"] for rate in ERROR_RATES}
                 for mode in MODES
             }
-            for name, own in errors.items()
+            for name, rows in errors.items()
         },
         "apart": {clip.name: apart_of(clip) for clip, _ in clips},
     }
 
 
-def _told(clip: Clip, skipped: int, limbs: Iterable[Limb]) -> dict[str, Any]:
+def _about(clip: Clip, skipped: int, limbs: Iterable[Limb]) -> dict[str, Any]:
     """Return what is said of a body; "moved" is the farthest that any joint but the roots moves in its parent's space.
 
     That is from corner to corner of what it fills.
     """
-    widths = np.ptp(clip.poses.positions, axis=1)[clip.rest_body.parents >= 0] * clip.metres_per_unit
+    joints = np.flatnonzero(clip.rest_body.parents >= 0)
+    widths = np.ptp(clip.poses.positions[joints], axis=1) * clip.metres_per_unit
     return {
         "joints": len(clip.rest_body.joints),
         "seconds": float(clip.times[-1] - clip.times[0]),
@@ -322,17 +258,7 @@ def _told(clip: Clip, skipped: int, limbs: Iterable[Limb]) -> dict[str, Any]:
     }
 
 
-def _mean(shares: Sequence[Sequence[float]]) -> dict[str, list[Any]]:
-    """Return for each of `RATES` the mean share saved, on how many it was reached, and of how many."""
-    table = np.array(shares)
-    return {
-        "saved": 1.0 - geometric_mean(table),
-        "reached": np.isfinite(table).sum(axis=0),
-        "asked": (~np.isnan(table)).sum(axis=0),
-    }
-
-
-def _mean_error(rows: Iterable[tuple], of: str, way: str, mode: str, rate: int) -> dict[str, float]:
+def _mean_error(rows: Iterable[tuple], kind: str, way: str, mode: str, rate: int) -> dict[str, float]:
     """Return geometric means of the RMS shell error, and of the RMS velocity error where there is one."""
-    errors = np.array([row[4:] for row in rows if row[:4] == (of, way, mode, rate)]).reshape(-1, 2)
+    errors = np.array([row[4:] for row in rows if row[:4] == (kind, way, mode, rate)]).reshape(-1, 2)
     return dict(zip(("shell", "velocity"), geometric_mean(errors).tolist(), strict=True))

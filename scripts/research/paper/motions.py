@@ -1,12 +1,14 @@
-"""The clips that the table is made from: those in assets/, and the recordings in a folder. Not those of a body at rest.
+"""The clips that the table is made from: those in assets/, and other recordings. Not those of a body at rest.
 
 Times are seconds, lengths metres. Errors do not depend on the axes, so recordings are taken as they are.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -16,32 +18,27 @@ from rigid_motion_batch.places import ASSETS, from_here
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.recordings.reading import FORMATS
 
 REST = 0.01
 """A body is at rest that stays, by the root mean square, so near to its mean pose: less than a hand trembles."""
 
-
-def assets() -> list[Clip]:
-    """Read the motions in assets/."""
-    return [read_motion(path) for path in sorted(from_here(ASSETS).glob("*.csv"))]
+Read = TypeVar("Read")
 
 
-def recordings_in(folder: Path) -> list[Path]:
-    """Return the recordings in a folder, by name: files of any format that is read.
+def assets() -> dict[str, Clip]:
+    """Read the motions in assets/, by name."""
+    return {path.stem: read_motion(path) for path in sorted(from_here(ASSETS).glob("*.csv"))}
 
-    Raises
-    ------
-    TrajectoryError
-        Where there is no such folder, or no recording in it.
-    """
-    if not folder.is_dir():
-        raise TrajectoryError(str(folder), "no such folder", "check the path")
-    extensions = {extension for known in FORMATS for extension in known.extensions}
-    result = sorted(path for path in folder.iterdir() if path.is_file() and path.suffix.lower() in extensions)
-    if not result:
-        raise TrajectoryError(str(folder), "no recording in this folder", f"known are {', '.join(sorted(extensions))}")
-    return result
+
+def read_all(paths: Iterable[Path], read: Callable[[Path], Read]) -> tuple[list[Read], dict[str, str]]:
+    """Return what could be read, and of the other files why not."""
+    result, left_out = [], {}
+    for path in paths:
+        try:
+            result.append(read(path))
+        except TrajectoryError as error:
+            left_out[path.stem] = error.problem
+    return result, left_out
 
 
 def read_motion(path: Path) -> Clip:
@@ -65,7 +62,6 @@ def read_motion(path: Path) -> Clip:
 
 def spread(poses: Poses, radius: float = 0.1) -> float:
     """Return how far the points of the shell are from their means, the farthest, by the root mean square."""
-    arms = radius * np.eye(3)[:, None]
-    points = poses.positions + rotate(poses.quaternions, np.broadcast_to(arms, (3, len(poses), 3)))
+    points = poses.positions + rotate(poses.quaternions, radius * np.eye(3)[:, None])
     offsets = points - points.mean(axis=1, keepdims=True)
     return float(np.sqrt(np.square(offsets).sum(axis=-1).mean(axis=1).max()))

@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Quaternion
 
+from research.making.rendering import add, tubes
 from rigid_motion.motion import Poses
 from rigid_motion_batch.scenes import captions, layout
 from rigid_motion_batch.scenes.materials import ink
@@ -20,18 +21,9 @@ from rigid_motion_batch.scenes.scene import make_camera, make_frame, make_lights
 from rigid_motion_batch.scenes.settings import SceneSettings
 from rigid_motion_batch.scenes.subject import tinted_slots
 
-WIDTH = 1004
-"""Pixels."""
-
-DOTS_PER_INCH = 300.0
-
-PAPER = "#FFFFFF"
-INK = "#1B2026"
-FAINT = "#58626E"
-RULE = "#C9CFD6"
-
-MARGIN = 0.016
-"""In units of the sheet's width."""
+WIDTH, DOTS_PER_INCH = 1004, 300.0  # pixels
+PAPER, INK, FAINT, RULE = "#FFFFFF", "#1B2026", "#58626E", "#C9CFD6"
+MARGIN = 0.016  # in units of the sheet's width
 
 
 class Sheet:
@@ -45,68 +37,53 @@ class Sheet:
         What the height spans in the world.
     frames : int
         Of a film; a picture has one.
-    width : int
-        Pixels, even.
     """
 
-    def __init__(self, height: int, metres: float, *, frames: int = 1, width: int = WIDTH) -> None:
+    def __init__(self, height: int, metres: float, *, frames: int = 1) -> None:
         bpy.ops.wm.read_factory_settings(use_empty=True)
         self.scene = bpy.context.scene
-        self.height, self.width, self.metres = height, width, metres
-        self.aspect = width / height
-        self.objects = self.scene.collection
+        self.height, self.metres, self.aspect = height, metres, WIDTH / height
+        self.left = -self.aspect * (0.5 - MARGIN)
+        """Of the words, in units of the height."""
         self._frame = make_frame(metres)
-        self.objects.objects.link(self._frame)
+        self.scene.collection.objects.link(self._frame)
         self._frame.location = layout.AWAY * 4.0 * metres
         make_camera(self.scene, metres, depth=2.0 * metres)
         self.scene.camera.data.clip_end = 20.0 * metres
         make_lights(self.scene)
-        settings = SceneSettings(resolution=(width, height), antialiasing="16" if frames == 1 else "FXAA")
+        settings = SceneSettings(resolution=(WIDTH, height), antialiasing="16" if frames == 1 else "FXAA")
         set_up_render(self.scene, settings, frames, PAPER)
         self._inks: dict[str, bpy.types.Material] = {}
 
-    @property
-    def left(self) -> float:
-        """Of the words, in units of the height."""
-        return -self.aspect * (0.5 - MARGIN)
-
-    @property
-    def top(self) -> float:
-        return 0.5 - self.aspect * MARGIN
-
     def size(self, points: float) -> float:
-        """Points in units of the sheet's height."""
+        """Return points in units of the sheet's height."""
         return points * DOTS_PER_INCH / 72.0 / self.height
 
     def place(self, x: float, y: float) -> np.ndarray:
-        """Where in the world something is that is seen at a place of the sheet, shape (3,)."""
+        """Return where in the world something is that is seen at a place of the sheet, shape (3,)."""
         return layout.unproject(np.array((x, y, 0.0)) * self.metres)
 
     def ink(self, colour: str) -> bpy.types.Material:
-        """A flat colour, the same one each time."""
+        """Return a flat colour, the same one each time."""
         if colour not in self._inks:
             self._inks[colour] = ink(f"Ink {colour}", colour)
         return self._inks[colour]
 
-    def words(
-        self, text: str, x: float, y: float, points: float = 7.0, colour: str = INK, align: str = "LEFT"
-    ) -> bpy.types.Object:
+    def words(self, text: str, x: float, y: float, points: float = 7.0, colour: str = INK, align: str = "LEFT") -> None:
         """Write a line on the sheet, behind all that stands in the world."""
-        obj = captions.words(text[:40], text, self.size(points), self.ink(colour), align)
-        captions.put(obj, self._frame, self.objects, x, y)
-        return obj
+        self.put(captions.words(text[:40], text, self.size(points), self.ink(colour), align), x, y)
 
-    def put(self, obj: bpy.types.Object, x: float, y: float) -> None:
+    def put(self, obj: bpy.types.Object, x: float, y: float, lift: int = 2) -> None:
         """Place something on the sheet."""
-        captions.put(obj, self._frame, self.objects, x, y)
+        captions.put(obj, self._frame, self.scene.collection, x, y, lift)
 
-    def card(self, x: float, y: float, width: float, height: float, colour: str, lift: int = 0) -> None:
-        """A rectangle on the sheet, around its middle."""
+    def card(self, x: float, y: float, width: float, height: float, colour: str) -> None:
+        """Draw a rectangle on the sheet, around its middle."""
         mesh = captions.card("Card", width, height, self.ink(colour), corner=0.0)
-        captions.put(bpy.data.objects.new("Card", mesh), self._frame, self.objects, x, y, lift)
+        self.put(bpy.data.objects.new("Card", mesh), x, y, lift=0)
 
     def key(self, entries: Sequence[tuple[str, str]], x: float, y: float, points: float = 7.0) -> None:
-        """A legend in one line: patches of colour, each with its word."""
+        """Write a legend in one line: patches of colour, each with its word."""
         size = self.size(points)
         for colour, text in entries:
             self.card(x + 0.5 * size, y + 0.33 * size, size, 0.7 * size, colour)
@@ -114,42 +91,24 @@ class Sheet:
             x += (2.6 + captions.width_of(text)) * size
 
     def lines(self, name: str, paths: np.ndarray, radius: float, colour: str, *, closed: bool = False) -> None:
-        """Tubes along polylines, shape (k, m, 3), of a radius in metres."""
-        curve = bpy.data.curves.new(name, "CURVE")
-        curve.dimensions = "3D"
-        curve.bevel_depth, curve.bevel_resolution = radius, 2
-        curve.materials.append(self.ink(colour))
-        for path in paths:
-            spline = curve.splines.new("POLY")
-            spline.points.add(len(path) - 1)
-            spline.points.foreach_set("co", np.pad(path, ((0, 0), (0, 1)), constant_values=1.0).ravel())
-            spline.use_cyclic_u = closed
-        self.objects.objects.link(bpy.data.objects.new(name, curve))
+        """Draw tubes along polylines, shape (k, m, 3), of a radius in metres."""
+        curve = tubes(name, paths, radius, closed=closed)
+        curve.bevel_resolution = 2
+        add(name, curve, self.ink(colour))
 
     def faces(self, name: str, polygons: np.ndarray, material: bpy.types.Material) -> None:
-        """Flat polygons, shape (k, m, 3)."""
+        """Draw flat polygons, shape (k, m, 3)."""
         mesh = bpy.data.meshes.new(name)
         corners = np.arange(polygons.shape[0] * polygons.shape[1]).reshape(polygons.shape[:2])
         mesh.from_pydata(polygons.reshape(-1, 3).tolist(), [], corners.tolist())
-        mesh.materials.append(material)
-        self.objects.objects.link(bpy.data.objects.new(name, mesh))
+        add(name, mesh, material)
 
     def solid(
-        self,
-        name: str,
-        mesh: bpy.types.Mesh,
-        place: np.ndarray,
-        pose: Poses,
-        material: bpy.types.Material,
-        *,
-        whole: bool,
+        self, name: str, mesh: bpy.types.Mesh, pose: Poses, material: bpy.types.Material, *, whole: bool
     ) -> bpy.types.Object:
-        """An object at a pose, shape (), moved by `place` (3,); its tinted parts, or the whole of it, in a material."""
-        obj = bpy.data.objects.new(name, mesh)
-        obj.matrix_world = Matrix.LocRotScale(
-            (place + pose.positions).tolist(), Quaternion(pose.quaternions.tolist()), None
-        )
-        self.objects.objects.link(obj)
+        """Return an object at a pose, shape (); its tinted parts, or the whole of it, are of a material."""
+        obj = add(name, mesh)
+        obj.matrix_world = Matrix.LocRotScale(pose.positions.tolist(), Quaternion(pose.quaternions.tolist()), None)
         for slot in range(len(mesh.materials)) if whole else tinted_slots(mesh):
             obj.material_slots[slot].link = "OBJECT"
             obj.material_slots[slot].material = material

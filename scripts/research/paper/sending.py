@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from rigid_motion.motion import Poses, rms, shell_error
+from rigid_motion.motion.poses import joined
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion.streams import Receiver, Sender
 from rigid_motion.streams.wire import DESCRIPTION, kind_of
@@ -25,19 +26,15 @@ from rigid_motion_batch.streaming.packed import CUBE, PLACE_BITS, STAMP, smalles
 from rigid_motion_batch.streaming.sending import body_of, samples_of
 from rigid_motion_batch.streaming.transports import HEADERS
 
-from .claims import UPDATES
-from .table import RADIUS, even_points, lowest
+from .table import RADIUS, UPDATES, even_points, lowest
 
-DELAYS = (0.1, 0.2)
-"""By which the picture is behind."""
-
+DELAYS = (0.1, 0.2)  # by which the picture is behind
 SECONDS = 10.0
 
 TOLERANCES = 1.0, 5.0, 4
 """From this multiple of the smallest error wanted to this multiple of the largest, so many."""
 
-TURN_BITS = 10
-"""Of each of the smallest three components of a quaternion."""
+TURN_BITS = 10  # of each of the smallest three components of a quaternion
 
 PACKINGS = {
     "7 doubles": 56,
@@ -73,11 +70,10 @@ def sent(clip: Clip, tolerance: float, delay: float) -> tuple[float, float, floa
         post(sender.add(moment, poses[:, sample]), moment)
     post(sender.finish(), float(times[-1]))
     draw(np.inf)
-    truth = straight(times, poses).at([one.moment for one in shown])[0]
-    own = [one.poses[body.name] for one in shown]
-    filled = Poses(np.concatenate([one.positions for one in own]), np.concatenate([one.quaternions for one in own]))
+    truth = straight(times, poses).at([it.moment for it in shown])[0]
+    error = rms(shell_error(joined([it.poses[body.name] for it in shown]), truth, RADIUS))
     seconds = float(times[-1] - times[0])
-    return len(sizes) / seconds, sum(sizes) / seconds, rms(shell_error(filled, truth, RADIUS))
+    return len(sizes) / seconds, sum(sizes) / seconds, error
 
 
 def costs_of(clip: Clip) -> dict[float, dict[int, tuple[float, float]]]:
@@ -98,40 +94,31 @@ def costs_of(clip: Clip) -> dict[float, dict[int, tuple[float, float]]]:
 def costs(clips: list[Clip]) -> dict[str, Any]:
     """Return the geometric means over clips, and the bytes of even streams, for each of the paper's rates."""
     of_clips = {clip.name: costs_of(clip) for clip in clips}
+    even = {name: [rate * (size + STAMP + HEADERS) for rate in UPDATES] for name, size in PACKINGS.items()}
+    missing = (np.nan, np.nan)
     needed = {}
     for delay in DELAYS:
-        rows = [
-            geometric_mean(np.array([own[delay][rate] for own in of_clips.values() if rate in own[delay]]))
-            for rate in UPDATES
-        ]
+        table = np.array([[costs[delay].get(rate, missing) for rate in UPDATES] for costs in of_clips.values()])
+        datagrams, size = geometric_mean(table).T
         needed[f"{1e3 * delay:.0f}"] = {
-            "datagrams": [row[0] for row in rows],
-            "bytes": [row[1] for row in rows],
-            "saved_datagrams": [1.0 - row[0] / rate for row, rate in zip(rows, UPDATES, strict=True)],
+            "datagrams": datagrams,
+            "bytes": size,
+            "saved_datagrams": 1.0 - datagrams / UPDATES,
+            "saved_bytes": {name: 1.0 - size / of_even for name, of_even in even.items()},
         }
-    even = {name: [rate * (size + STAMP + HEADERS) for rate in UPDATES] for name, size in PACKINGS.items()}
-    for own in needed.values():
-        own["saved_bytes"] = {
-            name: [1.0 - size / of_even for size, of_even in zip(own["bytes"], row, strict=True)]
-            for name, row in even.items()
-        }
-    return {"seconds": SECONDS, "clips": list(of_clips), "even": even, "needed": needed, "by_clip": of_clips}
+    return {"seconds": SECONDS, "clips": list(of_clips), "even": even, "needed": needed}
 
 
 def packings(clip: Clip) -> dict[str, dict[str, float]]:
     """Return the bytes of a pose in each packing, and the largest shell error that it makes on a clip, in metres."""
     poses = clip.in_metres(clip.poses)
     step = CUBE / (2**PLACE_BITS - 1)
-    exact, single, small = PACKINGS
-    packed = {
-        exact: (poses.positions, poses.quaternions),
-        single: (poses.positions.astype(np.float32), normalise(poses.quaternions.astype(np.float32))),
-        small: (np.rint(poses.positions / step) * step, smallest_three(poses.quaternions, TURN_BITS)),
-    }
+    packed = (
+        poses,
+        Poses(poses.positions.astype(np.float32), normalise(poses.quaternions.astype(np.float32))),
+        Poses(np.rint(poses.positions / step) * step, smallest_three(poses.quaternions, TURN_BITS)),
+    )
     return {
-        name: {
-            "bytes": PACKINGS[name],
-            "error": float(shell_error(Poses(positions, quaternions), poses, RADIUS).max()),
-        }
-        for name, (positions, quaternions) in packed.items()
+        name: {"bytes": size, "error": float(shell_error(shown, poses, RADIUS).max())}
+        for (name, size), shown in zip(PACKINGS.items(), packed, strict=True)
     }

@@ -13,7 +13,6 @@ from rigid_motion.motion import MODES, Poses, interpolate, measure
 from rigid_motion.motion.quaternions import angle_between, normalise, rotate
 from rigid_motion_batch.scenes.materials import surface
 
-from . import claims
 from .picture import FAINT, INK, Sheet
 
 IN_BETWEENS = 20
@@ -21,78 +20,65 @@ IN_BETWEENS = 20
 ENGINES = {"lerp": "pga_lerp", "slerp": "pga_slerp"}
 """What the paper calls them, and the modes that they are here."""
 
+COLOURS = {"lerp": "#FFD60A", "slerp": "#1FA63A"}  # of the paper's figure: yellow and green
+
 TRIANGLE = np.array(((-0.30, 0.0, -0.36), (0.40, 0.0, -0.26), (-0.08, 0.0, 0.46)))
 """The corners in the body's own axes, shape (3, 3)."""
 
-TURN, AXIS = np.radians(150.0), np.array((-0.45, 0.85, 0.20))
-"""Of the second pose: an extreme turn."""
+TURN, AXIS = np.radians(150.0), normalise(np.array((-0.45, 0.85, 0.20)))  # of the second pose: an extreme turn
 
 EXTREMES = Poses(
     [(-1.85, 0.0, -0.60), (1.65, 0.0, -0.30)],
-    normalise(np.array([(1.0, 0.0, 0.0, 0.0), (np.cos(TURN / 2), *np.sin(TURN / 2) * AXIS / np.linalg.norm(AXIS))])),
+    normalise(np.array([(1.0, 0.0, 0.0, 0.0), (np.cos(TURN / 2), *np.sin(TURN / 2) * AXIS)])),
 )
 
+SHARES = np.arange(1, IN_BETWEENS + 1) / (IN_BETWEENS + 1.0)  # of the way, without the ends
 
-def in_betweens() -> tuple[np.ndarray, dict[str, Poses]]:
-    """The shares of the way, without the ends, and the poses there of either kind."""
-    shares = np.arange(1, IN_BETWEENS + 1) / (IN_BETWEENS + 1.0)
-    return shares, {name: interpolate([0.0, 1.0], EXTREMES, shares, mode) for name, mode in ENGINES.items()}
+
+def in_betweens(shares: np.ndarray = SHARES) -> dict[str, Poses]:
+    """Return the poses of either kind at shares of the way (n,)."""
+    return {name: interpolate([0.0, 1.0], EXTREMES, shares, mode) for name, mode in ENGINES.items()}
 
 
 def figures() -> dict[str, float]:
     """Return the figure in numbers: degrees that LERP and SLERP turn at a step, and how far they are apart at most."""
-    shares, poses = in_betweens()
-    first = EXTREMES.quaternions[0]
-    turned = {
-        name: np.degrees(np.append(0.0, angle_between(np.broadcast_to(first, own.quaternions.shape), own.quaternions)))
-        for name, own in poses.items()
+    poses, first = in_betweens(), EXTREMES.quaternions[:1]
+    steps = {
+        name: np.diff(np.degrees(angle_between(first, np.concatenate((first, of_kind.quaternions)))))
+        for name, of_kind in poses.items()
     }
-    apart = measure(shares, poses["lerp"], poses["slerp"])
+    apart = measure(SHARES, poses["lerp"], poses["slerp"])
     return {
         "in_betweens": IN_BETWEENS,
-        "slerp_step": np.diff(turned["slerp"])[0],
-        "lerp_first_step": np.diff(turned["lerp"])[0],
-        "lerp_largest_step": np.diff(turned["lerp"]).max(),
+        "slerp_step": steps["slerp"][0],
+        "lerp_first_step": steps["lerp"][0],
+        "lerp_largest_step": steps["lerp"].max(),
         "apart": apart.position.max(),
         "apart_degrees": np.degrees(apart.rotation.max()),
     }
 
 
 def build() -> bpy.types.Scene:
-    """The figure as a scene."""
+    """Return the figure as a scene."""
     sheet = Sheet(620, 3.1)
-    _, poses = in_betweens()
-    fine = np.linspace(0.0, 1.0, 200)
-    for name, mode in ENGINES.items():
-        colour = claims.COLOURS[name]
-        corners = _corners(poses[name])
+    fine = in_betweens(np.linspace(0.0, 1.0, 200))
+    for name, poses in in_betweens().items():
+        corners, colour = _corners(poses), COLOURS[name]
         sheet.faces(f"{name} faces", corners, surface(name, colour, alpha=0.14))
         sheet.lines(f"{name} edges", corners, 0.013, colour, closed=True)
-        paths = _corners(interpolate([0.0, 1.0], EXTREMES, fine, mode)).transpose(1, 0, 2)
-        sheet.lines(f"{name} paths", paths, 0.006, colour)
+        sheet.lines(f"{name} paths", _corners(fine[name]).transpose(1, 0, 2), 0.006, colour)
     ends = _corners(EXTREMES)
     sheet.faces("Extremes", ends, surface("Extremes", "#7C8794", alpha=0.75))
     sheet.lines("Extreme edges", ends, 0.018, INK, closed=True)
     low = -0.5 + 0.05
     sheet.words("LERP and SLERP of multivectors", sheet.left, 0.5 - 0.095, 9.0)
-    sheet.key(
-        [
-            (claims.COLOURS["lerp"], f"LERP: {MODES[ENGINES['lerp']].label}"),
-            (claims.COLOURS["slerp"], f"SLERP: {MODES[ENGINES['slerp']].label}"),
-        ],
-        sheet.left,
-        low + 0.07,
-    )
-    sheet.words(
-        f"{IN_BETWEENS} in-betweens at even steps, {np.degrees(TURN):.0f}° from the first to the last",
-        sheet.left,
-        low,
-        7.0,
-        FAINT,
-    )
+    entries = [(COLOURS[name], f"{name.upper()}: {MODES[mode].label}") for name, mode in ENGINES.items()]
+    sheet.key(entries, sheet.left, low + 0.07)
+    turned = f"{IN_BETWEENS} in-betweens at even steps, {np.degrees(TURN):.0f}° from the first to the last"
+    sheet.words(turned, sheet.left, low, 7.0, FAINT)
     return sheet.scene
 
 
 def _corners(poses: Poses) -> np.ndarray:
-    """Where the triangle's corners are, shape (n, 3, 3)."""
+    """Return where the triangle's corners are, shape (n, 3, 3)."""
     return poses.positions[:, None] + rotate(poses.quaternions[:, None], TRIANGLE[None])

@@ -30,7 +30,7 @@ class Command:
 
 
 RESEARCH = {
-    "paper": "paper.study",
+    "paper": "paper.parts",
     "benchmark": "benchmark",
     "benchmark_batch": "benchmark_batch",
     "benchmark_live": "benchmark_live",

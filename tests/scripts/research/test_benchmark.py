@@ -8,11 +8,11 @@ from tests.scripts.research.keeping import written
 
 def test_rates_are_those_of_the_fastest_round():
     case = next(benchmark.cases(2000))
-    ours, peer = benchmark.rates(
-        case, {("dq_sclerp", benchmark.OURS): [0.004, 0.005], ("dq_sclerp", "SciPy"): [0.4, 0.3]}
+    program, peer = benchmark.rates(
+        case, {("dq_sclerp", benchmark.PROGRAM): [0.004, 0.005], ("dq_sclerp", "SciPy"): [0.4, 0.3]}
     )
-    assert ours["millions"] == pytest.approx(case.in_betweens / 0.004 / 1e6)
-    assert (ours["faster_by"], peer["faster_by"]) == (None, pytest.approx(75.0))
+    assert program["millions"] == pytest.approx(case.in_betweens / 0.004 / 1e6)
+    assert (program["faster_by"], peer["faster_by"]) == (None, pytest.approx(75.0))
 
 
 def test_the_study_writes_what_the_page_reads(tmp_path, monkeypatch):

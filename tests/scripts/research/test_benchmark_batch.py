@@ -1,15 +1,12 @@
 """The benchmark of many clips: its clips are recordings, and it sees what processes take."""
 
 import os
-import shutil
 import sys
 
 import numpy as np
 import pytest
 
 from research import benchmark_batch
-from rigid_motion_batch.pipeline.steps import OWN
-from rigid_motion_batch.pipeline.store import INDEX
 from tests.scripts.research.keeping import written
 
 
@@ -27,22 +24,10 @@ def test_two_workers_are_measured_beside_one(tmp_path, monkeypatch):
     took = {(1, False): 20.0, (2, False): 10.0, (1, True): 21.0}
 
     def compare(clips, folder, jobs, *options, alone=False):
-        return benchmark_batch.Run(took[jobs, alone], 10**8, 2 * 10**8, 0.75 if "--rates" in options else 0.0)
+        return benchmark_batch.Run(took[jobs, alone], 10**8, 2 * 10**8)
 
     monkeypatch.setattr(benchmark_batch, "compare", compare)
     assert benchmark_batch.main(["--clips", "4", "--films", "2", "--minutes", "1", "--root", str(tmp_path)]) == 0
     result = written(tmp_path, "benchmark_batch")
     assert [row["clips_a_minute"] for row in result["numbers"][:2]] == [12.0, 24.0]
     assert [row["speedup"] for row in result["videos"][:2]] == [1.0, 2.0]
-    assert [row["rendering"] for row in result["numbers"] + result["videos"]][1::3] == [None, 0.75]
-
-
-def test_tasks_are_noted_before_their_results_go(tmp_path):
-    folder = tmp_path / OWN / "results" / "a"
-    folder.mkdir(parents=True)
-    (folder / INDEX).write_text('{"seconds": 2.0, "facts": {"rendering": 1.5}}', encoding="utf-8")
-    tasks = {}
-    benchmark_batch.note_tasks(tmp_path, tasks)
-    shutil.rmtree(folder)
-    benchmark_batch.note_tasks(tmp_path, tasks)
-    assert tasks == {"a": {"seconds": 2.0, "facts": {"rendering": 1.5}}}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from research import benchmark_live
-from research.live_scenes import MODE, MOTIONS, NativeBaking, Size, scene_of, set_modes
+from research.benchmark_live import MODE, MOTIONS, NativeBaking, Size, scene_of, set_modes
 from rigid_motion import animation
 from rigid_motion.animation import channelbag_of, read_poses
 from tests.scripts.research.keeping import written

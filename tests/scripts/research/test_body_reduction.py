@@ -84,7 +84,7 @@ def test_the_optimum_is_the_fewest_of_all_choices(body, mode):
         for count in range(few.frames - 1):
             for inner in itertools.combinations(range(1, few.frames - 1), count):
                 keys = np.array((0, *inner, few.frames - 1))
-                if few.errors(few.shown_by_key_poses(keys, mode)).max() <= tolerance:
+                if few.errors(few.shown(keys, mode)).max() <= tolerance:
                     return len(keys)
         return few.frames
 
@@ -120,7 +120,8 @@ def test_a_foot_that_stands_is_found_and_its_slide_measured(body):
 def test_the_study_writes_what_the_page_reads(tmp_path, monkeypatch):
     path = made_up(tmp_path)
     recording = reduction.read(reduction.ASSETS / "reach.csv", 15.0)
-    monkeypatch.setattr(reduction, "files", lambda _folder: ["reach.csv"])
+    monkeypatch.setattr(reduction, "ASSETS", tmp_path)
+    (tmp_path / "reach.csv").touch()
     monkeypatch.setattr(reduction, "read", lambda _path, _rate: recording)
     monkeypatch.setattr(body_reduction, "OZZ_BODY", "leg")
     monkeypatch.setattr(body_reduction, "TRIALS", 4)

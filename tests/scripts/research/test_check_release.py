@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from research import check_release
-from research.check_release import CHANGELOG, CHECKS, LISTING, MANIFEST, MANUAL
+from research.check_release import CHANGELOG, MANIFEST, MANUAL
 
 ROOT = Path(__file__).resolve().parents[3]
 WEBSITE = "https://motion.dev/rigid"
@@ -27,11 +27,10 @@ def change(folder: Path, name: str, old: str, new: str) -> None:
 @pytest.fixture
 def ready(tmp_path, monkeypatch) -> Path:
     """A checkout of which nothing is missing: this one, with addresses and a day."""
-    for name in (MANIFEST, CHANGELOG, MANUAL, LISTING):
+    for name in (MANIFEST, CHANGELOG, MANUAL):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
-        copy(ROOT / name, tmp_path / name)
-    manifest = check_release._manifest(ROOT)
+        shutil.copy(ROOT / name, tmp_path / name)
+    manifest = check_release.manifest_of(ROOT)
     change(tmp_path, MANIFEST, manifest["website"], WEBSITE)
     change(tmp_path, MANUAL, manifest["website"], WEBSITE)
     change(tmp_path, MANIFEST, manifest["maintainer"], "Maintainer <maintainer@motion.dev>")
@@ -40,7 +39,7 @@ def ready(tmp_path, monkeypatch) -> Path:
     git(tmp_path, "init", "--quiet")
     git(tmp_path, "add", ".")
     git(tmp_path, "commit", "--quiet", "-m", "Ready")
-    monkeypatch.setattr(check_release, "CHECKOUT", tmp_path)
+    monkeypatch.setattr(check_release, "ROOT", tmp_path)
     return tmp_path
 
 
@@ -81,25 +80,3 @@ def test_what_is_not_ready_is_told(ready, capsys, name, old, new, told):
 def test_a_version_that_has_its_tag_was_released(ready, capsys):
     git(ready, "tag", "v0.1.0")
     assert "the tag v0.1.0 is there already" in missing(capsys)
-
-
-def test_pictures_are_there_in_their_size(ready):
-    (ready / LISTING / "icon.png").unlink()
-    shutil.copy(ROOT / LISTING / "icon.png", ready / LISTING / "featured.png")
-    icon, featured = check_release.pictures(ready)
-    assert "icon.png is missing" in icon
-    assert "featured.png is 256 x 256 pixels, and has to be 1920 x 1080" in featured
-
-
-def test_a_zip_that_blender_refuses_is_no_release(ready, monkeypatch, capsys):
-    from rigid_motion_batch.cli import build_extension
-
-    def refused(folder: Path) -> Path:
-        raise build_extension.BuildError("Blender refuses the extension")
-
-    monkeypatch.setattr(build_extension, "build", refused)
-    assert "Blender refuses the extension" in missing(capsys)
-
-
-def test_the_pictures_and_the_text_of_this_checkout_are_ready():
-    assert [finding for check in CHECKS if check.__name__ in ("pictures", "text") for finding in check(ROOT)] == []

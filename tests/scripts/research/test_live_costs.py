@@ -38,7 +38,8 @@ def test_the_study_writes_what_the_page_reads(tmp_path, monkeypatch):
     (tmp_path / "walk.bvh").write_text(seed("ZXY", 20), encoding="utf-8")
     monkeypatch.setattr(live_costs, "HAND", "pivot")
     monkeypatch.setattr(live_costs, "WAYS", {"20 ms": live_costs.WAYS["20 ms"]})
-    monkeypatch.setattr(live_costs, "figures", lambda users, seconds: Room(22.0, 9, 10, 0.5, 1.0, 2.0, 0.1, users))
+    result = Room(22.0, 9, 10, 0.5, 1.0, 2.0, 0.1, 0.5)
+    monkeypatch.setattr(live_costs.room, "measured", lambda users, seconds: result)
     given = [str(tmp_path / "walk.bvh"), str(ASSETS / "pivot.csv")]
     assert live_costs.main([*given, "--users", "3", "--seconds", "2", "--root", str(tmp_path)]) == 0
     result = written(tmp_path, "live_costs")

@@ -8,7 +8,7 @@ import jinja2
 import numpy as np
 import pytest
 
-from research.pages import QUOTE, ROOT, alike, each, environment, filled, less, pages, spread, table, write_figures
+from research.pages import QUOTE, ROOT, alike, each, environment, filled, less, pages, spread, write_figures
 
 TEMPLATES = environment()
 
@@ -42,7 +42,7 @@ def test_every_template_and_every_file_of_figures_is_used():
         assert re.search(rf"\b{path.stem}\b[.[]", used), path.name
 
 
-def test_figures_are_plain_numbers_of_six_digits(checkout: Path):
+def test_figures_are_numbers_of_six_digits(checkout: Path):
     path = write_figures("found", {"a": np.float64(2 / 3), "b": np.arange(2), "c": (float("nan"),)}, "x", checkout)
     result = json.loads(path.read_text(encoding="utf-8"))
     assert result.pop("made_by").startswith("`x`: Python ")
@@ -55,7 +55,7 @@ def test_a_page_is_its_template_with_figures(checkout: Path):
         "{% for name, share in found.saved.items() %}\n{{ name }}: {{ share | less }}\n{% endfor %}\n", encoding="utf-8"
     )
     (checkout / "docs/templates/quotes.md").write_text(
-        "{% macro rows() %}{{ [['e', found.error]] | table('', 'm') }}{% endmacro %}", encoding="utf-8"
+        "{% macro rows() %}{{ [found.error, 1.0] | each('{:.1f}', 100) | join(' | ') }}{% endmacro %}", encoding="utf-8"
     )
     (checkout / "README.md").write_text(
         "It is <!--= found.error | digits(2) -->9<!-- end -->, <!--= quotes.rows() --><!-- end -->", encoding="utf-8"
@@ -65,8 +65,7 @@ def test_a_page_is_its_template_with_figures(checkout: Path):
         filled(checkout / "docs/page.md", templates) == "a: 3\N{NO-BREAK SPACE}% less\nb: 20\N{NO-BREAK SPACE}% more\n"
     )
     assert filled(checkout / "README.md", templates) == (
-        "It is <!--= found.error | digits(2) -->0.012<!-- end -->, "
-        "<!--= quotes.rows() -->|  | m |\n| --- | ---: |\n| e | 0.01234 |<!-- end -->"
+        "It is <!--= found.error | digits(2) -->0.012<!-- end -->, <!--= quotes.rows() -->1.2 | 100.0<!-- end -->"
     )
 
 
@@ -85,4 +84,3 @@ def test_how_figures_are_written():
     assert alike([0.33, 0.5], "fewer") == "33 and 50\N{NO-BREAK SPACE}% fewer"
     assert alike([0.33, -0.5]) == "33\N{NO-BREAK SPACE}% less and 50\N{NO-BREAK SPACE}% more"
     assert each([1.234, None]) == ["1.23", "\N{EN DASH}"]
-    assert table([["a", 1]], "x", "y") == "| x | y |\n| --- | ---: |\n| a | 1 |"

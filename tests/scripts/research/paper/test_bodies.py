@@ -8,9 +8,9 @@ import pytest
 
 from research.paper import bodies
 from research.paper.bodies import ALONE, BODY, THROUGH, Limb
+from research.studies import files_in
 from rigid_motion.motion import Poses, interpolate, rms, shell_error
 from rigid_motion_batch.analysis.bodies import moving
-from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clips import Clip
 from tests.motion.bodies import body_errors, in_root_space
 from tests.scripts.bvh_bodies import write_body
@@ -38,20 +38,14 @@ def places(poses: Poses) -> np.ndarray:
 # -- names -------------------------------------------------------------------------------------------------------------
 
 
-LIMBS = {
-    "hands": "LeftHand;mixamorig:RightHand;Lefthand;Bip01 L Hand;hand.L;hand_r;RHand",
-    "feet": "Foot_Right;rig:LeftFoot",
-    "heads": "Head;bip01_head",
-    "": "LeftHandIndex1;HeadTop_End;Bip01HeadNub;LeftFootThumb1;Hand;LeftForeArm;;手;|`\n;L;5",
-}
-
-
-@pytest.mark.parametrize("limb", LIMBS)
-def test_hands_feet_and_heads_are_told_by_their_names_and_the_plainest_is_taken(limb: str) -> None:
-    for joint in LIMBS[limb].split(";"):
-        result = bodies.limbs_of(named("Hips", joint))
-        assert [(one.kind, one.joint) for one in result] == ([(limb, 1)] if limb else []), joint
-    assert [one.joint for one in bodies.limbs_of(named("Hips", "IK_LeftHand", "LeftHand", "Left_Hand"))] == [2]
+def test_hands_feet_and_heads_are_told_by_their_names() -> None:
+    clip = named("Hips", "mixamorig:RightHand", "hand.L", "Foot_Right", "Head", "LeftHandIndex1", "LeftForeArm")
+    assert [(limb.kind, limb.joint) for limb in bodies.limbs_of(clip)] == [
+        ("hands", 2),
+        ("hands", 1),
+        ("feet", 3),
+        ("heads", 4),
+    ]
 
 
 def test_a_limb_says_how_many_moving_joints_carry_it() -> None:
@@ -118,12 +112,12 @@ def test_the_difference_is_that_of_the_two_modes_by_matrices() -> None:
 # -- keys needed -------------------------------------------------------------------------------------------------------
 
 
-def test_a_study_says_everything_of_each_body() -> None:
+def test_the_figures_say_everything_of_each_body() -> None:
     short = swinging_body("short", seconds=1.0, rate=30.0, seed=4, joints=NAMES)
-    result = bodies.study([(BODY_CLIP, 0), (short, 1)])
+    result = bodies.measure([(BODY_CLIP, 0), (short, 1)])
     assert result["bodies"]["short"]["skipped"] == 1
     assert result["bodies"]["walk"]["limbs"] == ["LeftHand", "RightFoot", "Head"]
-    assert set(result["needed"]) == {BODY, *bodies.LIMBS}
+    assert tuple(result["needed"]) == bodies.KINDS
     assert result["chains"]["hands"] == [4, 4]
     assert result["errors"][BODY][THROUGH]["pga_lerp"][5]["velocity"] > 0.0
     errors = [result["by_body"][name]["lerp_slerp"][10] for name in ("walk", "short")]
@@ -137,14 +131,8 @@ def test_a_study_says_everything_of_each_body() -> None:
 def test_a_folder_stands_for_the_bodies_in_it_and_each_file_comes_once(tmp_path: Path) -> None:
     for name in ("b.bvh", "a.FBX", "notes.txt", "hand.csv"):
         (tmp_path / name).touch()
-    assert [path.name for path in bodies.body_files([tmp_path, tmp_path / "b.bvh"])] == ["a.FBX", "b.bvh"]
-
-
-def test_what_is_missing_is_named(tmp_path: Path) -> None:
-    with pytest.raises(TrajectoryError, match="no such file or folder"):
-        bodies.body_files([tmp_path / "nowhere.bvh"])
-    with pytest.raises(TrajectoryError, match="no recording in this folder that may hold a body"):
-        bodies.body_files([tmp_path])
+    files = files_in([tmp_path, tmp_path / "b.bvh"], bodies.EXTENSIONS)
+    assert [path.name for path in files] == ["a.FBX", "b.bvh"]
 
 
 def test_a_first_sample_from_which_the_body_jumps_is_no_motion(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from mathutils import Vector
 
-from research.paper import claims, picture, strips, triangle
+from research.paper import picture, strips, triangle
 from research.paper.catching import build
 from rigid_motion_batch.scenes.film import render_still
 from tests.scripts.research.paper.clips import thrown
@@ -60,7 +60,7 @@ def test_a_picture_is_as_wide_as_a_column_and_has_both_colours(tmp_path):
     image = bpy.data.images.load(str(path))
     assert tuple(image.size) == (picture.WIDTH, scene.render.resolution_y)
     pixels = np.array(image.pixels[:]).reshape(-1, 4)[:, :3]
-    for colour in claims.COLOURS.values():
+    for colour in triangle.COLOURS.values():
         expected = np.array([int(colour[start : start + 2], 16) / 255.0 for start in (1, 3, 5)])
         assert np.count_nonzero(np.abs(pixels - expected).max(axis=1) < 0.06) > 500
     assert np.all(pixels[:: picture.WIDTH] > 0.97)

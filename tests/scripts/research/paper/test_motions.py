@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from research.paper.motions import REST, read_motion, recordings_in
-from research.paper.study import read_all
+from research.paper.motions import REST, read_all, read_motion
+from research.studies import files_in
 from rigid_motion_batch.recordings import TrajectoryError, read_trajectories
 from tests.recordings import RECORDINGS as FOLDER
 from tests.scripts.recordings.test_damaged_bvh_bodies import seed
@@ -46,7 +46,7 @@ def test_a_skeleton_is_represented_by_its_root(tmp_path: Path):
 def test_a_file_that_is_no_recording_is_left_out_and_says_why_without_its_folder(tmp_path: Path):
     (tmp_path / "notes.csv").write_text("dear diary\n", encoding="utf-8")
     write(tmp_path / "moves.csv", swinging(3.0 * REST))
-    result, left_out = read_all(recordings_in(tmp_path), read_motion)
+    result, left_out = read_all(files_in([tmp_path]), read_motion)
     assert [clip.name for clip in result] == ["moves"]
     assert list(left_out) == ["notes"]
     assert str(tmp_path) not in left_out["notes"]
@@ -54,4 +54,4 @@ def test_a_file_that_is_no_recording_is_left_out_and_says_why_without_its_folder
 
 @pytest.mark.recordings
 def test_of_other_peoples_recordings_the_one_at_rest_is_left_out():
-    assert list(read_all(recordings_in(FOLDER), read_motion)[1]) == ["optitrack_rigid_body"]
+    assert list(read_all(files_in([FOLDER]), read_motion)[1]) == ["optitrack_rigid_body"]

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from research.paper import table
-from research.paper.claims import UPDATES
+from research.paper.table import UPDATES
 from rigid_motion_batch.recordings.clips import Clip
-from tests.scripts.research.paper.clips import circling
+from tests.scripts.clips.recordings import swinging_clip
+from tests.scripts.research.paper.clips import circling, spinning_straight
 
 FIRST = next(iter(table.YARDSTICKS))
 
@@ -66,5 +67,30 @@ def test_means_are_geometric_and_over_the_clips_that_got_there():
     mean = table.mean_over([{30: 0.25}, {30: 1.0, 12: np.inf}, {30: np.inf}, {}])
     assert mean["updates"][0] == pytest.approx(15.0)
     assert mean["saved"][0] == pytest.approx(0.5)
-    assert (mean["reached"], mean["asked"]) == ([2, 0, 0, 0], [3, 0, 0, 1])
+    assert (mean["reached"].tolist(), mean["asked"].tolist()) == ([2, 0, 0, 0], [3, 0, 0, 1])
     assert np.isnan(mean["saved"][3])
+
+
+# -- bows --------------------------------------------------------------------------------------------------------------
+
+
+def test_a_pivot_has_all_of_the_bow_and_the_screw_no_error():
+    result = table.bows_of(circling(turns=1.0))
+    assert list(result) == list(table.BOW_RATES)
+    assert all(share == pytest.approx(1.0, abs=1e-9) and error < 1e-9 for share, error in result.values())
+
+
+def test_a_circle_that_turns_the_other_way_has_less_than_none_of_it():
+    assert all(share < 0.0 and error > 1.0 for share, error in table.bows_of(circling(turns=-1.0)).values())
+
+
+def test_a_body_that_flies_straight_has_no_error_to_compare():
+    assert table.bows_of(spinning_straight()) == {}
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_screw_is_nearer_exactly_where_more_than_half_of_the_bow_is_there(seed: int):
+    result = table.bows_of(swinging_clip(seed=seed))
+    assert result
+    for share, error in result.values():
+        assert (share > 0.5) == (error < 1.0)

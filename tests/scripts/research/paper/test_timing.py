@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from research.paper import timing
-from research.paper.claims import PAPER, UPDATES
-from research.paper.timing import Work
+from research.paper.table import PAPER, UPDATES
+from research.studies import seconds_in_turns
 from rigid_motion.motion import MODES
 from tests.scripts.research.paper.clips import circling
 
@@ -15,23 +15,22 @@ EXACT = [mode for mode in MODES if not MODES[mode].is_smooth]
 
 @pytest.mark.parametrize("mode", EXACT)
 def test_all_readings_generate_the_same_frames(mode: str):
-    fast = timing.fast(CLIP, mode, 10.0)
-    arrays = timing.in_the_algebra(CLIP, mode, 10.0)
-    single = timing.one_by_one(CLIP, mode, 10.0)
-    assert fast.frames == arrays.frames == timing.USERS * 90
-    one_user = fast.run().positions[0]
-    np.testing.assert_allclose(arrays.run().positions[:90], one_user, atol=1e-12)
-    np.testing.assert_allclose([pose.positions[0] for pose in single.run()], one_user[: timing.SINGLES], atol=1e-12)
+    case = timing.case_of(CLIP, 10.0)
+    (fast, frames), (arrays, others), (single, _) = (
+        engine(case, mode) for engine in (timing.fast, timing.in_the_algebra, timing.one_by_one)
+    )
+    assert frames == others == timing.USERS * 90
+    one_user = fast().positions[0]
+    np.testing.assert_allclose(arrays().positions[:90], one_user, atol=1e-12)
+    np.testing.assert_allclose([pose.positions[0] for pose in single()], one_user[: timing.SINGLES], atol=1e-12)
 
 
-def test_everyone_runs_as_often_and_the_turn_to_begin_goes_round():
+def test_everyone_runs_as_often_in_turns():
     ran: list[str] = []
-    contestants = {name: Work(lambda name=name: ran.append(name), 10) for name in "abc"}
-    wall, processor = timing.taken(contestants, 3)
-    firsts = [ran[turn * 3 * (1 + timing.RUNS)] for turn in range(3)]
-    assert firsts == ["a", "b", "c"]
-    assert {name: ran.count(name) for name in "abc"} == dict.fromkeys("abc", 3 * (1 + timing.RUNS))
-    assert all(len(seconds) == 3 for seconds in (*wall.values(), *processor.values()))
+    runs = {name: lambda name=name: ran.append(name) for name in "abc"}
+    seconds = seconds_in_turns(runs, 2, warm=True)
+    assert "".join(ran) == "aabbcc" * 2
+    assert {name: len(spent) for name, spent in seconds.items()} == dict.fromkeys("abc", 2)
 
 
 def test_the_interval_holds_the_ratio_and_narrows_with_more_rounds():

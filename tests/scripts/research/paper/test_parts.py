@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from research.paper import sending, study, table
-from research.paper.claims import UPDATES
+from research.paper import parts, sending, table
+from research.paper.table import UPDATES
 from rigid_motion_batch.streaming.measuring import measure
 from rigid_motion_batch.streaming.sending import body_of, samples_of
 from rigid_motion_batch.streaming.transports import HEADERS
@@ -19,12 +19,12 @@ CLIP = circling(turns=0.7, rate=90.0, seconds=3.0)
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(table, "STEP", 2.0)
     monkeypatch.setattr(table, "TOLERANCES", (0.5, 2.0, 2))
-    monkeypatch.setattr(study.motions, "assets", lambda: [CLIP])
+    monkeypatch.setattr(parts.motions, "assets", lambda: {CLIP.name: CLIP})
 
 
 @pytest.mark.usefixtures("small")
 def test_a_part_writes_its_figures(tmp_path: Path) -> None:
-    assert study.main(["--only", "table", "--root", str(tmp_path)]) == 0
+    assert parts.main(["--only", "table", "--root", str(tmp_path)]) == 0
     (path,) = (tmp_path / "docs" / "figures").iterdir()
     assert path.name == "paper_table.json"
     result = json.loads(path.read_text(encoding="utf-8"))
@@ -38,7 +38,7 @@ def test_a_part_writes_its_figures(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--recordings", "nowhere"], "no such folder"),
+        (["--recordings", "nowhere"], "no such file or folder"),
         (["--only", "bodies", "--bodies", "nowhere"], "no such file or folder"),
         (["--only", "nothing"], "invalid choice"),
         (["--unknown"], "unrecognized arguments"),
@@ -48,7 +48,7 @@ def test_a_wrong_option_is_named_and_ends_with_code_2(
     arguments: list[str], said: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     try:
-        code = study.main([*arguments, "--root", str(tmp_path)])
+        code = parts.main([*arguments, "--root", str(tmp_path)])
     except SystemExit as ended:
         code = ended.code
     assert code == 2
@@ -60,7 +60,7 @@ def test_a_stream_costs_less_the_more_it_may_be_off(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(sending, "TOLERANCES", (1.0, 5.0, 3))
     result = sending.costs([CLIP])
     own = result["needed"]["100"]
-    assert own["bytes"] == sorted(own["bytes"], reverse=True)
+    assert own["bytes"].tolist() == sorted(own["bytes"], reverse=True)
     for datagrams, size in zip(own["datagrams"], own["bytes"], strict=True):
         assert size > HEADERS * datagrams > 0.0
     assert result["even"]["7 doubles"][0] == 30 * (56 + HEADERS + sending.STAMP)

@@ -1,0 +1,42 @@
+"""In-betweens of keys, as work that is timed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigid_motion.motion import Poses, interpolate
+from rigid_motion.motion.poses import reshaped
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """Objects (b) with keys (n), looked at m times each; and the same as a list of pairs, as the peers want it."""
+
+    title: str
+    key_times: np.ndarray
+    keys: Poses
+    times: np.ndarray
+
+    @property
+    def in_betweens(self) -> int:
+        return self.keys.shape[0] * self.times.shape[-1]
+
+    def pairs(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the first key of each in-between among all keys of all objects, and the share u of the way on."""
+        objects, n = self.keys.shape
+        times = np.broadcast_to(self.times, (objects, self.times.shape[-1]))
+        segment = np.clip(np.searchsorted(self.key_times, times, side="right") - 1, 0, n - 2)
+        u = (times - self.key_times[segment]) / (self.key_times[segment + 1] - self.key_times[segment])
+        return (segment + n * np.arange(objects)[:, None]).ravel(), u.ravel()
+
+    def ends(self) -> tuple[Poses, Poses, np.ndarray]:
+        """Return both keys of each in-between, and u."""
+        first, u = self.pairs()
+        keys = reshaped(self.keys, -1)
+        return keys[first], keys[first + 1], u
+
+    def filled_in(self, mode: str) -> Poses:
+        """Return the in-betweens of a mode, shape (b, m): each segment is worked out once."""
+        return interpolate(self.key_times, self.keys, self.times, mode)

@@ -1,0 +1,167 @@
+"""Reproduce the paper: its figures, its table and its example, from this program, with the paper's numbers beside them.
+
+Kamarianakis, Lydatakis, Papagiannakis, "Never 'Drop the Ball' in the Operating Room", 2021. The table is made from the
+clips in assets/, and from those in a folder. The part on whole bodies takes those that --bodies names.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from rigid_motion_batch.command_line import complain, program_of
+from rigid_motion_batch.system_libraries import missing_for_rendering, require_blender, way_out
+
+SCRIPT = "research paper"
+PROGRAM = program_of(SCRIPT)
+
+require_blender(SCRIPT)
+
+import bpy
+
+from research.pages import FIGURES
+from research.studies import files_in, publish, study_parser
+from rigid_motion_batch.recordings import TrajectoryError
+from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.scenes.film import render_film, render_still
+
+from . import bodies, catching, motions, sending, strips, table, timing, triangle
+from .table import PAPER, TIME_SAVED, UPDATES
+
+EPILOG = """
+examples:
+  python scripts/research paper --recordings ../recordings --bodies ../rigs run.fbx
+  python scripts/research paper --recordings ../recordings --only table sending
+  python scripts/research paper --only pictures
+  python scripts/research pages
+
+Each part writes its numbers to docs/figures/paper_PART.json, and the pictures are in docs/paper/; the last command puts
+them into docs/paper.md. The same command gives the same numbers again, except those of timing. On two processors
+it takes less than an hour, the film longest.
+Exit code: 0 done, 2 a wrong input or option, 130 stopped by Ctrl-C.
+"""
+
+
+def main(arguments: list[str]) -> int:
+    """Reproduce the paper, and return the exit code."""
+    parser = study_parser("paper", __doc__, EPILOG)
+    parser.add_argument("--recordings", type=Path, metavar="FOLDER", help="more recordings for the table")
+    parser.add_argument(
+        "--bodies", type=Path, nargs="+", default=[], metavar="PATH", help="whole bodies, or folders of them"
+    )
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART", help=", ".join(PARTS))
+    parser.add_argument("--no-video", action="store_true", help="make pictures, but no film")
+    parser.add_argument("--rounds", type=int, default=timing.ROUNDS, metavar="N", help="of the timing (%(default)s)")
+    options = parser.parse_args(arguments)
+    if "pictures" in options.only and (missing := missing_for_rendering()):
+        print(f"{PROGRAM}: {way_out(missing)}", file=sys.stderr)
+        return 2
+    try:
+        for part in options.only:
+            print(f"{PROGRAM}: {part}", file=sys.stderr, flush=True)
+            if result := PARTS[part](options):
+                publish(f"paper_{part}", result, options, *arguments, Blender=bpy.app.version_string)
+    except (TrajectoryError, ValueError, OSError) as error:
+        complain(PROGRAM, error)
+        return 2
+    return 0
+
+
+def clips_of(options: argparse.Namespace) -> tuple[dict[str, list[Clip]], dict[str, str]]:
+    """Return the clips of each set, and of the recordings that do not count why not."""
+    files = files_in([options.recordings]) if options.recordings else []
+    recordings, left_out = motions.read_all(files, motions.read_motion)
+    sets = {"recordings": recordings, "assets": list(motions.assets().values())}
+    return {name: clips for name, clips in sets.items() if clips}, left_out
+
+
+# -- parts -------------------------------------------------------------------------------------------------------------
+
+
+def tabulate(options: argparse.Namespace) -> dict[str, Any]:
+    """Return Table 1, and why a screw wins here and loses there."""
+    sets, left_out = clips_of(options)
+    clips = [clip for of_set in sets.values() for clip in of_set]
+    needed = {clip.name: table.needed(clip, table.curves_of(clip)) for clip in clips}
+    names = [*table.MODES, *(mode + table.CHOSEN for mode in table.ADAPTIVE)]
+    first = next(iter(table.YARDSTICKS))
+    return {
+        "paper": {
+            "rates": UPDATES,
+            "updates": list(PAPER.values()),
+            "time_saved": TIME_SAVED,
+            "saved": [1.0 - fewer / rate for rate, fewer in PAPER.items()],
+        },
+        "clips": {name: [clip.name for clip in of_set] for name, of_set in sets.items()},
+        "samples": {name: sum(len(clip.times) for clip in of_set) for name, of_set in sets.items()},
+        "seconds": {name: sum(float(it.times[-1] - it.times[0]) for it in of_set) for name, of_set in sets.items()},
+        "left_out": left_out,
+        "yardsticks": table.YARDSTICKS,
+        "needed": {
+            of_set: {
+                yardstick: {
+                    name: table.mean_over(needed[clip.name][yardstick].get(name, {}) for clip in clips)
+                    for name in names
+                }
+                for yardstick in table.YARDSTICKS
+            }
+            for of_set, clips in sets.items()
+        },
+        "by_clip": {
+            clip.name: {mode: table.mean_over([needed[clip.name][first][mode]])["saved"] for mode in table.MODES}
+            for clip in clips
+        },
+        "bows": {clip.name: table.bows_of(clip) for clip in clips},
+    }
+
+
+def send(options: argparse.Namespace) -> dict[str, Any]:
+    """Return streams that are sent when needed, and the bytes of a pose."""
+    clips = next(iter(clips_of(options)[0].values()))
+    return sending.costs(clips) | {"packings": sending.packings(motions.assets()["reach"])}
+
+
+def measure_bodies(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the same of whole bodies."""
+    clips, left_out = motions.read_all(files_in(options.bodies, bodies.EXTENSIONS), bodies.read_body)
+    return bodies.measure(clips) | {"left_out": left_out} if clips else {}
+
+
+def race(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the running time of a frame, at the rates of Table 1 among others."""
+    result = json.loads((options.root / FIGURES / "paper_table.json").read_text(encoding="utf-8"))
+    needed = next(iter(result["needed"].values()))[next(iter(table.YARDSTICKS))]
+    return timing.races(motions.assets()["reach"], needed, options.rounds)
+
+
+def count_figures(_: argparse.Namespace) -> dict[str, Any]:
+    """Return the figures in numbers."""
+    caught = catching.figures(motions.assets()["throw"])
+    return {"triangle": triangle.figures(), "strips": strips.figures(), "catching": caught}
+
+
+def render(options: argparse.Namespace) -> None:
+    """Render the figures to docs/paper/."""
+    folder = options.root / "docs" / "paper"
+    folder.mkdir(parents=True, exist_ok=True)
+    caught = partial(catching.build, motions.assets()["throw"])
+    pictures = {"triangle": triangle.build, "strips": strips.build, "catching": partial(caught, film=False)}
+    for name, build in pictures.items():
+        render_still(build(), folder / f"{name}.png")
+    if not options.no_video:
+        render_film(caught(film=True), folder / "catching.mp4", lambda *_: None)
+
+
+PARTS: dict[str, Callable[[argparse.Namespace], dict[str, Any] | None]] = {
+    "table": tabulate,
+    "sending": send,
+    "bodies": measure_bodies,
+    "timing": race,
+    "figures": count_figures,
+    "pictures": render,
+}

@@ -1,0 +1,98 @@
+"""What studies share: their command line, their clock, Blender with the extension, and where their figures go."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TypeVar
+
+from research.pages import ROOT, write_figures
+from rigid_motion_batch.command_line import Parser, parser_of
+from rigid_motion_batch.recordings import TrajectoryError
+from rigid_motion_batch.recordings.reading import FORMATS
+
+EXTENSIONS = frozenset(extension for known in FORMATS for extension in known.extensions)  # of recordings
+
+Name = TypeVar("Name", bound=Hashable)
+
+
+def study_parser(name: str, description: str, epilog: str = "") -> Parser:
+    """Return the parser of a study, with the option where to write."""
+    parser = parser_of(f"research {name}", description, epilog)
+    parser.set_defaults(study=name)
+    parser.add_argument(
+        "--root", type=Path, default=ROOT, metavar="FOLDER", help="write FOLDER/docs/figures (this checkout)"
+    )
+    return parser
+
+
+def publish(name: str, figures: object, options: argparse.Namespace, *given: object, **versions: object) -> int:
+    """Write figures, made by a study with these arguments, and return the exit code."""
+    command = " ".join(["python scripts/research", options.study, *map(str, given)])
+    print(write_figures(name, figures, command, options.root, **versions))
+    return 0
+
+
+def report(text: str) -> None:
+    """Print what is measured now."""
+    print(f"{text} ...", file=sys.stderr, flush=True)
+
+
+def seconds_in_turns(
+    runs: Mapping[Name, Callable[[], object]],
+    rounds: int,
+    *,
+    warm: bool = False,
+    most: float = float("inf"),
+    clock: Callable[[], float] = time.perf_counter,
+) -> dict[Name, list[float]]:
+    """Return the seconds of every round of each, all taking turns, so that a machine that slows down slows all.
+
+    A warm run has one before it that pays for memory and caches. Whoever has used up `most` seconds has had its rounds.
+    """
+    seconds: dict[Name, list[float]] = {name: [] for name in runs}
+    for _ in range(rounds):
+        for name, run in runs.items():
+            if sum(seconds[name]) < most:
+                if warm:
+                    run()
+                start = clock()
+                run()
+                seconds[name].append(clock() - start)
+    return seconds
+
+
+@contextmanager
+def registered() -> Iterator[None]:
+    """Have the extension in Blender meanwhile."""
+    from rigid_motion import animation
+
+    animation.register()
+    try:
+        yield
+    finally:
+        animation.unregister()
+
+
+def files_in(paths: Iterable[Path], extensions: Collection[str] = EXTENSIONS) -> list[Path]:
+    """Return the files that are given, and those with these extensions in folders and below, each once.
+
+    Raises
+    ------
+    TrajectoryError
+        Where there is no such file, or none in a folder.
+    """
+    result: dict[Path, None] = {}
+    for path in paths:
+        if not path.exists():
+            raise TrajectoryError(str(path), "no such file or folder", "check the path")
+        files = [file for file in sorted(path.rglob("*")) if file.is_file() and file.suffix.lower() in extensions]
+        if path.is_dir() and not files:
+            known = ", ".join(sorted(extensions))
+            raise TrajectoryError(str(path), "no recording in this folder", f"known are {known}")
+        result |= dict.fromkeys(files if path.is_dir() else [path])
+    return list(result)
