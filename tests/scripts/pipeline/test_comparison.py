@@ -22,7 +22,7 @@ from rigid_motion_batch.pipeline.comparison import Comparison, ComparisonPlan
 from rigid_motion_batch.pipeline.comparison_steps import result_in
 from rigid_motion_batch.pipeline.executors import ProcessExecutor
 from rigid_motion_batch.pipeline.performing import Executor
-from rigid_motion_batch.pipeline.running import Outcome, Share, run
+from rigid_motion_batch.pipeline.running import Run, Share
 from rigid_motion_batch.pipeline.steps import OWN, Task
 from rigid_motion_batch.pipeline.store import OutputError, Store
 from rigid_motion_batch.recordings.clip_reading import read_clips
@@ -31,7 +31,7 @@ from rigid_motion_batch.report.settings import Settings
 from rigid_motion_batch.scenes.settings import SceneSettings
 from tests.scripts.bvh_bodies import write_body
 from tests.scripts.comparing import write_toss
-from tests.scripts.pipeline.plans import Listener, Watched, states
+from tests.scripts.pipeline.plans import Listener, Watched, run, states
 from tests.thoroughness import THOROUGH
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -49,7 +49,7 @@ def planned(*sources: Path, **fields: object) -> Comparison:
 
 def compared(
     output: Path, comparison: Comparison, executor: Executor | None = None, **options: object
-) -> tuple[Outcome, Listener]:
+) -> tuple[Run, Listener]:
     """Run a comparison in a folder."""
     listener = Listener()
     of_store = {name: options.pop(name) for name in ("alone", "overwrite") if name in options}
@@ -280,7 +280,7 @@ def test_stages_in_parts_make_the_same(output: Path, toss: Path, tmp_path: Path)
     comparison = planned(toss, other, stage=STAGE, about=ABOUT)
     for stage in ("read", "measure", "build", "render", "encode", "report"):
         for number in (1, 2):
-            outcome, _ = compared(output, comparison, alone=False, share=Share(frozenset({stage}), number, 2))
+            outcome, _ = compared(output, comparison, alone=False, share=Share(stage, number, 2))
             assert outcome.failures == {}
     whole, _ = compared(tmp_path / "whole", comparison, ProcessExecutor(2))
     assert whole.failures == {}
@@ -386,7 +386,6 @@ from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.pipeline.comparison import Comparison, ComparisonPlan
 from rigid_motion_batch.report.settings import Settings
 from rigid_motion_batch.pipeline.performing import Executor
-from rigid_motion_batch.pipeline.running import run
 from rigid_motion_batch.pipeline.store import Store
 
 with Store(Path(sys.argv[2])) as store, Executor() as executor:

@@ -9,11 +9,10 @@ import pytest
 from rigid_motion_batch.pipeline import steps as pipeline_steps
 from rigid_motion_batch.pipeline.explain import explain
 from rigid_motion_batch.pipeline.performing import Executor
-from rigid_motion_batch.pipeline.running import run
 from rigid_motion_batch.pipeline.steps import OWN, Step, Task, digest_of
 from rigid_motion_batch.pipeline.store import Store
 from tests.scripts.pipeline import steps
-from tests.scripts.pipeline.plans import joining, run_in, task, writing
+from tests.scripts.pipeline.plans import joining, run, run_in, task, writing
 from tests.scripts.pipeline.steps import Write
 
 
