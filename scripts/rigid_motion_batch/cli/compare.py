@@ -37,7 +37,7 @@ from rigid_motion_batch.pipeline.comparison import (
 from rigid_motion_batch.pipeline.executors import ProcessExecutor
 from rigid_motion_batch.pipeline.explain import explain
 from rigid_motion_batch.pipeline.performing import Executor, ExecutorError, processors
-from rigid_motion_batch.pipeline.running import Plan, Run, Share, State, Survey
+from rigid_motion_batch.pipeline.running import FAILED, STATES, Plan, Run, Share, Survey
 from rigid_motion_batch.pipeline.steps import OWN, Task
 from rigid_motion_batch.pipeline.store import OutputError, Store
 from rigid_motion_batch.places import CHECKOUT, manifest, output_folder
@@ -408,7 +408,7 @@ class _Comparing:
 
     def _as_data(self, page: Path | None, code: int) -> dict[str, Any]:
         numbers, said = self._numbers()
-        counts = {**self.work.counts, State.FAILED: len(self.work.failures)}
+        counts = {**self.work.counts, FAILED: len(self.work.failures)}
         return {
             "report": os.fspath(page) if page else None,
             "exit_code": code,
@@ -418,7 +418,7 @@ class _Comparing:
             "clips": list(numbers.clips) if numbers else [],
             "notes": self.notes,
             "failures": self.work.failures,
-            "tasks": {state.value: counts[state] for state in State if counts.get(state)},
+            "tasks": {state: counts[state] for state in STATES if counts.get(state)},
         }
 
 

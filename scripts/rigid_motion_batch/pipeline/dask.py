@@ -59,21 +59,10 @@ def _processes(jobs: int) -> ProcessExecutor:
 
 
 class DaskExecutor(Executor):
-    """The workers of a Dask scheduler.
+    """The workers of the Dask scheduler at an address, tcp://HOST:8786, or tls:// with certificates in Dask's settings.
 
-    Parameters
-    ----------
-    address : str
-        Of the scheduler: tcp://HOST:8786, or tls:// with the certificates in Dask's configuration.
-    folder : Path
-        The output folder, which all workers must see.
-    note : callable
-        Takes a line for the user about the workers.
-
-    Raises
-    ------
-    ExecutorError
-        On entering, where no scheduler answers, or all its workers are unfit; and later, where it is gone.
+    All of them must see the output folder; `note` takes lines for the user about them. Raises ExecutorError on
+    entering, where no scheduler answers, or all its workers are unfit, and later, where it is gone.
     """
 
     def __init__(self, address: str, folder: Path, note: Callable[[str], object]) -> None:
@@ -82,7 +71,6 @@ class DaskExecutor(Executor):
         self._fit: dict[str, bool] = {}
         """The workers that were asked, by their addresses."""
         self._capacity, self._looked_at = 0, 0.0
-        self._futures: set[Future[Made]] = set()
         self._client: Client
 
     @property
@@ -93,14 +81,7 @@ class DaskExecutor(Executor):
         return self._capacity
 
     def submit(self, job: Job) -> Future[Made]:
-        future = self._client.get_executor(pure=False, resources={self._resource: 1}).submit(do, job)
-        self._futures.add(future)
-        future.add_done_callback(self._futures.discard)
-        return future
-
-    def stop(self) -> None:
-        for future in [*self._futures] if self._client.status == "running" else ():
-            future.cancel()
+        return self._client.get_executor(pure=False, resources={self._resource: 1}).submit(do, job)
 
     def _look(self) -> int:
         """See which workers there are, ask those that are new, and return how many threads fit."""
@@ -153,9 +134,8 @@ class DaskExecutor(Executor):
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.stop()
         with suppress(*UNREACHABLE):
-            self._client.close(timeout=2.0)
+            self._client.close(timeout=2.0)  # Then nobody wants what is at work, and it is cancelled.
 
 
 async def _knock(address: str) -> None:

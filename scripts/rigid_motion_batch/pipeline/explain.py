@@ -7,7 +7,7 @@ from typing import Any
 
 from .running import EVERYTHING, Plan, Share
 from .steps import Task
-from .store import OutputError, Store
+from .store import Store
 
 MOST = 3
 """Number of changes that are named, of several."""
@@ -19,28 +19,30 @@ def explain(plan: Plan, store: Store, share: Share = EVERYTHING) -> Iterator[tup
     changed: dict[str, str] = {}
     """Key to name, of tasks that would be done."""
     for task in plan():
-        if not store.index_of(task.key):
-            changed[task.key] = task.shown
-        if task.name not in chosen or store.is_done(task):
-            continue
-        if task.key not in changed:
-            yield task, _unpublished(task, store)
-        elif store.folder_of(task.key).exists():
-            yield task, "its result is damaged"
-        elif earlier := latest.get(task.name):
-            yield task, _difference(task, earlier.get("made_of", {}), changed)
+        reason = ""
+        if index := store.index_of(task.key):
+            missing = [path for _, path in store.unpublished(task, index)]
+            reason = f"{_few(missing)} missing, edited or of something else" if missing else ""
         else:
-            yield task, "never done"
+            changed[task.key] = task.shown
+            earlier = latest.get(task.name, {}).get("made_of")
+            is_damaged = store.folder_of(task.key).exists()
+            reason = "its result is damaged" if is_damaged else _difference(earlier, task, changed)
+        if reason and task.name in chosen:
+            yield task, reason
 
 
-def _difference(task: Task, before: Mapping[str, Any], changed: Mapping[str, str]) -> str:
+def _difference(before: Mapping[str, Any] | None, task: Task, changed: Mapping[str, str]) -> str:
     """Return in what a task differs from what its last result was made of."""
+    if before is None:
+        return "never done"
     reasons = []
     for title, part in (("program", "versions"), ("parameters", "parameters"), ("input file", "inputs")):
         old, new = (dict(_leaves(made_of.get(part))) for made_of in (before, task.made_of))
         names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
         if part == "parameters":
-            names = [f"{name}: {old.get(name)} -> {new.get(name)}" for name in names]
+            values = [f"{old.get(name)} -> {new.get(name)}" for name in names]
+            names = [f"{name}: {v}" if len(v) < 60 else name for name, v in zip(names, values, strict=True)]
         reasons += [f"{title} changed ({_few(names)})"] if names else []
     if before.get("after") != task.made_of["after"]:
         anew = [changed[key] for key in task.after if key in changed]
@@ -57,16 +59,6 @@ def _leaves(plain: Any, name: str = "") -> Iterator[tuple[str, Any]]:
         yield name, plain
 
 
-def _unpublished(task: Task, store: Store) -> str:
-    if missing := [path for path in task.publish.values() if not (store.output / path).exists()]:
-        return f"{_few(missing)} missing"
-    try:
-        others = store.strangers(task, task.key)
-    except OutputError as error:
-        return str(error)
-    return f"{_few(others)} edited" if others else "published of something else"
-
-
 def _few(names: Iterable[str]) -> str:
-    names = [name if len(name) < 80 else name.partition(":")[0] for name in names]
+    names = [*names]
     return ", ".join(names[:MOST]) + (f" and {len(names) - MOST} more" if len(names) > MOST else "")

@@ -7,7 +7,6 @@ What ends a run is Ctrl-C, and a disk that is full or must not be written. Nothi
 
 from __future__ import annotations
 
-import enum
 import io
 import shutil
 import time
@@ -15,7 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from rigid_motion_batch.progress import Progress
 
@@ -31,17 +30,10 @@ RETRIES = 2
 LOOK = 0.2
 """Seconds between two looks at how far tasks are."""
 
-
-class State(enum.Enum):
-    """State of a task. The values are what people read."""
-
-    DONE = "done"
-    UP_TO_DATE = "up to date"
-    FAILED = "failed"
-    SKIPPED = "skipped"
-    """A task before it failed."""
-
-    STOPPED = "not begun or stopped"
+DONE, UP_TO_DATE, FAILED, SKIPPED = "done", "up to date", "failed", "skipped"
+STOPPED = "not begun or stopped"
+STATES = (DONE, UP_TO_DATE, FAILED, SKIPPED, STOPPED)
+"""States of a task, for people. It is skipped where a task before it failed."""
 
 
 @dataclass(frozen=True)
@@ -103,39 +95,33 @@ class Survey:
         return survey
 
 
+@dataclass(eq=False)
 class Run:
-    """A run in an opened store, by an opened executor: of one plan, or of several of the same work.
+    """A run in an opened store, by an opened executor: of one plan, or of several of the same work."""
 
-    Parameters
-    ----------
-    store, executor
-    progress : Progress, optional
-        Gets a stage for each plan, and what is said of tasks.
-    share : Share
-        What is to be done here; of the rest, what is there is used.
-    blender : str
-        The program for steps that need Blender, if it is not to be this one.
-    """
+    store: Store
+    executor: Executor
+    progress: Progress = field(default_factory=lambda: Progress(io.StringIO()))
+    """Gets a stage for each plan, and what is said of tasks."""
 
-    def __init__(
-        self,
-        store: Store,
-        executor: Executor,
-        progress: Progress | None = None,
-        share: Share = EVERYTHING,
-        blender: str = "",
-    ) -> None:
-        self.store, self.executor, self.progress = store, executor, progress or Progress(io.StringIO())
-        self.share, self.blender = share, blender
-        self.counts: Counter[State] = Counter()
-        self.failures: dict[str, str] = {}
-        """Task to what was wrong, in one line."""
-        self.details: dict[str, str] = {}
-        """Task to what Python said of its failure; empty where the reason is known."""
-        self.interrupted = False
-        """True if it was interrupted by Ctrl-C; then nothing is at work any more."""
-        self.problem = ""
-        """The reason why nothing more could be done, in one line; empty where everything was tried."""
+    share: Share = EVERYTHING
+    """What is to be done here; of the rest, what is there is used."""
+
+    blender: str = ""
+    """The program for steps that need Blender, if it is not to be this one."""
+
+    counts: Counter[str] = field(default_factory=Counter)
+    failures: dict[str, str] = field(default_factory=dict)
+    """Task to what was wrong, in one line."""
+
+    details: dict[str, str] = field(default_factory=dict)
+    """Task to what Python said of its failure; empty where the reason is known."""
+
+    interrupted: bool = False
+    """True if it was interrupted by Ctrl-C; then nothing is at work any more."""
+
+    problem: str = ""
+    """The reason why nothing more could be done, in one line; empty where everything was tried."""
 
     def do(self, plan: Plan, title: str = "") -> None:
         """Do what is missing of a plan, which yields the same tasks each time.
@@ -146,15 +132,15 @@ class Run:
             Before anything is done, where something would be replaced that must not be.
         """
         # What an earlier plan did is found up to date by this one.
-        done = self.counts[State.DONE]
-        self.counts = Counter({State.DONE: done, State.UP_TO_DATE: -done})
+        done = self.counts[DONE]
+        self.counts = Counter({DONE: done, UP_TO_DATE: -done})
         with self.progress.stage(title, 1.0) as self._stage:
             self._survey = Survey.of(plan, self.store, self.share)
             self._stage.total = self._survey.weight
             if self._survey.tasks:
                 self._do(plan)
             else:
-                self.counts[State.UP_TO_DATE] += self._survey.up_to_date
+                self.counts[UP_TO_DATE] += self._survey.up_to_date
         if self.share == EVERYTHING:
             failures = {name: {"message": m, "details": self.details[name]} for name, m in self.failures.items()}
             with suppress(OSError):
@@ -171,8 +157,6 @@ class Run:
         """Key of a task to how many died that did it."""
         self._reached = Survey()
         """What there was to do of the tasks that have come to their end."""
-        self._shown = 0
-        """The most frames that were shown: they do not become fewer where a worker dies."""
         try:
             self._work(self.share.tasks(plan))
             if self.share == EVERYTHING and not self.failures:
@@ -183,7 +167,7 @@ class Run:
             self.interrupted = True
         if self.problem or self.interrupted:
             self.executor.stop()
-            self.counts[State.STOPPED] = self._survey.tasks - self._reached.tasks
+            self.counts[STOPPED] = self._survey.tasks - self._reached.tasks
 
     def _work(self, rest: Iterator[Task]) -> None:
         """Do tasks, each when those before it are settled. Raises ExecutorError where nothing more can be done."""
@@ -210,7 +194,7 @@ class Run:
         """Take a task from the plan: it is up to date, or waits from now on, and is returned."""
         if task.key not in self._open and self.store.is_done(task):
             self._settled[task.key] = task.key
-            self.counts[State.UP_TO_DATE] += 1
+            self.counts[UP_TO_DATE] += 1
             return []
         self._open.add(task.key)
         self._waiting.append(task)
@@ -232,7 +216,7 @@ class Run:
         if self.store.index_of(task.key_after(before)):
             self._settle(task)
         elif None in before and not (task.step.partial and any(before)):
-            self._close(task, State.SKIPPED)
+            self._close(task, SKIPPED)
         else:
             folders = [self.store.folder_of(key) if key else None for key in before]
             job = Job(task, self.store.new_scratch(), self.store.output, folders, self.blender)
@@ -276,18 +260,18 @@ class Run:
         else:
             for spent in task.spends:
                 self.store.discard(spent)
-            self._close(task, State.DONE if is_new else State.UP_TO_DATE, key)
+            self._close(task, DONE if is_new else UP_TO_DATE, key)
 
     def _fail(self, task: Task, said: str, details: str = "", *, fatal: bool = False) -> None:
         if not fatal and self.store.discard_damaged(filter(None, self._before(task))):
             said = f"{task.shown}: what it reads was damaged; run the same command again"
         self.failures[task.name], self.details[task.name] = said, details
         self.progress.error(said)
-        self._close(task, State.FAILED)
+        self._close(task, FAILED)
         if fatal:
             raise ExecutorError(said)
 
-    def _close(self, task: Task, state: State, key: str | None = None) -> None:
+    def _close(self, task: Task, state: str, key: str | None = None) -> None:
         """Take it that a task has come to its end, with a result of this key: those after it may begin."""
         self._open.discard(task.key)
         self._settled[task.key] = key
@@ -302,8 +286,7 @@ class Run:
     def _show(self, task: Task, doing: str = "") -> None:
         """Report how far the whole is, and a task."""
         parts = [(job.reached()[0], one) for one, job in self._at_work.values()]
-        frames = self._reached.frames + sum(share * one.frames for share, one in parts)
-        self._shown = max(self._shown, int(frames))
-        counted = f"frame {self._shown} of {self._survey.frames}" if self._survey.frames else ""
+        frames = int(self._reached.frames + sum(share * one.frames for share, one in parts))
+        counted = f"frame {frames} of {self._survey.frames}" if self._survey.frames else ""
         words = ", ".join(filter(None, (": ".join(filter(None, (task.shown, doing))), counted)))
         self._stage.reach(self._reached.weight + sum(share * one.weight for share, one in parts), words)

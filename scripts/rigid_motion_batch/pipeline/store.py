@@ -35,9 +35,6 @@ from .steps import OWN, Input, Task, sha256_of
 INDEX = ".index.json"
 """Index of a result: its files with size, time of change and digest; what it was made of, in how long, and facts."""
 
-UNSETTLED = 2.0
-"""Seconds since its last change, by which a file that was hashed may have changed again without a trace in its time."""
-
 KEPT = 7 * 86400.0
 """Seconds that a result is kept that the last plan did not ask for, and what a process was making that was killed."""
 
@@ -151,8 +148,7 @@ class Store:
                 digest = sha256_of(path)
             except OSError:
                 return Input(shown, "", status.st_size, status.st_mtime_ns)
-            settled = time.time() - max(status.st_mtime, status.st_ctime) > UNSETTLED
-            self._digests[place] = [*(seen if settled else ()), digest]
+            self._digests[place] = [*seen, digest]
         return Input(shown, digest, status.st_size, status.st_mtime_ns)
 
     def _require_no_output(self, shown: str) -> None:
@@ -230,7 +226,12 @@ class Store:
     def is_done(self, task: Task) -> bool:
         """Return whether the result of a task is there, and all files that it publishes are in place."""
         index = self.index_of(task.key)
-        return index is not None and not self._unpublished(task, index)
+        return index is not None and not self.unpublished(task, index)
+
+    def unpublished(self, task: Task, index: Mapping[str, Any] | None) -> list[tuple[str, str]]:
+        """Return the files of a result that are not in place, and where they belong."""
+        files = index["files"] if index else {}
+        return [(name, path) for name, path in task.published(files) if not self._is_same(files.get(name), path)]
 
     def strangers(self, task: Task, key: str) -> list[str]:
         """Return paths where the result of a key would replace what this program has not written, or was edited since.
@@ -241,7 +242,7 @@ class Store:
             Where there is an input, or a folder, or a file where a folder must be: nothing of that is ever replaced.
         """
         index = self.index_of(key)
-        return [path for _, path in self._unpublished(task, index) if not self._is_own(path)]
+        return [path for _, path in self.unpublished(task, index) if not self._is_own(path)]
 
     def require_none(self, strangers: list[str]) -> None:
         """Raise OutputError where there are such paths, unless they may be replaced."""
@@ -265,7 +266,7 @@ class Store:
         """
         self.require_none(self.strangers(task, key))
         index = self.index_of(key) or {}
-        missing = self._unpublished(task, index)
+        missing = self.unpublished(task, index)
         for name, path in missing:
             target, beside = self.output / path, self.new_scratch()
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -292,11 +293,6 @@ class Store:
                     for folder in (self.output / path).parents:
                         if folder == self.output or not _remove_if_empty(folder):
                             break
-
-    def _unpublished(self, task: Task, index: Mapping[str, Any] | None) -> list[tuple[str, str]]:
-        """Return the files of a result that are not in place, and where they belong."""
-        files = index["files"] if index else {}
-        return [(name, path) for name, path in task.published(files) if not self._is_same(files.get(name), path)]
 
     def _is_same(self, known: tuple[int, int, str] | None, path: str) -> bool:
         """Return whether a published file is one of a result, of this size and time of change, or a copy."""

@@ -84,7 +84,7 @@ def run_in(output: Path, *tasks: Task, executor: Executor | None = None, **optio
 
 
 def states(outcome: Run) -> dict[str, int]:
-    return {state.value: number for state, number in outcome.counts.items() if number}
+    return {state: number for state, number in outcome.counts.items() if number}
 
 
 def contents(output: Path) -> dict[str, str]:

@@ -58,7 +58,7 @@ def saving(scene: Scene, store: Store, *after: Task, source: Path | None = None)
 def saved(output: Path, blender: str, fate: str = "", listener: Listener | None = None) -> Run:
     with Store(output) as store, ProcessExecutor(1) as executor:
         tasks = [saving(Scene("one", (1, 2), fate), store)]
-        return run(lambda: tasks, store, executor, blender=blender, progress=listener)
+        return run(lambda: tasks, store, executor, blender=blender, progress=listener or Listener())
 
 
 def test_a_step_is_done_by_the_program(blender: str, tmp_path: Path) -> None:

@@ -386,16 +386,18 @@ from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.pipeline.comparison import Comparison, ComparisonPlan
 from rigid_motion_batch.report.settings import Settings
 from rigid_motion_batch.pipeline.performing import Executor
+from rigid_motion_batch.pipeline.running import Run
 from rigid_motion_batch.pipeline.store import Store
 
 with Store(Path(sys.argv[2])) as store, Executor() as executor:
     choices, modes = (Tolerance("2cm"),), ("lerp_slerp", "motor_spline")
     about = Settings(0.1, "x", "y")
     plan = ComparisonPlan(Comparison((sys.argv[1],), choices, modes, count_keys=True, about=about), store)
-    run(plan.reading, store, executor)
+    run = Run(store, executor)
+    run.do(plan.reading)
     plan.look_into()
-    outcome = run(plan.tasks, store, executor)
-sys.exit(str(outcome.failures) if outcome.failures else 0)
+    run.do(plan.tasks)
+sys.exit(str(run.failures) if run.failures else 0)
 """
 
 

@@ -65,7 +65,8 @@ def test_files_that_are_missing_or_edited_are_named(output: Path) -> None:
     (output / "a.txt").unlink()
     (output / "b.txt").unlink()
     (output / "b.txt").write_text("mine")
-    assert explained(output, *two()) == {"a": "a.txt missing", "b": "b.txt edited"}
+    reason = "missing, edited or of something else"
+    assert explained(output, *two()) == {"a": f"a.txt {reason}", "b": f"b.txt {reason}"}
 
 
 def test_a_damaged_result_is_named(output: Path) -> None:
