@@ -29,23 +29,18 @@ STARTING = 120.0
 
 def version_of(blender: str) -> str:
     """Return the version of a Blender program, "5.2.3". Raises ExecutorError if it cannot be run or is no Blender."""
+    reason = "this does not say that it is Blender"
     try:
-        ended = subprocess.run(
-            [blender, "--version"], capture_output=True, text=True, errors="replace", timeout=STARTING, check=False
-        )
+        ended = subprocess.run([blender, "--version"], capture_output=True, timeout=STARTING, check=False)
+        if said := re.search(rb"^Blender (\d+\.\d+\.\d+)", ended.stdout, re.MULTILINE):
+            return said[1].decode()
     except (OSError, ValueError, subprocess.TimeoutExpired) as error:
-        said = getattr(error, "strerror", None) or str(error)
-        raise ExecutorError(f"{blender}: {said}; give the path of a Blender program") from None
-    result = re.search(r"^Blender (\d+\.\d+\.\d+)", ended.stdout, re.MULTILINE)
-    if result is None:
-        raise ExecutorError(f"{blender}: this does not say that it is Blender; give the path of a Blender program")
-    return result[1]
+        reason = getattr(error, "strerror", None) or str(error)
+    raise ExecutorError(f"{blender}: {reason}; give the path of a Blender program")
 
 
 def call_in_blender(job: Job) -> Any:
-    """Call a job's step in a Blender of its own, and return what it returns. Raises what it raises, and
-    CalledProcessError where Blender dies.
-    """
+    """Call a job's step in a Blender of its own. Raises what it raises, and CalledProcessError if Blender dies."""
     path = [os.fspath(place) for place in (PACKAGE.parent, EXTENSION.parent, *_of_module(job.task.step))]
     command = [job.blender, "--background", "--factory-startup", "--python", WORKER, "--", *path]
     with (

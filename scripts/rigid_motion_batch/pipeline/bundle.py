@@ -38,9 +38,9 @@ def write_bundle(
         Of the comparison, but for `--output`. The files that they name are looked for in the job's folder of inputs.
     output : Path
     parts : mapping
-        Of the stages that there are to how many tasks they are split into.
+        Stage to how many tasks it is split into.
     name : str
-        Of the job.
+        What farms call the job.
 
     Raises
     ------
@@ -51,19 +51,11 @@ def write_bundle(
     if braced := next((one for one in arguments if "{{" in one), None):
         raise ValueError(f"{braced!r}: a job cannot have this name, for its braces; rename it")
     arguments, inputs = below_inputs(arguments)
-    values = {
-        "Program": str(PACKAGE.parent),
-        "Python": sys.executable,
-        "Inputs": str(inputs),
-        "Output": str(output.absolute()),
-    }
-    folder.mkdir(parents=True, exist_ok=True)
+    places = {"Program": PACKAGE.parent, "Python": sys.executable, "Inputs": inputs, "Output": output.absolute()}
+    values = {parameter: str(place) for parameter, place in places.items()}
     given = [{"name": parameter, "value": value} for parameter, value in values.items()]
-    for file, content in (
-        ("parameter_values.json", {"parameterValues": given}),
-        ("template.json", _template(arguments, parts, name)),
-    ):
-        write_text(folder / file, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
+    _write(folder / "parameter_values.json", {"parameterValues": given})
+    _write(folder / "template.json", _template(arguments, parts, name))
     return values
 
 
@@ -137,6 +129,10 @@ def _python(*arguments: str) -> dict[str, Any]:
 
 def _path(name: str, description: str, flow: str) -> dict[str, Any]:
     return {"name": name, "type": "PATH", "objectType": "DIRECTORY", "dataFlow": flow, "description": description}
+
+
+def _write(path: Path, content: Mapping[str, Any]) -> None:
+    write_text(path, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
 
 
 def check(requested: str) -> None:

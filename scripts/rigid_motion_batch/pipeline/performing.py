@@ -112,9 +112,9 @@ def _make(job: Job) -> Made:
         if path.is_file() and not path.is_symlink():
             status = path.stat()
             files[path.relative_to(job.folder).as_posix()] = status.st_size, status.st_mtime_ns, sha256_of(path)
-    for name, path in task.publish.items():
+    for name, place in task.publish.items():
         if not name.endswith("/") and name not in files:
-            raise TaskError(f"{job.output / path}: this was to be made, and was not")
+            raise TaskError(f"{job.output / place}: this was to be made, and was not")
     return {"folder": job.folder, "files": files, "seconds": time.perf_counter() - started, "facts": facts or {}}
 
 

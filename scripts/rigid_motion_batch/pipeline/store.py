@@ -300,7 +300,8 @@ class Store:
             status = os.lstat(f"{self.output}/{path}")
         except OSError:
             return False
-        return bool(known) and stat.S_ISREG(status.st_mode) and [status.st_size, status.st_mtime_ns] == [*known[:2]]
+        same = known is not None and [status.st_size, status.st_mtime_ns] == [*known[:2]]
+        return same and stat.S_ISREG(status.st_mode)
 
     def _is_own(self, path: str) -> bool:
         """Return whether a path has nothing, or what this program wrote. Raises OutputError for what always stays."""
