@@ -121,13 +121,14 @@ class DaskExecutor(Executor):
             # A client that finds nobody goes on trying for long, even when it has said so.
             asyncio.run(_knock(self._address))
             self._client = Client(self._address, timeout=CONNECTING, set_as_default=False, name="rigid-motion")
-            self._look()
         except (ValueError, ImportError, TypeError) as error:  # The last one where tls:// finds no certificates.
             way_out = "give an address such as tcp://farm:8786, and certificates of tls:// in Dask's configuration"
             raise ExecutorError(f"{self._address}: {error}; {way_out}") from None
         except OSError:
             way_out = "start one with `dask scheduler`, or give the address that it prints"
             raise ExecutorError(f"{self._address}: no Dask scheduler answers there; {way_out}") from None
+        try:
+            self._look()
         except ExecutorError:
             self.__exit__()
             raise

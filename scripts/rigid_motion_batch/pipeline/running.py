@@ -187,8 +187,9 @@ class Run:
             ended, _ = wait(self._at_work, LOOK, FIRST_COMPLETED)
             for future in ended:
                 self._end(future, *self._at_work.pop(future))
-            for task, job in self._at_work.values():
-                self._show(task, job.reached()[1])
+            for task, job in () if ended else self._at_work.values():
+                job.look()
+                self._show(task, job.doing)
 
     def _meet(self, task: Task) -> list[Task]:
         """Take a task from the plan: it is up to date, or waits from now on, and is returned."""
@@ -285,7 +286,7 @@ class Run:
 
     def _show(self, task: Task, doing: str = "") -> None:
         """Report how far the whole is, and a task."""
-        parts = [(job.reached()[0], one) for one, job in self._at_work.values()]
+        parts = [(job.share, one) for one, job in self._at_work.values()]
         frames = int(self._reached.frames + sum(share * one.frames for share, one in parts))
         counted = f"frame {frames} of {self._survey.frames}" if self._survey.frames else ""
         words = ", ".join(filter(None, (": ".join(filter(None, (task.shown, doing))), counted)))

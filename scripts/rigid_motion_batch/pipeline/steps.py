@@ -30,7 +30,6 @@ DIGITS = 32
 OWN = ".rigid-motion"
 """The folder in an output folder where the pipeline keeps its own files."""
 
-
 INTERVAL = 0.2
 """Seconds between two messages about how far a task is."""
 
@@ -66,6 +65,10 @@ class Job:
     folder: Path = field(init=False)
     """Where the result's files are to be written: there, and empty, while it is done."""
 
+    share: float = 0.0
+    """The share of it that was done at the last look, and what was being done."""
+
+    doing: str = ""
     _said_at: float = 0.0
 
     @property
@@ -85,12 +88,10 @@ class Job:
                 said = json.dumps([min(done / total, 1.0) if total else 1.0, doing])
                 (self.place / "progress").write_text(said, encoding="utf-8")
 
-    def reached(self) -> tuple[float, str]:
-        """Return the share that was done when it said so last, wherever it is done, and what was being done."""
+    def look(self) -> None:
+        """See how far it is, wherever it is done."""
         with suppress(OSError, ValueError):
-            share, doing = json.loads((self.place / "progress").read_bytes())
-            return share, doing
-        return 0.0, ""
+            self.share, self.doing = json.loads((self.place / "progress").read_bytes())
 
     def note(self, text: str) -> None:
         """Say something that the user should know, in a line, when the task is done."""
