@@ -21,11 +21,6 @@ def explained(output: Path, *tasks: Task) -> dict[str, str]:
     return {task.name: reason for task, reason in explain(lambda: tasks, store)}
 
 
-@pytest.fixture
-def output(tmp_path: Path) -> Path:
-    return tmp_path / "out"
-
-
 def two(text: str = "1") -> tuple[Task, Task]:
     first = writing("a", text, title="The first")
     return first, joining("b", first)
