@@ -8,17 +8,18 @@ before anything is done, and equal tasks have one result. Standard library alone
 from __future__ import annotations
 
 import hashlib
-import importlib
 import importlib.metadata
+import inspect
 import json
 import os
+import pkgutil
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from rigid_motion_batch import places
 
@@ -141,27 +142,17 @@ class Step:
         """The versions of the program, and in a checkout of the packages it may use and the function's own module."""
         result = {"program": places.manifest()["version"]}
         if places.CHECKOUT:
-            module = importlib.import_module(self.function.__module__)
             result |= {room: digest_of(place_of_room(room)) for room in self.rooms}
-            result[self.function.__module__] = digest_of(Path(cast(str, module.__file__)))
+            result[self.function.__module__] = digest_of(Path(inspect.getfile(self.function)))
         return result
 
     def __reduce__(self) -> tuple[Callable[[str], Step], tuple[str]]:
-        return step_named, (self.name,)
+        return pkgutil.resolve_name, (self.name,)
 
 
 def step(**options: Any) -> Callable[[Callable[[Job, Any], Mapping[str, Any] | None]], Step]:
     """Make a step of a function, with the fields of `Step`."""
     return lambda function: Step(function, **options)
-
-
-def step_named(name: str) -> Step:
-    """Return the step of a name. Raises ValueError where there is none."""
-    module, _, function = name.partition(":")
-    result = getattr(importlib.import_module(module), function, None)
-    if not isinstance(result, Step):
-        raise ValueError(f"{name}: no such step")
-    return result
 
 
 @dataclass(frozen=True, slots=True)
