@@ -31,7 +31,8 @@ def main(arguments: list[str]) -> int:
         return 2
     store = Store(options.output, alone=False)
     failures = _failures(options.output / OWN / "failures.json")
-    for name, index in store.latest().items():
+    for name, key in store.latest().items():
+        index = store.index_of(key) or {}
         if not (name in failures or options.failed):
             print(printable(f"{name}: done in {index.get('seconds', 0.0):.1f} s"))
     for name, failure in failures.items():

@@ -25,9 +25,9 @@ def explain(plan: Plan, store: Store, share: Share = EVERYTHING) -> Iterator[tup
             reason = f"{_few(missing)} missing, edited or of something else" if missing else ""
         else:
             changed[task.key] = task.shown
-            earlier = latest.get(task.name, {}).get("made_of")
+            earlier = store.index_of(latest.get(task.name, "")) or {}
             is_damaged = store.folder_of(task.key).exists()
-            reason = "its result is damaged" if is_damaged else _difference(earlier, task, changed)
+            reason = "its result is damaged" if is_damaged else _difference(earlier.get("made_of"), task, changed)
         if reason and task.name in chosen:
             yield task, reason
 

@@ -61,16 +61,21 @@ EVERYTHING = Share()
 
 @dataclass
 class Survey:
-    """What there is to do of a plan."""
+    """Tasks, and what they come to."""
 
     tasks: int = 0
     up_to_date: int = 0
     weight: float = 0.0
     frames: int = 0
 
+    def add(self, task: Task) -> None:
+        self.tasks += 1
+        self.weight += task.weight
+        self.frames += task.frames
+
     @classmethod
     def of(cls, plan: Plan, store: Store, share: Share = EVERYTHING) -> Survey:
-        """Look through a plan.
+        """Look through a plan for what there is to do.
 
         Raises
         ------
@@ -88,9 +93,7 @@ class Survey:
                 survey.up_to_date += 1
             else:
                 strangers += store.strangers(task, task.key)
-                survey.tasks += 1
-                survey.weight += task.weight
-                survey.frames += task.frames
+                survey.add(task)
         store.require_none(strangers)
         return survey
 
@@ -156,7 +159,7 @@ class Run:
         self._losses: Counter[str] = Counter()
         """Key of a task to how many died that did it."""
         self._reached = Survey()
-        """What there was to do of the tasks that have come to their end."""
+        """The tasks that have come to their end."""
         try:
             self._work(self.share.tasks(plan))
             if self.share == EVERYTHING and not self.failures:
@@ -277,9 +280,7 @@ class Run:
         self._open.discard(task.key)
         self._settled[task.key] = key
         self.counts[state] += 1
-        self._reached.tasks += 1
-        self._reached.weight += task.weight
-        self._reached.frames += task.frames
+        self._reached.add(task)
         if key is None:
             self.store.withdraw(task.publish.values())  # What is there under its name was made of something else.
         self._show(task)

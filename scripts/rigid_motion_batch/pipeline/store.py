@@ -216,10 +216,10 @@ class Store:
             if folder.name not in requested and _age(folder) > KEPT:
                 self.discard(folder.name)
 
-    def latest(self) -> dict[str, Mapping[str, Any]]:
-        """Return the index of the last result of each task, by the task's name, of all that are kept."""
-        folders = sorted(self._results.glob("*"), key=_age, reverse=True)
-        return {index["name"]: index for folder in folders if (index := self.index_of(folder.name))}
+    def latest(self) -> dict[str, str]:
+        """Return the key of the last result of each task, by the task's name, of all that are kept."""
+        keys = [folder.name for folder in sorted(self._results.glob("*"), key=_age, reverse=True)]
+        return {index["name"]: key for key in keys if (index := self.index_of(key))}
 
     # -- published files ----------------------------------------------------------------------------------------------
 
