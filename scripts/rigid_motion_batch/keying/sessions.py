@@ -309,13 +309,8 @@ def _record_of(work: Work, job: Job) -> Record:
 
 def _inputs(job: Job) -> tuple[steps.Input, ...]:
     """Return the file of an input as it is now; none where that is no file, or is to be replaced."""
-    try:
-        if job.in_place or not job.file.is_file():
-            return ()
-        result = job.file.stat()
-        return (steps.Input(os.fspath(job.file), steps.sha256_of(job.file), result.st_size, result.st_mtime_ns),)
-    except (OSError, ValueError):
-        return ()
+    digest = "" if job.in_place else steps.sha256_in(job.file)
+    return (steps.Input(os.fspath(job.file), digest),) if digest else ()
 
 
 def _executor(workers: int | None, count: int) -> Executor:

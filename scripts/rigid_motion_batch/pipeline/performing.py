@@ -19,7 +19,7 @@ from typing import Any, Self
 
 from rigid_motion_batch.supervising import death
 
-from .steps import Job, TaskError, sha256_of
+from .steps import Job, TaskError, sha256_in, sha256_of
 
 Made = dict[str, Any]
 """What a job has made: the `folder`, its `files` with size, time of change and digest, the `seconds` that it took, and
@@ -105,7 +105,7 @@ def _make(job: Job) -> Made:
     else:
         facts = task.step.function(job, task.parameters)
     for one in task.inputs:
-        if one.changed():
+        if sha256_in(one.path) != one.sha256:
             raise TaskError(f"{one.path}: this file changed while it was read; run the same command again")
     files = {}
     for path in sorted(job.folder.rglob("*")):

@@ -161,18 +161,7 @@ class Input:
 
     path: str
     sha256: str
-    """The digest of its content; empty where it is missing or no file."""
-
-    size: int = -1
-    mtime_ns: int = 0
-
-    def changed(self) -> bool:
-        """Return whether the file is another by now, by size and time of change."""
-        try:
-            status = os.stat(self.path)  # noqa: PTH116 - it may be text that is no path
-        except (OSError, ValueError):
-            return self.size >= 0
-        return (status.st_size, status.st_mtime_ns) != (self.size, self.mtime_ns)
+    """The digest of its content; empty where there is no file that can be read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,6 +263,14 @@ def version_here() -> str:
         with suppress(importlib.metadata.PackageNotFoundError):
             result.append(f"{module} {importlib.metadata.version(module)}")
     return ", ".join(result)
+
+
+def sha256_in(path: Path | str) -> str:
+    """Return the digest of a file; empty where there is no file that can be read."""
+    try:
+        return sha256_of(path) if os.path.isfile(path) else ""
+    except (OSError, ValueError):
+        return ""
 
 
 def sha256_of(path: Path | str) -> str:

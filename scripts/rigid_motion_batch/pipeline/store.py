@@ -30,7 +30,7 @@ from filelock import FileLock, Timeout
 from rigid_motion_batch.files import append_lines, lines_of, write_text
 
 from .performing import Made
-from .steps import OWN, Input, Task, sha256_of
+from .steps import OWN, Input, Task, sha256_in, sha256_of
 
 INDEX = ".index.json"
 """Index of a result: its files with size, time of change and digest; what it was made of, in how long, and facts."""
@@ -144,12 +144,9 @@ class Store:
         seen = [status.st_size, status.st_mtime_ns, status.st_ctime_ns]
         *known, digest = self._digests.get(place, ("",))
         if known != seen:
-            try:
-                digest = sha256_of(path)
-            except OSError:
-                return Input(shown, "", status.st_size, status.st_mtime_ns)
+            digest = sha256_in(path)
             self._digests[place] = [*seen, digest]
-        return Input(shown, digest, status.st_size, status.st_mtime_ns)
+        return Input(shown, digest)
 
     def _require_no_output(self, shown: str) -> None:
         real, output = os.path.realpath(shown), os.path.realpath(self.output)

@@ -317,8 +317,8 @@ def test_the_digest_of_an_input_is_kept_until_it_changes(
     copying(output, source)
     hashed: list[str] = []
     monkeypatch.setattr(
-        "rigid_motion_batch.pipeline.store.sha256_of",
-        lambda path: hashed.append(str(path)) or pipeline_steps.sha256_of(path),
+        "rigid_motion_batch.pipeline.store.sha256_in",
+        lambda path: hashed.append(str(path)) or pipeline_steps.sha256_in(path),
     )
     assert copying(output, source) == {"up to date": 1}
     assert hashed == []
