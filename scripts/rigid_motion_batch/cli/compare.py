@@ -37,9 +37,9 @@ from rigid_motion_batch.pipeline.comparison import (
 from rigid_motion_batch.pipeline.executors import ProcessExecutor
 from rigid_motion_batch.pipeline.explain import explain
 from rigid_motion_batch.pipeline.performing import Executor, ExecutorError, processors
-from rigid_motion_batch.pipeline.running import Outcome, Plan, Share, State, Survey, run
+from rigid_motion_batch.pipeline.running import FAILED, STATES, Plan, Run, Share, Survey
 from rigid_motion_batch.pipeline.steps import OWN, Task
-from rigid_motion_batch.pipeline.store import FolderInUse, OutputError, Store
+from rigid_motion_batch.pipeline.store import OutputError, Store
 from rigid_motion_batch.places import CHECKOUT, manifest, output_folder
 from rigid_motion_batch.progress import FARM, Progress
 from rigid_motion_batch.recordings import TrajectoryError
@@ -86,8 +86,8 @@ def main(arguments: list[str]) -> int:
                 Progress(quiet=options.quiet, program=PROGRAM) as progress,
                 _executor(options, store, progress) as executor,
             ):
-                return _Run(options, plan, executor, progress).run()
-    except (SubjectError, FolderInUse, ExecutorError, OutputError, Refused) as error:
+                return _Comparing(options, plan, executor, progress).run()
+    except (SubjectError, ExecutorError, OutputError, Refused) as error:
         print(*(f"{PROGRAM}: {error}".splitlines()), sep="\n", file=sys.stderr)
     except OSError as error:
         complain(PROGRAM, error, options.output or "")
@@ -254,16 +254,15 @@ def _executor(options: argparse.Namespace, store: Store, progress: Progress) -> 
 # -- doing it ---------------------------------------------------------------------------------------------------------
 
 
-class _Run:
+class _Comparing:
     """A comparison in its opened folder."""
 
     def __init__(
         self, options: argparse.Namespace, plan: ComparisonPlan, executor: Executor, progress: Progress
     ) -> None:
         self.options, self.plan, self.store = options, plan, plan.store
-        self.executor, self.progress = executor, progress
-        self.notes: list[str] = []
-        self.outcome = Outcome()
+        self.progress, self.notes = progress, list[str]()
+        self.work = Run(plan.store, executor, progress, _share(options), options.blender or "")
         self.page = False
         """True if there is one of this run."""
 
@@ -272,7 +271,7 @@ class _Run:
         report(summary="Stopped. There is no new report yet; the same command goes on from here.")
         if not self.options.only or self.options.only == "read":
             self._do("Reading", self.plan.reading)
-            if self.outcome.interrupted or self.outcome.problem or self.options.only:
+            if self.work.interrupted or self.work.problem or self.options.only:
                 return self._end()
         notes = self.plan.look_into()
         warnings = [
@@ -295,10 +294,10 @@ class _Run:
         self.store.note(RECORD, dict(zip(_places([*digests], self.store.output), digests.values(), strict=True)))
         # What an earlier run found is no finding of this.
         self.store.withdraw({METRICS, JOINT_METRICS, DECIMATED, KEYS_NEEDED} - self.plan.tables)
-        if self.plan.comparison.stage and Survey.of(self.plan.tasks, self.store).amounts["frame"]:
+        if self.plan.comparison.stage and Survey.of(self.plan.tasks, self.store).frames:
             # The numbers take seconds, and films minutes: nobody has to wait for the one to see the other.
             self._do("Measuring", lambda: self.plan.tasks(films=False))
-            if self.outcome.interrupted or self.outcome.problem:
+            if self.work.interrupted or self.work.problem:
                 return self._end()
             self._show_numbers()
             report(summary="Stopped. The report holds what was ready; the same command goes on from here.")
@@ -311,17 +310,8 @@ class _Run:
         return self._end()
 
     def _do(self, title: str, tasks: Plan) -> None:
-        self.outcome = run(
-            tasks,
-            self.store,
-            self.executor,
-            progress=self.progress,
-            title=title,
-            share=_share(self.options),
-            blender=self.options.blender or "",
-            before=self.outcome,
-        )
-        self.page |= bool(self.plan.studies) and not self.outcome.interrupted
+        self.work.do(tasks, title)
+        self.page |= bool(self.plan.studies) and not self.work.interrupted
 
     def _note(self, text: str, style: str = "") -> None:
         self.notes.append(text)
@@ -329,10 +319,10 @@ class _Run:
             self.progress.note(text, style)
 
     def _say_nothing_to_compare(self) -> None:
-        if not any(self.store.result(task.key) for task in self.plan.reading()):
-            if self.options.only or not self.outcome.failures:
+        if not any(self.store.index_of(task.key) for task in self.plan.reading()):
+            if self.options.only or not self.work.failures:
                 complain(PROGRAM, "none of the recordings has been read; that is done by --only read")
-        elif not self.outcome.failures:
+        elif not self.work.failures:
             higher = "--budget" if self.options.budget else "--rates"
             complain(PROGRAM, f"every clip is too short for two keys at these rates; give higher {higher}")
 
@@ -340,9 +330,9 @@ class _Run:
         """Name what the stages before the report have not done."""
         tasks = (task for task in chain(self.plan.reading(), self.plan.tasks()) if task.step.stage != "report")
         for task in tasks:
-            if not self.store.result(task.key):
-                self.outcome.failures[task.name] = "not done: its own stage said why"
-                complain(PROGRAM, f"{task.shown}: {self.outcome.failures[task.name]}")
+            if not self.store.index_of(task.key):
+                self.work.failures[task.name] = "not done: its own stage said why"
+                complain(PROGRAM, f"{task.shown}: {self.work.failures[task.name]}")
 
     def _require_tolerances(self) -> None:
         """Raise Refused where a tolerance is larger than the motion of every clip."""
@@ -395,7 +385,7 @@ class _Run:
 
     def _end(self) -> int:
         """Say what came of it, and last the path of the report; the exit code."""
-        outcome, page = self.outcome, self.store.output / steps.PAGE
+        outcome, page = self.work, self.store.output / steps.PAGE
         there = self.page and page.exists() and not self.options.only
         report(ended=True)
         if outcome.problem:
@@ -418,7 +408,7 @@ class _Run:
 
     def _as_data(self, page: Path | None, code: int) -> dict[str, Any]:
         numbers, said = self._numbers()
-        counts = {**self.outcome.counts, State.FAILED: len(self.outcome.failures)}
+        counts = {**self.work.counts, FAILED: len(self.work.failures)}
         return {
             "report": os.fspath(page) if page else None,
             "exit_code": code,
@@ -427,23 +417,23 @@ class _Run:
             "table": terminal.as_data(terminal.lines_of(numbers)) if numbers else [],
             "clips": list(numbers.clips) if numbers else [],
             "notes": self.notes,
-            "failures": self.outcome.failures,
-            "tasks": {state.value: counts[state] for state in State if counts.get(state)},
+            "failures": self.work.failures,
+            "tasks": {state: counts[state] for state in STATES if counts.get(state)},
         }
 
 
 def _share(options: argparse.Namespace) -> Share:
     """Return what is to be done here."""
-    return Share(frozenset({options.only}), *options.part) if options.only else Share()
+    return Share(options.only or "", *options.part)
 
 
 def _explain(plan: ComparisonPlan, store: Store, share: Share) -> int:
     """Print what a run would do, and why."""
     lines = [f"{task.name}: {why}" for task, why in explain(plan.reading, store, share)]
-    if any(not store.result(task.key) for task in plan.reading()):
-        if share.stages != {"read"}:
+    if any(not store.index_of(task.key) for task in plan.reading()):
+        if share.stage != "read":
             lines.append("What follows from these recordings is known when they have been read.")
-    elif share.stages != {"read"}:
+    elif share.stage != "read":
         plan.look_into()
         lines += [f"{task.name}: {why}" for task, why in explain(plan.tasks, store, share)]
     print(*(lines or ["nothing to do"]), sep="\n")

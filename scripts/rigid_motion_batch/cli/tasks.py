@@ -31,9 +31,10 @@ def main(arguments: list[str]) -> int:
         return 2
     store = Store(options.output, alone=False)
     failures = _failures(options.output / OWN / "failures.json")
-    for name, result in store.latest().items():
+    for name, key in store.latest().items():
+        index = store.index_of(key) or {}
         if not (name in failures or options.failed):
-            print(printable(f"{name}: done in {result.index.get('seconds', 0.0):.1f} s"))
+            print(printable(f"{name}: done in {index.get('seconds', 0.0):.1f} s"))
     for name, failure in failures.items():
         print(printable(f"{name}: failed: {failure['message']}"))
         if options.failed and failure.get("details"):

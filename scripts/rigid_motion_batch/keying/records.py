@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from rigid_motion_batch.files import append_lines, lines_of, written_beside
-from rigid_motion_batch.pipeline.steps import OWN, sha256_of
+from rigid_motion_batch.pipeline.steps import OWN, sha256_in, sha256_of
 
 from .output_files import FileProblem, refuse_came_meanwhile, refuse_long_name
 
@@ -76,7 +76,7 @@ class Record:
             "source": self._source,
             "key": key,
             "written": [_from(self.folder, path) for path in written],
-            "files": {_from(self.folder, path): _digest(path) for path in (*written, *beside, *read)},
+            "files": {_from(self.folder, path): sha256_in(path) for path in (*written, *beside, *read)},
             "facts": dict(facts),
         }
         with suppress(OSError):
@@ -88,7 +88,7 @@ class Record:
         """
         with suppress(LookupError, TypeError, AttributeError):
             line = [line for line in self._lines if line.get("key") == key][-1]
-            if all(_digest(self.folder / name) == digest for name, digest in line["files"].items()):
+            if all(sha256_in(self.folder / name) == digest for name, digest in line["files"].items()):
                 return [self.folder / name for name in line["written"]], line["facts"]
         return None
 
@@ -112,7 +112,7 @@ def is_made(path: Path) -> bool:
 def _is_among(path: Path, name: str, lines: Iterable[Mapping[str, Any]]) -> bool:
     """Return whether a file is as lines of a record say under its name."""
     digests = {line.get("sha256") for line in lines if line.get("file") == name}
-    return bool(digests) and _digest(path) in digests
+    return bool(digests) and sha256_in(path) in digests
 
 
 def _lines_of(file: Path) -> Sequence[dict[str, Any]]:
@@ -134,11 +134,3 @@ def _from(folder: Path, path: str | os.PathLike[str]) -> str:
         return Path(os.path.relpath(path, folder)).as_posix()
     except ValueError:  # On another drive.
         return Path(os.path.abspath(path)).as_posix()
-
-
-def _digest(path: Path) -> str:
-    """Return the digest of a file; empty where it cannot be read."""
-    try:
-        return sha256_of(path) if path.is_file() else ""
-    except OSError:
-        return ""

@@ -15,7 +15,7 @@ import tempfile
 import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -23,7 +23,7 @@ from typing import cast
 
 from rigid_motion_batch.command_line import complain, path_line, printable
 from rigid_motion_batch.pipeline import steps
-from rigid_motion_batch.pipeline.performing import Answer, Executor, ExecutorError, Order, answer_of, processors
+from rigid_motion_batch.pipeline.performing import Executor, ExecutorError, Made, loss, processors
 from rigid_motion_batch.progress import Progress, Stage
 from rigid_motion_batch.supervising import blender_program, report, stop_signals, written_of
 
@@ -222,7 +222,7 @@ class _Session:
         """By the places of the inputs."""
         self._at_work: dict[int, str] = {}
         """Places of inputs to the keys of their results."""
-        self._futures: dict[Future[Answer], tuple[int, Order]] = {}
+        self._futures: dict[Future[Made], tuple[int, steps.Job]] = {}
 
     @property
     def in_order(self) -> list[Outcome]:
@@ -240,8 +240,7 @@ class _Session:
                     stop_if_asked()
             ended, _ = wait(self._futures, LOOK, FIRST_COMPLETED)
             for future in ended:
-                place, order = self._futures.pop(future)
-                self._end(place, answer_of(future, order))
+                self._end(future, *self._futures.pop(future))
             self._show(stage)
 
     def take_partly(self, stopped: Stopped) -> None:
@@ -279,34 +278,28 @@ class _Session:
             for path in written:
                 outcome.add_written(path)
             return
-        order = Order(
-            step=keyed,
-            parameters=(self._work, job),
-            before=(),
-            inputs=task.inputs,
-            requested={},
-            output=os.fspath(job.folder),
-            folder=os.fspath(self._scratch / str(place)),
-        )
+        request = steps.Job(replace(task, parameters=(self._work, job)), self._scratch / str(place), job.folder)
         self._at_work[place] = key
         self._show(stage)
         stop_if_asked()
-        self._futures[self._executor.submit(order, lambda *_: None)] = place, order
+        self._futures[self._executor.submit(request)] = place, request
 
-    def _end(self, place: int, answer: Answer) -> None:
+    def _end(self, future: Future[Made], place: int, request: steps.Job) -> None:
         """Take what came of an input."""
         job, key = self._jobs[place], self._at_work.pop(place)
-        for note in answer.notes:
+        for note in request.notes():
             self._note(note)
-        if answer.index:
-            outcome = answer.index["facts"]["outcome"]
+        outcome = Outcome(job.source, failed=True)
+        try:
+            outcome = future.result()["facts"]["outcome"]
+        except steps.TaskError as error:
+            self._note(f"{job.source}: {str(error).removeprefix(f'{job.source}: ')}")
+        except (CancelledError, Exception) as error:
+            self._note(f"{job.source}: {loss(error, request)}: leave it out, or see whether Blender opens it")
+        else:
             if key and outcome.is_whole and not self._work.dry_run:
                 facts = {"matched": sorted(outcome.matched)}
                 _record_of(self._work, job).keep(key, outcome.written, outcome.beside, outcome.read, facts)
-        else:
-            way_out = ": leave it out, or see whether Blender opens it" if answer.lost else ""
-            self._note(f"{job.source}: {answer.problem.removeprefix(f'{job.source}: ')}{way_out}")
-            outcome = Outcome(job.source, failed=True)
         self._outcomes[place] = outcome
 
 
@@ -316,13 +309,8 @@ def _record_of(work: Work, job: Job) -> Record:
 
 def _inputs(job: Job) -> tuple[steps.Input, ...]:
     """Return the file of an input as it is now; none where that is no file, or is to be replaced."""
-    try:
-        if job.in_place or not job.file.is_file():
-            return ()
-        result = job.file.stat()
-        return (steps.Input(os.fspath(job.file), steps.sha256_of(job.file), result.st_size, result.st_mtime_ns),)
-    except (OSError, ValueError):
-        return ()
+    digest = "" if job.in_place else steps.sha256_in(job.file)
+    return (steps.Input(os.fspath(job.file), digest),) if digest else ()
 
 
 def _executor(workers: int | None, count: int) -> Executor:

@@ -11,7 +11,7 @@
             yield counting
             yield Task(report, Report(), "report", after=(counting.key,), publish={"report.html": "report.html"})
 
-        outcome = run(plan, store, executor)
+        Run(store, executor).do(plan)
 
 A result is kept under a digest of all that it depends on, so a second run does only what is missing or has changed,
 and whatever is killed, the same call goes on from there.

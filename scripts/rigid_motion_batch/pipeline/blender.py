@@ -1,7 +1,6 @@
-"""Orders in a Blender of the user's: one program for each, `BLENDER --background --python worker.py -- ORDER PATH...`.
+"""Steps in a Blender of the user's: a program for each job, `BLENDER --background --python worker.py -- PATH...`.
 
-Order and answer are pickled into a temporary folder that no one else may enter. The step's modules are found by path;
-they may use the standard library, NumPy and bpy, which is what a Blender has.
+The step's modules are found by path; they may use the standard library, NumPy and bpy, which is what a Blender has.
 """
 
 from __future__ import annotations
@@ -13,15 +12,14 @@ import subprocess
 import sys
 import tempfile
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
-from typing import cast
+from typing import IO, Any, cast
 
 from rigid_motion_batch.places import EXTENSION, PACKAGE
-from rigid_motion_batch.supervising import death, end_with_parent
+from rigid_motion_batch.supervising import end_with_parent
 
-from .performing import INTERVAL, Answer, ExecutorError, Order, Tell, last_words, progress_of
-from .steps import Step
+from .performing import ExecutorError
+from .steps import Job, Step
 
 WORKER = str(Path(__file__).with_name("worker.py"))
 
@@ -31,51 +29,42 @@ STARTING = 120.0
 
 def version_of(blender: str) -> str:
     """Return the version of a Blender program, "5.2.3". Raises ExecutorError if it cannot be run or is no Blender."""
+    reason = "this does not say that it is Blender"
     try:
-        ended = subprocess.run(
-            [blender, "--version"], capture_output=True, text=True, errors="replace", timeout=STARTING, check=False
-        )
+        ended = subprocess.run([blender, "--version"], capture_output=True, timeout=STARTING, check=False)
+        if said := re.search(rb"^Blender (\d+\.\d+\.\d+)", ended.stdout, re.MULTILINE):
+            return said[1].decode()
     except (OSError, ValueError, subprocess.TimeoutExpired) as error:
-        said = getattr(error, "strerror", None) or str(error)
-        raise ExecutorError(f"{blender}: {said}; give the path of a Blender program") from None
-    result = re.search(r"^Blender (\d+\.\d+\.\d+)", ended.stdout, re.MULTILINE)
-    if result is None:
-        raise ExecutorError(f"{blender}: this does not say that it is Blender; give the path of a Blender program")
-    return result[1]
+        reason = getattr(error, "strerror", None) or str(error)
+    raise ExecutorError(f"{blender}: {reason}; give the path of a Blender program")
 
 
-def perform_in_blender(order: Order, tell: Tell | None) -> Answer:
-    """Do an order in a Blender of its own, as `perform` does it here."""
-    path = [os.fspath(place) for place in (PACKAGE.parent, EXTENSION.parent, *_of_module(order.step))]
-    try:
-        with tempfile.TemporaryDirectory() as folder:
-            file, answer, log = (Path(folder, name) for name in ("order", "order.answer", "log"))
-            file.write_bytes(pickle.dumps(replace(order, blender="")))
-            command = [order.blender, "--background", "--factory-startup", "--python", WORKER, "--", str(file), *path]
-            with (
-                log.open("wb") as errors,
-                subprocess.Popen(
-                    command,
-                    stdin=subprocess.PIPE,  # Whose end tells it that nobody waits any more.
-                    stdout=subprocess.DEVNULL,
-                    stderr=errors,
-                    preexec_fn=end_with_parent if sys.platform == "linux" else None,
-                ) as process,
-            ):
-                while _is_at_work(process):
-                    if tell and (progress := progress_of(order)):
-                        tell(*progress)
-            if answer.exists():
-                return pickle.loads(answer.read_bytes())
-            return Answer(problem=f"Blender died ({death(process.returncode)}){last_words(log)}", lost=True)
-    except OSError as error:
-        return Answer(problem=f"{order.blender}: {error.strerror}")
-
-
-def _is_at_work(process: subprocess.Popen) -> bool:
-    with suppress(subprocess.TimeoutExpired):
-        process.wait(INTERVAL)
-    return process.returncode is None
+def call_in_blender(job: Job) -> Any:
+    """Call a job's step in a Blender of its own. Raises what it raises, and CalledProcessError if Blender dies."""
+    path = [os.fspath(place) for place in (PACKAGE.parent, EXTENSION.parent, *_of_module(job.task.step))]
+    command = [job.blender, "--background", "--factory-startup", "--python", WORKER, "--", *path]
+    with (
+        tempfile.TemporaryFile() as answer,
+        (job.place / "log").open("ab") as log,
+        subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,  # Whose end tells it that nobody waits any more.
+            stdout=answer,
+            stderr=log,
+            preexec_fn=end_with_parent if sys.platform == "linux" else None,
+        ) as process,
+    ):
+        with suppress(BrokenPipeError):
+            stream = cast(IO[bytes], process.stdin)
+            pickle.dump(job, stream)
+            stream.flush()
+        if code := process.wait():
+            raise subprocess.CalledProcessError(code, command)
+        answer.seek(0)
+        facts, error = pickle.load(answer)
+    if error:
+        raise error
+    return facts
 
 
 def _of_module(step: Step) -> list[Path]:

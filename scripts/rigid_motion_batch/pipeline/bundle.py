@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,22 +22,12 @@ from .steps import version_here
 STAGES = ("read", "measure", "build", "render", "encode", "report")
 """Stages of a comparison; each begins when all before it have ended."""
 
-COMPARE = ("-m", "rigid_motion_batch", "compare")
-
-CHECK = ("-m", "rigid_motion_batch.pipeline.bundle")
-"""Arguments of Python for a check that fails where the version after them is not that of the program: see `main`."""
-
 MOST_PARTS = 1024
 """Values of a parameter, in Open Job Description."""
 
 
 def write_bundle(
-    folder: Path,
-    arguments: Sequence[str],
-    output: Path,
-    parts: Mapping[str, int],
-    name: str,
-    command: Sequence[str] = COMPARE,
+    folder: Path, arguments: Sequence[str], output: Path, parts: Mapping[str, int], name: str
 ) -> dict[str, str]:
     """Write the files of a bundle, and return the parameters of the job for a farm on which all is where it is here.
 
@@ -48,11 +38,9 @@ def write_bundle(
         Of the comparison, but for `--output`. The files that they name are looked for in the job's folder of inputs.
     output : Path
     parts : mapping
-        Of the stages that there are to how many tasks they are split into.
+        Stage to how many tasks it is split into.
     name : str
-        Of the job.
-    command : sequence of str
-        What Python runs.
+        What farms call the job.
 
     Raises
     ------
@@ -63,16 +51,11 @@ def write_bundle(
     if braced := next((one for one in arguments if "{{" in one), None):
         raise ValueError(f"{braced!r}: a job cannot have this name, for its braces; rename it")
     arguments, inputs = below_inputs(arguments)
-    values = {
-        "Program": str(PACKAGE.parent),
-        "Python": sys.executable,
-        "Inputs": str(inputs),
-        "Output": str(output.absolute()),
-    }
-    folder.mkdir(parents=True, exist_ok=True)
+    places = {"Program": PACKAGE.parent, "Python": sys.executable, "Inputs": inputs, "Output": output.absolute()}
+    values = {parameter: str(place) for parameter, place in places.items()}
     given = [{"name": parameter, "value": value} for parameter, value in values.items()]
-    write_text(folder / "parameter_values.json", _json({"parameterValues": given}))
-    write_text(folder / "template.json", _json(_template([*command, *arguments], parts, name)))
+    _write(folder / "parameter_values.json", {"parameterValues": given})
+    _write(folder / "template.json", _template(arguments, parts, name))
     return values
 
 
@@ -81,33 +64,31 @@ def below_inputs(arguments: Sequence[str]) -> tuple[list[str], Path]:
 
     The program of `--blender` is none of the inputs.
     """
-    programs = {place + 1 for place, one in enumerate(arguments) if one == "--blender"}
-    is_input = [place not in programs and not one.startswith("--blender=") for place, one in enumerate(arguments)]
-    result = [
-        (one, *(_file_in(one) if requested else ("", "", one)))
-        for one, requested in zip(arguments, is_input, strict=True)
-    ]
-    files = [os.path.abspath(file) for _, _, file, _ in result if file]
-    inputs = Path(os.path.commonpath([os.path.dirname(file) for file in files])) if files else Path.cwd()
+    parts = [_file_in(one, before) for before, one in zip(["", *arguments], arguments, strict=False)]
+    places = [os.path.abspath(file) for _, file, _ in parts if file]
+    inputs = Path(os.path.commonpath([os.path.dirname(place) for place in places])) if places else Path.cwd()
 
     def moved(option: str, file: str, rest: str) -> str:
-        return f"{option}{{{{Param.Inputs}}}}/{Path(os.path.abspath(file)).relative_to(inputs).as_posix()}{rest}"
+        below = f"{{{{Param.Inputs}}}}/{Path(os.path.abspath(file)).relative_to(inputs).as_posix()}" if file else ""
+        return option + below + rest
 
-    return [moved(*parts) if parts[1] else one for one, *parts in result], inputs
+    return [moved(*each) for each in parts], inputs
 
 
-def _file_in(argument: str) -> tuple[str, str, str]:
-    """Return what stands before the file in an argument, the file, and what is behind it; no file if there is none."""
+def _file_in(argument: str, before: str) -> tuple[str, str, str]:
+    """Return what stands before the file in an argument, the file or folder, and what is behind it; "" for none."""
     option, equals, value = argument.partition("=") if argument.startswith("-") else ("", "", argument)
-    ends = [len(value), *(place for place in range(len(value) - 1, 0, -1) if value[place] == ":")]
     # A number is no file, whatever lies in the current folder.
-    there = (end for end in ends if not value.replace(".", "").isdigit() and os.path.exists(value[:end]))
-    end = next(there, 0) if "\0" not in value else 0
+    if "--blender" in (option, before) or "\0" in value or value.replace(".", "").isdigit():
+        return argument, "", ""
+    ends = [len(value), *(place for place in range(len(value) - 1, 0, -1) if value[place] == ":")]
+    end = next((end for end in ends if os.path.exists(value[:end])), 0)
     return option + equals, value[:end], value[end:]
 
 
-def _template(command: Sequence[str], parts: Mapping[str, int], name: str) -> dict[str, Any]:
+def _template(arguments: Sequence[str], parts: Mapping[str, int], name: str) -> dict[str, Any]:
     stages = [stage for stage in STAGES if stage in parts]
+    check = f"from rigid_motion_batch.pipeline.bundle import check; check({version_here()!r})"
     return {
         "specificationVersion": "jobtemplate-2023-09",
         "name": name,
@@ -122,27 +103,27 @@ def _template(command: Sequence[str], parts: Mapping[str, int], name: str) -> di
             {
                 "name": "Rigid Motion",
                 "variables": {"PYTHONPATH": "{{Param.Program}}", FARM: "openjd"},
-                "script": {"actions": {"onEnter": _action([*CHECK, version_here()])}},
+                "script": {"actions": {"onEnter": _python("-c", check)}},
             }
         ],
         "steps": [
-            _step(stage, before, min(max(parts[stage], 1), MOST_PARTS), command)
-            for stage, before in zip(stages, [None, *stages], strict=False)
+            _step(stage, before, min(max(parts[stage], 1), MOST_PARTS), arguments)
+            for stage, before in zip(stages, ["", *stages], strict=False)
         ],
     }
 
 
-def _step(stage: str, before: str | None, parts: int, command: Sequence[str]) -> dict[str, Any]:
+def _step(stage: str, before: str, parts: int, arguments: Sequence[str]) -> dict[str, Any]:
     share = ("--output", "{{Param.Output}}", "--only", stage, "--part", f"{{{{Task.Param.Part}}}}/{parts}")
     return {
         "name": stage.capitalize(),
         **({"dependencies": [{"dependsOn": before.capitalize()}]} if before else {}),
         "parameterSpace": {"taskParameterDefinitions": [{"name": "Part", "type": "INT", "range": f"1-{parts}"}]},
-        "script": {"actions": {"onRun": _action([*command, *share])}},
+        "script": {"actions": {"onRun": _python("-m", "rigid_motion_batch", "compare", *arguments, *share)}},
     }
 
 
-def _action(arguments: Iterable[str]) -> dict[str, Any]:
+def _python(*arguments: str) -> dict[str, Any]:
     return {"command": "{{Param.Python}}", "args": [*arguments]}
 
 
@@ -150,16 +131,12 @@ def _path(name: str, description: str, flow: str) -> dict[str, Any]:
     return {"name": name, "type": "PATH", "objectType": "DIRECTORY", "dataFlow": flow, "description": description}
 
 
-def _json(content: Any) -> str:
-    return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+def _write(path: Path, content: Mapping[str, Any]) -> None:
+    write_text(path, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
 
 
-def main(requested: str) -> int:
-    """Make sure that this is the version of the program that wrote a bundle."""
+def check(requested: str) -> None:
+    """End a session of a farm where this is not the version of the program that wrote its bundle."""
     if (result := version_here()) != requested:
         print(f"openjd_fail: this machine has {result}, and the bundle is of {requested}", flush=True)
-    return int(result != requested)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1]))
+        sys.exit(1)

@@ -198,7 +198,7 @@ class ComparisonPlan:
     def _look_into(self) -> list[str]:
         comparison = self.comparison
         readers = [task.key for task in self._readers]
-        folders = {key: result.folder for key in dict.fromkeys(readers) if (result := self.store.result(key))}
+        folders = {key: self.store.folder_of(key) for key in dict.fromkeys(readers) if self.store.index_of(key)}
         read = {
             key: values.read(tuple[str, tuple[ClipFacts, ...]], folder / "facts") for key, folder in folders.items()
         }
@@ -378,11 +378,11 @@ class ComparisonPlan:
         pieces = math.ceil(count / PIECE)
         firsts = [1 + count * number // pieces for number in range(pieces + 1)]
         rendering: list[Task] = []
-        about: dict[str, Any] = {"title": title, "unit": "frame", "group": study.name}
+        about: dict[str, Any] = {"title": title, "group": study.name}
         for first, following in itertools.pairwise(firsts):
             frames, name = following - first, f"{folder} from {first}"
             part = steps.Frames(title, first, following - 1)
-            about |= {"weight": seconds * frames, "amount": frames}
+            about |= {"weight": seconds * frames, "frames": frames}
             rendering.append(Task(steps.render, part, f"render {name}", (building.key,), **about))
         keys = tuple(task.key for task in rendering)
         encoding = Task(
@@ -396,7 +396,7 @@ class ComparisonPlan:
             weight=seconds * count * 0.06,
             group=folder,
         )
-        if not self.store.result(encoding.key):
+        if not self.store.index_of(encoding.key):
             yield from rendering
         yield encoding
 

@@ -1,7 +1,8 @@
-"""Many machines: the workers of a Dask scheduler do orders, each in processes of its own, as they are done here.
+"""Many machines: the workers of a Dask scheduler do jobs, each in processes of its own, as they are done here.
 
 The output folder is on a disk that all share. Every worker is asked first whether it has this version of the program,
-and sees the folder; only those that fit get orders.
+and sees the folder. Those that fit get a resource of Dask's, which jobs need: so Dask sends them there alone, and those
+of a worker that dies to another.
 """
 
 from __future__ import annotations
@@ -11,8 +12,8 @@ import logging
 import multiprocessing
 import os
 import time
-from collections import Counter
-from collections.abc import Callable
+import uuid
+from collections.abc import Awaitable, Callable
 from concurrent.futures import CancelledError, Future, wait
 from contextlib import suppress
 from functools import cache
@@ -23,8 +24,8 @@ from distributed import Client, Security, get_worker
 from distributed.comm import connect
 
 from .executors import ProcessExecutor
-from .performing import Answer, Executor, ExecutorError, Order, Tell, answer_of
-from .steps import version_here
+from .performing import Executor, ExecutorError, Made
+from .steps import Job, version_here
 
 CONNECTING = 5.0
 """Seconds that a scheduler has to answer."""
@@ -33,21 +34,21 @@ BUSY = 30.0
 """Seconds that one may take to answer which is connected: where it is gone, that is seen at once."""
 
 LOOK = 0.5
-"""Seconds between two looks at which workers there are, and at whether an order is still needed."""
+"""Seconds between two looks at which workers there are, and at whether a job is still to be done."""
 
 UNREACHABLE = (OSError, RuntimeError, TimeoutError, CancelledError)
 """Errors that Dask raises where its scheduler does not answer."""
 
 
-def do(order: Order) -> Answer:
-    """Do an order on a worker, in a process of its own, which ends with the worker, or where the order is cancelled."""
+def do(job: Job) -> Made:
+    """Do a job on a worker, in a process of its own, which ends with the worker, or where the job is cancelled."""
     worker = get_worker()
-    key, future = worker.get_current_task(), _processes(worker.state.nthreads).submit(order)
+    key, future = worker.get_current_task(), _processes(worker.state.nthreads).submit(job)
     while not wait([future], LOOK).done:
         task = worker.state.tasks.get(key)
         if (task is None or task.state == "cancelled") and future.cancel():
             break
-    return answer_of(future, order)
+    return future.result()
 
 
 @cache
@@ -58,112 +59,51 @@ def _processes(jobs: int) -> ProcessExecutor:
 
 
 class DaskExecutor(Executor):
-    """The workers of a Dask scheduler.
+    """The workers of the Dask scheduler at an address, tcp://HOST:8786, or tls:// with certificates in Dask's settings.
 
-    Parameters
-    ----------
-    address : str
-        Of the scheduler: tcp://HOST:8786, or tls:// with the certificates in Dask's configuration.
-    folder : Path
-        The output folder, which all workers must see.
-    note : callable
-        Takes a line for the user about the workers.
-
-    Raises
-    ------
-    ExecutorError
-        On entering, where no scheduler answers, or all its workers are unfit; and later, where it is gone.
+    All of them must see the output folder; `note` takes lines for the user about them. Raises ExecutorError on
+    entering, where no scheduler answers, or all its workers are unfit, and later, where it is gone.
     """
 
     def __init__(self, address: str, folder: Path, note: Callable[[str], object]) -> None:
         self._address, self._folder, self._note = address, folder, note
+        self._resource = f"rigid-motion-{uuid.uuid4().hex[:8]}"
         self._fit: dict[str, bool] = {}
         """The workers that were asked, by their addresses."""
-        self._workers: dict[str, int] = {}
-        """The workers that fit at the last look, and how many threads each has."""
-        self._looked_at = 0.0
-        self._alone = False
-        """True if it was reported that there is no worker."""
-        self._at_work: dict[Future[Answer], str] = {}
+        self._capacity, self._looked_at = 0, 0.0
         self._client: Client
 
     @property
     def capacity(self) -> int:  # type: ignore[override]  # it is only read
-        """The threads of all workers as they are now. What was done by one that is gone is cancelled."""
+        """The threads of all workers that fit. Raises ExecutorError where there are workers, and none of them fits."""
         if time.monotonic() - self._looked_at > LOOK:
-            self._workers, self._looked_at = self.workers(), time.monotonic()
-            for future, worker in [*self._at_work.items()]:
-                if worker not in self._workers:
-                    future.cancel()
-        return sum(self._workers.values())
+            self._capacity, self._looked_at = self._look(), time.monotonic()
+        return self._capacity
 
-    def submit(self, order: Order, tell: Tell | None = None) -> Future[Answer]:
-        busy = Counter(self._at_work.values())
-        worker = max(self._workers, key=lambda one: self._workers[one] - busy[one])
-        future = self._client.get_executor(workers=[worker], pure=False).submit(do, order)
-        self._at_work[future] = worker
-        future.add_done_callback(lambda future: self._at_work.pop(future, None))
-        return future
+    def submit(self, job: Job) -> Future[Made]:
+        return self._client.get_executor(pure=False, resources={self._resource: 1}).submit(do, job)
 
-    def stop(self) -> None:
-        for future in [*self._at_work] if self._client.status == "running" else ():
-            future.cancel()
-
-    def workers(self) -> dict[str, int]:
-        """Return the threads of each worker that fits, by address. Raises ExecutorError where there is none ever."""
-        threads = self._threads()
+    def _look(self) -> int:
+        """See which workers there are, ask those that are new, and return how many threads fit."""
+        threads, before = self._threads(), bool(self._fit)
         for address in self._fit.keys() - threads.keys():
             if self._fit.pop(address):
                 self._note(f"worker {address} is gone; others go on with its tasks")
         if strangers := [*threads.keys() - self._fit.keys()]:
             answers: dict[str, str | BaseException] = {}
             with suppress(*UNREACHABLE):
-                ask = _asker(version_here(), os.fspath(self._folder))
+                ask = _asker(version_here(), os.fspath(self._folder), self._resource)
                 answers = self._client.run(ask, workers=strangers, on_error="return")
             for address, said in answers.items():
-                if isinstance(said, OSError):
-                    continue  # It is seen again at the next look, or gone.
-                self._fit[address] = not said
-                if said:
-                    self._note(f"worker {address}: {said}; it is left out")
+                if isinstance(said, str):  # Otherwise it is seen again at the next look, or gone.
+                    self._fit[address] = not said
+                    if said:
+                        self._note(f"worker {address}: {said}; it is left out")
         if self._fit and not any(self._fit.values()):
             raise ExecutorError(f"{self._address}: none of its workers is fit")
-        if not threads and not self._alone:
+        if not threads and (before or not self._looked_at):
             self._note(f"{self._address} has no worker; waiting for one: `dask worker {self._address}`")
-        self._alone = not threads
-        return {address: threads[address] for address, fits in self._fit.items() if fits}
-
-    def __enter__(self) -> Self:
-        for name in ("distributed", "distributed.client"):
-            # What there is to say of the connection is said here, in one line.
-            logging.getLogger(name).setLevel(logging.CRITICAL)
-        try:
-            # A client that finds nobody goes on trying for long, even when it has said so.
-            asyncio.run(_knock(self._address))
-            self._client = Client(self._address, timeout=CONNECTING, set_as_default=False, name="rigid-motion")
-        except TypeError:
-            raise ExecutorError(
-                f"{self._address}: Dask's configuration has no certificates; set "
-                "DASK_DISTRIBUTED__COMM__TLS__CA_FILE, and CERT and KEY of the CLIENT"
-            ) from None
-        except (ValueError, ImportError) as error:
-            raise ExecutorError(f"{self._address}: {error}; give an address such as tcp://farm:8786") from None
-        except OSError:
-            raise ExecutorError(
-                f"{self._address}: no Dask scheduler answers there; start one with `dask scheduler`, or give the "
-                "address that it prints"
-            ) from None
-        try:
-            self.workers()
-        except BaseException:
-            self.__exit__()
-            raise
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.stop()
-        with suppress(*UNREACHABLE):
-            self._client.close(timeout=2.0)
+        return sum(threads[address] for address, fits in self._fit.items() if fits)
 
     def _threads(self) -> dict[str, int]:
         """Return the workers that the scheduler knows, and how many threads each has."""
@@ -173,6 +113,31 @@ class DaskExecutor(Executor):
                 return {address: worker["nthreads"] for address, worker in result["workers"].items()}
         raise ExecutorError(f"{self._address}: the Dask scheduler is gone")
 
+    def __enter__(self) -> Self:
+        for name in ("distributed", "distributed.client"):
+            # What there is to say of the connection is said here, in one line.
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+        try:
+            # A client that finds nobody goes on trying for long, even when it has said so.
+            asyncio.run(_knock(self._address))
+            self._client = Client(self._address, timeout=CONNECTING, set_as_default=False, name="rigid-motion")
+        except (ValueError, ImportError, TypeError) as error:  # The last one where tls:// finds no certificates.
+            way_out = "give an address such as tcp://farm:8786, and certificates of tls:// in Dask's configuration"
+            raise ExecutorError(f"{self._address}: {error}; {way_out}") from None
+        except OSError:
+            way_out = "start one with `dask scheduler`, or give the address that it prints"
+            raise ExecutorError(f"{self._address}: no Dask scheduler answers there; {way_out}") from None
+        try:
+            self._look()
+        except ExecutorError:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with suppress(*UNREACHABLE):
+            self._client.close(timeout=2.0)  # Then nobody wants what is at work, and it is cancelled.
+
 
 async def _knock(address: str) -> None:
     """Raise OSError where nothing answers that speaks Dask's protocol."""
@@ -181,19 +146,22 @@ async def _knock(address: str) -> None:
     comm.abort()
 
 
-def _asker(requested: str, folder: str) -> Callable[[], str]:
-    """Return a function that answers why a worker does not fit. It is sent whole: one may not have the program."""
+def _asker(requested: str, folder: str, resource: str) -> Callable[[Any], Awaitable[str]]:
+    """Return a function that answers why a worker does not fit, or gives it the resource.
 
-    def ask() -> str:
+    It is sent whole: one may not have the program.
+    """
+
+    async def ask(dask_worker: Any) -> str:
         if not os.path.isdir(folder):
             return f"it does not see {folder}; choose one on a disk that all share"
         try:
             from rigid_motion_batch.pipeline.steps import version_here
         except ImportError as error:
             return str(error)
-        result = version_here()
-        return (
-            "" if result == requested else f"it has {result}, and this run is of {requested}; start it anew with that"
-        )
+        if (result := version_here()) != requested:
+            return f"it has {result}, and this run is of {requested}; start it anew with that"
+        await dask_worker.set_resources(**{resource: dask_worker.state.nthreads})
+        return ""
 
     return ask

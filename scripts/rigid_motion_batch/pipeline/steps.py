@@ -8,15 +8,18 @@ before anything is done, and equal tasks have one result. Standard library alone
 from __future__ import annotations
 
 import hashlib
-import importlib
 import importlib.metadata
+import inspect
 import json
+import os
+import pkgutil
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from rigid_motion_batch import places
 
@@ -28,48 +31,87 @@ DIGITS = 32
 OWN = ".rigid-motion"
 """The folder in an output folder where the pipeline keeps its own files."""
 
+INTERVAL = 0.2
+"""Seconds between two messages about how far a task is."""
+
 
 class TaskError(Exception):
-    """Error that says what is wrong with the input of a task, and what to do about it, in one line."""
+    """Error that says why a task cannot be done, and what to do about it, in one line."""
+
+    details = ""
+    """The place in the program, for an error that nobody foresaw."""
+
+    fatal = False
+    """True if other tasks will fail for the same reason: the disk is full."""
 
 
+@dataclass
 class Job:
-    """A task's view of its files while it is done.
+    """A task that is done somewhere, with its files: what goes to a worker, and what its step is given."""
 
-    Parameters
-    ----------
-    folder : Path
-        Where the result's files are to be written; there, and empty.
-    before : sequence of Path or None
-        The folders of the results of the tasks before it; None for those that failed, in partial steps alone.
-    inputs : sequence of Path
-    tell : callable
-        Takes the share that is done and what is being done.
-    """
+    task: Task
+    place: Path
+    """A folder for all that is written meanwhile, which may be missing."""
 
-    def __init__(
-        self,
-        folder: Path,
-        before: Sequence[Path | None] = (),
-        inputs: Sequence[Path] = (),
-        tell: Callable[[float, str], object] = lambda *_: None,
-    ) -> None:
-        self.folder, self.before, self.inputs = folder, tuple(before), tuple(inputs)
-        self.notes: list[str] = []
-        self._tell = tell
+    output: Path
+    before: Sequence[Path | None] = ()
+    """The folders of the results of the tasks before it; None for those that failed, in partial steps alone."""
+
+    blender: str = ""
+    """The program that does steps that need Blender, if that is not to be this one."""
+
+    here: str = field(default_factory=os.getcwd)
+    """The folder where relative paths start."""
+
+    folder: Path = field(init=False)
+    """Where the result's files are to be written: there, and empty, while it is done."""
+
+    share: float = 0.0
+    """The share of it that was done at the last look, and what was being done."""
+
+    doing: str = ""
+    _said_at: float = 0.0
 
     @property
     def results(self) -> list[Path]:
         """The folders of the results before it that there are, which are all but in partial steps."""
         return [folder for folder in self.before if folder]
 
+    @property
+    def inputs(self) -> list[Path]:
+        return [Path(one.path) for one in self.task.inputs]
+
     def progress(self, done: float, total: float = 1.0, doing: str = "") -> None:
         """Say how far it is, and what is being done. Cheap enough to be called often."""
-        self._tell(min(done / total, 1.0) if total else 1.0, doing)
+        if time.monotonic() - self._said_at >= INTERVAL:
+            self._said_at = time.monotonic()
+            with suppress(OSError):
+                said = json.dumps([min(done / total, 1.0) if total else 1.0, doing])
+                (self.place / "progress").write_text(said, encoding="utf-8")
+
+    def look(self) -> None:
+        """See how far it is, wherever it is done."""
+        with suppress(OSError, ValueError):
+            self.share, self.doing = json.loads((self.place / "progress").read_bytes())
 
     def note(self, text: str) -> None:
         """Say something that the user should know, in a line, when the task is done."""
-        self.notes.append(text)
+        with (self.place / "notes").open("a", encoding="utf-8") as stream:
+            stream.write(f"{text}\n")
+
+    def notes(self) -> list[str]:
+        """Return what it has said, wherever it was done."""
+        return _lines(self.place / "notes")
+
+    def last_words(self) -> str:
+        """Return the last line that libraries have printed where it was done, behind a colon; empty for none."""
+        return "".join(f": {line[:200]}" for line in [*filter(str.strip, _lines(self.place / "log"))][-1:])
+
+
+def _lines(file: Path) -> list[str]:
+    with suppress(OSError):
+        return file.read_text(encoding="utf-8", errors="replace").splitlines()
+    return []
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,32 +142,17 @@ class Step:
         """The versions of the program, and in a checkout of the packages it may use and the function's own module."""
         result = {"program": places.manifest()["version"]}
         if places.CHECKOUT:
-            module = importlib.import_module(self.function.__module__)
             result |= {room: digest_of(place_of_room(room)) for room in self.rooms}
-            result[self.function.__module__] = digest_of(Path(cast(str, module.__file__)))
+            result[self.function.__module__] = digest_of(Path(inspect.getfile(self.function)))
         return result
 
-    @cached_property
-    def digest(self) -> str:
-        """The digest of its name and versions."""
-        return _digest([self.name, self.versions])
-
     def __reduce__(self) -> tuple[Callable[[str], Step], tuple[str]]:
-        return step_named, (self.name,)
+        return pkgutil.resolve_name, (self.name,)
 
 
 def step(**options: Any) -> Callable[[Callable[[Job, Any], Mapping[str, Any] | None]], Step]:
     """Make a step of a function, with the fields of `Step`."""
     return lambda function: Step(function, **options)
-
-
-def step_named(name: str) -> Step:
-    """Return the step of a name. Raises ValueError where there is none."""
-    module, _, function = name.partition(":")
-    result = getattr(importlib.import_module(module), function, None)
-    if not isinstance(result, Step):
-        raise ValueError(f"{name}: no such step")
-    return result
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,13 +161,10 @@ class Input:
 
     path: str
     sha256: str
-    """The digest of its content; empty where it is missing or no file."""
-
-    size: int = -1
-    mtime_ns: int = 0
+    """The digest of its content; empty where there is no file that can be read."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False)
 class Task:
     """Something to do once, unless its result is there."""
 
@@ -166,28 +190,19 @@ class Task:
     weight: float = 1.0
     """The seconds that it takes, roughly."""
 
-    amount: int = 0
-    unit: str = ""
-    """The unit that is counted over all tasks, and how many it makes: 120 "frame"."""
+    frames: int = 0
+    """The number of frames of films that it renders, which are counted over all tasks."""
 
     group: str = ""
     """Tasks of one group are the share of one worker, where a job is split."""
 
-    key: str = field(init=False)
-
     def __post_init__(self) -> None:
         for path in self.publish.values():
             require_inside(path.removesuffix("/"))
-        object.__setattr__(self, "key", self.key_after(self.after))
-
-    def key_after(self, after: Iterable[str | None]) -> str:
-        """Return its key where the tasks before it had these keys; None for one that failed."""
-        inputs = [one.sha256 for one in self.inputs]
-        return _digest([self.step.digest, to_plain(self.parameters), list(after), inputs])[:DIGITS]
 
     @property
     def made_of(self) -> dict[str, Any]:
-        """Return what its result depends on, for people; `explain` compares it."""
+        """What its result depends on, for people; `explain` compares it."""
         return {
             "step": self.step.name,
             "versions": dict(self.step.versions),
@@ -195,6 +210,16 @@ class Task:
             "inputs": {one.path: one.sha256 for one in self.inputs},
             "after": list(self.after),
         }
+
+    @cached_property
+    def key(self) -> str:
+        """The digest of what its result depends on, wherever its inputs are."""
+        return self.key_after(self.after)
+
+    def key_after(self, after: Iterable[str | None]) -> str:
+        """Return its key where the tasks before it had these keys; None for one that failed."""
+        inputs = [one.sha256 for one in self.inputs]
+        return _digest({**self.made_of, "inputs": inputs, "after": list(after)})[:DIGITS]
 
     def published(self, files: Iterable[str] = ()) -> Iterator[tuple[str, str]]:
         """Yield each file that is published and where it goes, of a result with these files."""
@@ -210,19 +235,11 @@ class Task:
 
 
 def require_inside(path: str) -> None:
-    """Make sure that a path of an output, with slashes, leads into the output folder on every system.
-
-    Raises
-    ------
-    ValueError
-        Where it does not, or leads to where the pipeline keeps its own files.
-    """
+    """Raise ValueError unless a path, with slashes, is that of a file for the user below the output folder."""
     parts = path.split("/")
     # A colon in the first part would be a drive of Windows, and in another a stream of a file.
-    if not path.isprintable() or "\\" in path or ":" in path or {"", ".", ".."} & {*parts}:
+    if not path.isprintable() or {*"\\:"} & {*path} or {"", ".", ".."} & {*parts} or parts[0].casefold() == OWN:
         raise ValueError(f"{path!r} is no path below the output folder")
-    if parts[0].casefold() == OWN:
-        raise ValueError(f"{path!r} is where the program keeps its own files")
 
 
 def place_of_room(room: str) -> Path:
@@ -234,7 +251,8 @@ def place_of_room(room: str) -> Path:
 @cache
 def digest_of(place: Path) -> str:
     """Return the digest of the content of a file, or of all files of a folder, once in the life of this process."""
-    files = sorted(path for path in place.rglob("*") if _is_source(path)) if place.is_dir() else [place]
+    files = sorted(path for path in place.rglob("[!.]*") if path.is_file()) if place.is_dir() else [place]
+    files = [path for path in files if path.suffix != ".pyc"]
     return _digest([[path.relative_to(place).as_posix(), sha256_of(path)] for path in files])[:12]
 
 
@@ -247,13 +265,17 @@ def version_here() -> str:
     return ", ".join(result)
 
 
+def sha256_in(path: Path | str) -> str:
+    """Return the digest of a file; empty where there is no file that can be read."""
+    try:
+        return sha256_of(path) if os.path.isfile(path) else ""
+    except (OSError, ValueError):
+        return ""
+
+
 def sha256_of(path: Path | str) -> str:
     with open(path, "rb") as stream:  # noqa: PTH123 - a path may be text as it was given, "/" at its end and all
         return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
-def _is_source(path: Path) -> bool:
-    return path.is_file() and path.suffix != ".pyc" and not path.name.startswith(".")
 
 
 def _digest(content: Any) -> str:

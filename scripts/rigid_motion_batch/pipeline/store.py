@@ -5,7 +5,7 @@ Below `.rigid-motion/` of the folder:
     results/KEY/        what a task made, with an index of its files; there if and only if the task is done
     scratch/SESSION/    what is being made, by one process
     published/          what this program has put into the output folder: lines of JSON, a file for each folder
-    inputs.json         digests of inputs, by size, time of change and inode
+    inputs.json         digests of inputs, by size and times of change
     lock                held by a run that has the folder for itself
 
 Whatever is written is written beside its place and moved there. So any process may be killed at any moment, and any
@@ -20,10 +20,8 @@ import shutil
 import stat
 import time
 import uuid
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any, Self
 
@@ -31,38 +29,21 @@ from filelock import FileLock, Timeout
 
 from rigid_motion_batch.files import append_lines, lines_of, write_text
 
-from .steps import OWN, Input, Task, sha256_of
+from .performing import Made
+from .steps import OWN, Input, Task, sha256_in, sha256_of
 
 INDEX = ".index.json"
 """Index of a result: its files with size, time of change and digest; what it was made of, in how long, and facts."""
 
-UNSETTLED = 2.0
-"""Seconds since its last change, by which a file that was hashed may have changed again without a trace in its time."""
-
 KEPT = 7 * 86400.0
 """Seconds that a result is kept that the last plan did not ask for, and what a process was making that was killed."""
 
-ALONE = "run"
-"""The session of a run that has the folder for itself."""
-
-Files = Mapping[str, tuple[int, int, str]]
-"""Name to size, time of change in ns and SHA-256."""
-
-
-class FolderInUse(Exception):
-    """Another run works in the folder, in one line."""
+UNREADABLE = (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError)
+"""Errors of a file of the store that is missing or damaged."""
 
 
 class OutputError(Exception):
-    """Error that says what must not be replaced or read, and the way out, in one line."""
-
-
-@dataclass(frozen=True)
-class Result:
-    """Result of a task."""
-
-    folder: Path
-    index: Mapping[str, Any]
+    """Error that says what must not be replaced or read, or who is at work there, and the way out, in one line."""
 
 
 class Store:
@@ -79,69 +60,63 @@ class Store:
 
     Raises
     ------
-    FolderInUse, OSError
-        On entering.
+    OutputError, OSError
+        On entering, where another run has the folder, or there can be none.
     """
 
     def __init__(self, output: Path, *, alone: bool = True, overwrite: bool = False) -> None:
         self.output, self.overwrite = output.absolute(), overwrite
         self.own = self.output / OWN
-        self._results, self._scratch = self.own / "results", self.own / "scratch"
+        self._results, self._published = self.own / "results", self.own / "published"
         self._lock = FileLock(self.own / "lock", blocking=False) if alone else None
         self._missing = [folder for folder in (self.output, *self.output.parents) if not folder.exists()]
-        self._cache = _inputs_known(self.output)
-        self._identities: dict[tuple[int, int], str] = {}
+        self._digests = _digests_in(self.own / "inputs.json")
+        """Path of an input to what was seen of it when it was hashed, and its digest."""
+        self._inputs: dict[tuple[int, int], str] = {}
         """Identities of inputs in the file system, to their paths."""
-        self._real = cache(os.path.realpath)
-        """Real paths of folders: asking the system for those of all inputs takes long."""
-        self.scratch = self._scratch / (ALONE if alone else uuid.uuid4().hex[:8])
-        """The folder of this process for what is being made."""
+        self._scratch = self.own / "scratch" / ("run" if alone else uuid.uuid4().hex[:8])
         self._number = 0
 
     # -- opening and closing ------------------------------------------------------------------------------------------
 
     def __enter__(self) -> Self:
-        for folder in (self.own, self._results, self._scratch, self.own / "published"):
+        for folder in (self._results, self._published, self._scratch.parent):
             folder.mkdir(parents=True, exist_ok=True)
-        if self._lock:
-            try:
+        try:
+            if self._lock:
                 self._lock.acquire()
-            except Timeout:
-                raise FolderInUse(
-                    f"{self.output}: another run is at work in this folder; wait for it, or choose another"
-                ) from None
-        for session in self._scratch.glob("*"):
+        except Timeout:
+            raise OutputError(
+                f"{self.output}: another run is at work in this folder; wait for it, or choose another with --output"
+            ) from None
+        for session in self._scratch.parent.iterdir():
             with suppress(FileNotFoundError):  # Another process has ended.
-                if session == self.scratch or time.time() - session.stat().st_mtime > KEPT:
+                if session == self._scratch or _age(session) > KEPT:
                     shutil.rmtree(session, ignore_errors=True)
-        self.scratch.mkdir(parents=True)
+        self._scratch.mkdir()
         return self
 
     def __exit__(self, *_: object) -> None:
-        shutil.rmtree(self.scratch, ignore_errors=True)
-        if self._identities:
-            with suppress(OSError):
-                self.note("inputs.json", self._cache)
-        for name in ("results", "scratch", "published"):
-            _remove_if_empty(self.own / name)
+        shutil.rmtree(self._scratch, ignore_errors=True)
+        with suppress(OSError):
+            self.note("inputs.json", self._digests)
+        for folder in (self._results, self._scratch.parent, self._published):
+            _remove_if_empty(folder)
         if self._lock:
             if not self._results.exists():
                 for name in ("inputs.json", "failures.json", "lock"):
                     (self.own / name).unlink(missing_ok=True)
             self._lock.release()
         for folder in (self.own, *self._missing):
-            if not _remove_if_empty(folder):
-                break
+            _remove_if_empty(folder)
 
     def new_scratch(self) -> Path:
-        """Return a path for the result of a task that is begun; nothing is there."""
+        """Return a path for what is being made; nothing is there."""
         self._number += 1
-        return self.scratch / str(self._number)
+        return self._scratch / str(self._number)
 
     def note(self, name: str, content: Any) -> None:
         """Write a file of the store's own, of JSON; of nothing there is none."""
-        if (self.own / name).is_dir():
-            shutil.rmtree(self.own / name)
         if content:
             write_text(self.own / name, json.dumps(content, indent=1))
         else:
@@ -157,44 +132,40 @@ class Store:
         OutputError
             Where this program has written it into this folder.
         """
-        shown = os.fspath(path)
+        shown, place = os.fspath(path), os.path.abspath(path)
         try:
-            result, link = os.stat(path), os.lstat(path)  # noqa: PTH116 - it may be text, and "" no folder
+            status, link = os.stat(path), os.lstat(path)  # noqa: PTH116 - it may be text, and "" no folder
         except (OSError, ValueError):
             return Input(shown, "")
-        place = os.path.abspath(path)
-        self._require_no_output(shown, place, is_link=stat.S_ISLNK(link.st_mode))
-        if not stat.S_ISREG(result.st_mode):
+        self._require_no_output(shown)
+        if not stat.S_ISREG(status.st_mode):
             return Input(shown, "")
-        self._identities[result.st_dev, result.st_ino] = self._identities[link.st_dev, link.st_ino] = place
-        seen = [result.st_size, result.st_mtime_ns, result.st_ctime_ns, result.st_ino]
-        known = self._cache.get(place)
-        if known and known[:-1] == seen:
-            digest = known[-1]
-        else:
-            try:
-                digest = sha256_of(path)
-            except OSError:
-                return Input(shown, "", result.st_size, result.st_mtime_ns)
-            settled = time.time() - max(result.st_mtime, result.st_ctime) > UNSETTLED
-            self._cache[place] = [*(seen if settled else [0, 0, 0, 0]), digest]
-        return Input(shown, digest, result.st_size, result.st_mtime_ns)
+        self._inputs[status.st_dev, status.st_ino] = self._inputs[link.st_dev, link.st_ino] = place
+        seen = [status.st_size, status.st_mtime_ns, status.st_ctime_ns]
+        *known, digest = self._digests.get(place, ("",))
+        if known != seen:
+            digest = sha256_in(path)
+            self._digests[place] = [*seen, digest]
+        return Input(shown, digest)
 
-    def _require_no_output(self, path: str, place: str, *, is_link: bool) -> None:
-        folder, name = os.path.split(os.path.realpath(place) if is_link else place)
-        real, output = self._real(folder), self._real(os.fspath(self.output))
-        if real != output and not real.startswith(output + os.sep):
+    def _require_no_output(self, shown: str) -> None:
+        real, output = os.path.realpath(shown), os.path.realpath(self.output)
+        if not real.startswith(output + os.sep):
             return
-        inside = Path(real, name).relative_to(output)
-        if inside.parts[0] == OWN:
-            raise OutputError(f"{path}: this input lies in {self.own}, where the program works; move it elsewhere")
-        if any(self._published(inside.as_posix())):
-            raise OutputError(f"{path}: this input was written by a run into this folder; choose another with --output")
+        path = Path(real).relative_to(output).as_posix()
+        if path.partition("/")[0] == OWN:
+            raise OutputError(f"{shown}: this input lies in {self.own}, where the program works; move it elsewhere")
+        if self._digests_of(path):
+            raise OutputError(f"{shown}: this input was written by a run into this folder; choose another --output")
 
     # -- results ------------------------------------------------------------------------------------------------------
 
-    def result(self, key: str, *, thoroughly: bool = False) -> Result | None:
-        """Return what the task of a key made; None where it is not there, or damaged.
+    def folder_of(self, key: str) -> Path:
+        """Return the folder where the result of a key is, if it is there."""
+        return self._results / key
+
+    def index_of(self, key: str, *, thoroughly: bool = False) -> Mapping[str, Any] | None:
+        """Return the index of the result of a key; None where it is not there, or damaged.
 
         With `thoroughly` the content of all files is looked at, otherwise of those that changed since they were made.
         """
@@ -202,50 +173,35 @@ class Store:
         try:
             index = json.loads(Path(folder, INDEX).read_bytes())
             for name, (size, mtime, digest) in index["files"].items():
-                matches = os.lstat(f"{folder}/{name}")
-                if not stat.S_ISREG(matches.st_mode) or matches.st_size != size:
+                status = os.lstat(f"{folder}/{name}")
+                if not stat.S_ISREG(status.st_mode) or status.st_size != size:
                     return None
-                if (matches.st_mtime_ns != mtime or thoroughly) and sha256_of(f"{folder}/{name}") != digest:
+                if (status.st_mtime_ns != mtime or thoroughly) and sha256_of(f"{folder}/{name}") != digest:
                     return None
-        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        except UNREADABLE:
             return None
-        return Result(Path(folder), index)
+        return index
 
-    def folder_of(self, key: str) -> Path:
-        """Return the folder where the result of a key is, if it is there."""
-        return self._results / key
-
-    def keep(self, task: Task, key: str, made: Path, index: Mapping[str, Any]) -> Result:
-        """Take a folder as the result of a task. Raises OSError where that cannot be."""
-        content = {**index, "name": task.name, "made_of": task.made_of}
-        (made / INDEX).write_text(json.dumps(content), encoding="utf-8")
-        target = self._results / key
+    def keep(self, task: Task, key: str, made: Made) -> None:
+        """Take what was made as the result of a task. Raises OSError where that cannot be."""
+        folder, index = made["folder"], {name: made[name] for name in ("files", "seconds", "facts")}
+        content = json.dumps({**index, "name": task.name, "made_of": task.made_of})
+        (folder / INDEX).write_text(content, encoding="utf-8")
         try:
-            made.rename(target)
+            folder.rename(self.folder_of(key))
         except OSError:
-            if self.result(key):  # Another worker was quicker.
-                shutil.rmtree(made, ignore_errors=True)
-            else:
+            if not self.index_of(key):  # Otherwise another worker was quicker.
                 self.discard(key)
                 self._results.mkdir(exist_ok=True)  # A worker that made nothing may have taken it away.
-                made.rename(target)
-        return Result(target, content)
+                folder.rename(self.folder_of(key))
 
     def discard(self, key: str) -> None:
         """Delete a result."""
-        place, away = self._results / key, self.new_scratch()
-        if not os.path.lexists(place):
-            return
-        with suppress(FileNotFoundError):
-            place.rename(away)
-        shutil.rmtree(away, ignore_errors=True)
-        with suppress(OSError):
-            away.unlink()
+        shutil.rmtree(self.folder_of(key), ignore_errors=True)
 
     def discard_damaged(self, keys: Iterable[str]) -> bool:
         """Delete those of these results that are damaged, and return whether there are any."""
-        kept = (key for key in keys if os.path.lexists(self._results / key))
-        damaged = [key for key in kept if not self.result(key, thoroughly=True)]
+        damaged = [key for key in keys if self.folder_of(key).exists() and not self.index_of(key, thoroughly=True)]
         for key in damaged:
             self.discard(key)
         return bool(damaged)
@@ -253,39 +209,51 @@ class Store:
     def sweep(self, requested: Iterable[str]) -> None:
         """Delete results that are not among these, and older than a week."""
         requested = frozenset(requested)
-        for entry in os.scandir(self._results):
-            if entry.name not in requested and time.time() - entry.stat(follow_symlinks=False).st_mtime > KEPT:
-                self.discard(entry.name)
+        for folder in self._results.iterdir():
+            if folder.name not in requested and _age(folder) > KEPT:
+                self.discard(folder.name)
 
-    def latest(self) -> dict[str, Result]:
-        """Return the last result of each task, by the task's name, of all that are kept."""
-        results = sorted(self._results.glob("*"), key=lambda folder: folder.stat().st_mtime)
-        matches = (self.result(folder.name) for folder in results)
-        return {result.index["name"]: result for result in matches if result}
+    def latest(self) -> dict[str, str]:
+        """Return the key of the last result of each task, by the task's name, of all that are kept."""
+        keys = [folder.name for folder in sorted(self._results.glob("*"), key=_age, reverse=True)]
+        return {index["name"]: key for key in keys if (index := self.index_of(key))}
 
     # -- published files ----------------------------------------------------------------------------------------------
 
-    def is_published(self, task: Task, result: Result) -> bool:
-        """Return whether all files that a task publishes are in place, and are those of this result."""
-        files = task.published(result.index["files"])
-        return all(self._is_same(f"{result.folder}/{name}", path) for name, path in files)
+    def is_done(self, task: Task) -> bool:
+        """Return whether the result of a task is there, and all files that it publishes are in place."""
+        index = self.index_of(task.key)
+        return index is not None and not self.unpublished(task, index)
 
-    def strangers(self, task: Task, result: Result | None) -> list[str]:
-        """Return paths where a task would replace a file that this program has not written, or that was edited since.
+    def unpublished(self, task: Task, index: Mapping[str, Any] | None) -> list[tuple[str, str]]:
+        """Return the files of a result that are not in place, and where they belong."""
+        files = index["files"] if index else {}
+        return [(name, path) for name, path in task.published(files) if not self._is_same(files.get(name), path)]
+
+    def strangers(self, task: Task, key: str) -> list[str]:
+        """Return paths where the result of a key would replace what this program has not written, or was edited since.
 
         Raises
         ------
         OutputError
             Where there is an input, or a folder, or a file where a folder must be: nothing of that is ever replaced.
         """
-        return [
-            path
-            for name, path in task.published(result.index["files"] if result else ())
-            if not (result and self._is_same(f"{result.folder}/{name}", path)) and not self._is_set_here(path)
-        ]
+        index = self.index_of(key)
+        return [path for _, path in self.unpublished(task, index) if not self._is_own(path)]
 
-    def publish(self, task: Task, result: Result) -> None:
-        """Put files of a result where they belong.
+    def require_none(self, strangers: list[str]) -> None:
+        """Raise OutputError where there are such paths, unless they may be replaced."""
+        if strangers and not self.overwrite:
+            named = ", ".join(os.fspath(self.output / path) for path in strangers[:3])
+            more = f" and {len(strangers) - 3} more" if len(strangers) > 3 else ""
+            were, them = ("was", "it") if len(strangers) == 1 else ("were", "them")
+            raise OutputError(
+                f"{named}{more} {were} not written by this program, or edited since; choose another folder with "
+                f"--output, or replace {them} with --overwrite"
+            )
+
+    def publish(self, task: Task, key: str) -> bool:
+        """Put files of a result where they belong, and return whether there were any that were not there.
 
         Raises
         ------
@@ -293,108 +261,89 @@ class Store:
             Where something is there that must not be replaced; what was put in place before that stays.
         OSError
         """
-        if not self.overwrite and (matches := self.strangers(task, result)):
-            raise OutputError(not_written([os.fspath(self.output / path) for path in matches]))
-        for name, path in task.published(result.index["files"]):
-            original, target = result.folder / name, self.output / path
-            if self._is_same(os.fspath(original), path):
-                continue
-            self._is_set_here(path)  # Raises OutputError for inputs and folders.
+        self.require_none(self.strangers(task, key))
+        index = self.index_of(key) or {}
+        missing = self.unpublished(task, index)
+        for name, path in missing:
+            target, beside = self.output / path, self.new_scratch()
             target.parent.mkdir(parents=True, exist_ok=True)
             if not Path(os.path.realpath(target.parent)).is_relative_to(os.path.realpath(self.output)):
                 raise OutputError(f"{target.parent}: this leads out of the output folder; choose another with --output")
-            status, (_, _, digest) = os.lstat(original), result.index["files"][name]
-            line = {"path": path, "size": status.st_size, "mtime_ns": status.st_mtime_ns, "sha256": digest}
             # Killed from here on, what was moved is known to be the program's own.
-            append_lines(self._record_of(path), [line])
-            beside = self.new_scratch()
+            append_lines(self._record_of(path), [{"path": path, "sha256": index["files"][name][-1]}])
             try:
-                os.link(original, beside)
+                os.link(self.folder_of(key) / name, beside)
             except OSError:  # This file system has no links.
-                shutil.copy2(original, beside)
+                shutil.copy2(self.folder_of(key) / name, beside)
             try:
                 beside.replace(target)
             except OSError as error:
-                beside.unlink(missing_ok=True)
                 raise OSError(error.errno, error.strerror, os.fspath(target)) from None
+        return bool(missing)
 
     def withdraw(self, paths: Iterable[str]) -> None:
         """Delete files of this program that are needed no more, and folders that are empty then."""
         for path in paths:
             with suppress(OSError, OutputError):
-                if not self._is_set_here(path) or not (self.output / path).is_file():
-                    continue
-                (self.output / path).unlink()
-                for folder in (self.output / path).parents:
-                    if folder == self.output or not _remove_if_empty(folder):
-                        break
+                if self._is_own(path):
+                    (self.output / path).unlink()
+                    for folder in (self.output / path).parents:
+                        if folder == self.output or not _remove_if_empty(folder):
+                            break
 
-    def _is_same(self, original: str, path: str) -> bool:
-        """Return whether a published file is that of a result: the same, or a copy."""
+    def _is_same(self, known: tuple[int, int, str] | None, path: str) -> bool:
+        """Return whether a published file is one of a result, of this size and time of change, or a copy."""
         try:
-            requested, result = os.lstat(original), os.lstat(f"{self.output}/{path}")
+            status = os.lstat(f"{self.output}/{path}")
         except OSError:
             return False
-        return stat.S_ISREG(result.st_mode) and (
-            (requested.st_size, requested.st_mtime_ns) == (result.st_size, result.st_mtime_ns)
-        )
+        same = known is not None and [status.st_size, status.st_mtime_ns] == [*known[:2]]
+        return same and stat.S_ISREG(status.st_mode)
 
-    def _is_set_here(self, path: str) -> bool:
+    def _is_own(self, path: str) -> bool:
         """Return whether a path has nothing, or what this program wrote. Raises OutputError for what always stays."""
         target = f"{self.output}/{path}"
         try:
-            result = os.lstat(target)
+            status = os.lstat(target)
         except FileNotFoundError:
             return True
         except NotADirectoryError:
-            result = None
-        if result is None or stat.S_ISDIR(result.st_mode):
-            kind = "a folder where a file" if result else "a file where a folder"
-            raise OutputError(f"{target}: there is {kind} goes; move it, or choose another folder with --output")
-        if source := self._identities.get((result.st_dev, result.st_ino)):
+            raise OutputError(_in_the_way(target, "a file where a folder")) from None
+        if stat.S_ISDIR(status.st_mode):
+            raise OutputError(_in_the_way(target, "a folder where a file"))
+        if source := self._inputs.get((status.st_dev, status.st_ino)):
             raise OutputError(f"{source}: this input lies where {target} goes; choose another folder with --output")
-        if not stat.S_ISREG(result.st_mode):
-            return False
-        lines = [line for line in self._published(path) if line["size"] == result.st_size]
-        if any(line["mtime_ns"] == result.st_mtime_ns for line in lines):
-            return True
-        return bool(lines) and sha256_of(target) in {line["sha256"] for line in lines}
+        return stat.S_ISREG(status.st_mode) and sha256_of(target) in self._digests_of(path)
 
     def _record_of(self, path: str) -> Path:
         """Return the file of the record of what was published into the same folder."""
         folder = path.rpartition("/")[0].casefold()
-        return self.own / "published" / f"{uuid.uuid5(uuid.NAMESPACE_URL, folder).hex[:16]}.jsonl"
+        return self._published / f"{uuid.uuid5(uuid.NAMESPACE_URL, folder).hex[:16]}.jsonl"
 
-    def _published(self, path: str) -> Iterator[dict[str, Any]]:
-        """Yield what was ever published at a path, or at one that differs in case, which file systems may ignore."""
-        requested = {"path": str, "size": int, "mtime_ns": int, "sha256": str}
-        for line in lines_of(self._record_of(path)):
-            is_whole = all(isinstance(line.get(name), kind) for name, kind in requested.items())
-            if is_whole and line["path"].casefold() == path.casefold():
-                yield line
+    def _digests_of(self, path: str) -> set[str]:
+        """Return digests of all that was put at a path, or one that differs in case, which file systems may ignore."""
+        lines = lines_of(self._record_of(path))
+        return {str(line.get("sha256")) for line in lines if str(line.get("path")).casefold() == path.casefold()}
 
 
-def not_written(paths: list[str]) -> str:
-    """Return what to say of files in the way that this program has not written."""
-    some = ", ".join(paths[:3]) + (f" and {len(paths) - 3} more" if len(paths) > 3 else "")
-    were, them = ("was", "it") if len(paths) == 1 else ("were", "them")
-    return (
-        f"{some} {were} not written by this program, or edited since; choose another folder with --output, or replace "
-        f"{them} with --overwrite"
-    )
+def _in_the_way(target: str, kind: str) -> str:
+    return f"{target}: there is {kind} goes; move it, or choose another folder with --output"
 
 
-def _inputs_known(output: Path) -> dict[str, list[Any]]:
+def _digests_in(file: Path) -> dict[str, list[Any]]:
     try:
-        content = json.loads((output / OWN / "inputs.json").read_bytes())
-        return {path: seen for path, seen in content.items() if len(seen) == 5 and isinstance(seen[-1], str)}
-    except (OSError, ValueError, TypeError, AttributeError, RecursionError):
+        return {path: seen for path, seen in json.loads(file.read_bytes()).items() if isinstance(seen[-1], str)}
+    except UNREADABLE:
         return {}
 
 
+def _age(path: Path) -> float:
+    """Return the seconds since a path was made or changed."""
+    return time.time() - path.lstat().st_mtime
+
+
 def _remove_if_empty(folder: Path) -> bool:
-    try:
+    with suppress(OSError):
         folder.rmdir()
-    except OSError:
-        return False
-    return True
+        return True
+    return False

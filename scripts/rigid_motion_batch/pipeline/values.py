@@ -72,14 +72,13 @@ def write(stem: Path, value: Any) -> None:
 
 def read(kind: type[T], stem: Path) -> T:
     """Read a value of this type that was written. Raises OSError, ValueError or KeyError where it is damaged."""
-    plain = json.loads(stem.with_suffix(".json").read_text(encoding="utf-8"))
+    arrays: dict[str, Any] = {}
     if stem.with_suffix(".npz").exists():
         import numpy as np
 
-        with np.load(stem.with_suffix(".npz"), allow_pickle=False) as arrays:
-            value = from_plain(plain, arrays)
-    else:
-        value = from_plain(plain)
+        with np.load(stem.with_suffix(".npz"), allow_pickle=False) as stored:
+            arrays = dict(stored)
+    value = from_plain(json.loads(stem.with_suffix(".json").read_text(encoding="utf-8")), arrays)
     if not isinstance(value, get_origin(kind) or kind):
         raise ValueError(f"{stem}: a {type(value).__name__} is no {kind.__name__}")
     return value

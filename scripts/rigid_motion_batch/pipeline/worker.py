@@ -1,22 +1,26 @@
-"""One order, inside a Blender program: see `blender`. Standard library, NumPy and bpy alone."""
+"""A step inside a Blender program: see `blender`. Standard library, NumPy and bpy alone."""
 
 import os
 import pickle
 import sys
 import threading
-from pathlib import Path
 
 
 def main() -> None:
-    """Do the order in the file that is named behind "--", and write beside it what came of it."""
+    """Do the job that comes by the standard input, and put what came of it in the place of the standard output."""
+    answer = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # What Blender prints goes where its errors go.
+    sys.path[:0] = sys.argv[sys.argv.index("--") + 1 :]
+    job, facts, problem = pickle.load(sys.stdin.buffer), None, None
     threading.Thread(target=_end_with_input, daemon=True).start()
-    file, *sys.path[:0] = sys.argv[sys.argv.index("--") + 1 :]
-
-    from rigid_motion_batch.pipeline.performing import perform
-
-    message = perform(pickle.loads(Path(file).read_bytes()))
-    Path(f"{file}.answer").write_bytes(pickle.dumps(message))
+    try:
+        facts = job.task.step.function(job, job.task.parameters)
+    except Exception as error:
+        problem = error
+    answer.truncate(0)  # Blender has said which it is.
+    answer.seek(0)
+    pickle.dump((facts, problem), answer)
+    answer.flush()
     # Not sys.exit: Blender can wait for long while it is taken down.
     sys.stderr.flush()
     os._exit(0)

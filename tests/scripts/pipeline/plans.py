@@ -9,9 +9,9 @@ from pathlib import Path
 
 from rigid_motion_batch.pipeline.executors import ProcessExecutor
 from rigid_motion_batch.pipeline.performing import Executor
-from rigid_motion_batch.pipeline.running import Outcome, run
+from rigid_motion_batch.pipeline.running import Plan, Run
 from rigid_motion_batch.pipeline.steps import OWN, Step, Task
-from rigid_motion_batch.pipeline.store import Result, Store
+from rigid_motion_batch.pipeline.store import Store
 from rigid_motion_batch.progress import Progress, Stage
 from tests.scripts.pipeline import steps
 from tests.scripts.pipeline.steps import FILE, Nothing, Write
@@ -64,20 +64,27 @@ class Watched(Store):
         super().__init__(output, **options)
         self.made: list[str] = []
 
-    def keep(self, task: Task, *made: object) -> Result:
+    def keep(self, task: Task, *made: object) -> None:
         self.made.append(task.name)
-        return super().keep(task, *made)
+        super().keep(task, *made)
 
 
-def run_in(output: Path, *tasks: Task, executor: Executor | None = None, **options: object) -> Outcome:
+def run(plan: Plan, store: Store, executor: Executor, **options: object) -> Run:
+    """Do what is missing of a plan."""
+    work = Run(store, executor, **options)
+    work.do(plan)
+    return work
+
+
+def run_in(output: Path, *tasks: Task, executor: Executor | None = None, **options: object) -> Run:
     """Run a plan in a folder."""
     of_store = {name: options.pop(name) for name in ("alone", "overwrite") if name in options}
     with Store(output, **of_store) as store, executor or Executor() as opened:
         return run(lambda: tasks, store, opened, **options)
 
 
-def states(outcome: Outcome) -> dict[str, int]:
-    return {state.value: number for state, number in outcome.counts.items() if number}
+def states(outcome: Run) -> dict[str, int]:
+    return {state: number for state, number in outcome.counts.items() if number}
 
 
 def contents(output: Path) -> dict[str, str]:

@@ -101,7 +101,7 @@ def fail(job: Job, parameters: Fail) -> None:
 
 @step()
 def stumble(job: Job, parameters: Write) -> None:
-    """Fail at writing a file, or what is to take its place."""
+    """Fail at writing a file."""
     (job.folder / parameters.text).mkdir(parents=True)
     (job.folder / parameters.text).write_text("never")
 

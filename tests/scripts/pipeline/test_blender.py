@@ -15,12 +15,12 @@ import pytest
 from rigid_motion_batch.pipeline.blender import version_of
 from rigid_motion_batch.pipeline.executors import ProcessExecutor
 from rigid_motion_batch.pipeline.performing import Executor, ExecutorError
-from rigid_motion_batch.pipeline.running import Outcome, run
+from rigid_motion_batch.pipeline.running import Run
 from rigid_motion_batch.pipeline.steps import OWN, Task
 from rigid_motion_batch.pipeline.store import INDEX, Store
 from tests.scripts.pipeline import blender_steps
 from tests.scripts.pipeline.blender_steps import Scene
-from tests.scripts.pipeline.plans import Listener, contents, states, task, writing
+from tests.scripts.pipeline.plans import Listener, contents, run, states, task, writing
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -55,10 +55,10 @@ def saving(scene: Scene, store: Store, *after: Task, source: Path | None = None)
     return task("save", blender_steps.save, scene, *after, inputs=inputs, publish=publish)
 
 
-def saved(output: Path, blender: str, fate: str = "", listener: Listener | None = None) -> Outcome:
+def saved(output: Path, blender: str, fate: str = "", listener: Listener | None = None) -> Run:
     with Store(output) as store, ProcessExecutor(1) as executor:
         tasks = [saving(Scene("one", (1, 2), fate), store)]
-        return run(lambda: tasks, store, executor, blender=blender, progress=listener)
+        return run(lambda: tasks, store, executor, blender=blender, progress=listener or Listener())
 
 
 def test_a_step_is_done_by_the_program(blender: str, tmp_path: Path) -> None:
@@ -91,7 +91,7 @@ def test_a_blender_that_dies_is_started_twice_more(blender: str, tmp_path: Path)
     listener = Listener()
     outcome = saved(tmp_path / "out", blender, "killed", listener)
     assert len(listener.notes) == 2
-    assert listener.notes[0].startswith("save: Blender died (")
+    assert listener.notes[0].startswith("save: its process died (")
     assert outcome.failures["save"].endswith("given up after 3 attempts")
     assert contents(tmp_path / "out") == {}
 
@@ -119,7 +119,7 @@ def test_a_blender_ends_with_what_started_it(blender: str, tmp_path: Path) -> No
 
     def kill() -> None:
         ends = time.monotonic() + 60.0
-        while not list(tmp_path.glob(f"{OWN}/scratch/*/*/begun")) and time.monotonic() < ends:
+        while not list(tmp_path.glob(f"{OWN}/scratch/*/*/*/begun")) and time.monotonic() < ends:
             time.sleep(0.05)
         pids.extend(blenders())
         os.kill(os.getpid(), signal.SIGINT)

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from rigid_motion_batch.cli import compare
 from rigid_motion_batch.pipeline import bundle
 from rigid_motion_batch.pipeline.bundle import below_inputs, write_bundle
-from rigid_motion_batch.pipeline.executors import ProcessExecutor
-from tests.scripts.comparing import write_toss
-from tests.scripts.pipeline.test_comparison import ABOUT, STAGE, compared, planned, published
+from tests.scripts.comparing import outputs, write_toss
 
 PARTS = {"read": 2, "measure": 2, "build": 1, "render": 3, "encode": 1, "report": 1}
 
@@ -27,30 +25,22 @@ def openjd(*command: object, cwd: Path) -> subprocess.CompletedProcess:
 def test_a_job_on_a_farm_makes_the_same_as_a_run_on_one_machine(tmp_path: Path) -> None:
     takes = tmp_path / "takes"
     sources = [write_toss(takes / "toss.csv"), write_toss(takes / "other.csv", samples=70)]
-    command = ("-m", "tests.scripts.pipeline.part_of_comparison")
-    given = write_bundle(
-        tmp_path / "bundle", [*map(str, sources), "--rates", "5"], tmp_path / "out", PARTS, "Two clips", command
-    )
+    asked = [*map(str, sources), "--rates", "5", "--modes", "lerp_slerp", "--resolution", "64x36", "--fps", "10"]
+    given = write_bundle(tmp_path / "bundle", asked, tmp_path / "out", PARTS, "Two clips")
     template = tmp_path / "bundle" / "template.json"
     checked = openjd("check", template, cwd=tmp_path)
     assert checked.returncode == 0, checked.stdout
-    # On the farm the recordings are in another folder, and the steps of the tests are found beside the program.
+    # On the farm the recordings are in another folder.
     there = tmp_path / "mounted" / "takes"
     there.parent.mkdir()
     takes.rename(there)
     rule = {"source_path_format": "POSIX", "source_path": str(takes), "destination_path": str(there)}
     rules = json.dumps({"version": "pathmapping-1.0", "path_mapping_rules": [rule]})
-    given["Program"] = os.environ["PYTHONPATH"]
     values = [part for name, value in given.items() for part in ("-p", f"{name}={value}")]
     ran = openjd("run", template, *values, "--path-mapping-rules", rules, cwd=tmp_path)
     assert ran.returncode == 0, ran.stdout + ran.stderr
-    outcome, _ = compared(
-        tmp_path / "here",
-        planned(*(there / source.name for source in sources), stage=STAGE, about=ABOUT),
-        ProcessExecutor(2),
-    )
-    assert outcome.failures == {}
-    assert published(tmp_path / "out") == published(tmp_path / "here")
+    assert compare.main([*(str(there / source.name) for source in sources), *asked[2:], "-o", f"{tmp_path}/here"]) == 0
+    assert outputs(tmp_path / "out") == outputs(tmp_path / "here")
 
 
 def test_stages_follow_one_another_and_their_parts_are_a_parameter(tmp_path: Path) -> None:
@@ -96,6 +86,7 @@ def test_a_name_that_is_an_expression_of_templates_is_refused(tmp_path: Path) ->
 
 
 def test_a_machine_with_another_version_is_told_so(capsys: pytest.CaptureFixture) -> None:
-    assert bundle.main(bundle.version_here()) == 0
-    assert bundle.main("program 0") == 1
+    bundle.check(bundle.version_here())
+    with pytest.raises(SystemExit):
+        bundle.check("program 0")
     assert "and the bundle is of program 0" in capsys.readouterr().out

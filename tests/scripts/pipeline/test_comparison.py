@@ -22,7 +22,7 @@ from rigid_motion_batch.pipeline.comparison import Comparison, ComparisonPlan
 from rigid_motion_batch.pipeline.comparison_steps import result_in
 from rigid_motion_batch.pipeline.executors import ProcessExecutor
 from rigid_motion_batch.pipeline.performing import Executor
-from rigid_motion_batch.pipeline.running import Outcome, Share, run
+from rigid_motion_batch.pipeline.running import Run
 from rigid_motion_batch.pipeline.steps import OWN, Task
 from rigid_motion_batch.pipeline.store import OutputError, Store
 from rigid_motion_batch.recordings.clip_reading import read_clips
@@ -31,7 +31,7 @@ from rigid_motion_batch.report.settings import Settings
 from rigid_motion_batch.scenes.settings import SceneSettings
 from tests.scripts.bvh_bodies import write_body
 from tests.scripts.comparing import write_toss
-from tests.scripts.pipeline.plans import Listener, Watched, states
+from tests.scripts.pipeline.plans import Listener, Watched, run, states
 from tests.thoroughness import THOROUGH
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -49,7 +49,7 @@ def planned(*sources: Path, **fields: object) -> Comparison:
 
 def compared(
     output: Path, comparison: Comparison, executor: Executor | None = None, **options: object
-) -> tuple[Outcome, Listener]:
+) -> tuple[Run, Listener]:
     """Run a comparison in a folder."""
     listener = Listener()
     of_store = {name: options.pop(name) for name in ("alone", "overwrite") if name in options}
@@ -75,11 +75,6 @@ def published(folder: Path) -> dict[str, bytes]:
 @pytest.fixture
 def toss(tmp_path: Path) -> Path:
     return write_toss(tmp_path / "clips" / "toss.csv")
-
-
-@pytest.fixture
-def output(tmp_path: Path) -> Path:
-    return tmp_path / "out"
 
 
 def test_tables_are_published_and_their_numbers_are_those_of_the_analysis(output: Path, toss: Path) -> None:
@@ -229,18 +224,6 @@ def test_a_recording_that_was_edited_is_read_and_measured_again(output: Path, to
     assert len(listener.made) == 5
 
 
-@pytest.mark.parametrize("place", ["metrics.csv", "toss/5/keys.csv"])
-def test_an_input_that_lies_where_an_output_goes_is_refused(tmp_path: Path, place: str) -> None:
-    source = tmp_path / place
-    source.parent.mkdir(parents=True, exist_ok=True)
-    write_toss(source)
-    toss = write_toss(tmp_path / "clips" / "toss.csv")
-    before = source.read_bytes()
-    with pytest.raises(OutputError, match="this input lies where"):
-        compared(tmp_path, planned(toss, source), overwrite=True)
-    assert source.read_bytes() == before
-
-
 def garbage(path: Path) -> None:
     """Other bytes, of which size and time say nothing."""
     status = path.stat()
@@ -273,18 +256,6 @@ def test_a_damaged_part_is_made_again(output: Path, toss: Path, part: str, damag
     assert outcome.failures == {}
     assert (output / "metrics.csv").read_bytes() == metrics
     assert (output / "report.html").exists()
-
-
-def test_stages_in_parts_make_the_same(output: Path, toss: Path, tmp_path: Path) -> None:
-    other = write_toss(toss.with_name("other.csv"), samples=70)
-    comparison = planned(toss, other, stage=STAGE, about=ABOUT)
-    for stage in ("read", "measure", "build", "render", "encode", "report"):
-        for number in (1, 2):
-            outcome, _ = compared(output, comparison, alone=False, share=Share(frozenset({stage}), number, 2))
-            assert outcome.failures == {}
-    whole, _ = compared(tmp_path / "whole", comparison, ProcessExecutor(2))
-    assert whole.failures == {}
-    assert published(output) == published(tmp_path / "whole")
 
 
 # -- whatever is killed -----------------------------------------------------------------------------------------------
@@ -386,17 +357,18 @@ from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.pipeline.comparison import Comparison, ComparisonPlan
 from rigid_motion_batch.report.settings import Settings
 from rigid_motion_batch.pipeline.performing import Executor
-from rigid_motion_batch.pipeline.running import run
+from rigid_motion_batch.pipeline.running import Run
 from rigid_motion_batch.pipeline.store import Store
 
 with Store(Path(sys.argv[2])) as store, Executor() as executor:
     choices, modes = (Tolerance("2cm"),), ("lerp_slerp", "motor_spline")
     about = Settings(0.1, "x", "y")
     plan = ComparisonPlan(Comparison((sys.argv[1],), choices, modes, count_keys=True, about=about), store)
-    run(plan.reading, store, executor)
+    run = Run(store, executor)
+    run.do(plan.reading)
     plan.look_into()
-    outcome = run(plan.tasks, store, executor)
-sys.exit(str(outcome.failures) if outcome.failures else 0)
+    run.do(plan.tasks)
+sys.exit(str(run.failures) if run.failures else 0)
 """
 
 

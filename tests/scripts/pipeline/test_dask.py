@@ -116,7 +116,7 @@ class Connecting:
         self.executor = DaskExecutor(address, folder, self.notes.append)
 
     def wait_for_workers(self, count: int) -> None:
-        wait_for(lambda: len(self.executor.workers()) == count)
+        wait_for(lambda: self.executor.capacity == count)
 
 
 def children_of(worker: int) -> set[int]:
@@ -135,7 +135,7 @@ def processor_time(process: int) -> int:
 
 def at_work(output: Path) -> list[Path]:
     """What is printed by orders that are being done."""
-    return [*output.glob(f"{OWN}/scratch/*/*.log")]
+    return [*output.glob(f"{OWN}/scratch/*/*/log")]
 
 
 FILMED = ("--rates", "5", "--modes", "lerp_slerp", "--resolution", "64x36", "--fps", "30")
@@ -216,8 +216,8 @@ def test_a_worker_without_this_program_is_left_out_and_lives(cluster: Cluster, t
         stranger = cluster.add_worker(program=tmp_path)
 
         def left_out() -> bool:
-            result = executor.workers()
-            return any("No module named 'rigid_motion_batch'" in note for note in connecting.notes) and len(result) == 2
+            capacity = executor.capacity
+            return any("No module named 'rigid_motion_batch'" in note for note in connecting.notes) and capacity == 2
 
         wait_for(left_out)
         assert stranger.poll() is None

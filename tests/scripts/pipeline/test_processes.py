@@ -8,10 +8,9 @@ from pathlib import Path
 import pytest
 
 from rigid_motion_batch.pipeline.executors import ProcessExecutor
-from rigid_motion_batch.pipeline.running import run
 from rigid_motion_batch.pipeline.store import Store
 from tests.scripts.pipeline import steps
-from tests.scripts.pipeline.plans import Listener, contents, joining, run_in, states, task, writing
+from tests.scripts.pipeline.plans import Listener, contents, joining, run, run_in, states, task, writing
 from tests.scripts.pipeline.steps import Die, Write
 
 needs_signals = pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")

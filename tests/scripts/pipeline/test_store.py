@@ -12,11 +12,10 @@ import pytest
 
 from rigid_motion_batch.pipeline import steps as pipeline_steps
 from rigid_motion_batch.pipeline.performing import Executor
-from rigid_motion_batch.pipeline.running import run
 from rigid_motion_batch.pipeline.steps import OWN, Task
-from rigid_motion_batch.pipeline.store import FolderInUse, OutputError, Store
+from rigid_motion_batch.pipeline.store import OutputError, Store
 from tests.scripts.pipeline import steps
-from tests.scripts.pipeline.plans import contents, joining, run_in, states, task, writing
+from tests.scripts.pipeline.plans import contents, joining, run, run_in, states, task, writing
 from tests.scripts.pipeline.steps import FILE, Nothing, Write
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -294,7 +293,7 @@ def test_old_results_that_nobody_asks_for_go(output: Path, monkeypatch: pytest.M
 
 
 def test_two_runs_in_one_folder_are_refused(output: Path) -> None:
-    with Store(output), pytest.raises(FolderInUse, match="another run is at work in this folder"):
+    with Store(output), pytest.raises(match="another run is at work in this folder"):
         run_in(output, writing("a"))
     assert states(run_in(output, writing("a"))) == {"done": 1}
 
@@ -318,8 +317,8 @@ def test_the_digest_of_an_input_is_kept_until_it_changes(
     copying(output, source)
     hashed: list[str] = []
     monkeypatch.setattr(
-        "rigid_motion_batch.pipeline.store.sha256_of",
-        lambda path: hashed.append(str(path)) or pipeline_steps.sha256_of(path),
+        "rigid_motion_batch.pipeline.store.sha256_in",
+        lambda path: hashed.append(str(path)) or pipeline_steps.sha256_in(path),
     )
     assert copying(output, source) == {"up to date": 1}
     assert hashed == []
