@@ -15,18 +15,24 @@ import math
 import numpy as np
 
 from .key_costs import Recording
-from .key_links import beside, joined_keys, traded_keys
+from .key_links import joined_keys, traded_keys
 from .key_search import ROUNDS, SHORT, Keys, Search
 from .key_spread import moved_together, spread_keys
 
-SPREAD = 6, 8
-"""Candidates for each key of a budget, at least and at most, when its keys are first laid out anew."""
+SPREAD = 5, 6
+"""Candidates for each key of a budget, when its keys are first laid out anew.
+
+Where a segment depends on its two keys alone, and where on more.
+"""
 
 SPARSER = 3
-"""How many times as few candidates there are each time after that, where a segment depends on other keys too."""
+"""How many times as few candidates there are each time after that."""
 
-BESIDE = 1
-"""Samples on either side of all keys so far that are candidates then, where it depends on these alone."""
+CALM = 0.005
+"""Of the largest error of the first keys: a sample that is off by no more, when it alone is left out, is calm."""
+
+CALMER = 4
+"""Of calm samples, each how many-th is a candidate."""
 
 LENGTHS = 5, 10, 50
 """Samples for each key that settings change at. In the middle, from 10 to 50, there is time for every step.
@@ -36,12 +42,7 @@ at samples takes so long that another try is worth more.
 """
 
 BRIEF = 600
-"""Samples up to which there is time for more candidates, and for a last try."""
-
-TAKEN = 15, 10
-"""Samples for each key up to which all of them are candidates, where a segment depends on its two keys alone: in brief
-recordings, and in longer ones.
-"""
+"""Samples up to which there is time for a last try."""
 
 ENOUGH = 10.0, 15.0
 """Times the poses that the first keys have taken, after which no try begins: in the middle and above."""
@@ -74,31 +75,42 @@ class BudgetSearch(Search):
         self._length = int(np.searchsorted(LENGTHS, len(recording.times) / budget, side="right"))
         self._is_short = self._length < 2
         """Whether there are few samples for each key."""
-        self._is_brief = len(recording.times) <= BRIEF
-        self._takes_all = self.reach == 0 and len(recording.times) < TAKEN[not self._is_brief] * budget
+        self._takes_all = self.reach == 0 and self._is_short
         """Whether all samples are candidates."""
 
     def least(self, tries: int) -> np.ndarray:
         """So many samples that are keys with as small an error as can be found."""
         count = len(self.recording.times)
-        least, most = (self.budget * spread for spread in SPREAD)
-        keys = self.thinned(self.measured(np.arange(count)), math.inf, max(least, min(most, count // 4)))
-        candidates = np.arange(count) if self._takes_all else keys.indices
+        keys = self.measured(np.arange(count))
+        if not self._takes_all:
+            keys = self.thinned(keys, math.inf, SPREAD[min(self.reach, 1)] * self.budget)
+        candidates = keys.indices
         keys = self.thinned(keys, math.inf, self.budget)
+        if self._takes_all:
+            candidates = self._lively(CALM * keys.peak.max())
         if self.power == 2:
             return self._least_squares(self._settled(keys), tries)
         return self._least_peak(keys, candidates, tries) if tries else self._settled(keys).indices
+
+    def _lively(self, calm: float) -> np.ndarray:
+        """All samples, but of those that are off by so little when left out alone only every few."""
+        samples = np.arange(len(self.recording.times))
+        _, peak = self.costs.of(np.stack((samples[:-2], samples[2:]), axis=1))
+        is_lively = samples % CALMER == 0
+        is_lively[1:-1] |= peak > calm
+        is_lively[-1] = True
+        return samples[is_lively]
 
     def _least_peak(self, keys: Keys, candidates: np.ndarray, tries: int) -> np.ndarray:
         """Return the keys with the smallest largest error of all that tries lead to from some."""
         enough = math.inf if self._is_short else ENOUGH[self._length - 2] * self.costs.looked
         best = samples = (self.moved(keys, math.inf) if self._length == 2 else keys).indices
         result = [best]
-        for number in range(min(tries, 2) if self._is_short else tries):
+        for number in range(min(tries, 1 if self.reach == 0 else 2 if self._is_short else 3)):
             if self.costs.peak(best) == 0.0 or self.costs.looked > enough:
                 break
             steps, is_complete = STEPS[self._length], False
-            if number and self._is_short and self.reach:
+            if number and self._is_short:
                 # Those that matter least go where the motion is off most.
                 fewest = max(2, int(KEPT * self.budget))
                 samples, steps = self.thinned(self.measured(best), math.inf, fewest).indices, AGAIN
@@ -108,20 +120,22 @@ class BudgetSearch(Search):
             result += moved
             samples, best = moved[-1], min(best, *moved, key=self.costs.peak)
             if self._takes_all and is_complete:
-                if not number:
-                    return best
-                break
-            candidates = candidates[::SPARSER] if self.reach else beside(self.costs, result, BESIDE)
+                return best
+            candidates = candidates[::SPARSER]
         # Without neighbours there is little left to gain, and in long recordings it takes long.
         is_long = len(self.recording.times) > SHORT and not self.reach
         if is_long or not self.is_linkable or self.costs.peak(best) == 0.0:
             return best
-        if tries > 2 and self._length < 3 and self._is_brief:
+        if tries > 2 and self.reach and self._length < 3 and len(self.recording.times) <= BRIEF:
             # Keys that keep to a little less have better places, also when they are too many.
             aim = self.costs.peak(best) / LESS
             keys = self.refined(self.densified(self.measured(best), aim), aim)
             result.append(keys.indices)
             result += self._moved_together(self.thinned(keys, math.inf, self.budget).indices, AGAIN)
+        if not self.reach:
+            # All are near to one another: the two best have what the others have.
+            by_peak = {self.costs.peak(keys): keys for keys in result}
+            result = [by_peak[peak] for peak in sorted(by_peak)[:2]]
         joined = self._filled(self.measured(joined_keys(self.costs, result, self.budget))).indices
         return min(best, joined, key=self.costs.peak)
 
