@@ -1,11 +1,10 @@
 """The search for so many keys that are as near to a recording as can be.
 
 Keys are taken out until so many are left. For the largest error they are laid out anew and moved together, a few times,
-or, where there are few samples for each, some are taken out and put in elsewhere. From the best of them some more are
-found that keep to a twentieth less, and as many taken out as are too many; then the best is put together of all that
-this has led to. Where a segment depends on its two keys alone and there are few samples for each key, all of them are
-candidates, and the first layout is the best there is but for a few hundredths. For the mean square some more keys are
-put in, moved, and as many taken out.
+or, where there are few samples for each, some are taken out and put in elsewhere. Then the best is put together of all
+that this has led to. Where a segment depends on its two keys alone and there are few samples for each key, nearly all
+of them are candidates, and the first layout is the best there is but for a few hundredths. For the mean square some
+more keys are put in, moved, and as many taken out.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ import numpy as np
 
 from .key_costs import Recording
 from .key_links import joined_keys, traded_keys
-from .key_search import ROUNDS, SHORT, Keys, Search
+from .key_search import ROUNDS, SHORT, Keys, Search, spaced
 from .key_spread import moved_together, spread_keys
 
 SPREAD = 5, 6
@@ -41,9 +40,6 @@ Where there are fewer, what is done for each key takes longer than looking at sa
 at samples takes so long that another try is worth more.
 """
 
-BRIEF = 600
-"""Samples up to which there is time for a last try."""
-
 ENOUGH = 10.0, 15.0
 """Times the poses that the first keys have taken, after which no try begins: in the middle and above."""
 
@@ -58,9 +54,6 @@ AGAIN = slice(1)
 
 KEPT = 0.9
 """Of the keys: what is left of them when some are taken out, for others to be put in elsewhere."""
-
-LESS = 1.05
-"""How many times as small an error as that of the best keys the last ones are made for, whatever their number."""
 
 SWAPPED = 1.15
 """How many times the budget keys may be in between, for the mean square, to find better places."""
@@ -126,12 +119,6 @@ class BudgetSearch(Search):
         is_long = len(self.recording.times) > SHORT and not self.reach
         if is_long or not self.is_linkable or self.costs.peak(best) == 0.0:
             return best
-        if tries > 2 and self.reach and self._length < 3 and len(self.recording.times) <= BRIEF:
-            # Keys that keep to a little less have better places, also when they are too many.
-            aim = self.costs.peak(best) / LESS
-            keys = self.refined(self.densified(self.measured(best), aim), aim)
-            result.append(keys.indices)
-            result += self._moved_together(self.thinned(keys, math.inf, self.budget).indices, AGAIN)
         if not self.reach:
             # All are near to one another: the two best have what the others have.
             by_peak = {self.costs.peak(keys): keys for keys in result}
@@ -181,13 +168,16 @@ class BudgetSearch(Search):
     def _filled(self, keys: Keys, most: int | None = None) -> Keys:
         """Keys with more of them where the motion is off most, as many as the budget, or this, has left."""
         most = min(most or self.budget, len(self.recording.times))
+        columns = np.arange(-2 * self.reach, 2 + 2 * self.reach)
         while (left := most - len(keys.indices)) > 0:
-            # The segments that are off most get one each, where they are so: half as many as there are keys left.
-            between, segments = np.diff(keys.indices) > 1, self.segments(keys)[1]
-            order = np.argsort(np.where(between, -keys.peak[:-1], 1.0), kind="stable")[: (left + 1) // 2]
-            picked = order[between[order]]
-            errors = self.costs.errors(segments[np.sort(picked)])
-            ends = zip(keys.indices[picked] + 1, keys.indices[picked + 1], strict=True)
-            worst = [first + np.argmax(errors[first:second]) for first, second in ends]
-            keys = self.measured(np.union1d(keys.indices, worst))
+            trials = np.flatnonzero(np.diff(keys.indices) > 1)
+            errors = self.costs.errors(self.segments(keys)[1][trials])
+            ends = zip(keys.indices[trials] + 1, keys.indices[trials + 1], strict=True)
+            worst = np.array([first + np.argmax(errors[first:second]) for first, second in ends])
+            windows = np.insert(keys.windows(trials, columns), 1 + 2 * self.reach, worst, axis=1)
+            peak, before = self.evaluate(windows)[1].max(axis=1), keys.peak[trials]
+            # Those that are off most get one each, half as many as there are left; none does where that makes it worse.
+            order = np.argsort(np.where(peak < before, -before, peak), kind="stable")
+            picked = spaced(trials[order], self.spacing, len(keys.indices))[: (left + 1) // 2]
+            keys = self.measured(np.union1d(keys.indices, worst[np.searchsorted(trials, picked)]))
         return keys
