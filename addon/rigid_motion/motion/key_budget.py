@@ -79,8 +79,6 @@ class BudgetSearch(Search):
             keys = self.thinned(keys, math.inf, SPREAD[min(self.reach, 1)] * self.budget)
         candidates = keys.indices
         keys = self.thinned(keys, math.inf, self.budget)
-        if self._takes_all:
-            candidates = self._lively(CALM * keys.peak.max())
         if self.power == 2:
             return self._least_squares(self._settled(keys), tries)
         return self._least_peak(keys, candidates, tries) if tries else self._settled(keys).indices
@@ -96,6 +94,8 @@ class BudgetSearch(Search):
 
     def _least_peak(self, keys: Keys, candidates: np.ndarray, tries: int) -> np.ndarray:
         """Return the keys with the smallest largest error of all that tries lead to from some."""
+        if self._takes_all:
+            candidates = self._lively(CALM * keys.peak.max())
         enough = math.inf if self._is_short else ENOUGH[self._length - 2] * self.costs.looked
         best = samples = (self.moved(keys, math.inf) if self._length == 2 else keys).indices
         result = [best]
@@ -123,49 +123,10 @@ class BudgetSearch(Search):
             # All are near to one another: the two best have what the others have.
             by_peak = {self.costs.peak(keys): keys for keys in result}
             result = [by_peak[peak] for peak in sorted(by_peak)[:2]]
-        joined = self._filled(self.measured(joined_keys(self.costs, result, self.budget))).indices
+        joined = self.filled(self.measured(joined_keys(self.costs, result, self.budget))).indices
         return min(best, joined, key=self.costs.peak)
 
-    def _moved_together(self, samples: np.ndarray, steps: slice) -> list[np.ndarray]:
-        """As many keys as the budget, these among them, and what moving them together makes of them step by step."""
-        result = [self._filled(self.measured(samples)).indices]
-        for ways, part in TOGETHER[self.reach][steps]:
-            result.append(moved_together(self.costs, result[-1], ways, part))
-        return result
-
-    def _least_squares(self, best: Keys, tries: int) -> np.ndarray:
-        """Return the same for the mean square, from keys that are many enough."""
-        result = [best.indices]
-        links = tries and self.is_linkable  # The last try.
-        for _ in range(tries - bool(links)):
-            # Some more where the motion is off most, moved together.
-            more = self._filled(self.measured(best.indices), math.ceil(SWAPPED * self.budget))
-            more = self.moved(more, math.inf)
-            result.append(more.indices)
-            best = self._better_of(best, more)
-        if links:
-            traded = traded_keys(self.costs, result, budget=self.budget)
-            best = self._better_of(best, self.measured(traded))
-        return best.indices
-
-    def _better_of(self, best: Keys, other: Keys) -> Keys:
-        """Of keys and others, brought to the budget, those with the smaller sum of squares."""
-        keys = self.measured(other.indices)
-        if len(keys.indices) > self.budget:
-            keys = self.thinned(keys, math.inf, self.budget)
-        keys = self.moved(self._filled(self.moved(keys, math.inf)), math.inf)
-        return keys if keys.cost.sum() < best.cost.sum() else best
-
-    def _settled(self, keys: Keys) -> Keys:
-        """Keys moved to where the sum of the powers of errors is least."""
-        for _ in range(ROUNDS):
-            before = keys.cost.sum()
-            keys = self.moved(keys, math.inf)
-            if not keys.cost.sum() < 0.99 * before:
-                break
-        return keys
-
-    def _filled(self, keys: Keys, most: int | None = None) -> Keys:
+    def filled(self, keys: Keys, most: int | None = None) -> Keys:
         """Keys with more of them where the motion is off most, as many as the budget, or this, has left."""
         most = min(most or self.budget, len(self.recording.times))
         columns = np.arange(-2 * self.reach, 2 + 2 * self.reach)
@@ -180,4 +141,43 @@ class BudgetSearch(Search):
             order = np.argsort(np.where(peak < before, -before, peak), kind="stable")
             picked = spaced(trials[order], self.spacing, len(keys.indices))[: (left + 1) // 2]
             keys = self.measured(np.union1d(keys.indices, worst[np.searchsorted(trials, picked)]))
+        return keys
+
+    def _moved_together(self, samples: np.ndarray, steps: slice) -> list[np.ndarray]:
+        """As many keys as the budget, these among them, and what moving them together makes of them step by step."""
+        result = [self.filled(self.measured(samples)).indices]
+        for ways, part in TOGETHER[self.reach][steps]:
+            result.append(moved_together(self.costs, result[-1], ways, part))
+        return result
+
+    def _least_squares(self, best: Keys, tries: int) -> np.ndarray:
+        """Return the same for the mean square, from keys that are many enough."""
+        result = [best.indices]
+        links = tries and self.is_linkable  # The last try.
+        for _ in range(tries - bool(links)):
+            # Some more where the motion is off most, moved together.
+            more = self.filled(self.measured(best.indices), math.ceil(SWAPPED * self.budget))
+            more = self.moved(more, math.inf)
+            result.append(more.indices)
+            best = self._better_of(best, more)
+        if links:
+            traded = traded_keys(self.costs, result, budget=self.budget)
+            best = self._better_of(best, self.measured(traded))
+        return best.indices
+
+    def _better_of(self, best: Keys, other: Keys) -> Keys:
+        """Of keys and others, brought to the budget, those with the smaller sum of squares."""
+        keys = self.measured(other.indices)
+        if len(keys.indices) > self.budget:
+            keys = self.thinned(keys, math.inf, self.budget)
+        keys = self.moved(self.filled(self.moved(keys, math.inf)), math.inf)
+        return keys if keys.cost.sum() < best.cost.sum() else best
+
+    def _settled(self, keys: Keys) -> Keys:
+        """Keys moved to where the sum of the powers of errors is least."""
+        for _ in range(ROUNDS):
+            before = keys.cost.sum()
+            keys = self.moved(keys, math.inf)
+            if not keys.cost.sum() < 0.99 * before:
+                break
         return keys
