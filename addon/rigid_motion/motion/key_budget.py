@@ -55,6 +55,9 @@ AGAIN = slice(1)
 KEPT = 0.9
 """Of the keys: what is left of them when some are taken out, for others to be put in elsewhere."""
 
+FEW = 8
+"""Keys that are put in at once where each makes the error less; else half of those that are left."""
+
 SWAPPED = 1.15
 """How many times the budget keys may be in between, for the mean square, to find better places."""
 
@@ -137,10 +140,12 @@ class BudgetSearch(Search):
             worst = np.array([first + np.argmax(errors[first:second]) for first, second in ends])
             windows = np.insert(keys.windows(trials, columns), 1 + 2 * self.reach, worst, axis=1)
             peak, before = self.evaluate(windows)[1].max(axis=1), keys.peak[trials]
-            # Those that are off most get one each, half as many as there are left; none does where that makes it worse.
-            order = np.argsort(np.where(peak < before, -before, peak), kind="stable")
-            picked = spaced(trials[order], self.spacing, len(keys.indices))[: (left + 1) // 2]
-            keys = self.measured(np.union1d(keys.indices, worst[np.searchsorted(trials, picked)]))
+            # Those that are off most get one each, but those where that makes it worse come last.
+            is_better = peak < before
+            order = np.argsort(np.where(is_better, -before, peak), kind="stable")
+            picked = np.searchsorted(trials, spaced(trials[order], self.spacing, len(keys.indices)))
+            picked = picked[: max((left + 1) // 2, min(left, FEW, np.count_nonzero(is_better[picked])))]
+            keys = self.measured(np.union1d(keys.indices, worst[picked]))
         return keys
 
     def _moved_together(self, samples: np.ndarray, steps: slice) -> list[np.ndarray]:
