@@ -1,11 +1,10 @@
 """The search for so many keys that are as near to a recording as can be.
 
 Keys are taken out until so many are left. For the largest error they are laid out anew and moved together, a few times,
-or, where there are few samples for each, some are taken out and put in elsewhere. From the best of them some more are
-found that keep to a twentieth less, and as many taken out as are too many; then the best is put together of all that
-this has led to. Where a segment depends on its two keys alone and there are few samples for each key, all of them are
-candidates, and the first layout is the best there is but for a few hundredths. For the mean square some more keys are
-put in, moved, and as many taken out.
+or, where there are few samples for each, some are taken out and put in elsewhere. Then the best is put together of all
+that this has led to. Where a segment depends on its two keys alone and there are few samples for each key, nearly all
+of them are candidates, and the first layout is the best there is but for a few hundredths. For the mean square some
+more keys are put in, moved, and as many taken out.
 """
 
 from __future__ import annotations
@@ -15,32 +14,30 @@ import math
 import numpy as np
 
 from .key_costs import Recording
-from .key_links import beside, joined_keys, traded_keys
-from .key_search import ROUNDS, SHORT, Keys, Search
+from .key_links import joined_keys, traded_keys
+from .key_search import ROUNDS, SHORT, Keys, Search, spaced
 from .key_spread import moved_together, spread_keys
 
-SPREAD = 6, 8
-"""Candidates for each key of a budget, at least and at most, when its keys are first laid out anew."""
+SPREAD = 5, 6
+"""Candidates for each key of a budget, when its keys are first laid out anew.
+
+Where a segment depends on its two keys alone, and where on more.
+"""
 
 SPARSER = 3
-"""How many times as few candidates there are each time after that, where a segment depends on other keys too."""
+"""How many times as few candidates there are each time after that."""
 
-BESIDE = 1
-"""Samples on either side of all keys so far that are candidates then, where it depends on these alone."""
+CALM = 0.005
+"""Of the largest error of the first keys: a sample that is off by no more, when it alone is left out, is calm."""
+
+CALMER = 4
+"""Of calm samples, each how many-th is a candidate."""
 
 LENGTHS = 5, 10, 50
 """Samples for each key that settings change at. In the middle, from 10 to 50, there is time for every step.
 
 Where there are fewer, what is done for each key takes longer than looking at samples; where there are more, looking
 at samples takes so long that another try is worth more.
-"""
-
-BRIEF = 600
-"""Samples up to which there is time for more candidates, and for a last try."""
-
-TAKEN = 15, 10
-"""Samples for each key up to which all of them are candidates, where a segment depends on its two keys alone: in brief
-recordings, and in longer ones.
 """
 
 ENOUGH = 10.0, 15.0
@@ -58,8 +55,8 @@ AGAIN = slice(1)
 KEPT = 0.9
 """Of the keys: what is left of them when some are taken out, for others to be put in elsewhere."""
 
-LESS = 1.05
-"""How many times as small an error as that of the best keys the last ones are made for, whatever their number."""
+FEW = 8
+"""Keys that are put in at once where each makes the error less; else half of those that are left."""
 
 SWAPPED = 1.15
 """How many times the budget keys may be in between, for the mean square, to find better places."""
@@ -74,31 +71,42 @@ class BudgetSearch(Search):
         self._length = int(np.searchsorted(LENGTHS, len(recording.times) / budget, side="right"))
         self._is_short = self._length < 2
         """Whether there are few samples for each key."""
-        self._is_brief = len(recording.times) <= BRIEF
-        self._takes_all = self.reach == 0 and len(recording.times) < TAKEN[not self._is_brief] * budget
+        self._takes_all = self.reach == 0 and self._is_short
         """Whether all samples are candidates."""
 
     def least(self, tries: int) -> np.ndarray:
         """So many samples that are keys with as small an error as can be found."""
         count = len(self.recording.times)
-        least, most = (self.budget * spread for spread in SPREAD)
-        keys = self.thinned(self.measured(np.arange(count)), math.inf, max(least, min(most, count // 4)))
-        candidates = np.arange(count) if self._takes_all else keys.indices
+        keys = self.measured(np.arange(count))
+        if not self._takes_all:
+            keys = self.thinned(keys, math.inf, SPREAD[min(self.reach, 1)] * self.budget)
+        candidates = keys.indices
         keys = self.thinned(keys, math.inf, self.budget)
         if self.power == 2:
             return self._least_squares(self._settled(keys), tries)
         return self._least_peak(keys, candidates, tries) if tries else self._settled(keys).indices
 
+    def _lively(self, calm: float) -> np.ndarray:
+        """All samples, but of those that are off by so little when left out alone only every few."""
+        samples = np.arange(len(self.recording.times))
+        _, peak = self.costs.of(np.stack((samples[:-2], samples[2:]), axis=1))
+        is_lively = samples % CALMER == 0
+        is_lively[1:-1] |= peak > calm
+        is_lively[-1] = True
+        return samples[is_lively]
+
     def _least_peak(self, keys: Keys, candidates: np.ndarray, tries: int) -> np.ndarray:
         """Return the keys with the smallest largest error of all that tries lead to from some."""
+        if self._takes_all:
+            candidates = self._lively(CALM * keys.peak.max())
         enough = math.inf if self._is_short else ENOUGH[self._length - 2] * self.costs.looked
         best = samples = (self.moved(keys, math.inf) if self._length == 2 else keys).indices
         result = [best]
-        for number in range(min(tries, 2) if self._is_short else tries):
+        for number in range(min(tries, 1 if self.reach == 0 else 2 if self._is_short else 3)):
             if self.costs.peak(best) == 0.0 or self.costs.looked > enough:
                 break
             steps, is_complete = STEPS[self._length], False
-            if number and self._is_short and self.reach:
+            if number and self._is_short:
                 # Those that matter least go where the motion is off most.
                 fewest = max(2, int(KEPT * self.budget))
                 samples, steps = self.thinned(self.measured(best), math.inf, fewest).indices, AGAIN
@@ -108,26 +116,41 @@ class BudgetSearch(Search):
             result += moved
             samples, best = moved[-1], min(best, *moved, key=self.costs.peak)
             if self._takes_all and is_complete:
-                if not number:
-                    return best
-                break
-            candidates = candidates[::SPARSER] if self.reach else beside(self.costs, result, BESIDE)
+                return best
+            candidates = candidates[::SPARSER]
         # Without neighbours there is little left to gain, and in long recordings it takes long.
         is_long = len(self.recording.times) > SHORT and not self.reach
         if is_long or not self.is_linkable or self.costs.peak(best) == 0.0:
             return best
-        if tries > 2 and self._length < 3 and self._is_brief:
-            # Keys that keep to a little less have better places, also when they are too many.
-            aim = self.costs.peak(best) / LESS
-            keys = self.refined(self.densified(self.measured(best), aim), aim)
-            result.append(keys.indices)
-            result += self._moved_together(self.thinned(keys, math.inf, self.budget).indices, AGAIN)
-        joined = self._filled(self.measured(joined_keys(self.costs, result, self.budget))).indices
+        if not self.reach:
+            # All are near to one another: the two best have what the others have.
+            by_peak = {self.costs.peak(keys): keys for keys in result}
+            result = [by_peak[peak] for peak in sorted(by_peak)[:2]]
+        joined = self.filled(self.measured(joined_keys(self.costs, result, self.budget))).indices
         return min(best, joined, key=self.costs.peak)
+
+    def filled(self, keys: Keys, most: int | None = None) -> Keys:
+        """Keys with more of them where the motion is off most, as many as the budget, or this, has left."""
+        most = min(most or self.budget, len(self.recording.times))
+        columns = np.arange(-2 * self.reach, 2 + 2 * self.reach)
+        while (left := most - len(keys.indices)) > 0:
+            trials = np.flatnonzero(np.diff(keys.indices) > 1)
+            errors = self.costs.errors(self.segments(keys)[1][trials])
+            ends = zip(keys.indices[trials] + 1, keys.indices[trials + 1], strict=True)
+            worst = np.array([first + np.argmax(errors[first:second]) for first, second in ends])
+            windows = np.insert(keys.windows(trials, columns), 1 + 2 * self.reach, worst, axis=1)
+            peak, before = self.evaluate(windows)[1].max(axis=1), keys.peak[trials]
+            # Those that are off most get one each, but those where that makes it worse come last.
+            is_better = peak < before
+            order = np.argsort(np.where(is_better, -before, peak), kind="stable")
+            picked = np.searchsorted(trials, spaced(trials[order], self.spacing, len(keys.indices)))
+            picked = picked[: max((left + 1) // 2, min(left, FEW, np.count_nonzero(is_better[picked])))]
+            keys = self.measured(np.union1d(keys.indices, worst[picked]))
+        return keys
 
     def _moved_together(self, samples: np.ndarray, steps: slice) -> list[np.ndarray]:
         """As many keys as the budget, these among them, and what moving them together makes of them step by step."""
-        result = [self._filled(self.measured(samples)).indices]
+        result = [self.filled(self.measured(samples)).indices]
         for ways, part in TOGETHER[self.reach][steps]:
             result.append(moved_together(self.costs, result[-1], ways, part))
         return result
@@ -138,7 +161,7 @@ class BudgetSearch(Search):
         links = tries and self.is_linkable  # The last try.
         for _ in range(tries - bool(links)):
             # Some more where the motion is off most, moved together.
-            more = self._filled(self.measured(best.indices), math.ceil(SWAPPED * self.budget))
+            more = self.filled(self.measured(best.indices), math.ceil(SWAPPED * self.budget))
             more = self.moved(more, math.inf)
             result.append(more.indices)
             best = self._better_of(best, more)
@@ -152,7 +175,7 @@ class BudgetSearch(Search):
         keys = self.measured(other.indices)
         if len(keys.indices) > self.budget:
             keys = self.thinned(keys, math.inf, self.budget)
-        keys = self.moved(self._filled(self.moved(keys, math.inf)), math.inf)
+        keys = self.moved(self.filled(self.moved(keys, math.inf)), math.inf)
         return keys if keys.cost.sum() < best.cost.sum() else best
 
     def _settled(self, keys: Keys) -> Keys:
@@ -162,18 +185,4 @@ class BudgetSearch(Search):
             keys = self.moved(keys, math.inf)
             if not keys.cost.sum() < 0.99 * before:
                 break
-        return keys
-
-    def _filled(self, keys: Keys, most: int | None = None) -> Keys:
-        """Keys with more of them where the motion is off most, as many as the budget, or this, has left."""
-        most = min(most or self.budget, len(self.recording.times))
-        while (left := most - len(keys.indices)) > 0:
-            # The segments that are off most get one each, where they are so: half as many as there are keys left.
-            between, segments = np.diff(keys.indices) > 1, self.segments(keys)[1]
-            order = np.argsort(np.where(between, -keys.peak[:-1], 1.0), kind="stable")[: (left + 1) // 2]
-            picked = order[between[order]]
-            errors = self.costs.errors(segments[np.sort(picked)])
-            ends = zip(keys.indices[picked] + 1, keys.indices[picked + 1], strict=True)
-            worst = [first + np.argmax(errors[first:second]) for first, second in ends]
-            keys = self.measured(np.union1d(keys.indices, worst))
         return keys

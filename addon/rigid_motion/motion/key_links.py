@@ -36,7 +36,7 @@ EFFORT = 100
 BESIDE = {0: 2, 1: 0}
 """The same for keys of a budget, whatever the effort."""
 
-NEAR = 1.2, 1.4
+NEAR = {0: (1.0, 1.2), 1: (1.2, 1.4)}
 """How many times the least error so far a segment may be off by for these, and for a longer one to be looked at."""
 
 JOINED = 300
@@ -138,7 +138,7 @@ def joined_keys(costs: Costs, result: list[np.ndarray], budget: int) -> np.ndarr
     best, high = within[0], costs.peak(within[0])
     for some in (result, within[:FEWER]):
         candidates = beside(costs, some, BESIDE[costs.reach])
-        good, alive = (high * times for times in NEAR)
+        good, alive = (high * times for times in NEAR[costs.reach])
         links = _links(costs, candidates, some, good, alive, JOINED)
         if links is not None:
             break

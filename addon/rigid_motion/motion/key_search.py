@@ -273,7 +273,7 @@ class Search:
         if self.power != 2:
             order = order[peak[order] <= tolerance]
             order = order[: max(1, len(rise) // 4)]
-        picked = _spaced(order, self.spacing, len(rise))[:most]
+        picked = spaced(order, self.spacing, len(rise))[:most]
         if self.power == 2 and math.isfinite(tolerance):
             allowed = tolerance**2 * len(self.recording.times)
             picked = picked[keys.cost.sum() + np.cumsum(rise[picked]) <= allowed]
@@ -322,7 +322,7 @@ class Search:
             best = best[np.argsort(rise[best], kind="stable")]
             numbers = inner[rows[best]]
             keys.stale[numbers] = True
-            picked = _spaced(numbers, self.spacing, len(keys.indices))
+            picked = spaced(numbers, self.spacing, len(keys.indices))
             chosen = best[np.argsort(numbers)[np.searchsorted(np.sort(numbers), picked)]]
             segments, inside = keys.around(picked, of_segments)
             keys.cost[segments[inside]], keys.peak[segments[inside]] = cost[chosen][inside], peak[chosen][inside]
@@ -360,7 +360,7 @@ class Search:
         return cost, peak
 
 
-def _spaced(order: np.ndarray, distance: int, count: int) -> np.ndarray:
+def spaced(order: np.ndarray, distance: int, count: int) -> np.ndarray:
     """Of the numbers below `count`, in the order of their worth, those that are `distance` from any better one."""
     rank = np.full(count + 2 * distance, len(order))
     rank[order + distance] = np.arange(len(order))

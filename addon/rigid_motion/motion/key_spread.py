@@ -31,7 +31,7 @@ RAISED = 1.15
 HALVINGS = 3
 """Of the last step up, by its logarithm."""
 
-ALIVE = 2.0, 1.2
+ALIVE = 1.5, 1.2
 """Times the error that a segment may be off by, for longer ones from its first key to be looked at.
 
 Where it depends on its two keys alone, and where on more."""
@@ -41,6 +41,9 @@ LONGEST = 4, 36
 
 EFFORT = 200
 """Times that every sample may be looked at for segments, on average."""
+
+EACH = 8
+"""Candidates that a segment reaches over, up to which it may reach over any number of them: beyond, steps grow."""
 
 TOGETHER = 8
 """Lengths of segments that are looked at in one go."""
@@ -103,7 +106,10 @@ class _Ways:
 
     def __init__(self, costs: Costs, candidates: np.ndarray, keys: np.ndarray) -> None:
         self._costs, self._candidates, self._alive = costs, candidates, ALIVE[min(costs.reach, 1)]
-        self._longest = max(LONGEST[0] * -(-len(candidates) // len(keys)), LONGEST[1])
+        longest, lengths = max(LONGEST[0] * -(-len(candidates) // len(keys)), LONGEST[1]), [1]
+        while lengths[-1] < longest:
+            lengths.append(lengths[-1] + max(1, lengths[-1] // EACH))
+        self._lengths = np.array(lengths)
         self._left = float(EFFORT * len(costs.recording.times) * costs.recording.poses_each)
         # The samples of keys 1, 2... further, before each candidate and after it, -1 beyond the ends.
         number = np.arange(len(keys))
@@ -114,8 +120,8 @@ class _Ways:
         near = np.floor(np.round(np.interp(places, number, keys), 6) + 0.5).astype(np.int64)
         near = np.where((places < 0) | (places > number[-1]), -1, near)
         self._before, self._after = near[: costs.reach], near[costs.reach :]
-        # How far each candidate has been looked at, and the error that has ended that.
-        self._length, self._ended = np.ones(len(candidates), dtype=np.int64), np.zeros(len(candidates))
+        # How many lengths of segments from each candidate have been good enough, and the error of the next.
+        self._looked, self._ended = np.zeros(len(candidates), dtype=np.int64), np.zeros(len(candidates))
         own = np.searchsorted(candidates, keys)
         self._pairs = [np.stack((own[:-1], own[1:]))]
         self._peaks = [costs.of(self._windows(*self._pairs[0]))[1]]
@@ -133,9 +139,9 @@ class _Ways:
     def look(self, error: float) -> None:
         """Look at all segments that may be off by an error at most."""
         last = len(self._candidates) - 1
-        most = np.minimum(self._longest, last - np.arange(last + 1))
+        most = np.searchsorted(self._lengths, last - np.arange(last + 1), side="right")
         while True:
-            open_ones = np.flatnonzero((self._ended <= self._alive * error) & (self._length <= most))
+            open_ones = np.flatnonzero((self._ended <= self._alive * error) & (self._looked < most))
             if not len(open_ones):
                 return
             for begin in range(0, len(open_ones), AT_ONCE):
@@ -145,15 +151,16 @@ class _Ways:
 
     def _look_from(self, first: np.ndarray, error: float) -> None:
         """Look at the next few lengths of segments from some candidates."""
-        second = self._length[first, None] + first[:, None] + np.arange(TOGETHER)
-        there = second < len(self._candidates)
+        numbers = self._looked[first, None] + np.arange(TOGETHER)
+        second = first[:, None] + self._lengths[np.minimum(numbers, len(self._lengths) - 1)]
+        there = (numbers < len(self._lengths)) & (second < len(self._candidates))
         windows = self._windows(np.broadcast_to(first[:, None], second.shape)[there], second[there])
         peak = np.full(second.shape, math.inf)
         peak[there] = self._costs.of(windows)[1]
         self._left -= self._costs.effort(windows)
         lives = np.logical_and.accumulate(peak <= error, axis=1)
         passed = lives.sum(axis=1)
-        self._length[first] += passed
+        self._looked[first] += passed
         at_end = peak[np.arange(len(first)), np.minimum(passed, TOGETHER - 1)]
         self._ended[first] = np.where(passed < TOGETHER, at_end, 0.0)
         rows, columns = np.nonzero(lives)
