@@ -222,7 +222,8 @@ def similarity_lerp(segments: Segments) -> Curves:
     """Return the projected blend of two versors of CGA. A motor's where nothing grows.
 
     With the roots k0 and k1 of the scales, the blend has no scale at |s| = (k0 + k1) / |k0 - k1|, where nothing turns,
-    or later, and a negative one behind that: half-way from the key to there the motion stops.
+    or later, and a negative one behind that: half-way from the key to there the motion stops. Where rounding could pass
+    that, it stops at the key.
     """
     if segments.scales is None:
         return motor_lerp(segments)
@@ -248,7 +249,8 @@ def similarity_lerp(segments: Segments) -> Curves:
         return rows, dot(rotor, growing) / dot(rotor, shrinking)
 
     h, (first, second) = segments.quarter_angle, np.sqrt(segments.scales)
-    last = 0.5 + 0.5 * (first + second) / np.maximum(np.abs(first - second), SMALLEST_ANGLE)
+    beyond = np.minimum(first, second) / np.maximum(np.abs(first - second), SMALLEST_ANGLE)
+    last = 1.0 + np.where(beyond > 1e-15, beyond, 0.0)
     _, _, around = segments.decompose()
     ends = segments.middle * np.cos(h), segments.difference * np.sin(h)
     return Curves(
