@@ -53,7 +53,7 @@ def test_style(command):
 
 def test_commits_are_checked_with_the_ruff_that_is_tested():
     groups = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["dependency-groups"]
-    (pinned,) = (one for one in groups["test"] if one.startswith("ruff=="))
+    (pinned,) = (group for group in groups["test"] if group.startswith("ruff=="))
     hooks = (ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8")
     assert re.findall(r"ruff==[\d.]+", hooks) == [pinned] * 2
 

@@ -53,7 +53,9 @@ class Parser(argparse.ArgumentParser):
     """A parser whose complaints are two lines, whatever was typed, and say what may have been meant."""
 
     def error(self, message: str) -> NoReturn:
-        names = [self._get_formatter()._format_args(one, one.dest.upper()) for one in self._get_positional_actions()]
+        names = [
+            self._get_formatter()._format_args(action, action.dest.upper()) for action in self._get_positional_actions()
+        ]
         usage = " ".join([self.prog, *names, "[options]"])
         error = f"{self.prog}: error: {printable(message)}"
         self.exit(2, f"usage: {usage}   (--help lists the options)\n{error}\n")
@@ -69,14 +71,17 @@ class Parser(argparse.ArgumentParser):
 
     def _all_options(self) -> list[str]:
         """Return the options of this parser, and of its commands."""
-        below = [one.choices.values() for one in self._actions if isinstance(one, argparse._SubParsersAction)]
-        return [*self._option_string_actions, *(name for ones in below for one in ones for name in one._all_options())]
+        below = [action.choices.values() for action in self._actions if isinstance(action, argparse._SubParsersAction)]
+        return [
+            *self._option_string_actions,
+            *(name for ones in below for item in ones for name in item._all_options()),
+        ]
 
     def _get_value(self, action: argparse.Action, text: str) -> Any:
         value = super()._get_value(action, text)
         if action.choices is None or isinstance(action, argparse._SubParsersAction) or not isinstance(value, str):
             return value
-        fitting = (one for one in action.choices if str(one).lower() == value.lower())
+        fitting = (choice for choice in action.choices if str(choice).lower() == value.lower())
         return value if value in action.choices else next(fitting, value)
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:

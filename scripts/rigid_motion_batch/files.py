@@ -71,8 +71,8 @@ def _make_folders(folder: Path) -> list[Path]:
         made.insert(0, folder)
         folder = folder.parent
     if made:
-        for one in made:
-            report(making=os.path.abspath(one))
+        for item in made:
+            report(making=os.path.abspath(item))
         made[-1].mkdir(parents=True, exist_ok=True)
     return made
 

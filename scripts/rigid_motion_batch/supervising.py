@@ -67,7 +67,7 @@ def stop_signals() -> list[signal.Signals]:
         return [ASK]
     names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
     known = [getattr(signal, name) for name in names if hasattr(signal, name)]
-    return [one for one in known if signal.getsignal(one) is not signal.SIG_IGN]
+    return [item for item in known if signal.getsignal(item) is not signal.SIG_IGN]
 
 
 @contextmanager
@@ -76,7 +76,7 @@ def ended_at_once() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = {one: signal.signal(one, signal.SIG_DFL) for one in stop_signals()}
+    before = {item: signal.signal(item, signal.SIG_DFL) for item in stop_signals()}
     try:
         yield
     finally:
@@ -95,7 +95,7 @@ def supervise(program: str) -> int:
         if len(received) == 1 and child is not None and ASK:
             child.send_signal(ASK)
 
-    before = {one: signal.signal(one, handle) for one in stop_signals()}
+    before = {item: signal.signal(item, handle) for item in stop_signals()}
     try:
         with held_back(before):
             early = bool(received)
@@ -164,8 +164,8 @@ def begin_child() -> bool:
             with suppress(OSError):
                 os.kill(parent, number)
 
-        for one in signals:
-            signal.signal(one, relay)
+        for item in signals:
+            signal.signal(item, relay)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, signals)
     _is_child = True
     return True

@@ -111,8 +111,8 @@ def everywhere(field: str, value: float) -> Damage:
 
 def each(*damages: Damage) -> Damage:
     def damage(obj: bpy.types.Object) -> None:
-        for one in damages:
-            one(obj)
+        for item in damages:
+            item(obj)
 
     return damage
 

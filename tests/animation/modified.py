@@ -16,7 +16,12 @@ FCurves = Sequence[bpy.types.FCurve]
 
 def acting(fcurves: Iterable[bpy.types.FCurve]) -> list[bpy.types.FModifier]:
     """The modifiers of these that are not muted, without Cycles."""
-    return [one for fcurve in fcurves for one in fcurve.modifiers if one.type != "CYCLES" and not one.mute]
+    return [
+        modifier
+        for fcurve in fcurves
+        for modifier in fcurve.modifiers
+        if modifier.type != "CYCLES" and not modifier.mute
+    ]
 
 
 def led_to(settings: Iterable[dict[str, object]], frames: Sequence[float]) -> np.ndarray:
@@ -26,9 +31,9 @@ def led_to(settings: Iterable[dict[str, object]], frames: Sequence[float]) -> np
     fcurve = strip.channelbag(action.slots.new("OBJECT", "Frames"), ensure=True).fcurves.new("location")
     for frame in (-1024.0, 1024.0):
         fcurve.keyframe_points.insert(frame, frame).interpolation = "LINEAR"
-    for one in settings:
+    for setting in settings:
         modifier = fcurve.modifiers.new("STEPPED")
-        for name, value in one.items():
+        for name, value in setting.items():
             setattr(modifier, name, value)
     result = np.array([fcurve.evaluate(frame) for frame in frames])
     bpy.data.actions.remove(action)
@@ -38,9 +43,9 @@ def led_to(settings: Iterable[dict[str, object]], frames: Sequence[float]) -> np
 def held_frames(fcurves: FCurves, frames: Sequence[float]) -> np.ndarray:
     """The frames whose poses channels hold on these ones, as the first that does so."""
     for fcurve in fcurves:
-        stepped = [one for one in acting([fcurve]) if one.type == "STEPPED"]
+        stepped = [item for item in acting([fcurve]) if item.type == "STEPPED"]
         if stepped and len(fcurve.keyframe_points) > 1:
-            return led_to([{name: getattr(one, name) for name in STEPPED} for one in stepped], frames)
+            return led_to([{name: getattr(item, name) for name in STEPPED} for item in stepped], frames)
     return np.asarray(frames)
 
 
@@ -48,10 +53,10 @@ def held_frames(fcurves: FCurves, frames: Sequence[float]) -> np.ndarray:
 def without_modifiers(fcurves: FCurves) -> Iterator[None]:
     """Modifiers but for Cycles are muted meanwhile; nothing is evaluated."""
     result = acting(fcurves)
-    for one in result:
-        one.mute = True
+    for item in result:
+        item.mute = True
     try:
         yield
     finally:
-        for one in result:
-            one.mute = False
+        for item in result:
+            item.mute = False

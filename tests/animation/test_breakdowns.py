@@ -238,7 +238,7 @@ def test_what_cannot_be_keyed_is_refused_and_the_others_are_keyed(live_file):
     breakdown([good, bad, idle], 0.5, refused=refused)
     assert NOW in key_frames(good).tolist()
     assert NOW not in key_frames(bad).tolist()
-    assert sorted(str(one).split(" ")[0] for one in refused) == ["Bad", "Idle"]
+    assert sorted(str(item).split(" ")[0] for item in refused) == ["Bad", "Idle"]
 
 
 def test_a_breakdown_below_noise_and_holds_is_that_of_the_keys(live_file):
@@ -256,7 +256,7 @@ def test_a_breakdown_below_noise_and_holds_is_that_of_the_keys(live_file):
         breakdown(obj, 0.4)
         poses.append(
             [
-                next(one.co[1] for one in fcurve.keyframe_points if one.co[0] == NOW)
+                next(point.co[1] for point in fcurve.keyframe_points if point.co[0] == NOW)
                 for (path, _), fcurve in curves_of(obj).items()
                 if path in ("location", "rotation_quaternion")
             ]
@@ -274,9 +274,9 @@ def test_a_breakdown_leaves_the_path_and_changes_when_the_body_is_there(live_fil
     beside = shown_worlds([obj], [*range(1, 11), *range(25, 41)])[0]
     bpy.context.scene.frame_set(int(NOW))
     breakdown(obj, 0.8)
-    assert {one.type for curve in curves_of(obj).values() for one in curve.keyframe_points if one.co[0] == NOW} == {
-        "BREAKDOWN"
-    }
+    assert {
+        point.type for curve in curves_of(obj).values() for point in curve.keyframe_points if point.co[0] == NOW
+    } == {"BREAKDOWN"}
     shown = shown_worlds([obj], np.arange(BEFORE, AFTER + 1.0))[0]
     nearest = np.abs(shown[:, None] - path).max(axis=(2, 3)).min(axis=1)
     assert nearest.max() < 2e-3 * np.abs(path).max()
@@ -292,7 +292,7 @@ def test_a_path_with_a_breakdown_leads_through_keys_that_not_all_channels_have(l
     breakdown(obj, 0.8)
     for path in ("location", "rotation_quaternion"):
         points = curves_of(obj)[path, 0].keyframe_points
-        points.remove(next(one for one in points if one.co[0] == gone))
+        points.remove(next(point for point in points if point.co[0] == gone))
     bpy.context.view_layer.update()
     assert_shown([obj], np.arange(-2.0, 44.0))
 

@@ -187,7 +187,7 @@ class Hand:
 
     def open_sidebar(self, area: bpy.types.Area, category: str) -> Steps[None]:
         """Open the sidebar of an area at the tab of this name."""
-        sidebar = next(one for one in area.regions if one.type == "UI")
+        sidebar = next(region for region in area.regions if region.type == "UI")
         if not area.spaces.active.show_region_ui:
             yield from self.hover(places.centre(places.region(area)))
             yield from self.press("N")

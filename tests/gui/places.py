@@ -24,15 +24,15 @@ REDO_ROW = 22
 
 def area(window: bpy.types.Window, kind: str) -> bpy.types.Area:
     """The largest area of this type, for instance "VIEW_3D"."""
-    result = [one for one in window.screen.areas if one.type == kind]
+    result = [item for item in window.screen.areas if item.type == kind]
     if not result:
-        raise LookupError(f"no {kind} in the window, only {', '.join(one.type for one in window.screen.areas)}")
-    return max(result, key=lambda one: one.width * one.height)
+        raise LookupError(f"no {kind} in the window, only {', '.join(item.type for item in window.screen.areas)}")
+    return max(result, key=lambda item: item.width * item.height)
 
 
 def region(area: bpy.types.Area, kind: str = "WINDOW") -> bpy.types.Region:
     """The region of this type in an area; it has to be open."""
-    result = next((one for one in area.regions if one.type == kind), None)
+    result = next((item for item in area.regions if item.type == kind), None)
     if result is None or min(result.width, result.height) <= 1:
         raise LookupError(f"the {kind} region of the {area.type} is not open")
     return result

@@ -90,6 +90,6 @@ def test_stretches_side_by_side_are_those_one_by_one(separate):
         assert as_lists(reduce_skeleton_keys(*body, **options, run=pool.map)) == here
 
     def elsewhere(function, arguments):
-        return map(*(pickle.loads(pickle.dumps(one)) for one in (function, list(arguments))))
+        return map(*(pickle.loads(pickle.dumps(item)) for item in (function, list(arguments))))
 
     assert as_lists(reduce_skeleton_keys(*body, **options, run=elsewhere)) == here

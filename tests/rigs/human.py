@@ -78,5 +78,5 @@ def _generate() -> bpy.types.Object:
             # It leaves panels and operators of the rig behind, which need it, and a handler that fails where it is not.
             for name in set(dir(bpy.types)) - known:
                 bpy.utils.unregister_class(getattr(bpy.types, name))
-            for handler in [one for one in bpy.app.handlers.load_post if one.__module__.startswith("rigify.")]:
+            for handler in [item for item in bpy.app.handlers.load_post if item.__module__.startswith("rigify.")]:
                 bpy.app.handlers.load_post.remove(handler)

@@ -23,4 +23,9 @@ def test_all_of_its_controls_take_a_mode_and_everything_that_hangs_on_them_follo
     assert np.array_equal(ends_of_bones(rig), shown)
     set_mode(posed, "BLENDER")
     assert np.abs(ends_of_bones(rig) - shown).max() > 0.001 * reach
-    assert not [one for bone in rig.pose.bones for one in bone.constraints if one.name.startswith("Rigid Motion")]
+    assert not [
+        constraint
+        for bone in rig.pose.bones
+        for constraint in bone.constraints
+        if constraint.name.startswith("Rigid Motion")
+    ]

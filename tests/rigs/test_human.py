@@ -29,7 +29,7 @@ def test_what_was_in_the_file_is_there_and_nothing_but_the_rig_has_come(human):
     assert len(bpy.data.scenes) == 1
     assert bpy.context.mode == "OBJECT"
     assert not [name for name in dir(bpy.types) if "rigify" in name.lower()]
-    assert not [one for one in bpy.app.handlers.load_post if one.__module__.startswith("rigify")]
+    assert not [item for item in bpy.app.handlers.load_post if item.__module__.startswith("rigify")]
 
 
 def test_controls_are_what_animators_pose(human):

@@ -330,7 +330,7 @@ def test_a_folder_is_baked_and_what_was_baked_is_no_input(tmp_path, capsys):
     for times, written in ((1, "2 written"), (2, "0 written, 2 already baked")):
         assert run(tmp_path, "--output", tmp_path / "out") == 0, times
         said = capsys.readouterr()
-        assert said.out.splitlines() == [str(tmp_path / "out" / f"{one}shot-baked.blend") for one in ("a/", "")]
+        assert said.out.splitlines() == [str(tmp_path / "out" / f"{item}shot-baked.blend") for item in ("a/", "")]
         assert said.err.splitlines()[-1].endswith(f"2 files: {written}.")
     assert run(tmp_path / "out", "--unbake") == 0
     assert listed(tmp_path / "out" / "a") == ["shot-baked-unbaked.blend", "shot-baked.blend"]

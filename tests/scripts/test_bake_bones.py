@@ -86,9 +86,9 @@ def test_un_baking_gives_back_exactly_the_keys_the_modes_and_the_motion(tmp_path
     assert run(path, "--output", tmp_path / "farm") == 0
     assert run(tmp_path / "farm" / "shot-baked.blend", "--unbake") == 0
     result = []
-    for one in (path, tmp_path / "farm" / "shot-baked-unbaked.blend"):
+    for item in (path, tmp_path / "farm" / "shot-baked-unbaked.blend"):
         with extension():
-            open_again(one)
+            open_again(item)
             rig = bpy.data.objects["Rig"]
             modes = [animation.modes_of(bone, np.array(FRAMES)) for bone in rig.pose.bones]
             shown = shown_worlds([bpy.data.objects[name] for name in probes()], PLAYED)
@@ -155,8 +155,8 @@ def test_what_cannot_be_baked_of_a_rig_is_named_by_bone_and_the_others_go_on(tmp
     def edit(rig: bpy.types.Object) -> None:
         rig.pose.bones["Index"].rotation_mode = "AXIS_ANGLE"
         for name in ("location", "rotation_quaternion", "scale"):
-            for one in rig.driver_add(rig.pose.bones["Hand"].path_from_id(name)):
-                one.driver.expression = "frame"
+            for item in rig.driver_add(rig.pose.bones["Hand"].path_from_id(name)):
+                item.driver.expression = "frame"
         for point in curves_of(rig)[rig.pose.bones["Arm"].path_from_id("location"), 0].keyframe_points:
             point.co_ui.x -= 100.0
 

@@ -163,7 +163,7 @@ def test_on_a_full_disk_nothing_is_written_and_what_is_there_stays(tmp_path, cap
     path = one_object_file(tmp_path / "shot.blend", compress=compress)
     if options == ("--overwrite",):
         baked_name(path).write_text("precious")
-    before = {one.name: one.read_bytes() for one in tmp_path.iterdir()}
+    before = {item.name: item.read_bytes() for item in tmp_path.iterdir()}
     capsys.readouterr()
     with disk_full_after(path.stat().st_size // 2):
         assert run(path, *options) == 1
@@ -171,7 +171,7 @@ def test_on_a_full_disk_nothing_is_written_and_what_is_there_stays(tmp_path, cap
     output = path if options == ("--in-place",) else baked_name(path)
     assert f"{path}: {output} could not be written (it broke off half-way, the disk may be full)" in said.err
     assert said.out == ""
-    assert {one.name: one.read_bytes() for one in tmp_path.iterdir()} == before
+    assert {item.name: item.read_bytes() for item in tmp_path.iterdir()} == before
 
 
 def test_a_link_is_saved_through_in_place(tmp_path):

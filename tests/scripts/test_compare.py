@@ -334,7 +334,7 @@ def test_the_best_of_each_segment_is_compared_with_the_modes_it_is_made_of(short
     assert [row["mode"] for row in rows] == [*KEYFRAME_MODES, "best_of"] * 2
     for choice in (rows[:8], rows[8:]):
         *single, best = choice
-        same = [float(row["rms_shell_m"]) for row in single if row["keys"] == min(one["keys"] for one in single)]
+        same = [float(row["rms_shell_m"]) for row in single if row["keys"] == min(item["keys"] for item in single)]
         assert float(best["rms_shell_m"]) <= min(same) * (1.0 + 1e-6)
     assert float(rows[-1]["max_shell_m"]) <= 0.005 * (1.0 + 1e-9)
     keys = rows_of(tmp_path / "toss" / "8" / "best_of.keys.csv")

@@ -51,7 +51,7 @@ def test_the_name_beside_is_short_however_long_the_name_is(tmp_path: Path) -> No
         assert len(beside.name) < 30
         assert beside.suffix == path.suffix
         beside.write_text("whole")
-    assert [one.name for one in tmp_path.iterdir()] == [path.name]
+    assert [item.name for item in tmp_path.iterdir()] == [path.name]
 
 
 @pytest.mark.parametrize("links", [True, False])
@@ -64,7 +64,7 @@ def test_what_has_come_meanwhile_is_not_replaced(tmp_path: Path, monkeypatch: py
     with pytest.raises(FileExistsError) as raised, replacing(path, overwrite=False) as stream:
         stream.write("second")
     assert raised.value.filename == str(path)
-    assert [(one.name, one.read_text()) for one in tmp_path.iterdir()] == [("keys.csv", "first")]
+    assert [(item.name, item.read_text()) for item in tmp_path.iterdir()] == [("keys.csv", "first")]
 
 
 def refuse_links(*_: object) -> None:

@@ -306,7 +306,7 @@ def test_a_file_that_was_saved_meanwhile_is_not_replaced_in_place(tmp_path, caps
     monkeypatch.setattr(blend_files, "refuse_cut_off", save_first)
     assert run(path, "--in-place") == 1
     assert f"{path}: it was changed while this program was at it" in capsys.readouterr().err
-    assert [(one.name, one.read_bytes()) for one in tmp_path.iterdir()] == [(path.name, b"saved by an animator")]
+    assert [(item.name, item.read_bytes()) for item in tmp_path.iterdir()] == [(path.name, b"saved by an animator")]
 
 
 def test_a_stop_between_bodies_tells_of_the_files_that_are_complete(tmp_path, capsys, monkeypatch):

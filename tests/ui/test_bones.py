@@ -288,7 +288,7 @@ def test_a_constraint_that_is_not_as_it_was_made_is_noted_and_mended(rig, tamper
     assert operators.mend() == {"FINISHED"}
     assert constraint_trouble(hand) == ""
     assert hand.constraints[0].name == CONSTRAINT
-    assert len([one for one in hand.constraints if one.type == "ACTION"]) == 1
+    assert len([item for item in hand.constraints if item.type == "ACTION"]) == 1
     for constraint in list(hand.constraints)[1:]:
         hand.constraints.remove(constraint)
     bpy.context.scene.frame_set(4)

@@ -56,7 +56,7 @@ def go(frame: int) -> None:
 
 def switch(parent: str, bone: str = HAND) -> set[str]:
     """As the menu does."""
-    one = next(one for one in switches_of(bpy.context) if one.bone == bone)
+    one = next(item for item in switches_of(bpy.context) if item.bone == bone)
     return bpy.ops.rigid_motion.switch_parent("EXEC_DEFAULT", True, parent=_choice(one, parent))
 
 

@@ -21,8 +21,8 @@ def footprint():
         "of scenes": hasattr(bpy.types.Scene, "rigid_motion_overlay"),
         "operators": dir(bpy.ops.rigid_motion),
         "menus": [len(getattr(bpy.types, menu)._dyn_ui_initialize()) for menu in menus.ENTRIES],
-        "keymaps": sum(len(one.keymap_items) if one else 0 for one in result),
-        "handlers": [list(one) for one in lists if isinstance(one, list)],
+        "keymaps": sum(len(item.keymap_items) if item else 0 for item in result),
+        "handlers": [list(item) for item in lists if isinstance(item, list)],
     }
 
 

@@ -19,7 +19,7 @@ class LeaveOut:
         for identity, listed in list(actions.actions.items()):
             for entry in list(listed):
                 differences = {pair.differences for pair in entry.action.rigid_motion.bone_slots}
-                entry.slots[:] = [one for one in entry.slots if one.slot.handle not in differences]
+                entry.slots[:] = [slot for slot in entry.slots if slot.slot.handle not in differences]
                 if not entry.slots or entry.action in kept:
                     listed.remove(entry)
             if not listed:
@@ -29,7 +29,7 @@ class LeaveOut:
 def _kept_originals(obj: bpy.types.Object) -> set[bpy.types.Action]:
     """Return the Actions that are in the file for Un-Bake and Restore Keys alone."""
     bones = obj.pose.bones if obj.pose is not None else ()
-    kept = {entry.original for one in (obj, *bones) for entry in one.rigid_motion.bakes} - {None}
+    kept = {entry.original for item in (obj, *bones) for entry in item.rigid_motion.bakes} - {None}
     data = obj.animation_data
     if data is not None:
         kept -= {data.action, *(strip.action for track in data.nla_tracks for strip in track.strips)}

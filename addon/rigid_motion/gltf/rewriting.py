@@ -259,7 +259,7 @@ def _range(view: Json) -> Range:
 
 def _cuts(removed: list[Range], kept: list[Range]) -> list[Range]:
     """Return what can go out of a buffer: ranges without those that stay, aligned, rising."""
-    edges = sorted({place for some in (removed, kept) for one in some for place in one})
+    edges = sorted({place for some in (removed, kept) for item in some for place in item})
     if not edges:
         return []
     places = np.array(edges)

@@ -118,10 +118,10 @@ def _summary(report: Report, output: Path) -> str:
         "{name}: {keys} of {all_keys} keys, {size:.0f} of {full:.0f} kB of animation, {error:.2f} mm off at most"
     ).format(
         name=output.name,
-        keys=sum(one.keys for one in after),
-        all_keys=sum(one.keys for one in before),
-        size=sum(one.size for one in after) / 1000.0,
-        full=sum(one.size for one in before) / 1000.0,
+        keys=sum(item.keys for item in after),
+        all_keys=sum(item.keys for item in before),
+        size=sum(item.size for item in after) / 1000.0,
+        full=sum(item.size for item in before) / 1000.0,
         error=1000.0 * max(clip.error for clip in report.clips),
     )
 

@@ -65,7 +65,7 @@ def switches_in(script: str) -> tuple[Switch, ...]:
         with suppress(SyntaxError, ValueError, TypeError, AttributeError, StopIteration, RecursionError, MemoryError):
             first, *lines = ast.parse(dedent(button)).body
             settings = {line.targets[0].attr: ast.literal_eval(line.value) for line in lines}
-            label = next(ast.literal_eval(one.value) for one in first.value.keywords if one.arg == "text")
+            label = next(ast.literal_eval(keyword.value) for keyword in first.value.keywords if keyword.arg == "text")
             operator = ast.literal_eval(first.value.args[0]).removeprefix("pose.")
             switch = Switch(label, operator, **settings)
             if all(isinstance(text, str) for text in (*switch[:-1], *switch.parents)) and len(switch.locks) == 3:
@@ -137,7 +137,7 @@ class RIGID_MOTION_OT_switch_parent(bpy.types.Operator):
         if not self.parent:
             return {"CANCELLED"}
         rig, (*names, number) = context.active_object, json.loads(self.parent)
-        switch = next(one for one in switches_of(context) if [one.bone, one.prop_bone, one.prop_id] == names)
+        switch = next(item for item in switches_of(context) if [item.bone, item.prop_bone, item.prop_id] == names)
         operator = bpy.types.Operator.bl_rna_get_subclass_py(f"POSE_OT_{switch.operator}")
         if operator is None:
             text = rpt_("{name} has no operator of Rigify's: run its script {script} in the Text Editor first")

@@ -74,7 +74,7 @@ def with_bones_of_rigs(context: bpy.types.Context, targets: Iterable[Transform])
         targets = (*map(transform_of, rigs), *targets)
     seen: set[Transform] = set()
     for target in targets:
-        keyed = [one for one in with_keyed_bones(target) if one not in seen]
+        keyed = [bone for bone in with_keyed_bones(target) if bone not in seen]
         yield from keyed
         seen.update(keyed)
 
@@ -84,7 +84,7 @@ def with_keyed_bones(target: Transform) -> list[Transform]:
     if target.is_part or target.carrier.type != "ARMATURE":
         return [target]
     keyed = list(with_more_keys_than((target, *map(transform_of, target.carrier.pose.bones)), 0))
-    return keyed if any(one.is_part for one in keyed) else [target]
+    return keyed if any(item.is_part for item in keyed) else [target]
 
 
 def selected(context: bpy.types.Context) -> list[bpy.types.Object] | list[bpy.types.PoseBone]:

@@ -225,7 +225,7 @@ def _of_rigid_body(made: Reconstruction) -> ChoiceResult:
         motions.append(
             Motion(
                 group,
-                tuple(rows[one] for one in group),
+                tuple(rows[item] for item in group),
                 made.keys[mode],
                 to_blender(made.clip.in_metres(made.poses[mode]), made.clip.axes),
                 np.stack([errors.shell, errors.position, np.degrees(errors.rotation)]),

@@ -143,8 +143,8 @@ def _run(module: str, arguments: Sequence[str]) -> int:
     try:
         with ended_at_once():
             command = import_module(module, __package__).main
-        for one in stop_signals():
-            signal.signal(one, interrupt)
+        for item in stop_signals():
+            signal.signal(item, interrupt)
         return command(list(arguments))
     except KeyboardInterrupt:
         return 128 + (received or [signal.SIGINT])[0]

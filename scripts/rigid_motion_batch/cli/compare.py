@@ -174,7 +174,7 @@ def _require_same_comparison(output: Path, sources: list[str]) -> None:
     """Raise OutputError where a folder holds the comparison of other recordings."""
     held = _held(output)
     if held and not _is_same(output, sources) and not {*held.values()} & {*_digests(sources, Store(output)).values()}:
-        names = ", ".join(sorted(Path(one).name for one in held)[:3]) + (" and more" if len(held) > 3 else "")
+        names = ", ".join(sorted(Path(item).name for item in held)[:3]) + (" and more" if len(held) > 3 else "")
         raise OutputError(
             f"{_short(output)} holds another comparison, of {names}; choose another folder, such as --output "
             f"{_short(free_folder(sources))}, or replace it with --overwrite"
@@ -207,7 +207,7 @@ def _blender(options: argparse.Namespace) -> str:
     Refused, ExecutorError, SubjectError
         Where one is needed that there is not, with the way out.
     """
-    read = next((one for one in [*options.inputs, options.against or ""] if _suffix(one) in IN_BLENDER), None)
+    read = next((item for item in [*options.inputs, options.against or ""] if _suffix(item) in IN_BLENDER), None)
     if not (options.blender or blender_program() or find_spec("bpy")):
         if options.stage or read:
             raise Refused(without_blender(f"{read} is read by" if read else "Videos are made by", films=not read))

@@ -262,7 +262,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     options = parser.parse_args(arguments)
     try:
         options.distinct = options.modes.distinct
-        stage = SceneSettings(**{one.name: getattr(options, one.name) for one in fields(SceneSettings)})
+        stage = SceneSettings(**{field.name: getattr(options, field.name) for field in fields(SceneSettings)})
         options.stage = None if options.no_video else stage
         if options.part != (1, 1) and not options.only:
             raise ValueError("--part is a share of one stage: add --only STAGE")

@@ -114,6 +114,6 @@ def show(*what: Table | str, stream: TextIO | None = None) -> None:
     stream = stream or sys.stdout
     console = Console(file=stream, highlight=False, width=None if stream.isatty() else WIDE)
     with console.capture() as captured:
-        for one in what:
-            console.print(one, markup=False, soft_wrap=isinstance(one, str) and not stream.isatty())
+        for item in what:
+            console.print(item, markup=False, soft_wrap=isinstance(item, str) and not stream.isatty())
     print(*(line.rstrip() for line in captured.get().splitlines()), sep="\n", file=stream, flush=True)

@@ -67,7 +67,7 @@ def _by_target(refusals: Iterable[Refused], targets: Sequence[Transform]) -> dic
     longest_first = sorted(targets, key=lambda target: -len(target.name))
     result = {}
     for text in map(str, refusals):
-        target = next(one for one in longest_first if one not in result and text.startswith(one.name))
+        target = next(item for item in longest_first if item not in result and text.startswith(item.name))
         result[target] = text
     return result
 

@@ -39,7 +39,7 @@ def refuse_read_only(path: Path) -> None:
     """Raise `FileProblem` where a file or its folder cannot be written: better said before hours go into it."""
     place = Path(os.path.realpath(path))
     if not os.path.exists(place):
-        place = next(one for one in place.parents if os.path.exists(one))
+        place = next(parent for parent in place.parents if os.path.exists(parent))
         if not os.path.isdir(place):
             raise FileProblem(f"{place} is a file, and {path} cannot be written in it: give another --output")
     elif os.access(place, os.W_OK):

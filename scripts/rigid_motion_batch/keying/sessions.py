@@ -198,18 +198,18 @@ def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = 
     outcomes = session.in_order
     report(ended=True)
     if not work.dry_run:
-        for path in (path for one in outcomes for path in one.written):
+        for path in (path for outcome in outcomes for path in outcome.written):
             print(path_line(path), flush=True)
-    failed = [one.source for one in outcomes if one.failed]
+    failed = [outcome.source for outcome in outcomes if outcome.failed]
     if failed and len(jobs) > NAMED:  # What was said of them is far above.
         more = f" and {len(failed) - NAMED} more" if len(failed) > NAMED else ""
         print(f"Failed: {printable(', '.join(failed[:NAMED]))}{more}", file=sys.stderr)
     print(_summary(outcomes, len(jobs), work, interrupted=stopped is not None), file=sys.stderr, flush=True)
     if stopped is not None:
         return 128 + stopped
-    if all(one.unreadable for one in outcomes):
+    if all(outcome.unreadable for outcome in outcomes):
         return 2
-    return int(bool(unmatched) or any(one.refused or one.failed or one.incomplete for one in outcomes))
+    return int(bool(unmatched) or any(outcome.refused or outcome.failed or outcome.incomplete for outcome in outcomes))
 
 
 class _Session:
@@ -254,8 +254,8 @@ class _Session:
     def unmatched(self) -> set[str]:
         """Return the names and patterns that were asked for, and that nothing has."""
         outcomes = self._outcomes.values()
-        seen = any(not one.failed for one in outcomes)
-        return set(self._work.objects or ()).difference(*(one.matched for one in outcomes)) if seen else set()
+        seen = any(not outcome.failed for outcome in outcomes)
+        return set(self._work.objects or ()).difference(*(outcome.matched for outcome in outcomes)) if seen else set()
 
     def _show(self, stage: Stage) -> None:
         at_work = [self._jobs[place] for place in self._at_work]
@@ -331,16 +331,18 @@ def _executor(workers: int | None, count: int) -> Executor:
 def _summary(outcomes: Sequence[Outcome], count: int, work: Work, *, interrupted: bool) -> str:
     """Return what came of it all, in a line."""
     would = "to be " if work.dry_run else ""
-    objects, bones, clips = (sum(getattr(one, what) for one in outcomes) for what in ("objects", "bones", "clips"))
-    refused = sum(one.refused for one in outcomes)
-    written, failed = sum(bool(one.written) for one in outcomes), sum(one.failed for one in outcomes)
-    old = sum(one.is_old for one in outcomes)
-    idle = sum(not (one.written or one.failed) for one in outcomes)
+    objects, bones, clips = (
+        sum(getattr(outcome, what) for outcome in outcomes) for what in ("objects", "bones", "clips")
+    )
+    refused = sum(outcome.refused for outcome in outcomes)
+    written, failed = sum(bool(outcome.written) for outcome in outcomes), sum(outcome.failed for outcome in outcomes)
+    old = sum(outcome.is_old for outcome in outcomes)
+    idle = sum(not (outcome.written or outcome.failed) for outcome in outcomes)
     parts = [f"{written - old} {would}written"]
     parts += [f"{old} already {work.done}"] if old else []
     parts += [f"{idle} left alone"] if idle else []
     parts += [f"{failed} failed"] if failed else []
-    parts += [f"{incomplete} incomplete"] if (incomplete := sum(one.incomplete for one in outcomes)) else []
+    parts += [f"{incomplete} incomplete"] if (incomplete := sum(outcome.incomplete for outcome in outcomes)) else []
     parts += [f"{count - len(outcomes)} not reached"] if interrupted else []
     done = [counted(objects, "object")] if objects or not (bones or clips) else []
     done += [counted(bones, "bone")] if bones else []
@@ -406,7 +408,7 @@ def stop_if_asked() -> None:
 def _stopped_between_steps() -> Iterator[None]:
     """Have the signals that stop a command wait for `stop_if_asked`."""
     _received.clear()
-    before = {one: signal.signal(one, lambda number, _: _received.append(number)) for one in stop_signals()}
+    before = {item: signal.signal(item, lambda number, _: _received.append(number)) for item in stop_signals()}
     try:
         yield
     finally:

@@ -31,7 +31,7 @@ class Result:
         all bones of a rig at once where it is the rig's.
         """
         reasons = set(self.refused.values())
-        if len(reasons) == 1 < len(self.refused) and not (any(one.is_part for one in self.done) or self.left):
+        if len(reasons) == 1 < len(self.refused) and not (any(item.is_part for item in self.done) or self.left):
             yield title_of(list(self.refused)), reasons.pop(), len(self.refused)
         else:
             yield from ((target.name, reason, 1) for target, reason in self.refused.items())
@@ -80,12 +80,12 @@ def matching(target: Transform, asked: Iterable[str]) -> set[str]:
     """Return the names and patterns that a target fits. Those of a rig mean its bones too,
     and RIG/BONE means a bone.
     """
-    return {one for one in asked for name in {target.name, target.animated.name} if _fits(name, one)}
+    return {item for item in asked for name in {target.name, target.animated.name} if _fits(name, item)}
 
 
 def matching_missing(obj: bpy.types.Object, asked: Iterable[str]) -> set[str]:
     """Return the names and patterns that an object fits, or may have bones for that cannot be looked at."""
-    return {one for one in asked if any(_fits(obj.name, part) for part in (one, *_before_slashes(one)))}
+    return {item for item in asked if any(_fits(obj.name, part) for part in (item, *_before_slashes(item)))}
 
 
 def _before_slashes(pattern: str) -> list[str]:

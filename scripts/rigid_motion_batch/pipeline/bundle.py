@@ -48,7 +48,7 @@ def write_bundle(
         Where an argument would be taken for an expression of the template, or no folder has all inputs, on Windows.
     OSError
     """
-    if braced := next((one for one in arguments if "{{" in one), None):
+    if braced := next((argument for argument in arguments if "{{" in argument), None):
         raise ValueError(f"{braced!r}: a job cannot have this name, for its braces; rename it")
     arguments, inputs = below_inputs(arguments)
     places = {"Program": PACKAGE.parent, "Python": sys.executable, "Inputs": inputs, "Output": output.absolute()}

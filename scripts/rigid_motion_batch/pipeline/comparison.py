@@ -172,7 +172,7 @@ class ComparisonPlan:
         inputs: tuple[Input, ...] = ()
         step, called = steps.read, ""
         with suppress(TrajectoryError):  # Whoever reads it will say that there is no such file.
-            paths = [split_source(one)[0] for one in (source, comparison.against) if one]
+            paths = [split_source(item)[0] for item in (source, comparison.against) if item]
             called = name_of_other(paths[-1].stem) if comparison.against else ""
             inputs = tuple(map(self.store.input, paths))
             step = steps.read_in_blender if any(path.suffix.lower() in IN_BLENDER for path in paths) else step

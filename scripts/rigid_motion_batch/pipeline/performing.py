@@ -94,9 +94,9 @@ def perform(job: Job) -> Made:
 def _make(job: Job) -> Made:
     """Have the files of a job written."""
     started, task = time.perf_counter(), job.task
-    for one in task.inputs:
-        if os.path.exists(one.path) and not os.path.isfile(one.path):
-            raise TaskError(f"{one.path}: this is no file, but a folder, pipe or device; give a file")
+    for item in task.inputs:
+        if os.path.exists(item.path) and not os.path.isfile(item.path):
+            raise TaskError(f"{item.path}: this is no file, but a folder, pipe or device; give a file")
     job.folder.mkdir(parents=True)
     if job.blender and task.step.blender:
         from .blender import call_in_blender
@@ -104,9 +104,9 @@ def _make(job: Job) -> Made:
         facts = call_in_blender(job)
     else:
         facts = task.step.function(job, task.parameters)
-    for one in task.inputs:
-        if sha256_in(one.path) != one.sha256:
-            raise TaskError(f"{one.path}: this file changed while it was read; run the same command again")
+    for item in task.inputs:
+        if sha256_in(item.path) != item.sha256:
+            raise TaskError(f"{item.path}: this file changed while it was read; run the same command again")
     files = {}
     for path in sorted(job.folder.rglob("*")):
         if path.is_file() and not path.is_symlink():

@@ -79,7 +79,7 @@ class Job:
 
     @property
     def inputs(self) -> list[Path]:
-        return [Path(one.path) for one in self.task.inputs]
+        return [Path(item.path) for item in self.task.inputs]
 
     def progress(self, done: float, total: float = 1.0, doing: str = "") -> None:
         """Say how far it is, and what is being done. Cheap enough to be called often."""
@@ -207,7 +207,7 @@ class Task:
             "step": self.step.name,
             "versions": dict(self.step.versions),
             "parameters": to_plain(self.parameters),
-            "inputs": {one.path: one.sha256 for one in self.inputs},
+            "inputs": {item.path: item.sha256 for item in self.inputs},
             "after": list(self.after),
         }
 
@@ -218,14 +218,14 @@ class Task:
 
     def key_after(self, after: Iterable[str | None]) -> str:
         """Return its key where the tasks before it had these keys; None for one that failed."""
-        inputs = [one.sha256 for one in self.inputs]
+        inputs = [item.sha256 for item in self.inputs]
         return _digest({**self.made_of, "inputs": inputs, "after": list(after)})[:DIGITS]
 
     def published(self, files: Iterable[str] = ()) -> Iterator[tuple[str, str]]:
         """Yield each file that is published and where it goes, of a result with these files."""
         for name, path in self.publish.items():
             if name.endswith("/"):
-                yield from ((one, path + one.removeprefix(name)) for one in files if one.startswith(name))
+                yield from ((file, path + file.removeprefix(name)) for file in files if file.startswith(name))
             else:
                 yield name, path
 

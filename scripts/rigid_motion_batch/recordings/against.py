@@ -71,7 +71,7 @@ def _as_in(clip: Clip, other: Clip, source: str) -> Poses:
     if own is None and theirs is None:
         return poses
     if own is None or theirs is None:
-        kinds = [f"a body of {len(one.joints)} joints" if one else "a single rigid body" for one in (own, theirs)]
+        kinds = [f"a body of {len(item.joints)} joints" if item else "a single rigid body" for item in (own, theirs)]
         raise TrajectoryError(source, f"this is {kinds[1]}, and {clip.source} {kinds[0]}", "give the same of both")
     places = {name: place for place, name in enumerate(theirs.joints)}
     if missing := [name for name in own.joints if name not in places]:

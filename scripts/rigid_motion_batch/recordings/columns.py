@@ -106,7 +106,7 @@ def layout_of(cells: Sequence[str], options: ReadingOptions) -> Layout:
     where = {}
     for label, result in whole.items():
         columns = result | {meaning: [index] for meaning, index in explicit.items()}
-        where[label] = {one: only(one, columns[one]) for one in (*needed, "scale") if one in columns}
+        where[label] = {item: only(item, columns[item]) for item in (*needed, "scale") if item in columns}
     units = {index: name.unit for index, name in enumerate(names) if name and name.unit}
     units |= {index: unit for index in explicit.values() if (unit := unit_in(cells[index]))}
     time = only("t", times)
@@ -158,22 +158,22 @@ def _missing(
     known: int,
 ) -> ColumnProblem:
     """Return what is missing to a header of which no body is whole: of the body that lacks the least."""
-    label, nearest = max(bodies.items(), key=lambda body: sum(one in body[1] for one in needed))
+    label, nearest = max(bodies.items(), key=lambda body: sum(item in body[1] for item in needed))
     if not nearest.keys() >= set(POSITION):
         # Something by chance ends like an axis.
         label, nearest = "", bodies[""]
-    missing = [one for one in ("t", *needed) if one not in explicit and one not in nearest]
+    missing = [item for item in ("t", *needed) if item not in explicit and item not in nearest]
     if timed:
         missing.remove("t")
     turns = {*QUATERNION, *EULER, *TURNS}
     positions_only = not any(turns & body.keys() for body in bodies.values()) and turns.isdisjoint(explicit)
     if timed and positions_only and set(missing) == set(needed) - set(POSITION):
         problem = f"positions only, and rotations are needed (found {columns_found(cells)})"
-        named = ",".join(f"{one}=NAME" for one in missing)
+        named = ",".join(f"{item}=NAME" for item in missing)
         return ColumnProblem(problem, f"record them as qx, qy, qz, qw, or name them: --columns {named}", known)
-    angles = [one for one in (*EULER, *TURNS) if one in nearest]
+    angles = [item for item in (*EULER, *TURNS) if item in nearest]
     if set(QUATERNION) <= set(missing) and set(needed) - set(missing) >= set(POSITION) and angles:
-        shown_angles = ", ".join(cells[nearest[one][0]] for one in angles[:3])
+        shown_angles = ", ".join(cells[nearest[angle][0]] for angle in angles[:3])
         return ColumnProblem(
             f"rotations are Euler angles here ({shown_angles}), and their order is not said",
             "say it: --euler ORDER, with --degrees if they are (Unity: --euler YXZ --degrees; docs/csv.md has others)",
@@ -185,7 +185,7 @@ def _missing(
             "say which is which: --columns rx=roll,ry=pitch,rz=yaw in ROS, rx=pitch,ry=yaw,rz=roll in Unity",
             known,
         )
-    others = ",".join(f"{one}=NAME" for one in missing[:3]) + ",..." * (len(missing) > 3)
+    others = ",".join(f"{item}=NAME" for item in missing[:3]) + ",..." * (len(missing) > 3)
     way_out = f"known are {KNOWN}; or --columns {others}"
     if not any(names) and not explicit:
         kind: type[TrajectoryError] = NoMotion

@@ -99,7 +99,11 @@ def _buffers(path: Path, document: dict[str, Any]) -> dict[int, Path]:
 def _refuse_made_up(path: Path, document: dict[str, Any]) -> None:
     """Raise TrajectoryError for more numbers than are read: what no buffer holds is zeros, and may be any number."""
     accessors = document.get("accessors")
-    counts = [one.get("count") for one in accessors if isinstance(one, dict)] if isinstance(accessors, list) else []
+    counts = (
+        [accessor.get("count") for accessor in accessors if isinstance(accessor, dict)]
+        if isinstance(accessors, list)
+        else []
+    )
     total = sum(count for count in counts if isinstance(count, int) and count > 0)
     if total > MOST_POSES:
         problem = f"{total} numbers, vectors and matrices are more than {MOST_POSES}"
@@ -125,7 +129,7 @@ def _refuse_too_many(path: Path, document: dict[str, Any]) -> None:
 
 
 def _objects(part: Any) -> list[dict[str, Any]]:
-    return [one for one in part if isinstance(one, dict)] if isinstance(part, list) else []
+    return [item for item in part if isinstance(item, dict)] if isinstance(part, list) else []
 
 
 def _depth(nodes: list[dict[str, Any]]) -> int:
@@ -173,7 +177,7 @@ def _bytes_of(folder: Path, buffer: dict[str, Any]) -> bytes:
 def _plain(part: Any) -> Any:
     """Return a part of the document without materials, extras, and extensions that do more than compress."""
     if isinstance(part, list):
-        return [_plain(one) for one in part]
+        return [_plain(item) for item in part]
     if not isinstance(part, dict):
         return part
     plain = {name: _plain(one) for name, one in part.items() if name not in ("extensions", "extras", "material")}

@@ -62,7 +62,7 @@ LONGEST_REASON = 120
 
 def refuse_too_large(path: Path, *others: Path) -> None:
     """Raise TrajectoryError where a file, and those that belong to it, have more bytes than are read."""
-    size = sum(one.stat().st_size for one in (path, *others))
+    size = sum(item.stat().st_size for item in (path, *others))
     if size > LARGEST_FILE:
         problem = f"{size} bytes are more than the {LARGEST_FILE} that are read"
         raise TrajectoryError(path, problem, "export the skeleton without its meshes, or split the recording")

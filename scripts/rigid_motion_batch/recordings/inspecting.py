@@ -160,7 +160,7 @@ def inspect(source: str, axes: str | None = None, options: ReadingOptions = AS_T
     """
     recording = read_trajectories(source, options)
     path, body = split_source(source)
-    if body is None and recording.others and all(one.rest_body is None for one in recording.trajectories):
+    if body is None and recording.others and all(item.rest_body is None for item in recording.trajectories):
         recording = read_trajectories(f"{path}:{ALL}", options)
     result = format_of(path)
     contents, unreadable = [], []
@@ -174,8 +174,8 @@ def inspect(source: str, axes: str | None = None, options: ReadingOptions = AS_T
             unreadable.append((trajectory.name, error.problem))
     if not contents:
         raise TrajectoryError(source, "; ".join(problem for _, problem in unreadable), "record at least 2 poses")
-    bodies = (*(one.name for one in recording.trajectories), *recording.others)
-    ups = {one.up for one in contents if one.up}
+    bodies = (*(item.name for item in recording.trajectories), *recording.others)
+    ups = {content.up for content in contents if content.up}
     taken = _axes(recording, axes, next(iter(ups)) if len(ups) == 1 else "")
     size = path.stat().st_size
     return Inspection(
@@ -185,7 +185,7 @@ def inspect(source: str, axes: str | None = None, options: ReadingOptions = AS_T
 
 def _note_of(recording: Recording) -> str:
     """Return what is said of the bodies; not that of the others, which are listed."""
-    return "; ".join(one.remark for one in recording.trajectories if one.remark)
+    return "; ".join(trajectory.remark for trajectory in recording.trajectories if trajectory.remark)
 
 
 def _contents(clip: Clip, trajectory: Trajectory, unit: Unit) -> Contents:

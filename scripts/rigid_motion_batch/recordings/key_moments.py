@@ -103,8 +103,8 @@ def moments_of(obj: bpy.types.Object, lead: float) -> tuple[np.ndarray, bool]:
         Whether there is nothing but straight lines and steps between them.
     """
     result, straight = [np.empty(0)], True
-    for one in with_parents(obj):
-        if data := one.animation_data:
+    for parent in with_parents(obj):
+        if data := parent.animation_data:
             for fcurve in curves_that_move(data.action, data.action_slot, bones=True):
                 keys = keys_of(fcurve)
                 result += [keys.frames, keys.frames[keys.jumps] - lead]

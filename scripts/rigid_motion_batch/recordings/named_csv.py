@@ -100,7 +100,7 @@ def _read(
         times = seconds_of(table, numbers["t"], layout.time_unit)
     trajectories = []
     for body in requested:
-        held = {one: numbers[body.label(one)][body.rows] for one in body.columns}
+        held = {column: numbers[body.label(column)][body.rows] for column in body.columns}
         trajectory = replace(_trajectory(body, times[body.rows], held, layout, options), dated=kind is not None)
         require_one_body(trajectory, path, way_out, header.number)
         trajectories.append(trajectory)
@@ -185,10 +185,10 @@ def _trajectory(
     warnings: tuple[ClipWarning, ...] = ()
     if options.euler:
         angles = np.column_stack([held[f"r{axis.lower()}"] for axis in options.intrinsic_order])
-        angles, warnings = _radians(angles, [layout.units.get(body.columns[one], "") for one in EULER], options)
+        angles, warnings = _radians(angles, [layout.units.get(body.columns[item], "") for item in EULER], options)
         quaternions = quaternions_from_intrinsic_eulers(angles, options.intrinsic_order)
     else:
-        quaternions = np.column_stack([held[one] for one in ("qw", "qx", "qy", "qz")])
+        quaternions = np.column_stack([held[item] for item in ("qw", "qx", "qy", "qz")])
     scales = held["scale"] if np.any(held.get("scale", 1.0) != 1.0) else None
     return Trajectory(body.name, times, Poses(positions, quaternions, scales), metres[0], warnings=warnings)
 

@@ -117,7 +117,7 @@ def read_trajectories(source: str, options: ReadingOptions = AS_THE_FILE_SAYS) -
         problem = f"this file cannot be read ({error.strerror})"
         raise TrajectoryError(path, problem, "check its permissions") from None
     if all(len(trajectory.times) < 2 for trajectory in trajectories):
-        problem = ", ".join(f"{shown(one.name)} has {len(one.times)} samples" for one in trajectories[:3])
+        problem = ", ".join(f"{shown(item.name)} has {len(item.times)} samples" for item in trajectories[:3])
         raise TrajectoryError(path, problem, "a trajectory needs at least 2")
     return replace(selection.recording(trajectories), axes=result.axes, measured=result.measured)
 

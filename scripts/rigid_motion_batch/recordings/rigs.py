@@ -198,8 +198,8 @@ class _Look:
             if rows is None:
                 rows = _rows(self.path, seen, self.bones)
                 raw = np.empty(16 * len(pose.bones), dtype=np.float32)
-                for one in (self.rig, *self.followed):
-                    self.first.setdefault(one, _matrix(one.evaluated_get(depsgraph)))
+                for item in (self.rig, *self.followed):
+                    self.first.setdefault(item, _matrix(item.evaluated_get(depsgraph)))
             pose.bones.foreach_get("matrix", raw)
             row = number % BLOCK
             # They come column by column.

@@ -33,8 +33,10 @@ def _mesh_of(obj: bpy.types.Object) -> bpy.types.Mesh:
 
 def _deforms(rig: bpy.types.Object, obj: bpy.types.Object) -> bool:
     by_parent = obj.parent == rig and obj.parent_type == "ARMATURE"
-    deforming = (cast("bpy.types.ArmatureModifier", one) for one in obj.modifiers if one.type == "ARMATURE")
-    return by_parent or any(one.object == rig for one in deforming)
+    deforming = (
+        cast("bpy.types.ArmatureModifier", modifier) for modifier in obj.modifiers if modifier.type == "ARMATURE"
+    )
+    return by_parent or any(item.object == rig for item in deforming)
 
 
 def skin_of(
@@ -74,10 +76,10 @@ def _carriers(mesh: bpy.types.Mesh, joint_of_group: Sequence[int]) -> tuple[np.n
     """Return the joints (vertices, 4) that carry each vertex most, and by how much of it."""
     # Blender has no way to hand out all weights at once.
     entries = [
-        (vertex.index, joint_of_group[one.group], one.weight)
+        (vertex.index, joint_of_group[group.group], group.weight)
         for vertex in mesh.vertices
-        for one in vertex.groups
-        if one.group < len(joint_of_group) and joint_of_group[one.group] >= 0 and one.weight > 0.0
+        for group in vertex.groups
+        if group.group < len(joint_of_group) and joint_of_group[group.group] >= 0 and group.weight > 0.0
     ]
     joints, weights = np.zeros((len(mesh.vertices), CARRIERS), dtype=np.int64), np.zeros((len(mesh.vertices), CARRIERS))
     if entries:

@@ -104,10 +104,10 @@ def clip_data(clip: ClipResult, label: Callable[[str], str], mesh: Mesh) -> dict
         "box": [truth.min(axis=(0, 1)).tolist(), truth.max(axis=(0, 1)).tolist()],
         "warnings": [
             {
-                "from": None if one.start_s is None else one.start_s - begin,
-                "to": None if one.end_s is None else one.end_s - begin,
+                "from": None if warning.start_s is None else warning.start_s - begin,
+                "to": None if warning.end_s is None else warning.end_s - begin,
             }
-            for one in clip.facts.warnings
+            for warning in clip.facts.warnings
         ],
         "recording": recording | {"block": block.text()},
         "choices": [_choice_data(clip, result, seen, label, size) for result in clip.choices],

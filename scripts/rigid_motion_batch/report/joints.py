@@ -91,4 +91,4 @@ def png(pixels: np.ndarray, palette: bytes) -> bytes:
     lines = np.pad(pixels, ((0, 0), (1, 0))).tobytes()
     header = struct.pack(">IIBBBBB", pixels.shape[1], pixels.shape[0], 8, 3, 0, 0, 0)
     content = ((b"IHDR", header), (b"PLTE", palette), (b"IDAT", zlib.compress(lines, 9)), (b"IEND", b""))
-    return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(*one) for one in content)
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(*item) for item in content)

@@ -135,7 +135,7 @@ class Gathering:
             raise ValueError("no reconstruction to report: every clip is too short for two keys")
         values = np.full((len(MEASURES), len(self._rows), len(choices), len(modes)), np.nan)
         for clip, (own_choices, own_modes, own) in enumerate(self._rows):
-            rows, columns = [choices.index(one) for one in own_choices], [modes.index(one) for one in own_modes]
+            rows, columns = [choices.index(item) for item in own_choices], [modes.index(item) for item in own_modes]
             values[:, clip, np.array(rows)[:, None], columns] = own
         return Numbers(tuple(self._clips), choices, modes, values, tuple(self._groupings))
 

@@ -187,7 +187,7 @@ def write_overview(
         "grids": tables.grids(numbers),
         "rows": _overview_rows(numbers, facts, pages),
         "count": len(facts),
-        "warned": sum(bool(one.warnings) for one in facts),
+        "warned": sum(bool(fact.warnings) for fact in facts),
     }
     _write(path, "overview.html.j2", context)
 
@@ -265,12 +265,12 @@ class _Clips:
         return [
             Warned(
                 name,
-                one.text,
-                one.way_out,
-                _address(name, choice, None if one.start_s is None else one.start_s - begin),
+                item.text,
+                item.way_out,
+                _address(name, choice, None if item.start_s is None else item.start_s - begin),
             )
             for name, warned, begin in self._warned
-            for one in warned
+            for item in warned
         ]
 
 

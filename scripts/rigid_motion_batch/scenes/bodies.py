@@ -310,4 +310,4 @@ def _shifted(group: Group, points: Socket) -> Socket:
 
 def _input(socket: Socket, name: str) -> Socket:
     """Return the input of a socket's node that is in use, of several that have the name."""
-    return next(one for one in socket.node.inputs if one.name == name and one.enabled)
+    return next(item for item in socket.node.inputs if item.name == name and item.enabled)

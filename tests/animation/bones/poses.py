@@ -57,7 +57,7 @@ def expected_poses(
     frames, result = np.asarray(frames, dtype=np.float64), {}
     bases = bases or {}
     asked = [rig.pose.bones[name] for name in (names_of(rig) if bones is None else bones)]
-    needed = {one.name for bone in asked for one in (bone, *bone.parent_recursive)}
+    needed = {item.name for bone in asked for item in (bone, *bone.parent_recursive)}
     for pose_bone in (bone for bone in rig.pose.bones if bone.name in needed):
         basis = bases[pose_bone.name] if pose_bone.name in bases else expected_bases(pose_bone, frames)
         parent = None if pose_bone.parent is None else result[pose_bone.parent.name]

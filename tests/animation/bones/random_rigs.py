@@ -172,7 +172,7 @@ def _constrain(rig: bpy.types.Object, number: int, settings: BoneCase) -> None:
     target = new_object(f"Target {number}")
     target.location = (0.3, 0.4, 0.5)
     constraint.target = target
-    if number + 1 < len(rig.pose.bones) and all(one.name != other for one in bone.children_recursive):
+    if number + 1 < len(rig.pose.bones) and all(item.name != other for item in bone.children_recursive):
         constraint.target, constraint.subtarget = rig, other
     if settings.follows == "IK":
         constraint.chain_count = 2

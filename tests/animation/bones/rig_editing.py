@@ -43,9 +43,9 @@ def as_blender_has_it(bone: bpy.types.PoseBone, frames: Iterable[float]) -> np.n
 def smallest_scale(bone: bpy.types.PoseBone, frames: Iterable[float]) -> np.ndarray:
     """The smallest scale of a bone by its channels, and of its parents, along any axis; at most 1."""
     least = np.ones(len(frames))
-    for one in (bone, *bone.parent_recursive):
-        curves = curves_of(one)
-        for index, rest in enumerate(one.scale):
+    for item in (bone, *bone.parent_recursive):
+        curves = curves_of(item)
+        for index, rest in enumerate(item.scale):
             fcurve = curves.get(("scale", index))
             keyed = fcurve is not None and len(fcurve.keyframe_points) and not fcurve.mute
             least = np.minimum(least, [fcurve.evaluate(frame) for frame in frames] if keyed else rest)
@@ -53,7 +53,7 @@ def smallest_scale(bone: bpy.types.PoseBone, frames: Iterable[float]) -> np.ndar
 
 
 def own_constraints(bone: bpy.types.PoseBone) -> list[bpy.types.Constraint]:
-    return [one for one in bone.constraints if one.name.startswith(CONSTRAINT)]
+    return [constraint for constraint in bone.constraints if constraint.name.startswith(CONSTRAINT)]
 
 
 def channelbags(action: bpy.types.Action) -> list[bpy.types.ActionChannelbag]:
@@ -152,7 +152,9 @@ class RigEditing(TakenAway, Editing):
 
     def _motion(self, bone: bpy.types.PoseBone, frames: np.ndarray, how: Callable = expected_bases) -> Motion:
         """What was muted or taken off does not move a bone."""
-        is_off = (bone.id_data.name, bone.name) in self.taken_off or any(one.mute for one in own_constraints(bone))
+        is_off = (bone.id_data.name, bone.name) in self.taken_off or any(
+            constraint.mute for constraint in own_constraints(bone)
+        )
         native, scale = as_blender_has_it(bone, frames), smallest_scale(bone, frames)
         precision = shortest_quaternion(bone, frames) * np.where(scale > 0.02, scale, 0.0)
         return Motion(native if is_off else how(bone, frames), native, precision)

@@ -170,9 +170,9 @@ def twin_of(rig: bpy.types.Object) -> bpy.types.Object:
     bpy.context.scene.collection.objects.link(twin)
     twin.animation_data_clear()
     for pose_bone in twin.pose.bones:
-        for constraint in [one for one in pose_bone.constraints if one.name.startswith(CONSTRAINT)]:
+        for constraint in [item for item in pose_bone.constraints if item.name.startswith(CONSTRAINT)]:
             pose_bone.constraints.remove(constraint)
-        for aiming in (one for constraint in pose_bone.constraints for one in (constraint, *_targets(constraint))):
+        for aiming in (item for constraint in pose_bone.constraints for item in (constraint, *_targets(constraint))):
             for name in ("target", "pole_target"):
                 if getattr(aiming, name, None) == rig:
                     setattr(aiming, name, twin)

@@ -164,7 +164,9 @@ class EditingBones(ComingAndGoing):
             return
         self._in_pose_mode(name, bpy.ops.pose.paste)
         self._assert_seen(rig, seen)
-        settable = self._has_keys_for_any_pose(bone) and not any(one.mute for one in own_constraints(bone))
+        settable = self._has_keys_for_any_pose(bone) and not any(
+            constraint.mute for constraint in own_constraints(bone)
+        )
 
         def insert() -> None:
             for path in transform_paths(bone):

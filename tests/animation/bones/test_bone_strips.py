@@ -168,7 +168,7 @@ def test_strips_that_cross_fade_mix_turns_nearly_as_they_mix_real_keys(live_file
     fading = (FADED > 26.0) & (FADED < 41.0)
     assert_same_poses(rig, FADED[~fading], rows(shown, ~fading), rows(real, ~fading))
     for name in shown:
-        off, without = (np.abs(one[name] - real[name])[fading].max() for one in (shown, native))
+        off, without = (np.abs(item[name] - real[name])[fading].max() for item in (shown, native))
         assert off < 0.3 * without
 
 

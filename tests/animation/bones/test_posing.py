@@ -24,7 +24,7 @@ def channel_maps(rig: bpy.types.Object) -> AffineMaps:
     """The matrices of all bones' channels, by Blender's own F-curves, shape (bones, n)."""
     curves = curves_of(rig) if rig.animation_data and rig.animation_data.action else {}
     maps = [evaluated(transform_of(bone), curves, FRAMES)[1] for bone in rig.pose.bones]
-    return AffineMaps(np.stack([one.axes for one in maps]), np.stack([one.origins for one in maps]))
+    return AffineMaps(np.stack([item.axes for item in maps]), np.stack([item.origins for item in maps]))
 
 
 def posed_by_blender(rig: bpy.types.Object) -> np.ndarray:

@@ -61,7 +61,7 @@ def complaints(case: RigCase, folder: Path, player: Player) -> list[str]:
         refused: list[Refused] = []
         reduce_keys_of(targets, case.mode, case.tolerance, refused=refused, **wishes)
         done = [transform for transform in targets if len(transform.motion.bakes)]
-        result = [f"{one.name} has not fewer keys" for one in done if key_count(one) >= counts[one]]
+        result = [f"{item.name} has not fewer keys" for item in done if key_count(item) >= counts[item]]
         result += [str(refusal) for refusal in refused if "goes on outside" in str(refusal)]
         if not any(transform.is_part for transform in done) or not promised.any():
             return result

@@ -180,9 +180,9 @@ def test_names_swapped_in_a_rig_that_is_duplicated_linked_are_swapped_in_both(li
     bpy.context.view_layer.update()
     swap_two(rig)
     bpy.context.view_layer.update()
-    for one in (rig, copy):
-        assert modes_in(one) == {"Lower": "dq_sclerp", "Upper": "pga_lerp"}
-        assert_posed(one, PLAYED)
+    for item in (rig, copy):
+        assert modes_in(item) == {"Lower": "dq_sclerp", "Upper": "pga_lerp"}
+        assert_posed(item, PLAYED)
     assert_nothing_stale()
 
 

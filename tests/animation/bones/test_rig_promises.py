@@ -89,7 +89,7 @@ def test_a_bone_whose_scale_has_keys_on_every_frame_and_is_uneven_is_left_alone_
     write_channel(rig, 'pose.bones["Spine"].scale', FRAMES, uneven())
     truth, refused = matrices(rig), []
     reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS, refused=refused)
-    assert [str(one) for one in refused if "its scale changes differently along its axes" in str(one)] == list(
+    assert [str(item) for item in refused if "its scale changes differently along its axes" in str(item)] == list(
         map(str, refused)
     )
     assert not is_reduced(rig.pose.bones["Spine"])

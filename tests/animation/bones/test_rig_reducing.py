@@ -70,7 +70,7 @@ def test_no_bone_gets_further_off_than_the_tolerance(live_file, mode, shared, be
         assert keys == keys[:1] * len(keys)
     assert total_reduction(bones(rig)).rig.frames == len({frame for some in keys for frame in some})
     if not best_of:
-        assert {one for bone in bones(rig) for one in modes_of(bone, key_frames(bone))} == {mode}
+        assert {item for bone in bones(rig) for item in modes_of(bone, key_frames(bone))} == {mode}
 
 
 @pytest.mark.parametrize("best_of", [False, True])
@@ -95,7 +95,7 @@ def test_a_rig_that_moves_itself_has_its_keys_on_the_key_poses(live_file):
     rig.scale = (0.5, 0.5, 0.5)
     bpy.context.view_layer.update()
     reduce_keys_of([rig, *bones(rig)], "motor_spline", radius=RADIUS, count=9)
-    keys = [key_frames(one).tolist() for one in (rig, *bones(rig))]
+    keys = [key_frames(item).tolist() for item in (rig, *bones(rig))]
     assert keys == keys[:1] * len(keys)
     assert len(keys[0]) == 9
     by_nine = total_reduction([rig, *bones(rig)]).largest_error

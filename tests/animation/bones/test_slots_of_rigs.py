@@ -39,7 +39,7 @@ def assert_only_its_own(rig: bpy.types.Object) -> None:
     action = rig.animation_data.action
     assert slots_of_rig(rig) == [rig.animation_data.action_slot.name_display, "Rigid Motion"]
     assert {constraint.action for held in own_constraints(rig).values() for constraint in held} == {action}
-    assert not [one.name for one in bpy.data.actions if one.name.startswith("Rigid Motion")]
+    assert not [item.name for item in bpy.data.actions if item.name.startswith("Rigid Motion")]
     assert_nothing_stale(action)
 
 

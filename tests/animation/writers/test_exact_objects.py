@@ -73,13 +73,13 @@ def test_who_comes_to_share_the_action_is_exact_as_well(live_file):
     other.animation_data.action = obj.animation_data.action
     other.animation_data.action_slot = obj.animation_data.action_slot
     bpy.context.view_layer.update()
-    for one in (obj, other):
-        assert largest_error(one, EIGHTHS) < PROMISE
+    for item in (obj, other):
+        assert largest_error(item, EIGHTHS) < PROMISE
     set_exact(other, False)
     bpy.context.view_layer.update()
-    for one in (obj, other):
-        assert not len(one.constraints)
-        assert largest_error(one, np.arange(1.0, 41.0)) < PROMISE
+    for item in (obj, other):
+        assert not len(item.constraints)
+        assert largest_error(item, np.arange(1.0, 41.0)) < PROMISE
     assert refresh() == 0
 
 

@@ -240,5 +240,5 @@ def only_the_hand(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     middle = bone[:3, 3] + 0.5 * rig().data.bones["Hand"].length * bone[:3, 1]
     yield from hand.click(places.point(view, middle))
     yield from hand.wait_until(
-        lambda: [one.name for one in bpy.context.selected_pose_bones] == ["Hand"], "the hand alone is selected"
+        lambda: [bone.name for bone in bpy.context.selected_pose_bones] == ["Hand"], "the hand alone is selected"
     )

@@ -110,7 +110,9 @@ def _clear(hand: Hand) -> Steps[None]:
     yield from hand.search("Clear Keyframes")
     yield 0.3
     yield from hand.press("RET")
-    yield from hand.wait_until(lambda: not any("Rigid" in one.name for one in hand_bone().constraints), "it is cleared")
+    yield from hand.wait_until(
+        lambda: not any("Rigid" in constraint.name for constraint in hand_bone().constraints), "it is cleared"
+    )
     _assert_seen(seen)
     yield from hand.picture("cleared")
     yield from _go(OTHER)

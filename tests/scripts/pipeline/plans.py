@@ -23,7 +23,7 @@ def task(name: str, step: Step = steps.write, parameters: object = None, *after:
     """A task that publishes its file under its name."""
     fields = {"publish": {FILE: f"{name}.txt"}} | fields
     made = Nothing() if parameters is None else parameters
-    return Task(step, made, name, after=tuple(one.key for one in after), **fields)
+    return Task(step, made, name, after=tuple(item.key for item in after), **fields)
 
 
 def writing(name: str, text: str = "", log: object = "", **fields: object) -> Task:

@@ -122,7 +122,7 @@ class Connecting:
 def children_of(worker: int) -> set[int]:
     """The processes that a worker has started."""
     result = [path.read_text().split() for path in Path(f"/proc/{worker}/task").glob("*/children")]
-    return {int(one) for some in result for one in some}
+    return {int(item) for some in result for item in some}
 
 
 def processor_time(process: int) -> int:

@@ -229,7 +229,7 @@ def film(output: Path, log: object, piece: str = "1", step: Step = steps.join, *
     """Run a plan of a film whose pieces are wanted where it is missing only."""
     pieces = [Task(steps.write, Write(text, str(log)), f"piece {text}") for text in (piece, "2")]
     parameters = Fail() if step is steps.fail else Nothing(str(log))
-    whole = task("film", step, parameters, *pieces, spends=tuple(one.key for one in pieces))
+    whole = task("film", step, parameters, *pieces, spends=tuple(item.key for item in pieces))
     with Store(output, **options) as store, Executor() as executor:
         return run(lambda: [whole] if store.index_of(whole.key) else [*pieces, whole], store, executor)
 

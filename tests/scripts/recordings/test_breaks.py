@@ -98,7 +98,7 @@ def test_another_pose_in_front_stays_and_is_said() -> None:
     dance.poses.quaternions[4, 0] = turned(np.array(1.4), 2)
     clip = clip_of(dance)
     assert clip.calibration == 0
-    (warning,) = [one for one in clip.warnings if "pose of its own" in one.text]
+    (warning,) = [item for item in clip.warnings if "pose of its own" in item.text]
     assert warning.way_out == "leave it out: --start 0.00833"
     assert len(clip_of(dance, start=0.00833).times) == len(dance.times) - 1
 

@@ -184,7 +184,7 @@ def test_images_of_an_fbx_are_not_looked_for(scene, tmp_path: Path, monkeypatch:
         material.use_nodes = True
     node = material.node_tree.nodes.new("ShaderNodeTexImage")
     node.image = image
-    shader = next(one for one in material.node_tree.nodes if one.type == "BSDF_PRINCIPLED")
+    shader = next(item for item in material.node_tree.nodes if item.type == "BSDF_PRINCIPLED")
     material.node_tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
     obj.data.materials.append(material)
     path = export(tmp_path / "walk.fbx", path_mode="ABSOLUTE")

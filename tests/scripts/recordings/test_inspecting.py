@@ -70,9 +70,9 @@ def test_all_devices_of_a_log_are_described_and_those_without_poses_named(write)
     source = write("log.csv", f"{text}\nspare,9,,,,,,,\n")
     result = inspect(source)
     assert result.bodies == ("left", "right", "spare")
-    assert [one.name for one in result.contents] == ["left", "right"]
+    assert [content.name for content in result.contents] == ["left", "right"]
     assert result.unreadable[0][0] == "spare"
-    assert [one.name for one in inspect(f"{source}:RIGHT").contents] == ["right"]
+    assert [content.name for content in inspect(f"{source}:RIGHT").contents] == ["right"]
 
 
 def test_the_command_says_it_in_words(write, capsys) -> None:

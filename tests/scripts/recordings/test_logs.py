@@ -243,7 +243,8 @@ def loggers(draw: st.DrawFn) -> tuple[str, ReadingOptions, str, int]:
         device = draw(st.sampled_from(spellings(logs.DEVICES)))
         both = [times | columns_of(side, "") | {device: [side] * logs.COUNT} for side in MOTIONS]
         columns = {
-            name: [cell for pair in zip(*(one[name] for one in both), strict=True) for cell in pair] for name in both[0]
+            name: [cell for pair in zip(*(item[name] for item in both), strict=True) for cell in pair]
+            for name in both[0]
         }
     for extra in draw(st.lists(st.sampled_from(spellings(logs.EXTRAS)), unique=True, max_size=3)):
         columns[extra] = ["0.5"] * len(columns[time])

@@ -78,7 +78,7 @@ def test_what_stays_far_from_its_origin_may_be_in_another_unit(shift: float, sca
     calm = one.poses.positions * scale / 10.0 + np.array((0.0, shift, 0.0))
     result = doubts(replace(one, poses=Poses(calm, one.poses.quaternions)))
     assert len(result) == said
-    assert all("--scale 0.01, if inches, --scale 0.0254" in one.way_out for one in result)
+    assert all("--scale 0.01, if inches, --scale 0.0254" in item.way_out for item in result)
 
 
 def test_recordings_one_behind_the_other_are_said() -> None:

@@ -25,4 +25,4 @@ def result_of(
     """What the analysis finds of a clip under some choices of keys."""
     result = [compare_clip(clip, choice, modes, EVERYWHERE, shared=False) for choice in choices]
     counted = keys_needed(OfRigidBody(clip, RIGID), modes) if needed else None
-    return clip_result(replace(clip, warnings=(*clip.warnings, *warnings)), [one for one in result if one], counted)
+    return clip_result(replace(clip, warnings=(*clip.warnings, *warnings)), [item for item in result if item], counted)

@@ -79,7 +79,7 @@ def page(chromium: Browser, folder: Path) -> Iterator[Browser]:
     chromium.requests.clear()
     yield chromium
     assert [problem for problem in chromium.problems if NOISE not in problem] == []
-    assert [one for one in chromium.requests if not one.startswith((folder.as_uri(), "data:"))] == []
+    assert [request for request in chromium.requests if not request.startswith((folder.as_uri(), "data:"))] == []
 
 
 NOW = "+document.getElementById('now').textContent"

@@ -52,7 +52,7 @@ def lanes_of(file: File) -> dict[str, tuple[int, list[int]]]:
 
     def below(node: int) -> list[int]:
         children = nodes[node].get("children", [])
-        return [*children, *(one for child in children for one in below(child))]
+        return [*children, *(item for child in children for item in below(child))]
 
     return {nodes[lane]["name"]: (lane, sorted(below(lane))) for lane in nodes[0]["children"]}
 

@@ -121,7 +121,7 @@ def _same(text: str, value: float) -> bool:
 def test_the_table_to_take_along_is_that_of_all_modes(tmp_path: Path) -> None:
     clip = result_of(swinging_clip())
     page = written(tmp_path / "report.html", clip)
-    (address,) = [one for one in page.attributes("a", "href") if one.startswith("data:text/csv")]
+    (address,) = [attribute for attribute in page.attributes("a", "href") if attribute.startswith("data:text/csv")]
     rows = list(csv.DictReader(io.StringIO(b64decode(address.partition(",")[2]).decode())))
     assert {row["mode"] for row in rows} == set(MODES)
     assert len(rows) == len(MODES) * len(clip.choices)
@@ -149,7 +149,7 @@ def test_data_that_would_make_the_page_too_large_are_files_beside_it(tmp_path, m
     files = write_report(path, clips, SETTINGS)
     assert files == [path, *(tmp_path / "report_data" / f"{number}.js" for number in (1, 2, 3))]
     settings = json.loads(Page(path).texts["script"][0])
-    assert [one["data"] for one in settings["clips"]] == [f"report_data/{number}.js" for number in (1, 2, 3)]
+    assert [setting["data"] for setting in settings["clips"]] == [f"report_data/{number}.js" for number in (1, 2, 3)]
     for number, file in enumerate(files[1:]):
         text = file.read_text(encoding="utf-8")
         assert text.startswith(f"rigidMotionClips[{number}](")
@@ -225,7 +225,7 @@ def test_nothing_to_report_is_refused(tmp_path: Path) -> None:
 def test_the_overview_has_what_matters_first_and_leads_to_every_page(tmp_path: Path) -> None:
     quiet, loud = result_of(swinging_clip("quiet"), TEN), result_of(swinging_clip("loud"), TEN)
     rows = loud.choices[0].motions
-    louder = tuple(replace(one, metrics=tuple(replace(row, max_shell_m=9.0) for row in one.metrics)) for one in rows)
+    louder = tuple(replace(item, metrics=tuple(replace(row, max_shell_m=9.0) for row in item.metrics)) for item in rows)
     loud = replace(loud, choices=(replace(loud.choices[0], motions=louder),))
     doubtful = result_of(swinging_clip("doubtful", seed=3), TEN, warnings=[ClipWarning("Centimetres?", "Say so.")])
     addresses = {"quiet": "quiet/page 1.html", "loud": None, "doubtful": "doubtful/report.html"}

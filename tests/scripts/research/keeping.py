@@ -12,7 +12,7 @@ def names(value: Any, place: str = "") -> set[str]:
     if isinstance(value, dict):
         return {place}.union(*(names(one, f"{place}.{key}") for key, one in value.items()))
     if isinstance(value, list):
-        return {place}.union(*(names(one, f"{place}[]") for one in value))
+        return {place}.union(*(names(item, f"{place}[]") for item in value))
     return {place}
 
 

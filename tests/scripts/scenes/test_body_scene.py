@@ -159,9 +159,9 @@ def test_the_colour_of_each_face_is_that_of_its_joints_error(skin):
 def instances_of(name: str) -> list[np.ndarray]:
     """Where the instances of an object are."""
     return [
-        np.array(one.matrix_world.translation)
-        for one in bpy.context.evaluated_depsgraph_get().object_instances
-        if one.is_instance and one.parent.name == name
+        np.array(instance.matrix_world.translation)
+        for instance in bpy.context.evaluated_depsgraph_get().object_instances
+        if instance.is_instance and instance.parent.name == name
     ]
 
 

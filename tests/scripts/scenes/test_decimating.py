@@ -120,7 +120,7 @@ def test_decimate_is_held_to_our_largest_error_and_all_is_counted(monkeypatch, s
     measured = measure_modes(made, RADIUS)
     rows = beside_decimate(made, RADIUS, measured.rows)
     how = SHARED if shared else OWN
-    assert [(row.mode, row.how) for row in rows] == [(mode, one) for mode in MODES for one in (how, DECIMATE)]
+    assert [(row.mode, row.how) for row in rows] == [(mode, item) for mode in MODES for item in (how, DECIMATE)]
     for own, theirs, metrics in zip(rows[::2], rows[1::2], measured.rows, strict=True):
         keys = [joint for joint in made.keys[own.mode] if len(joint) > 1]
         assert own.frames_with_keys == len(set(np.concatenate(keys).tolist()))
@@ -132,8 +132,8 @@ def test_decimate_is_held_to_our_largest_error_and_all_is_counted(monkeypatch, s
         assert 0.0 < theirs.max_shell_m <= own.max_shell_m
         result = Left(DECIMATE, theirs.frames_with_keys, theirs.keys, theirs.numbers, theirs.max_shell_m)
         assert result in tried
-        assert result.keys == min(one.keys for one in tried if one.largest <= own.max_shell_m)
-        assert result.keys < max(one.keys for one in tried)
+        assert result.keys == min(item.keys for item in tried if item.largest <= own.max_shell_m)
+        assert result.keys < max(item.keys for item in tried)
 
 
 def test_a_body_that_stays_and_an_error_beyond_single_precision_have_no_row_of_decimate() -> None:

@@ -21,7 +21,7 @@ def influence_of(slot: Slot) -> Influence | None:
     tracks = [
         [strip for strip in track.strips if not strip.mute]
         for track in data.nla_tracks
-        if not track.mute and not (any(one.is_solo for one in data.nla_tracks) and not track.is_solo)
+        if not track.mute and not (any(item.is_solo for item in data.nla_tracks) and not track.is_solo)
     ]
     lowest = next((strips for strips in tracks if strips), [])
     showing = [strip for strips in tracks for strip in strips if strip.action == slot.action]

@@ -79,7 +79,7 @@ def sources_of_users(places: Sequence[SlotTransform]) -> list[list[Source | Refu
         for user in place.users:
             if user.animated not in drivers:
                 driving = user.animated.animation_data.drivers
-                drivers[user.animated] = {(one.data_path, one.array_index) for one in driving if not one.mute}
+                drivers[user.animated] = {(item.data_path, item.array_index) for item in driving if not item.mute}
             try:
                 users.append(_keyed_for(user, place, drivers[user.animated]))
             except Refused as problem:

@@ -103,7 +103,7 @@ def _originals_of(slot: Slot) -> list[Slot]:
     actions = {entry.original for entry in notes if entry.original is not None and entry.original.is_editable}
     played = {(other.action, other.handle) for other in slots_in(actions)}
     result = (in_action(action, slot) for action in actions)
-    return [one for one in result if one is not None and (one.action, one.handle) not in played]
+    return [item for item in result if item is not None and (item.action, item.handle) not in played]
 
 
 def _take_out_doubles(slot: Slot, prefixes: Iterable[str]) -> None:

@@ -313,12 +313,12 @@ def counterpart_in(action: bpy.types.Action, slot: bpy.types.ActionSlot) -> bpy.
     or renamed by its handle.
     """
     result = action.slots.get(slot.identifier)
-    return result or next((one for one in action.slots if one.handle == slot.handle), None)
+    return result or next((item for item in action.slots if item.handle == slot.handle), None)
 
 
 def in_action(action: bpy.types.Action, slot: Slot) -> Slot | None:
     """Return the same slot in a copy of its Action, or in the original. None where it was taken out of it."""
-    own = next(one for one in slot.action.slots if one.handle == slot.handle)
+    own = next(item for item in slot.action.slots if item.handle == slot.handle)
     result = counterpart_in(action, own)
     return None if result is None else replace(slot, action=action, handle=result.handle)
 
@@ -369,7 +369,7 @@ def _give_length(strip: bpy.types.NlaStrip, track: bpy.types.NlaTrack, slot: bpy
     else:
         # Differences may lie behind the keys.
         first, last = min(begin for begin, _ in keyed), max(end for _, end in keyed)
-    room = min((one.frame_start for one in track.strips if one.frame_start > strip.frame_start), default=math.inf)
+    room = min((item.frame_start for item in track.strips if item.frame_start > strip.frame_start), default=math.inf)
     strip.action_frame_end = min(last, first + room - strip.frame_start)
     strip.action_frame_start = first
 

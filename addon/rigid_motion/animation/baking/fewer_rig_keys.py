@@ -176,7 +176,7 @@ class _Rig:
         above = motion.hierarchy.parents
         self.skeleton = Skeleton(np.where(follows, above, -1))
         # The head of a bone that begins a chain still moves with its parent: each chain gets a part of the tolerance.
-        chains = np.array([sum(not follows[one] for one in motion.above(number)) for number in range(len(above))])
+        chains = np.array([sum(not follows[item] for item in motion.above(number)) for number in range(len(above))])
         self.parts = np.sqrt(chains.max(initial=1))
         local = []
         for number, (bone, poses) in enumerate(zip(motion.bones, motion.poses, strict=True)):
@@ -346,10 +346,10 @@ class _Rig:
             # Once what it hangs on is put right, it may be, too.
             if off.isdisjoint(chain):
                 off.add(number)
-                movable = list(chosen) if shared else [one for one in chain if one in chosen]
+                movable = list(chosen) if shared else [item for item in chain if item in chosen]
                 added = self._with_keys_at(moment, movable, chosen)
                 if not added and changed.isdisjoint(chain):
-                    names = [self.targets[one].name for one in chain if one in self.targets]
+                    names = [self.targets[item].name for item in chain if item in self.targets]
                     raise goes_elsewhere(names[0] if names else f"{self.rig.name}/{self.motion.bones[number].name}")
                 chosen.update(added)
                 changed.update(added)
@@ -365,7 +365,7 @@ class _Rig:
             for number in movable:
                 first, last = self._ends(number)
                 # Before and behind its keys it stays where they leave it.
-                more = [one for one in np.clip(moments, first, last).tolist() if one not in chosen[number]]
+                more = [item for item in np.clip(moments, first, last).tolist() if item not in chosen[number]]
                 if more:
                     added[number] = np.union1d(chosen[number], (first, *more, last))
             if added:

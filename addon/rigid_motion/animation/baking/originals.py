@@ -123,7 +123,7 @@ def put_back(transform: Transform, kind: str, lookup: Lookup) -> None:
         if entry.is_property_set("mode"):
             # From a version that kept modes on objects: the original takes it from there.
             transform.motion.mode = entry.mode
-        places = [lookup.find(one, transform.prefix) for one in (slot, in_action(entry.original, slot))]
+        places = [lookup.find(item, transform.prefix) for item in (slot, in_action(entry.original, slot))]
         let_rest(transform, entry, *places)
         exchange(transform.animated, slot, entry.original)
         bakes.remove(number)

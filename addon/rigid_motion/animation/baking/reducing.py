@@ -171,9 +171,9 @@ def reduce_keys_of(
             return result
         size = radius or radius_of(transform.carrier)
         planned = {fewer.place for fewer in result}
-        rest = [one for one in keyed if one[0] not in planned]
+        rest = [item for item in keyed if item[0] not in planned]
         wishes = {"best_of": best_of, "count": count}
-        result = [*result, *(fewer_keys(transform, *one, mode, tolerance, size, **wishes) for one in rest)]
+        result = [*result, *(fewer_keys(transform, *item, mode, tolerance, size, **wishes) for item in rest)]
         fewer = [reduced for reduced in result if len(reduced.key_frames) < reduced.before]
         if not fewer:
             before, keeps_scale = sum(kept.before for kept in result), any(kept.keeps_scale for kept in result)

@@ -120,7 +120,7 @@ class RigMotion:
 
     def below(self, number: int) -> list[int]:
         """Return a bone and all that hang on it."""
-        return [one for one in range(len(self.bones)) if number in self.above(one)]
+        return [item for item in range(len(self.bones)) if number in self.above(item)]
 
     def over(
         self, allowed: float, weights: np.ndarray, numbers: Iterable[int] | None = None

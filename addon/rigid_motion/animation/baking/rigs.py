@@ -52,7 +52,7 @@ def put_back(transform: Transform, kind: str, lookup: Lookup) -> None:
         if entry.kind != kind:
             break
         changed, original = entry.changed, entry.original
-        place, before = (lookup.find(one, transform.prefix) for one in (slot, in_action(original, slot)))
+        place, before = (lookup.find(item, transform.prefix) for item in (slot, in_action(original, slot)))
         let_rest(transform, entry, place, before)
         _copy_channels(before, place)
         bakes.remove(number)
@@ -65,7 +65,7 @@ def _copy_of(rig: bpy.types.Object, slot: Slot) -> bpy.types.Action | None:
     """
     noted = {entry.changed for entry in _entries(rig) if entry.original == slot.action}
     # One that somebody has put the original in place of by hand is not used any more.
-    return next((one for one in noted if used_in(rig, one) is not None and in_action(one, slot) is not None), None)
+    return next((item for item in noted if used_in(rig, item) is not None and in_action(item, slot) is not None), None)
 
 
 def _originals_of(rig: bpy.types.Object, changed: bpy.types.Action) -> Iterator[bpy.types.Action]:
@@ -87,7 +87,9 @@ def _rename_in_notes(rig: bpy.types.Object, old: bpy.types.Action, new: bpy.type
 
 def _is_shared(rig: bpy.types.Object, slot: Slot) -> bool:
     """Return whether something else moves by a slot of a rig as well."""
-    return any(one.users != (rig,) for one in slots_of([rig]) if (one.action, one.handle) == (slot.action, slot.handle))
+    return any(
+        item.users != (rig,) for item in slots_of([rig]) if (item.action, item.handle) == (slot.action, slot.handle)
+    )
 
 
 def _is_as_in(action: bpy.types.Action, place: SlotTransform) -> bool:
@@ -141,7 +143,7 @@ def _go_back_to(rig: bpy.types.Object, changed: bpy.types.Action, original: bpy.
     """Let a rig move by an original again, if all of its keys are what it has by now."""
     if any(entry.changed == changed and entry.original == original for entry in _entries(rig)):
         return
-    here, there = ({place.prefix: place for place in transforms_in(one)} for one in (slot, in_action(original, slot)))
+    here, there = ({place.prefix: place for place in transforms_in(item)} for item in (slot, in_action(original, slot)))
     if here.keys() == there.keys() and all(_is_as(place, there[prefix]) for prefix, place in here.items()):
         exchange(rig, slot, original)
         _rename_in_notes(rig, changed, original)

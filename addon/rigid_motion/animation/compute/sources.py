@@ -356,11 +356,11 @@ class Source:
     def held_range(self) -> tuple[float, float]:
         """The first and the last frame on which there may be anything between keys: holds show it behind these, too."""
         (first, last), longest = self.keyed_range, self._longest_hold
-        return (first - longest if any(first < one.offset for one in self.steps) else first), last + longest
+        return (first - longest if any(first < step.offset for step in self.steps) else first), last + longest
 
     @property
     def _longest_hold(self) -> float:
-        return sum(one.step for one in self.steps)
+        return sum(step.step for step in self.steps)
 
     @cached_property
     def seen_range(self) -> tuple[int, int]:
@@ -425,8 +425,8 @@ class Source:
     def used_up(self) -> tuple[float, float]:
         """Before and after which frame cycles with a count are through: Blender goes back to the outermost keys."""
         cycles = [keys.cycles for keys in self.curves if keys.cycles is not None]
-        before = any(one.before != "NONE" and one.before_count > 0 for one in cycles)
-        after = any(one.after != "NONE" and one.after_count > 0 for one in cycles)
+        before = any(cycle.before != "NONE" and cycle.before_count > 0 for cycle in cycles)
+        after = any(cycle.after != "NONE" and cycle.after_count > 0 for cycle in cycles)
         return float(self.key_frames[0]) if before else -np.inf, float(self.key_frames[-1]) if after else np.inf
 
     @cached_property

@@ -31,8 +31,8 @@ def held(steps: Sequence[Stepped], times: np.ndarray) -> np.ndarray:
         return times
     result = np.asarray(times).astype(np.float32)
     # Blender asks the last one first.
-    for one in reversed(steps):
-        step, offset = np.float32(one.step), np.float32(one.offset)
+    for item in reversed(steps):
+        step, offset = np.float32(item.step), np.float32(item.offset)
         blocks = np.trunc((result - offset) / step)
-        result = np.where((result >= one.start) & (result <= one.end), blocks * step + offset, result)
+        result = np.where((result >= item.start) & (result <= item.end), blocks * step + offset, result)
     return result.astype(np.float64)

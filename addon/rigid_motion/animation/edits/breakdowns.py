@@ -160,7 +160,7 @@ class _Between:
                 before = len(fcurve.keyframe_points)
                 set_key(fcurve, self.frame, components[row])
                 if len(fcurve.keyframe_points) > before:
-                    next(one for one in fcurve.keyframe_points if _is_on(one, self.frame)).type = key_type
+                    next(point for point in fcurve.keyframe_points if _is_on(point, self.frame)).type = key_type
         if needs_turning(self.source):
             place = self.place.read_again()
             share_out_turns(place, read(place), self.source, factor if kind == BREAKDOWN else None)

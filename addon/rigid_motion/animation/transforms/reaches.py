@@ -59,13 +59,13 @@ def _reach_of_chain(bone: bpy.types.Bone | None, known: dict[bpy.types.Bone, flo
     if bone is None:  # It was just made in Edit Mode.
         return SOME_SIZE / metres_per_unit(bpy.context.scene)
     chain = [bone]
-    for one in chain:
-        if one not in known:
-            chain += one.children
-    for one in reversed(chain):
-        if one not in known:
-            children = [(other.head_local - one.head_local).length + known[other] for other in one.children]
-            known[one] = max(children, default=0.0) or _length(one)
+    for item in chain:
+        if item not in known:
+            chain += item.children
+    for item in reversed(chain):
+        if item not in known:
+            children = [(other.head_local - item.head_local).length + known[other] for other in item.children]
+            known[item] = max(children, default=0.0) or _length(item)
     return known[bone]
 
 

@@ -15,7 +15,14 @@ from .times import constraint_path, name_of, span_of
 def constraint_of(user: Transform, place: SlotTransform) -> bpy.types.ActionConstraint | None:
     """Return the constraint that shows the differences of a slot on a bone."""
     desired = slot_of_differences(place)
-    return next((one for one in user.carrier.constraints if shows_differences(one) and shown_by(one) == desired), None)
+    return next(
+        (
+            constraint
+            for constraint in user.carrier.constraints
+            if shows_differences(constraint) and shown_by(constraint) == desired
+        ),
+        None,
+    )
 
 
 def shown_by(constraint: bpy.types.ActionConstraint) -> tuple[bpy.types.Action | None, int]:
@@ -103,7 +110,7 @@ def ensure_constraint(user: BoneTransform, place: SlotTransform) -> None:
         return
     if constraint is None:
         constraint = _new(user, 0, name)
-    names = [one for one in user.motion.mounted.split("\n") if one not in ("", name, constraint.name)]
+    names = [item for item in user.motion.mounted.split("\n") if item not in ("", name, constraint.name)]
     if constraint.name != name:
         constraint = _renamed(constraint, name, user, place)
     action, handle = slot_of_differences(place)
@@ -172,7 +179,7 @@ def _in_use(rig: bpy.types.Object) -> set[tuple[bpy.types.Action, int]]:
 def remove_constraints(user: BoneTransform, shown: set[tuple[bpy.types.Action, int]]) -> None:
     """Take the constraints off a bone that show something else than these."""
     constraints, names, left = user.carrier.constraints, [], set(shown)
-    for constraint in [one for one in constraints if shows_differences(one)]:
+    for constraint in [item for item in constraints if shows_differences(item)]:
         if (what := shown_by(constraint)) in left:
             left.remove(what)
             names.append(constraint.name)

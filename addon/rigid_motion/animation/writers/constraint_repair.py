@@ -52,9 +52,9 @@ def restore(user: BoneTransform, place: SlotTransform) -> None:
     constraints, desired, name = user.carrier.constraints, slot_of_differences(place), name_of(place)
     if constraint_of(user, place) is None:
         # One that was given another name, or frames by a target, still shows them.
-        for one in constraints:
-            if one.type == "ACTION" and shown_by(one) == desired:
-                one.name, one.use_eval_time = name, True
+        for item in constraints:
+            if item.type == "ACTION" and shown_by(item) == desired:
+                item.name, item.use_eval_time = name, True
                 break
     ensure_constraint(user, place)
     constraint = constraint_of(user, place)

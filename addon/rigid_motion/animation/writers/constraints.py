@@ -174,7 +174,7 @@ class ConstraintWriter(Writer):
         }
         if gone and channelbag is not None:
             gone -= {
-                prefix for prefix, prop in (split_path(one.data_path) for one in channelbag.fcurves) if prop in WIDTHS
+                prefix for prefix, prop in (split_path(item.data_path) for item in channelbag.fcurves) if prop in WIDTHS
             }
         if not gone:
             return
@@ -246,7 +246,7 @@ def _remove_slot_if_empty(slot: Slot) -> None:
     if channelbag is not None and not len(channelbag.fcurves):
         pairs = slot.action.rigid_motion.bone_slots
         number, pair = next((number, pair) for number, pair in enumerate(pairs) if pair.handle == slot.handle)
-        slot.action.slots.remove(next(one for one in slot.action.slots if one.handle == pair.differences))
+        slot.action.slots.remove(next(item for item in slot.action.slots if item.handle == pair.differences))
         pairs.remove(number)
 
 
@@ -290,7 +290,7 @@ def _frame_of_a_key(place: SlotTransform) -> float:
 def _at_rest(channelbag: bpy.types.ActionChannelbag) -> dict[Channel, bpy.types.FCurve]:
     """Return the F-curves that hold quaternions without samples."""
     group = channelbag.groups.get(AT_REST)
-    return {} if group is None else {(one.data_path, one.array_index): one for one in group.channels}
+    return {} if group is None else {(channel.data_path, channel.array_index): channel for channel in group.channels}
 
 
 def _make_room(place: SlotTransform, points: Collection[Channel]) -> None:

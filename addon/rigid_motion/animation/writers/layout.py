@@ -181,9 +181,9 @@ class Layout:
     def stepping(self) -> list[Modifier]:
         """Types and settings of those that hold frames."""
         result = []
-        for one in self.steps:
-            settings: dict[str, object] = {"frame_step": one.step, "frame_offset": one.offset}
-            for name, end in (("start", one.start), ("end", one.end)):
+        for step in self.steps:
+            settings: dict[str, object] = {"frame_step": step.step, "frame_offset": step.offset}
+            for name, end in (("start", step.start), ("end", step.end)):
                 settings[f"use_frame_{name}"] = math.isfinite(end)
                 if math.isfinite(end):
                     settings[f"frame_{name}"] = end

@@ -108,7 +108,7 @@ def _time_seen_from(place: SlotTransform, other: SlotTransform, rig: bpy.types.O
     where there is no one time.
     """
     line = next((_line_of(fcurve) for fcurve in (time_of(other),) if fcurve is not None), None)
-    own, others = (_frames_of(rig, one.slot) for one in (place, other))
+    own, others = (_frames_of(rig, item.slot) for item in (place, other))
     if line is None or own is None or others is None:
         return 0.0, 0.0
     # From this Action's frames to the scene's, on to the other's, and on to its time.

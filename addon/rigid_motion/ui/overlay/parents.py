@@ -41,11 +41,11 @@ class Carried:
     def read(self, transforms: Iterable[Transform]) -> dict[Transform, tuple[SlotTransform | None, Source | None]]:
         """Return the place that each moves by, and what is keyed there; None where there is none."""
         transforms = list(transforms)
-        if missing := [one for one in transforms if one not in self._read]:
+        if missing := [transform for transform in transforms if transform not in self._read]:
             places = active_places_of(missing)
             sources = dict(zip(places, sources_of(list(places.values())), strict=True))
-            self._read |= {one: (places.get(one), sources.get(one)) for one in missing}
-        return {one: self._read[one] for one in transforms}
+            self._read |= {item: (places.get(item), sources.get(item)) for item in missing}
+        return {transform: self._read[transform] for transform in transforms}
 
     def follows(self, bone: Transform) -> bool:
         """Return whether a bone follows constraints or drivers, or hangs on one that does."""
@@ -101,7 +101,7 @@ class Parents:
             for one, (place, source) in self._read.items()
         )
         """True if they move, and by keys alone."""
-        self.ids = {one.animated.session_uid for one in self._read}
+        self.ids = {item.animated.session_uid for item in self._read}
         self.ids |= {place.slot.action.session_uid for place, _ in self._read.values() if place is not None}
         """Session ids of the data-blocks that decide on it."""
 
@@ -178,7 +178,10 @@ def _moves_by_keys(transform: Transform, carried: Carried) -> bool:
     data, body = obj.animation_data, obj.rigid_body
     in_strips = data is not None and (data.use_tweak_mode or any(track.strips for track in data.nla_tracks))
     driven = data is not None and any(driver.data_path.removeprefix("delta_") in MOVING for driver in data.drivers)
-    constrained = any(not one.mute and one.influence > 0.0 and not shows_differences(one) for one in obj.constraints)
+    constrained = any(
+        not constraint.mute and constraint.influence > 0.0 and not shows_differences(constraint)
+        for constraint in obj.constraints
+    )
     return not (in_strips or driven or constrained or body is not None) and _hangs_on_a_whole(obj)
 
 

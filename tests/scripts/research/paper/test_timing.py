@@ -61,4 +61,4 @@ def test_the_races_have_every_mode_at_the_rates_that_were_asked_for(monkeypatch:
         assert updates("as good", rate) == as_good
         assert result["equal"]["lerp_slerp"][rate]["relative"] == 1.0
     assert set(result["algebra"]) == set(result["single"]) == set(EXACT)
-    assert all(one["processor"] > 0.0 for one in result["algebra"].values())
+    assert all(item["processor"] > 0.0 for item in result["algebra"].values())
