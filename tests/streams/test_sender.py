@@ -124,7 +124,7 @@ def test_a_clock_that_is_set_makes_no_difference() -> None:
     assert others == pytest.approx([usual, usual], rel=0.03)
 
 
-@pytest.mark.parametrize("wrong", [{"tolerance": 0.0}, {"delay": float("nan")}, {"refresh": -1.0}])
+@pytest.mark.parametrize("wrong", [{"tolerance": 0.0}, {"delay": float("nan")}, {"keepalive": -1.0}])
 def test_numbers_that_are_none_are_refused(wrong: dict) -> None:
     with pytest.raises(ValueError, match="is not a positive number"):
         Sender([body()], **wrong)

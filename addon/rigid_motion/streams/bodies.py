@@ -27,9 +27,6 @@ MOST_BODIES = 255
 LONGEST_NAME = 255
 """Bytes of a name in UTF-8."""
 
-FINEST = 15
-"""The largest level of a joint: its steps are the tolerance, divided by 2^(level / 2) metres."""
-
 
 @dataclass(frozen=True, eq=False)
 class Body:
@@ -88,15 +85,8 @@ class Forest:
         if len(bodies) > MOST_BODIES or sum(counts) > MOST_JOINTS:
             raise ValueError(f"more than {MOST_BODIES} bodies or {MOST_JOINTS} joints are too many for one sender")
         self.bodies = tuple(bodies)
-        ends = np.cumsum(counts).tolist()
-        self.slices = {
-            body.name: slice(end - count, end) for body, count, end in zip(bodies, counts, ends, strict=True)
-        }
-        """The joints of each body."""
-        starts = [end - count for count, end in zip(counts, ends, strict=True)]
-        self.parents = np.concatenate(
-            [np.where(body.parents < 0, -1, body.parents + start) for body, start in zip(bodies, starts, strict=True)]
-        )
+        parents = np.concatenate([body.parents for body in bodies])
+        self.parents = np.where(parents < 0, -1, parents + np.repeat(np.cumsum(counts) - counts, counts))
         self.rest = joined([body.rest for body in bodies])
         self.radii = np.repeat([body.radius for body in bodies], counts)
         self.sliding = np.concatenate([body.sliding for body in bodies])
@@ -111,7 +101,11 @@ class Forest:
 
     def parted(self, poses: Poses) -> dict[str, Poses]:
         """Return the poses of each body by its name, of those of all joints (joints, ...)."""
-        return {name: poses[joints] for name, joints in self.slices.items()}
+        result, first = {}, 0
+        for body in self.bodies:
+            result[body.name] = poses[first : first + len(body.joints)]
+            first += len(body.joints)
+        return result
 
     @cached_property
     def reaches(self) -> np.ndarray:

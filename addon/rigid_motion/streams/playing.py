@@ -84,6 +84,10 @@ class Playing:
         self.longest = max(took for _, took in known)
         self._heard, self._unsure = arrival, False
 
+    def due(self, moment: float) -> float:
+        """When a moment is to be shown; never, where nothing came yet."""
+        return np.inf if self.longest is None else moment + self.longest + self.delay
+
     def moment(self, now: float) -> float | None:
         """Return the moment to be shown now; None before anything came."""
         if self.longest is None:

@@ -17,9 +17,8 @@ import numpy as np
 
 from ..motion import Poses
 from .bodies import Body, Forest
-from .knots import Scale, State
-from .messages import Codec
-from .paths import Path
+from .messages import Codec, State
+from .paths import Path, transposed
 from .playing import Fading, Playing
 from .wire import (
     DESCRIPTION,
@@ -42,11 +41,8 @@ from .wire import (
     read_piece,
 )
 
-MOST_STREAMS = 64
-"""That are remembered; the one that was silent for longest is forgotten for a new one."""
-
-MOST_ALL_JOINTS = 4096
-"""Of all streams together."""
+MOST_STREAMS, MOST_ALL_JOINTS = 64, 4096
+"""That are remembered, the streams without descriptions for a new one as well; and joints of all streams together."""
 
 MOST_STATES = 40
 """Messages of a stream that others may build on."""
@@ -57,17 +53,11 @@ MOST_GONE = 256
 MOST_KNOTS, MOST_JOINT_KNOTS = 256, 1 << 14
 """Knots of a stream that wait for `keys`, or as many more as a body of few joints has in so many poses of joints."""
 
-MOST_WINDOWS = 8
-"""Windows of a stream that one that came late can be put among."""
+MOST_WINDOWS, MOST_WAITING = 8, 4
+"""Windows of a stream that one that came late can be put among; and messages that wait for its description."""
 
-MOST_WAITING = 4
-"""Messages of a stream that wait for its description."""
-
-SILENT = 10.0
-"""Seconds of silence after which a stream is forgotten."""
-
-MOST_SILENCE = 7.0
-"""Seconds of silence in which the ticks of a stream still go on for sure."""
+SILENT, MOST_SILENCE = 10.0, 7.0
+"""Seconds of silence after which a stream is forgotten, and in which its ticks still go on for sure."""
 
 
 class Stream(NamedTuple):
@@ -116,19 +106,16 @@ class Receiver:
 
     def take(self, datagram: bytes, arrival: float, source: Hashable = None) -> None:
         """Take a datagram that came at a time, by the clock of `show`, from somewhere."""
-        kind = kind_of(datagram)
-        if kind not in (DESCRIPTION, MOTION, LATE):
-            self.refused += 1
-            return
-        stream = Stream(source, datagram[1 : HEAD.size])
-        read = read_piece(datagram) if kind == DESCRIPTION else read_motion(datagram)
+        stream, read = Stream(source, datagram[1 : HEAD.size]), None
+        if (kind := kind_of(datagram)) in (DESCRIPTION, MOTION, LATE):
+            read = read_piece(datagram) if kind == DESCRIPTION else read_motion(datagram)
         if read is None:
-            self.refused += 1
+            taken = False
         elif (playback := self._streams.get(stream)) is not None:
-            taken = isinstance(read, Motion) and playback.take(read, arrival)
-            self.refused += not (taken or isinstance(read, Piece))
+            taken = isinstance(read, Piece) or playback.take(read, arrival)
         else:
-            self._begin(stream, read, arrival)
+            taken = self._begin(stream, read, arrival)
+        self.refused += not taken
 
     def show(self, now: float) -> dict[Stream, Shown]:
         """Return what every stream shows."""
@@ -144,12 +131,11 @@ class Receiver:
     def due(self, stream: Stream, moment: float) -> float:
         """When a moment of the sender's time is to be shown, by our clock; never, where nothing came yet."""
         playback = self._streams.get(stream)
-        return playback.due(moment) if playback else np.inf
+        return playback.playing.due(moment) if playback else np.inf
 
     def body(self, stream: Stream, name: str) -> Body | None:
         """Return a body of a stream, with its names, parents and rest poses."""
-        playback = self._streams.get(stream)
-        return next((body for body in playback.forest.bodies if body.name == name), None) if playback else None
+        return next((body for body in self.bodies(stream) if body.name == name), None)
 
     def bodies(self, stream: Stream) -> tuple[Body, ...]:
         """All bodies of a stream."""
@@ -172,36 +158,32 @@ class Receiver:
 
     def keys(self) -> list[Keys]:
         """Return the knots that came since the last call and are not going to change any more."""
-        result = [playback.keys(stream) for stream, playback in self._streams.items()]
+        result = [Keys(stream, *playback.keys()) for stream, playback in self._streams.items()]
         return [keys for keys in result if len(keys.moments)]
 
-    def _begin(self, stream: Stream, read: Motion | Piece, arrival: float) -> None:
-        """Collect what a stream needs before it can be shown."""
+    def _begin(self, stream: Stream, read: Motion | Piece, arrival: float) -> bool:
+        """Collect what a stream needs before it can be shown; False where that is refused."""
         begun = self._begun.setdefault(stream, _Begun())
         self._begun.move_to_end(stream)
         if len(self._begun) > MOST_STREAMS:
             self._begun.popitem(last=False)
         if isinstance(read, Motion):
             begun.unanswered = True
-            begun.motions = [*begun.motions, (read, arrival)][-MOST_WAITING:]
-            return
-        if begun.pieces and len(begun.pieces) != read.pieces:
-            begun.pieces = []
-        begun.pieces = begun.pieces or [None] * read.pieces
+            begun.motions.append((read, arrival))
+            return True
+        if len(begun.pieces) != read.pieces:
+            begun.pieces = [b""] * read.pieces
         begun.pieces[read.number] = read.data
-        known = [piece for piece in begun.pieces if piece is not None]
-        if len(known) < read.pieces:
-            return
+        if not all(begun.pieces):
+            return True
         del self._begun[stream]
-        described = read_description(b"".join(known))
+        described = read_description(b"".join(begun.pieces))
         if described is None or not self._room_for(stream, described[0], arrival):
-            self.refused += 1
-            return
-        playback = _Playback(*described, read.ticks)
-        self._streams[stream] = playback
+            return False
+        playback = self._streams[stream] = _Playback(*described, read.ticks, arrival)
         for motion, when in begun.motions:
             playback.take(motion, when)
-        playback.heard = arrival
+        return True
 
     def _room_for(self, stream: Stream, forest: Forest, now: float) -> bool:
         """Forget a stream that this one is instead of, and say whether there is room for it."""
@@ -231,8 +213,9 @@ class _Begun:
     """A stream without its description."""
 
     def __init__(self) -> None:
-        self.pieces: list[bytes | None] = []
-        self.motions: list[tuple[Motion, float]] = []
+        self.pieces: list[bytes] = []
+        """Of the description, empty where they are missing."""
+        self.motions: deque[tuple[Motion, float]] = deque(maxlen=MOST_WAITING)
         self.unanswered = False
 
     def entry(self, identity: bytes) -> Entry:
@@ -240,32 +223,29 @@ class _Begun:
 
 
 class _Playback:
-    """A stream with its description."""
+    """A stream with its description, of which `heard` was the newest moment."""
 
-    def __init__(self, forest: Forest, terms: Terms, ticks: int) -> None:
-        self.forest, self._terms = forest, terms
-        self._codec = Codec(Scale(forest, terms.tolerance / 1e6), terms)
-        self._rest = State.at_rest(self._codec.scale)
-        self._states: OrderedDict[int, State] = OrderedDict()
+    def __init__(self, forest: Forest, terms: Terms, ticks: int, heard: float) -> None:
+        self.forest, self.heard, self.unanswered = forest, heard, False
+        self._codec = Codec(forest, terms)
+        self._states: dict[int, State] = {}
         self._windows: dict[int, Path] = {}
         """Of the newest messages, by their sequence numbers."""
         self._path: Path | None = None
         self._newest, self._ticks, self._came = -1, float(ticks), 0.0
-        self._playing, self._fading = Playing(terms.delay / TICKS), Fading()
+        self.playing, self._fading = Playing(terms.delay / TICKS), Fading()
         self._moment: float | None = None
         self._begins = np.inf
         """The first moment that can be shown."""
         self._kept = -np.inf
         """Until this moment keys were handed out."""
         self._needs = NEEDS_REFRESH
-        self.heard = 0.0
-        self.unanswered = False
 
     def take(self, motion: Motion, arrival: float) -> bool:
         """Take a message, and say whether it was a new one that could be read."""
         if motion.sequence in self._states or self._newest - motion.sequence > MOST_STATES:
             return False
-        state = self._rest if motion.back == 0 else self._states.get(motion.sequence - motion.back)
+        state = self._states.get(motion.sequence - motion.back) if motion.back else self._codec.rest
         self.unanswered = True
         if state is None:
             self._needs = NEEDS_REFRESH
@@ -274,19 +254,18 @@ class _Playback:
         end = expanded(motion.ticks, self._ticks + elapsed)
         kind = state.kind(end, motion.back)
         read = self._codec.read(motion.payload, kind, state, motion.late)
-        window = self._codec.window(read[0], state, kind, end) if read else None
-        if read is None or window is None:
+        path = self._codec.path(read[0], state, kind, end) if read else None
+        if read is None or path is None:
             return False
-        path = window.path()
         self._states[motion.sequence] = State(path, read[1], end)
         if len(self._states) > MOST_STATES:
             self._states.pop(min(self._states))
-        newer, lost = motion.sequence > self._newest, motion.sequence - self._newest - 1
-        if newer:
+        lost = motion.sequence - self._newest - 1
+        if lost >= 0:
             self._newest, self._ticks, self._came, self._needs = motion.sequence, float(end), arrival, 0
-        self.heard = max(self.heard, arrival) if newer else self.heard
-        if not motion.late or self._playing.longest is None:
-            self._playing.heard(end / TICKS, arrival)
+            self.heard = max(self.heard, arrival)
+        if not motion.late or self.playing.longest is None:
+            self.playing.heard(end / TICKS, arrival)
         self._put(motion.sequence, path, lost)
         return True
 
@@ -309,45 +288,33 @@ class _Playback:
         else:
             numbers = sorted(self._windows)
             first = self._windows[numbers[0]]
-            joined = before.followed(first) if before.moments[0] < first.moments[0] else first
+            self._path = before.followed(first) if before.moments[0] < first.moments[0] else first
             for last, number in pairwise(numbers):
-                joined = joined.followed(self._windows[number], number - last - 1)
-            self._path = joined
+                self._path = self._path.followed(self._windows[number], number - last - 1)
         if self._moment is not None and (lost or path.moments[0] < self._moment):
-            self._fading.changed(_only(self._path.at(np.array([self._moment]))))
-
-    def due(self, moment: float) -> float:
-        """When a moment is to be shown."""
-        return np.inf if self._playing.longest is None else moment + self._playing.longest + self._playing.delay
+            self._fading.changed(self._path.pose(self._moment))
 
     def show(self, now: float) -> Shown | None:
         """Return what is shown now."""
-        self._moment = self._playing.moment(now)
+        self._moment = self.playing.moment(now)
         if self._moment is None or self._path is None or self._moment < self._begins:
             return None
-        poses = self._fading.show(_only(self._path.at(np.array([self._moment]))), now)
+        poses = self._fading.show(self._path.pose(self._moment), now)
         return Shown(self._moment, self.forest.parted(poses))
 
-    def keys(self, stream: Stream) -> Keys:
+    def keys(self) -> tuple[np.ndarray, dict[str, Poses]]:
         """Return the knots until the start of the newest window that were not handed out yet."""
         path = self._path
         if path is None:
-            return Keys(stream, np.empty(0), {})
+            return np.empty(0), {}
         until = self._windows[max(self._windows)].moments[0]
         rows = np.flatnonzero((path.moments > self._kept) & (path.moments <= until))
         if len(rows):
             self._kept = float(path.moments[rows[-1]])
-        poses = {
-            name: Poses(path.positions[rows][:, joints], path.quaternions[rows][:, joints])
-            for name, joints in self.forest.slices.items()
-        }
-        return Keys(stream, path.moments[rows], poses)
+        poses = self.forest.parted(path.poses[:, rows])
+        return path.moments[rows], {name: transposed(own) for name, own in poses.items()}
 
     def entry(self, identity: bytes) -> Entry:
         """Return what is answered."""
         there = sum(1 << back for back in range(32) if self._newest - 1 - back in self._states)
         return Entry(identity, max(self._newest, 0), there, self._needs)
-
-
-def _only(poses: Poses) -> Poses:
-    return poses[:, 0]

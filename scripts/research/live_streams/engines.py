@@ -197,10 +197,8 @@ ENGINES: dict[str, Callable[[Arrivals, np.ndarray], list[Pose]]] = {
 def truth_of(times: np.ndarray, hand: Poses) -> Path:
     """The hand (n,) and the tool in it, as two joints."""
     tool = Poses(hand.positions + rotate(hand.quaternions, GRIP), hand.quaternions)
-    still = np.zeros((2, 3))
-    places = np.stack((hand.positions, tool.positions), axis=1)
-    turns = align_signs(np.stack((hand.quaternions, tool.quaternions))).swapaxes(0, 1)
-    return Path(times - times[0], places, turns, still, still)
+    turns = align_signs(np.stack((hand.quaternions, tool.quaternions)))
+    return Path(times - times[0], Poses(np.stack((hand.positions, tool.positions)), turns))
 
 
 def by_engine(engine: str, truth: Path, way: Way, frames: np.ndarray) -> Poses:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import log2
 from pathlib import Path
 
 import numpy as np
@@ -19,16 +20,13 @@ import numpy as np
 from rigid_motion.motion import Poses
 from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.coding import TOTAL
-from rigid_motion.streams.knots import State
-from rigid_motion.streams.messages import Said
+from rigid_motion.streams.messages import Said, State
 from rigid_motion.streams.residuals import (
     FLAGS,
     HISTORIES,
     KNOT_COUNTS,
     NEIGHBOURS,
     SIZES,
-    TABLES,
-    Counting,
     symbols_of,
 )
 from rigid_motion_batch.cli.stream_measure import body_of, samples_of
@@ -98,13 +96,29 @@ def messages(sample: Sample, delay: float, latency: float | None) -> list[Messag
     return result
 
 
+class Counting:
+    """A coder that writes nothing, and counts how often each symbol of each table occurs."""
+
+    def __init__(self) -> None:
+        self.counts = [[0] * symbols_of(table) for table in range(KNOT_COUNTS + 1)]
+        self.raw = 0.0
+        """Bits that no table is for."""
+
+    def symbol(self, table: int, value: int) -> int:
+        self.counts[table][value] += 1
+        return value
+
+    def flat(self, count: int, value: int) -> int:
+        self.raw += log2(count)
+        return value
+
+
 def counted(all_messages: list[Message]) -> list[np.ndarray]:
     """How often each symbol of each table occurs."""
-    counts = [[0] * symbols_of(table) for table in range(TABLES)]
-    coder = Counting(counts)
+    coder = Counting()
     for codec, *message in all_messages:
         codec.through(coder, *message)
-    return [np.array(own, dtype=np.float64) for own in counts]
+    return [np.array(own, dtype=np.float64) for own in coder.counts]
 
 
 def probabilities(counts: list[np.ndarray]) -> list[np.ndarray]:
@@ -136,7 +150,7 @@ def table_of(probability: np.ndarray) -> list[int]:
 
 def bits(all_messages: list[Message], tables: list[list[int]]) -> float:
     """What messages cost by some tables."""
-    counting = Counting([[0] * symbols_of(table) for table in range(TABLES)])
+    counting = Counting()
     for codec, *message in all_messages:
         codec.through(counting, *message)
     cost = sum(

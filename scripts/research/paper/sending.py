@@ -16,14 +16,14 @@ import numpy as np
 from rigid_motion.motion import Poses, rms, shell_error
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion.streams import Receiver, Sender
+from rigid_motion.streams.paths import Path
 from rigid_motion.streams.wire import DESCRIPTION, kind_of
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.analysis.needed import part_of
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.streaming.measuring import even_rate, straight
+from rigid_motion_batch.streaming.measuring import HEADERS, even_rate
 from rigid_motion_batch.streaming.packed import CUBE, PLACE_BITS, STAMP, smallest_three
 from rigid_motion_batch.streaming.sending import body_of, samples_of
-from rigid_motion_batch.streaming.transports import HEADERS
 
 from .claims import UPDATES
 from .table import RADIUS, even_points, lowest
@@ -73,7 +73,7 @@ def sent(clip: Clip, tolerance: float, delay: float) -> tuple[float, float, floa
         post(sender.add(moment, poses[:, sample]), moment)
     post(sender.finish(), float(times[-1]))
     draw(np.inf)
-    truth = straight(times, poses).at([one.moment for one in shown])[0]
+    truth = Path(times, poses).at(np.array([one.moment for one in shown]))[0]
     own = [one.poses[body.name] for one in shown]
     filled = Poses(np.concatenate([one.positions for one in own]), np.concatenate([one.quaternions for one in own]))
     seconds = float(times[-1] - times[0])

@@ -7,14 +7,14 @@ somebody came. Everything stays on loopback, and nobody is looked for, unless mo
 
 from __future__ import annotations
 
-import ipaddress
 import json
 import queue
 import re
-import time
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
+from rigid_motion.live.sockets import is_loopback
 from rigid_motion.streams.wire import LONGEST
 from rigid_motion_batch.places import CHECKOUT
 
@@ -68,13 +68,9 @@ def locator(address: str) -> str:
     return f"tcp/{address}" if has_port else f"tcp/{address}:{PORT}"
 
 
-def is_loopback(address: str) -> bool:
+def is_local(address: str) -> bool:
     """Return whether an address, as a locator or HOST:PORT, is of this machine alone."""
-    host = re.sub(r"^\w+/|[?#].*$|:\d+([?#].*)?$", "", address).strip("[]")
-    try:
-        return host == "localhost" or ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
+    return is_loopback(re.sub(r"^\w+/|[?#].*$|:\d+([?#].*)?$", "", address).strip("[]"))
 
 
 def settings(role: str, at: str | None, network: bool) -> dict[str, Any]:
@@ -94,7 +90,7 @@ def settings(role: str, at: str | None, network: bool) -> dict[str, Any]:
     if role == "router":
         return result | {"listen/endpoints": [place]}
     result["connect/endpoints"] = [place]
-    if is_loopback(place):
+    if is_local(place):
         listen = {"listen/endpoints": [place, f"tcp/{everywhere}:0"], "listen/exit_on_failure": False}
         return result | listen | {"connect/timeout_ms": 0, "connect/exit_on_failure": False}
     return result | {"mode": "client", "connect/timeout_ms": WAIT_MS, "connect/exit_on_failure": True}
@@ -180,16 +176,11 @@ class Room:
     def come(self, seconds: float) -> list[Came]:
         """Return what came since the last call or, where that is nothing, the first thing within so many seconds."""
         result = []
-        try:
-            result.append(self._came.get(timeout=seconds) if seconds > 0.0 else self._came.get_nowait())
+        with suppress(queue.Empty):
+            result.append(self._came.get(seconds > 0.0, max(seconds, 0.0)))
             while True:
                 result.append(self._came.get_nowait())
-        except queue.Empty:
-            return result
-
-    def wait(self, until: float) -> list[Came]:
-        """Return what came, as `come` does, until a moment of `time.monotonic`."""
-        return self.come(until - time.monotonic())
+        return result
 
     def _publisher(self, user: str, stream: str) -> Any:
         import zenoh
@@ -211,7 +202,5 @@ class Room:
         gone = str(sample.kind) == "SampleKind.DELETE"
         datagram: bytes | None = None if gone else sample.payload.to_bytes()
         if datagram is None or len(datagram) <= LONGEST:
-            try:
+            with suppress(queue.Full):
                 self._came.put_nowait(Came(user, stream, datagram))
-            except queue.Full:
-                return

@@ -10,9 +10,8 @@ import pytest
 
 from research.paper import sending, study, table
 from research.paper.claims import UPDATES
-from rigid_motion_batch.streaming.measuring import measure
+from rigid_motion_batch.streaming.measuring import HEADERS, measure
 from rigid_motion_batch.streaming.sending import body_of, samples_of
-from rigid_motion_batch.streaming.transports import HEADERS
 from tests.scripts.research.paper.clips import circling
 
 CLIP = circling(turns=0.7, rate=90.0, seconds=3.0)
