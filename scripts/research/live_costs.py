@@ -58,7 +58,7 @@ def costs_of(clip: Clip) -> tuple[int, Costs]:
     say(clip.name)
     times, poses = samples_of(clip)
     body = body_of(clip, poses, RADIUS)
-    result = {needed(delay): vars(measure(body, times, poses, TOLERANCE, delay).cost) for delay in DELAYS}
+    result = {needed(delay): vars(measure(body, times, poses, TOLERANCE, delay)[0]) for delay in DELAYS}
     result |= packed(body, times, poses)
     return len(body.joints), {way: {name: cost[key] for name, key in COST.items()} for way, cost in result.items()}
 

@@ -125,7 +125,7 @@ def test_strangers_cannot_fill_the_memory() -> None:
             receiver.take(datagram, 0.0, number)
     _, most = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert sum(len(receiver.body(stream, "performer").joints) for stream in receiver.streams) <= MOST_ALL_JOINTS
+    assert sum(len(receiver.bodies(stream)[0].joints) for stream in receiver.streams) <= MOST_ALL_JOINTS
     assert most < MOST_BYTES
 
 

@@ -22,7 +22,7 @@ A receiver takes any bytes, from anybody, without ever raising an exception:
     for stream, shown in receiver.show(now).items():
         shown.moment                              # of the sender's time
         shown.poses["performer"]                  # Poses (joints,), each joint in its parent's space
-        receiver.body(stream, "performer")        # its Body: names, parents, rest
+        receiver.bodies(stream)                   # each Body: name, joints, parents, rest
     for keys in receiver.keys():                  # since the last call: what was sent, to be recorded
         keys.stream, keys.moments, keys.poses     # (k,) seconds; of each body Poses (k, joints)
 

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..motion import Poses, Skeleton
+from ..motion import Poses, Skeleton, shell_error
 from ..motion.poses import joined
 
 RADIUS = 0.03
@@ -106,6 +106,18 @@ class Forest:
             result[body.name] = poses[first : first + len(body.joints)]
             first += len(body.joints)
         return result
+
+    def errors(self, shown: Poses, truth: Poses) -> np.ndarray:
+        """Return how far off any point of each joint's ball is at most, in metres, shape (joints, n).
+
+        `shown` are poses (joints, n) in their parents' spaces, `truth` those in the root's.
+        """
+        return shell_error(self.skeleton.in_root_space(shown), truth, self.radii[:, None])
+
+    @cached_property
+    def below(self) -> list[np.ndarray]:
+        """Each joint and all that hang on it."""
+        return [self.skeleton.below(joint) for joint in range(len(self))]
 
     @cached_property
     def reaches(self) -> np.ndarray:

@@ -8,11 +8,11 @@ outcome is looked at exactly. Arrays have joints first, (joints, n), and compone
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from ..motion import Poses, shell_error
 from ..motion.quaternions import conjugate, cross, matrices, multiply
 from .messages import FINEST, Codec, State, Window
 from .paths import Path, carried
@@ -34,11 +34,21 @@ CHOICES = np.array([[1, 1, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, 0, 0], [0, 1
 """Which of three numbers are made smaller."""
 
 
-@dataclass(frozen=True, eq=False)
-class Task:
-    """What is to be said."""
+class Fitted(NamedTuple):
+    """A message that could be sent, what is shown with it, and the largest error within the window."""
 
-    path: Path | None
+    window: Window
+    path: Path
+    error: float
+
+
+@dataclass(eq=False)
+class Fitting:
+    """Finds what to say of a window."""
+
+    codec: Codec
+
+    shown: Path | None
     """What is shown so far."""
 
     state: State
@@ -46,10 +56,10 @@ class Task:
 
     kind: int
 
+    samples: Path
+
     start: float
     """Of the window."""
-
-    samples: Path
 
     end: float
 
@@ -59,118 +69,78 @@ class Task:
     grid: np.ndarray
     """Where knots may be, rising. Shape (k,)."""
 
-    def window(self, codec: Codec, finer: int) -> Window:
-        return Window(codec, self.state, self.kind, self.start, self.end, finer)
+    def __post_init__(self) -> None:
+        self._forest, self._walk = self.codec.forest, self.codec.walk
+        self._truth = self._forest.skeleton.in_root_space(self.samples.at(self.moments))
 
-
-@dataclass(eq=False)
-class Fitted:
-    """A message that could be sent."""
-
-    finer: int
-
-    window: Window
-
-    moments: list[float] = field(default_factory=list)
-    """Of the knots besides the end, in their order."""
-
-    numbers: list[np.ndarray] = field(default_factory=list)
-    """Of each knot, the end first, shape (groups, 3)."""
-
-    path: Path | None = None
-    """What is shown with it."""
-
-    error: float = np.inf
-    """The largest within the window."""
-
-
-class Fitting:
-    """Finds what to say of a forest."""
-
-    def __init__(self, codec: Codec) -> None:
-        self.codec, self.tolerance = codec, codec.tolerance
-        self._skeleton, self._radii = codec.forest.skeleton, codec.forest.radii
-        self._below = [self._skeleton.below(joint) for joint in range(len(codec.forest))]
-        self._most_knots = min(MOST_KNOTS, max(MOST_GROUPS // len(codec.walk), 1))
-
-    def errors(self, shown: Poses, truth: Poses) -> np.ndarray:
-        """Return the largest of all joints (n,), of poses (joints, n) in their parents' spaces and true ones in the
-        root's.
-        """
-        return shell_error(self._skeleton.in_root_space(shown), truth, self._radii[:, None]).max(axis=0)
-
-    def fitted(self, task: Task) -> Fitted:
-        """Return the message for a task."""
-        truth = self._skeleton.in_root_space(task.samples.at(task.moments))
-        knots: list[float] = []
+    def fitted(self) -> Fitted:
+        """Return the message."""
+        tolerance, knots = self.codec.tolerance, list[float]()
         for finer in range(FINEST + 1):
-            result = self._near(task, truth, knots, finer)
-            if result.error <= NEAR * self.tolerance:
+            result = self._near(knots, finer)
+            if result.error <= NEAR * tolerance:
                 break
-        left = np.maximum(task.end - task.moments, 0.0) / (task.end - task.start)
-        most = self.tolerance * np.minimum(AT_END + (1.0 - AT_END) * left / TAPER, 1.0)
+        left = np.maximum(self.end - self.moments, 0.0) / (self.end - self.start)
+        most = tolerance * np.minimum(AT_END + (1.0 - AT_END) * left / TAPER, 1.0)
         for margin in MARGINS:
-            smaller = self._smaller(task, truth, result, margin * most)
-            if smaller.error <= max(self.tolerance, result.error):
+            smaller = self._smaller(result, margin * most)
+            if smaller.error <= max(tolerance, result.error):
                 return smaller
         return result
 
-    def _near(self, task: Task, truth: Poses, knots: list[float], finer: int) -> Fitted:
+    def _near(self, knots: list[float], finer: int) -> Fitted:
         """Return the numbers nearest to the truth, with knots and, where that is not enough, with more of them."""
-        window = task.window(self.codec, finer)
-        result = Fitted(finer, window, knots, [window.fit(task.samples.pose(task.end))])
-        for moment in knots:
-            result.numbers.append(window.fit(task.samples.pose(moment), moment))
+        tolerance, most_knots = self.codec.tolerance, min(MOST_KNOTS, max(MOST_GROUPS // len(self._walk), 1))
+        window = self._window(finer)
+        for moment in (None, *knots):
+            window.fit(self.samples.pose(self.end if moment is None else moment), moment)
         while True:
-            errors = self._look(task, truth, result)
-            worst = task.moments[np.argmax(errors)]
-            free = task.grid[~np.isin(task.grid, window.moments)]
-            if result.error <= NEAR * self.tolerance or not len(free) or len(knots) + 1 == self._most_knots:
-                return result
+            path, errors = self._look(window)
+            error, worst = float(errors.max()), self.moments[np.argmax(errors)]
+            free = self.grid[~np.isin(self.grid, window.moments)]
+            if error <= NEAR * tolerance or not len(free) or len(knots) + 1 == most_knots:
+                return Fitted(window, path, error)
             nearest = float(free[np.argmin(np.abs(free - worst))])
-            good = finer < FINEST or result.error <= self.tolerance
+            good = finer < FINEST or error <= tolerance
             if good and np.abs(np.array(window.moments[1:]) - worst).min() < abs(nearest - worst):
-                return result
+                return Fitted(window, path, error)
             knots.append(nearest)
-            result.numbers.append(window.fit(task.samples.pose(nearest), nearest))
+            window.fit(self.samples.pose(nearest), nearest)
 
-    def _look(self, task: Task, truth: Poses, result: Fitted) -> np.ndarray:
-        """Note what a message shows, and return the largest error of each moment (n,)."""
-        path = result.window.path()
-        result.path = path if task.path is None else task.path.followed(path)
-        inside = task.moments <= task.end
-        errors = self.errors(result.path.at(task.moments[inside]), truth[:, inside])
-        result.error = float(errors.max())
-        return errors
+    def _window(self, finer: int) -> Window:
+        return Window(self.codec, self.state, self.kind, self.start, self.end, finer)
 
-    def _smaller(self, task: Task, truth: Poses, result: Fitted, most: np.ndarray) -> Fitted:
+    def _look(self, window: Window) -> tuple[Path, np.ndarray]:
+        """Return what is shown with a window, and the largest error of each moment within it."""
+        path = window.path() if self.shown is None else self.shown.followed(window.path())
+        inside = self.moments <= self.end
+        return path, self._forest.errors(path.at(self.moments[inside]), self._truth[:, inside]).max(axis=0)
+
+    def _smaller(self, result: Fitted, most: np.ndarray) -> Fitted:
         """Return a message with smaller numbers, with which no joint is off by more than `most` (n,)."""
-        assert result.path is not None
-        there = self._skeleton.in_root_space(result.path.at(task.moments))
-        places, d = (_apart(part) for part in (there.positions, there.positions - truth.positions))
-        turn = multiply(there.quaternions, conjugate(truth.quaternions))
-        v = _apart(2.0 * turn[..., 1:] * np.where(turn[..., :1] < 0.0, -1.0, 1.0)) * self._radii[:, None]
-        axes, numbers, walk = matrices(there.quaternions), np.array(result.numbers), self.codec.walk
-        for number in range(len(numbers) - 1, -1, -1):
-            support = result.window.supports[number]
-            hat = _hat(support, task.moments, task.end, max([task.start, *result.moments]))
+        there = self._forest.skeleton.in_root_space(result.path.at(self.moments))
+        places, d = (_apart(part) for part in (there.positions, there.positions - self._truth.positions))
+        turn = multiply(there.quaternions, conjugate(self._truth.quaternions))
+        v = _apart(2.0 * turn[..., 1:] * np.where(turn[..., :1] < 0.0, -1.0, 1.0)) * self._forest.radii[:, None]
+        axes, window = matrices(there.quaternions), result.window
+        numbers, last = np.array(window.numbers), max([self.start, *window.inner])
+        for own, support in zip(numbers[::-1], window.supports[::-1], strict=True):
+            hat = _hat(support, self.moments, self.end, last)
             seen = np.flatnonzero(hat)
             if not len(seen):
-                numbers[number] = 0
+                own[:] = 0
                 continue
             near = [part[..., seen] for part in (d, v, places, axes)]
-            for group in range(len(walk) - 1, -1, -1):
-                if numbers[number, group].any():
-                    does = self._does(group, near[2], near[3], 0.5**result.finer * hat[seen])
-                    hung = self._below[walk.joints[group]]
-                    _reduce(numbers[number, group], hung, near, does, most[seen] ** 2)
+            for group in range(len(self._walk) - 1, -1, -1):
+                if own[group].any():
+                    does = self._does(group, near[2], near[3], window.factor * hat[seen])
+                    _reduce(own[group], self._forest.below[self._walk.joints[group]], near, does, most[seen] ** 2)
             d[..., seen], v[..., seen] = near[:2]
-        window = task.window(self.codec, result.finer)
-        for moment, own in zip([None, *result.moments], numbers, strict=True):
-            window.say(own, moment)
-        said = Fitted(result.finer, window, result.moments, list(numbers))
-        self._look(task, truth, said)
-        return said
+        smaller = self._window(window.finer)
+        for moment, own in zip((None, *window.inner), numbers, strict=True):
+            smaller.say(own, moment)
+        path, errors = self._look(smaller)
+        return Fitted(smaller, path, float(errors.max()))
 
     def _does(self, group: int, places: np.ndarray, axes: np.ndarray, hat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return what one step of each number of a group does to what hangs on its joint.
@@ -180,15 +150,15 @@ class Fitting:
         moved, turned : array, shape (3 components, 3 numbers, hung, n)
             By how much places move, and the balls' shells turn.
         """
-        joint = self.codec.walk.joints[group]
-        hung, parent = self._below[joint], self._skeleton.parents[joint]
-        if self.codec.walk.slides[group]:
+        joint = self._walk.joints[group]
+        hung, parent = self._forest.below[joint], self._forest.parents[joint]
+        if self._walk.slides[group]:
             along = np.eye(3)[:, :, None] if parent < 0 else axes[:, :, parent]
             moved = np.broadcast_to((along * (self.codec.slide_step * hat))[:, :, None], (3, 3, len(hung), len(hat)))
             return moved, np.zeros_like(moved)
         about = (axes[:, :, joint] * (self.codec.turn_steps[joint] * hat))[:, :, None]
         arms = (places[:, hung] - places[:, [joint]])[:, None]
-        return cross(about, arms), about * self._radii[hung][:, None]
+        return cross(about, arms), about * self._forest.radii[hung][:, None]
 
 
 def _reduce(

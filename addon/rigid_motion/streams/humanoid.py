@@ -46,13 +46,12 @@ def plain_name(name: str) -> tuple[str, str]:
         if side.lower() in name.lower():
             return _letters(re.sub(side, "", name, flags=re.IGNORECASE)), side[0]
     parts = re.split(r"[\W_]+", name)
-    for side in "LR":
-        for place in (0, -1, 1):
-            if len(parts) > abs(place) and parts[place].upper() == side:
-                return _letters("".join(parts[:place] + parts[place:][1:] if place >= 0 else parts[:-1])), side
-        if re.match(side + "[A-Z]", name):
-            return _letters(name[1:]), side
-    return _letters(name), ""
+    for place in (0, -1, 1):
+        if len(parts) > abs(place) and (side := parts[place].upper()) in ("L", "R"):
+            del parts[place]
+            return "".join(parts).lower(), side
+    side = name[0] if re.match("[LR][A-Z]", name) else ""
+    return _letters(name[len(side) :]), side
 
 
 def _letters(name: str) -> str:

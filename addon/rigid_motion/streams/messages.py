@@ -142,7 +142,7 @@ class Window:
     """The knots of a window: the end, and then others, each between two that are there already."""
 
     def __init__(self, codec: Codec, state: State, kind: int, start: float, end: float, finer: int = 0) -> None:
-        self._codec, self._factor, self._goes_on = codec, 0.5**finer, kind in (NEAR, FAR)
+        self._codec, self.finer, self.factor, self._goes_on = codec, finer, 0.5**finer, kind in (NEAR, FAR)
         # What the motion would do if nothing new came.
         expected = state.path.at(np.array([start, end])) if self._goes_on else state.path.poses[:, [-1, -1]]
         self.moments = [start, end]
@@ -150,27 +150,34 @@ class Window:
         self._poses = [expected[:, 0], expected[:, 1]]
         self.supports = [(start, end, end)]
         """Of each knot, in the order in which they came, the moments between which it has a say, its own in between."""
+        self.numbers: list[np.ndarray] = []
+        """Of each of them the whole numbers (groups, 3)."""
+
+    @property
+    def inner(self) -> list[float]:
+        """The moments of the knots besides the end, in the order in which they came."""
+        return [moment for _, moment, _ in self.supports[1:]]
 
     def say(self, numbers: np.ndarray, moment: float | None = None) -> None:
         """Move the end, which comes first, or else a new knot at a moment, by whole numbers (groups, 3)."""
-        at = 1 if moment is None else self._insert(moment)
-        self._move(at, numbers)
+        self._move(self._place(moment), numbers)
 
-    def fit(self, desired: Poses, moment: float | None = None) -> np.ndarray:
-        """Move a knot as near to poses (joints,) as whole numbers (groups, 3) bring it, and return those."""
-        at = 1 if moment is None else self._insert(moment)
-        numbers = self._codec.rounded(self._poses[at], desired, self._factor)
-        self._move(at, numbers)
-        return numbers
+    def fit(self, desired: Poses, moment: float | None = None) -> None:
+        """Move a knot as near to poses (joints,) as whole numbers bring it."""
+        at = self._place(moment)
+        self._move(at, self._codec.rounded(self._poses[at], desired, self.factor))
 
     def _move(self, at: int, numbers: np.ndarray) -> None:
-        self._poses[at] = self._codec.moved(self._poses[at], numbers, self._factor)
+        self.numbers.append(numbers)
+        self._poses[at] = self._codec.moved(self._poses[at], numbers, self.factor)
         if len(self.moments) == 2 and not self._goes_on:
             # How the motion got there is not known.
             self._poses[0] = self._poses[1]
 
-    def _insert(self, moment: float) -> int:
-        """Add a knot on the straight way between its neighbours, and return its place."""
+    def _place(self, moment: float | None) -> int:
+        """Return the place of the end or of a new knot, on the straight way between its neighbours."""
+        if moment is None:
+            return 1
         at = bisect_left(self.moments, moment)
         before, after = self.moments[at - 1], self.moments[at]
         share, first, second = (moment - before) / (after - before), self._poses[at - 1], self._poses[at]

@@ -5,11 +5,9 @@ Source: "The Open Sound Control 1.0 Specification" (Wright, 2002). Big-endian, e
 
 from __future__ import annotations
 
-import re
 import struct
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from functools import lru_cache
 from itertools import islice
 from typing import NamedTuple
 
@@ -21,7 +19,7 @@ IMMEDIATELY = struct.pack(">Q", 1)
 DEEPEST, MOST_MESSAGES = 4, 2048
 """Bundles in one another, and messages of a datagram."""
 
-NUMBERS = {"i": "i", "f": "f", "h": "q", "d": "d", "t": "Q"}
+NUMBERS = {kind: struct.Struct(f">{own}") for kind, own in zip("ifhdt", "ifqdQ", strict=True)}
 """Types of OSC, as `struct` has them."""
 
 CONSTANTS = {"T": True, "F": False, "N": None}
@@ -85,10 +83,10 @@ def _message(data: bytes) -> Message:
     if address[:1] != "/" or tags[:1] != ",":
         raise ValueError("a message has an address and types")
     arguments: list[object] = []
-    for tag in _parts(tags[1:]):
-        if isinstance(tag, struct.Struct):
-            arguments += tag.unpack_from(data, at)
-            at += tag.size
+    for tag in tags[1:]:
+        if tag in NUMBERS:
+            arguments += NUMBERS[tag].unpack_from(data, at)
+            at += NUMBERS[tag].size
         elif tag in CONSTANTS:
             arguments.append(CONSTANTS[tag])
         elif tag in "sb":
@@ -97,13 +95,6 @@ def _message(data: bytes) -> Message:
         else:
             raise ValueError("there is no such type")
     return Message(address, tuple(arguments))
-
-
-@lru_cache(256)
-def _parts(tags: str) -> list[str | struct.Struct]:
-    """Types one by one, but for numbers, which are read together where they are side by side."""
-    runs = re.findall(f"[{''.join(NUMBERS)}]+|.", tags, re.DOTALL)
-    return [struct.Struct(">" + "".join(NUMBERS[kind] for kind in run)) if run[0] in NUMBERS else run for run in runs]
 
 
 def _string(data: bytes, at: int) -> tuple[str, int]:

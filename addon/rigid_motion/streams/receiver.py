@@ -8,38 +8,20 @@ from __future__ import annotations
 
 import secrets
 from collections import OrderedDict, deque
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..motion import Poses
+from . import wire
 from .bodies import Body, Forest
 from .messages import Codec, State
 from .paths import Path, transposed
 from .playing import Fading, Playing
-from .wire import (
-    DESCRIPTION,
-    HEAD,
-    LATE,
-    MOST_ENTRIES,
-    MOTION,
-    NEEDS_DESCRIPTION,
-    NEEDS_REFRESH,
-    TICKS,
-    Entry,
-    Motion,
-    Piece,
-    Terms,
-    answer,
-    expanded,
-    kind_of,
-    read_description,
-    read_motion,
-    read_piece,
-)
+from .wire import DESCRIPTION, HEAD, LATE, MOST_ENTRIES, MOTION, TICKS, Entry, Motion, Piece, Terms
 
 MOST_STREAMS, MOST_ALL_JOINTS = 64, 4096
 """That are remembered, the streams without descriptions for a new one as well; and joints of all streams together."""
@@ -91,31 +73,12 @@ class Keys:
     """Of each body, shape (k, joints)."""
 
 
-class Receiver:
-    """Takes datagrams of any number of streams, and shows them."""
+class Streams:
+    """Streams that are shown until they were silent for so many seconds: each shows itself, and has bodies and keys."""
 
-    def __init__(self) -> None:
-        self.own = secrets.token_bytes(3)
-        """Who answers."""
-        self.refused = 0
-        """Datagrams that were nothing, or nothing new."""
-        self._streams: dict[Stream, _Playback] = {}
-        self._begun: OrderedDict[Stream, _Begun] = OrderedDict()
-        """Streams whose description is not complete."""
-        self._gone: deque[Stream] = deque(maxlen=MOST_GONE)
-
-    def take(self, datagram: bytes, arrival: float, source: Hashable = None) -> None:
-        """Take a datagram that came at a time, by the clock of `show`, from somewhere."""
-        stream, read = Stream(source, datagram[1 : HEAD.size]), None
-        if (kind := kind_of(datagram)) in (DESCRIPTION, MOTION, LATE):
-            read = read_piece(datagram) if kind == DESCRIPTION else read_motion(datagram)
-        if read is None:
-            taken = False
-        elif (playback := self._streams.get(stream)) is not None:
-            taken = isinstance(read, Piece) or playback.take(read, arrival)
-        else:
-            taken = self._begin(stream, read, arrival)
-        self.refused += not taken
+    def __init__(self, silent: float) -> None:
+        self._silent = silent
+        self._streams: dict[Stream, Any] = {}
 
     def show(self, now: float) -> dict[Stream, Shown]:
         """Return what every stream shows."""
@@ -128,19 +91,49 @@ class Receiver:
         """Those that can be shown, or soon can."""
         return list(self._streams)
 
-    def due(self, stream: Stream, moment: float) -> float:
-        """When a moment of the sender's time is to be shown, by our clock; never, where nothing came yet."""
-        playback = self._streams.get(stream)
-        return playback.playing.due(moment) if playback else np.inf
-
-    def body(self, stream: Stream, name: str) -> Body | None:
-        """Return a body of a stream, with its names, parents and rest poses."""
-        return next((body for body in self.bodies(stream) if body.name == name), None)
-
     def bodies(self, stream: Stream) -> tuple[Body, ...]:
-        """All bodies of a stream."""
-        playback = self._streams.get(stream)
-        return playback.forest.bodies if playback else ()
+        """All bodies of a stream, with their names, parents and rest poses."""
+        return self._streams[stream].bodies if stream in self._streams else ()
+
+    def keys(self) -> list[Keys]:
+        """Return what came since the last call and is not going to change any more."""
+        result = [Keys(stream, *playback.keys()) for stream, playback in self._streams.items()]
+        return [keys for keys in result if len(keys.moments)]
+
+    def _forget_silent(self, now: float) -> None:
+        silent = [stream for stream, it in self._streams.items() if not -self._silent < now - it.heard < self._silent]
+        self._forget(silent)
+
+    def _forget(self, streams: Sequence[Stream]) -> None:
+        for stream in streams:
+            del self._streams[stream]
+
+
+class Receiver(Streams):
+    """Takes datagrams of any number of streams, and shows them."""
+
+    def __init__(self) -> None:
+        super().__init__(SILENT)
+        self.own = secrets.token_bytes(3)
+        """Who answers."""
+        self._begun: OrderedDict[Stream, _Begun] = OrderedDict()
+        """Streams whose description is not complete."""
+        self._gone: deque[Stream] = deque(maxlen=MOST_GONE)
+
+    def take(self, datagram: bytes, arrival: float, source: Hashable = None) -> None:
+        """Take a datagram that came at a time, by the clock of `show`, from somewhere."""
+        kind, stream = wire.kind_of(datagram), Stream(source, datagram[1 : HEAD.size])
+        if kind not in (DESCRIPTION, MOTION, LATE):
+            return
+        read = wire.read_piece(datagram) if kind == DESCRIPTION else wire.read_motion(datagram)
+        if isinstance(read, Motion) and stream in self._streams:
+            self._streams[stream].take(read, arrival)
+        elif read is not None and stream not in self._streams:
+            self._begin(stream, read, arrival)
+
+    def due(self, moment: float) -> float:
+        """When the first stream shows a moment of its sender's time, by our clock; never, where nothing came yet."""
+        return min((playback.playing.due(moment) for playback in self._streams.values()), default=np.inf)
 
     def answers(self) -> list[tuple[Hashable, bytes]]:
         """Return what came since the last call, to be sent to where it came from."""
@@ -151,18 +144,13 @@ class Receiver:
                 known.unanswered = False
                 entries.setdefault(stream.source, []).append(known.entry(stream.identity))
         return [
-            (source, answer(self.own, few[first : first + MOST_ENTRIES]))
+            (source, wire.answer(self.own, few[first : first + MOST_ENTRIES]))
             for source, few in entries.items()
             for first in range(0, len(few), MOST_ENTRIES)
         ]
 
-    def keys(self) -> list[Keys]:
-        """Return the knots that came since the last call and are not going to change any more."""
-        result = [Keys(stream, *playback.keys()) for stream, playback in self._streams.items()]
-        return [keys for keys in result if len(keys.moments)]
-
-    def _begin(self, stream: Stream, read: Motion | Piece, arrival: float) -> bool:
-        """Collect what a stream needs before it can be shown; False where that is refused."""
+    def _begin(self, stream: Stream, read: Motion | Piece, arrival: float) -> None:
+        """Collect what a stream needs before it can be shown."""
         begun = self._begun.setdefault(stream, _Begun())
         self._begun.move_to_end(stream)
         if len(self._begun) > MOST_STREAMS:
@@ -170,22 +158,20 @@ class Receiver:
         if isinstance(read, Motion):
             begun.unanswered = True
             begun.motions.append((read, arrival))
-            return True
+            return
         if len(begun.pieces) != read.pieces:
             begun.pieces = [b""] * read.pieces
         begun.pieces[read.number] = read.data
         if not all(begun.pieces):
-            return True
+            return
         del self._begun[stream]
-        described = read_description(b"".join(begun.pieces))
-        if described is None or not self._room_for(stream, described[0], arrival):
-            return False
-        playback = self._streams[stream] = _Playback(*described, read.ticks, arrival)
-        for motion, when in begun.motions:
-            playback.take(motion, when)
-        return True
+        described = wire.read_description(b"".join(begun.pieces))
+        if described and self._has_room_for(stream, described[0], arrival):
+            playback = self._streams[stream] = _Playback(*described, read.ticks, arrival)
+            for motion, when in begun.motions:
+                playback.take(motion, when)
 
-    def _room_for(self, stream: Stream, forest: Forest, now: float) -> bool:
+    def _has_room_for(self, stream: Stream, forest: Forest, now: float) -> bool:
         """Forget a stream that this one is instead of, and say whether there is room for it."""
         self._forget_silent(now)
         names = {body.name for body in forest.bodies}
@@ -200,13 +186,9 @@ class Receiver:
         joints = sum(len(playback.forest) for playback in self._streams.values())
         return len(self._streams) < MOST_STREAMS and joints + len(forest) <= MOST_ALL_JOINTS
 
-    def _forget_silent(self, now: float) -> None:
-        self._forget([stream for stream, it in self._streams.items() if not -SILENT < now - it.heard < SILENT])
-
-    def _forget(self, streams: Iterable[Stream]) -> None:
-        for stream in streams:
-            del self._streams[stream]
-            self._gone.append(stream)
+    def _forget(self, streams: Sequence[Stream]) -> None:
+        super()._forget(streams)
+        self._gone.extend(streams)
 
 
 class _Begun:
@@ -219,14 +201,14 @@ class _Begun:
         self.unanswered = False
 
     def entry(self, identity: bytes) -> Entry:
-        return Entry(identity, 0, 0, NEEDS_DESCRIPTION | NEEDS_REFRESH)
+        return Entry(identity, 0, 0, wire.NEEDS_DESCRIPTION | wire.NEEDS_REFRESH)
 
 
 class _Playback:
     """A stream with its description, of which `heard` was the newest moment."""
 
     def __init__(self, forest: Forest, terms: Terms, ticks: int, heard: float) -> None:
-        self.forest, self.heard, self.unanswered = forest, heard, False
+        self.forest, self.bodies, self.heard, self.unanswered = forest, forest.bodies, heard, False
         self._codec = Codec(forest, terms)
         self._states: dict[int, State] = {}
         self._windows: dict[int, Path] = {}
@@ -239,24 +221,24 @@ class _Playback:
         """The first moment that can be shown."""
         self._kept = -np.inf
         """Until this moment keys were handed out."""
-        self._needs = NEEDS_REFRESH
+        self._needs = wire.NEEDS_REFRESH
 
-    def take(self, motion: Motion, arrival: float) -> bool:
-        """Take a message, and say whether it was a new one that could be read."""
+    def take(self, motion: Motion, arrival: float) -> None:
+        """Take a message, if it is a new one that can be read."""
         if motion.sequence in self._states or self._newest - motion.sequence > MOST_STATES:
-            return False
+            return
         state = self._states.get(motion.sequence - motion.back) if motion.back else self._codec.rest
         self.unanswered = True
         if state is None:
-            self._needs = NEEDS_REFRESH
-            return False
+            self._needs = wire.NEEDS_REFRESH
+            return
         elapsed = min(max(arrival - self._came, 0.0), MOST_SILENCE) * TICKS if self._came else 0.0
-        end = expanded(motion.ticks, self._ticks + elapsed)
+        end = wire.expanded(motion.ticks, self._ticks + elapsed)
         kind = state.kind(end, motion.back)
         read = self._codec.read(motion.payload, kind, state, motion.late)
         path = self._codec.path(read[0], state, kind, end) if read else None
         if read is None or path is None:
-            return False
+            return
         self._states[motion.sequence] = State(path, read[1], end)
         if len(self._states) > MOST_STATES:
             self._states.pop(min(self._states))
@@ -267,7 +249,6 @@ class _Playback:
         if not motion.late or self.playing.longest is None:
             self.playing.heard(end / TICKS, arrival)
         self._put(motion.sequence, path, lost)
-        return True
 
     def _put(self, sequence: int, path: Path, lost: int) -> None:
         """Let a window take part in what is shown; before it so many are lost, or it came late where that is < 0."""

@@ -18,25 +18,13 @@ import numpy as np
 
 from ..motion import Poses, shell_error
 from ..motion.poses import joined
-from ..motion.quaternions import align_signs, normalise
+from ..motion.quaternions import normalise
+from . import wire
 from .bodies import Body, Forest
-from .fitting import Fitted, Fitting, Task
+from .fitting import Fitted, Fitting
 from .messages import Codec, Said, State
 from .paths import Path
-from .wire import (
-    ANSWER,
-    NEEDS_DESCRIPTION,
-    NEEDS_REFRESH,
-    TICKS,
-    Entry,
-    Terms,
-    describe,
-    kind_of,
-    motion,
-    read_answer,
-    read_description,
-    read_piece,
-)
+from .wire import ANSWER, TICKS, Entry, Terms
 
 KEEPALIVE, REFRESH = 0.5, 1.0
 """Seconds of silence after which something is said in any case; and, where nobody answers, between messages that build
@@ -140,14 +128,13 @@ class Sender:
     def _begin(self) -> None:
         """Begin with a new identity, and with the bodies as receivers read them, in single precision."""
         self.identity = secrets.token_bytes(3)
-        pieces = [read_piece(datagram) for datagram in describe(self.identity, 0, self._given, self._terms)]
+        pieces = [wire.read_piece(datagram) for datagram in wire.describe(self.identity, 0, self._given, self._terms)]
         data = [piece.data for piece in pieces if piece]
-        read = read_description(b"".join(data)) if len(data) == len(pieces) else None
+        read = wire.read_description(b"".join(data)) if len(data) == len(pieces) else None
         if read is None:
             raise ValueError("the delay, the tolerance or the bodies are too large to be described")
         self._forest = read[0]
         self.codec = Codec(*read)
-        self._fitting = Fitting(self.codec)
         self._states: dict[int, State] = {}
         """Of messages that others may build on, by their sequence numbers."""
         self._sequence = 0
@@ -213,7 +200,7 @@ class Sender:
     def describe(self) -> list[bytes]:
         """Names, parents and rest poses, for those who join."""
         newest = self._samples.moments[-1] if len(self._samples.moments) else 0.0
-        return describe(self.identity, max(math.floor(newest * TICKS), 0), self._forest, self._terms)
+        return wire.describe(self.identity, max(math.floor(newest * TICKS), 0), self._forest, self._terms)
 
     def join(self) -> list[bytes]:
         """Return what somebody who joins needs: the description. The next message then builds on nothing."""
@@ -222,7 +209,7 @@ class Sender:
 
     def hear(self, datagram: bytes, now: float) -> list[bytes]:
         """Take an answer, at a time by the clock of the samples, and return what is to be sent for it."""
-        read = read_answer(datagram) if kind_of(datagram) == ANSWER else None
+        read = wire.read_answer(datagram) if wire.kind_of(datagram) == ANSWER else None
         if read is None:
             return []
         receiver, entries = read
@@ -236,8 +223,8 @@ class Sender:
         missing = entry.before.bit_length() - entry.before.bit_count()
         self._missed = heard if missing >= LOSSY or (self._lossy and missing) else self._missed
         self._lossy = heard - self._missed < CALM
-        self._desired |= bool(entry.needs & NEEDS_REFRESH) and heard - self._refreshed > PATIENCE
-        return self.describe() if entry.needs & NEEDS_DESCRIPTION else []
+        self._desired |= bool(entry.needs & wire.NEEDS_REFRESH) and heard - self._refreshed > PATIENCE
+        return self.describe() if entry.needs & wire.NEEDS_DESCRIPTION else []
 
     def _remember(self, time: float, poses: Poses) -> float:
         """Keep a sample, and return its time by a clock that only goes on."""
@@ -249,14 +236,10 @@ class Sender:
             now = time + self._slip
         if len(times):
             self._interval = max(now - float(times[-1]), CALMER * self._interval)
-        new = Poses(poses.positions[:, None], normalise(poses.quaternions)[:, None])
-        if len(times):
-            both = np.concatenate((before.quaternions[:, -1:], new.quaternions), axis=1)
-            new = Poses(new.positions, align_signs(both)[:, 1:])
-        self._samples = Path(np.append(times, now), joined((before, new), axis=1))
-        past = int(np.searchsorted(self._samples.moments, now - self._delay - STEP)) - 2
-        if past > AT_ONCE:
-            self._samples = Path(self._samples.moments[past:], self._samples.poses[:, past:])
+        new = Poses(poses.positions, normalise(poses.quaternions))[:, None]
+        samples = Path(np.append(times, now), joined((before, new), axis=1))
+        past = now - self._delay - STEP
+        self._samples = samples.since(past) if np.searchsorted(samples.moments, past) > AT_ONCE else samples
         return now
 
     def _due(self, now: float, interval: float) -> list[bytes]:
@@ -288,7 +271,7 @@ class Sender:
             moments = closely(times[first:])
             moments = moments[moments > max(self._shown, now - self._delay)]
             truth = self._forest.skeleton.in_root_space(self._samples.at(moments))
-            off = self._fitting.errors(self._path.at(moments), truth) > self.codec.tolerance
+            off = self._forest.errors(self._path.at(moments), truth).max(axis=0) > self.codec.tolerance
             if off.any():
                 self._good = self._shown = float(np.append(self._shown, moments)[np.argmax(off)])
             else:
@@ -323,8 +306,9 @@ class Sender:
         back = 0 if base is None else self._sequence - base
         kind = state.kind(end, back)
         fitted = self._fitted(state, kind, end, late)
-        cells = [round((end - moment * TICKS) / self._terms.grid) for moment in fitted.moments]
-        said = Said(fitted.finer, cells, np.array(fitted.numbers).tolist(), late)
+        window = fitted.window
+        cells = [round((end - moment * TICKS) / self._terms.grid) for moment in window.inner]
+        said = Said(window.finer, cells, np.array(window.numbers).tolist(), late)
         payload, memory = self.codec.write(said, kind, state, is_late)
         path = self.codec.path(said, state, kind, end)
         assert path is not None  # which receivers read, too
@@ -338,10 +322,10 @@ class Sender:
         if base is None:
             self._refreshed, self._desired = now, False
             again, _ = self.codec.write(said, kind, state, True)
-            datagram = motion(self.identity, self._sequence, end, back, again, late=True)
+            datagram = wire.motion(self.identity, self._sequence, end, back, again, late=True)
             self._again = (now + AGAIN, self._sequence, datagram)
         self._sequence += 1
-        return motion(self.identity, self._sequence - 1, end, back, payload, is_late)
+        return wire.motion(self.identity, self._sequence - 1, end, back, payload, is_late)
 
     def _fitted(self, state: State, kind: int, end: int, late: int) -> Fitted:
         """Return what to say of the window that ends at some ticks."""
@@ -361,8 +345,8 @@ class Sender:
             if is_still:
                 # It is to come to rest, and not to be put right again and again.
                 moments = np.append(moments, end / TICKS + BEYOND)
-            task = Task(self._path, state, kind, start, self._samples, end / TICKS, moments, grid)
-            fitted = self._fitting.fitted(task)
+            fitting = Fitting(self.codec, self._path, state, kind, self._samples, start, end / TICKS, moments, grid)
+            fitted = fitting.fitted()
             if fitted.error <= self.codec.tolerance:
                 break
         return fitted

@@ -24,7 +24,7 @@ from .humanoid import HUMANOID, alignments, beside, humanoid_bones
 from .osc import Message, read, write_bundle, write_message
 from .paths import Path, transposed
 from .playing import SET, Playing
-from .receiver import Keys, Shown, Stream
+from .receiver import Shown, Stream, Streams
 
 PORT = 39539
 """That programs which show a performer listen on."""
@@ -132,12 +132,12 @@ def _parents(names: list[str]) -> list[int]:
     return result
 
 
-class VmcReceiver:
-    """Shows performers and their devices a delay later: what `Receiver` is for the codec."""
+class VmcReceiver(Streams):
+    """Shows performers and their devices a delay later: what `Receiver` is for the codec. Its keys are all samples."""
 
     def __init__(self, delay: float = 0.1) -> None:
+        super().__init__(SILENT)
         self.delay = delay
-        self._sources: dict[Stream, _Source] = {}
 
     def take(self, datagram: bytes, arrival: float, source: Hashable = None) -> None:
         """Take a datagram that came at a time, by the clock of `show`, from somewhere."""
@@ -145,28 +145,11 @@ class VmcReceiver:
         for message in read(datagram):
             if not message.address.startswith("/VMC/Ext/"):
                 continue
-            known = self._sources.get(stream)
-            if known is None:
-                if len(self._sources) >= MOST_SOURCES:
+            if stream not in self._streams:
+                if len(self._streams) >= MOST_SOURCES:
                     return
-                known = self._sources[stream] = _Source(self.delay)
-            known.hear(message, arrival)
-
-    def show(self, now: float) -> dict[Stream, Shown]:
-        """Return what every performer does now."""
-        self._sources = {stream: it for stream, it in self._sources.items() if -SILENT < now - it.heard < SILENT}
-        shown = {stream: it.show(now) for stream, it in self._sources.items()}
-        return {stream: what for stream, what in shown.items() if what is not None}
-
-    def bodies(self, stream: Stream) -> tuple[Body, ...]:
-        """Return the performer of a stream, at rest, and its devices."""
-        known = self._sources.get(stream)
-        return known.bodies if known else ()
-
-    def keys(self) -> list[Keys]:
-        """All samples that came since the last call."""
-        result = [it.keys(stream) for stream, it in self._sources.items()]
-        return [keys for keys in result if len(keys.moments)]
+                self._streams[stream] = _Source(self.delay)
+            self._streams[stream].hear(message, arrival)
 
 
 class _Source:
@@ -279,9 +262,9 @@ class _Source:
         moments, bodies = self._of_bodies(islice(self._samples, 2))
         return Shown(moment, {name: Path(moments, poses).pose(moment) for name, poses in bodies.items()})
 
-    def keys(self, stream: Stream) -> Keys:
+    def keys(self) -> tuple[np.ndarray, dict[str, Poses]]:
         if not self._unkept:
-            return Keys(stream, np.empty(0), {})
+            return np.empty(0), {}
         moments, bodies = self._of_bodies(self._unkept)
         self._unkept.clear()
-        return Keys(stream, moments, {name: transposed(poses) for name, poses in bodies.items()})
+        return moments, {name: transposed(poses) for name, poses in bodies.items()}

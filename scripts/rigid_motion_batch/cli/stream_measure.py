@@ -28,7 +28,7 @@ from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.bvh_writing import write_bvh
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.streaming.measuring import Link, Measured, measure
+from rigid_motion_batch.streaming.measuring import Cost, Link, measure
 from rigid_motion_batch.streaming.packed import WAYS
 from rigid_motion_batch.streaming.sending import body_of, samples_of
 
@@ -76,14 +76,14 @@ def run(options: argparse.Namespace) -> None:
     if options.output and (options.output.suffix.lower() == ".bvh") != (clip.rest_body is not None):
         raise ValueError(f"{options.output}: a body is written as .bvh, a single rigid body as .csv")
     link = Link(options.latency, options.jitter, options.loss)
-    result = measure(body, times, poses, tolerance, options.delay, link, not options.no_answers)
+    cost, shown = measure(body, times, poses, tolerance, options.delay, link, not options.no_answers)
     beside = packed(body, times, poses)
     if options.output:
-        write(options.output, clip, body, times, result.shown)
+        write(options.output, clip, body, times, shown)
     if options.json:
-        print(json.dumps({"recording": clip.name, **asdict(result.cost), "beside": beside}, indent=2))
+        print(json.dumps({"recording": clip.name, **asdict(cost), "beside": beside}, indent=2))
         return
-    for line in lines(result, beside, tolerance):
+    for line in lines(cost, beside, tolerance):
         print(line)
     if options.output:
         print(path_line(options.output))
@@ -115,9 +115,8 @@ def write(path: Path, clip: Clip, body: Body, times: np.ndarray, shown: Poses) -
             write_bvh(file, clip.rest_body, cast(np.ndarray, body.sliding), times, there)
 
 
-def lines(result: Measured, beside: dict[str, dict[str, float]], tolerance: float) -> list[str]:
+def lines(cost: Cost, beside: dict[str, dict[str, float]], tolerance: float) -> list[str]:
     """Return the numbers as text."""
-    cost = result.cost
     rows = [
         f"datagrams: {cost.datagrams}, of which {cost.lost} were lost, in {cost.seconds:.2f} s",
         f"to join: {cost.joining_bytes} bytes",

@@ -67,14 +67,6 @@ class Cost:
     """By which the picture was behind."""
 
 
-@dataclass(frozen=True, eq=False)
-class Measured:
-    """What it cost, and what was shown at the moments of the samples, shape (joints, n)."""
-
-    cost: Cost
-    shown: Poses
-
-
 def measure(
     body: Body,
     times: np.ndarray,
@@ -84,8 +76,8 @@ def measure(
     link: Link = Link(),
     answers: bool = True,
     seed: int = 1,
-) -> Measured:
-    """Send samples (n,) of a body's poses (joints, n), and measure what is shown of them.
+) -> tuple[Cost, Poses]:
+    """Send samples (n,) of a body's poses (joints, n), and return what it costs and what is shown at their moments.
 
     Raises
     ------
@@ -117,14 +109,15 @@ def measure(
     off = errors(body, shown[:, compared], poses[:, compared]).max(axis=0)
     seconds = float(times[-1] - times[0])
     joining = [datagram for datagram in run.sent if kind_of(datagram) == DESCRIPTION]
-    motion = len(run.sent) - len(joining), sum(map(len, run.sent)) - sum(map(len, joining))
+    joining_bytes = sum(map(len, joining))
+    a_second = (sum(map(len, run.sent)) - joining_bytes) / seconds
     cost = Cost(
         seconds=seconds,
         datagrams=len(run.sent),
         lost=run.lost,
-        joining_bytes=sum(map(len, joining)) + HEADERS * len(joining),
-        bytes_a_second=motion[1] / seconds,
-        bytes_a_second_with_headers=(motion[1] + HEADERS * motion[0]) / seconds,
+        joining_bytes=joining_bytes + HEADERS * len(joining),
+        bytes_a_second=a_second,
+        bytes_a_second_with_headers=a_second + HEADERS * (len(run.sent) - len(joining)) / seconds,
         answers_a_second=answered / seconds,
         rms_mm=1000.0 * rms(off),
         largest_mm=1000.0 * float(off.max()),
@@ -132,7 +125,7 @@ def measure(
         share_within_20_mm=float(np.mean(off <= 0.02)),
         delay_s=float(np.median(lags)),
     )
-    return Measured(cost, shown)
+    return cost, shown
 
 
 def errors(body: Body, shown: Poses, truth: Poses) -> np.ndarray:
@@ -212,8 +205,7 @@ def _receive(pipe: Connection, times: np.ndarray, answers: bool) -> None:
     def draw(until: float) -> None:
         due = now
         while len(frames) < len(times):
-            following = times[len(frames)]
-            due = max(due, min((receiver.due(stream, following) for stream in receiver.streams), default=np.inf))
+            due = max(due, receiver.due(times[len(frames)]))
             if due > until:
                 return
             # Nothing where the motion of that moment was over when the first datagram came.

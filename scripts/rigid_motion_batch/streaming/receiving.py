@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from typing import cast
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -26,30 +25,23 @@ LINGER = 0.3
 """Seconds without anybody who sends, after somebody did, that are the end: a sender may be followed by another."""
 
 
-class Tracks:
-    """What was shown of all bodies of all streams, or their keys."""
+class Tracks(dict[tuple[str, Body], dict[float, Poses]]):
+    """What was shown of all bodies of all users, or their keys: poses (joints,) by rising moments of the sender."""
 
-    def __init__(self, receiver: Receiver) -> None:
-        self._receiver = receiver
-        self._bodies: dict[tuple[Stream, str], tuple[Body, dict[float, Poses]]] = {}
-        """Of each its poses (joints,) by the moments of the sender's clock, which rise."""
-
-    def add(self, stream: Stream, moment: float, poses: Mapping[str, Poses]) -> None:
-        """Add the poses (joints,) of a stream's bodies at a moment."""
-        for name, shown in poses.items():
-            if (stream, name) not in self._bodies:
-                self._bodies[stream, name] = cast(Body, self._receiver.body(stream, name)), {}
-            known = self._bodies[stream, name][1]
+    def add(self, user: str, bodies: Iterable[Body], moment: float, poses: Mapping[str, Poses]) -> None:
+        """Add the poses (joints,) of a user's bodies at a moment."""
+        for body in bodies:
+            known = self.setdefault((user, body), {})
             if moment > next(reversed(known), -math.inf):
-                known[moment] = shown
+                known[moment] = poses[body.name]
 
     def motions(self) -> list[Motion]:
         """Return those of which there is more than a pose."""
         result = []
-        for (stream, name), (body, known) in self._bodies.items():
+        for (user, body), known in self.items():
             if len(known) > 1:
                 poses = joined([pose[:, None] for pose in known.values()], axis=1)
-                result.append(Motion(f"{stream.source}-{name}", body, np.array(list(known)), poses))
+                result.append(Motion(f"{user}-{body.name}", body, np.array(list(known)), poses))
         return result
 
 
@@ -76,7 +68,7 @@ class Receiving:
     ) -> None:
         self._room, self._fps, self._margin, self._to, self._keeps = room, fps, margin, to, keeps
         self.receiver = Receiver()
-        self.shown, self.keys = Tracks(self.receiver), Tracks(self.receiver)
+        self.shown, self.keys = Tracks(), Tracks()
         self.datagrams, self.bytes = Counter[str](), Counter[str]()
         """Counts for each user."""
         self.on_frame: list[Callable[[dict[Stream, Shown]], None]] = []
@@ -132,11 +124,12 @@ class Receiving:
             act(shown)
         if self._keeps:
             for stream, what in shown.items():
-                self.shown.add(stream, what.moment, what.poses)
+                self.shown.add(str(stream.source), self.receiver.bodies(stream), what.moment, what.poses)
             came = self.receiver.keys()
             for keys in came:
                 for row, moment in enumerate(keys.moments.tolist()):
-                    self.keys.add(keys.stream, moment, {name: poses[row] for name, poses in keys.poses.items()})
+                    poses = {name: poses[row] for name, poses in keys.poses.items()}
+                    self.keys.add(str(keys.stream.source), self.receiver.bodies(keys.stream), moment, poses)
         for user in [user for user, heard in self._heard.items() if now - heard > SILENT]:
             self._leave(user)
         if self.datagrams and not self._heard and self._silent == math.inf:

@@ -34,14 +34,13 @@ ROOM = re.compile(r"[\w.-]+(/[\w.-]+)*")
 WAIT_MS = 4000
 """For which a router that cannot be reached is tried."""
 
-RETRY = {"period_init_ms": 100, "period_max_ms": 200, "period_increase_factor": 1.5}
-"""Milliseconds between attempts, at first and at most."""
-
-LARGEST = 1 << 16
-"""Bytes of what Zenoh takes from others at once."""
-
-BATCHES = 16
-"""The number that may be on the way out at once before some are dropped: in a room of many each datagram is one."""
+LIMITS = {
+    "connect/retry": {"period_init_ms": 100, "period_max_ms": 200, "period_increase_factor": 1.5},
+    "transport/link/rx/max_message_size": 1 << 16,
+    # So many may be on the way out at once before some are dropped: in a room of many each datagram is one.
+    "transport/link/tx/queue/size/data": 16,
+}
+"""Of Zenoh: the pauses between attempts to connect, and bytes of what is taken from others at once."""
 
 MOST_WAITING = 4096
 """Datagrams that wait to be looked at; others are dropped, as a network does."""
@@ -80,13 +79,7 @@ def settings(role: str, at: str | None, network: bool) -> dict[str, Any]:
     """
     everywhere = EVERYWHERE if network else HERE
     place = locator(at or (everywhere if role == "router" else HERE))
-    result: dict[str, Any] = {
-        "mode": role,
-        "scouting/multicast/enabled": network,
-        "connect/retry": RETRY,
-        "transport/link/rx/max_message_size": LARGEST,
-        "transport/link/tx/queue/size/data": BATCHES,
-    }
+    result: dict[str, Any] = {"mode": role, "scouting/multicast/enabled": network, **LIMITS}
     if role == "router":
         return result | {"listen/endpoints": [place]}
     result["connect/endpoints"] = [place]
@@ -112,11 +105,10 @@ def opened(role: str, at: str | None = None, network: bool = False, config: Path
     chosen = settings(role, at, network)
     try:
         text = zenoh.Config.from_file(config) if config else zenoh.Config()
-        if config and not at:
-            side = f"{'listen' if role == 'router' else 'connect'}/endpoints"
-            if text.get_json(side) != zenoh.Config().get_json(side):
-                chosen = settings(role, "the file's", network)
-                del chosen[side]
+        side = f"{'listen' if role == 'router' else 'connect'}/endpoints"
+        if config and not at and text.get_json(side) != zenoh.Config().get_json(side):
+            chosen = settings(role, "the file's", network)
+            del chosen[side]
         for key, value in chosen.items():
             text.insert_json5(key, json.dumps(value))
     except (zenoh.ZError, OSError) as error:
@@ -124,10 +116,9 @@ def opened(role: str, at: str | None = None, network: bool = False, config: Path
     try:
         return zenoh.open(text)
     except zenoh.ZError as error:
+        way = "is its router running, as stream router --network on that machine?"
         if role == "router":
             way = "another program may have this port, or a file is missing"
-        else:
-            way = "is its router running, as stream router --network on that machine?"
         raise RoomError(f"{at or config or HERE}: there is no way to it ({_first_line(error)}); {way}") from None
 
 
@@ -139,10 +130,10 @@ class Room:
     """One room of a session, as a context that closes it. What comes waits until it is looked at."""
 
     def __init__(self, session: zenoh.Session, name: str) -> None:
-        self.name = name
-        self._session = session
+        self.name, self._session = name, session
         self._came: queue.Queue[Came] = queue.Queue(MOST_WAITING)
         self._declared: dict[str, Any] = {}
+        """Zenoh's publishers by their keys, and what it would let go otherwise."""
 
     def __enter__(self) -> Self:
         return self

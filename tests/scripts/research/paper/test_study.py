@@ -72,7 +72,7 @@ def test_a_stream_costs_less_the_more_it_may_be_off(monkeypatch: pytest.MonkeyPa
 @pytest.mark.network
 def test_a_stream_is_that_which_another_process_shows() -> None:
     times, poses = samples_of(CLIP)
-    cost = measure(body_of(CLIP, poses, 0.1), times, poses, 0.005, 0.1).cost
+    cost, _ = measure(body_of(CLIP, poses, 0.1), times, poses, 0.005, 0.1)
     datagrams, size, error = sending.sent(CLIP, 0.005, 0.1)
     assert datagrams == pytest.approx((cost.bytes_a_second_with_headers - cost.bytes_a_second) / HEADERS)
     assert size == pytest.approx(cost.bytes_a_second_with_headers)
