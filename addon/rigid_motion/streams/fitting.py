@@ -8,15 +8,16 @@ outcome is looked at exactly. Arrays have joints first, (joints, n), and compone
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from ..motion import shell_error
 from ..motion.quaternions import conjugate, cross, matrices, multiply
-from .messages import FINEST, Codec, State, Window
+from .messages import FINEST, Codec, Said, State, Window
 from .paths import Path, carried
 from .residuals import MOST_GROUPS, MOST_KNOTS
+from .wire import TICKS
 
 NEAR = 0.97
 """Part of the tolerance that rounding may use."""
@@ -28,7 +29,13 @@ AT_END, TAPER = 0.85, 0.4
 """Part of that at the end of a window, from where the motion has to go on well by itself; from this part of it on."""
 
 NOTHING = 1e-9
-"""Seconds."""
+"""Seconds: moments that are not further apart are the same."""
+
+STILL, BEYOND = 0.25, 0.2
+"""Part of the tolerance within which a body does not move; and so many seconds later it is still where it was."""
+
+FAR_APART, MOST_PARTS = 0.013, 8
+"""Seconds between samples beyond which it is looked at what is shown between them, and into how many parts at most."""
 
 CHOICES = np.array([[1, 1, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=bool)
 """Which of three numbers are made smaller."""
@@ -42,45 +49,67 @@ class Fitted(NamedTuple):
     error: float
 
 
-@dataclass(eq=False)
 class Fitting:
-    """Finds what to say of a window."""
+    """Finds what to say of a window.
 
-    codec: Codec
+    Parameters
+    ----------
+    codec : Codec
+    shown : Path, optional
+        What is shown so far.
+    state : State
+        What the message builds on.
+    kind : int
+        How it does, a kind of `residuals`.
+    samples : Path
+    end, late : int
+        Ticks of the end of the window, and by how many it is shorter than the delay.
+    """
 
-    shown: Path | None
-    """What is shown so far."""
+    def __init__(
+        self, codec: Codec, shown: Path | None, state: State, kind: int, samples: Path, end: int, late: int
+    ) -> None:
+        self._codec, self._forest, self._walk = codec, codec.forest, codec.walk
+        self._shown, self._state, self._kind, self._samples = shown, state, kind, samples
+        self._ticks, self._late = end, late
+        self._start, self._end = (end + late - codec.terms.delay) / TICKS, end / TICKS
 
-    state: State
-    """What the message builds on, and how: a kind of `residuals`."""
+    def said(self) -> tuple[Said, bool]:
+        """Return the message, and whether all of the window is within the tolerance."""
+        tolerance, terms = self._codec.tolerance, self._codec.terms
+        moments = self._samples.moments
+        inside = moments[(moments > self._start) & (moments < self._end)]
+        looked = np.concatenate(([self._start], inside, [self._end]))
+        ends = self._forest.skeleton.in_root_space(self._samples.at(looked[[0, -1]]))
+        is_still = shell_error(ends[:, 0], ends[:, 1], self._forest.radii).max() < STILL * tolerance
+        exact = (self._ticks - inside * TICKS) / terms.grid
+        # A jump between two cells takes both of them, everything else the nearest.
+        for cells in (np.rint(exact), np.concatenate((np.floor(exact), np.ceil(exact)))):
+            cells = np.unique(cells.astype(int))
+            cells = cells[(cells > 0) & (cells * terms.grid < terms.delay - self._late)]
+            self._grid = (self._ticks - cells[::-1] * terms.grid) / TICKS
+            between = self._grid[np.abs(self._grid[:, None] - looked).min(axis=1) > NOTHING]
+            self._moments = closely(np.unique(np.concatenate((looked, between))))[1:]
+            if is_still:
+                # It is to come to rest, and not to be put right again and again.
+                self._moments = np.append(self._moments, self._end + BEYOND)
+            self._truth = self._forest.skeleton.in_root_space(self._samples.at(self._moments))
+            fitted = self._fitted()
+            if fitted.error <= tolerance:
+                break
+        window = fitted.window
+        inner = [round((self._ticks - moment * TICKS) / terms.grid) for moment in window.inner]
+        said = Said(window.finer, inner, np.array(window.numbers).tolist(), self._late)
+        return said, fitted.error <= tolerance
 
-    kind: int
-
-    samples: Path
-
-    start: float
-    """Of the window."""
-
-    end: float
-
-    moments: np.ndarray
-    """What is looked at, rising; the last ones are where motion and picture go on beyond the window. Shape (n,)."""
-
-    grid: np.ndarray
-    """Where knots may be, rising. Shape (k,)."""
-
-    def __post_init__(self) -> None:
-        self._forest, self._walk = self.codec.forest, self.codec.walk
-        self._truth = self._forest.skeleton.in_root_space(self.samples.at(self.moments))
-
-    def fitted(self) -> Fitted:
-        """Return the message."""
-        tolerance, knots = self.codec.tolerance, list[float]()
+    def _fitted(self) -> Fitted:
+        """Return the message with knots on the grid, of what is shown at the moments (n,) that are looked at."""
+        tolerance, knots = self._codec.tolerance, list[float]()
         for finer in range(FINEST + 1):
             result = self._near(knots, finer)
             if result.error <= NEAR * tolerance:
                 break
-        left = np.maximum(self.end - self.moments, 0.0) / (self.end - self.start)
+        left = np.maximum(self._end - self._moments, 0.0) / (self._end - self._start)
         most = tolerance * np.minimum(AT_END + (1.0 - AT_END) * left / TAPER, 1.0)
         for margin in MARGINS:
             smaller = self._smaller(result, margin * most)
@@ -90,14 +119,14 @@ class Fitting:
 
     def _near(self, knots: list[float], finer: int) -> Fitted:
         """Return the numbers nearest to the truth, with knots and, where that is not enough, with more of them."""
-        tolerance, most_knots = self.codec.tolerance, min(MOST_KNOTS, max(MOST_GROUPS // len(self._walk), 1))
+        tolerance, most_knots = self._codec.tolerance, min(MOST_KNOTS, max(MOST_GROUPS // len(self._walk), 1))
         window = self._window(finer)
         for moment in (None, *knots):
-            window.fit(self.samples.pose(self.end if moment is None else moment), moment)
+            window.fit(self._samples, moment)
         while True:
             path, errors = self._look(window)
-            error, worst = float(errors.max()), self.moments[np.argmax(errors)]
-            free = self.grid[~np.isin(self.grid, window.moments)]
+            error, worst = float(errors.max()), self._moments[np.argmax(errors)]
+            free = self._grid[~np.isin(self._grid, window.moments)]
             if error <= NEAR * tolerance or not len(free) or len(knots) + 1 == most_knots:
                 return Fitted(window, path, error)
             nearest = float(free[np.argmin(np.abs(free - worst))])
@@ -105,27 +134,27 @@ class Fitting:
             if good and np.abs(np.array(window.moments[1:]) - worst).min() < abs(nearest - worst):
                 return Fitted(window, path, error)
             knots.append(nearest)
-            window.fit(self.samples.pose(nearest), nearest)
+            window.fit(self._samples, nearest)
 
     def _window(self, finer: int) -> Window:
-        return Window(self.codec, self.state, self.kind, self.start, self.end, finer)
+        return Window(self._codec, self._state, self._kind, self._start, self._end, finer)
 
     def _look(self, window: Window) -> tuple[Path, np.ndarray]:
         """Return what is shown with a window, and the largest error of each moment within it."""
-        path = window.path() if self.shown is None else self.shown.followed(window.path())
-        inside = self.moments <= self.end
-        return path, self._forest.errors(path.at(self.moments[inside]), self._truth[:, inside]).max(axis=0)
+        path = window.path() if self._shown is None else self._shown.followed(window.path())
+        inside = self._moments <= self._end
+        return path, self._forest.errors(path.at(self._moments[inside]), self._truth[:, inside]).max(axis=0)
 
     def _smaller(self, result: Fitted, most: np.ndarray) -> Fitted:
         """Return a message with smaller numbers, with which no joint is off by more than `most` (n,)."""
-        there = self._forest.skeleton.in_root_space(result.path.at(self.moments))
+        there = self._forest.skeleton.in_root_space(result.path.at(self._moments))
         places, d = (_apart(part) for part in (there.positions, there.positions - self._truth.positions))
         turn = multiply(there.quaternions, conjugate(self._truth.quaternions))
         v = _apart(2.0 * turn[..., 1:] * np.where(turn[..., :1] < 0.0, -1.0, 1.0)) * self._forest.radii[:, None]
         axes, window = matrices(there.quaternions), result.window
-        numbers, last = np.array(window.numbers), max([self.start, *window.inner])
+        numbers, last = np.array(window.numbers), max([self._start, *window.inner])
         for own, support in zip(numbers[::-1], window.supports[::-1], strict=True):
-            hat = _hat(support, self.moments, self.end, last)
+            hat = _hat(support, self._moments, self._end, last)
             seen = np.flatnonzero(hat)
             if not len(seen):
                 own[:] = 0
@@ -154,11 +183,20 @@ class Fitting:
         hung, parent = self._forest.below[joint], self._forest.parents[joint]
         if self._walk.slides[group]:
             along = np.eye(3)[:, :, None] if parent < 0 else axes[:, :, parent]
-            moved = np.broadcast_to((along * (self.codec.slide_step * hat))[:, :, None], (3, 3, len(hung), len(hat)))
+            moved = np.broadcast_to((along * (self._codec.slide_step * hat))[:, :, None], (3, 3, len(hung), len(hat)))
             return moved, np.zeros_like(moved)
-        about = (axes[:, :, joint] * (self.codec.turn_steps[joint] * hat))[:, :, None]
+        about = (axes[:, :, joint] * (self._codec.turn_steps[joint] * hat))[:, :, None]
         arms = (places[:, hung] - places[:, [joint]])[:, None]
         return cross(about, arms), about * self._forest.radii[hung][:, None]
+
+
+def closely(moments: np.ndarray) -> np.ndarray:
+    """Moments (n,) with others between them, where they are far apart."""
+    parts = np.ceil(np.diff(moments) / FAR_APART).astype(int)
+    parts = np.clip(parts, 1, MOST_PARTS)
+    share = np.concatenate([np.arange(1, count + 1) / count for count in parts]) if len(parts) else np.empty(0)
+    before = np.repeat(moments[:-1], parts)
+    return np.append(moments[:1], before + share * np.repeat(np.diff(moments), parts))
 
 
 def _reduce(

@@ -162,9 +162,10 @@ class Window:
         """Move the end, which comes first, or else a new knot at a moment, by whole numbers (groups, 3)."""
         self._move(self._place(moment), numbers)
 
-    def fit(self, desired: Poses, moment: float | None = None) -> None:
-        """Move a knot as near to poses (joints,) as whole numbers bring it."""
+    def fit(self, samples: Path, moment: float | None = None) -> None:
+        """Move a knot as near to what samples have there as whole numbers bring it."""
         at = self._place(moment)
+        desired = samples.pose(self.moments[at])
         self._move(at, self._codec.rounded(self._poses[at], desired, self.factor))
 
     def _move(self, at: int, numbers: np.ndarray) -> None:

@@ -16,13 +16,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..motion import Poses, shell_error
+from ..motion import Poses
 from ..motion.poses import joined
 from ..motion.quaternions import normalise
 from . import wire
 from .bodies import Body, Forest
-from .fitting import Fitted, Fitting
-from .messages import Codec, Said, State
+from .fitting import Fitting, closely
+from .messages import Codec, State
 from .paths import Path
 from .wire import ANSWER, TICKS, Entry, Terms
 
@@ -33,9 +33,6 @@ on nothing."""
 AGAIN = 0.03
 """Seconds after which a refresh is sent a second time, so that one loss does not lose both."""
 
-STILL, BEYOND = 0.25, 0.2
-"""Part of the tolerance within which a body does not move; and so many seconds later it is still where it was."""
-
 PATIENCE = 0.15
 """Seconds that a refresh has to arrive, before another is sent to somebody who asks for one."""
 
@@ -45,8 +42,8 @@ SILENT, MOST_RECEIVERS = 2.0, 256
 GRID = 3
 """Ticks of the grid of knots for samples at any moments."""
 
-ROUNDING, SAME = 1e-3, 1e-9
-"""Ticks by which a sample may be before the one that it is at; seconds by which a knot is at the same moment."""
+ROUNDING = 1e-3
+"""Ticks by which a sample may be before the one that it is at."""
 
 LAST = 0xFFFF
 """The largest sequence number: behind it the sender begins again, with another identity."""
@@ -71,9 +68,6 @@ MOST_BACK, FURTHEST_BACK = 33, 255
 
 OLDEST = 2.0
 """Seconds: what is older is not worth building on, and everything is said anew."""
-
-FAR_APART, MOST_PARTS = 0.013, 8
-"""Seconds between samples beyond which it is looked at what is shown between them, and into how many parts at most."""
 
 LOSSY, CALM = 2, 5.0
 """Messages of the last 32: where so many are missing, each is sent twice until none is for some seconds."""
@@ -305,10 +299,7 @@ class Sender:
         late = min(math.floor(now * TICKS) - end, self._terms.delay - 1) if is_late else 0
         back = 0 if base is None else self._sequence - base
         kind = state.kind(end, back)
-        fitted = self._fitted(state, kind, end, late)
-        window = fitted.window
-        cells = [round((end - moment * TICKS) / self._terms.grid) for moment in window.inner]
-        said = Said(window.finer, cells, np.array(window.numbers).tolist(), late)
+        said, is_within = Fitting(self.codec, self._path, state, kind, self._samples, end, late).said()
         payload, memory = self.codec.write(said, kind, state, is_late)
         path = self.codec.path(said, state, kind, end)
         assert path is not None  # which receivers read, too
@@ -317,7 +308,7 @@ class Sender:
         self._states = {number: old for number, old in self._states.items() if number in kept}
         start = float(path.moments[0])
         self._path = path if self._path is None else self._path.followed(path).since(start - 0.05)
-        self._shown, self._good = end / TICKS if fitted.error <= self.codec.tolerance else start, None
+        self._shown, self._good = end / TICKS if is_within else start, None
         self._sent = now
         if base is None:
             self._refreshed, self._desired = now, False
@@ -326,36 +317,3 @@ class Sender:
             self._again = (now + AGAIN, self._sequence, datagram)
         self._sequence += 1
         return wire.motion(self.identity, self._sequence - 1, end, back, payload, is_late)
-
-    def _fitted(self, state: State, kind: int, end: int, late: int) -> Fitted:
-        """Return what to say of the window that ends at some ticks."""
-        start, times = (end + late - self._terms.delay) / TICKS, self._samples.moments
-        inside = times[(times > start) & (times < end / TICKS)]
-        looked = np.concatenate(([start], inside, [end / TICKS]))
-        ends = self._forest.skeleton.in_root_space(self._samples.at(looked[[0, -1]]))
-        is_still = shell_error(ends[:, 0], ends[:, 1], self._forest.radii).max() < STILL * self.codec.tolerance
-        exact = (end - inside * TICKS) / self._terms.grid
-        # A jump between two cells takes both of them, everything else the nearest.
-        for cells in (np.rint(exact), np.concatenate((np.floor(exact), np.ceil(exact)))):
-            cells = np.unique(cells.astype(int))
-            cells = cells[(cells > 0) & (cells * self._terms.grid < self._terms.delay - late)]
-            grid = (end - cells[::-1] * self._terms.grid) / TICKS
-            between = grid[np.abs(grid[:, None] - looked).min(axis=1) > SAME]
-            moments = closely(np.unique(np.concatenate((looked, between))))[1:]
-            if is_still:
-                # It is to come to rest, and not to be put right again and again.
-                moments = np.append(moments, end / TICKS + BEYOND)
-            fitting = Fitting(self.codec, self._path, state, kind, self._samples, start, end / TICKS, moments, grid)
-            fitted = fitting.fitted()
-            if fitted.error <= self.codec.tolerance:
-                break
-        return fitted
-
-
-def closely(moments: np.ndarray) -> np.ndarray:
-    """Moments (n,) with others between them, where they are far apart."""
-    parts = np.ceil(np.diff(moments) / FAR_APART).astype(int)
-    parts = np.clip(parts, 1, MOST_PARTS)
-    share = np.concatenate([np.arange(1, count + 1) / count for count in parts]) if len(parts) else np.empty(0)
-    before = np.repeat(moments[:-1], parts)
-    return np.append(moments[:1], before + share * np.repeat(np.diff(moments), parts))

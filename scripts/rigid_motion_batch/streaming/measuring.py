@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from rigid_motion.live.sockets import Outlet, Port
-from rigid_motion.motion import Poses, rms, shell_error
+from rigid_motion.motion import Poses, rms
 from rigid_motion.motion.poses import joined
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion.streams import Body, Receiver, Sender
@@ -131,8 +131,7 @@ def measure(
 def errors(body: Body, shown: Poses, truth: Poses) -> np.ndarray:
     """Return how far off any point of each joint's ball is at most, of poses (joints, n), shape (joints, n)."""
     forest = Forest([body])
-    there, true = (forest.skeleton.in_root_space(poses) for poses in (shown, truth))
-    return shell_error(there, true, forest.radii[:, None])
+    return forest.errors(shown, forest.skeleton.in_root_space(truth))
 
 
 def even_rate(times: np.ndarray) -> float | None:
