@@ -81,4 +81,4 @@ def stream() -> dict:
 
 
 if __name__ == "__main__":
-    VECTORS.write_text(json.dumps({"version": 1, "coding": coding(), "stream": stream()}), encoding="utf-8")
+    VECTORS.write_text(json.dumps({"version": 2, "coding": coding(), "stream": stream()}), encoding="utf-8")

@@ -21,7 +21,7 @@ from .bodies import Body, Forest
 from .messages import Codec, State
 from .paths import Path, transposed
 from .playing import Fading, Playing
-from .wire import DESCRIPTION, HEAD, LATE, MOST_ENTRIES, MOTION, TICKS, Entry, Motion, Piece, Terms
+from .wire import DESCRIPTION, HEAD, LATE, MOST_ENTRIES, MOTION, NEXT, TICKS, Entry, Motion, Piece, Terms
 
 MOST_STREAMS, MOST_ALL_JOINTS = 64, 4096
 """That are remembered, the streams without descriptions for a new one as well; and joints of all streams together."""
@@ -123,7 +123,7 @@ class Receiver(Streams):
     def take(self, datagram: bytes, arrival: float, source: Hashable = None) -> None:
         """Take a datagram that came at a time, by the clock of `show`, from somewhere."""
         kind, stream = wire.kind_of(datagram), Stream(source, datagram[1 : HEAD.size])
-        if kind not in (DESCRIPTION, MOTION, LATE):
+        if kind not in (DESCRIPTION, MOTION, LATE, NEXT):
             return
         read = wire.read_piece(datagram) if kind == DESCRIPTION else wire.read_motion(datagram)
         if isinstance(read, Motion) and stream in self._streams:

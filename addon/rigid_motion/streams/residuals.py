@@ -27,6 +27,9 @@ FLAGS = 7 * 2 * HISTORIES * NEIGHBOURS
 KNOT_COUNTS = FLAGS + 7 * 2 * HISTORIES * SIZES
 """The number of the table of how many knots a window has besides its end, behind those of magnitudes."""
 
+WIDTHS = KNOT_COUNTS + 1
+"""The number of the table of how many binary digits what is above `LARGEST` has."""
+
 MOST_KNOTS = 16
 """Of a window."""
 
@@ -44,7 +47,8 @@ def bucket(value: int, most: int) -> int:
 
 def symbols_of(table: int) -> int:
     """How many symbols a table has."""
-    return 2 if table < FLAGS else LARGEST + 1 if table < KNOT_COUNTS else MOST_KNOTS
+    few = 2 if table < FLAGS else LARGEST + 1
+    return few if table < KNOT_COUNTS else MOST_KNOTS if table == KNOT_COUNTS else MOST_BITS + 1
 
 
 class Walk:
@@ -111,7 +115,7 @@ def _group(coder: Encoder | Decoder, values: list[int], first_table: int) -> int
         magnitude = coder.symbol(first_table + size, min(abs(values[axis]), LARGEST))
         if magnitude == LARGEST:
             rest = max(abs(values[axis]) - LARGEST, 0)
-            width = coder.flat(MOST_BITS + 1, rest.bit_length())
+            width = coder.symbol(WIDTHS, rest.bit_length())
             magnitude += coder.flat(1 << width, rest)
         negative = coder.flat(2, int(values[axis] < 0)) if magnitude else 0
         values[axis] = -magnitude if negative else magnitude

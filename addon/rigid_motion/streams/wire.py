@@ -16,19 +16,21 @@ import numpy as np
 from ..motion import Poses
 from .bodies import MOST_JOINTS, Body, Forest
 
-VERSION = 1
+VERSION = 2
 
 TICKS = 3600
 """A second, in the unit of all times on the wire: whole numbers of it are the frames of 24, 25, 30, 60, 72, 90, 120."""
 
-DESCRIPTION, MOTION, LATE, ANSWER = range(4)
-"""Kinds of datagrams. `LATE` is a motion that was sent later than at the end of its window."""
+DESCRIPTION, MOTION, LATE, ANSWER, NEXT = range(5)
+"""Kinds of datagrams. `LATE` is a motion that was sent later than at the end of its window, and `NEXT` one that builds
+on the message before."""
 
 HEAD = struct.Struct("<B3s")
 """Version and kind; identity."""
 
-MOTION_HEAD = struct.Struct("<B3sHHB")
-"""Version and kind; identity; sequence; ticks of the end of the window; by how much to go back for the base, or 0."""
+MOTION_HEAD = struct.Struct("<B3sHH")
+"""Version and kind; identity; sequence; ticks of the end of the window. Behind it, but for `NEXT`, is a byte: by how
+much to go back for the base, or 0."""
 
 DESCRIPTION_HEAD = struct.Struct("<B3sBBQ")
 """Version and kind; identity; number of the piece; pieces; the sender's ticks."""
@@ -127,16 +129,20 @@ def kind_of(datagram: bytes) -> int | None:
 
 def motion(identity: bytes, sequence: int, ticks: int, back: int, payload: bytes, late: bool = False) -> bytes:
     """Return the datagram of a message."""
-    kind = LATE if late else MOTION
-    return MOTION_HEAD.pack(VERSION << 4 | kind, identity, sequence, ticks & 0xFFFF, back) + payload
+    kind = LATE if late else NEXT if back == 1 else MOTION
+    head = MOTION_HEAD.pack(VERSION << 4 | kind, identity, sequence, ticks & 0xFFFF)
+    return head + (b"" if kind == NEXT else bytes([back])) + payload
 
 
 def read_motion(datagram: bytes) -> Motion | None:
     """Return a message, or None."""
-    if len(datagram) < MOTION_HEAD.size:
+    kind = kind_of(datagram)
+    size = MOTION_HEAD.size + (kind != NEXT)
+    if len(datagram) < size:
         return None
-    _, identity, sequence, ticks, back = MOTION_HEAD.unpack_from(datagram)
-    return Motion(identity, sequence, ticks, back, datagram[MOTION_HEAD.size :], datagram[0] & 15 == LATE)
+    _, identity, sequence, ticks = MOTION_HEAD.unpack_from(datagram)
+    back = 1 if kind == NEXT else datagram[size - 1]
+    return Motion(identity, sequence, ticks, back, datagram[size:], kind == LATE)
 
 
 def answer(receiver: bytes, entries: Sequence[Entry]) -> bytes:

@@ -27,6 +27,7 @@ from rigid_motion.streams.residuals import (
     KNOT_COUNTS,
     NEIGHBOURS,
     SIZES,
+    WIDTHS,
     symbols_of,
 )
 from rigid_motion_batch.cli.stream_measure import body_of, samples_of
@@ -100,7 +101,7 @@ class Counting:
     """A coder that writes nothing, and counts how often each symbol of each table occurs."""
 
     def __init__(self) -> None:
-        self.counts = [[0] * symbols_of(table) for table in range(KNOT_COUNTS + 1)]
+        self.counts = [[0] * symbols_of(table) for table in range(WIDTHS + 1)]
         self.raw = 0.0
         """Bits that no table is for."""
 
@@ -165,7 +166,7 @@ def written(tables: list[list[int]]) -> str:
     head = (
         '"""Cumulative frequencies of the coder\'s symbols, in the order of `residuals`: made by stream_tables.py."""'
     )
-    return f"{head}\n\n# fmt: off\nTABLES: tuple[tuple[int, ...], ...] = (\n{rows})\n"
+    return f"{head}\n\n# fmt: off\n# ruff: noqa: E501\nTABLES: tuple[tuple[int, ...], ...] = (\n{rows})\n"
 
 
 def main(arguments: list[str]) -> int:
