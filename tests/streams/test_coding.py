@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.streams.coding import TOTAL, Decoder, Encoder
-from rigid_motion.streams.residuals import KNOT_COUNTS, WIDTHS, bucket, symbols_of
+from rigid_motion.streams.residuals import COUNT, FINENESS, KNOT_COUNTS, WIDTHS, bucket, symbols_of
 from rigid_motion.streams.tables import TABLES
 
 
@@ -59,12 +59,12 @@ def test_any_bytes_are_some_symbols(seed: int) -> None:
 
 
 def test_the_tables_are_whole() -> None:
-    assert len(TABLES) == WIDTHS + 1
+    assert len(TABLES) == COUNT
     for number, own in enumerate(TABLES):
         assert len(own) == symbols_of(number) + 1
         assert (own[0], own[-1]) == (0, TOTAL)
         assert all(low < high for low, high in itertools.pairwise(own))
-    assert (symbols_of(KNOT_COUNTS), symbols_of(WIDTHS)) == (16, 21)
+    assert [symbols_of(table) for table in (KNOT_COUNTS, WIDTHS, FINENESS)] == [16, 21, 4]
 
 
 def test_buckets() -> None:

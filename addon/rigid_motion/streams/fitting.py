@@ -14,9 +14,9 @@ import numpy as np
 
 from ..motion import shell_error
 from ..motion.quaternions import conjugate, cross, matrices, multiply
-from .messages import FINEST, Codec, Said, State, Window
+from .messages import Codec, Said, State, Window
 from .paths import Path, carried
-from .residuals import MOST_GROUPS, MOST_KNOTS
+from .residuals import FINEST, MOST_GROUPS, MOST_KNOTS
 from .wire import TICKS
 
 NEAR = 0.97

@@ -18,11 +18,8 @@ from ..motion.quaternions import normalise
 from .bodies import Forest
 from .coding import Decoder, Encoder
 from .paths import Path, at_rest, turned, turns_between
-from .residuals import FAR, KNOT_COUNTS, MOST_GROUPS, NEAR, STALE, UNKNOWN, Groups, Walk
+from .residuals import FAR, FINENESS, KNOT_COUNTS, MOST_GROUPS, NEAR, STALE, UNKNOWN, Groups, Walk
 from .wire import TICKS, Terms
-
-FINEST = 3
-"""Steps are halved so many times at most."""
 
 OLD = TICKS // 2
 """Ticks after which a pose says nothing any more about how the motion goes on."""
@@ -82,6 +79,7 @@ class Codec:
         """The groups of each kind: all joints turn."""
         self.turn_steps = TURN_STEP * self.tolerance / forest.reaches
         self.slide_step = SLIDE_STEP * self.tolerance
+        self._fineness = FINENESS + bool((forest.parents >= 0).any())
         self.rest = State(Path(np.zeros(1), forest.rest[:, None]), (0,) * len(self.walk), 0)
         """What is known before any message."""
 
@@ -115,7 +113,7 @@ class Codec:
     ) -> tuple[Said, tuple[int, ...]] | None:
         """Write what a message says, or read it in place of what is given."""
         late = coder.flat(self.terms.delay, said.late) if is_late else 0
-        finer = coder.flat(FINEST + 1, said.finer)
+        finer = coder.symbol(self._fineness, said.finer)
         inner = coder.symbol(KNOT_COUNTS, len(said.cells))
         size = len(self.walk)
         if (inner + 1) * size > max(MOST_GROUPS, size) or inner > self.terms.cells:

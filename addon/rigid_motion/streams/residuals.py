@@ -27,8 +27,15 @@ FLAGS = 7 * 2 * HISTORIES * NEIGHBOURS
 KNOT_COUNTS = FLAGS + 7 * 2 * HISTORIES * SIZES
 """The number of the table of how many knots a window has besides its end, behind those of magnitudes."""
 
-WIDTHS = KNOT_COUNTS + 1
-"""The number of the table of how many binary digits what is above `LARGEST` has."""
+WIDTHS, FINENESS = KNOT_COUNTS + 1, KNOT_COUNTS + 2
+"""The numbers of the tables of how many binary digits what is above `LARGEST` has; and of how fine steps are, for rigid
+bodies alone, and in the next table where joints hang on others."""
+
+FINEST = 3
+"""Steps are halved so many times at most."""
+
+COUNT = FINENESS + 2
+"""Of all tables."""
 
 MOST_KNOTS = 16
 """Of a window."""
@@ -47,8 +54,9 @@ def bucket(value: int, most: int) -> int:
 
 def symbols_of(table: int) -> int:
     """How many symbols a table has."""
-    few = 2 if table < FLAGS else LARGEST + 1
-    return few if table < KNOT_COUNTS else MOST_KNOTS if table == KNOT_COUNTS else MOST_BITS + 1
+    if table >= FINENESS:
+        return FINEST + 1
+    return {KNOT_COUNTS: MOST_KNOTS, WIDTHS: MOST_BITS + 1}.get(table, 2 if table < FLAGS else LARGEST + 1)
 
 
 class Walk:

@@ -22,12 +22,12 @@ from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.coding import TOTAL
 from rigid_motion.streams.messages import Said, State
 from rigid_motion.streams.residuals import (
+    COUNT,
     FLAGS,
     HISTORIES,
     KNOT_COUNTS,
     NEIGHBOURS,
     SIZES,
-    WIDTHS,
     symbols_of,
 )
 from rigid_motion_batch.cli.stream_measure import body_of, samples_of
@@ -101,7 +101,7 @@ class Counting:
     """A coder that writes nothing, and counts how often each symbol of each table occurs."""
 
     def __init__(self) -> None:
-        self.counts = [[0] * symbols_of(table) for table in range(WIDTHS + 1)]
+        self.counts = [[0] * symbols_of(table) for table in range(COUNT)]
         self.raw = 0.0
         """Bits that no table is for."""
 
