@@ -39,12 +39,6 @@ def dance(own: Body, seconds: float = 6.0, rate: float = 60.0, speed: float = 1.
     return times, Poses(positions, np.array(turned(still, angles)))
 
 
-def straight(times: np.ndarray, poses: Poses) -> Path:
-    """Samples (joints, n) and the straight way between them."""
-    still = np.zeros((poses.shape[0], 3))
-    return Path(times, poses.positions.swapaxes(0, 1), poses.quaternions.swapaxes(0, 1), still, still)
-
-
 @dataclass
 class Outcome:
     """What a run showed."""
@@ -138,7 +132,7 @@ def run(
             come(now)
             before = now
     if drawn:
-        compare(outcome, own, straight(times, poses), drawn)
+        compare(outcome, own, Path(times, poses), drawn)
     return outcome
 
 

@@ -15,8 +15,7 @@ import numpy as np
 
 from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.coding import Encoder
-from rigid_motion.streams.knots import State
-from rigid_motion.streams.messages import Said
+from rigid_motion.streams.messages import Said, State
 from rigid_motion.streams.tables import TABLES
 
 from .links import body, dance
@@ -34,11 +33,11 @@ def coding() -> list[dict]:
             if rng.random() < 0.3:
                 count = int(rng.integers(1, 1 << 12))
                 steps.append({"flat": count, "symbol": int(rng.integers(count))})
-                encoder.write_flat(steps[-1]["symbol"], count)
+                encoder.flat(count, steps[-1]["symbol"])
             else:
                 table = int(rng.integers(len(TABLES)))
                 steps.append({"table": table, "symbol": int(rng.integers(len(TABLES[table]) - 1))})
-                encoder.write(steps[-1]["symbol"], TABLES[table])
+                encoder.symbol(table, steps[-1]["symbol"])
         cases.append({"steps": steps, "bytes": encoder.finish().hex()})
     return cases
 
@@ -82,4 +81,4 @@ def stream() -> dict:
 
 
 if __name__ == "__main__":
-    VECTORS.write_text(json.dumps({"version": 1, "coding": coding(), "stream": stream()}), encoding="utf-8")
+    VECTORS.write_text(json.dumps({"version": 2, "coding": coding(), "stream": stream()}), encoding="utf-8")

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rigid_motion.streams.coding import TOTAL, Decoder, Encoder
-from rigid_motion.streams.residuals import KNOT_COUNTS, TABLES, bucket, symbols_of
-from rigid_motion.streams.tables import TABLES as COUNTED
+from rigid_motion.streams.residuals import COUNT, FINENESS, KNOT_COUNTS, WIDTHS, bucket, symbols_of
+from rigid_motion.streams.tables import TABLES
 
 
 def table(rng: np.random.Generator, symbols: int) -> tuple[int, ...]:
@@ -21,28 +21,28 @@ def table(rng: np.random.Generator, symbols: int) -> tuple[int, ...]:
 def test_what_is_written_is_read(seed: int) -> None:
     rng = np.random.default_rng(seed)
     tables = [table(rng, int(rng.integers(2, 20))) for _ in range(5)]
-    written, encoder = [], Encoder()
+    written, encoder = [], Encoder(tables)
     for _ in range(int(rng.integers(0, 400))):
         if rng.random() < 0.2:
             count = int(rng.integers(1, 1 << 20))
-            written.append((count, int(rng.integers(count))))
-            encoder.write_flat(written[-1][1], count)
+            written.append((count, None, encoder.flat(count, int(rng.integers(count)))))
         else:
-            own = tables[rng.integers(5)]
+            number = int(rng.integers(5))
+            last = len(tables[number]) - 2
             # The rarest and the most frequent symbols are where carries come from.
-            written.append((own, int(rng.choice([0, len(own) - 2, rng.integers(len(own) - 1)]))))
-            encoder.write(written[-1][1], own)
-    decoder = Decoder(encoder.finish())
-    read = [decoder.read_flat(own) if isinstance(own, int) else decoder.read(own) for own, _ in written]
-    assert read == [symbol for _, symbol in written]
+            symbol = int(rng.choice([0, last, rng.integers(last + 1)]))
+            written.append((None, number, encoder.symbol(number, symbol)))
+    decoder = Decoder(encoder.finish(), tables)
+    read = [decoder.flat(count) if count else decoder.symbol(number) for count, number, _ in written]
+    assert read == [symbol for *_, symbol in written]
 
 
 def test_symbols_cost_what_their_frequencies_say() -> None:
     rng, own = np.random.default_rng(1), (0, 3500, 4000, TOTAL)
     symbols = rng.choice(3, 4000, p=np.diff(own) / TOTAL)
-    encoder = Encoder()
+    encoder = Encoder([own])
     for symbol in symbols.tolist():
-        encoder.write(symbol, own)
+        encoder.symbol(0, symbol)
     ideal = -np.log2(np.diff(own) / TOTAL)[symbols].sum() / 8.0
     assert ideal <= len(encoder.finish()) <= ideal * 1.002 + 2.0
 
@@ -54,18 +54,17 @@ def test_nothing_said_is_no_bytes() -> None:
 @pytest.mark.parametrize("seed", range(50))
 def test_any_bytes_are_some_symbols(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    own = table(rng, 7)
-    decoder = Decoder(rng.bytes(int(rng.integers(0, 60))))
-    assert all(0 <= decoder.read(own) < 7 and 0 <= decoder.read_flat(1000) < 1000 for _ in range(300))
+    decoder = Decoder(rng.bytes(int(rng.integers(0, 60))), [table(rng, 7)])
+    assert all(0 <= decoder.symbol(0) < 7 and 0 <= decoder.flat(1000) < 1000 for _ in range(300))
 
 
 def test_the_tables_are_whole() -> None:
-    assert len(COUNTED) == TABLES
-    for number, own in enumerate(COUNTED):
+    assert len(TABLES) == COUNT
+    for number, own in enumerate(TABLES):
         assert len(own) == symbols_of(number) + 1
         assert (own[0], own[-1]) == (0, TOTAL)
         assert all(low < high for low, high in itertools.pairwise(own))
-    assert symbols_of(KNOT_COUNTS) == 16
+    assert [symbols_of(table) for table in (KNOT_COUNTS, WIDTHS, FINENESS)] == [16, 21, 4]
 
 
 def test_buckets() -> None:

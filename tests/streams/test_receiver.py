@@ -7,7 +7,7 @@ import pytest
 
 from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.receiver import MOST_JOINT_KNOTS
-from rigid_motion.streams.wire import LATE, MOTION, kind_of
+from rigid_motion.streams.wire import LATE, MOTION, NEXT, kind_of
 from tests.thoroughness import tried
 
 from .links import body, dance, run
@@ -278,7 +278,7 @@ def test_keys_that_nobody_records_are_forgotten() -> None:
     assert 500 < len(keys.moments) <= MOST_JOINT_KNOTS
 
 
-def test_motions_are_of_two_kinds() -> None:
+def test_motions_are_of_three_kinds() -> None:
     own = body()
     outcome = run(own, *dance(own, 1.0))
-    assert {kind_of(datagram) for _, datagram in outcome.datagrams[2:]} <= {MOTION, LATE}
+    assert {kind_of(datagram) for _, datagram in outcome.datagrams[2:]} <= {MOTION, LATE, NEXT}

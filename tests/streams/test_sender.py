@@ -8,6 +8,7 @@ import pytest
 from rigid_motion.motion import Poses
 from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.paths import turned
+from rigid_motion.streams.wire import NEXT, kind_of
 
 from .links import body, dance, run
 
@@ -96,7 +97,7 @@ def test_it_builds_on_what_is_acknowledged() -> None:
     own = body()
     samples = dance(own, 4.0)
     with_answers, without = (run(own, *samples, answers=answers) for answers in (True, False))
-    assert {datagram[8] for sent, datagram in with_answers.datagrams if sent > 0.5} == {1}
+    assert {kind_of(datagram) for sent, datagram in with_answers.datagrams if sent > 0.5} == {NEXT}
     assert sum(len(d) for _, d in with_answers.datagrams) < 0.8 * sum(len(d) for _, d in without.datagrams)
 
 
@@ -124,7 +125,7 @@ def test_a_clock_that_is_set_makes_no_difference() -> None:
     assert others == pytest.approx([usual, usual], rel=0.03)
 
 
-@pytest.mark.parametrize("wrong", [{"tolerance": 0.0}, {"delay": float("nan")}, {"refresh": -1.0}])
+@pytest.mark.parametrize("wrong", [{"tolerance": 0.0}, {"delay": float("nan")}, {"keepalive": -1.0}])
 def test_numbers_that_are_none_are_refused(wrong: dict) -> None:
     with pytest.raises(ValueError, match="is not a positive number"):
         Sender([body()], **wrong)

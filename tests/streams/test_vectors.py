@@ -10,9 +10,7 @@ import pytest
 
 from rigid_motion.streams import Receiver
 from rigid_motion.streams.coding import Decoder, Encoder
-from rigid_motion.streams.knots import Scale, State
-from rigid_motion.streams.messages import Codec, Said
-from rigid_motion.streams.tables import TABLES
+from rigid_motion.streams.messages import Codec, Said, State
 from rigid_motion.streams.wire import (
     DESCRIPTION,
     LATE,
@@ -33,11 +31,11 @@ def test_symbols(case: dict) -> None:
     encoder, decoder = Encoder(), Decoder(bytes.fromhex(case["bytes"]))
     for step in case["steps"]:
         if "flat" in step:
-            encoder.write_flat(step["symbol"], step["flat"])
-            assert decoder.read_flat(step["flat"]) == step["symbol"]
+            encoder.flat(step["flat"], step["symbol"])
+            assert decoder.flat(step["flat"]) == step["symbol"]
         else:
-            encoder.write(step["symbol"], TABLES[step["table"]])
-            assert decoder.read(TABLES[step["table"]]) == step["symbol"]
+            encoder.symbol(step["table"], step["symbol"])
+            assert decoder.symbol(step["table"]) == step["symbol"]
     assert encoder.finish().hex() == case["bytes"]
 
 
@@ -45,19 +43,19 @@ def test_messages() -> None:
     pieces = [read_piece(datagram) for datagram in DATAGRAMS if kind_of(datagram) == DESCRIPTION]
     forest, terms = read_description(b"".join(piece.data for piece in pieces[: pieces[0].pieces]))
     assert [body.name for body in forest.bodies] == ["performer", "tool"]
-    codec = Codec(Scale(forest, terms.tolerance / 1e6), terms)
+    codec = Codec(forest, terms)
     motions = [read_motion(datagram) for datagram in DATAGRAMS if kind_of(datagram) != DESCRIPTION]
     states, payloads = {}, {row["payload"]: row for row in STREAM["messages"]}
     for motion in motions:
         expected = payloads[motion.payload.hex()]
-        state = states.get(motion.sequence - motion.back) if motion.back else State.at_rest(codec.scale)
+        state = states.get(motion.sequence - motion.back) if motion.back else codec.rest
         kind = state.kind(motion.ticks, motion.back)
         said, memory = codec.read(motion.payload, kind, state, motion.late)
         assert kind == expected["kind"]
         assert said == Said(expected["finer"], expected["cells"], expected["groups"], expected["late"])
         assert list(memory) == expected["memory"]
         assert codec.write(said, kind, state, motion.late)[0] == motion.payload
-        states[motion.sequence] = State(codec.window(said, state, kind, motion.ticks).path(), memory, motion.ticks)
+        states[motion.sequence] = State(codec.path(said, state, kind, motion.ticks), memory, motion.ticks)
 
 
 def test_what_is_shown() -> None:

@@ -18,7 +18,8 @@ from ..motion import Poses, Skeleton
 from ..motion.eulers import ORDERS
 from ..motion.quaternions import conjugate, from_matrices, multiply, rotate
 from ..streams import Body
-from ..streams.humanoid import Retargeting, humanoid_bones
+from ..streams.humanoid import beside, humanoid_bones
+from .retargeting import Retargeting
 
 MARK = "rigid_motion_live"
 """The property of an object that was made for a body: the body's name."""
@@ -121,7 +122,7 @@ class RigDriver(Driver):
         self.bones = [pairs[joint] for joint in joints]
         self._skeleton = Skeleton(body.parents)
         placed, self._follows = _space(obj, self.bones)
-        self._offsets = _beside(placed, self._follows)
+        self._offsets = beside(placed, self._follows)
         """The pose of each bone with no values, seen from the bone that it follows, or in the armature."""
         _, turn, scale = obj.matrix_basis.decompose()
         self._turn, self._scale = np.array(turn), max(sum(map(abs, scale)) / 3.0, 1e-9)
@@ -175,16 +176,6 @@ class RigDriver(Driver):
         slides = np.where(values.has_location[:, None, None], values.poses.positions, 0.0)
         places = offsets.positions + rotate(offsets.quaternions, slides)
         return Poses(places, multiply(offsets.quaternions, values.poses.quaternions)), self._follows, self._scale
-
-
-def _beside(placed: Poses, follows: np.ndarray) -> Poses:
-    """Return poses (bones,) seen from those that each follows; as they are where that is none, -1."""
-    hanging = (follows >= 0)[:, None]
-    back = np.where(hanging, conjugate(placed.quaternions[follows]), (1.0, 0.0, 0.0, 0.0))
-    return Poses(
-        rotate(back, placed.positions - np.where(hanging, placed.positions[follows], 0.0)),
-        multiply(back, placed.quaternions),
-    )
 
 
 def object_of(label: str, body: Body) -> bpy.types.Object | None:

@@ -23,7 +23,7 @@ from ..streams.receiver import Stream
 from ..streams.vmc import VmcReceiver
 from .driving import Driver, ObjectDriver, RigDriver, object_of
 from .recording import Take
-from .sockets import Port
+from .sockets import Port, check_access
 from .ticking import Ticking
 
 Which = tuple[Stream, str]
@@ -94,6 +94,7 @@ class Listening:
 
     def __init__(self, host: str, port: int, settings: Callable[[], Settings], pairs: Pairs) -> None:
         self._settings, self._pairs = settings, pairs
+        check_access(host)
         self._port = Port(host, port)
         self._codec, self._vmc = Receiver(), VmcReceiver(settings().delay)
         self._heard: dict[Which, _Heard] = {}

@@ -11,7 +11,7 @@ import numpy as np
 from ..motion import Poses
 from ..streams.vmc import Performer, write, write_trackers
 from .driving import unscaled
-from .sockets import Outlet
+from .sockets import Outlet, check_access
 from .ticking import Ticking
 
 
@@ -20,6 +20,7 @@ class Sending:
 
     def __init__(self, host: str, port: int, objects: Iterable[bpy.types.Object]) -> None:
         self._names = [obj.name for obj in objects]
+        check_access(host)
         self._outlet = Outlet(host, port)
         self._performers: dict[str, tuple[int, Performer]] = {}
         """The number of bones that each rig had."""

@@ -1,15 +1,15 @@
-"""The only module that opens a socket: UDP, without waiting. An operator asks for it, nothing else.
+"""The only module that opens a socket: UDP, without waiting. In Blender an operator asks for it, nothing else.
 
 On this machine that is always allowed; to reach others, or to be reached by them, Blender has to be allowed online.
+Commands send and receive by the same ports, without Blender.
 """
 
 from __future__ import annotations
 
 import ipaddress
+import select
 import socket
-
-import bpy
-from bpy.app.translations import pgettext_rpt as rpt_
+from typing import Self
 
 LONGEST = 65535
 MOST_AT_ONCE = 2048
@@ -27,7 +27,10 @@ class NotAllowed(Exception):
 
 def check_access(host: str) -> None:
     """Raise NotAllowed for an address beyond this machine where Blender is to stay offline."""
-    if not _is_loopback(host) and not bpy.app.online_access:
+    import bpy
+    from bpy.app.translations import pgettext_rpt as rpt_
+
+    if not is_loopback(host) and not bpy.app.online_access:
         raise NotAllowed(
             rpt_(
                 "{host} is not on this machine, and Blender is offline: "
@@ -36,7 +39,7 @@ def check_access(host: str) -> None:
         )
 
 
-def _is_loopback(host: str) -> bool:
+def is_loopback(host: str) -> bool:
     try:
         return host == "localhost" or ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -44,19 +47,23 @@ def _is_loopback(host: str) -> bool:
 
 
 class Port:
-    """A UDP port. Raises OSError where it is taken, and NotAllowed."""
+    """A UDP port, as a context that closes it. Raises OSError where it is taken."""
 
-    def __init__(self, host: str, port: int = 0) -> None:
-        check_access(host)
-        family = socket.AF_INET6 if ":" in host else socket.AF_INET
-        self._socket = socket.socket(family, socket.SOCK_DGRAM)
+    def __init__(self, host: str = "127.0.0.1", port: int = 0) -> None:
+        self._socket = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._allow_pending()
             self._socket.setblocking(False)
             self._socket.bind((host, port))
         except OSError:
-            self._socket.close()
+            self.close()
             raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def _allow_pending(self) -> None:
         """Set how many bytes may be pending: Linux takes what is allowed of what is asked for, others refuse it."""
@@ -73,8 +80,10 @@ class Port:
     def number(self) -> int:
         return self._socket.getsockname()[1]
 
-    def received(self) -> list[tuple[bytes, Address]]:
-        """Return what came since the last look, and from where."""
+    def received(self, wait: float = 0.0) -> list[tuple[bytes, Address]]:
+        """Return what came since the last look, or comes first within so many seconds, and from where."""
+        if wait:
+            select.select([self._socket], [], [], wait)
         result = []
         while len(result) < MOST_AT_ONCE:
             try:
@@ -101,10 +110,9 @@ class Outlet(Port):
     """A port to send from, to one address."""
 
     def __init__(self, host: str, port: int) -> None:
-        check_access(host)
         # Looked up once: a name could take seconds at every datagram.
         family, *_, self.to = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
-        own = ("::" if family == socket.AF_INET6 else "0.0.0.0") if not _is_loopback(host) else self.to[0]
+        own = ("::" if family == socket.AF_INET6 else "0.0.0.0") if not is_loopback(host) else self.to[0]
         super().__init__(own)
 
     def say(self, data: bytes) -> None:

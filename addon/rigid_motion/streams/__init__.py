@@ -22,7 +22,7 @@ A receiver takes any bytes, from anybody, without ever raising an exception:
     for stream, shown in receiver.show(now).items():
         shown.moment                              # of the sender's time
         shown.poses["performer"]                  # Poses (joints,), each joint in its parent's space
-        receiver.body(stream, "performer")        # its Body: names, parents, rest
+        receiver.bodies(stream)                   # each Body: name, joints, parents, rest
     for keys in receiver.keys():                  # since the last call: what was sent, to be recorded
         keys.stream, keys.moments, keys.poses     # (k,) seconds; of each body Poses (k, joints)
 
@@ -33,10 +33,8 @@ bodies     what is streamed, as one forest of joints
 wire       datagrams
 coding     whole numbers to bytes and back, by frequencies
 residuals  which table each number of a message is coded by
-tables     those tables, as `python scripts/research stream_tables` counted them
 paths      what is shown at any moment
-knots      what the numbers of a message are in metres and radians
-messages   what a message says as bytes, and back
+messages   what a message says, in whole numbers, metres and radians, and as bytes
 fitting    what a message has to say
 sender     when it has to be said
 playing    the jitter buffer: which moment is shown when
@@ -45,8 +43,10 @@ receiver   from datagrams to what is shown
 and of what the world speaks:
 
 osc        messages and bundles of Open Sound Control
-humanoid   which bone is which, and poses of one skeleton as those of another
+humanoid   which bone is which, and how they are held at rest
 vmc        the Virtual Motion Capture protocol
+
+Tables alone: tables, which `python scripts/research stream_tables` counted for the coder, and bones.
 """
 
 from .bodies import Body

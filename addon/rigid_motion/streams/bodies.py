@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..motion import Poses, Skeleton
+from ..motion import Poses, Skeleton, shell_error
 from ..motion.poses import joined
 
 RADIUS = 0.03
@@ -26,9 +26,6 @@ MOST_BODIES = 255
 
 LONGEST_NAME = 255
 """Bytes of a name in UTF-8."""
-
-FINEST = 15
-"""The largest level of a joint: its steps are the tolerance, divided by 2^(level / 2) metres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,15 +85,8 @@ class Forest:
         if len(bodies) > MOST_BODIES or sum(counts) > MOST_JOINTS:
             raise ValueError(f"more than {MOST_BODIES} bodies or {MOST_JOINTS} joints are too many for one sender")
         self.bodies = tuple(bodies)
-        ends = np.cumsum(counts).tolist()
-        self.slices = {
-            body.name: slice(end - count, end) for body, count, end in zip(bodies, counts, ends, strict=True)
-        }
-        """The joints of each body."""
-        starts = [end - count for count, end in zip(counts, ends, strict=True)]
-        self.parents = np.concatenate(
-            [np.where(body.parents < 0, -1, body.parents + start) for body, start in zip(bodies, starts, strict=True)]
-        )
+        parents = np.concatenate([body.parents for body in bodies])
+        self.parents = np.where(parents < 0, -1, parents + np.repeat(np.cumsum(counts) - counts, counts))
         self.rest = joined([body.rest for body in bodies])
         self.radii = np.repeat([body.radius for body in bodies], counts)
         self.sliding = np.concatenate([body.sliding for body in bodies])
@@ -111,7 +101,23 @@ class Forest:
 
     def parted(self, poses: Poses) -> dict[str, Poses]:
         """Return the poses of each body by its name, of those of all joints (joints, ...)."""
-        return {name: poses[joints] for name, joints in self.slices.items()}
+        result, first = {}, 0
+        for body in self.bodies:
+            result[body.name] = poses[first : first + len(body.joints)]
+            first += len(body.joints)
+        return result
+
+    def errors(self, shown: Poses, truth: Poses) -> np.ndarray:
+        """Return how far off any point of each joint's ball is at most, in metres, shape (joints, n).
+
+        `shown` are poses (joints, n) in their parents' spaces, `truth` those in the root's.
+        """
+        return shell_error(self.skeleton.in_root_space(shown), truth, self.radii[:, None])
+
+    @cached_property
+    def below(self) -> list[np.ndarray]:
+        """Each joint and all that hang on it."""
+        return [self.skeleton.below(joint) for joint in range(len(self))]
 
     @cached_property
     def reaches(self) -> np.ndarray:

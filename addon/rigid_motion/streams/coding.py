@@ -2,13 +2,17 @@
 
 Integers of 32 bits and nothing else, so that every language decodes the same. After the carry-propagating range coder
 of G. N. N. Martin (1979), in the form of LZMA: `low` and `size` say the interval, bytes leave it from the top. Tables
-are cumulative frequencies that rise from 0 to `TOTAL`.
+are cumulative frequencies that rise from 0 to `TOTAL`. To write and to read go by the same two methods, so that what is
+said is written down once: `symbol` takes a table's number and `flat` how many numbers are as likely; both return the
+number, which only an encoder has to be given.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Sequence
+
+from .tables import TABLES
 
 BITS = 12
 TOTAL = 1 << BITS
@@ -23,28 +27,25 @@ MASK = 0xFFFFFFFF
 class Encoder:
     """Numbers to bytes."""
 
-    def __init__(self) -> None:
-        self._low = 0
-        """The lower end of the interval, all bytes of it."""
+    def __init__(self, tables: Sequence[Sequence[int]] = TABLES) -> None:
+        self._tables = tables
+        self._low = self._shifted = 0
+        """The lower end of the interval, all bytes of it; by how many it was shifted."""
         self._size = MASK
-        self._shifted = 0
-        """By how many bytes."""
 
-    def write(self, symbol: int, table: Sequence[int]) -> None:
-        """Write a symbol, of a table of cumulative frequencies."""
-        part = self._size >> BITS
-        self._low += part * table[symbol]
-        self._size = part * (table[symbol + 1] - table[symbol])
-        while self._size < SMALLEST:
-            self._size <<= 8
-            self._low <<= 8
-            self._shifted += 1
+    def symbol(self, table: int, value: int) -> int:
+        own = self._tables[table]
+        self._narrow(self._size >> BITS, own[value], own[value + 1])
+        return value
 
-    def write_flat(self, value: int, count: int) -> None:
+    def flat(self, count: int, value: int) -> int:
         """Write a number below a count of at most 2^20, all of them as likely."""
-        part = self._size // count
-        self._low += part * value
-        self._size = part
+        self._narrow(self._size // count, value, value + 1)
+        return value
+
+    def _narrow(self, part: int, first: int, last: int) -> None:
+        self._low += part * first
+        self._size = part * (last - first)
         while self._size < SMALLEST:
             self._size <<= 8
             self._low <<= 8
@@ -64,34 +65,32 @@ class Encoder:
 class Decoder:
     """Bytes to numbers. Any bytes are some numbers: nothing is raised, and nothing read beyond the end but zeros."""
 
-    def __init__(self, data: bytes) -> None:
-        self._data, self._at = data, 4
+    def __init__(self, data: bytes, tables: Sequence[Sequence[int]] = TABLES) -> None:
+        self._data, self._at, self._tables = data, 4, tables
         self._size = MASK
         self._value = int.from_bytes(data[:4].ljust(4, b"\0"), "big")
         """How far what was written is above the lower end of the interval."""
 
-    def read(self, table: Sequence[int]) -> int:
-        """Return a symbol, of a table of cumulative frequencies."""
-        part = self._size >> BITS
-        # Only bytes that no encoder wrote are beyond the last part.
-        self._value = min(self._value, (part << BITS) - 1)
-        symbol = bisect_right(table, self._value // part) - 1
-        self._value -= part * table[symbol]
-        self._size = part * (table[symbol + 1] - table[symbol])
-        self._widen()
-        return symbol
+    def symbol(self, table: int, _value: int = 0) -> int:
+        own, part = self._tables[table], self._size >> BITS
+        read = bisect_right(own, self._share(part, TOTAL)) - 1
+        self._narrow(part, own[read], own[read + 1])
+        return read
 
-    def read_flat(self, count: int) -> int:
-        """Return a number below a count, all of them as likely."""
+    def flat(self, count: int, _value: int = 0) -> int:
         part = self._size // count
-        self._value = min(self._value, part * count - 1)
-        value = self._value // part
-        self._value -= part * value
-        self._size = part
-        self._widen()
-        return value
+        read = self._share(part, count)
+        self._narrow(part, read, read + 1)
+        return read
 
-    def _widen(self) -> None:
+    def _share(self, part: int, count: int) -> int:
+        """Return in which part of the interval the value is: beyond the last are only bytes that no encoder wrote."""
+        self._value = min(self._value, part * count - 1)
+        return self._value // part
+
+    def _narrow(self, part: int, first: int, last: int) -> None:
+        self._value -= part * first
+        self._size = part * (last - first)
         while self._size < SMALLEST:
             self._size <<= 8
             byte = self._data[self._at] if self._at < len(self._data) else 0

@@ -8,15 +8,16 @@ outcome is looked at exactly. Arrays have joints first, (joints, n), and compone
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
-from ..motion import Poses, shell_error
+from ..motion import shell_error
 from ..motion.quaternions import conjugate, cross, matrices, multiply
-from .knots import FINEST, Scale, State, Window
-from .paths import Path, carried, transposed
-from .residuals import MOST_GROUPS, MOST_KNOTS
+from .messages import Codec, Said, State, Window
+from .paths import Path, carried
+from .residuals import FINEST, MOST_GROUPS, MOST_KNOTS
+from .wire import TICKS
 
 NEAR = 0.97
 """Part of the tolerance that rounding may use."""
@@ -28,148 +29,147 @@ AT_END, TAPER = 0.85, 0.4
 """Part of that at the end of a window, from where the motion has to go on well by itself; from this part of it on."""
 
 NOTHING = 1e-9
-"""Seconds."""
+"""Seconds: moments that are not further apart are the same."""
+
+STILL, BEYOND = 0.25, 0.2
+"""Part of the tolerance within which a body does not move; and so many seconds later it is still where it was."""
+
+FAR_APART, MOST_PARTS = 0.013, 8
+"""Seconds between samples beyond which it is looked at what is shown between them, and into how many parts at most."""
+
+CHOICES = np.array([[1, 1, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=bool)
+"""Which of three numbers are made smaller."""
 
 
-@dataclass(frozen=True, eq=False)
-class Task:
-    """What is to be said."""
+class Fitted(NamedTuple):
+    """A message that could be sent, what is shown with it, and the largest error within the window."""
 
-    path: Path | None
-    """What is shown so far."""
-
-    state: State
-    """What the message builds on, and how: a kind of `residuals`."""
-
-    kind: int
-
-    start: float
-    """Of the window."""
-
-    samples: Path
-
-    end: float
-
-    moments: np.ndarray
-    """What is looked at, rising; the last ones are where motion and picture go on beyond the window. Shape (n,)."""
-
-    grid: np.ndarray
-    """Where knots may be, rising. Shape (k,)."""
-
-
-@dataclass(eq=False)
-class Fitted:
-    """A message that could be sent."""
-
-    finer: int
-
-    moments: list[float] = field(default_factory=list)
-    """Of the knots besides the end, in their order."""
-
-    numbers: list[np.ndarray] = field(default_factory=list)
-    """Of each knot, the end first, shape (groups, 3)."""
-
-    supports: list[tuple[float, float, float]] = field(default_factory=list)
-
-    path: Path | None = None
-    """What is shown with it."""
-
-    error: float = np.inf
-    """The largest within the window."""
+    window: Window
+    path: Path
+    error: float
 
 
 class Fitting:
-    """Finds what to say of a forest."""
+    """Finds what to say of a window.
 
-    def __init__(self, scale: Scale) -> None:
-        self.scale = scale
-        self.skeleton, self.radii = scale.forest.skeleton, scale.forest.radii
-        self._below = [self.skeleton.below(joint) for joint in range(len(scale.forest))]
-        self._most_knots = min(MOST_KNOTS, max(MOST_GROUPS // len(scale.walk), 1))
-        self._steps = np.zeros(len(scale.forest))
-        self._steps[scale.turning] = scale.turn_steps
+    Parameters
+    ----------
+    codec : Codec
+    shown : Path, optional
+        What is shown so far.
+    state : State
+        What the message builds on.
+    kind : int
+        How it does, a kind of `residuals`.
+    samples : Path
+    end, late : int
+        Ticks of the end of the window, and by how many it is shorter than the delay.
+    """
 
-    def errors(self, shown: Poses, truth: Poses) -> np.ndarray:
-        """Of poses (joints, n) in their parents' spaces, and true ones in the root's, shape (joints, n)."""
-        return shell_error(self.skeleton.in_root_space(shown), truth, self.radii[:, None])
+    def __init__(
+        self, codec: Codec, shown: Path | None, state: State, kind: int, samples: Path, end: int, late: int
+    ) -> None:
+        self._codec, self._forest, self._walk = codec, codec.forest, codec.walk
+        self._shown, self._state, self._kind, self._samples = shown, state, kind, samples
+        self._ticks, self._late = end, late
+        self._start, self._end = (end + late - codec.terms.delay) / TICKS, end / TICKS
 
-    def fitted(self, task: Task) -> Fitted:
-        """Return the message for a task."""
-        truth = self.skeleton.in_root_space(task.samples.at(task.moments))
-        knots: list[float] = []
-        for finer in range(FINEST + 1):
-            result = self._near(task, truth, knots, finer)
-            if result.error <= NEAR * self.scale.tolerance:
+    def said(self) -> tuple[Said, bool]:
+        """Return the message, and whether all of the window is within the tolerance."""
+        tolerance, terms = self._codec.tolerance, self._codec.terms
+        moments = self._samples.moments
+        inside = moments[(moments > self._start) & (moments < self._end)]
+        looked = np.concatenate(([self._start], inside, [self._end]))
+        ends = self._forest.skeleton.in_root_space(self._samples.at(looked[[0, -1]]))
+        is_still = shell_error(ends[:, 0], ends[:, 1], self._forest.radii).max() < STILL * tolerance
+        exact = (self._ticks - inside * TICKS) / terms.grid
+        # A jump between two cells takes both of them, everything else the nearest.
+        for cells in (np.rint(exact), np.concatenate((np.floor(exact), np.ceil(exact)))):
+            cells = np.unique(cells.astype(int))
+            cells = cells[(cells > 0) & (cells * terms.grid < terms.delay - self._late)]
+            self._grid = (self._ticks - cells[::-1] * terms.grid) / TICKS
+            between = self._grid[np.abs(self._grid[:, None] - looked).min(axis=1) > NOTHING]
+            self._moments = closely(np.unique(np.concatenate((looked, between))))[1:]
+            if is_still:
+                # It is to come to rest, and not to be put right again and again.
+                self._moments = np.append(self._moments, self._end + BEYOND)
+            self._truth = self._forest.skeleton.in_root_space(self._samples.at(self._moments))
+            fitted = self._fitted()
+            if fitted.error <= tolerance:
                 break
-        left = np.maximum(task.end - task.moments, 0.0) / (task.end - task.start)
-        most = self.scale.tolerance * np.minimum(AT_END + (1.0 - AT_END) * left / TAPER, 1.0)
+        window = fitted.window
+        inner = [round((self._ticks - moment * TICKS) / terms.grid) for moment in window.inner]
+        said = Said(window.finer, inner, np.array(window.numbers).tolist(), self._late)
+        return said, fitted.error <= tolerance
+
+    def _fitted(self) -> Fitted:
+        """Return the message with knots on the grid, of what is shown at the moments (n,) that are looked at."""
+        tolerance, knots = self._codec.tolerance, list[float]()
+        for finer in range(FINEST + 1):
+            result = self._near(knots, finer)
+            if result.error <= NEAR * tolerance:
+                break
+        left = np.maximum(self._end - self._moments, 0.0) / (self._end - self._start)
+        most = tolerance * np.minimum(AT_END + (1.0 - AT_END) * left / TAPER, 1.0)
         for margin in MARGINS:
-            smaller = self._smaller(task, truth, result, margin * most)
-            if smaller.error <= max(self.scale.tolerance, result.error):
+            smaller = self._smaller(result, margin * most)
+            if smaller.error <= max(tolerance, result.error):
                 return smaller
         return result
 
-    def _near(self, task: Task, truth: Poses, knots: list[float], finer: int) -> Fitted:
+    def _near(self, knots: list[float], finer: int) -> Fitted:
         """Return the numbers nearest to the truth, with knots and, where that is not enough, with more of them."""
-        result = Fitted(finer, moments=knots)
-        window = Window(self.scale, task.state, task.kind, task.start, task.end, finer)
-        result.numbers.append(window.fit(_at(task.samples, task.end)))
-        for moment in knots:
-            result.numbers.append(window.fit(_at(task.samples, moment), window.insert(moment)))
+        tolerance, most_knots = self._codec.tolerance, min(MOST_KNOTS, max(MOST_GROUPS // len(self._walk), 1))
+        window = self._window(finer)
+        for moment in (None, *knots):
+            window.fit(self._samples, moment)
         while True:
-            errors = self._look(task, truth, result, window)
-            worst = task.moments[np.argmax(errors)]
-            free = task.grid[~np.isin(task.grid, window.moments)]
-            if result.error <= NEAR * self.scale.tolerance or not len(free) or len(knots) + 1 == self._most_knots:
-                return result
+            path, errors = self._look(window)
+            error, worst = float(errors.max()), self._moments[np.argmax(errors)]
+            free = self._grid[~np.isin(self._grid, window.moments)]
+            if error <= NEAR * tolerance or not len(free) or len(knots) + 1 == most_knots:
+                return Fitted(window, path, error)
             nearest = float(free[np.argmin(np.abs(free - worst))])
-            good = finer < FINEST or result.error <= self.scale.tolerance
+            good = finer < FINEST or error <= tolerance
             if good and np.abs(np.array(window.moments[1:]) - worst).min() < abs(nearest - worst):
-                return result
+                return Fitted(window, path, error)
             knots.append(nearest)
-            result.numbers.append(window.fit(_at(task.samples, nearest), window.insert(nearest)))
+            window.fit(self._samples, nearest)
 
-    def _said(self, task: Task, truth: Poses, like: Fitted, numbers: np.ndarray) -> Fitted:
-        """Return a message with the knots of another, and other numbers (knots, groups, 3)."""
-        said = Fitted(like.finer, like.moments, list(numbers))
-        window = Window(self.scale, task.state, task.kind, task.start, task.end, like.finer)
-        window.say(numbers[0])
-        for moment, own in zip(like.moments, numbers[1:], strict=True):
-            window.say(own, window.insert(moment))
-        self._look(task, truth, said, window)
-        return said
+    def _window(self, finer: int) -> Window:
+        return Window(self._codec, self._state, self._kind, self._start, self._end, finer)
 
-    def _look(self, task: Task, truth: Poses, result: Fitted, window: Window) -> np.ndarray:
-        """Note what a window shows, and return the largest error of each moment (n,)."""
-        path = window.path()
-        result.path = path if task.path is None else task.path.followed(path)
-        result.supports = window.supports
-        inside = task.moments <= task.end
-        errors = self.errors(result.path.at(task.moments[inside]), truth[:, inside]).max(axis=0)
-        result.error = float(errors.max())
-        return errors
+    def _look(self, window: Window) -> tuple[Path, np.ndarray]:
+        """Return what is shown with a window, and the largest error of each moment within it."""
+        path = window.path() if self._shown is None else self._shown.followed(window.path())
+        inside = self._moments <= self._end
+        return path, self._forest.errors(path.at(self._moments[inside]), self._truth[:, inside]).max(axis=0)
 
-    def _smaller(self, task: Task, truth: Poses, result: Fitted, most: np.ndarray) -> Fitted:
+    def _smaller(self, result: Fitted, most: np.ndarray) -> Fitted:
         """Return a message with smaller numbers, with which no joint is off by more than `most` (n,)."""
-        assert result.path is not None
-        there = self.skeleton.in_root_space(result.path.at(task.moments))
-        places, d = (_apart(part) for part in (there.positions, there.positions - truth.positions))
-        turn = multiply(there.quaternions, conjugate(truth.quaternions))
-        v = _apart(2.0 * turn[..., 1:] * np.where(turn[..., :1] < 0.0, -1.0, 1.0)) * self.radii[:, None]
-        axes, numbers, walk = matrices(there.quaternions), np.array(result.numbers), self.scale.walk
-        for number in range(len(numbers) - 1, -1, -1):
-            hat = _hat(result.supports[number], task.moments, task.end, max([task.start, *result.moments]))
+        there = self._forest.skeleton.in_root_space(result.path.at(self._moments))
+        places, d = (_apart(part) for part in (there.positions, there.positions - self._truth.positions))
+        turn = multiply(there.quaternions, conjugate(self._truth.quaternions))
+        v = _apart(2.0 * turn[..., 1:] * np.where(turn[..., :1] < 0.0, -1.0, 1.0)) * self._forest.radii[:, None]
+        axes, window = matrices(there.quaternions), result.window
+        numbers, last = np.array(window.numbers), max([self._start, *window.inner])
+        for own, support in zip(numbers[::-1], window.supports[::-1], strict=True):
+            hat = _hat(support, self._moments, self._end, last)
             seen = np.flatnonzero(hat)
             if not len(seen):
-                numbers[number] = 0
+                own[:] = 0
                 continue
             near = [part[..., seen] for part in (d, v, places, axes)]
-            for group in range(len(walk) - 1, -1, -1):
-                if numbers[number, group].any():
-                    does = self._does(group, near[2], near[3], 0.5**result.finer * hat[seen])
-                    self._reduce(numbers[number, group], walk.joints[group], near, does, most[seen] ** 2)
+            for group in range(len(self._walk) - 1, -1, -1):
+                if own[group].any():
+                    does = self._does(group, near[2], near[3], window.factor * hat[seen])
+                    _reduce(own[group], self._forest.below[self._walk.joints[group]], near, does, most[seen] ** 2)
             d[..., seen], v[..., seen] = near[:2]
-        return self._said(task, truth, result, numbers)
+        smaller = self._window(window.finer)
+        for moment, own in zip((None, *window.inner), numbers, strict=True):
+            smaller.say(own, moment)
+        path, errors = self._look(smaller)
+        return Fitted(smaller, path, float(errors.max()))
 
     def _does(self, group: int, places: np.ndarray, axes: np.ndarray, hat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return what one step of each number of a group does to what hangs on its joint.
@@ -179,52 +179,53 @@ class Fitting:
         moved, turned : array, shape (3 components, 3 numbers, hung, n)
             By how much places move, and the balls' shells turn.
         """
-        joint = self.scale.walk.joints[group]
-        hung, parent = self._below[joint], self.skeleton.parents[joint]
-        if self.scale.walk.slides[group]:
+        joint = self._walk.joints[group]
+        hung, parent = self._forest.below[joint], self._forest.parents[joint]
+        if self._walk.slides[group]:
             along = np.eye(3)[:, :, None] if parent < 0 else axes[:, :, parent]
-            moved = np.broadcast_to((along * (self.scale.slide_step * hat))[:, :, None], (3, 3, len(hung), len(hat)))
+            moved = np.broadcast_to((along * (self._codec.slide_step * hat))[:, :, None], (3, 3, len(hung), len(hat)))
             return moved, np.zeros_like(moved)
-        about = (axes[:, :, joint] * (self._steps[joint] * hat))[:, :, None]
+        about = (axes[:, :, joint] * (self._codec.turn_steps[joint] * hat))[:, :, None]
         arms = (places[:, hung] - places[:, [joint]])[:, None]
-        return cross(about, arms), about * self.radii[hung][:, None]
+        return cross(about, arms), about * self._forest.radii[hung][:, None]
 
-    def _reduce(
-        self,
-        values: np.ndarray,
-        joint: int,
-        near: list[np.ndarray],
-        does: tuple[np.ndarray, np.ndarray],
-        most: np.ndarray,
-    ) -> None:
-        """Put the smallest numbers that will do in the place of three, and what they do into the errors."""
-        hung = self._below[joint]
-        fewer = smaller_than(values)
-        changes = (fewer - values).astype(np.float64)
-        d, v = (
-            part[:, None, hung] + np.einsum("ca,wahn->wchn", changes, own)
-            for part, own in zip(near[:2], does, strict=True)
-        )
-        # Where it is off by more already, it may not become worse.
-        most = np.maximum(most, _squared_errors(near[0][:, hung], near[1][:, hung]))
-        good = (_squared_errors(d, v) <= most).all(axis=(1, 2))
-        if good.any():
-            first = int(np.argmax(good))
-            values[:] = fewer[first]
-            near[0][:, hung], near[1][:, hung] = d[:, first], v[:, first]
+
+def closely(moments: np.ndarray) -> np.ndarray:
+    """Moments (n,) with others between them, where they are far apart."""
+    parts = np.ceil(np.diff(moments) / FAR_APART).astype(int)
+    parts = np.clip(parts, 1, MOST_PARTS)
+    share = np.concatenate([np.arange(1, count + 1) / count for count in parts]) if len(parts) else np.empty(0)
+    before = np.repeat(moments[:-1], parts)
+    return np.append(moments[:1], before + share * np.repeat(np.diff(moments), parts))
+
+
+def _reduce(
+    values: np.ndarray,
+    hung: np.ndarray,
+    near: list[np.ndarray],
+    does: tuple[np.ndarray, np.ndarray],
+    most: np.ndarray,
+) -> None:
+    """Put the smallest numbers that will do in the place of three, and what they do into the errors."""
+    fewer = smaller_than(values)
+    changes = (fewer - values).astype(np.float64)
+    d, v = (
+        part[:, None, hung] + np.einsum("ca,wahn->wchn", changes, own) for part, own in zip(near[:2], does, strict=True)
+    )
+    # Where it is off by more already, it may not become worse.
+    most = np.maximum(most, _squared_errors(near[0][:, hung], near[1][:, hung]))
+    good = (_squared_errors(d, v) <= most).all(axis=(1, 2))
+    if good.any():
+        first = int(np.argmax(good))
+        values[:] = fewer[first]
+        near[0][:, hung], near[1][:, hung] = d[:, first], v[:, first]
 
 
 def smaller_than(values: np.ndarray) -> np.ndarray:
     """Numbers (c, 3) that cost less than three, the least first."""
-    towards = values - np.sign(values)
-    taken = CHOICES & (values != 0)
-    result = np.where(taken, towards, values)
+    result = np.where(CHOICES & (values != 0), values - np.sign(values), values)
     result = np.concatenate((np.zeros((1, 3), dtype=values.dtype), result))
     return result[(result != values).any(axis=1)]
-
-
-CHOICES = np.array([[1, 1, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=bool)
-"""Which of three numbers are made smaller."""
 
 
 def _squared_errors(d: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -239,11 +240,6 @@ def _hat(support: tuple[float, float, float], moments: np.ndarray, end: float, l
     line = (before, own, max(after, own + NOTHING)), (0.0, 1.0, float(after == own))
     ends, lasts = np.interp((end, last), *line)
     return np.interp(moments, *line) + (ends - lasts) / (end - last) * carried(moments - end)
-
-
-def _at(samples: Path, moment: float) -> Poses:
-    """Return the poses (joints,) of a moment."""
-    return transposed(samples.at(np.array([moment])))[0]
 
 
 def _apart(vectors: np.ndarray) -> np.ndarray:

@@ -5,24 +5,21 @@ Source: "The Open Sound Control 1.0 Specification" (Wright, 2002). Big-endian, e
 
 from __future__ import annotations
 
-import re
 import struct
 from collections.abc import Iterable, Iterator
-from functools import lru_cache
+from contextlib import suppress
+from itertools import islice
 from typing import NamedTuple
 
 BUNDLE = b"#bundle\0"
 
-DEEPEST = 4
-"""Bundles in one another."""
-
-MOST_MESSAGES = 2048
-"""Of a datagram."""
-
 IMMEDIATELY = struct.pack(">Q", 1)
 """The time tag of a bundle that is for now."""
 
-NUMBERS = {"i": "i", "f": "f", "h": "q", "d": "d", "t": "Q"}
+DEEPEST, MOST_MESSAGES = 4, 2048
+"""Bundles in one another, and messages of a datagram."""
+
+NUMBERS = {kind: struct.Struct(f">{own}") for kind, own in zip("ifhdt", "ifqdQ", strict=True)}
 """Types of OSC, as `struct` has them."""
 
 CONSTANTS = {"T": True, "F": False, "N": None}
@@ -39,12 +36,9 @@ def write_message(address: str, *arguments: float | str) -> bytes:
     """Return a message of strings, whole numbers, and floats in single precision."""
     tags, data = ",", b""
     for argument in arguments:
-        if isinstance(argument, str):
-            tags, data = tags + "s", data + _padded(argument)
-        elif isinstance(argument, int):
-            tags, data = tags + "i", data + struct.pack(">i", argument)
-        else:
-            tags, data = tags + "f", data + struct.pack(">f", argument)
+        tag = "s" if isinstance(argument, str) else "i" if isinstance(argument, int) else "f"
+        tags += tag
+        data += _padded(argument) if isinstance(argument, str) else struct.pack(f">{tag}", argument)
     return _padded(address) + _padded(tags) + data
 
 
@@ -55,19 +49,14 @@ def write_bundle(messages: Iterable[bytes]) -> bytes:
 
 def is_osc(datagram: bytes) -> bool:
     """Whether a datagram begins as OSC does."""
-    return datagram[:1] == b"/" or datagram.startswith(BUNDLE)
+    return datagram.startswith((b"/", BUNDLE))
 
 
 def read(datagram: bytes) -> list[Message]:
     """All messages of a datagram, until the first thing that is none."""
     result: list[Message] = []
-    try:
-        for message in _messages(datagram, DEEPEST):
-            result.append(message)
-            if len(result) == MOST_MESSAGES:
-                break
-    except (ValueError, struct.error):
-        pass  # as if it ended here
+    with suppress(ValueError, struct.error):  # as if it ended there
+        result.extend(islice(_messages(datagram, DEEPEST), MOST_MESSAGES))
     return result
 
 
@@ -80,51 +69,44 @@ def _messages(data: bytes, depth: int) -> Iterator[Message]:
     if not data.startswith(BUNDLE):
         yield _message(data)
         return
-    if not depth:
-        raise ValueError
     at = len(BUNDLE) + len(IMMEDIATELY)
     while at < len(data):
-        (size,) = struct.unpack_from(">I", data, at)
-        at += 4 + size
-        if at > len(data):
-            raise ValueError
-        yield from _messages(data[at - size : at], depth - 1)
+        part, at = _block(data, at)
+        if not depth:
+            raise ValueError("too many bundles in one another")
+        yield from _messages(part, depth - 1)
 
 
 def _message(data: bytes) -> Message:
     address, at = _string(data, 0)
     tags, at = _string(data, at)
     if address[:1] != "/" or tags[:1] != ",":
-        raise ValueError
+        raise ValueError("a message has an address and types")
     arguments: list[object] = []
-    for tag in _parts(tags[1:]):
-        if tag in CONSTANTS:
+    for tag in tags[1:]:
+        if tag in NUMBERS:
+            arguments += NUMBERS[tag].unpack_from(data, at)
+            at += NUMBERS[tag].size
+        elif tag in CONSTANTS:
             arguments.append(CONSTANTS[tag])
-        elif isinstance(tag, struct.Struct):
-            arguments += tag.unpack_from(data, at)
-            at += tag.size
-        elif tag == "s":
-            text, at = _string(data, at)
-            arguments.append(text)
-        elif tag == "b":
-            (size,) = struct.unpack_from(">I", data, at)
-            if at + 4 + size > len(data):
-                raise ValueError
-            arguments.append(data[at + 4 : at + 4 + size])
-            at += 4 + size + -size % 4
+        elif tag in "sb":
+            argument, at = _string(data, at) if tag == "s" else _block(data, at)
+            arguments.append(argument)
         else:
-            raise ValueError
+            raise ValueError("there is no such type")
     return Message(address, tuple(arguments))
-
-
-@lru_cache(256)
-def _parts(tags: str) -> list[str | struct.Struct]:
-    """Types one by one, but for numbers, which are read together where they are side by side."""
-    runs = re.findall(f"[{''.join(NUMBERS)}]+|.", tags, re.DOTALL)
-    return [struct.Struct(">" + "".join(NUMBERS[kind] for kind in run)) if run[0] in NUMBERS else run for run in runs]
 
 
 def _string(data: bytes, at: int) -> tuple[str, int]:
     """Return a text, and where what follows begins."""
     end = data.index(b"\0", at)
     return data[at:end].decode(), end + 4 - end % 4
+
+
+def _block(data: bytes, at: int) -> tuple[bytes, int]:
+    """Return bytes with their number in front, and where what follows begins."""
+    (size,) = struct.unpack_from(">I", data, at)
+    end = at + 4 + size
+    if end > len(data):
+        raise ValueError("it is cut off")
+    return data[at + 4 : end], end + -size % 4

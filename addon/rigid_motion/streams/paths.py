@@ -1,17 +1,18 @@
 """Paths: what is shown of some messages, at any moment.
 
 All joints share the moments of their knots. Between two knots places go straight and turns go about one axis; beyond
-the last knot the motion goes on as it was going, and comes to rest. Arrays of poses have the shape (knots, joints)
-here; rotation vectors are radians in the joint's own axes. Seconds.
+the last knot the motion goes on as it was going, and comes to rest. Rotation vectors are radians in the joint's own
+axes. Seconds.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..motion import Poses
+from ..motion.poses import joined
 from ..motion.quaternions import conjugate, multiply
 
 CARRY = 0.15
@@ -21,9 +22,14 @@ SMALLEST = 1e-12
 """Stands for the angle of no turn."""
 
 
-def carried(after: np.ndarray | float) -> np.ndarray | float:
+def at_rest() -> np.ndarray:
+    """Return no velocity, of all joints."""
+    return np.zeros((1, 3))
+
+
+def carried(after: np.ndarray | float) -> np.ndarray:
     """By how many seconds of its velocity a motion goes on, so many seconds after its last knot."""
-    return CARRY * -np.expm1(-np.maximum(after, 0.0) / CARRY)
+    return np.asarray(CARRY * -np.expm1(-np.maximum(after, 0.0) / CARRY))
 
 
 def turned(quaternions: np.ndarray, vectors: np.ndarray) -> np.ndarray:
@@ -55,32 +61,31 @@ class Path:
     moments: np.ndarray
     """Shape (knots,)."""
 
-    positions: np.ndarray
-    """Shape (knots, joints, 3)."""
+    poses: Poses
+    """Shape (joints, knots)."""
 
-    quaternions: np.ndarray
-    """Shape (knots, joints, 4)."""
-
-    velocities: np.ndarray
+    velocities: np.ndarray = field(default_factory=at_rest)
     """Of places at the last knot, a second, shape (joints, 3)."""
 
-    spins: np.ndarray
+    spins: np.ndarray = field(default_factory=at_rest)
     """Angular velocities at the last knot, shape (joints, 3)."""
 
     def at(self, moments: np.ndarray) -> Poses:
         """Return the poses at moments (n,), shape (joints, n). Before the first knot those of the first."""
-        moments = np.asarray(moments, dtype=np.float64)
         last = len(self.moments) - 1
         before = np.clip(np.searchsorted(self.moments, moments, side="right") - 1, 0, last)
         after = np.minimum(before + 1, last)
         span = np.where(after > before, self.moments[after] - self.moments[before], 1.0)
-        share = np.clip((moments - self.moments[before]) / span, 0.0, 1.0)[:, None, None]
-        beyond = np.asarray(carried(moments - self.moments[last]))[:, None, None]
-        first, second = self.positions[before], self.positions[after]
-        positions = first + share * (second - first) + beyond * self.velocities
-        first = self.quaternions[before]
-        vectors = share * turns_between(first, self.quaternions[after]) + beyond * self.spins
-        return Poses(positions.swapaxes(0, 1), turned(first, vectors).swapaxes(0, 1))
+        share = np.clip((moments - self.moments[before]) / span, 0.0, 1.0)[:, None]
+        beyond = carried(moments - self.moments[last])[:, None]
+        first, second = self.poses[:, before], self.poses[:, after]
+        slides = share * (second.positions - first.positions) + beyond * self.velocities[:, None]
+        vectors = share * turns_between(first.quaternions, second.quaternions) + beyond * self.spins[:, None]
+        return Poses(first.positions + slides, turned(first.quaternions, vectors))
+
+    def pose(self, moment: float) -> Poses:
+        """Return the poses of a moment, shape (joints,)."""
+        return self.at(np.array([moment]))[:, 0]
 
     def followed(self, other: Path, lost: int = 0) -> Path:
         """Return this path until the start of another, and from there straight to the knots of that.
@@ -90,22 +95,12 @@ class Path:
         """
         start = other.moments[0]
         start = max(start - lost * (other.moments[-1] - start), min(start, self.moments[-1]))
-        here = self.at(np.array([start]))
         kept = int(np.searchsorted(self.moments, start))
-        return Path(
-            np.concatenate((self.moments[:kept], [start], other.moments[1:])),
-            np.concatenate((self.positions[:kept], here.positions.swapaxes(0, 1), other.positions[1:])),
-            np.concatenate((self.quaternions[:kept], here.quaternions.swapaxes(0, 1), other.quaternions[1:])),
-            other.velocities,
-            other.spins,
-        )
+        moments = np.concatenate((self.moments[:kept], [start], other.moments[1:]))
+        poses = joined((self.poses[:, :kept], self.at(np.array([start])), other.poses[:, 1:]), axis=1)
+        return Path(moments, poses, other.velocities, other.spins)
 
     def since(self, moment: float) -> Path:
         """Return the same without knots that nothing from this moment on depends on."""
         kept = max(int(np.searchsorted(self.moments, moment, side="right")) - 1, 0)
-        return Path(self.moments[kept:], self.positions[kept:], self.quaternions[kept:], self.velocities, self.spins)
-
-
-def speeds(span: float, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return velocities and angular velocities (joints, 3) from a knot to the next, so much later, of arrays of two."""
-    return (positions[1] - positions[0]) / span, turns_between(quaternions[0], quaternions[1]) / span
+        return Path(self.moments[kept:], self.poses[:, kept:], self.velocities, self.spins)

@@ -84,6 +84,10 @@ class Playing:
         self.longest = max(took for _, took in known)
         self._heard, self._unsure = arrival, False
 
+    def due(self, moment: float) -> float:
+        """When a moment is to be shown; never, where nothing came yet."""
+        return np.inf if self.longest is None else moment + self.longest + self.delay
+
     def moment(self, now: float) -> float | None:
         """Return the moment to be shown now; None before anything came."""
         if self.longest is None:
@@ -113,47 +117,39 @@ class Fading:
         self._path: Poses | None = None
         """What the path has where that was shown."""
         self._last = 0.0
-        self._slides, self._turns = _Differences(), _Differences()
+        self._left, self._rate = np.zeros((2, 2, 1, 3))
+        """Differences of places and turns, the latter as rotation vectors, and by how much they change a second. Shape
+        (2, joints, 3)."""
 
     def changed(self, poses: Poses) -> None:
         """Go on from what was shown last, where a new path has poses (joints,)."""
         if self._shown is not None:
-            self._path = poses
-            self._slides.left = self._shown.positions - poses.positions
-            self._turns.left = turns_between(poses.quaternions, self._shown.quaternions)
+            self._path, self._left = poses, _between(poses, self._shown)
 
     def show(self, poses: Poses, now: float) -> Poses:
         """Poses (joints,) of the path, with what is left of differences."""
         passed, self._last = max(now - self._last, 0.0), now
-        if self._path is not None and passed > 0.0:
-            self._slides.fade(poses.positions - self._path.positions, passed)
-            self._turns.fade(turns_between(self._path.quaternions, poses.quaternions), passed)
-        shown = Poses(poses.positions + self._slides.left, normalise(turned(poses.quaternions, self._turns.left)))
-        self._path, self._shown = poses, shown
-        return shown
+        if self._path is not None and passed > 0.0 and self._left.any():
+            self._fade(_between(self._path, poses), passed)
+        slides, turns = self._left
+        self._path = poses
+        self._shown = Poses(poses.positions + slides, normalise(turned(poses.quaternions, turns)))
+        return self._shown
 
-
-class _Differences:
-    """Of places or, as rotation vectors, of turns."""
-
-    def __init__(self) -> None:
-        self.left = np.zeros((1, 3))
-        """Shape (joints, 3)."""
-        self._rate = np.zeros((1, 3))
-        """By which they change, a second."""
-
-    def fade(self, step: np.ndarray, passed: float) -> None:
-        """Let so many seconds pass, in which the path goes on by steps (joints, 3)."""
-        if not self.left.any():
-            return
-        before, decay = self.left, np.exp(-passed / FADE)
+    def _fade(self, step: np.ndarray, passed: float) -> None:
+        """Let so many seconds pass, in which the path goes on by steps (2, joints, 3)."""
+        before, decay = self._left, np.exp(-passed / FADE)
         pull = self._rate + before / FADE
         left = (before + pull * passed) * decay
-        length = np.linalg.norm(step, axis=1, keepdims=True)
+        length = np.linalg.norm(step, axis=-1, keepdims=True)
         along = step / np.maximum(length, SMALLEST)
-        back = np.minimum(np.sum((left - before) * along, axis=1, keepdims=True) + FORWARD * length, 0.0)
+        back = np.minimum(np.sum((left - before) * along, axis=-1, keepdims=True) + FORWARD * length, 0.0)
         held = np.where(length > RESTS * passed, back, 0.0) * along
-        self._rate = pull * decay - left / FADE - held / passed
-        self.left = left - held
-        if np.abs(self.left).max() < NOTHING:
-            self.left, self._rate = np.zeros_like(left), np.zeros_like(left)
+        self._rate, self._left = pull * decay - left / FADE - held / passed, left - held
+        over = np.abs(self._left).max(axis=(1, 2)) < NOTHING
+        self._rate[over] = self._left[over] = 0.0
+
+
+def _between(first: Poses, second: Poses) -> np.ndarray:
+    turns = turns_between(first.quaternions, second.quaternions)
+    return np.stack((second.positions - first.positions, turns))

@@ -8,45 +8,23 @@ from __future__ import annotations
 
 import secrets
 from collections import OrderedDict, deque
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..motion import Poses
+from . import wire
 from .bodies import Body, Forest
-from .knots import Scale, State
-from .messages import Codec
-from .paths import Path
+from .messages import Codec, State
+from .paths import Path, transposed
 from .playing import Fading, Playing
-from .wire import (
-    DESCRIPTION,
-    HEAD,
-    LATE,
-    MOST_ENTRIES,
-    MOTION,
-    NEEDS_DESCRIPTION,
-    NEEDS_REFRESH,
-    TICKS,
-    Entry,
-    Motion,
-    Piece,
-    Terms,
-    answer,
-    expanded,
-    kind_of,
-    read_description,
-    read_motion,
-    read_piece,
-)
+from .wire import DESCRIPTION, HEAD, LATE, MOST_ENTRIES, MOTION, NEXT, TICKS, Entry, Motion, Piece, Terms
 
-MOST_STREAMS = 64
-"""That are remembered; the one that was silent for longest is forgotten for a new one."""
-
-MOST_ALL_JOINTS = 4096
-"""Of all streams together."""
+MOST_STREAMS, MOST_ALL_JOINTS = 64, 4096
+"""That are remembered, the streams without descriptions for a new one as well; and joints of all streams together."""
 
 MOST_STATES = 40
 """Messages of a stream that others may build on."""
@@ -57,17 +35,11 @@ MOST_GONE = 256
 MOST_KNOTS, MOST_JOINT_KNOTS = 256, 1 << 14
 """Knots of a stream that wait for `keys`, or as many more as a body of few joints has in so many poses of joints."""
 
-MOST_WINDOWS = 8
-"""Windows of a stream that one that came late can be put among."""
+MOST_WINDOWS, MOST_WAITING = 8, 4
+"""Windows of a stream that one that came late can be put among; and messages that wait for its description."""
 
-MOST_WAITING = 4
-"""Messages of a stream that wait for its description."""
-
-SILENT = 10.0
-"""Seconds of silence after which a stream is forgotten."""
-
-MOST_SILENCE = 7.0
-"""Seconds of silence in which the ticks of a stream still go on for sure."""
+SILENT, MOST_SILENCE = 10.0, 7.0
+"""Seconds of silence after which a stream is forgotten, and in which its ticks still go on for sure."""
 
 
 class Stream(NamedTuple):
@@ -101,34 +73,12 @@ class Keys:
     """Of each body, shape (k, joints)."""
 
 
-class Receiver:
-    """Takes datagrams of any number of streams, and shows them."""
+class Streams:
+    """Streams that are shown until they were silent for so many seconds: each shows itself, and has bodies and keys."""
 
-    def __init__(self) -> None:
-        self.own = secrets.token_bytes(3)
-        """Who answers."""
-        self.refused = 0
-        """Datagrams that were nothing, or nothing new."""
-        self._streams: dict[Stream, _Playback] = {}
-        self._begun: OrderedDict[Stream, _Begun] = OrderedDict()
-        """Streams whose description is not complete."""
-        self._gone: deque[Stream] = deque(maxlen=MOST_GONE)
-
-    def take(self, datagram: bytes, arrival: float, source: Hashable = None) -> None:
-        """Take a datagram that came at a time, by the clock of `show`, from somewhere."""
-        kind = kind_of(datagram)
-        if kind not in (DESCRIPTION, MOTION, LATE):
-            self.refused += 1
-            return
-        stream = Stream(source, datagram[1 : HEAD.size])
-        read = read_piece(datagram) if kind == DESCRIPTION else read_motion(datagram)
-        if read is None:
-            self.refused += 1
-        elif (playback := self._streams.get(stream)) is not None:
-            taken = isinstance(read, Motion) and playback.take(read, arrival)
-            self.refused += not (taken or isinstance(read, Piece))
-        else:
-            self._begin(stream, read, arrival)
+    def __init__(self, silent: float) -> None:
+        self._silent = silent
+        self._streams: dict[Stream, Any] = {}
 
     def show(self, now: float) -> dict[Stream, Shown]:
         """Return what every stream shows."""
@@ -141,20 +91,49 @@ class Receiver:
         """Those that can be shown, or soon can."""
         return list(self._streams)
 
-    def due(self, stream: Stream, moment: float) -> float:
-        """When a moment of the sender's time is to be shown, by our clock; never, where nothing came yet."""
-        playback = self._streams.get(stream)
-        return playback.due(moment) if playback else np.inf
-
-    def body(self, stream: Stream, name: str) -> Body | None:
-        """Return a body of a stream, with its names, parents and rest poses."""
-        playback = self._streams.get(stream)
-        return next((body for body in playback.forest.bodies if body.name == name), None) if playback else None
-
     def bodies(self, stream: Stream) -> tuple[Body, ...]:
-        """All bodies of a stream."""
-        playback = self._streams.get(stream)
-        return playback.forest.bodies if playback else ()
+        """All bodies of a stream, with their names, parents and rest poses."""
+        return self._streams[stream].bodies if stream in self._streams else ()
+
+    def keys(self) -> list[Keys]:
+        """Return what came since the last call and is not going to change any more."""
+        result = [Keys(stream, *playback.keys()) for stream, playback in self._streams.items()]
+        return [keys for keys in result if len(keys.moments)]
+
+    def _forget_silent(self, now: float) -> None:
+        silent = [stream for stream, it in self._streams.items() if not -self._silent < now - it.heard < self._silent]
+        self._forget(silent)
+
+    def _forget(self, streams: Sequence[Stream]) -> None:
+        for stream in streams:
+            del self._streams[stream]
+
+
+class Receiver(Streams):
+    """Takes datagrams of any number of streams, and shows them."""
+
+    def __init__(self) -> None:
+        super().__init__(SILENT)
+        self.own = secrets.token_bytes(3)
+        """Who answers."""
+        self._begun: OrderedDict[Stream, _Begun] = OrderedDict()
+        """Streams whose description is not complete."""
+        self._gone: deque[Stream] = deque(maxlen=MOST_GONE)
+
+    def take(self, datagram: bytes, arrival: float, source: Hashable = None) -> None:
+        """Take a datagram that came at a time, by the clock of `show`, from somewhere."""
+        kind, stream = wire.kind_of(datagram), Stream(source, datagram[1 : HEAD.size])
+        if kind not in (DESCRIPTION, MOTION, LATE, NEXT):
+            return
+        read = wire.read_piece(datagram) if kind == DESCRIPTION else wire.read_motion(datagram)
+        if isinstance(read, Motion) and stream in self._streams:
+            self._streams[stream].take(read, arrival)
+        elif read is not None and stream not in self._streams:
+            self._begin(stream, read, arrival)
+
+    def due(self, moment: float) -> float:
+        """When the first stream shows a moment of its sender's time, by our clock; never, where nothing came yet."""
+        return min((playback.playing.due(moment) for playback in self._streams.values()), default=np.inf)
 
     def answers(self) -> list[tuple[Hashable, bytes]]:
         """Return what came since the last call, to be sent to where it came from."""
@@ -165,15 +144,10 @@ class Receiver:
                 known.unanswered = False
                 entries.setdefault(stream.source, []).append(known.entry(stream.identity))
         return [
-            (source, answer(self.own, few[first : first + MOST_ENTRIES]))
+            (source, wire.answer(self.own, few[first : first + MOST_ENTRIES]))
             for source, few in entries.items()
             for first in range(0, len(few), MOST_ENTRIES)
         ]
-
-    def keys(self) -> list[Keys]:
-        """Return the knots that came since the last call and are not going to change any more."""
-        result = [playback.keys(stream) for stream, playback in self._streams.items()]
-        return [keys for keys in result if len(keys.moments)]
 
     def _begin(self, stream: Stream, read: Motion | Piece, arrival: float) -> None:
         """Collect what a stream needs before it can be shown."""
@@ -183,27 +157,21 @@ class Receiver:
             self._begun.popitem(last=False)
         if isinstance(read, Motion):
             begun.unanswered = True
-            begun.motions = [*begun.motions, (read, arrival)][-MOST_WAITING:]
+            begun.motions.append((read, arrival))
             return
-        if begun.pieces and len(begun.pieces) != read.pieces:
-            begun.pieces = []
-        begun.pieces = begun.pieces or [None] * read.pieces
+        if len(begun.pieces) != read.pieces:
+            begun.pieces = [b""] * read.pieces
         begun.pieces[read.number] = read.data
-        known = [piece for piece in begun.pieces if piece is not None]
-        if len(known) < read.pieces:
+        if not all(begun.pieces):
             return
         del self._begun[stream]
-        described = read_description(b"".join(known))
-        if described is None or not self._room_for(stream, described[0], arrival):
-            self.refused += 1
-            return
-        playback = _Playback(*described, read.ticks)
-        self._streams[stream] = playback
-        for motion, when in begun.motions:
-            playback.take(motion, when)
-        playback.heard = arrival
+        described = wire.read_description(b"".join(begun.pieces))
+        if described and self._has_room_for(stream, described[0], arrival):
+            playback = self._streams[stream] = _Playback(*described, read.ticks, arrival)
+            for motion, when in begun.motions:
+                playback.take(motion, when)
 
-    def _room_for(self, stream: Stream, forest: Forest, now: float) -> bool:
+    def _has_room_for(self, stream: Stream, forest: Forest, now: float) -> bool:
         """Forget a stream that this one is instead of, and say whether there is room for it."""
         self._forget_silent(now)
         names = {body.name for body in forest.bodies}
@@ -218,77 +186,69 @@ class Receiver:
         joints = sum(len(playback.forest) for playback in self._streams.values())
         return len(self._streams) < MOST_STREAMS and joints + len(forest) <= MOST_ALL_JOINTS
 
-    def _forget_silent(self, now: float) -> None:
-        self._forget([stream for stream, it in self._streams.items() if not -SILENT < now - it.heard < SILENT])
-
-    def _forget(self, streams: Iterable[Stream]) -> None:
-        for stream in streams:
-            del self._streams[stream]
-            self._gone.append(stream)
+    def _forget(self, streams: Sequence[Stream]) -> None:
+        super()._forget(streams)
+        self._gone.extend(streams)
 
 
 class _Begun:
     """A stream without its description."""
 
     def __init__(self) -> None:
-        self.pieces: list[bytes | None] = []
-        self.motions: list[tuple[Motion, float]] = []
+        self.pieces: list[bytes] = []
+        """Of the description, empty where they are missing."""
+        self.motions: deque[tuple[Motion, float]] = deque(maxlen=MOST_WAITING)
         self.unanswered = False
 
     def entry(self, identity: bytes) -> Entry:
-        return Entry(identity, 0, 0, NEEDS_DESCRIPTION | NEEDS_REFRESH)
+        return Entry(identity, 0, 0, wire.NEEDS_DESCRIPTION | wire.NEEDS_REFRESH)
 
 
 class _Playback:
-    """A stream with its description."""
+    """A stream with its description, of which `heard` was the newest moment."""
 
-    def __init__(self, forest: Forest, terms: Terms, ticks: int) -> None:
-        self.forest, self._terms = forest, terms
-        self._codec = Codec(Scale(forest, terms.tolerance / 1e6), terms)
-        self._rest = State.at_rest(self._codec.scale)
-        self._states: OrderedDict[int, State] = OrderedDict()
+    def __init__(self, forest: Forest, terms: Terms, ticks: int, heard: float) -> None:
+        self.forest, self.bodies, self.heard, self.unanswered = forest, forest.bodies, heard, False
+        self._codec = Codec(forest, terms)
+        self._states: dict[int, State] = {}
         self._windows: dict[int, Path] = {}
         """Of the newest messages, by their sequence numbers."""
         self._path: Path | None = None
         self._newest, self._ticks, self._came = -1, float(ticks), 0.0
-        self._playing, self._fading = Playing(terms.delay / TICKS), Fading()
+        self.playing, self._fading = Playing(terms.delay / TICKS), Fading()
         self._moment: float | None = None
         self._begins = np.inf
         """The first moment that can be shown."""
         self._kept = -np.inf
         """Until this moment keys were handed out."""
-        self._needs = NEEDS_REFRESH
-        self.heard = 0.0
-        self.unanswered = False
+        self._needs = wire.NEEDS_REFRESH
 
-    def take(self, motion: Motion, arrival: float) -> bool:
-        """Take a message, and say whether it was a new one that could be read."""
+    def take(self, motion: Motion, arrival: float) -> None:
+        """Take a message, if it is a new one that can be read."""
         if motion.sequence in self._states or self._newest - motion.sequence > MOST_STATES:
-            return False
-        state = self._rest if motion.back == 0 else self._states.get(motion.sequence - motion.back)
+            return
+        state = self._states.get(motion.sequence - motion.back) if motion.back else self._codec.rest
         self.unanswered = True
         if state is None:
-            self._needs = NEEDS_REFRESH
-            return False
+            self._needs = wire.NEEDS_REFRESH
+            return
         elapsed = min(max(arrival - self._came, 0.0), MOST_SILENCE) * TICKS if self._came else 0.0
-        end = expanded(motion.ticks, self._ticks + elapsed)
+        end = wire.expanded(motion.ticks, self._ticks + elapsed)
         kind = state.kind(end, motion.back)
         read = self._codec.read(motion.payload, kind, state, motion.late)
-        window = self._codec.window(read[0], state, kind, end) if read else None
-        if read is None or window is None:
-            return False
-        path = window.path()
+        path = self._codec.path(read[0], state, kind, end) if read else None
+        if read is None or path is None:
+            return
         self._states[motion.sequence] = State(path, read[1], end)
         if len(self._states) > MOST_STATES:
             self._states.pop(min(self._states))
-        newer, lost = motion.sequence > self._newest, motion.sequence - self._newest - 1
-        if newer:
+        lost = motion.sequence - self._newest - 1
+        if lost >= 0:
             self._newest, self._ticks, self._came, self._needs = motion.sequence, float(end), arrival, 0
-        self.heard = max(self.heard, arrival) if newer else self.heard
-        if not motion.late or self._playing.longest is None:
-            self._playing.heard(end / TICKS, arrival)
+            self.heard = max(self.heard, arrival)
+        if not motion.late or self.playing.longest is None:
+            self.playing.heard(end / TICKS, arrival)
         self._put(motion.sequence, path, lost)
-        return True
 
     def _put(self, sequence: int, path: Path, lost: int) -> None:
         """Let a window take part in what is shown; before it so many are lost, or it came late where that is < 0."""
@@ -309,45 +269,33 @@ class _Playback:
         else:
             numbers = sorted(self._windows)
             first = self._windows[numbers[0]]
-            joined = before.followed(first) if before.moments[0] < first.moments[0] else first
+            self._path = before.followed(first) if before.moments[0] < first.moments[0] else first
             for last, number in pairwise(numbers):
-                joined = joined.followed(self._windows[number], number - last - 1)
-            self._path = joined
+                self._path = self._path.followed(self._windows[number], number - last - 1)
         if self._moment is not None and (lost or path.moments[0] < self._moment):
-            self._fading.changed(_only(self._path.at(np.array([self._moment]))))
-
-    def due(self, moment: float) -> float:
-        """When a moment is to be shown."""
-        return np.inf if self._playing.longest is None else moment + self._playing.longest + self._playing.delay
+            self._fading.changed(self._path.pose(self._moment))
 
     def show(self, now: float) -> Shown | None:
         """Return what is shown now."""
-        self._moment = self._playing.moment(now)
+        self._moment = self.playing.moment(now)
         if self._moment is None or self._path is None or self._moment < self._begins:
             return None
-        poses = self._fading.show(_only(self._path.at(np.array([self._moment]))), now)
+        poses = self._fading.show(self._path.pose(self._moment), now)
         return Shown(self._moment, self.forest.parted(poses))
 
-    def keys(self, stream: Stream) -> Keys:
+    def keys(self) -> tuple[np.ndarray, dict[str, Poses]]:
         """Return the knots until the start of the newest window that were not handed out yet."""
         path = self._path
         if path is None:
-            return Keys(stream, np.empty(0), {})
+            return np.empty(0), {}
         until = self._windows[max(self._windows)].moments[0]
         rows = np.flatnonzero((path.moments > self._kept) & (path.moments <= until))
         if len(rows):
             self._kept = float(path.moments[rows[-1]])
-        poses = {
-            name: Poses(path.positions[rows][:, joints], path.quaternions[rows][:, joints])
-            for name, joints in self.forest.slices.items()
-        }
-        return Keys(stream, path.moments[rows], poses)
+        poses = self.forest.parted(path.poses[:, rows])
+        return path.moments[rows], {name: transposed(own) for name, own in poses.items()}
 
     def entry(self, identity: bytes) -> Entry:
         """Return what is answered."""
         there = sum(1 << back for back in range(32) if self._newest - 1 - back in self._states)
         return Entry(identity, max(self._newest, 0), there, self._needs)
-
-
-def _only(poses: Poses) -> Poses:
-    return poses[:, 0]

@@ -8,8 +8,6 @@ decoder and the counting for training go through the same function.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import log2
-from typing import Protocol
 
 from .bodies import Forest
 from .coding import Decoder, Encoder
@@ -18,48 +16,26 @@ NEAR, FAR, STALE, UNKNOWN, MIDDLE, FINER, STILL = range(7)
 """Kinds of knots. The end of a window is coded against how the message before it goes on, or one before that; against
 an old pose; against rest. Then come the first knot within, the others; and those behind an old pose or rest."""
 
-KINDS = 7
-
-LARGEST = 14
-"""Magnitudes from here on are written in full."""
-
-MOST_BITS = 20
-"""Of a magnitude that is written in full."""
+LARGEST, MOST_BITS = 14, 20
+"""Magnitudes from the first on are written in full, in so many bits at most."""
 
 HISTORIES, NEIGHBOURS, SIZES = 8, 5, 6
 
-FULL = 16
-"""What a magnitude counts in what is remembered of a joint."""
+FLAGS = 7 * 2 * HISTORIES * NEIGHBOURS
+"""Tables that say, for each kind of knot, turns and slides, whether a group is anything but zeros."""
 
+KNOT_COUNTS = FLAGS + 7 * 2 * HISTORIES * SIZES
+"""The number of the table of how many knots a window has besides its end, behind those of magnitudes."""
 
-def bucket(value: int, most: int) -> int:
-    """0, 1, 2, 3 to 4, 5 to 8, ...: a number in few classes."""
-    return min((value - 1).bit_length() + 1 if value > 0 else 0, most - 1)
+WIDTHS, FINENESS = KNOT_COUNTS + 1, KNOT_COUNTS + 2
+"""The numbers of the tables of how many binary digits what is above `LARGEST` has; and of how fine steps are, for rigid
+bodies alone, and in the next table where joints hang on others."""
 
+FINEST = 3
+"""Steps are halved so many times at most."""
 
-class Coder(Protocol):
-    """What a number goes through: it is written and returned, or read."""
-
-    def symbol(self, table: int, value: int) -> int: ...
-
-    def flat(self, value: int, count: int) -> int: ...
-
-
-def flag_table(kind: int, slide: int, history: int, neighbour: int) -> int:
-    """Return the number of the table that says whether a group is anything but zeros."""
-    return ((kind * 2 + slide) * HISTORIES + history) * NEIGHBOURS + neighbour
-
-
-FLAGS = KINDS * 2 * HISTORIES * NEIGHBOURS
-
-
-def size_table(kind: int, slide: int, history: int, size: int) -> int:
-    """Return the number of the table of a magnitude."""
-    return FLAGS + ((kind * 2 + slide) * HISTORIES + history) * SIZES + size
-
-
-KNOT_COUNTS = FLAGS + KINDS * 2 * HISTORIES * SIZES
-"""The number of the table of how many knots a window has besides its end."""
+COUNT = FINENESS + 2
+"""Of all tables."""
 
 MOST_KNOTS = 16
 """Of a window."""
@@ -67,16 +43,20 @@ MOST_KNOTS = 16
 MOST_GROUPS = 4096
 """Of all knots of a message together, unless the end alone has more: so much work a datagram can make."""
 
-TABLES = KNOT_COUNTS + 1
+Groups = list[list[list[int]]]
+"""Of each knot and each group three numbers."""
+
+
+def bucket(value: int, most: int) -> int:
+    """0, 1, 2, 3 to 4, 5 to 8, ...: a number in few classes."""
+    return min((value - 1).bit_length() + 1 if value > 0 else 0, most - 1)
 
 
 def symbols_of(table: int) -> int:
     """How many symbols a table has."""
-    return 2 if table < FLAGS else LARGEST + 1 if table < KNOT_COUNTS else MOST_KNOTS
-
-
-Groups = list[list[list[int]]]
-"""Of each knot and each group three numbers."""
+    if table >= FINENESS:
+        return FINEST + 1
+    return {KNOT_COUNTS: MOST_KNOTS, WIDTHS: MOST_BITS + 1}.get(table, 2 if table < FLAGS else LARGEST + 1)
 
 
 class Walk:
@@ -100,12 +80,12 @@ class Walk:
     def __len__(self) -> int:
         return len(self.joints)
 
-    def through(self, coder: Coder, groups: Groups, kind: int, memory: Sequence[int]) -> list[int]:
+    def through(self, coder: Encoder | Decoder, groups: Groups, kind: int, memory: Sequence[int]) -> list[int]:
         """Write or read the groups of a message, and return what is remembered of each group.
 
         Parameters
         ----------
-        coder : Coder
+        coder : Encoder or Decoder
         groups : list
             Of each knot and group three numbers; overwritten by what is read.
         kind : int
@@ -113,90 +93,39 @@ class Walk:
         memory : sequence of int
             What is remembered of each group with the pose that the message is coded against.
         """
-        last = groups[0]
+        sums: list[list[int]] = []
         for number, knot in enumerate(groups):
             if number:
                 kind = STILL if kind in (STALE, UNKNOWN, STILL) else MIDDLE if number == 1 else FINER
-            above, before = self.above, 0
-            sums = [0] * len(knot)
+                weights = [2 * before + end for before, end in zip(sums[-1], sums[0], strict=True)]
+            else:
+                weights = [old >> 2 for old in memory]
+            own = [0] * len(knot)
+            before = 0
             for group, values in enumerate(knot):
-                slide = self.slides[group]
-                if number == 0:
-                    history = bucket(memory[group] >> 2, HISTORIES)
-                else:
-                    x, y, z = groups[number - 1][group]
-                    coarser = abs(x) + abs(y) + abs(z)
-                    ends = last[group]
-                    history = bucket(2 * coarser + abs(ends[0]) + abs(ends[1]) + abs(ends[2]), HISTORIES)
-                neighbour = (sums[above[group]] if above[group] >= 0 else 0) + before
-                table = flag_table(kind, slide, history, bucket(neighbour, NEIGHBOURS))
-                if coder.symbol(table, int(values[0] != 0 or values[1] != 0 or values[2] != 0)):
-                    sums[group] = _group(coder, values, kind, slide, history)
+                of_kind = (kind * 2 + self.slides[group]) * HISTORIES + bucket(weights[group], HISTORIES)
+                neighbour = (own[self.above[group]] if self.above[group] >= 0 else 0) + before
+                table = of_kind * NEIGHBOURS + bucket(neighbour, NEIGHBOURS)
+                if coder.symbol(table, int(any(values))):
+                    own[group] = _group(coder, values, FLAGS + of_kind * SIZES)
                 else:
                     values[:] = (0, 0, 0)
-                before = sums[group]
-            if number == 0:
-                memory = [(old + FULL * new) >> 1 for old, new in zip(memory, sums, strict=True)]
-        return list(memory)
+                before = own[group]
+            sums.append(own)
+        return [(old + 16 * new) >> 1 for old, new in zip(memory, sums[0], strict=True)]
 
 
-def _group(coder: Coder, values: list[int], kind: int, slide: int, history: int) -> int:
+def _group(coder: Encoder | Decoder, values: list[int], first_table: int) -> int:
     """Write or read three numbers, and return the sum of their magnitudes."""
     total = 0
     for axis in range(3):
-        size = 0 if axis == 0 else 1 + bucket(total if axis == 1 else total >> 1, SIZES - 1)
-        table = size_table(kind, slide, history, min(size, SIZES - 1))
-        magnitude = coder.symbol(table, min(abs(values[axis]), LARGEST))
+        size = 0 if axis == 0 else min(1 + bucket(total >> (axis - 1), SIZES - 1), SIZES - 1)
+        magnitude = coder.symbol(first_table + size, min(abs(values[axis]), LARGEST))
         if magnitude == LARGEST:
-            rest = abs(values[axis]) - LARGEST
-            width = coder.flat(rest.bit_length() if rest > 0 else 0, MOST_BITS + 1)
-            magnitude += coder.flat(max(rest, 0), 1 << width)
-        negative = coder.flat(int(values[axis] < 0), 2) if magnitude else 0
+            rest = max(abs(values[axis]) - LARGEST, 0)
+            width = coder.symbol(WIDTHS, rest.bit_length())
+            magnitude += coder.flat(1 << width, rest)
+        negative = coder.flat(2, int(values[axis] < 0)) if magnitude else 0
         values[axis] = -magnitude if negative else magnitude
         total += magnitude
     return min(total, 1 << MOST_BITS)
-
-
-class Writing:
-    """To an encoder."""
-
-    def __init__(self, tables: Sequence[Sequence[int]]) -> None:
-        self.encoder, self._tables = Encoder(), tables
-
-    def symbol(self, table: int, value: int) -> int:
-        self.encoder.write(value, self._tables[table])
-        return value
-
-    def flat(self, value: int, count: int) -> int:
-        self.encoder.write_flat(value, count)
-        return value
-
-
-class Reading:
-    """From a decoder."""
-
-    def __init__(self, data: bytes, tables: Sequence[Sequence[int]]) -> None:
-        self.decoder, self._tables = Decoder(data), tables
-
-    def symbol(self, table: int, value: int) -> int:
-        return self.decoder.read(self._tables[table])
-
-    def flat(self, value: int, count: int) -> int:
-        return self.decoder.read_flat(count)
-
-
-class Counting:
-    """How often each symbol of each table occurs."""
-
-    def __init__(self, counts: list[list[int]]) -> None:
-        self.counts = counts
-        self.raw = 0.0
-        """Bits that no table is for."""
-
-    def symbol(self, table: int, value: int) -> int:
-        self.counts[table][value] += 1
-        return value
-
-    def flat(self, value: int, count: int) -> int:
-        self.raw += log2(count)
-        return value

@@ -13,58 +13,37 @@ from __future__ import annotations
 import math
 import secrets
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from ..motion import Poses, shell_error
-from ..motion.quaternions import align_signs, normalise
+from ..motion import Poses
+from ..motion.poses import joined
+from ..motion.quaternions import normalise
+from . import wire
 from .bodies import Body, Forest
-from .fitting import Fitting, Task
-from .knots import Scale, State
-from .messages import Codec, Said
+from .fitting import Fitting, closely
+from .messages import Codec, State
 from .paths import Path
-from .wire import (
-    ANSWER,
-    NEEDS_DESCRIPTION,
-    NEEDS_REFRESH,
-    TICKS,
-    Entry,
-    Terms,
-    describe,
-    kind_of,
-    motion,
-    read_answer,
-    read_description,
-    read_piece,
-)
+from .wire import ANSWER, TICKS, Entry, Terms
 
-KEEPALIVE = 0.5
-"""Seconds of silence after which something is said in any case."""
-
-REFRESH = 1.0
-"""Seconds between messages that build on nothing, where nobody answers."""
+KEEPALIVE, REFRESH = 0.5, 1.0
+"""Seconds of silence after which something is said in any case; and, where nobody answers, between messages that build
+on nothing."""
 
 AGAIN = 0.03
 """Seconds after which a refresh is sent a second time, so that one loss does not lose both."""
 
-STILL, BEYOND = 0.25, 0.2
-"""Part of the tolerance within which a body does not move; and so many seconds later it is still where it was."""
-
 PATIENCE = 0.15
 """Seconds that a refresh has to arrive, before another is sent to somebody who asks for one."""
 
-SILENT = 2.0
-"""Seconds after which somebody who does not answer any more is not waited for."""
+SILENT, MOST_RECEIVERS = 2.0, 256
+"""Seconds after which somebody who does not answer any more is not waited for; and for so many at most."""
 
 GRID = 3
 """Ticks of the grid of knots for samples at any moments."""
 
 ROUNDING = 1e-3
 """Ticks by which a sample may be before the one that it is at."""
-
-SAME = 1e-9
-"""Seconds that make no difference between a knot and a sample."""
 
 LAST = 0xFFFF
 """The largest sequence number: behind it the sender begins again, with another identity."""
@@ -84,28 +63,14 @@ OVERDUE = 2e-4
 CALMER = 0.9
 """What is left of the longest interval between samples with every sample that came sooner."""
 
-MOST_BACK = 33
-"""Messages that an answer speaks of."""
+MOST_BACK, FURTHEST_BACK = 33, 255
+"""Messages that an answer speaks of; and the base of one may be so many before it."""
 
 OLDEST = 2.0
 """Seconds: what is older is not worth building on, and everything is said anew."""
 
-FAR_APART, MOST_PARTS = 0.013, 8
-"""Seconds between samples beyond which it is looked at what is shown between them, and into how many parts at most."""
-
 LOSSY, CALM = 2, 5.0
 """Messages of the last 32: where so many are missing, each is sent twice until none is for some seconds."""
-
-MOST_RECEIVERS = 256
-"""Receivers that are waited for."""
-
-
-@dataclass(eq=False)
-class _Receiver:
-    """Somebody who answers."""
-
-    entry: Entry
-    heard: float
 
 
 class Sender:
@@ -120,8 +85,8 @@ class Sender:
         Seconds by which what is shown is behind, beside what the network takes.
     rate : float, optional
         Samples a second, where they are even.
-    refresh, keepalive : float
-        Seconds between them.
+    keepalive : float
+        Seconds of silence at most.
 
     Raises
     ------
@@ -135,35 +100,35 @@ class Sender:
         tolerance: float = 0.005,
         delay: float = 0.1,
         rate: float | None = None,
-        refresh: float = REFRESH,
         keepalive: float = KEEPALIVE,
     ) -> None:
-        for name, value in (("tolerance", tolerance), ("delay", delay), ("refresh", refresh), ("keepalive", keepalive)):
+        for name, value in (("tolerance", tolerance), ("delay", delay), ("keepalive", keepalive)):
             if not (math.isfinite(value) and value > 0.0):
                 raise ValueError(f"a {name} of {value} is not a positive number")
         even = TICKS / rate if rate else GRID
         grid = round(even) if abs(even - round(even)) < 0.01 and even >= 1.0 else GRID
-        self._terms = Terms(math.floor(tolerance * 1e6), round(delay * TICKS), grid)
+        self._terms, self._keepalive = Terms(math.floor(tolerance * 1e6), round(delay * TICKS), grid), keepalive
+        self._delay = self._terms.delay / TICKS
         self._given = Forest(bodies)
-        self.refresh, self.keepalive = refresh, keepalive
         self._slip = 0.0
         """What is added to the times of samples, so that a clock that was set makes no difference."""
-        self._times: list[float] = []
-        self._positions = np.empty((0, len(self._given), 3))
-        self._quaternions = np.empty((0, len(self._given), 4))
+        none = np.empty((len(self._given), 0, 4))
+        self._samples = Path(np.empty(0), Poses(none[..., :3], none))
         self._next = math.inf
         self._interval = 0.0
         """Within which the next sample is expected."""
         self._begin()
 
     def _begin(self) -> None:
-        """Begin with a new identity."""
+        """Begin with a new identity, and with the bodies as receivers read them, in single precision."""
         self.identity = secrets.token_bytes(3)
-        forest = _as_read(self.identity, self._given, self._terms)
-        self._forest = forest
-        self._scale = Scale(forest, self._terms.tolerance / 1e6)
-        self._fitting, self.codec = Fitting(self._scale), Codec(self._scale, self._terms)
-        self._rest = State.at_rest(self._scale)
+        pieces = [wire.read_piece(datagram) for datagram in wire.describe(self.identity, 0, self._given, self._terms)]
+        data = [piece.data for piece in pieces if piece]
+        read = wire.read_description(b"".join(data)) if len(data) == len(pieces) else None
+        if read is None:
+            raise ValueError("the delay, the tolerance or the bodies are too large to be described")
+        self._forest = read[0]
+        self.codec = Codec(*read)
         self._states: dict[int, State] = {}
         """Of messages that others may build on, by their sequence numbers."""
         self._sequence = 0
@@ -173,18 +138,17 @@ class Sender:
         """Until this moment it is known to be within the tolerance."""
         self._good: float | None = None
         """The moment behind which it is not."""
-        self._receivers: dict[bytes, _Receiver] = {}
-        self._refreshed = -math.inf
-        self._sent = -math.inf
+        self._receivers: dict[bytes, tuple[Entry, float]] = {}
+        """What those who answer have, and when they said so."""
+        self._refreshed = self._sent = -math.inf
         self._again: tuple[float, int, bytes] | None = None
+        """When a refresh is due again, its number and datagram."""
         self._base: int | None = None
         """The last refresh that was sent twice."""
         self._desired = False
         """Whether somebody cannot read what is sent."""
-        self._lossy = False
-        """Whether so much is lost that all is sent twice."""
-        self._missed = -math.inf
-        """When somebody said so last."""
+        self._lossy, self._missed = False, -math.inf
+        """Whether so much is lost that all is sent twice, and when somebody said so last."""
 
     def add(self, time: float, poses: Poses | Mapping[str, Poses]) -> list[bytes]:
         """Take a sample, and return what is to be sent now.
@@ -211,10 +175,10 @@ class Sender:
 
     def poll(self, time: float) -> list[bytes]:
         """Return what is to be sent at a time at which no sample came: worth asking at `next`, where one is overdue."""
-        now = time + self._slip
-        if not self._times or now > self._times[-1] + STEP:
+        now, times = time + self._slip, self._samples.moments
+        if not len(times) or now > times[-1] + STEP:
             return []  # Somebody set the clock, as the next sample will tell; or no sample is going to come.
-        return self._due(max(now, self._times[-1]), 0.0)
+        return self._due(max(now, float(times[-1])), 0.0)
 
     @property
     def next(self) -> float:
@@ -223,14 +187,14 @@ class Sender:
 
     def finish(self) -> list[bytes]:
         """Return what is still needed where no more samples are to come."""
-        if self._path is None or self._is_shown_until(self._times[-1]) is None:
+        if self._path is None or self._is_shown_until(now := float(self._samples.moments[-1])) is None:
             return []
-        return [self._message(self._times[-1])]
+        return [self._message(now)]
 
     def describe(self) -> list[bytes]:
         """Names, parents and rest poses, for those who join."""
-        ticks = math.floor(self._times[-1] * TICKS) if self._times else 0
-        return describe(self.identity, max(ticks, 0), self._forest, self._terms)
+        newest = self._samples.moments[-1] if len(self._samples.moments) else 0.0
+        return wire.describe(self.identity, max(math.floor(newest * TICKS), 0), self._forest, self._terms)
 
     def join(self) -> list[bytes]:
         """Return what somebody who joins needs: the description. The next message then builds on nothing."""
@@ -239,53 +203,38 @@ class Sender:
 
     def hear(self, datagram: bytes, now: float) -> list[bytes]:
         """Take an answer, at a time by the clock of the samples, and return what is to be sent for it."""
-        read = read_answer(datagram) if kind_of(datagram) == ANSWER else None
+        read = wire.read_answer(datagram) if wire.kind_of(datagram) == ANSWER else None
         if read is None:
             return []
         receiver, entries = read
         entry = next((entry for entry in entries if entry.identity == self.identity), None)
         if entry is None or (receiver not in self._receivers and len(self._receivers) == MOST_RECEIVERS):
             return []
-        heard = now + self._slip
-        if self._times and abs(heard - self._times[-1]) > STEP:
-            heard = self._times[-1]
-        self._receivers[receiver] = _Receiver(entry, heard)
+        heard, times = now + self._slip, self._samples.moments
+        if len(times) and abs(heard - times[-1]) > STEP:
+            heard = float(times[-1])
+        self._receivers[receiver] = entry, heard
         missing = entry.before.bit_length() - entry.before.bit_count()
         self._missed = heard if missing >= LOSSY or (self._lossy and missing) else self._missed
         self._lossy = heard - self._missed < CALM
-        self._desired |= bool(entry.needs & NEEDS_REFRESH) and heard - self._refreshed > PATIENCE
-        return self.describe() if entry.needs & NEEDS_DESCRIPTION else []
-
-    # Samples
+        self._desired |= bool(entry.needs & wire.NEEDS_REFRESH) and heard - self._refreshed > PATIENCE
+        return self.describe() if entry.needs & wire.NEEDS_DESCRIPTION else []
 
     def _remember(self, time: float, poses: Poses) -> float:
         """Keep a sample, and return its time by a clock that only goes on."""
-        poses = Poses(poses.positions, normalise(poses.quaternions))
+        times, before = self._samples.moments, self._samples.poses
         now = time + self._slip
-        if self._times and not 0.0 < now - self._times[-1] <= STEP:
-            usual = self._times[-1] - self._times[-2] if len(self._times) > 1 else 1.0 / TICKS
-            self._slip += self._times[-1] + usual - now
+        if len(times) and not 0.0 < now - times[-1] <= STEP:
+            usual = times[-1] - times[-2] if len(times) > 1 else 1.0 / TICKS
+            self._slip += float(times[-1] + usual - now)
             now = time + self._slip
-        if self._times:
-            self._interval = max(now - self._times[-1], CALMER * self._interval)
-        self._times.append(now)
-        near = poses.quaternions
-        if len(self._quaternions):
-            near = align_signs(np.stack((self._quaternions[-1], near), axis=1))[:, 1]
-        self._positions = np.concatenate((self._positions, poses.positions[None]))
-        self._quaternions = np.concatenate((self._quaternions, near[None]))
-        past = int(np.searchsorted(self._times, now - self._terms.delay / TICKS - STEP)) - 2
-        if past > AT_ONCE:
-            self._times = self._times[past:]
-            self._positions, self._quaternions = self._positions[past:], self._quaternions[past:]
+        if len(times):
+            self._interval = max(now - float(times[-1]), CALMER * self._interval)
+        new = Poses(poses.positions, normalise(poses.quaternions))[:, None]
+        samples = Path(np.append(times, now), joined((before, new), axis=1))
+        past = now - self._delay - STEP
+        self._samples = samples.since(past) if np.searchsorted(samples.moments, past) > AT_ONCE else samples
         return now
-
-    def _samples(self, first: int = 0) -> Path:
-        """Return the samples from one on, with the straight way between them."""
-        still = np.zeros((len(self._forest), 3))
-        return Path(np.array(self._times[first:]), self._positions[first:], self._quaternions[first:], still, still)
-
-    # When
 
     def _due(self, now: float, interval: float) -> list[bytes]:
         """Return what is to be sent now, where nobody asks again before the interval is over."""
@@ -295,121 +244,76 @@ class Sender:
             self._again = None
             if not (self._answered(now) and self._have(self._base)):
                 due.append(datagram)
-        if not self._answered(now) and now - self._refreshed >= self.refresh:
+        if not self._answered(now) and now - self._refreshed >= REFRESH:
             due += [*self.describe(), self._message(now, refresh=True)]
         elif self._desired:
             due.append(self._message(now, refresh=True))
-        elif now - self._sent >= self.keepalive:
+        elif now - self._sent >= self._keepalive:
             due.append(self._message(now))
-        else:
-            good = self._is_shown_until(now)
-            delay = self._terms.delay / TICKS
-            if good is not None and good < now - delay + max(ALMOST * interval, SOON):
+        elif (good := self._is_shown_until(now)) is not None:
+            if good < now - self._delay + max(ALMOST * interval, SOON):
                 due.append(self._message(now))
-            elif good is not None:
-                self._next = good + delay + OVERDUE
+            else:
+                self._next = good + self._delay + OVERDUE
         return due * (1 + self._lossy)
 
     def _is_shown_until(self, now: float) -> float | None:
         """Return moment before one that is shown further off than the tolerance; None where there is none until now."""
-        if self._good is None and self._path is not None and self._shown < self._times[-1]:
-            first = max(int(np.searchsorted(self._times, self._shown, side="right")) - 1, 0)
-            moments = closely(np.array(self._times[first:]))
-            moments = moments[moments > max(self._shown, now - self._terms.delay / TICKS)]
-            truth = self._forest.skeleton.in_root_space(self._samples(first).at(moments))
-            off = self._fitting.errors(self._path.at(moments), truth).max(axis=0) > self._scale.tolerance
+        times = self._samples.moments
+        if self._good is None and self._path is not None and self._shown < times[-1]:
+            first = max(int(np.searchsorted(times, self._shown, side="right")) - 1, 0)
+            moments = closely(times[first:])
+            moments = moments[moments > max(self._shown, now - self._delay)]
+            truth = self._forest.skeleton.in_root_space(self._samples.at(moments))
+            off = self._forest.errors(self._path.at(moments), truth).max(axis=0) > self.codec.tolerance
             if off.any():
                 self._good = self._shown = float(np.append(self._shown, moments)[np.argmax(off)])
             else:
-                self._shown = self._times[-1]
+                self._shown = float(times[-1])
         return self._good
 
     def _answered(self, now: float) -> bool:
         """Whether anybody answers; those who do not any more are forgotten."""
-        self._receivers = {own: who for own, who in self._receivers.items() if now - who.heard < SILENT}
+        self._receivers = {own: it for own, it in self._receivers.items() if now - it[1] < SILENT}
         return bool(self._receivers)
 
     def _have(self, sequence: int) -> bool:
         """Whether all who answer have a message."""
-        return all(who.entry.has(sequence) for who in self._receivers.values())
-
-    # What
-
-    def _message(self, now: float, refresh: bool = False) -> bytes:
-        """Say the window until the last sample."""
-        end = math.floor(self._times[-1] * TICKS + ROUNDING)
-        base = None if refresh else self._usable(now)
-        state = self._rest if base is None else self._states[base]
-        is_late = now - self._times[-1] > SOON
-        late = min(math.floor(now * TICKS) - end, self._terms.delay - 1) if is_late else 0
-        back = 0 if base is None else self._sequence - base
-        kind = state.kind(end, back)
-        start = (end + late - self._terms.delay) / TICKS
-        times = np.array(self._times)
-        inside = times[(times > start) & (times < end / TICKS)]
-        looked = np.concatenate(([start], inside, [end / TICKS]))
-        samples = self._samples()
-        ends = self._forest.skeleton.in_root_space(samples.at(np.array([start, end / TICKS])))
-        is_still = shell_error(ends[:, 0], ends[:, 1], self._forest.radii).max() < STILL * self._scale.tolerance
-        exact = (end - inside * TICKS) / self._terms.grid
-        # A jump between two cells takes both of them, everything else the nearest.
-        for cells in (np.rint(exact), np.concatenate((np.floor(exact), np.ceil(exact)))):
-            cells = np.unique(cells.astype(int))
-            cells = cells[(cells > 0) & (cells * self._terms.grid < self._terms.delay - late)]
-            grid = (end - cells[::-1] * self._terms.grid) / TICKS
-            between = grid[np.abs(grid[:, None] - looked).min(axis=1) > SAME]
-            moments = closely(np.unique(np.concatenate((looked, between))))[1:]
-            if is_still:
-                # It is to come to rest, and not to be put right again and again.
-                moments = np.append(moments, end / TICKS + BEYOND)
-            fitted = self._fitting.fitted(Task(self._path, state, kind, start, samples, end / TICKS, moments, grid))
-            if fitted.error <= self._scale.tolerance:
-                break
-        inner = [round((end - moment * TICKS) / self._terms.grid) for moment in fitted.moments]
-        said = Said(fitted.finer, inner, np.array(fitted.numbers).tolist(), late)
-        payload, memory = self.codec.write(said, kind, state, is_late)
-        datagram = motion(self.identity, self._sequence, end, back, payload, is_late)
-        window = self.codec.window(said, state, kind, end)
-        assert window is not None  # which receivers read, too
-        path = window.path()
-        self._states[self._sequence] = State(path, memory, end)
-        kept = {*range(self._sequence - MOST_BACK, self._sequence + 1), self._base}
-        self._states = {number: old for number, old in self._states.items() if number in kept}
-        self._path = path if self._path is None else self._path.followed(path).since(start - 0.05)
-        self._shown, self._good = end / TICKS if fitted.error <= self._scale.tolerance else start, None
-        self._sent = now
-        if base is None:
-            self._refreshed, self._desired = now, False
-            payload, _ = self.codec.write(said, kind, state, True)
-            again = motion(self.identity, self._sequence, end, back, payload, late=True)
-            self._again = (now + AGAIN, self._sequence, again)
-        self._sequence += 1
-        return datagram
+        return all(entry.has(sequence) for entry, _ in self._receivers.values())
 
     def _usable(self, now: float) -> int | None:
         """Return the message to build on, or None."""
         if self._answered(now):
-            for number in range(self._sequence - 1, max(self._sequence - 1 - MOST_BACK, -1), -1):
-                state = self._states.get(number)
-                if state is not None and self._have(number):
-                    return number if now - state.end / TICKS < OLDEST else None
-        return self._base if self._base is not None and self._sequence - self._base < 256 else None
+            for number in sorted(self._states, reverse=True):
+                if number >= self._sequence - MOST_BACK and self._have(number):
+                    return number if now - self._states[number].end / TICKS < OLDEST else None
+        is_near = self._base is not None and self._sequence - self._base <= FURTHEST_BACK
+        return self._base if is_near else None
 
-
-def closely(moments: np.ndarray) -> np.ndarray:
-    """Moments (n,) with others between them, where they are far apart."""
-    parts = np.ceil(np.diff(moments) / FAR_APART).astype(int)
-    parts = np.clip(parts, 1, MOST_PARTS)
-    share = np.concatenate([np.arange(1, count + 1) / count for count in parts]) if len(parts) else np.empty(0)
-    before = np.repeat(moments[:-1], parts)
-    return np.append(moments[:1], before + share * np.repeat(np.diff(moments), parts))
-
-
-def _as_read(identity: bytes, forest: Forest, terms: Terms) -> Forest:
-    """Return a forest as receivers read it, in single precision. Raises ValueError for what cannot be described."""
-    pieces = [read_piece(datagram) for datagram in describe(identity, 0, forest, terms)]
-    sound = [piece.data for piece in pieces if piece is not None]
-    read = read_description(b"".join(sound)) if len(sound) == len(pieces) else None
-    if read is None:
-        raise ValueError("the delay, the tolerance or the bodies are too large to be described")
-    return read[0]
+    def _message(self, now: float, refresh: bool = False) -> bytes:
+        """Say the window until the last sample."""
+        end = math.floor(self._samples.moments[-1] * TICKS + ROUNDING)
+        base = None if refresh else self._usable(now)
+        state = self.codec.rest if base is None else self._states[base]
+        is_late = now - self._samples.moments[-1] > SOON
+        late = min(math.floor(now * TICKS) - end, self._terms.delay - 1) if is_late else 0
+        back = 0 if base is None else self._sequence - base
+        kind = state.kind(end, back)
+        said, is_within = Fitting(self.codec, self._path, state, kind, self._samples, end, late).said()
+        payload, memory = self.codec.write(said, kind, state, is_late)
+        path = self.codec.path(said, state, kind, end)
+        assert path is not None  # which receivers read, too
+        self._states[self._sequence] = State(path, memory, end)
+        kept = {*range(self._sequence - MOST_BACK, self._sequence + 1), self._base}
+        self._states = {number: old for number, old in self._states.items() if number in kept}
+        start = float(path.moments[0])
+        self._path = path if self._path is None else self._path.followed(path).since(start - 0.05)
+        self._shown, self._good = end / TICKS if is_within else start, None
+        self._sent = now
+        if base is None:
+            self._refreshed, self._desired = now, False
+            again, _ = self.codec.write(said, kind, state, True)
+            datagram = wire.motion(self.identity, self._sequence, end, back, again, late=True)
+            self._again = (now + AGAIN, self._sequence, datagram)
+        self._sequence += 1
+        return wire.motion(self.identity, self._sequence - 1, end, back, payload, is_late)

@@ -10,19 +10,21 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Hashable, Mapping
-from typing import Any, cast
+from collections.abc import Hashable, Iterable, Mapping
+from itertools import islice
+from typing import Any
 
 import numpy as np
 
 from ..motion import Poses
-from ..motion.quaternions import conjugate, multiply, rotate
+from ..motion.poses import joined
+from ..motion.quaternions import conjugate, multiply
 from .bodies import LONGEST_NAME, Body
-from .humanoid import HUMANOID, alignments, humanoid_bones
+from .humanoid import HUMANOID, alignments, beside, humanoid_bones
 from .osc import Message, read, write_bundle, write_message
-from .paths import Path
+from .paths import Path, transposed
 from .playing import SET, Playing
-from .receiver import Keys, Shown, Stream
+from .receiver import Shown, Stream, Streams
 
 PORT = 39539
 """That programs which show a performer listen on."""
@@ -40,9 +42,8 @@ DEVICES = {f"/VMC/Ext/{kind}/Pos" for kind in ("Tra", "Con", "Hmd")}
 PERFORMER = "VMC"
 """The name of a performer's body."""
 
-MOST_SOURCES, MOST_DEVICES = 16, 32
-MOST_SAMPLES = 512
-"""Of a source that wait to be shown, or to be recorded."""
+MOST_SOURCES, MOST_DEVICES, MOST_SAMPLES = 16, 32, 512
+"""Programs; devices of each, and samples that wait to be shown or to be recorded."""
 
 SILENT = 2.0
 """Seconds after which a performer, who is sent on every frame, has gone."""
@@ -74,27 +75,23 @@ def _mirrored(poses: Poses, change: np.ndarray) -> Poses:
 
 def write(time: float, poses: Mapping[str, Poses]) -> list[bytes]:
     """Return the datagrams of a frame: the pose () of each bone in its parent's space, with that of `ROOT`."""
-    there = [name for name in JOINTS if name in poses]
-    both = Poses(
-        np.array([poses[name].positions for name in there]), np.array([poses[name].quaternions for name in there])
-    )
-    unity = to_unity(both)
-    messages = []
-    for name, place, (w, *xyz) in zip(there, unity.positions.tolist(), unity.quaternions.tolist(), strict=True):
-        is_root = name == ROOT
-        address = "/VMC/Ext/Root/Pos" if is_root else "/VMC/Ext/Bone/Pos"
-        messages.append(write_message(address, "root" if is_root else name, *place, *xyz, w))
-    messages += [write_message("/VMC/Ext/OK", 1), write_message("/VMC/Ext/T", float(time))]
-    return [write_bundle(messages[first : first + AT_ONCE]) for first in range(0, len(messages), AT_ONCE)]
+    root = [_pose("/VMC/Ext/Root/Pos", "root", poses[ROOT])] if ROOT in poses else []
+    bones = [_pose("/VMC/Ext/Bone/Pos", bone, poses[bone]) for bone in HUMANOID if bone in poses]
+    return _bundles([*root, *bones, write_message("/VMC/Ext/OK", 1), write_message("/VMC/Ext/T", float(time))])
 
 
 def write_trackers(poses: Mapping[str, Poses]) -> list[bytes]:
     """Return the datagrams of the poses () of trackers in the world, by their names."""
-    messages = []
-    for name, pose in poses.items():
-        unity = to_unity(pose)
-        w, *xyz = unity.quaternions.tolist()
-        messages.append(write_message("/VMC/Ext/Tra/Pos", name, *unity.positions.tolist(), *xyz, w))
+    return _bundles([_pose("/VMC/Ext/Tra/Pos", name, pose) for name, pose in poses.items()])
+
+
+def _pose(address: str, name: str, pose: Poses) -> bytes:
+    unity = to_unity(pose)
+    w, *xyz = unity.quaternions.tolist()
+    return write_message(address, name, *unity.positions.tolist(), *xyz, w)
+
+
+def _bundles(messages: list[bytes]) -> list[bytes]:
     return [write_bundle(messages[first : first + AT_ONCE]) for first in range(0, len(messages), AT_ONCE)]
 
 
@@ -112,36 +109,35 @@ class Performer:
     def __init__(self, joints: tuple[str, ...], rest: Poses) -> None:
         self.bones = humanoid_bones(joints)
         """The joint that each humanoid bone is."""
+        self._numbers = list(self.bones.values())
         aligned = alignments(self.bones, rest.positions)
-        numbers = list(self.bones.values())
         turns = np.array([conjugate(aligned[bone]) if bone in aligned else (1.0, 0.0, 0.0, 0.0) for bone in self.bones])
-        self._from_rest = multiply(conjugate(rest.quaternions[numbers]), turns.reshape(-1, 4))
-        self._numbers = numbers
-        order = list(self.bones)
-        self._above = [order.index(above) if (above := self._parent(bone)) else -1 for bone in order]
-
-    def _parent(self, bone: str) -> str:
-        while (bone := HUMANOID[bone]) and bone not in self.bones:
-            pass
-        return bone
+        self._from_rest = multiply(conjugate(rest.quaternions[self._numbers]), turns.reshape(-1, 4))
+        self._follows = np.array(_parents(list(self.bones)))
 
     def __call__(self, poses: Poses) -> dict[str, Poses]:
         """Return the pose () of each bone in its parent's space, of poses (joints,) in the space of the roots."""
-        places = poses.positions[self._numbers]
-        turns = multiply(poses.quaternions[self._numbers], self._from_rest)
-        above = np.array(self._above)
-        hanging = (above >= 0)[:, None]
-        back = np.where(hanging, conjugate(turns[above]), (1.0, 0.0, 0.0, 0.0))
-        local = Poses(rotate(back, places - np.where(hanging, places[above], 0.0)), multiply(back, turns))
+        there = poses[self._numbers]
+        local = beside(Poses(there.positions, multiply(there.quaternions, self._from_rest)), self._follows)
         return {ROOT: Poses(np.zeros(3), [1.0, 0.0, 0.0, 0.0]), **dict(zip(self.bones, local, strict=True))}
 
 
-class VmcReceiver:
-    """Shows performers and their devices a delay later: what `Receiver` is for the codec."""
+def _parents(names: list[str]) -> list[int]:
+    """Return which of some joints each of them hangs on, -1 for none."""
+    result = []
+    for name in names:
+        while (name := PARENTS[name]) and name not in names:
+            pass
+        result.append(names.index(name) if name else -1)
+    return result
+
+
+class VmcReceiver(Streams):
+    """Shows performers and their devices a delay later: what `Receiver` is for the codec. Its keys are all samples."""
 
     def __init__(self, delay: float = 0.1) -> None:
+        super().__init__(SILENT)
         self.delay = delay
-        self._sources: dict[Stream, _Source] = {}
 
     def take(self, datagram: bytes, arrival: float, source: Hashable = None) -> None:
         """Take a datagram that came at a time, by the clock of `show`, from somewhere."""
@@ -149,28 +145,11 @@ class VmcReceiver:
         for message in read(datagram):
             if not message.address.startswith("/VMC/Ext/"):
                 continue
-            known = self._sources.get(stream)
-            if known is None:
-                if len(self._sources) >= MOST_SOURCES:
+            if stream not in self._streams:
+                if len(self._streams) >= MOST_SOURCES:
                     return
-                known = self._sources[stream] = _Source(self.delay)
-            known.hear(message, arrival)
-
-    def show(self, now: float) -> dict[Stream, Shown]:
-        """Return what every performer does now."""
-        self._sources = {stream: it for stream, it in self._sources.items() if -SILENT < now - it.heard < SILENT}
-        shown = {stream: it.show(now) for stream, it in self._sources.items()}
-        return {stream: what for stream, what in shown.items() if what is not None}
-
-    def bodies(self, stream: Stream) -> tuple[Body, ...]:
-        """Return the performer of a stream, at rest, and its devices."""
-        known = self._sources.get(stream)
-        return known.bodies if known else ()
-
-    def keys(self) -> list[Keys]:
-        """All samples that came since the last call."""
-        result = [it.keys(stream) for stream, it in self._sources.items()]
-        return [keys for keys in result if len(keys.moments)]
+                self._streams[stream] = _Source(self.delay)
+            self._streams[stream].hear(message, arrival)
 
 
 class _Source:
@@ -180,45 +159,43 @@ class _Source:
         self.heard = -np.inf
         self.bodies: tuple[Body, ...] = ()
         self._playing = Playing(delay)
-        self._positions = np.zeros((len(JOINTS) + MOST_DEVICES, 3))
-        self._quaternions = np.tile((1.0, 0.0, 0.0, 0.0), (len(self._positions), 1))
+        count = len(JOINTS) + MOST_DEVICES
+        self._unity = Poses(np.zeros((count, 3)), np.tile((1.0, 0.0, 0.0, 0.0), (count, 1)))
+        """The newest poses, in Unity's axes: of `JOINTS`, and of each device."""
         self._rows: dict[str, list[int]] = {}
-        """The joints of each body: those of `JOINTS`, and one for each device."""
+        """The joints of each body."""
         self._devices: dict[str, int] = {}
         self._known = {0}
         """Joints that were ever said."""
         self._said: set[int] = set()
-        """Those of this frame."""
+        """Those of this frame, and when it began."""
         self._begun = 0.0
-        self._samples: deque[tuple[float, np.ndarray, np.ndarray]] = deque(maxlen=MOST_SAMPLES)
-        self._unkept: deque[tuple[float, np.ndarray, np.ndarray]] = deque(maxlen=MOST_SAMPLES)
+        self._samples: deque[tuple[float, Poses]] = deque(maxlen=MOST_SAMPLES)
+        self._unkept: deque[tuple[float, Poses]] = deque(maxlen=MOST_SAMPLES)
         self._has_time = False
 
     def hear(self, message: Message, arrival: float) -> None:
         """Take one message."""
-        arguments = message.arguments
-        if message.address == "/VMC/Ext/Bone/Pos" and arguments and arguments[0] in NUMBERS:
-            self._place(NUMBERS[arguments[0]], arguments[1:], arrival)
-        elif message.address == "/VMC/Ext/Root/Pos":
-            self._place(0, arguments[1:], arrival)
-        elif message.address in DEVICES and arguments and (joint := self._device(arguments[0])):
-            self._place(joint, arguments[1:], arrival)
-        elif message.address == "/VMC/Ext/T" and len(arguments) == 1 and _is_finite(arguments[0]):
+        address, (name, *numbers) = message.address, message.arguments or (None,)
+        if address == "/VMC/Ext/Bone/Pos" and name in NUMBERS:
+            self._place(NUMBERS[name], numbers, arrival)
+        elif address == "/VMC/Ext/Root/Pos":
+            self._place(0, numbers, arrival)
+        elif address in DEVICES and (joint := self._device(name)):
+            self._place(joint, numbers, arrival)
+        elif address == "/VMC/Ext/T" and not numbers and isinstance(name, float | int) and math.isfinite(name):
             self._has_time = True
-            self._sample(float(cast(float, arguments[0])), arrival)
+            self._sample(float(name), arrival)
 
     def _device(self, serial: object) -> int | None:
         """Return the joint of a device; None for what is no name, and for too many."""
-        if not isinstance(serial, str):
-            return None
-        if serial not in self._devices:
+        if isinstance(serial, str) and serial not in self._devices:
             is_name = serial != PERFORMER and 0 < len(serial.encode()) <= LONGEST_NAME
-            if not is_name or len(self._devices) == MOST_DEVICES:
-                return None
-            self._devices[serial] = len(JOINTS) + len(self._devices)
-        return self._devices[serial]
+            if is_name and len(self._devices) < MOST_DEVICES:
+                self._devices[serial] = len(JOINTS) + len(self._devices)
+        return self._devices.get(serial) if isinstance(serial, str) else None
 
-    def _place(self, joint: int, numbers: tuple[Any, ...], arrival: float) -> None:
+    def _place(self, joint: int, numbers: list[Any], arrival: float) -> None:
         try:
             x, y, z, w = numbers[3:7]
             length = math.sqrt(x * x + y * y + z * z + w * w)
@@ -232,61 +209,49 @@ class _Source:
         if not self._said:
             self._begun = arrival
         self._said.add(joint)
-        self._positions[joint] = numbers[:3]
-        self._quaternions[joint] = w / length, x / length, y / length, z / length
+        self._unity.positions[joint] = numbers[:3]
+        self._unity.quaternions[joint] = w / length, x / length, y / length, z / length
 
     def _sample(self, moment: float, arrival: float) -> None:
         """Take the frame that is complete."""
         if not self._said - {0}:
             return
+        poses = from_unity(self._unity)
         if new := self._said - self._known:
             self._known |= new
-            self._describe(new)
+            self._describe(new, poses)
         self._said = set()
         last = self._samples[-1][0] if self._samples else -np.inf
         if abs(moment - last) > SET:
             self._samples.clear()
         elif moment <= last:
             return
-        poses = from_unity(Poses(self._positions, self._quaternions))
-        sample = moment, poses.positions, poses.quaternions
-        self._samples.append(sample)
-        self._unkept.append(sample)
+        self._samples.append((moment, poses))
+        self._unkept.append((moment, poses))
         self._playing.heard(moment, arrival)
         self.heard = arrival
 
-    def _describe(self, new: set[int]) -> None:
+    def _describe(self, new: set[int], poses: Poses) -> None:
         """Have bodies for joints that were never said before; the others stay the same."""
         bodies = {body.name: body for body in self.bodies}
         if min(new) < len(JOINTS):
-            bodies = {PERFORMER: self._performer()} | {name: it for name, it in bodies.items() if name != PERFORMER}
-        places = from_unity(Poses(self._positions, self._quaternions))
+            rows = self._rows[PERFORMER] = sorted(joint for joint in self._known if joint < len(JOINTS))
+            names = [JOINTS[joint] for joint in rows]
+            rest = Poses(poses.positions[rows], np.tile((1.0, 0.0, 0.0, 0.0), (len(names), 1)))
+            sliding = np.array([name in (ROOT, "Hips") for name in names])
+            performer = Body(PERFORMER, tuple(names), np.array(_parents(names)), rest, sliding=sliding)
+            bodies.pop(PERFORMER, None)
+            bodies = {PERFORMER: performer, **bodies}
         for serial, joint in self._devices.items():
             if joint in new:
-                bodies[serial] = Body.rigid(serial, places[joint : joint + 1])
-                self._rows[serial] = [joint]
+                bodies[serial], self._rows[serial] = Body.rigid(serial, poses[joint : joint + 1]), [joint]
         self.bodies = tuple(bodies.values())
 
-    def _performer(self) -> Body:
-        rows = self._rows[PERFORMER] = sorted(joint for joint in self._known if joint < len(JOINTS))
-        names = [JOINTS[joint] for joint in rows]
-        rest = from_unity(Poses(self._positions[rows], np.tile((1.0, 0.0, 0.0, 0.0), (len(names), 1))))
-        parents = []
-        for name in names:
-            above = PARENTS[name]
-            while above and above not in names:
-                above = PARENTS[above]
-            parents.append(names.index(above) if above else -1)
-        sliding = np.array([name in (ROOT, "Hips") for name in names])
-        return Body(PERFORMER, tuple(names), np.array(parents), rest, sliding=sliding)
-
-    def _poses(self, positions: np.ndarray, quaternions: np.ndarray) -> dict[str, Poses]:
-        """Of each body, of arrays (n, all joints, ...)."""
-        return {
-            body.name: Poses(positions[..., rows, :], quaternions[..., rows, :])
-            for body in self.bodies
-            for rows in (self._rows[body.name],)
-        }
+    def _of_bodies(self, samples: Iterable[tuple[float, Poses]]) -> tuple[np.ndarray, dict[str, Poses]]:
+        """Return the moments (n,) of samples, and poses (joints, n) of each body."""
+        moments, poses = zip(*samples, strict=True)
+        every = joined([own[:, None] for own in poses], axis=1)
+        return np.array(moments), {body.name: every[self._rows[body.name]] for body in self.bodies}
 
     def show(self, now: float) -> Shown | None:
         moment = self._playing.moment(now)
@@ -294,19 +259,12 @@ class _Source:
             return None
         while len(self._samples) > 2 and self._samples[1][0] <= moment:
             self._samples.popleft()
-        few = [self._samples[0], self._samples[min(1, len(self._samples) - 1)]][: len(self._samples)]
-        moments, positions, quaternions = (np.array(part) for part in zip(*few, strict=True))
-        still = np.zeros_like(self._positions)
-        poses = Path(moments, positions, quaternions, still, still).at(np.array([moment]))[:, 0]
-        return Shown(moment, self._poses(poses.positions, poses.quaternions))
+        moments, bodies = self._of_bodies(islice(self._samples, 2))
+        return Shown(moment, {name: Path(moments, poses).pose(moment) for name, poses in bodies.items()})
 
-    def keys(self, stream: Stream) -> Keys:
+    def keys(self) -> tuple[np.ndarray, dict[str, Poses]]:
         if not self._unkept:
-            return Keys(stream, np.empty(0), {})
-        moments, positions, quaternions = (np.array(part) for part in zip(*self._unkept, strict=True))
+            return np.empty(0), {}
+        moments, bodies = self._of_bodies(self._unkept)
         self._unkept.clear()
-        return Keys(stream, moments, self._poses(positions, quaternions))
-
-
-def _is_finite(number: object) -> bool:
-    return isinstance(number, float | int) and math.isfinite(number)
+        return moments, {name: transposed(poses) for name, poses in bodies.items()}

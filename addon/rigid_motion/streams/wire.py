@@ -9,32 +9,37 @@ import math
 import struct
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ..motion import Poses
 from .bodies import MOST_JOINTS, Body, Forest
 
-VERSION = 1
+VERSION = 2
 
 TICKS = 3600
 """A second, in the unit of all times on the wire: whole numbers of it are the frames of 24, 25, 30, 60, 72, 90, 120."""
 
-DESCRIPTION, MOTION, LATE, ANSWER = range(4)
-"""Kinds of datagrams. `LATE` is a motion that was sent later than at the end of its window."""
+DESCRIPTION, MOTION, LATE, ANSWER, NEXT = range(5)
+"""Kinds of datagrams. `LATE` is a motion that was sent later than at the end of its window, and `NEXT` one that builds
+on the message before."""
 
 HEAD = struct.Struct("<B3s")
 """Version and kind; identity."""
 
-MOTION_HEAD = struct.Struct("<B3sHHB")
-"""Version and kind; identity; sequence; ticks of the end of the window; by how much to go back for the base, or 0."""
+MOTION_HEAD = struct.Struct("<B3sHH")
+"""Version and kind; identity; sequence; ticks of the end of the window. Behind it, but for `NEXT`, is a byte: by how
+much to go back for the base, or 0."""
 
 DESCRIPTION_HEAD = struct.Struct("<B3sBBQ")
 """Version and kind; identity; number of the piece; pieces; the sender's ticks."""
 
 TERMS = struct.Struct("<IHHB")
 """Tolerance in micrometres; delay and grid in ticks; bodies."""
+
+BODY, JOINT = struct.Struct("<IH"), struct.Struct("<hB7f")
+"""Behind their names: radius in micrometres and joints; parent, whether it slides, and the pose at rest."""
 
 ENTRY = struct.Struct("<3sHIB")
 """Of an answer: identity; newest sequence; which of the 32 before it there are; what is missing."""
@@ -47,7 +52,7 @@ LONGEST = 65_000
 UNCUT = 1200
 """Bytes of a datagram that no network cuts up: so long are descriptions and answers at most, and most messages."""
 
-MOST_PIECES = 64
+MOST_PIECES, MOST_ENTRIES = 64, (UNCUT - HEAD.size) // ENTRY.size
 
 MOST_TICKS = 1 << 48
 """Of a sender's clock: seconds as floats still tell ticks apart."""
@@ -59,8 +64,7 @@ LONGEST_DELAY = 8 * TICKS
 """Half of what 16 bits of ticks can tell apart is more."""
 
 
-@dataclass(frozen=True)
-class Terms:
+class Terms(NamedTuple):
     """What sender and receivers agree on."""
 
     tolerance: int
@@ -78,8 +82,7 @@ class Terms:
         return max((self.delay - 1) // self.grid, 0)
 
 
-@dataclass(frozen=True)
-class Motion:
+class Motion(NamedTuple):
     """A message, not yet decoded."""
 
     identity: bytes
@@ -91,8 +94,7 @@ class Motion:
     late: bool
 
 
-@dataclass(frozen=True)
-class Piece:
+class Piece(NamedTuple):
     """Of a description."""
 
     identity: bytes
@@ -102,8 +104,7 @@ class Piece:
     data: bytes
 
 
-@dataclass(frozen=True)
-class Entry:
+class Entry(NamedTuple):
     """What an answer says of one stream."""
 
     identity: bytes
@@ -115,42 +116,38 @@ class Entry:
     def has(self, sequence: int) -> bool:
         """Whether a sequence is there, as far as this says."""
         back = (self.newest - sequence) & 0xFFFF
-        return not self.needs & NEEDS_DESCRIPTION and (
-            back == 0 or (back <= 32 and bool(self.before >> (back - 1) & 1))
-        )
+        there = (self.before << 1 | 1) >> back & 1 if back <= 32 else 0
+        return bool(there) and not self.needs & NEEDS_DESCRIPTION
 
 
 def kind_of(datagram: bytes) -> int | None:
     """Return the kind of a datagram of this version, or None."""
-    if len(datagram) < HEAD.size or len(datagram) > LONGEST or datagram[0] >> 4 != VERSION:
+    if not HEAD.size <= len(datagram) <= LONGEST or datagram[0] >> 4 != VERSION:
         return None
     return datagram[0] & 15
 
 
-def _first(kind: int) -> int:
-    return VERSION << 4 | kind
-
-
 def motion(identity: bytes, sequence: int, ticks: int, back: int, payload: bytes, late: bool = False) -> bytes:
     """Return the datagram of a message."""
-    return MOTION_HEAD.pack(_first(LATE if late else MOTION), identity, sequence, ticks & 0xFFFF, back) + payload
+    kind = LATE if late else NEXT if back == 1 else MOTION
+    head = MOTION_HEAD.pack(VERSION << 4 | kind, identity, sequence, ticks & 0xFFFF)
+    return head + (b"" if kind == NEXT else bytes([back])) + payload
 
 
 def read_motion(datagram: bytes) -> Motion | None:
     """Return a message, or None."""
-    if len(datagram) < MOTION_HEAD.size:
+    kind = kind_of(datagram)
+    size = MOTION_HEAD.size + (kind != NEXT)
+    if len(datagram) < size:
         return None
-    _, identity, sequence, ticks, back = MOTION_HEAD.unpack_from(datagram)
-    return Motion(identity, sequence, ticks, back, datagram[MOTION_HEAD.size :], datagram[0] & 15 == LATE)
+    _, identity, sequence, ticks = MOTION_HEAD.unpack_from(datagram)
+    back = 1 if kind == NEXT else datagram[size - 1]
+    return Motion(identity, sequence, ticks, back, datagram[size:], kind == LATE)
 
 
 def answer(receiver: bytes, entries: Sequence[Entry]) -> bytes:
     """Return the datagram of an answer."""
-    parts = [ENTRY.pack(entry.identity, entry.newest, entry.before, entry.needs) for entry in entries]
-    return HEAD.pack(_first(ANSWER), receiver) + b"".join(parts)
-
-
-MOST_ENTRIES = (UNCUT - HEAD.size) // ENTRY.size
+    return HEAD.pack(VERSION << 4 | ANSWER, receiver) + b"".join(ENTRY.pack(*entry) for entry in entries)
 
 
 def read_answer(datagram: bytes) -> tuple[bytes, list[Entry]] | None:
@@ -162,18 +159,17 @@ def read_answer(datagram: bytes) -> tuple[bytes, list[Entry]] | None:
 
 def describe(identity: bytes, ticks: int, forest: Forest, terms: Terms) -> list[bytes]:
     """Return the datagrams of a description."""
-    parts = [TERMS.pack(terms.tolerance, terms.delay, terms.grid, len(forest.bodies))]
+    parts = [TERMS.pack(*terms, len(forest.bodies))]
     for body in forest.bodies:
         assert body.sliding is not None
-        parts += [_named(body.name), struct.pack("<IH", round(body.radius * 1e6), len(body.joints))]
-        for joint, parent in enumerate(body.parents.tolist()):
-            parts += [_named(body.joints[joint]), struct.pack("<hB", parent, int(body.sliding[joint]))]
-            parts.append(struct.pack("<7f", *body.rest.positions[joint], *body.rest.quaternions[joint]))
+        parts += [_named(body.name), BODY.pack(round(body.radius * 1e6), len(body.joints))]
+        for name, parent, slides, rest in zip(body.joints, body.parents, body.sliding, body.rest, strict=True):
+            parts += [_named(name), JOINT.pack(parent, int(slides), *rest.positions, *rest.quaternions)]
     packed = zlib.compress(b"".join(parts), 9)
     size = UNCUT - DESCRIPTION_HEAD.size
     cut = [packed[at : at + size] for at in range(0, len(packed), size)]
     return [
-        DESCRIPTION_HEAD.pack(_first(DESCRIPTION), identity, number, len(cut), ticks) + piece
+        DESCRIPTION_HEAD.pack(VERSION << 4 | DESCRIPTION, identity, number, len(cut), ticks) + piece
         for number, piece in enumerate(cut)
     ]
 
@@ -183,9 +179,8 @@ def read_piece(datagram: bytes) -> Piece | None:
     if len(datagram) <= DESCRIPTION_HEAD.size:
         return None
     _, identity, number, pieces, ticks = DESCRIPTION_HEAD.unpack_from(datagram)
-    if not number < pieces <= MOST_PIECES or ticks >= MOST_TICKS:
-        return None
-    return Piece(identity, number, pieces, ticks, datagram[DESCRIPTION_HEAD.size :])
+    piece = Piece(identity, number, pieces, ticks, datagram[DESCRIPTION_HEAD.size :])
+    return piece if piece.number < piece.pieces <= MOST_PIECES and piece.ticks < MOST_TICKS else None
 
 
 def read_description(packed: bytes) -> tuple[Forest, Terms] | None:
@@ -193,41 +188,38 @@ def read_description(packed: bytes) -> tuple[Forest, Terms] | None:
     try:
         unpacking = zlib.decompressobj()
         data = unpacking.decompress(packed, MOST_DESCRIBED)
-        if not unpacking.eof:
-            return None
-        return _described(data)
+        return _described(data) if unpacking.eof else None
     except (zlib.error, struct.error, ValueError, IndexError):
         return None
 
 
-def _described(data: bytes) -> tuple[Forest, Terms] | None:
+def _described(data: bytes) -> tuple[Forest, Terms]:
     *numbers, count = TERMS.unpack_from(data)
     terms, at = Terms(*numbers), TERMS.size
     if not (terms.tolerance and terms.grid and 0 < terms.delay <= LONGEST_DELAY):
-        return None
+        raise ValueError("such terms are none")
     bodies, total = [], 0
     for _ in range(count):
         name, at = _read_name(data, at)
-        radius, joints = struct.unpack_from("<IH", data, at)
-        at, total = at + 6, total + joints
+        radius, joints = BODY.unpack_from(data, at)
+        at, total, names, rows = at + BODY.size, total + joints, [], []
         if total > MOST_JOINTS:
-            return None
-        names, parents, sliding, rest = [], [], [], []
+            raise ValueError("more joints than there may be")
         for _ in range(joints):
             own, at = _read_name(data, at)
-            parent, slides = struct.unpack_from("<hB", data, at)
-            rest.append(struct.unpack_from("<7f", data, at + 3))
-            at += 31
             names.append(own)
-            parents.append(parent)
-            sliding.append(bool(slides))
-        rows = np.array(rest, dtype=np.float64).reshape(-1, 7)
-        lengths = np.linalg.norm(rows[:, 3:], axis=1)
-        if not (np.abs(rows) < 1e6).all() or not (lengths > 0.5).all():
-            return None
-        poses = Poses(rows[:, :3], rows[:, 3:] / lengths[:, None])
-        bodies.append(Body(name, tuple(names), np.array(parents), poses, radius / 1e6, np.array(sliding)))
-    return (Forest(bodies), terms) if at == len(data) else None
+            rows.append(JOINT.unpack_from(data, at))
+            at += JOINT.size
+        table = np.array(rows, dtype=np.float64).reshape(-1, 9)
+        parents, sliding, rest = table[:, 0], table[:, 1], table[:, 2:]
+        lengths = np.linalg.norm(rest[:, 3:], axis=1)
+        if not (np.abs(rest) < 1e6).all() or not (lengths > 0.5).all():
+            raise ValueError("such a pose at rest is none")
+        poses = Poses(rest[:, :3], rest[:, 3:] / lengths[:, None])
+        bodies.append(Body(name, tuple(names), parents, poses, radius / 1e6, sliding))
+    if at != len(data):
+        raise ValueError("more than there should be")
+    return Forest(bodies), terms
 
 
 def _named(name: str) -> bytes:

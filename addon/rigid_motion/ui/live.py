@@ -12,9 +12,9 @@ from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProper
 
 from ..animation.properties import MODE_ITEMS
 from ..live import receiving, sending
+from ..live.retargeting import matched
 from ..live.sockets import NotAllowed
 from ..streams import Body
-from ..streams.humanoid import matched
 from ..streams.vmc import PORT
 from .panels import CATEGORY
 from .rows import draw_text, labelled

@@ -205,9 +205,9 @@ ENGINES: dict[str, Callable[[Arrivals, np.ndarray], list[Pose]]] = {
 
 def truth_of(times: np.ndarray, hand: Poses) -> Path:
     """Return the hand (n,) and the tool in it, as two joints."""
-    tool = hand.positions + rotate(hand.quaternions, GRIP)
-    turns = align_signs(np.stack((hand.quaternions, hand.quaternions))).swapaxes(0, 1)
-    return Path(times - times[0], np.stack((hand.positions, tool), axis=1), turns, *np.zeros((2, 2, 3)))
+    tool = Poses(hand.positions + rotate(hand.quaternions, GRIP), hand.quaternions)
+    turns = align_signs(np.stack((hand.quaternions, tool.quaternions)))
+    return Path(times - times[0], Poses(np.stack((hand.positions, tool.positions)), turns))
 
 
 def by_engine(engine: str, truth: Path, way: Way, frames: np.ndarray) -> Poses:

@@ -19,16 +19,14 @@ from research.studies import files_in, report
 from rigid_motion.motion import Poses
 from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.coding import TOTAL
-from rigid_motion.streams.knots import State
-from rigid_motion.streams.messages import Said
+from rigid_motion.streams.messages import Said, State
 from rigid_motion.streams.residuals import (
+    COUNT,
     FLAGS,
     HISTORIES,
     KNOT_COUNTS,
     NEIGHBOURS,
     SIZES,
-    TABLES,
-    Counting,
     symbols_of,
 )
 from rigid_motion_batch.cli.stream_measure import body_of, samples_of
@@ -44,6 +42,20 @@ PRIOR = 12.0  # what a table without any counts is worth beside them: as the mea
 
 TABLE_FILE = ROOT / "addon/rigid_motion/streams/tables.py"
 HEAD = '"""Cumulative frequencies of the coder\'s symbols, in the order of `residuals`: made by stream_tables.py."""'
+
+
+class Counting:
+    """A coder that writes nothing, and counts how often each symbol of each table occurs."""
+
+    def __init__(self) -> None:
+        self.counts = [np.zeros(symbols_of(table)) for table in range(COUNT)]
+
+    def symbol(self, table: int, value: int) -> int:
+        self.counts[table][value] += 1
+        return value
+
+    def flat(self, _count: int, value: int) -> int:
+        return value
 
 
 def samples(folder: Path) -> Iterator[tuple[Body, np.ndarray, Poses]]:
@@ -101,11 +113,12 @@ def main(arguments: list[str]) -> int:
     """Count, and write the tables; return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
-    coder = Counting([[0] * symbols_of(table) for table in range(TABLES)])
+    coder = Counting()
     for motion in samples(parser.parse_args(arguments).folder):
         for setting in SETTINGS:
             count(coder, *motion, *setting)
-    tables = map(table_of, probabilities([np.array(table, dtype=np.float64) for table in coder.counts]))
+    tables = map(table_of, probabilities(coder.counts))
     rows = "".join(f"    {table},\n" for table in tables)
-    TABLE_FILE.write_text(f"{HEAD}\n\n# fmt: off\nTABLES: tuple[tuple[int, ...], ...] = (\n{rows})\n", encoding="utf-8")
+    text = f"{HEAD}\n\n# fmt: off\n# ruff: noqa: E501\nTABLES: tuple[tuple[int, ...], ...] = (\n{rows})\n"
+    TABLE_FILE.write_text(text, encoding="utf-8")
     return 0

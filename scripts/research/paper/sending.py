@@ -17,14 +17,14 @@ from rigid_motion.motion import Poses, rms, shell_error
 from rigid_motion.motion.poses import joined
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion.streams import Receiver, Sender
+from rigid_motion.streams.paths import Path
 from rigid_motion.streams.wire import DESCRIPTION, kind_of
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.analysis.needed import part_of
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.streaming.measuring import even_rate, straight
+from rigid_motion_batch.streaming.measuring import HEADERS, even_rate
 from rigid_motion_batch.streaming.packed import CUBE, PLACE_BITS, STAMP, smallest_three
 from rigid_motion_batch.streaming.sending import body_of, samples_of
-from rigid_motion_batch.streaming.transports import HEADERS
 
 from .table import RADIUS, UPDATES, even_points, lowest
 
@@ -70,7 +70,7 @@ def sent(clip: Clip, tolerance: float, delay: float) -> tuple[float, float, floa
         post(sender.add(moment, poses[:, sample]), moment)
     post(sender.finish(), float(times[-1]))
     draw(np.inf)
-    truth = straight(times, poses).at([it.moment for it in shown])[0]
+    truth = Path(times, poses).at(np.array([it.moment for it in shown]))[0]
     error = rms(shell_error(joined([it.poses[body.name] for it in shown]), truth, RADIUS))
     seconds = float(times[-1] - times[0])
     return len(sizes) / seconds, sum(sizes) / seconds, error

@@ -10,6 +10,7 @@ from contextlib import AbstractContextManager, closing, contextmanager, nullcont
 
 from rigid_motion.motion import rms
 from rigid_motion.streams import Body, Sender
+from rigid_motion.streams.paths import Path
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.command_line import complain, path_line
 from rigid_motion_batch.progress import Progress, Stage
@@ -17,8 +18,8 @@ from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.streaming import vmc
-from rigid_motion_batch.streaming.measuring import straight
-from rigid_motion_batch.streaming.receiving import Handing, Receiving, Tracks, errors
+from rigid_motion_batch.streaming.measuring import HEADERS, errors
+from rigid_motion_batch.streaming.receiving import Receiving
 from rigid_motion_batch.streaming.rooms import (
     EVERYWHERE,
     HERE,
@@ -28,7 +29,6 @@ from rigid_motion_batch.streaming.rooms import (
     opened,
 )
 from rigid_motion_batch.streaming.sending import Sending, play, samples_of, sender_of, together
-from rigid_motion_batch.streaming.transports import HEADERS
 from rigid_motion_batch.streaming.written import Motion, write_motions
 from rigid_motion_batch.supervising import report, stop_signals
 
@@ -105,7 +105,7 @@ def send_performer(options: argparse.Namespace, stopped: list[int]) -> None:
     sending: Sending | None = None
     sent: tuple[Body, ...] = ()
     with _room(options) as room, vmc.Performers(options.from_vmc) as performers:
-        _say(f"{options.user} listens to port {performers.port} and sends to {options.room}")
+        _say(f"{options.user} listens to port {performers.number} and sends to {options.room}")
         while not stopped:
             for bodies, moments, poses in performers.samples():
                 if sending is None:
@@ -121,7 +121,7 @@ def send_performer(options: argparse.Namespace, stopped: list[int]) -> None:
                 if sending:
                     sending.take(came, time.monotonic() + ahead)
         if sending is None:
-            raise RoomError(f"nothing came by VMC at port {performers.port}; give the other program this port")
+            raise RoomError(f"nothing came by VMC at port {performers.number}; give the other program this port")
         room.leave(options.user, MOTION)
         _say(f"datagrams: {sending.datagrams}", f"bytes: {sending.bytes}")
 
@@ -129,14 +129,12 @@ def send_performer(options: argparse.Namespace, stopped: list[int]) -> None:
 def receive(options: argparse.Namespace, stopped: list[int]) -> None:
     """Show what comes. Raises what says why there is nothing."""
     truth = _read([options.truth], options)[0] if options.truth else None
-    handing = Handing(*options.to_blender) if options.to_blender else None
+    keeps = bool(options.output or truth)
     with (
         _room(options) as room,
         Progress() as progress,
-        closing(handing) if handing else nullcontext(),
+        closing(Receiving(room, options.user, options.fps, options.margin, options.to_blender, keeps)) as receiving,
     ):
-        keeps = bool(options.output or truth)
-        receiving = Receiving(room, options.user, options.fps, options.margin, handing, keeps)
         if options.to_vmc:
             receiving.on_frame.append(vmc.ToVmc(receiving.receiver, options.to_vmc))
         _say(f"{options.user} listens in {options.room}")
@@ -149,12 +147,12 @@ def receive(options: argparse.Namespace, stopped: list[int]) -> None:
                 stage.total = max(stage.done, 1e-9)
     for user, datagrams in receiving.datagrams.items():
         _say(f"{user}: {datagrams} datagrams, {receiving.bytes[user]} bytes")
-    motions = _motions(receiving.shown)
+    motions = receiving.shown.motions()
     if not (motions if keeps else receiving.datagrams):
         came = "nothing that could be shown came" if receiving.datagrams else f"nobody sent anything in {options.room}"
         raise RoomError(f"{came}, so nothing is written; see --room and --at of the sender")
     if options.mode:
-        motions = [motion.even(options.mode, options.fps) for motion in _motions(receiving.keys)]
+        motions = [motion.even(options.mode, options.fps) for motion in receiving.keys.motions()]
     for motion in motions:
         _say(f"{motion.name}: {len(motion.times)} poses{_error(motion, truth)}")
     if options.output:
@@ -213,14 +211,6 @@ def _read(recordings: list[str], options: argparse.Namespace) -> list[Clip]:
     return clips
 
 
-def _motions(tracks: Tracks) -> list[Motion]:
-    return [
-        Motion(f"{track.user}-{track.body.name}", track.body, *track.samples())
-        for track in tracks.values()
-        if len(track.moments) > 1
-    ]
-
-
 def _error(motion: Motion, truth: Clip | None) -> str:
     """Return how far off a motion is, as text; nothing where the truth has other joints."""
     if truth is None:
@@ -229,7 +219,7 @@ def _error(motion: Motion, truth: Clip | None) -> str:
     within = (motion.times >= times[0]) & (motion.times <= times[-1])
     if len(motion.body.joints) != len(poses) or not within.any():
         return ", which are not those of --truth"
-    off = errors(motion.body, motion.poses[:, within], straight(times, poses).at(motion.times[within]))
+    off = errors(motion.body, motion.poses[:, within], Path(times, poses).at(motion.times[within])).max(axis=0)
     return f", error {1000.0 * rms(off):.2f} mm RMS, {1000.0 * float(off.max()):.2f} mm at most"
 
 

@@ -17,19 +17,20 @@ import numpy as np
 from rigid_motion.motion import Poses, rms
 from rigid_motion.motion.quaternions import align_signs
 from rigid_motion.streams import Body
-from rigid_motion.streams.bodies import RADIUS, Forest
+from rigid_motion.streams.bodies import RADIUS
+from rigid_motion.streams.paths import Path as Samples
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.metrics import write_poses
 from rigid_motion_batch.axes import from_blender
 from rigid_motion_batch.command_line import bounded, path_line
 from rigid_motion_batch.files import replacing
 from rigid_motion_batch.recordings import TrajectoryError
+from rigid_motion_batch.recordings.bvh_writing import write_bvh
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.streaming.measuring import Link, Measured, measure, straight
-from rigid_motion_batch.streaming.packed import WAYS, bytes_a_second, errors
+from rigid_motion_batch.streaming.measuring import Cost, Link, measure
+from rigid_motion_batch.streaming.packed import WAYS
 from rigid_motion_batch.streaming.sending import body_of, samples_of
-from rigid_motion_batch.streaming.written import write_bvh
 
 EPILOG = """
 examples:
@@ -75,14 +76,14 @@ def run(options: argparse.Namespace) -> None:
     if options.output and (options.output.suffix.lower() == ".bvh") != (clip.rest_body is not None):
         raise ValueError(f"{options.output}: a body is written as .bvh, a single rigid body as .csv")
     link = Link(options.latency, options.jitter, options.loss)
-    result = measure(body, times, poses, tolerance, options.delay, link, not options.no_answers)
+    cost, shown = measure(body, times, poses, tolerance, options.delay, link, not options.no_answers)
     beside = packed(body, times, poses)
     if options.output:
-        write(options.output, clip, body, times, result.shown)
+        write(options.output, clip, body, times, shown)
     if options.json:
-        print(json.dumps({"recording": clip.name, **asdict(result.cost), "beside": beside}, indent=2))
+        print(json.dumps({"recording": clip.name, **asdict(cost), "beside": beside}, indent=2))
         return
-    for line in lines(result, beside, tolerance):
+    for line in lines(cost, beside, tolerance):
         print(line)
     if options.output:
         print(path_line(options.output))
@@ -90,11 +91,10 @@ def run(options: argparse.Namespace) -> None:
 
 def packed(body: Body, times: np.ndarray, poses: Poses) -> dict[str, dict[str, float]]:
     """Return what even streams of packed joints cost, and how far off they are."""
-    forest, result = Forest([body]), {}
-    samples = straight(times, Poses(poses.positions, align_signs(poses.quaternions)))
+    result, samples = {}, Samples(times, Poses(poses.positions, align_signs(poses.quaternions)))
     for way in WAYS:
-        worst = errors(way, forest, samples).max(axis=0)
-        alone, with_headers = bytes_a_second(way, forest)
+        worst = way.errors(body, samples).max(axis=0)
+        alone, with_headers = way.bytes_a_second(body)
         result[way.label] = {
             "bytes_a_second": alone,
             "bytes_a_second_with_headers": with_headers,
@@ -115,9 +115,8 @@ def write(path: Path, clip: Clip, body: Body, times: np.ndarray, shown: Poses) -
             write_bvh(file, clip.rest_body, cast(np.ndarray, body.sliding), times, there)
 
 
-def lines(result: Measured, beside: dict[str, dict[str, float]], tolerance: float) -> list[str]:
+def lines(cost: Cost, beside: dict[str, dict[str, float]], tolerance: float) -> list[str]:
     """Return the numbers as text."""
-    cost = result.cost
     rows = [
         f"datagrams: {cost.datagrams}, of which {cost.lost} were lost, in {cost.seconds:.2f} s",
         f"to join: {cost.joining_bytes} bytes",

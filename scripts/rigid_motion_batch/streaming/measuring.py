@@ -9,20 +9,25 @@ from __future__ import annotations
 
 import heapq
 import multiprocessing
-from collections.abc import Iterator
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any
 
 import numpy as np
 
-from rigid_motion.motion import Poses, rms, shell_error
+from rigid_motion.live.sockets import Outlet, Port
+from rigid_motion.motion import Poses, rms
+from rigid_motion.motion.poses import joined
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.bodies import Forest
 from rigid_motion.streams.paths import Path
+from rigid_motion.streams.wire import DESCRIPTION, kind_of
 
-from .transports import HEADERS, LOOPBACK, Counted, Udp
+LOOPBACK = "127.0.0.1"
+
+HEADERS = 28
+"""Bytes of UDP and IPv4 in front of every datagram."""
 
 PATIENCE = 30.0
 """Seconds in which the other process has to be there."""
@@ -62,18 +67,6 @@ class Cost:
     """By which the picture was behind."""
 
 
-@dataclass(frozen=True, eq=False)
-class Measured:
-    """What it cost, and what was shown."""
-
-    cost: Cost
-    shown: Poses
-    """At the moments of the samples, shape (joints, n)."""
-    errors: np.ndarray
-    """The error of every joint at every sample that was shown, in metres; NaN before the first picture. Shape
-    (joints, n)."""
-
-
 def measure(
     body: Body,
     times: np.ndarray,
@@ -83,8 +76,8 @@ def measure(
     link: Link = Link(),
     answers: bool = True,
     seed: int = 1,
-) -> Measured:
-    """Send samples (n,) of a body's poses (joints, n), and measure what is shown of them.
+) -> tuple[Cost, Poses]:
+    """Send samples (n,) of a body's poses (joints, n), and return what it costs and what is shown at their moments.
 
     Raises
     ------
@@ -99,18 +92,52 @@ def measure(
     process.start()
     there.close()
     try:
-        port = _answer(here)
-        with Udp((LOOPBACK, port)) as socket:
-            wire = Counted(socket)
-            sender = Sender([body], tolerance, delay, even_rate(times))
-            _send(_Link(wire, socket, here, link, seed), sender, times, poses, delay + link.latency + AFTER)
-            here.send(None)
-        received = _answer(here)
+        with Outlet(LOOPBACK, _answer(here)) as outlet:
+            run = _Run(Sender([body], tolerance, delay, even_rate(times)), outlet, here, link, seed)
+            run.play(times, poses, delay + link.latency + AFTER)
+        here.send(None)
+        moments, drawn, lags, answered = _answer(here)
     finally:
         here.close()
         process.join(AFTER)
         process.terminate()
-    return _measured(body, times, poses, tolerance, wire, received)
+    if not len(moments):
+        raise RuntimeError("nothing was shown: no datagram came through")
+    moments, first = np.unique(moments, return_index=True)
+    shown = Path(moments, Poses(drawn.positions[:, first], normalise(drawn.quaternions[:, first]))).at(times)
+    compared = times >= moments[0] - 1e-6
+    off = errors(body, shown[:, compared], poses[:, compared]).max(axis=0)
+    seconds = float(times[-1] - times[0])
+    joining = [datagram for datagram in run.sent if kind_of(datagram) == DESCRIPTION]
+    joining_bytes = sum(map(len, joining))
+    a_second = (sum(map(len, run.sent)) - joining_bytes) / seconds
+    cost = Cost(
+        seconds=seconds,
+        datagrams=len(run.sent),
+        lost=run.lost,
+        joining_bytes=joining_bytes + HEADERS * len(joining),
+        bytes_a_second=a_second,
+        bytes_a_second_with_headers=a_second + HEADERS * (len(run.sent) - len(joining)) / seconds,
+        answers_a_second=answered / seconds,
+        rms_mm=1000.0 * rms(off),
+        largest_mm=1000.0 * float(off.max()),
+        share_within_tolerance=float(np.mean(off <= tolerance)),
+        share_within_20_mm=float(np.mean(off <= 0.02)),
+        delay_s=float(np.median(lags)),
+    )
+    return cost, shown
+
+
+def errors(body: Body, shown: Poses, truth: Poses) -> np.ndarray:
+    """Return how far off any point of each joint's ball is at most, of poses (joints, n), shape (joints, n)."""
+    forest = Forest([body])
+    return forest.errors(shown, forest.skeleton.in_root_space(truth))
+
+
+def even_rate(times: np.ndarray) -> float | None:
+    """Return samples a second, where they are even."""
+    rate = 1.0 / float(np.median(np.diff(times)))
+    return float(round(rate)) if abs(rate - round(rate)) < 0.01 else None
 
 
 def _answer(pipe: Connection) -> Any:
@@ -122,60 +149,51 @@ def _answer(pipe: Connection) -> Any:
         raise RuntimeError("the receiver's process ended") from None
 
 
-class _Link:
-    """The way to the receiver's process and back: datagrams over UDP, and by a pipe what time it is."""
+class _Run:
+    """A sender, and the way to the receiver's process and back: datagrams over UDP, and by a pipe what time it is."""
 
-    def __init__(self, wire: Counted, socket: Udp, pipe: Connection, link: Link, seed: int) -> None:
-        self._wire, self._socket, self._pipe, self._link = wire, socket, pipe, link
+    def __init__(self, sender: Sender, outlet: Outlet, pipe: Connection, link: Link, seed: int) -> None:
+        self._sender, self._outlet, self._pipe, self._link = sender, outlet, pipe, link
         self._random = np.random.default_rng(seed)
         self._on_the_way: list[tuple[float, int, bytes, bool]] = []
-        self._count = 0
+        self._count = self.lost = 0
+        self.sent: list[bytes] = []
+        """All, whether or not they arrive."""
 
-    def post(self, datagram: bytes, now: float, back: bool = False) -> None:
-        """Give a datagram to the link, to the receiver or back."""
-        if not back:
-            self._wire.count(datagram)
-        if self._random.random() < self._link.loss:
-            self._wire.lost += not back
-            return
-        takes = self._link.latency + self._link.jitter * self._random.random()
-        self._count += 1
-        heapq.heappush(self._on_the_way, (now + takes, self._count, datagram, back))
+    def play(self, times: np.ndarray, poses: Poses, after: float) -> None:
+        """Play samples, by the clock of the recording."""
+        for sample, moment in enumerate(times.tolist()):
+            while (due := self._sender.next) < moment:
+                self._until(due)
+                self._post(self._sender.poll(due), due)
+            self._until(moment)
+            self._post(self._sender.add(moment, poses[:, sample]), moment)
+            self._until(moment)
+        self._post(self._sender.finish(), float(times[-1]))
+        self._until(float(times[-1]) + after)
 
-    def until(self, now: float) -> Iterator[tuple[float, bytes]]:
-        """Let come what comes by a time: what is for the receiver goes there, what comes back is returned."""
+    def _post(self, datagrams: list[bytes], now: float, back: bool = False) -> None:
+        """Give datagrams to the link, to the receiver or back."""
+        for datagram in datagrams:
+            self.sent += [] if back else [datagram]
+            if self._random.random() < self._link.loss:
+                self.lost += not back
+                continue
+            takes = self._link.latency + self._link.jitter * self._random.random()
+            self._count += 1
+            heapq.heappush(self._on_the_way, (now + takes, self._count, datagram, back))
+
+    def _until(self, now: float) -> None:
+        """Let come what comes by a time."""
         while self._on_the_way and self._on_the_way[0][0] <= now:
             arrival, _, datagram, back = heapq.heappop(self._on_the_way)
             if back:
-                yield arrival, datagram
+                self._post(self._sender.hear(datagram, arrival), arrival)
                 continue
-            self._wire.send(datagram)
+            self._outlet.say(datagram)
             self._pipe.send(arrival)
-            for _ in range(_answer(self._pipe)):
-                for answer in self._socket.awaited(PATIENCE):
-                    self.post(answer, arrival, back=True)
-
-
-def _send(link: _Link, sender: Sender, times: np.ndarray, poses: Poses, after: float) -> None:
-    """Play samples, by the clock of the recording."""
-
-    def hear(now: float) -> None:
-        for arrival, answer in link.until(now):
-            post(sender.hear(answer, arrival), arrival)
-
-    def post(datagrams: list[bytes], now: float) -> None:
-        for datagram in datagrams:
-            link.post(datagram, now)
-
-    for sample, moment in enumerate(times.tolist()):
-        while (due := sender.next) < moment:
-            hear(due)
-            post(sender.poll(due), due)
-        hear(moment)
-        post(sender.add(moment, poses[:, sample]), moment)
-        hear(moment)
-    post(sender.finish(), float(times[-1]))
-    hear(float(times[-1]) + after)
+            replies = self._outlet.received(PATIENCE) if _answer(self._pipe) else []
+            self._post([answer for answer, _ in replies], arrival, back=True)
 
 
 def _receive(pipe: Connection, times: np.ndarray, answers: bool) -> None:
@@ -186,75 +204,25 @@ def _receive(pipe: Connection, times: np.ndarray, answers: bool) -> None:
     def draw(until: float) -> None:
         due = now
         while len(frames) < len(times):
-            following = times[len(frames)]
-            due = max(due, min((receiver.due(stream, following) for stream in receiver.streams), default=np.inf))
+            due = max(due, receiver.due(times[len(frames)]))
             if due > until:
                 return
             # Nothing where the motion of that moment was over when the first datagram came.
             shown = next(iter(receiver.show(due).values()), None)
             frames.append((shown.moment, due - shown.moment, *shown.poses.values()) if shown else None)
 
-    with Udp() as socket:
-        pipe.send(socket.port)
+    with Port() as port:
+        pipe.send(port.number)
         while (arrival := pipe.recv()) is not None:
             draw(arrival)
-            for datagram in socket.awaited(PATIENCE):
-                receiver.take(datagram, arrival, LOOPBACK)
-            now = max(now, arrival)
-            replies = [answer for _, answer in receiver.answers()] if answers else []
-            for answer in replies:
-                socket.send(answer)
+            for datagram, source in port.received(PATIENCE):
+                receiver.take(datagram, arrival, source)
+            now, replies = max(now, arrival), receiver.answers() if answers else []
+            for _, answer in replies:
+                port.send(answer, source)
                 answered += HEADERS + len(answer)
-            pipe.send(len(replies))
+            pipe.send(bool(replies))
         draw(np.inf)
     drawn = [frame for frame in frames if frame]
-    moments, lags = (np.array([frame[number] for frame in drawn]) for number in (0, 1))
-    positions = np.array([frame[2].positions for frame in drawn])
-    quaternions = np.array([frame[2].quaternions for frame in drawn])
-    pipe.send((moments, positions, quaternions, lags, answered))
-
-
-def even_rate(times: np.ndarray) -> float | None:
-    """Return samples a second, where they are even."""
-    rate = 1.0 / float(np.median(np.diff(times)))
-    return float(round(rate)) if abs(rate - round(rate)) < 0.01 else None
-
-
-def straight(times: np.ndarray, poses: Poses) -> Path:
-    """Return samples (joints, n) with the straight way between them."""
-    still = np.zeros((poses.shape[0], 3))
-    return Path(times, poses.positions.swapaxes(0, 1), poses.quaternions.swapaxes(0, 1), still, still)
-
-
-def _measured(
-    body: Body, times: np.ndarray, poses: Poses, tolerance: float, wire: Counted, received: tuple
-) -> Measured:
-    """Compare what was shown with what was recorded."""
-    moments, positions, quaternions, lags, answered = received
-    if not len(moments):
-        raise RuntimeError("nothing was shown: no datagram came through")
-    moments, first = np.unique(moments, return_index=True)
-    still = np.zeros_like(positions[0])
-    shown = Path(moments, positions[first], normalise(quaternions[first]), still, still).at(times)
-    forest = Forest([body])
-    skeleton = forest.skeleton
-    errors = shell_error(skeleton.in_root_space(shown), skeleton.in_root_space(poses), forest.radii[:, None])
-    errors[:, times < moments[0] - 1e-6] = np.nan
-    drawn = np.nanmax(errors[:, times >= moments[0] - 1e-6], axis=0)
-    seconds = float(times[-1] - times[0])
-    motion = wire.datagrams - wire.joining_datagrams, wire.bytes - wire.joining_bytes
-    cost = Cost(
-        seconds=seconds,
-        datagrams=wire.datagrams,
-        lost=wire.lost,
-        joining_bytes=wire.joining_bytes + HEADERS * wire.joining_datagrams,
-        bytes_a_second=motion[1] / seconds,
-        bytes_a_second_with_headers=(motion[1] + HEADERS * motion[0]) / seconds,
-        answers_a_second=answered / seconds,
-        rms_mm=1000.0 * rms(drawn),
-        largest_mm=1000.0 * float(drawn.max()),
-        share_within_tolerance=float(np.mean(drawn <= tolerance)),
-        share_within_20_mm=float(np.mean(drawn <= 0.02)),
-        delay_s=float(np.median(lags)),
-    )
-    return Measured(cost, shown, errors)
+    shown = joined([poses[:, None] for *_, poses in drawn], axis=1) if drawn else None
+    pipe.send((np.array([frame[0] for frame in drawn]), shown, [frame[1] for frame in drawn], answered))

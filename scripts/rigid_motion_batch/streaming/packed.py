@@ -10,40 +10,48 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigid_motion.motion import shell_error
+from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import normalise
-from rigid_motion.streams.bodies import Forest
+from rigid_motion.streams import Body
 from rigid_motion.streams.paths import Path
 
-from .transports import HEADERS
+from .measuring import HEADERS, errors
 
 STAMP = 5
 """Bytes of a datagram that say whose it is, and when: as few as will do."""
 
-PLACE_BITS = 16
-"""The bits of each coordinate of a place that is packed, over a cube of 8 metres."""
-
-CUBE = 8.0
+PLACE_BITS, CUBE = 16, 8.0
+"""The bits of each coordinate of a place that is packed, over a cube of so many metres."""
 
 
 @dataclass(frozen=True)
 class Packed:
-    """A way of sending all joints, so often."""
+    """A way of sending all joints, so often, and the bits of each component of a quaternion; None for floats."""
 
     label: str
-
     rate: float
-
     bits: int | None
-    """The bits of each of three components of a quaternion; None for floats."""
 
-    @property
-    def bits_a_turn(self) -> int:
-        return 128 if self.bits is None else 2 + 3 * self.bits
+    def bytes_a_second(self, body: Body) -> tuple[float, float]:
+        """Return bytes without headers and with them."""
+        turn, place = (128, 96) if self.bits is None else (2 + 3 * self.bits, 3 * PLACE_BITS)
+        size = -(-(len(body.joints) * turn + np.count_nonzero(body.sliding) * place) // 8)
+        return self.rate * size, self.rate * (size + STAMP + HEADERS)
 
-    @property
-    def bits_a_place(self) -> int:
-        return 96 if self.bits is None else 3 * PLACE_BITS
+    def errors(self, body: Body, samples: Path) -> np.ndarray:
+        """Return how far off joints are shown at every sample, shape (joints, n)."""
+        moments = np.arange(samples.moments[0], samples.moments[-1] + 1.0 / self.rate, 1.0 / self.rate)
+        sent = samples.at(np.minimum(moments, samples.moments[-1]))
+        positions, quaternions = sent.positions, normalise(sent.quaternions)
+        if self.bits is None:
+            positions, quaternions = (part.astype(np.float32).astype(np.float64) for part in (positions, quaternions))
+        else:
+            step = CUBE / (2**PLACE_BITS - 1)
+            sliding = np.asarray(body.sliding)[:, None, None]
+            positions = np.where(sliding, np.rint(positions / step) * step, positions)
+            quaternions = smallest_three(quaternions, self.bits)
+        shown = Path(moments, Poses(positions, normalise(quaternions))).at(samples.moments)
+        return errors(body, shown, samples.at(samples.moments))
 
 
 WAYS = (
@@ -52,30 +60,6 @@ WAYS = (
     Packed("29 bits at 30 Hz", 30.0, 9),
     Packed("29 bits at 12 Hz", 12.0, 9),
 )
-
-
-def errors(way: Packed, forest: Forest, samples: Path) -> np.ndarray:
-    """Return how far off joints are shown at every sample, shape (joints, n)."""
-    moments = np.arange(samples.moments[0], samples.moments[-1] + 1.0 / way.rate, 1.0 / way.rate)
-    sent = samples.at(np.minimum(moments, samples.moments[-1]))
-    positions, quaternions = sent.positions.swapaxes(0, 1), normalise(sent.quaternions.swapaxes(0, 1))
-    if way.bits is None:
-        positions, quaternions = (part.astype(np.float32).astype(np.float64) for part in (positions, quaternions))
-    else:
-        step = CUBE / (2**PLACE_BITS - 1)
-        positions = np.where(forest.sliding[:, None], np.rint(positions / step) * step, positions)
-        quaternions = smallest_three(quaternions, way.bits)
-    still = np.zeros(positions.shape[1:])
-    shown = Path(moments, positions, normalise(quaternions), still, still).at(samples.moments)
-    skeleton = forest.skeleton
-    truth = skeleton.in_root_space(samples.at(samples.moments))
-    return shell_error(skeleton.in_root_space(shown), truth, forest.radii[:, None])
-
-
-def bytes_a_second(way: Packed, forest: Forest) -> tuple[float, float]:
-    """Return bytes without headers and with them."""
-    size = -(-(len(forest) * way.bits_a_turn + int(forest.sliding.sum()) * way.bits_a_place) // 8)
-    return way.rate * size, way.rate * (size + STAMP + HEADERS)
 
 
 def smallest_three(quaternions: np.ndarray, bits: int) -> np.ndarray:

@@ -7,14 +7,14 @@ somebody came. Everything stays on loopback, and nobody is looked for, unless mo
 
 from __future__ import annotations
 
-import ipaddress
 import json
 import queue
 import re
-import time
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
+from rigid_motion.live.sockets import is_loopback
 from rigid_motion.streams.wire import LONGEST
 from rigid_motion_batch.places import CHECKOUT
 
@@ -34,14 +34,13 @@ ROOM = re.compile(r"[\w.-]+(/[\w.-]+)*")
 WAIT_MS = 4000
 """For which a router that cannot be reached is tried."""
 
-RETRY = {"period_init_ms": 100, "period_max_ms": 200, "period_increase_factor": 1.5}
-"""Milliseconds between attempts, at first and at most."""
-
-LARGEST = 1 << 16
-"""Bytes of what Zenoh takes from others at once."""
-
-BATCHES = 16
-"""The number that may be on the way out at once before some are dropped: in a room of many each datagram is one."""
+LIMITS = {
+    "connect/retry": {"period_init_ms": 100, "period_max_ms": 200, "period_increase_factor": 1.5},
+    "transport/link/rx/max_message_size": 1 << 16,
+    # So many may be on the way out at once before some are dropped: in a room of many each datagram is one.
+    "transport/link/tx/queue/size/data": 16,
+}
+"""Of Zenoh: the pauses between attempts to connect, and bytes of what is taken from others at once."""
 
 MOST_WAITING = 4096
 """Datagrams that wait to be looked at; others are dropped, as a network does."""
@@ -68,13 +67,9 @@ def locator(address: str) -> str:
     return f"tcp/{address}" if has_port else f"tcp/{address}:{PORT}"
 
 
-def is_loopback(address: str) -> bool:
+def is_local(address: str) -> bool:
     """Return whether an address, as a locator or HOST:PORT, is of this machine alone."""
-    host = re.sub(r"^\w+/|[?#].*$|:\d+([?#].*)?$", "", address).strip("[]")
-    try:
-        return host == "localhost" or ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
+    return is_loopback(re.sub(r"^\w+/|[?#].*$|:\d+([?#].*)?$", "", address).strip("[]"))
 
 
 def settings(role: str, at: str | None, network: bool) -> dict[str, Any]:
@@ -84,17 +79,11 @@ def settings(role: str, at: str | None, network: bool) -> dict[str, Any]:
     """
     everywhere = EVERYWHERE if network else HERE
     place = locator(at or (everywhere if role == "router" else HERE))
-    result: dict[str, Any] = {
-        "mode": role,
-        "scouting/multicast/enabled": network,
-        "connect/retry": RETRY,
-        "transport/link/rx/max_message_size": LARGEST,
-        "transport/link/tx/queue/size/data": BATCHES,
-    }
+    result: dict[str, Any] = {"mode": role, "scouting/multicast/enabled": network, **LIMITS}
     if role == "router":
         return result | {"listen/endpoints": [place]}
     result["connect/endpoints"] = [place]
-    if is_loopback(place):
+    if is_local(place):
         listen = {"listen/endpoints": [place, f"tcp/{everywhere}:0"], "listen/exit_on_failure": False}
         return result | listen | {"connect/timeout_ms": 0, "connect/exit_on_failure": False}
     return result | {"mode": "client", "connect/timeout_ms": WAIT_MS, "connect/exit_on_failure": True}
@@ -116,11 +105,10 @@ def opened(role: str, at: str | None = None, network: bool = False, config: Path
     chosen = settings(role, at, network)
     try:
         text = zenoh.Config.from_file(config) if config else zenoh.Config()
-        if config and not at:
-            side = f"{'listen' if role == 'router' else 'connect'}/endpoints"
-            if text.get_json(side) != zenoh.Config().get_json(side):
-                chosen = settings(role, "the file's", network)
-                del chosen[side]
+        side = f"{'listen' if role == 'router' else 'connect'}/endpoints"
+        if config and not at and text.get_json(side) != zenoh.Config().get_json(side):
+            chosen = settings(role, "the file's", network)
+            del chosen[side]
         for key, value in chosen.items():
             text.insert_json5(key, json.dumps(value))
     except (zenoh.ZError, OSError) as error:
@@ -128,10 +116,9 @@ def opened(role: str, at: str | None = None, network: bool = False, config: Path
     try:
         return zenoh.open(text)
     except zenoh.ZError as error:
+        way = "is its router running, as stream router --network on that machine?"
         if role == "router":
             way = "another program may have this port, or a file is missing"
-        else:
-            way = "is its router running, as stream router --network on that machine?"
         raise RoomError(f"{at or config or HERE}: there is no way to it ({_first_line(error)}); {way}") from None
 
 
@@ -143,10 +130,10 @@ class Room:
     """One room of a session, as a context that closes it. What comes waits until it is looked at."""
 
     def __init__(self, session: zenoh.Session, name: str) -> None:
-        self.name = name
-        self._session = session
+        self.name, self._session = name, session
         self._came: queue.Queue[Came] = queue.Queue(MOST_WAITING)
         self._declared: dict[str, Any] = {}
+        """Zenoh's publishers by their keys, and what it would let go otherwise."""
 
     def __enter__(self) -> Self:
         return self
@@ -180,16 +167,11 @@ class Room:
     def come(self, seconds: float) -> list[Came]:
         """Return what came since the last call or, where that is nothing, the first thing within so many seconds."""
         result = []
-        try:
-            result.append(self._came.get(timeout=seconds) if seconds > 0.0 else self._came.get_nowait())
+        with suppress(queue.Empty):
+            result.append(self._came.get(seconds > 0.0, max(seconds, 0.0)))
             while True:
                 result.append(self._came.get_nowait())
-        except queue.Empty:
-            return result
-
-    def wait(self, until: float) -> list[Came]:
-        """Return what came, as `come` does, until a moment of `time.monotonic`."""
-        return self.come(until - time.monotonic())
+        return result
 
     def _publisher(self, user: str, stream: str) -> Any:
         import zenoh
@@ -211,7 +193,5 @@ class Room:
         gone = str(sample.kind) == "SampleKind.DELETE"
         datagram: bytes | None = None if gone else sample.payload.to_bytes()
         if datagram is None or len(datagram) <= LONGEST:
-            try:
+            with suppress(queue.Full):
                 self._came.put_nowait(Came(user, stream, datagram))
-            except queue.Full:
-                return

@@ -13,11 +13,13 @@ from rigid_motion.motion.poses import joined
 from rigid_motion.motion.quaternions import conjugate, multiply
 from rigid_motion.streams import Body, Sender
 from rigid_motion.streams.bodies import RADIUS
+from rigid_motion.streams.paths import Path
+from rigid_motion.streams.sender import KEEPALIVE
 from rigid_motion.streams.wire import DESCRIPTION, kind_of
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.clips import Clip
 
-from .measuring import even_rate, straight
+from .measuring import even_rate
 from .rooms import ANSWERS, LISTENING, MOTION, SKELETON, Came, Room
 
 SLIDES = 1e-4
@@ -46,7 +48,7 @@ def samples_of(clip: Clip) -> tuple[np.ndarray, Poses]:
     times, poses = clip.times, Poses(positions, quaternions)
     if clip.rate and len(times) != round((times[-1] - times[0]) * clip.rate) + 1:
         even = np.arange(times[0], times[-1] + 0.01 / clip.rate, 1.0 / clip.rate)
-        return even, straight(times, poses).at(even)
+        return even, Path(times, poses).at(even)
     return times, poses
 
 
@@ -69,25 +71,21 @@ def together(clips: Sequence[Clip], rate: float | None = None) -> tuple[list[Bod
     """
     samples = [samples_of(clip) for clip in clips]
     bodies = [body_of(clip, poses) for clip, (_, poses) in zip(clips, samples, strict=True)]
-    first = samples[0][0]
-    if rate is None and all(np.array_equal(times, first) for times, _ in samples[1:]):
-        moments = first
-    else:
+    moments = first = samples[0][0]
+    if rate or not all(np.array_equal(times, first) for times, _ in samples[1:]):
         rate = rate or max(clip.samples_a_second for clip in clips)
         seconds = max(times[-1] - times[0] for times, _ in samples)
         moments = first[0] + np.arange(int(seconds * rate + 1e-6) + 1) / rate
     shown = [
-        straight(times, poses).at(np.clip(moments - first[0] + times[0], times[0], times[-1]))
-        for times, poses in samples
+        Path(times, poses).at(np.clip(moments - first[0] + times[0], times[0], times[-1])) for times, poses in samples
     ]
     return bodies, moments, joined(shown)
 
 
 def sender_of(bodies: list[Body], moments: np.ndarray, tolerance: float, delay: float, rate: float | None) -> Sender:
     """Return a sender that says what is needed or, with a rate, a key at each of its ticks."""
-    if rate:
-        return Sender(bodies, tolerance, delay, rate, keepalive=ALMOST / rate)
-    return Sender(bodies, tolerance, delay, even_rate(moments) if len(moments) > 1 else None)
+    even = even_rate(moments) if len(moments) > 1 else None
+    return Sender(bodies, tolerance, delay, rate or even, ALMOST / rate if rate else KEEPALIVE)
 
 
 class Sending:

@@ -21,11 +21,11 @@ import zenoh  # noqa: F401 - without it these tests are skipped
 
 from rigid_motion.streams import Receiver
 from rigid_motion_batch.cli.stream import main
+from rigid_motion_batch.recordings.bvh_writing import write_bvh
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.rest_bodies import RestBody
 from rigid_motion_batch.streaming.receiving import Receiving
-from rigid_motion_batch.streaming.rooms import HERE, Room, RoomError, is_loopback, locator, opened, settings
-from rigid_motion_batch.streaming.written import write_bvh
+from rigid_motion_batch.streaming.rooms import HERE, Room, RoomError, is_local, locator, opened, settings
 from tests.scripts.streaming.motions import swinging
 from tests.streams.links import body, dance
 
@@ -313,7 +313,7 @@ def test_what_nobody_asked_for_stays_on_this_machine():
     for role in ("peer", "router"):
         result = settings(role, None, False)
         assert result["scouting/multicast/enabled"] is False
-        assert all(is_loopback(place) for place in result["listen/endpoints"])
+        assert all(is_local(place) for place in result["listen/endpoints"])
     assert settings("peer", "studio.local", False)["mode"] == "client"
     assert settings("router", None, True)["listen/endpoints"] == ["tcp/0.0.0.0:7447"]
 
@@ -331,7 +331,7 @@ def test_what_nobody_asked_for_stays_on_this_machine():
 )
 def test_addresses(address, written, loopback):
     assert locator(address) == written
-    assert is_loopback(address) is is_loopback(written) is loopback
+    assert is_local(address) is is_local(written) is loopback
 
 
 def test_a_router_that_is_not_there_is_one_line_with_the_way_out(tmp_path, hand):

@@ -135,7 +135,7 @@ def test_performers_are_bodies_with_samples():
     with Performers(0) as performers, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         for datagrams in frames_of_vmc(TIMES_OF_A_SECOND):
             for datagram in datagrams:
-                other.sendto(datagram, ("127.0.0.1", performers.port))
+                other.sendto(datagram, ("127.0.0.1", performers.number))
         time.sleep(0.01)
         (((body,), moments, poses),) = performers.samples()
         assert performers.samples() == []
@@ -152,7 +152,7 @@ def test_trackers_beside_a_performer_are_bodies_with_samples():
         for moment, datagrams in zip(TIMES_OF_A_SECOND, frames_of_vmc(TIMES_OF_A_SECOND), strict=True):
             ball = {"ball": Poses([moment, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0])}
             for datagram in [*write_trackers(ball), *datagrams]:
-                other.sendto(datagram, ("127.0.0.1", performers.port))
+                other.sendto(datagram, ("127.0.0.1", performers.number))
         time.sleep(0.01)
         ((bodies, moments, poses),) = performers.samples()
     assert [body.name for body in bodies] == ["VMC", "ball"]

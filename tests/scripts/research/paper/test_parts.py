@@ -7,9 +7,8 @@ import pytest
 
 from research.paper import parts, sending, table
 from research.paper.table import UPDATES
-from rigid_motion_batch.streaming.measuring import measure
+from rigid_motion_batch.streaming.measuring import HEADERS, measure
 from rigid_motion_batch.streaming.sending import body_of, samples_of
-from rigid_motion_batch.streaming.transports import HEADERS
 from tests.scripts.research.paper.clips import circling
 
 CLIP = circling(turns=0.7, rate=90.0, seconds=3.0)
@@ -70,7 +69,7 @@ def test_a_stream_costs_less_the_more_it_may_be_off(monkeypatch: pytest.MonkeyPa
 @pytest.mark.network
 def test_a_stream_is_that_which_another_process_shows() -> None:
     times, poses = samples_of(CLIP)
-    cost = measure(body_of(CLIP, poses, 0.1), times, poses, 0.005, 0.1).cost
+    cost, _ = measure(body_of(CLIP, poses, 0.1), times, poses, 0.005, 0.1)
     datagrams, size, error = sending.sent(CLIP, 0.005, 0.1)
     assert datagrams == pytest.approx((cost.bytes_a_second_with_headers - cost.bytes_a_second) / HEADERS)
     assert size == pytest.approx(cost.bytes_a_second_with_headers)
