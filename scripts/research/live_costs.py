@@ -23,9 +23,8 @@ from research.studies import files_in, publish, report, study_parser
 from rigid_motion_batch.cli.stream_measure import packed
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.streaming.measuring import measure
+from rigid_motion_batch.streaming.measuring import HEADERS, measure
 from rigid_motion_batch.streaming.sending import body_of, samples_of
-from rigid_motion_batch.streaming.transports import HEADERS
 
 RADIUS, TOLERANCE = 0.03, 0.005
 DELAYS = {0.1: "100 ms", 0.2: "200 ms"}

@@ -97,11 +97,14 @@ class Job:
     def note(self, text: str) -> None:
         """Say something that the user should know, in a line, when the task is done."""
         with (self.place / "notes").open("a", encoding="utf-8") as stream:
-            stream.write(f"{text}\n")
+            stream.write(f"{json.dumps(text)}\n")  # A name may have line breaks.
 
     def notes(self) -> list[str]:
         """Return what it has said, wherever it was done."""
-        return _lines(self.place / "notes")
+        result: list[str] = []
+        with suppress(ValueError):  # Whoever wrote them may have died at the last one.
+            result.extend(map(json.loads, _lines(self.place / "notes")))
+        return result
 
     def last_words(self) -> str:
         """Return the last line that libraries have printed where it was done, behind a colon; empty for none."""
