@@ -138,6 +138,7 @@ def test_a_hands_log_has_what_goes_wrong_in_logs(make: Callable, tmp_path: Path)
     assert all(word in repairs for word in ("runs backwards", "comes again", "sign flips", "gaps"))
 
 
+@pytest.mark.slow
 def test_a_dancer_keeps_within_the_tolerance_with_a_quarter_of_the_keys(make: Callable, tmp_path: Path) -> None:
     printed = make("dancer")
     assert all(line in printed for line in claims("dancer"))
@@ -180,6 +181,7 @@ def test_a_camera_keeps_within_the_tolerance_of_its_solution_with_few_keys(make:
     assert keys_of("Solved") == len(clip.times)
 
 
+@pytest.mark.slow
 def test_a_job_for_a_farm_makes_the_same_as_one_machine(make: Callable, tmp_path: Path) -> None:
     make("farm")
     on_farm, here = (outputs(tmp_path / "renders" / name) for name in ("farm", "farm-here"))

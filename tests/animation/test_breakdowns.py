@@ -283,6 +283,7 @@ def test_a_breakdown_leaves_the_path_and_changes_when_the_body_is_there(live_fil
     np.testing.assert_allclose(shown_worlds([obj], [*range(1, 11), *range(25, 41)])[0], beside, atol=2e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["motor_spline", "pga_lerp"])
 @pytest.mark.parametrize("gone", [BEFORE, AFTER])
 def test_a_path_with_a_breakdown_leads_through_keys_that_not_all_channels_have(live_file, mode, gone):

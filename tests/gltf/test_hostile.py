@@ -132,6 +132,7 @@ def test_a_chain_without_end_is_refused(tmp_path, capsys):
     assert line in refusal(changed(tmp_path / "walk.glb", put("nodes", to=[*nodes, {}])), capsys)
 
 
+@pytest.mark.slow
 def test_whatever_is_damaged_is_refused_or_does_no_harm(tmp_path):
     file = File(walk(joints=2, seconds=0.3).write(tmp_path / "walk.glb"))
     random, path = np.random.default_rng(3), tmp_path / "damaged.glb"

@@ -232,6 +232,7 @@ def test_key_poses_are_so_many_times_of_all_nodes(tmp_path):
     assert report.clips[0].error > 0.0
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10**9))
 def test_whatever_hangs_on_whatever_keeps_to_the_tolerance(tmp_path_factory, seed):

@@ -46,6 +46,7 @@ def trembling(seed: int, seconds: float = 4.0, joints: int = 3) -> Making:
     return made
 
 
+@pytest.mark.slow
 @settings(max_examples=tried(12), deadline=None)
 @given(st.integers(0, 10**9), st.booleans())
 def test_no_point_is_off_by_more_anywhere_across_the_borders(tmp_path_factory, seed, shared):
@@ -129,6 +130,7 @@ def test_feet_count_where_so_many_key_poses_are_wanted(tmp_path):
     assert slide(after, begin, end) <= 1e-3 * report.size / 1.7 + SINGLE
 
 
+@pytest.mark.slow
 def test_memory_hardly_grows_with_the_length(tmp_path, monkeypatch):
     monkeypatch.setattr(errors, "STRETCH", 300)
 

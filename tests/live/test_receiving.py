@@ -112,6 +112,7 @@ def test_rigid_bodies_of_the_codec_are_objects_and_a_skeleton_moves_the_rig(live
     assert np.linalg.norm(heads_of(rig) - expected, axis=1).max() < 0.006
 
 
+@pytest.mark.slow
 def test_a_rig_of_rigify_follows_by_its_controls(live, sent):
     live.armature = rig = human()
     for row, datagrams in enumerate(frames_of_vmc(TIMES)[:8]):

@@ -52,6 +52,7 @@ def displacements(poses: Poses, truth: Poses, points: np.ndarray) -> np.ndarray:
     return np.linalg.norm(placed(poses) - placed(truth), axis=-1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("growing", [False, True])
 def test_no_point_of_the_ball_is_off_by_more_and_one_is_off_by_as_much(growing):
     poses, truth = pairs(300, 2, growing)

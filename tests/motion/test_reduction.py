@@ -94,6 +94,7 @@ def error_of(times: np.ndarray, poses: Poses, keys: np.ndarray, mode: str, *, rm
     return float(np.sqrt(np.mean(errors**2)) if rms else errors.max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mode", "budget"),
     [("lerp_slerp", 12), ("lerp_slerp", 40), ("dq_sclerp", 12), ("motor_spline", 12), ("motor_spline", 40)],

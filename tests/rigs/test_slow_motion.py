@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+import pytest
 
 from rigid_motion import animation
 from tests.animation.scenes import push_down
@@ -47,6 +48,7 @@ def shown(rig: bpy.types.Object, thing: bpy.types.Object) -> np.ndarray:
     return np.array(result)
 
 
+@pytest.mark.slow
 def test_slowed_down_it_is_where_a_bake_at_eighths_is(rig):
     thing = bpy.data.objects.new("Thing", None)
     bpy.context.scene.collection.objects.link(thing)

@@ -148,6 +148,7 @@ def lines_about(said: str, path: Path) -> list[str]:
     return [line for line in said.splitlines() if str(path) in line]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals end no processes there")
 @pytest.mark.parametrize("jobs", sample([2, 1]))
 def test_a_body_that_ends_a_worker_is_told_and_the_others_go_on(deadly, tmp_path, capfd, jobs):

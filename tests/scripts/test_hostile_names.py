@@ -98,6 +98,7 @@ def compared(folder: Path, write: Callable[[Path, Sequence[str]], list[str]], na
     return output
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("write", "names"),
     [

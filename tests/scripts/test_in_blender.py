@@ -58,6 +58,7 @@ def test_where_none_can_be_made_it_says_how(lacking: None, tmp_path: Path, monke
     assert "rich" in str(raised.value)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not BLENDER, reason="starts a Blender: that of the variable BLENDER, or on the path")
 def test_a_real_blender_compares(tmp_path: Path) -> None:
     """It writes numbers and a film, in the environment of these tests."""

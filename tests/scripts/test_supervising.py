@@ -76,6 +76,7 @@ def test_what_is_half_written_is_gone(tmp_path, command, by, code):
     assert list(run.temporary.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_ctrl_c_in_a_terminal_pressed_again_and_again_leaves_nothing_behind(tmp_path):
     write_csv(tmp_path / "slow.csv")
     ours, theirs = pty.openpty()

@@ -56,6 +56,7 @@ def damaged(rng: np.random.Generator, genuine: list[bytes]) -> bytes:
     return bytes(data)
 
 
+@pytest.mark.slow
 def test_any_datagram_does_no_harm(genuine: list[bytes]) -> None:
     rng, own = np.random.default_rng(5), body()
     times, poses = dance(own, 4.0)
@@ -115,6 +116,7 @@ def test_a_sender_far_in_the_future_is_none(genuine: list[bytes]) -> None:
     assert [stream.source for stream in receiver.streams] == [1 << 47]
 
 
+@pytest.mark.slow
 def test_strangers_cannot_fill_the_memory() -> None:
     receiver = Receiver()
     tracemalloc.start()

@@ -124,6 +124,7 @@ def test_datagrams_in_any_order_come_to_the_same_motion() -> None:
     assert np.mean(outcome.between(3.0, 6.0) <= TOLERANCE) > 0.8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("loss", "within"), [(0.01, 0.98), (0.05, 0.93), (0.2, 0.7)])
 def test_loss(loss: float, within: float) -> None:
     own = body()
@@ -159,6 +160,7 @@ def test_where_datagrams_are_lost_no_hand_goes_back_against_its_motion(loss: flo
     assert outcome.turned_back[outcome.now[2:] > 2.0].max() < 0.005
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("answers", [True, False])
 def test_where_datagrams_are_lost_no_joint_leaps_back_to_the_motion(answers: bool) -> None:
     own = body()
@@ -267,6 +269,7 @@ def test_keys_can_be_recorded() -> None:
     assert np.abs(np.array(places)[:, 0] - true).max() < 0.006
 
 
+@pytest.mark.slow
 def test_keys_that_nobody_records_are_forgotten() -> None:
     own = Body.rigid("hand")
     times, poses = dance(own, 60.0, speed=8.0)

@@ -34,6 +34,7 @@ def player() -> Iterator[Player]:
         yield playing
 
 
+@pytest.mark.slow
 @settings(max_examples=tried(60), suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(case=RIGS)
 def test_no_bone_that_is_promised_is_off_by_more(tmp_path_factory, player, case):

@@ -53,6 +53,7 @@ def test_the_error_to_reach_is_that_of_the_reference_at_its_rate(swing: Clip, re
         assert result.targets[place] == result.uniform_errors[0, place]
 
 
+@pytest.mark.slow
 def test_adaptive_keys_reach_it_over_the_same_samples(swing: Clip, result: KeysNeeded) -> None:
     for place, rate in enumerate(RATES):
         covered = between(swing, 0, decimate(swing.times, float(rate))[-1])
@@ -76,6 +77,7 @@ def test_evenly_spaced_keys_reach_it_and_one_segment_fewer_do_not(swing: Clip, r
             assert result.reached[row, 0, place] == pytest.approx(enough, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_fitted_keys_reach_it_and_are_fewer(swing: Clip, result: KeysNeeded) -> None:
     shaken = np.random.default_rng(3).normal(size=swing.poses.positions.shape)
     clip = replace(swing, poses=Poses(swing.poses.positions + 1e-3 * shaken, swing.poses.quaternions))

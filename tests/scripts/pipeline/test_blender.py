@@ -79,6 +79,7 @@ def test_a_step_is_done_by_the_program(blender: str, tmp_path: Path) -> None:
     assert not (tmp_path / "out" / OWN / "scratch").exists()
 
 
+@pytest.mark.slow
 def test_errors_are_told_in_one_line(blender: str, tmp_path: Path) -> None:
     assert saved(tmp_path / "a", blender, "foreseen").failures == {"save": "no such scene; make another"}
     outcome = saved(tmp_path / "b", blender, "unforeseen")
@@ -87,6 +88,7 @@ def test_errors_are_told_in_one_line(blender: str, tmp_path: Path) -> None:
     assert outcome.problem == f"save: {tmp_path / 'c' / 'scene.blend'}: No space left on device"
 
 
+@pytest.mark.slow
 def test_a_blender_that_dies_is_started_twice_more(blender: str, tmp_path: Path) -> None:
     listener = Listener()
     outcome = saved(tmp_path / "out", blender, "killed", listener)

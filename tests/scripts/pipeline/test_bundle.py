@@ -22,6 +22,7 @@ def openjd(*command: object, cwd: Path) -> subprocess.CompletedProcess:
     return subprocess.run(line, capture_output=True, text=True, timeout=300, cwd=cwd)
 
 
+@pytest.mark.slow
 def test_a_job_on_a_farm_makes_the_same_as_a_run_on_one_machine(tmp_path: Path) -> None:
     takes = tmp_path / "takes"
     sources = [write_toss(takes / "toss.csv"), write_toss(takes / "other.csv", samples=70)]

@@ -129,6 +129,7 @@ def test_what_is_kept_of_a_clip_is_what_was_found(tmp_path: Path, toss: Path, ch
         np.testing.assert_array_equal(again.rest_body.rest.positions, clip.rest_body.rest.positions)
 
 
+@pytest.mark.slow
 def test_a_film_and_a_page_of_a_clip(output: Path, toss: Path) -> None:
     comparison = planned(toss, stage=STAGE, about=ABOUT)
     outcome, listener = compared(output, comparison, ProcessExecutor(2))
@@ -156,6 +157,7 @@ def test_a_page_may_be_made_before_its_films(output: Path, toss: Path) -> None:
     assert "toss/5/comparison.mp4" in (output / "report.html").read_text()
 
 
+@pytest.mark.slow
 def test_a_whole_body_has_joints_films_and_a_comparison_with_decimate(output: Path, tmp_path: Path) -> None:
     write_body(body := tmp_path / "body.bvh")
     outcome, _ = compared(output, planned(body, choices=(Tolerance("2cm"),), stage=STAGE, about=ABOUT, count_keys=True))
@@ -288,6 +290,7 @@ def workers_of(process: int) -> list[int]:
     return [child for child in children if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes()]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes where Linux shows them")
 def test_a_run_that_was_killed_again_and_again_ends_like_one_that_was_not(
     output: Path, toss: Path, tmp_path: Path
@@ -325,6 +328,7 @@ def test_a_run_that_was_killed_again_and_again_ends_like_one_that_was_not(
 # -- many clips -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_clip_takes_two_kilobytes_at_most_between_two_plans(output: Path, toss: Path) -> None:
     """Ten thousand clips, and Python with the program, are to stay within 200 MB."""
     import tracemalloc

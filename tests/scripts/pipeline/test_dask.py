@@ -154,6 +154,7 @@ def clips(tmp_path: Path) -> list[Path]:
     return [bad, *(write_toss(tmp_path / "clips" / f"{name}.csv") for name in ("one", "two"))]
 
 
+@pytest.mark.slow
 def test_the_workers_make_what_one_machine_makes_and_say_what_fails(
     cluster: Cluster, clips: list[Path], tmp_path: Path, capfd: pytest.CaptureFixture
 ) -> None:
@@ -172,6 +173,7 @@ def test_the_workers_make_what_one_machine_makes_and_say_what_fails(
     assert json.loads(capfd.readouterr().out)["tasks"].get("failed", 0) == 0
 
 
+@pytest.mark.slow
 def test_ctrl_c_leaves_no_process_at_work(cluster: Cluster, tmp_path: Path) -> None:
     clips = [write_toss(tmp_path / f"{name}.csv", samples=300) for name in ("one", "two")]
     command = options(clips, tmp_path / "out", cluster, "--rates", "5", "--fps", "120")
@@ -224,6 +226,7 @@ def test_a_worker_without_this_program_is_left_out_and_lives(cluster: Cluster, t
     stranger.kill()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("address", "complaint"),
     [
@@ -239,6 +242,7 @@ def test_a_wrong_address_is_said_to_be_one_within_seconds(tmp_path: Path, addres
     assert time.monotonic() - started < 10.0
 
 
+@pytest.mark.slow
 def test_workers_may_come_and_die_and_the_scheduler_too_and_nothing_is_lost(
     clips: list[Path], tmp_path: Path, capfd: pytest.CaptureFixture
 ) -> None:

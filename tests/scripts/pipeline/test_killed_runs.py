@@ -56,6 +56,7 @@ def alive(process: int) -> bool:
         return False
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes where Linux shows them")
 def test_a_run_that_was_killed_again_and_again_ends_like_one_that_was_not(output: Path, tmp_path: Path) -> None:
     expected = {f"{n}.txt": f"{n}" for n in range(20)} | {"all.txt": "".join(f"{n}" for n in range(20))}
@@ -86,6 +87,7 @@ def test_a_run_that_was_killed_again_and_again_ends_like_one_that_was_not(output
     assert not (output / OWN / "scratch").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes where Linux shows them")
 def test_whichever_worker_is_killed_the_files_are_the_same(output: Path, tmp_path: Path) -> None:
     with started(tmp_path, output, 0.3) as process:

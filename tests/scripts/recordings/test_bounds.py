@@ -116,6 +116,7 @@ def test_what_a_file_takes_is_bounded_by_what_it_holds(tmp_path: Path, name: str
     assert_is_read_within_bounds(f"{path}{body}", path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", SEEDS)
 def test_so_is_what_a_sound_recording_takes(tmp_path: Path, ending: str) -> None:
     for seed in SEEDS[ending]:

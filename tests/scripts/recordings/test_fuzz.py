@@ -206,6 +206,7 @@ def animated_blend(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_damaged_blend_is_refused_or_read_or_the_end_of_a_process_but_never_an_error_of_ours(
     tmp_path: Path, animated_blend: Path, reader: Reader
 ) -> None:

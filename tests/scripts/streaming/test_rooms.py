@@ -117,6 +117,7 @@ def test_a_hand_is_shown_within_the_tolerance(tmp_path, at, hand):
     assert len(clip.times) > 72
 
 
+@pytest.mark.slow
 def test_a_body_goes_to_several_receivers_in_the_formats_that_they_ask_for(tmp_path, at):
     own = body(6)
     times, poses = dance(own, 2.0, 60.0)
@@ -139,6 +140,7 @@ def test_a_body_goes_to_several_receivers_in_the_formats_that_they_ask_for(tmp_p
     assert len(clips[0].times) < 0.6 * len(clip.times)
 
 
+@pytest.mark.slow
 def test_many_bodies_of_many_senders_are_told_apart(tmp_path, at, hand, endless):
     shutil.copy(hand, tmp_path / "left.csv")
     shutil.copy(hand, tmp_path / "right.csv")
@@ -153,6 +155,7 @@ def test_many_bodies_of_many_senders_are_told_apart(tmp_path, at, hand, endless)
     assert made == ["shown-ada-left.tum", "shown-ada-right.tum", "shown-bob-endless.tum"]
 
 
+@pytest.mark.slow
 def test_another_room_is_not_heard(at, hand):
     with running("receive", "--room", "r", "--at", at, "--seconds", 4) as receiver:
         run("send", hand, "--room", "q", "--at", at)
@@ -188,6 +191,7 @@ def test_ctrl_c_leaves_the_file_of_what_was_shown(tmp_path, at, endless, what):
     assert len(shown.read_text().splitlines()) > 20
 
 
+@pytest.mark.slow
 def test_a_router_that_is_killed_and_started_again_is_found_again(tmp_path, endless):
     place = f"{HERE}:{free_port()}"
     config = tmp_path / "router.json5"
@@ -259,6 +263,7 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_stranger_without_rights_neither_hears_nor_speaks(house, hand):
     def listening(user: str, seconds: float) -> contextmanager:
         options = ("--room", "studio", "--user", user, "--config", f"{user}.json5", "--seconds", seconds)
@@ -334,6 +339,7 @@ def test_addresses(address, written, loopback):
     assert is_local(address) is is_local(written) is loopback
 
 
+@pytest.mark.slow
 def test_a_router_that_is_not_there_is_one_line_with_the_way_out(tmp_path, hand):
     config = tmp_path / "router.json5"
     config.write_text(json.dumps({"connect": {"endpoints": [f"tcp/{HERE}:{free_port()}"]}}))

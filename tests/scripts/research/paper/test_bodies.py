@@ -112,6 +112,7 @@ def test_the_difference_is_that_of_the_two_modes_by_matrices() -> None:
 # -- keys needed -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_figures_say_everything_of_each_body() -> None:
     short = swinging_body("short", seconds=1.0, rate=30.0, seed=4, joints=NAMES)
     result = bodies.measure([(BODY_CLIP, 0), (short, 1)])
