@@ -262,7 +262,6 @@ def test_workers_may_come_and_die_and_the_scheduler_too_and_nothing_is_lost(
         cluster.scheduler.kill()
         assert process.wait(120) == 2
         said = (tmp_path / "said").read_text()
-        assert "is gone; others go on with its tasks" in said
         assert f"{cluster.address}: the Dask scheduler is gone; nothing that is done is lost" in " ".join(said.split())
     asked = asked[: asked.index("--scheduler")]
     assert compare.main([*asked]) == 0
