@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from rigid_motion_batch import places
+from rigid_motion_batch.files import append_lines, lines_of
 
 from .values import to_plain
 
@@ -96,25 +97,18 @@ class Job:
 
     def note(self, text: str) -> None:
         """Say something that the user should know, in a line, when the task is done."""
-        with (self.place / "notes").open("a", encoding="utf-8") as stream:
-            stream.write(f"{json.dumps(text)}\n")  # A name may have line breaks.
+        append_lines(self.place / "notes", [{"note": text}])
 
     def notes(self) -> list[str]:
         """Return what it has said, wherever it was done."""
-        result: list[str] = []
-        with suppress(ValueError):  # Whoever wrote them may have died at the last one.
-            result.extend(map(json.loads, _lines(self.place / "notes")))
-        return result
+        return [str(line.get("note")) for line in lines_of(self.place / "notes")]
 
     def last_words(self) -> str:
         """Return the last line that libraries have printed where it was done, behind a colon; empty for none."""
-        return "".join(f": {line[:200]}" for line in [*filter(str.strip, _lines(self.place / "log"))][-1:])
-
-
-def _lines(file: Path) -> list[str]:
-    with suppress(OSError):
-        return file.read_text(encoding="utf-8", errors="replace").splitlines()
-    return []
+        printed = ""
+        with suppress(OSError):
+            printed = (self.place / "log").read_text(encoding="utf-8", errors="replace")
+        return "".join(f": {line[:200]}" for line in [*filter(str.strip, printed.splitlines())][-1:])
 
 
 @dataclass(frozen=True, eq=False)
