@@ -92,7 +92,7 @@ class Survey:
             if store.is_done(task):
                 survey.up_to_date += 1
             else:
-                strangers += store.strangers(task, task.key)
+                strangers += store.strangers(task, store.index_of(task.key))
                 survey.add(task)
         store.require_none(strangers)
         return survey

@@ -230,15 +230,14 @@ class Store:
         files = index["files"] if index else {}
         return [(name, path) for name, path in task.published(files) if not self._is_same(files.get(name), path)]
 
-    def strangers(self, task: Task, key: str) -> list[str]:
-        """Return paths where the result of a key would replace what this program has not written, or was edited since.
+    def strangers(self, task: Task, index: Mapping[str, Any] | None) -> list[str]:
+        """Return paths where a result would replace what this program has not written, or was edited since.
 
         Raises
         ------
         OutputError
             Where there is an input, or a folder, or a file where a folder must be: nothing of that is ever replaced.
         """
-        index = self.index_of(key)
         return [path for _, path in self.unpublished(task, index) if not self._is_own(path)]
 
     def require_none(self, strangers: list[str]) -> None:
@@ -261,8 +260,8 @@ class Store:
             Where something is there that must not be replaced; what was put in place before that stays.
         OSError
         """
-        self.require_none(self.strangers(task, key))
         index = self.index_of(key) or {}
+        self.require_none(self.strangers(task, index))
         missing = self.unpublished(task, index)
         for name, path in missing:
             target, beside = self.output / path, self.new_scratch()
