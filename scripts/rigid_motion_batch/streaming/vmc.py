@@ -20,15 +20,12 @@ from rigid_motion.motion.poses import joined
 from rigid_motion.streams import Body, Receiver, Shown
 from rigid_motion.streams.paths import transposed
 from rigid_motion.streams.receiver import Stream
-from rigid_motion.streams.vmc import Performer, VmcReceiver, write, write_trackers
+from rigid_motion.streams.vmc import SILENT, Performer, VmcReceiver, write, write_trackers
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.clips import Clip
 
 RATE = 90.0
 """Frames a second at most: programs draw no faster."""
-
-GONE = 2.0
-"""Seconds of silence after which a program has gone."""
 
 
 def play(
@@ -90,7 +87,7 @@ class Performers(Port):
         self._receiver.show(now)
         came = self._receiver.keys()
         for keys in came:
-            if now - self._heard > GONE:
+            if now - self._heard > SILENT:
                 self._stream = keys.stream
             if keys.stream == self._stream:
                 self._heard = now
