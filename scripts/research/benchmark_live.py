@@ -23,8 +23,9 @@ import bpy
 import numpy as np
 from bpy_extras import anim_utils
 
-from research.studies import publish, registered, report, seconds_in_turns, study_parser
+from research.studies import publish, report, seconds_in_turns, study_parser
 from rigid_motion import animation
+from rigid_motion_batch.scenes.body_scene import registered
 from rigid_motion_batch.silencing import silenced
 
 MODE = "dq_sclerp"  # the mode that is measured: the screw mode

@@ -19,12 +19,13 @@ import numpy as np
 
 from research import body_reduction
 from research.body_reduction import figures_of
-from research.studies import EXTENSIONS, files_in, publish, registered, report, study_parser
+from research.studies import EXTENSIONS, files_in, publish, report, study_parser
 from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate, repair, shell_error
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings import TrajectoryError, read_trajectories
+from rigid_motion_batch.scenes.body_scene import registered
 from rigid_motion_batch.scenes.decimated_bodies import FREE, Left, decimate
 
 ROTATION_MODES = ("QUATERNION", "XYZ")

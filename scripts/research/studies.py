@@ -1,12 +1,11 @@
-"""What studies share: their command line, their clock, Blender with the extension, and where their figures go."""
+"""What studies share: their command line, their clock, and where their figures go."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 import time
-from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Hashable, Iterable, Mapping
 from pathlib import Path
 from typing import TypeVar
 
@@ -64,18 +63,6 @@ def seconds_in_turns(
                 run()
                 seconds[name].append(clock() - start)
     return seconds
-
-
-@contextmanager
-def registered() -> Iterator[None]:
-    """Have the extension in Blender meanwhile."""
-    from rigid_motion import animation
-
-    animation.register()
-    try:
-        yield
-    finally:
-        animation.unregister()
 
 
 def files_in(paths: Iterable[Path], extensions: Collection[str] = EXTENSIONS) -> list[Path]:

@@ -15,7 +15,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from research.studies import publish, registered, report, study_parser
+from research.studies import publish, report, study_parser
 from rigid_motion import animation
 from rigid_motion.animation.compute.differences import in_betweens
 from rigid_motion.animation.queries.keyed import source_of
@@ -23,6 +23,7 @@ from rigid_motion.motion import KEYFRAME_MODES, Poses, shell_error
 from rigid_motion.motion.eulers import extrinsic_eulers_from_quaternions
 from rigid_motion.motion.measures import rms
 from rigid_motion.motion.quaternions import align_signs, angle_between, multiply, normalise
+from rigid_motion_batch.scenes.body_scene import registered
 
 SEGMENTS = 24
 ROTATION_MODES = ("QUATERNION", "XYZ")

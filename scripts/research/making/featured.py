@@ -13,9 +13,9 @@ import bmesh
 import bpy
 from mathutils import Matrix, Quaternion, Vector
 
-from research.studies import registered
 from rigid_motion import animation
 from rigid_motion_batch.palette import linear
+from rigid_motion_batch.scenes.body_scene import registered
 from rigid_motion_batch.scenes.materials import ink, surface
 
 from .rendering import add, empty_scene, look_from, render, tubes

@@ -87,7 +87,7 @@ def build_body_scene(made: BodyReconstruction, settings: SceneSettings, radii: n
     shape = Physique.of(made.clip.rest_body, rest, made.clip.metres_per_unit, made.clip.axes)
     bar = _Bar.of(1e3 * full, cast.largest_error)
     header = Header(made.clip.name, made.choice.title, _legend(made, settings), bar.width + 2.0 * BAR_GAP)
-    with _extension():
+    with registered():
         actors = Bodies(cast, motion, shape, full)
         scene = assemble_scene(settings, cast, lanes_of, actors, header, centre)
     bar.put(cast)
@@ -209,8 +209,8 @@ class _Bar:
 
 
 @contextmanager
-def _extension() -> Iterator[None]:
-    """Register what the extension brings, which stays out of the way otherwise."""
+def registered() -> Iterator[None]:
+    """Register what the extension brings meanwhile, unless it is there already."""
     there = hasattr(bpy.types.PoseBone, "rigid_motion")
     if not there:
         animation.register()
