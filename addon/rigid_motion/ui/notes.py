@@ -6,9 +6,9 @@ import bpy
 
 from .. import animation
 from ..animation.actions.records import recorded_digest
-from ..animation.actions.slots import places_of
+from ..animation.actions.slots import bindings_for
 from ..animation.compute.sources import Source
-from ..animation.queries.keyed import active_place, source_of
+from ..animation.queries.keyed import active_binding, source_of
 from ..animation.queries.segments import (
     SegmentFacts,
     frame_in_action,
@@ -83,8 +83,8 @@ def _read(target: Transform) -> tuple[Source | None, str]:
     if source is None:
         return None, animation.problem_of(target)
     # What the slot was filled in from as well: of several users it is the source of the leading one.
-    place = active_place(target, places_of(target))
-    depends_on = (target.animated.session_uid, target.prefix, source.digest, place and recorded_digest(place))
+    binding = active_binding(target, bindings_for(target))
+    depends_on = (target.animated.session_uid, target.prefix, source.digest, binding and recorded_digest(binding))
     if _problem[0] != depends_on:
         _problem = depends_on, animation.problem_of(target)
     return (None if _problem[1] else source), _problem[1]

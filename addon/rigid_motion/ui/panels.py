@@ -11,7 +11,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from .. import animation
 from ..animation.actions.records import record_of
 from ..animation.compute.components import SCALE
-from ..animation.queries.keyed import active_place
+from ..animation.queries.keyed import active_binding
 from ..animation.queries.polls import with_in_betweens
 from ..animation.queries.segments import SegmentFacts, parts_with_in_betweens
 from ..animation.transforms import ORIGINALS, OWN_WORDS, Refused, Transform
@@ -176,8 +176,8 @@ def _draw_turns(layout: bpy.types.UILayout, target: Transform) -> None:
     """Draw the turns of the segment, to be set; and what they are about once there are any."""
     row = labelled(layout, iface_("Turns", OWN_WORDS))
     row.prop(target.motion, "turns", text="")
-    place = active_place(target) if target.motion.turns else None
-    if place is not None and (record := record_of(place)) is not None:
+    binding = active_binding(target) if target.motion.turns else None
+    if binding is not None and (record := record_of(binding)) is not None:
         row.prop(record, "turns_axis", text="")
 
 

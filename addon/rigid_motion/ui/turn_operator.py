@@ -10,7 +10,7 @@ from .. import animation
 from ..animation import Refused
 from ..animation.actions.records import recorded
 from ..animation.properties import MOST_TURNS, OWN_WORDS, SCREW_AXIS, TURN_AXIS_ITEMS
-from ..animation.queries.keyed import active_place
+from ..animation.queries.keyed import active_binding
 from .on_targets import OnTargets
 from .targets import CURRENT, SELECTED, WHOLE, active_target, grouped_by_frames, is_key_editor, targets_of
 
@@ -56,8 +56,8 @@ class RIGID_MOTION_OT_set_turns(OnTargets, bpy.types.Operator):
         if not self.properties.is_property_set("on"):
             self.on = SELECTED if is_key_editor(context) else CURRENT
         active = active_target(context)
-        if active is not None and (place := active_place(active)) is not None:
-            self.turns, self.axis = active.motion.turns or 1, recorded(place).turns_axis
+        if active is not None and (binding := active_binding(active)) is not None:
+            self.turns, self.axis = active.motion.turns or 1, recorded(binding).turns_axis
         return context.window_manager.invoke_props_dialog(self, confirm_text="Set Turns")
 
     def draw(self, _context: bpy.types.Context) -> None:

@@ -10,7 +10,7 @@ from rigid_motion.animation import Refused
 from rigid_motion.animation.actions.reading import keyed_in
 from rigid_motion.animation.actions.records import recorded_mode
 from rigid_motion.animation.actions.refusals import refuse_numbers
-from rigid_motion.animation.actions.slots import SlotTransform, slot_transforms_of
+from rigid_motion.animation.actions.slots import Binding, bindings_of
 from rigid_motion.animation.compute.sources import Source
 from rigid_motion.animation.queries.keyed import segment_modes
 from rigid_motion.animation.transforms import Transform
@@ -74,7 +74,7 @@ def _by_target(refusals: Iterable[Refused], targets: Sequence[Transform]) -> dic
 
 def with_rigid_segments(targets: Sequence[Transform]) -> list[Transform]:
     """Return those that are to move otherwise than by Blender's own in-betweens, in any segment and possible or not."""
-    places = slot_transforms_of(targets)
+    places = bindings_of(targets)
     rigid = {
         user
         for place, source in zip(places, keyed_in(places), strict=True)
@@ -84,7 +84,7 @@ def with_rigid_segments(targets: Sequence[Transform]) -> list[Transform]:
     return [target for target in targets if target in rigid]
 
 
-def _has_rigid_segments(place: SlotTransform, source: Source | Refused) -> bool:
+def _has_rigid_segments(place: Binding, source: Source | Refused) -> bool:
     try:
         if isinstance(source, Refused):
             raise source
@@ -94,7 +94,7 @@ def _has_rigid_segments(place: SlotTransform, source: Source | Refused) -> bool:
         return bool(segment_modes(place)) and _has_mode(place)
 
 
-def _has_mode(place: SlotTransform) -> bool:
+def _has_mode(place: Binding) -> bool:
     """Return whether there is any mode but Blender's own in a slot, also one that this version does not know."""
     channel = place.curves.get(place.users[0].mode_channel)
     if channel is None or channel.mute or not len(channel.keyframe_points):
@@ -105,7 +105,7 @@ def _has_mode(place: SlotTransform) -> bool:
 def modes_of(targets: Sequence[Transform]) -> dict[Transform, str]:
     """Return the modes of each target's segments as Blender's menus show them, each once."""
     modes: dict[Transform, dict[str, None]] = {target: {} for target in targets}
-    for place in slot_transforms_of(targets):
+    for place in bindings_of(targets):
         for user in place.users:
             if user in modes:
                 modes[user] |= dict.fromkeys(segment_modes(place))

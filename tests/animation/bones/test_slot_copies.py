@@ -8,7 +8,7 @@ import pytest
 
 from rigid_motion.animation import modes_of, refresh, set_mode
 from rigid_motion.animation.actions.records import recorded_mode
-from rigid_motion.animation.actions.slots import places_of
+from rigid_motion.animation.actions.slots import bindings_for
 from rigid_motion.animation.compute.modes import MODE_NAMES
 from rigid_motion.animation.transforms import transform_of
 from tests.animation.bones.poses import assert_posed
@@ -31,7 +31,7 @@ def mode_of(carrier: bpy.types.Object | bpy.types.PoseBone) -> str:
 
 def modes_in(rig: bpy.types.Object, slot: bpy.types.ActionSlot) -> list[str]:
     """The modes that bones have throughout in one of the slots that move them."""
-    places = (place for bone in rig.pose.bones for place in places_of(transform_of(bone)))
+    places = (place for bone in rig.pose.bones for place in bindings_for(transform_of(bone)))
     return [MODE_NAMES[recorded_mode(place)] for place in places if place.slot.handle == slot.handle]
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from rigid_motion.animation import set_mode
 from rigid_motion.animation.actions.reading import keyed_in
-from rigid_motion.animation.actions.slots import slot_transforms_of
+from rigid_motion.animation.actions.slots import bindings_of
 from rigid_motion.animation.compute.differences import in_betweens
 from rigid_motion.animation.transforms import transform_of
 from tests.animation.bones.rigs import in_turn
@@ -60,7 +60,7 @@ def worlds(obj, mode: str, frames) -> np.ndarray:
 
 def speeds(obj, frame: float, step: float = 0.02) -> tuple[np.ndarray, np.ndarray]:
     """The twist by differences, as matrices (4, 4) for a frame, before and after a key."""
-    (source,) = keyed_in(slot_transforms_of([transform_of(obj)]))
+    (source,) = keyed_in(bindings_of([transform_of(obj)]))
     at = frame + step * np.array((-2.0, -1.0, 0.0, 1.0, 2.0))
     poses = in_betweens(source, at).desired
     world = matrices(poses.positions, poses.quaternions, np.ones((5, 3)))

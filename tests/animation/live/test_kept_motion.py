@@ -10,7 +10,7 @@ import pytest
 
 from rigid_motion.animation import bake, set_mode
 from rigid_motion.animation.actions.reading import keyed_in
-from rigid_motion.animation.actions.slots import slot_transforms_of
+from rigid_motion.animation.actions.slots import bindings_of
 from rigid_motion.animation.compute.differences import in_betweens
 from rigid_motion.animation.transforms import transform_of
 from tests.animation.bones.rigs import in_turn, new_rig
@@ -120,7 +120,7 @@ HANDLES = {
 
 def between(obj: bpy.types.Object) -> np.ndarray:
     """Where the points are at quarters of frames, between the samples as well, shape (m, 3, 4)."""
-    (source,) = keyed_in(slot_transforms_of([transform_of(obj)]))
+    (source,) = keyed_in(bindings_of([transform_of(obj)]))
     frames = np.arange(4.0 * FRAMES[0], 4.0 * FRAMES[-1] + 1.0) / 4.0
     poses = in_betweens(source, frames).desired
     scales = np.ones(len(frames)) if poses.scales is None else poses.scales

@@ -28,20 +28,20 @@ def read_keys(fcurves: Sequence[Sequence[bpy.types.FCurve]]) -> list[list[tuple[
     Returns
     -------
     list of lists of (list of int, Keys)
-        For each owner those together that are keyed together: their places in its sequence, and their keys.
+        For each owner those together that are keyed together: their indices in its sequence, and their keys.
     """
     batches: dict[tuple, list[tuple]] = {}
     for owner, curves in enumerate(fcurves):
-        for place, fcurve in enumerate(curves):
+        for index, fcurve in enumerate(curves):
             keys = fcurve.keyframe_points
             modifiers = fcurve.modifiers
             cycles, steps = (_read_cycles(modifiers), read_steps(modifiers)) if modifiers else (None, ())
-            batches.setdefault((len(keys), fcurve.extrapolation, cycles, steps), []).append((owner, place, keys))
+            batches.setdefault((len(keys), fcurve.extrapolation, cycles, steps), []).append((owner, index, keys))
     result: list[list[tuple[list[int], Keys]]] = [[] for _ in fcurves]
     for (_, extrapolation, cycles, steps), batch in batches.items():
-        owners, places, channels = zip(*batch, strict=True)
+        owners, indices, channels = zip(*batch, strict=True)
         for rows, keys in _read_batch(owners, channels, extrapolation == "LINEAR", cycles, steps):
-            result[owners[rows[0]]].append(([places[row] for row in rows], keys))
+            result[owners[rows[0]]].append(([indices[row] for row in rows], keys))
     for keys_of_owner in result:
         keys_of_owner.sort(key=lambda pair: pair[0])
     return result

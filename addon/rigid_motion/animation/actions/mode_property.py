@@ -20,7 +20,7 @@ from .records import (
     recorded,
     recorded_mode,
 )
-from .slots import SlotTransform
+from .slots import Binding
 
 
 def set_pending_mode(transform: Transform, mode: str) -> None:
@@ -32,35 +32,35 @@ def set_pending_mode(transform: Transform, mode: str) -> None:
         motion.mode = mode
 
 
-def is_keyed(place: SlotTransform) -> bool:
+def is_keyed(binding: Binding) -> bool:
     """Return whether a mode channel decides."""
-    fcurve = place.curves.get(place.users[0].mode_channel)
+    fcurve = binding.curves.get(binding.users[0].mode_channel)
     return fcurve is not None and not fcurve.mute and len(fcurve.keyframe_points) > 0
 
 
-def has_to_do_with_modes(place: SlotTransform) -> bool:
-    """Return whether a place has a mode, a channel for it, in-betweens, or a record of any of them."""
-    return recorded(place) != NOTHING_RECORDED or is_keyed(place) or bool(place.filled)
+def has_to_do_with_modes(binding: Binding) -> bool:
+    """Return whether a binding has a mode, a channel for it, in-betweens, or a record of any of them."""
+    return recorded(binding) != NOTHING_RECORDED or is_keyed(binding) or bool(binding.filled)
 
 
-def show_modes(places: Iterable[SlotTransform]) -> None:
+def show_modes(bindings: Iterable[Binding]) -> None:
     """Have the property of all users say what is in their slots, and have slots take what their users waited with."""
-    for place in places:
-        users = [user for user in place.users if _is_shown(user, place) and user.animated.is_editable]
-        keyed = is_keyed(place)
-        if not has_mode(place) and has_in_betweens(place) and not (keyed or place.slot.action.is_editable):
+    for binding in bindings:
+        users = [user for user in binding.users if _is_shown(user, binding) and user.animated.is_editable]
+        keyed = is_keyed(binding)
+        if not has_mode(binding) and has_in_betweens(binding) and not (keyed or binding.slot.action.is_editable):
             # From a library of a version that kept modes on objects.
             continue
-        if not has_mode(place) and place.slot.action.is_editable:
-            _adopt(place, users)
-        mode = MODE_NAMES.get(recorded_mode(place), "BLENDER")
+        if not has_mode(binding) and binding.slot.action.is_editable:
+            _adopt(binding, users)
+        mode = MODE_NAMES.get(recorded_mode(binding), "BLENDER")
         for user in users:
             motion = user.motion
             if motion.awaited != "BLENDER":
                 motion.awaited = "BLENDER"
             if not keyed and motion.mode != mode:
                 motion.mode = mode
-            if motion.turns and user.turns_channel not in place.curves:
+            if motion.turns and user.turns_channel not in binding.curves:
                 motion.turns = 0
 
 
@@ -80,13 +80,13 @@ def adopt_from_properties(transforms: Iterable[Transform]) -> None:
             motion.awaited = motion.mode
 
 
-def _is_shown(user: Transform, place: SlotTransform) -> bool:
-    """Return whether a place is the one that a user's property speaks of: its Action, or a strip where it has none."""
+def _is_shown(user: Transform, binding: Binding) -> bool:
+    """Return whether a user's property speaks of a binding: of its Action, or of a strip where it has none."""
     data = user.animated.animation_data
-    return data.action is None or (data.action, data.action_slot_handle) == (place.slot.action, place.slot.handle)
+    return data.action is None or (data.action, data.action_slot_handle) == (binding.slot.action, binding.slot.handle)
 
 
-def _adopt(place: SlotTransform, users: Sequence[Transform]) -> None:
+def _adopt(binding: Binding, users: Sequence[Transform]) -> None:
     """Let a slot without a mode have that which a user waits with.
 
     Where there are in-betweens already, one of Blender's operators has moved it out of another Action, and it has the
@@ -94,12 +94,12 @@ def _adopt(place: SlotTransform, users: Sequence[Transform]) -> None:
     from a version that kept the mode on the object: it goes on as its user shows it.
     """
     waiting = next((user.motion.awaited for user in users if user.motion.awaited not in ("BLENDER", "")), None)
-    if waiting is None and has_in_betweens(place) and (number := mode_before_move(place)) is not None:
+    if waiting is None and has_in_betweens(binding) and (number := mode_before_move(binding)) is not None:
         waiting = MODE_NAMES[number]
-    if waiting is None and (original := original_of(place)) is not None:
+    if waiting is None and (original := original_of(binding)) is not None:
         waiting = MODE_NAMES.get(recorded_mode(original))
-        record_turns_axis(place, recorded(original).turns_axis)
-    if waiting is None and has_in_betweens(place):
+        record_turns_axis(binding, recorded(original).turns_axis)
+    if waiting is None and has_in_betweens(binding):
         waiting = next((user.motion.mode for user in users if user.motion.mode not in ("BLENDER", "")), None)
     if waiting:
-        record_mode(place, MODE_NUMBERS[waiting])
+        record_mode(binding, MODE_NUMBERS[waiting])

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..compute.sources import Source
 from ..transforms import Transform
-from .slots import SlotTransform
+from .slots import Binding
 
 FOLLOWED = ("CYCLES", "STEPPED")
 """Types that change which moment is shown."""
@@ -41,12 +41,12 @@ def is_whole(modifier: bpy.types.FModifier) -> bool:
     return not (modifier.use_restricted_range or (modifier.use_influence and modifier.influence < 1.0))
 
 
-def added_values(place: SlotTransform, user: Transform, source: Source, frames: np.ndarray) -> np.ndarray:
+def added_values(binding: Binding, user: Transform, source: Source, frames: np.ndarray) -> np.ndarray:
     """Return what modifiers add to the channels of a slot on these frames (m,) of its Action, shape (10, m)."""
     added = np.zeros((10, len(frames)))
     if source.modified:
         native = source.values_at(source.held(frames))
         for row in source.modified:
-            fcurve = place.curves[user.channels[row]]
+            fcurve = binding.curves[user.channels[row]]
             added[row] = [fcurve.evaluate(frame) for frame in frames.tolist()] - native[row]
     return added

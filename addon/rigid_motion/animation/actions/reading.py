@@ -17,15 +17,15 @@ from .key_reading import read_keys
 from .modifiers import is_modified
 from .records import recorded, recorded_digest, recorded_mode
 from .refusals import refuse_channel, refuse_different_steps, refuse_drivers, refuse_numbers, refuse_what_is_taken
-from .slots import SlotTransform
+from .slots import Binding
 
 
-def read(place: SlotTransform, mode: int | None = None) -> Source:
+def read(binding: Binding, mode: int | None = None) -> Source:
     """Return what is keyed of a transform in a slot.
 
     Parameters
     ----------
-    place : SlotTransform
+    binding : Binding
     mode : int, optional
         Read it as if it had the mode of this number throughout.
 
@@ -34,54 +34,54 @@ def read(place: SlotTransform, mode: int | None = None) -> Source:
     Refused
         Where that cannot be filled in.
     """
-    (source,) = keyed_in([place])
+    (source,) = keyed_in([binding])
     if isinstance(source, Refused):
         raise source
     if mode is not None:
         source = replace(source, mode=mode)
-    refuse_numbers(place.name, source)
+    refuse_numbers(binding.name, source)
     return source
 
 
-def keyed_in(places: Sequence[SlotTransform]) -> list[Source | Refused]:
-    """Return what is keyed in each of several places, or why it cannot be filled in.
+def keyed_in(bindings: Sequence[Binding]) -> list[Source | Refused]:
+    """Return what is keyed in each of several bindings, or why it cannot be filled in.
 
     Where several users of a slot differ in what in-betweens depend on, it is what the leading one of them has: that by
     which the in-betweens were made that are there, or else the first one that the channels turn.
 
     Numbers and modes are as they are, which may be any in a damaged file: see `refuse_numbers`.
     """
-    result = sources_of_users(places)
-    return [leading(place, users) for place, users in zip(places, result, strict=True)]
+    result = sources_of_users(bindings)
+    return [leading(binding, users) for binding, users in zip(bindings, result, strict=True)]
 
 
-def differing_users(place: SlotTransform, sources: list[Source | Refused]) -> list[Transform]:
+def differing_users(binding: Binding, sources: list[Source | Refused]) -> list[Transform]:
     """Return the users of a slot that are moved by the in-betweens of another one, which do not fit them.
 
     `sources` is what is keyed as each of the users has it.
     """
-    leader = leading(place, sources)
+    leader = leading(binding, sources)
     if isinstance(leader, Refused):
         return []
     return [
         user
-        for user, source in zip(place.users, sources, strict=True)
+        for user, source in zip(binding.users, sources, strict=True)
         if isinstance(source, Refused) or source.digest != leader.digest
     ]
 
 
-def sources_of_users(places: Sequence[SlotTransform]) -> list[list[Source | Refused]]:
-    """Return what is keyed in each of the places as each of its users has it."""
+def sources_of_users(bindings: Sequence[Binding]) -> list[list[Source | Refused]]:
+    """Return what is keyed in each of the bindings as each of its users has it."""
     result: list[list[_Keyed | Refused]] = []
     drivers: dict[bpy.types.ID, set[Channel]] = {}
-    for place in places:
+    for binding in bindings:
         users: list[_Keyed | Refused] = []
-        for user in place.users:
+        for user in binding.users:
             if user.animated not in drivers:
                 driving = user.animated.animation_data.drivers
                 drivers[user.animated] = {(item.data_path, item.array_index) for item in driving if not item.mute}
             try:
-                users.append(_keyed_for(user, place, drivers[user.animated]))
+                users.append(_keyed_for(user, binding, drivers[user.animated]))
             except Refused as problem:
                 users.append(problem)
         result.append(users)
@@ -90,18 +90,18 @@ def sources_of_users(places: Sequence[SlotTransform]) -> list[list[Source | Refu
     modes, turns = (iter(read_keys(curves)) for curves in ([k.modes for k in readable], [k.turns for k in readable]))
     return [
         [
-            _source(keyed, place, next(channels), next(modes), next(turns)) if isinstance(keyed, _Keyed) else keyed
+            _source(keyed, binding, next(channels), next(modes), next(turns)) if isinstance(keyed, _Keyed) else keyed
             for keyed in users
         ]
-        for place, users in zip(places, result, strict=True)
+        for binding, users in zip(bindings, result, strict=True)
     ]
 
 
-def leading(place: SlotTransform, users: list[Source | Refused]) -> Source | Refused:
+def leading(binding: Binding, users: list[Source | Refused]) -> Source | Refused:
     """Return the source of the leading user: see `keyed_in`."""
     if len(users) == 1:
         return users[0]
-    digest = recorded_digest(place)
+    digest = recorded_digest(binding)
     readable = [source for source in users if isinstance(source, Source)]
     if not readable:
         return users[0]
@@ -140,14 +140,14 @@ class _Keyed:
     """The rows of components that drivers move."""
 
 
-def _keyed_for(user: Transform, place: SlotTransform, drivers: Collection[Channel]) -> _Keyed:
+def _keyed_for(user: Transform, binding: Binding, drivers: Collection[Channel]) -> _Keyed:
     """Return what of a slot moves one of its users. `Refused` where that cannot be filled in."""
-    refuse_what_is_taken(user, place, drivers)
+    refuse_what_is_taken(user, binding, drivers)
     keyed, channels = {}, user.channels
     driven = frozenset(row for row, channel in channels.items() if channel in drivers) if drivers else frozenset()
     left = rows_left_to(driven) if driven else ()
     for row, channel in channels.items():
-        fcurve = place.curves.get(channel)
+        fcurve = binding.curves.get(channel)
         if fcurve is not None and row not in left and _has_say(user, fcurve):
             keyed[row] = fcurve
     if not keyed:
@@ -162,7 +162,7 @@ def _keyed_for(user: Transform, place: SlotTransform, drivers: Collection[Channe
         if row not in keyed and PART_OF[row] in names
     }
     modes, turns = (
-        [fcurve] if (fcurve := place.curves.get(channel)) is not None and _has_say(user, fcurve) else []
+        [fcurve] if (fcurve := binding.curves.get(channel)) is not None and _has_say(user, fcurve) else []
         for channel in (user.mode_channel, user.turns_channel)
     )
     modified = frozenset(row for row in has_modifiers if is_modified(keyed[row]))
@@ -171,7 +171,7 @@ def _keyed_for(user: Transform, place: SlotTransform, drivers: Collection[Channe
 
 def _source(
     keyed: _Keyed,
-    place: SlotTransform,
+    binding: Binding,
     channels: list[tuple[list[int], Keys]],
     modes: list[tuple[list[int], Keys]],
     turns: list[tuple[list[int], Keys]],
@@ -189,14 +189,14 @@ def _source(
         rest=keyed.rest,
         original=original,
         location_axes=user.location_axes,
-        mode=modes[0][1] if modes else recorded_mode(place),
+        mode=modes[0][1] if modes else recorded_mode(binding),
         turns=turns[0][1] if turns else None,
-        turns_axis=recorded(place).turns_axis,
-        in_nla=place.slot.in_nla,
-        seen=place.slot.seen if goes_on else None,
+        turns_axis=recorded(binding).turns_axis,
+        in_nla=binding.slot.in_nla,
+        seen=binding.slot.seen if goes_on else None,
         modified=keyed.modified,
         driven=keyed.driven,
-        influence=influence_of(place.slot) if is_blended else None,
+        influence=influence_of(binding.slot) if is_blended else None,
         is_on_top=user.has_difference_slot,
     )
 

@@ -13,7 +13,7 @@ import bpy
 
 from ..compute.modes import MODE_NAMES, MODE_NUMBERS, UNKNOWN
 from ..compute.sources import SCREW_AXIS
-from .slots import Slot, SlotTransform
+from .slots import Binding, Slot
 
 
 class Recorded(NamedTuple):
@@ -33,13 +33,13 @@ class Recorded(NamedTuple):
 NOTHING_RECORDED = Recorded()
 
 
-def recorded(place: SlotTransform) -> Recorded:
+def recorded(binding: Binding) -> Recorded:
     """Return what is kept about a transform in a slot: looked up once,
     and again after it was changed by way of here.
     """
-    result = place.__dict__.get("recorded")
+    result = binding.__dict__.get("recorded")
     if result is None:
-        record = record_of(place)
+        record = record_of(binding)
         if record is None:
             result = NOTHING_RECORDED
         else:
@@ -47,104 +47,102 @@ def recorded(place: SlotTransform) -> Recorded:
             axis = record.turns_axis or SCREW_AXIS
             samples = max(record.rate, 1), record.error
             result = Recorded(mode, record.digest, record.rows, record.constraint, axis, *samples)
-        place.__dict__["recorded"] = result
+        binding.__dict__["recorded"] = result
     return result
 
 
-def recorded_digest(place: SlotTransform) -> str:
+def recorded_digest(binding: Binding) -> str:
     """Return the digest of the source that a transform was filled in from, "" where it was not."""
-    return recorded(place).digest
+    return recorded(binding).digest
 
 
-def recorded_rows(place: SlotTransform) -> list[int]:
+def recorded_rows(binding: Binding) -> list[int]:
     """Return the rows of the components that in-betweens were written for."""
-    return [int(row, 16) for row in recorded(place).rows]
+    return [int(row, 16) for row in recorded(binding).rows]
 
 
-def recorded_mode(place: SlotTransform) -> int:
+def recorded_mode(binding: Binding) -> int:
     """Return the number of the mode that a transform has throughout, `UNKNOWN` where it is none that is known."""
-    mode = recorded(place).mode
+    mode = recorded(binding).mode
     # A number that is no mode, from a damaged file or a later version, reads as an empty name.
     return 0 if mode is None else MODE_NUMBERS.get(mode, UNKNOWN)
 
 
-def has_mode(place: SlotTransform) -> bool:
+def has_mode(binding: Binding) -> bool:
     """Return whether a mode other than Blender's was chosen for all segments of a transform in this slot."""
-    return recorded(place).mode is not None
+    return recorded(binding).mode is not None
 
 
-def has_in_betweens(place: SlotTransform) -> bool:
+def has_in_betweens(binding: Binding) -> bool:
     """Return whether a transform was filled in, by whichever version;
     constants that are held beside strips are none.
     """
     return (
-        bool(recorded_digest(place))
-        or any(len(fcurve.sampled_points) > 2 for fcurve in place.filled.values())
-        or _has_time_of_its_own(place)
+        bool(recorded_digest(binding))
+        or any(len(fcurve.sampled_points) > 2 for fcurve in binding.filled.values())
+        or _has_time_of_its_own(binding)
     )
 
 
-def _has_time_of_its_own(place: SlotTransform) -> bool:
+def _has_time_of_its_own(binding: Binding) -> bool:
     """Return whether a bone was filled in, be it in an Action that its slot was in before:
     it has the time of a constraint.
 
     Those that are held in the NLA for other Actions have no influence.
     """
     influences = (
-        place.curves.get((path.removesuffix("eval_time") + "influence", 0))
-        for path, _ in place.curves
-        if place.kind.has_difference_slot and path.endswith(".eval_time")
+        binding.curves.get((path.removesuffix("eval_time") + "influence", 0))
+        for path, _ in binding.curves
+        if binding.kind.has_difference_slot and path.endswith(".eval_time")
     )
     return any(influence is None or influence.evaluate(0.0) > 0.0 for influence in influences)
 
 
-def record_mode(place: SlotTransform, number: int) -> None:
+def record_mode(binding: Binding, number: int) -> None:
     """Keep the mode that a transform has throughout, and have its users show it."""
     mode = MODE_NAMES[number]
     if number == 0:
-        if (record := record_of(place)) is not None:
+        if (record := record_of(binding)) is not None:
             record.property_unset("mode")
-            _tidy(place, record)
-    elif recorded(place).mode != mode:
-        _ensure_record(place).mode = mode
-    place.__dict__.pop("recorded", None)
-    for user in place.users:
+            _tidy(binding, record)
+    elif recorded(binding).mode != mode:
+        _ensure_record(binding).mode = mode
+    binding.__dict__.pop("recorded", None)
+    for user in binding.users:
         if user.motion.mode != mode and user.animated.is_editable:
             user.motion.mode = mode
 
 
-def record_turns_axis(place: SlotTransform, axis: str) -> None:
+def record_turns_axis(binding: Binding, axis: str) -> None:
     """Keep what turns are about, one of `TURN_AXES`."""
-    if axis != recorded(place).turns_axis:
-        _ensure_record(place).turns_axis = axis
-        place.__dict__.pop("recorded", None)
+    if axis != recorded(binding).turns_axis:
+        _ensure_record(binding).turns_axis = axis
+        binding.__dict__.pop("recorded", None)
 
 
-def record_in_betweens(
-    place: SlotTransform, digest: str, rows: Iterable[int], rate: int = 1, error: float = 0.0
-) -> None:
+def record_in_betweens(binding: Binding, digest: str, rows: Iterable[int], rate: int = 1, error: float = 0.0) -> None:
     """Keep what in-betweens were made from, which components they are in, how many samples a frame they have, and how
     far off they are between these.
     """
     if digest:
-        record = _ensure_record(place)
+        record = _ensure_record(binding)
         record.digest, record.rows = digest, "".join(f"{row:x}" for row in sorted(rows))
         record.rate, record.error = rate, error
-    elif recorded(place).digest and (record := record_of(place)) is not None:
+    elif recorded(binding).digest and (record := record_of(binding)) is not None:
         record.digest = record.rows = ""
-        _tidy(place, record)
-    place.__dict__.pop("recorded", None)
+        _tidy(binding, record)
+    binding.__dict__.pop("recorded", None)
 
 
-def record_constraint(place: SlotTransform, name: str) -> None:
+def record_constraint(binding: Binding, name: str) -> None:
     """Keep what the constraint of a bone is called, where that is not its usual name."""
-    _ensure_record(place).constraint = name
-    place.__dict__.pop("recorded", None)
+    _ensure_record(binding).constraint = name
+    binding.__dict__.pop("recorded", None)
 
 
-def keep_name(place: SlotTransform) -> None:
+def keep_name(binding: Binding) -> None:
     """Have a bone keep the name that its record is under, see `renaming`."""
-    for user in place.users if place.kind.is_part else ():
+    for user in binding.users if binding.kind.is_part else ():
         if user.motion.recorded_as != user.carrier.name and user.animated.is_editable:
             user.motion.recorded_as = user.carrier.name
 
@@ -172,15 +170,15 @@ def forget_in_betweens(slot: Slot, prefixes: Iterable[str]) -> None:
             record.digest = ""
 
 
-def record_of(place: SlotTransform) -> bpy.types.PropertyGroup | None:
+def record_of(binding: Binding) -> bpy.types.PropertyGroup | None:
     """Return what an Action keeps about a transform, None where that is nothing."""
-    records, key = place.slot.action.rigid_motion.slots, _key(place.slot, place.prefix)
+    records, key = binding.slot.action.rigid_motion.slots, _key(binding.slot, binding.prefix)
     number = _numbers.get(key, -1)
     if not (0 <= number < len(records) and records[number].name == key):
         number = records.find(key)
-        if number < 0 and not place.kind.is_part:
+        if number < 0 and not binding.kind.is_part:
             # Those of versions without bones have no name to be found by.
-            unnamed = (place.slot.handle, place.prefix, "")
+            unnamed = (binding.slot.handle, binding.prefix, "")
             old = (n for n, one in enumerate(records) if (one.handle, one.prefix, one.name) == unnamed)
             number = next(old, -1)
         _numbers[key] = number
@@ -188,7 +186,7 @@ def record_of(place: SlotTransform) -> bpy.types.PropertyGroup | None:
 
 
 _numbers: dict[str, int] = {}
-"""The places where records were found last, by their names: a rig has many,
+"""The indices at which records were found last, by their names: a rig has many,
 and Blender goes through all of them for a name."""
 
 
@@ -197,19 +195,19 @@ def _key(slot: Slot, prefix: str) -> str:
     return f"{slot.handle} {prefix}"
 
 
-def _ensure_record(place: SlotTransform) -> bpy.types.PropertyGroup:
+def _ensure_record(binding: Binding) -> bpy.types.PropertyGroup:
     """Return the record of a transform in a slot, made where there is none yet."""
-    record = record_of(place)
+    record = record_of(binding)
     if record is not None:
         return record
-    record = place.slot.action.rigid_motion.slots.add()
-    record.name, record.handle, record.prefix = _key(place.slot, place.prefix), place.slot.handle, place.prefix
-    keep_name(place)
+    record = binding.slot.action.rigid_motion.slots.add()
+    record.name, record.handle, record.prefix = _key(binding.slot, binding.prefix), binding.slot.handle, binding.prefix
+    keep_name(binding)
     return record
 
 
-def _tidy(place: SlotTransform, record: bpy.types.PropertyGroup) -> None:
+def _tidy(binding: Binding, record: bpy.types.PropertyGroup) -> None:
     """Take out a record that says nothing."""
     if not record.digest and not record.is_property_set("mode") and record.turns_axis == SCREW_AXIS:
-        records = place.slot.action.rigid_motion.slots
+        records = binding.slot.action.rigid_motion.slots
         records.remove(next(number for number, one in enumerate(records) if one == record))

@@ -18,7 +18,7 @@ from ..transforms import GROUP, LINKED, Channel, Refused, Transform
 from .key_reading import read_steps
 from .modifiers import FOLLOWED, is_added, is_whole, may_add
 from .records import recorded_digest, recorded_rows
-from .slots import SlotTransform, is_filled_in
+from .slots import Binding, is_filled_in
 
 MOST_FRAMES = 250_000
 """The longest motion that is filled in: two hours and a quarter at 30 frames a second."""
@@ -80,18 +80,18 @@ BAD_SETTING = n_(
 )
 
 
-def refuse_what_is_taken(user: Transform, place: SlotTransform, drivers: Collection[Channel]) -> None:
+def refuse_what_is_taken(user: Transform, binding: Binding, drivers: Collection[Channel]) -> None:
     """Raise `Refused` where what a user's differences go into is not to be had.
 
     `drivers` are the channels of the user's data-block that are driven.
     """
-    refuse_linked(user, place)
+    refuse_linked(user, binding)
     # Differences that are in a slot of their own take the place of nothing.
     for channel in () if user.has_difference_slot else user.differences.values():
         if channel in drivers:
             _refuse_driver(user.name, channel)
-        fcurve = place.curves.get(channel)
-        if fcurve is not None and not (is_filled_in(fcurve) or _was_filled_in(fcurve, user, place)):
+        fcurve = binding.curves.get(channel)
+        if fcurve is not None and not (is_filled_in(fcurve) or _was_filled_in(fcurve, user, binding)):
             if fcurve.group is not None and fcurve.group.name == GROUP:
                 raise Refused(
                     rpt_(
@@ -121,19 +121,19 @@ def _refuse_driver(name: str, channel: Channel) -> None:
     )
 
 
-def _was_filled_in(fcurve: bpy.types.FCurve, user: Transform, place: SlotTransform) -> bool:
+def _was_filled_in(fcurve: bpy.types.FCurve, user: Transform, binding: Binding) -> bool:
     """Return whether in-betweens are in an F-curve that has been put into another group, or into none."""
     channels = user.differences
-    written = [channels.get(row) for row in recorded_rows(place)] if recorded_digest(place) else []
+    written = [channels.get(row) for row in recorded_rows(binding)] if recorded_digest(binding) else []
     return (fcurve.data_path, fcurve.array_index) in written and not fcurve.keyframe_points
 
 
-def refuse_linked(user: Transform, place: SlotTransform | None = None) -> None:
+def refuse_linked(user: Transform, binding: Binding | None = None) -> None:
     """Raise `Refused` where what is moved, or the Action that moves it, belongs to another file."""
     if not user.animated.is_editable:
         raise Refused(rpt_(user.linked_text).format(name=user.animated.name))
-    if place is not None and not place.slot.action.is_editable:
-        raise Refused(rpt_(LINKED).format(name=place.slot.action.name))
+    if binding is not None and not binding.slot.action.is_editable:
+        raise Refused(rpt_(LINKED).format(name=binding.slot.action.name))
 
 
 def refuse_channel(name: str, fcurve: bpy.types.FCurve) -> None:

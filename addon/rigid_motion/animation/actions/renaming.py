@@ -14,19 +14,19 @@ import bpy
 
 from ..transforms import Transform, bone_name, prefix_of, split_path, transform_of
 from .records import NOTHING_RECORDED, forget_in_betweens, keep_name, recorded, rename_records
-from .slots import Slot, SlotTransform, in_action, slots_in, slots_of
+from .slots import Binding, Slot, in_action, slots_in, slots_of
 
 
-def follow_renamed(places: Iterable[SlotTransform]) -> None:
+def follow_renamed(bindings: Iterable[Binding]) -> None:
     """Have records follow the bones of these that were renamed; where there are several, all bones of their rigs."""
-    bones = [place for place in places if place.kind.is_part]
-    users = {user for place in bones for user in place.users}
+    bones = [binding for binding in bindings if binding.kind.is_part]
+    users = {user for binding in bones for user in binding.users}
     rigs = {user.animated for user in users}
     looked_at = (bone for rig in rigs for bone in _bones_of(rig)) if len(bones) > 1 else users
     _follow({bone.animated for bone in looked_at if _is_renamed(bone)})
-    for place in bones:
-        if recorded(place) != NOTHING_RECORDED:
-            keep_name(place)
+    for binding in bones:
+        if recorded(binding) != NOTHING_RECORDED:
+            keep_name(binding)
 
 
 def follow_renamed_in(rig: bpy.types.Object) -> None:

@@ -1,7 +1,8 @@
 """Which Action slots move something, and the F-curves in them, transform by transform.
 
-A slot may have several users, and moves transforms of each: the object itself, and the bones of a rig. `transforms_in`
-is where a slot is taken apart. What the in-betweens of bones differ in is in a second slot of the same Action.
+A slot may have several users, and moves transforms of each: the object itself, and the bones of a rig.
+`bindings_in_slot` is where a slot is taken apart. What the in-betweens of bones differ in is in a second slot of the
+same Action.
 """
 
 from __future__ import annotations
@@ -68,8 +69,8 @@ class Slot:
 
 
 @dataclass(frozen=True, eq=False)
-class SlotTransform:
-    """One transform in one slot: of each of the slot's users the same one."""
+class Binding:
+    """One transform that a slot animates: of each of the slot's users the same one."""
 
     slot: Slot
     prefix: str
@@ -129,16 +130,16 @@ class SlotTransform:
             fcurve = self.curves[channel] = self.channelbag.fcurves.new(path, index=index)
         return fcurve
 
-    def read_again(self) -> SlotTransform:
-        """Return this place with the F-curves that there are by now."""
+    def read_again(self) -> Binding:
+        """Return this binding with the F-curves that there are by now."""
         return read_again([self])[0]
 
 
-def transforms_in(slot: Slot, prefixes: Collection[str] | None = None) -> list[SlotTransform]:
+def bindings_in_slot(slot: Slot, prefixes: Collection[str] | None = None) -> list[Binding]:
     """Return what a slot moves, transform by transform: these, or all that it has something of."""
     channelbag = slot.channelbag
     if prefixes is not None:
-        return _transforms(slot, channelbag, prefixes, cache(partial(_curves_under, channelbag, prefixes)))
+        return _bindings(slot, channelbag, prefixes, cache(partial(_curves_under, channelbag, prefixes)))
     curves: dict[str, Curves] = {"": {}}
     for fcurve in () if channelbag is None else channelbag.fcurves:
         path = fcurve.data_path
@@ -148,33 +149,35 @@ def transforms_in(slot: Slot, prefixes: Collection[str] | None = None) -> list[S
     for record in slot.action.rigid_motion.slots:
         if record.handle == slot.handle:
             curves.setdefault(record.prefix, {})
-    return transforms_with(slot, channelbag, curves)
+    return bindings_with(slot, channelbag, curves)
 
 
-def read_again(places: Sequence[SlotTransform]) -> list[SlotTransform]:
-    """Return these places with the F-curves that there are by now."""
+def read_again(bindings: Sequence[Binding]) -> list[Binding]:
+    """Return these bindings with the F-curves that there are by now."""
     prefixes: dict[Slot, dict[str, None]] = {}
-    for place in places:
-        prefixes.setdefault(place.slot, {})[place.prefix] = None
-    result = {(slot, place.prefix): place for slot, own in prefixes.items() for place in transforms_in(slot, own)}
-    return [result[place.slot, place.prefix] for place in places]
+    for binding in bindings:
+        prefixes.setdefault(binding.slot, {})[binding.prefix] = None
+    result = {
+        (slot, binding.prefix): binding for slot, own in prefixes.items() for binding in bindings_in_slot(slot, own)
+    }
+    return [result[binding.slot, binding.prefix] for binding in bindings]
 
 
-def transforms_with(
+def bindings_with(
     slot: Slot, channelbag: bpy.types.ActionChannelbag | None, curves: Mapping[str, Curves]
-) -> list[SlotTransform]:
+) -> list[Binding]:
     """Return what a slot moves by these F-curves, transform by transform: all there are of each prefix."""
-    return _transforms(slot, channelbag, curves, lambda: curves)
+    return _bindings(slot, channelbag, curves, lambda: curves)
 
 
-def _transforms(
+def _bindings(
     slot: Slot,
     channelbag: bpy.types.ActionChannelbag | None,
     prefixes: Iterable[str],
     find: Callable[[], Mapping[str, Curves]],
-) -> list[SlotTransform]:
-    places = (SlotTransform(slot, prefix, channelbag, _users_of(slot, prefix), find) for prefix in prefixes)
-    return [place for place in places if place.users]
+) -> list[Binding]:
+    bindings = (Binding(slot, prefix, channelbag, _users_of(slot, prefix), find) for prefix in prefixes)
+    return [binding for binding in bindings if binding.users]
 
 
 def _curves_under(channelbag: bpy.types.ActionChannelbag | None, prefixes: Iterable[str]) -> dict[str, Curves]:
@@ -202,7 +205,7 @@ def _channelbag(action: bpy.types.Action, handle: int) -> bpy.types.ActionChanne
     return None if slot is None else action_get_channelbag_for_slot(action, slot)
 
 
-def slot_transforms_of(transforms: Iterable[Transform]) -> list[SlotTransform]:
+def bindings_of(transforms: Iterable[Transform]) -> list[Binding]:
     """Return the slots that move these, and of each slot what is in it of them."""
     prefixes: dict[bpy.types.Object, dict[str, None]] = {}
     for transform in transforms:
@@ -210,32 +213,32 @@ def slot_transforms_of(transforms: Iterable[Transform]) -> list[SlotTransform]:
     result = []
     for slot in slots_of(prefixes):
         desired = dict.fromkeys(prefix for user in slot.users for prefix in prefixes.get(user, ()))
-        result += transforms_in(slot, desired)
+        result += bindings_in_slot(slot, desired)
     return result
 
 
-def slot_transforms_in(actions: Iterable[bpy.types.Action]) -> list[SlotTransform]:
+def bindings_in(actions: Iterable[bpy.types.Action]) -> list[Binding]:
     """Return what these Actions move, transform by transform."""
-    return [place for slot in slots_in(actions) for place in transforms_in(slot)]
+    return [binding for slot in slots_in(actions) for binding in bindings_in_slot(slot)]
 
 
-def places_of(transform: Transform) -> list[SlotTransform]:
+def bindings_for(transform: Transform) -> list[Binding]:
     """Return what moves a transform, as if nothing else used the same slots: without a look at other objects."""
     slots = (
         Slot(action, handle, (transform.animated,), frozenset(strips))
         for action, handle, strips in uses_of(transform.animated).values()
     )
-    return [place for slot in slots for place in transforms_in(slot, (transform.prefix,))]
+    return [binding for slot in slots for binding in bindings_in_slot(slot, (transform.prefix,))]
 
 
-def filled_places_of(obj: bpy.types.Object) -> list[SlotTransform]:
+def filled_bindings(obj: bpy.types.Object) -> list[Binding]:
     """Return what is filled in of all that an object's Actions move of it, as if nothing else used the same slots."""
     result = []
     for action, handle, strips in uses_of(obj).values():
         slot = Slot(action, handle, (obj,), frozenset(strips))
         channelbag = slot.bones_channelbag
         bones = () if channelbag is None else map(prefix_of, channelbag.groups.keys())
-        result += [place for place in transforms_in(slot, {"", *bones}) if place.filled]
+        result += [binding for binding in bindings_in_slot(slot, {"", *bones}) if binding.filled]
     return result
 
 
@@ -266,15 +269,15 @@ def _slots(
         return []
     # A slot's own list of users may have some that are gone, which crashes Blender 5.2.
     owners = bpy.data.user_map(subset=actions, key_types={"ACTION"}, value_types={"OBJECT"})
-    places: Uses = {}
+    uses: Uses = {}
     users: dict[tuple[int, int], list[bpy.types.Object]] = {}
     for obj in sorted(set().union(*owners.values()), key=lambda obj: obj.name_full):
         for key, (action, handle, strips) in (known[obj] if obj in known else uses_of(obj)).items():
             if is_desired(key):
                 users.setdefault(key, []).append(obj)
-                places.setdefault(key, (action, handle, set()))[2].update(strips)
+                uses.setdefault(key, (action, handle, set()))[2].update(strips)
     return [
-        Slot(action, handle, tuple(users[key]), frozenset(strips)) for key, (action, handle, strips) in places.items()
+        Slot(action, handle, tuple(users[key]), frozenset(strips)) for key, (action, handle, strips) in uses.items()
     ]
 
 

@@ -22,7 +22,7 @@ from ..actions.channels import (
     write_channel,
 )
 from ..actions.modifiers import added_values
-from ..actions.slots import SlotTransform
+from ..actions.slots import Binding
 from ..compute.differences import SMOOTH, in_betweens
 from ..compute.sources import SAME_FRAME, Source
 from ..edits.apply import Readings, Target, Targets, apply_edit, readable, transforms_of
@@ -125,9 +125,9 @@ def bake(
     if not step > 0.0:
         raise Refused(rpt_("the step between baked keys has to be above zero, not {step}").format(step=step))
 
-    def plan(transform: Transform, readings: Readings) -> list[tuple[SlotTransform, Source, np.ndarray]]:
+    def plan(transform: Transform, readings: Readings) -> list[tuple[Binding, Source, np.ndarray]]:
         refuse_tweak_mode(transform)
-        live = [(place, source) for place, source in readable(transform, readings) if source.is_live]
+        live = [(binding, source) for binding, source in readable(transform, readings) if source.is_live]
         if not live:
             raise Refused(
                 rpt_("{name} has no rigid in-betweens to bake: choose a mode for its keys first").format(
@@ -135,12 +135,13 @@ def bake(
                 )
             )
         return [
-            (place, source, _frames(source, *_widened(transform, source, first, last), step)) for place, source in live
+            (binding, source, _frames(source, *_widened(transform, source, first, last), step))
+            for binding, source in live
         ]
 
-    def act(transform: Transform, planned: list[tuple[SlotTransform, Source, np.ndarray]]) -> tuple[float, float]:
-        for place, source, frames in planned:
-            _bake_place(transform, place, source, frames, interpolation)
+    def act(transform: Transform, planned: list[tuple[Binding, Source, np.ndarray]]) -> tuple[float, float]:
+        for binding, source, frames in planned:
+            _bake_place(transform, binding, source, frames, interpolation)
         return (
             min(float(frames[0]) for *_, frames in planned),
             max(float(frames[-1]) for *_, frames in planned),
@@ -233,11 +234,9 @@ def _frames(source: Source, begin: float, end: float, step: float) -> np.ndarray
     )
 
 
-def _bake_place(
-    transform: Transform, place: SlotTransform, source: Source, frames: np.ndarray, interpolation: str
-) -> None:
-    motion, added = in_betweens(source, frames), added_values(place, transform, source, frames)
-    copy = move_by_copy(transform, place, BAKED)
+def _bake_place(transform: Transform, binding: Binding, source: Source, frames: np.ndarray, interpolation: str) -> None:
+    motion, added = in_betweens(source, frames), added_values(binding, transform, source, frames)
+    copy = move_by_copy(transform, binding, BAKED)
     fcurves = copy.channelbag.fcurves
     driven = {transform.channels[row] for row in source.driven}
     cycles = source.cyclic.cycles if source.cyclic is not None and _may_repeat(source) else None
@@ -267,20 +266,20 @@ def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarr
     before, behind = at < frames[0] - SAME_FRAME, at > frames[-1] + SAME_FRAME
     new = empty_key_fields(len(frames))
     own = np.flatnonzero(~(before | behind))
-    places = np.clip(np.searchsorted(frames, at[own]), 1, len(frames) - 1)
-    places -= at[own] - frames[places - 1] <= frames[places] - at[own]
+    indices = np.clip(np.searchsorted(frames, at[own]), 1, len(frames) - 1)
+    indices -= at[own] - frames[indices - 1] <= frames[indices] - at[own]
     new["type"][:] = code_of("type", "GENERATED")
     for name, numbers in new.items():
-        numbers[places] = old[name][own]
+        numbers[indices] = old[name][own]
     new["interpolation"][:] = code_of("interpolation", interpolation)
     points = np.stack((frames, values), axis=1).astype(np.float32)
-    at_end = own[places == len(frames) - 1]
+    at_end = own[indices == len(frames) - 1]
     if behind.any() and len(at_end):
         new["interpolation"][-1] = old["interpolation"][at_end[0]]
     # Handles keep their distance from the key, where there were any; the outer ones shape what is left alone.
     for side in ("handle_left", "handle_right"):
         handles = points.copy()
-        handles[places] += old[side][own] - old["co"][own]
+        handles[indices] += old[side][own] - old["co"][own]
         new[side] = handles
     new["co"] = points
     for name in ("handle_left_type", "handle_right_type"):

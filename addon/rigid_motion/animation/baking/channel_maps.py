@@ -32,21 +32,23 @@ def shown(transform: Transform, source: Source, frames: np.ndarray) -> tuple[Pos
     """
     desired = in_betweens(source, frames).desired
     delta, rest, along, count = source.original, transform.components(), source.location_axes, len(frames)
-    places, quaternions = desired.positions, desired.quaternions
+    positions, quaternions = desired.positions, desired.quaternions
     if LOCATION not in source.keyed:
-        place = rest[ROWS[LOCATION]] + delta[ROWS[LOCATION]]
-        places = np.tile(place if along is None else along @ place, (count, 1))
+        position = rest[ROWS[LOCATION]] + delta[ROWS[LOCATION]]
+        positions = np.tile(position if along is None else along @ position, (count, 1))
     if ROTATION not in source.keyed:
         column = rest[:, None].copy()
         turn_into_quaternions(column, source.order)
         quaternions = np.tile(multiply(delta[ROWS[ROTATION]], column[ROWS[ROTATION], 0]), (count, 1))
     if desired.scales is not None:
-        return Poses(places, quaternions, desired.scales), _maps(places, quaternions, desired.scales[:, None], along)
+        return Poses(positions, quaternions, desired.scales), _maps(
+            positions, quaternions, desired.scales[:, None], along
+        )
     scale = np.tile(rest[ROWS[SCALE]] * delta[ROWS[SCALE]], (count, 1))
     if SCALE in source.keyed:
         scale = (source.values_at(frames)[ROWS[SCALE]] * delta[ROWS[SCALE], None]).T
     mean = np.cbrt(np.abs(scale.prod(axis=1)))
-    return Poses(places, quaternions, mean), _maps(places, quaternions, scale, along)
+    return Poses(positions, quaternions, mean), _maps(positions, quaternions, scale, along)
 
 
 def evaluated(
@@ -75,13 +77,13 @@ def evaluated(
     else:
         turns = [Quaternion(turn).normalized() for turn in values("rotation_quaternion").tolist()]
     along, scale = transform.location_axes, values("scale")
-    places = values("location") if along is None else values("location") @ along.T
+    positions = values("location") if along is None else values("location") @ along.T
     quaternions = np.array(turns, dtype=np.float64)
     mean = np.cbrt(np.abs(scale.prod(axis=1)))
-    return Poses(places, quaternions, mean), _maps(places, quaternions, scale, along)
+    return Poses(positions, quaternions, mean), _maps(positions, quaternions, scale, along)
 
 
-def _maps(places: np.ndarray, quaternions: np.ndarray, scale: np.ndarray, along: np.ndarray | None) -> AffineMaps:
-    """Return the maps with places (n, 3) along the axes of the body, quaternions (n, 4) and scales (n, 3) or (n, 1)."""
+def _maps(positions: np.ndarray, quaternions: np.ndarray, scale: np.ndarray, along: np.ndarray | None) -> AffineMaps:
+    """Return the maps with positions (n, 3) along the body's axes, quaternions (n, 4) and scales (n, 3) or (n, 1)."""
     axes = np.moveaxis(matrices(quaternions), -1, 0) * scale[:, None, :]
-    return AffineMaps(axes, places if along is None else places @ along)
+    return AffineMaps(axes, positions if along is None else positions @ along)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 
 import bpy
 
-from ..actions.slots import Slot, SlotTransform, counterpart_in, strips_of, transforms_in, transforms_with, uses_of
+from ..actions.slots import Binding, Slot, bindings_in_slot, bindings_with, counterpart_in, strips_of, uses_of
 from ..transforms import Transform, shows_differences
 
 BAKED, REDUCED = "BAKED", "REDUCED"
@@ -35,9 +35,7 @@ def note(transform: Transform, kind: str, changed: bpy.types.Action, original: b
     entry.components = transform.components()
 
 
-def let_rest(
-    transform: Transform, entry: bpy.types.PropertyGroup, changed: SlotTransform, original: SlotTransform
-) -> None:
+def let_rest(transform: Transform, entry: bpy.types.PropertyGroup, changed: Binding, original: Binding) -> None:
     """Give properties that got keys only with a copy the values that they had before."""
     if not entry.is_property_set("components"):
         # From a version that did not note them.
@@ -54,13 +52,13 @@ def used_in(animated: bpy.types.Object, action: bpy.types.Action | None) -> Slot
     return next((Slot(action, handle, (animated,), frozenset(at)) for used, handle, at in uses if used == action), None)
 
 
-def in_copy(transform: Transform, place: SlotTransform, changed: bpy.types.Action) -> SlotTransform:
+def in_copy(transform: Transform, binding: Binding, changed: bpy.types.Action) -> Binding:
     """Return something in the copy that it moves by, which has the same channels as the original."""
     slot = used_in(transform.animated, changed)
     channelbag = slot.channelbag
-    result = {channel: channelbag.fcurves.find(channel[0], index=channel[1]) for channel in place.curves}
+    result = {channel: channelbag.fcurves.find(channel[0], index=channel[1]) for channel in binding.curves}
     curves = {channel: fcurve for channel, fcurve in result.items() if fcurve is not None}
-    return transforms_with(slot, channelbag, {place.prefix: curves})[0]
+    return bindings_with(slot, channelbag, {binding.prefix: curves})[0]
 
 
 class Lookup:
@@ -68,12 +66,12 @@ class Lookup:
 
     def __init__(self, transforms: Iterable[Transform]) -> None:
         self._prefixes = {transform.prefix for transform in transforms}
-        self._found: dict[tuple, dict[str, SlotTransform]] = {}
+        self._found: dict[tuple, dict[str, Binding]] = {}
 
-    def find(self, slot: Slot, prefix: str) -> SlotTransform:
+    def find(self, slot: Slot, prefix: str) -> Binding:
         key = slot.action.session_uid, slot.handle, slot.users
         if key not in self._found:
-            self._found[key] = {place.prefix: place for place in transforms_in(slot, self._prefixes)}
+            self._found[key] = {binding.prefix: binding for binding in bindings_in_slot(slot, self._prefixes)}
         return self._found[key][prefix]
 
 

@@ -16,7 +16,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...motion import KEYFRAME_MODES, Poses, reduce_keys, shell_error
 from ...motion.affine import AffineMaps, ball_displacement
 from ...motion.best_of import least_errors
-from ..actions.slots import SlotTransform
+from ..actions.slots import Binding
 from ..compute.components import ROWS, SCALE
 from ..compute.differences import in_betweens
 from ..compute.modes import MODE_NUMBERS
@@ -64,7 +64,7 @@ class WholeRig:
 class FewerKeys:
     """The keys that one slot is to have, and what had them before."""
 
-    place: SlotTransform
+    binding: Binding
     before: int
     frames: np.ndarray
     """Shape (k,)."""
@@ -93,7 +93,7 @@ class FewerKeys:
     def planned(
         cls,
         transform: Transform,
-        place: SlotTransform,
+        binding: Binding,
         source: Source,
         fewer: Source,
         frames: np.ndarray,
@@ -106,7 +106,7 @@ class FewerKeys:
         """
         key_frames = distinct(fewer.keyed_frames)
         return cls(
-            place,
+            binding,
             len(distinct(source.keyed_frames)),
             frames,
             {transform.channels[row]: column for row, column in values.items()},
@@ -121,7 +121,7 @@ class FewerKeys:
 
 def fewer_keys(
     transform: Transform,
-    place: SlotTransform,
+    binding: Binding,
     source: Source,
     mode: str,
     tolerance: float,
@@ -184,7 +184,7 @@ def fewer_keys(
         if error_of_mixed.max() <= allowed:
             fewer, error = mixed, error_of_mixed
     columns = {row: column[chosen] for row, column in values.items()}
-    return FewerKeys.planned(transform, place, source, fewer, seen[chosen], columns, float(error.max()))
+    return FewerKeys.planned(transform, binding, source, fewer, seen[chosen], columns, float(error.max()))
 
 
 def with_best_modes(
@@ -233,8 +233,8 @@ def samples_of(source: Source) -> np.ndarray:
     """Return where the recording is looked at: on its keys, and on whole frames where those are further apart."""
     keys = distinct(source.keyed_frames)
     whole = np.arange(np.ceil(keys[0]), np.floor(keys[-1]) + 1.0)
-    place = np.clip(np.searchsorted(keys, whole), 1, max(len(keys) - 1, 1))
-    before, behind = keys[place - 1], keys[np.minimum(place, len(keys) - 1)]
+    index = np.clip(np.searchsorted(keys, whole), 1, max(len(keys) - 1, 1))
+    before, behind = keys[index - 1], keys[np.minimum(index, len(keys) - 1)]
     apart = (whole - before > SAME_FRAME) & (behind - whole > SAME_FRAME) & (behind - before > 1.0 + SAME_FRAME)
     return np.union1d(keys, whole[apart])
 
@@ -300,8 +300,8 @@ def with_keys(source: Source, frames: np.ndarray, values: dict[int, np.ndarray],
         codes = np.full(points.shape[:2], LINEAR, CODE)
         channels.append((rows, Keys(points, codes, linear=linear, cycles=cycles)))
     for own, keys in source.channels:
-        places = [place for place, row in enumerate(own) if row not in values]
-        if places:
-            channels.append(([own[place] for place in places], keys.only(places)))
+        indices = [index for index, row in enumerate(own) if row not in values]
+        if indices:
+            channels.append(([own[index] for index in indices], keys.only(indices)))
     rest = {row: value for row, value in source.rest.items() if row not in values}
     return replace(source, channels=tuple(channels), rest=rest, mode=MODE_NUMBERS[mode], turns=None)

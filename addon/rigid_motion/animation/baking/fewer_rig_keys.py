@@ -21,7 +21,7 @@ from ...motion.contacts import slide, standing
 from ...motion.poses import placed
 from ...motion.quaternions import align_signs
 from ..actions.refusals import refuse_modified
-from ..actions.slots import Slot, SlotTransform
+from ..actions.slots import Binding, Slot
 from ..compute.sources import SAME_FRAME, Source, distinct
 from ..edits.apply import Readings, readable
 from ..transforms import Refused, Transform, transform_of
@@ -64,7 +64,7 @@ Plans = dict[Transform, "list[FewerKeys] | Refused"]
 """The keys that each bone is to have in each slot that moves it, or why it cannot have them;
 and rigs with keys of their own."""
 
-_Members = dict[Transform, tuple[SlotTransform, Source]]
+_Members = dict[Transform, tuple[Binding, Source]]
 
 
 def fewer_keys_of_rigs(
@@ -92,10 +92,10 @@ def fewer_keys_of_rigs(
                     refuse_modified(transform.name, source)
             except Refused:
                 continue  # Its own plan says so.
-            for place, source in keyed:
+            for binding, source in keyed:
                 if source.channels and not source.driven:
-                    key = transform.animated, place.slot.action, place.slot.handle
-                    together.setdefault(key, {})[transform] = place, source
+                    key = transform.animated, binding.slot.action, binding.slot.handle
+                    together.setdefault(key, {})[transform] = binding, source
     plans: Plans = {}
     for (obj, *_), members in together.items():
         own = members.pop(transform_of(obj), None)
@@ -136,14 +136,14 @@ class _Rig:
         self.rig, self.tolerance = rig, tolerance
         numbers = {bone.name: number for number, bone in enumerate(rig.pose.bones)}
         self.targets = {numbers[transform.carrier.name]: transform for transform in members}
-        self.places = {numbers[transform.carrier.name]: place for transform, (place, _) in members.items()}
+        self.bindings = {numbers[transform.carrier.name]: binding for transform, (binding, _) in members.items()}
         self.sources = {numbers[transform.carrier.name]: source for transform, (_, source) in members.items()}
         self.before = {number: distinct(source.keyed_frames) for number, source in self.sources.items()}
         samples = _united(map(samples_of, self.sources.values()))
         self.frames = seen_frames(samples, list(self.sources.values()))
         self.sampled = np.isin(self.frames, samples)
         """True for the moments that keys may be on."""
-        slot: Slot = next(iter(self.places.values())).slot
+        slot: Slot = next(iter(self.bindings.values())).slot
         self.motion = RigMotion(rig, slot, self.sources, self.frames, radius)
         self.values = {
             number: values_on(self.targets[number], source, self.frames) for number, source in self.sources.items()
@@ -190,7 +190,7 @@ class _Rig:
         )
 
     def reduce_own_keys(
-        self, transform: Transform, place: SlotTransform, source: Source, mode: str, *, best_of: bool
+        self, transform: Transform, binding: Binding, source: Source, mode: str, *, best_of: bool
     ) -> FewerKeys:
         """Return fewer keys for the rig itself: on the key poses, or within a share of the tolerance at any bone."""
         if self.key_poses is not None:
@@ -201,10 +201,10 @@ class _Rig:
             if len(distinct(fewer.keyed_frames)) >= len(distinct(source.keyed_frames)):
                 fewer = source
             self.motion.carry(fewer)
-            return FewerKeys.planned(transform, place, source, fewer, self.frames[keys], values, 0.0)
+            return FewerKeys.planned(transform, binding, source, fewer, self.frames[keys], values, 0.0)
         share = SHARE * self.tolerance / self.weights.max()
         reach = self.motion.extent * scale_in_scene(transform)
-        plan = fewer_keys(transform, place, source, mode, share, reach, best_of=best_of, more_frames=self.frames)
+        plan = fewer_keys(transform, binding, source, mode, share, reach, best_of=best_of, more_frames=self.frames)
         if len(plan.key_frames) < plan.before:
             self.motion.carry(plan.fewer)
             self.largest_own = plan.largest_error
@@ -287,7 +287,7 @@ class _Rig:
         return {
             self.targets[number]: FewerKeys.planned(
                 self.targets[number],
-                self.places[number],
+                self.bindings[number],
                 self.sources[number],
                 source,
                 self.frames[chosen[number]],
@@ -411,5 +411,5 @@ def _rest(motion: RigMotion, number: int, follows: bool) -> Poses:
     matrix = bone.bone.matrix_local
     if follows:
         matrix = bone.parent.bone.matrix_local.inverted() @ matrix
-    place, turn, _ = matrix.decompose()
-    return Poses(np.array(place), np.array(turn))
+    position, turn, _ = matrix.decompose()
+    return Poses(np.array(position), np.array(turn))

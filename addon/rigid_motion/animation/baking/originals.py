@@ -10,7 +10,7 @@ import bpy
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ..actions.slots import SlotTransform, in_action, places_of
+from ..actions.slots import Binding, bindings_for, in_action
 from ..transforms import Refused, Transform
 from . import rigs
 from .copies import (
@@ -55,28 +55,28 @@ def refuse_tweak_mode(transform: Transform) -> None:
         )
 
 
-def move_by_copy(transform: Transform, place: SlotTransform, kind: str) -> SlotTransform:
+def move_by_copy(transform: Transform, binding: Binding, kind: str) -> Binding:
     """Let something move by a copy of what it moves by, to be given other keys.
 
     Parameters
     ----------
     transform : Transform
-    place : SlotTransform
+    binding : Binding
         One of those that move it.
     kind : str
         What is to be done to its keys, `BAKED` or `REDUCED`.
 
     Returns
     -------
-    SlotTransform
+    Binding
         The copy, in an Action of its own. The original stays in the file, for `put_back`.
     """
     if transform.animated.pose is not None:
-        return rigs.move_by_copy(transform, place, kind)
-    original, changed = place.slot.action, copied(place.slot, kind)
+        return rigs.move_by_copy(transform, binding, kind)
+    original, changed = binding.slot.action, copied(binding.slot, kind)
     note(transform, kind, changed, original)
-    exchange(transform.animated, place.slot, changed)
-    return in_copy(transform, place, changed)
+    exchange(transform.animated, binding.slot, changed)
+    return in_copy(transform, binding, changed)
 
 
 def has_original(transform: Transform, kind: str) -> bool:
@@ -123,13 +123,13 @@ def put_back(transform: Transform, kind: str, lookup: Lookup) -> None:
         if entry.is_property_set("mode"):
             # From a version that kept modes on objects: the original takes it from there.
             transform.motion.mode = entry.mode
-        places = [lookup.find(item, transform.prefix) for item in (slot, in_action(entry.original, slot))]
-        let_rest(transform, entry, *places)
+        bindings = [lookup.find(item, transform.prefix) for item in (slot, in_action(entry.original, slot))]
+        let_rest(transform, entry, *bindings)
         exchange(transform.animated, slot, entry.original)
         bakes.remove(number)
         if not changed.users:
             bpy.data.actions.remove(changed)
-    transform.note_original(channel for place in places_of(transform) for channel in place.filled)
+    transform.note_original(channel for binding in bindings_for(transform) for channel in binding.filled)
 
 
 def discard_originals(transform: Transform, kind: str) -> None:

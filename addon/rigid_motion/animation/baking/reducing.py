@@ -22,7 +22,7 @@ from ...motion import KEYFRAME_MODES
 from ...motion.modes import no_such_mode
 from ..actions.channels import replace_keys
 from ..actions.refusals import refuse_drivers, refuse_modified
-from ..actions.slots import SlotTransform, places_of, slots_of, transforms_in
+from ..actions.slots import Binding, bindings_for, bindings_in_slot, slots_of
 from ..compute.modes import MODE_NAMES
 from ..compute.sources import distinct
 from ..edits.apply import Readings, Target, Targets, apply_edit, readable, transforms_of
@@ -154,7 +154,7 @@ def reduce_keys_of(
 
     def plan(transform: Transform, readings: Readings) -> list[FewerKeys]:
         refuse_tweak_mode(transform)
-        keyed = [(place, source) for place, source in readable(transform, readings) if source.channels]
+        keyed = [(binding, source) for binding, source in readable(transform, readings) if source.channels]
         if not keyed:
             raise Refused(_why_nothing_is_keyed(transform, 0))
         for _, source in keyed:
@@ -170,7 +170,7 @@ def reduce_keys_of(
                 raise _no_fewer(transform, before, keeps_scale=keeps_scale, count=count)
             return result
         size = radius or radius_of(transform.carrier)
-        planned = {fewer.place for fewer in result}
+        planned = {fewer.binding for fewer in result}
         rest = [item for item in keyed if item[0] not in planned]
         wishes = {"best_of": best_of, "count": count}
         result = [*result, *(fewer_keys(transform, *item, mode, tolerance, size, **wishes) for item in rest)]
@@ -193,10 +193,10 @@ def reduction_of(target: Target) -> Reduction | None:
     transform = transform_of(target)
     if not len(transform.motion.bakes):
         return None
-    places = places_of(transform)
+    bindings = bindings_for(transform)
     entries = _reduced(entries_in_use(transform))
     reduced = {entry.changed for entry in entries}
-    modes = [mode for place in places if place.slot.action in reduced for mode in segment_modes(place)]
+    modes = [mode for binding in bindings if binding.slot.action in reduced for mode in segment_modes(binding)]
     return _summed(entries, entries if transform.is_part else [], dict(Counter(modes)))
 
 
@@ -292,8 +292,8 @@ def discard_dense_keys(targets: Targets, *, refused: list[Refused] | None = None
 
 
 def _write(transform: Transform, fewer: FewerKeys) -> None:
-    channel_keys = _channel_keys(fewer.place)
-    copy = move_by_copy(transform, fewer.place, REDUCED)
+    channel_keys = _channel_keys(fewer.binding)
+    copy = move_by_copy(transform, fewer.binding, REDUCED)
     entry = transform.motion.bakes[-1]
     entry.keys_before, entry.keys_after = fewer.before, len(fewer.key_frames)
     entry.largest_error = fewer.largest_error
@@ -319,8 +319,8 @@ def _write(transform: Transform, fewer: FewerKeys) -> None:
     entry.channel_keys_before, entry.channel_keys_after = channel_keys, _channel_keys(copy)
 
 
-def _channel_keys(place: SlotTransform) -> int:
-    return sum(len(fcurve.keyframe_points) for fcurve in place.curves.values())
+def _channel_keys(binding: Binding) -> int:
+    return sum(len(fcurve.keyframe_points) for fcurve in binding.curves.values())
 
 
 def _no_fewer(transform: Transform, before: int, *, keeps_scale: bool, count: int | None) -> Refused:
@@ -356,7 +356,7 @@ def _why_nothing_is_keyed(transform: Transform, count: int) -> str:
     if constraints or _is_driven(transform):
         return rpt_(CONSTRAINED_BONE if transform.is_part else CONSTRAINED).format(has=has)
     if not transform.is_part and any(
-        place.kind.is_part for slot in slots_of([transform.animated]) for place in transforms_in(slot)
+        binding.kind.is_part for slot in slots_of([transform.animated]) for binding in bindings_in_slot(slot)
     ):
         return rpt_("{has}, its bones have: select those in Pose mode, and reduce theirs").format(has=has)
     return rpt_("{has}: there is nothing to reduce").format(has=has)

@@ -15,7 +15,7 @@ import numpy as np
 from ...motion.affine import AffineMaps, ball_displacement, displacement_bound
 from ..actions.reading import sources_of_users
 from ..actions.refusals import refuse_numbers
-from ..actions.slots import Slot, transforms_in
+from ..actions.slots import Slot, bindings_in_slot
 from ..compute.sources import Source
 from ..transforms import Channel, Refused, split_path, transform_of
 from ..transforms.posing import Hierarchy
@@ -73,7 +73,7 @@ class RigMotion:
         """The place of the rig, shape (m,) or (1,)."""
         self._carried = self.world
         self.truth = self.world @ recorded
-        """The places of the bones in the scene, shape (bones, m)."""
+        """The positions of the bones in the scene, shape (bones, m)."""
         self.unit = float(np.linalg.norm(self.world.axes, 2, axis=(-2, -1)).max()) or 1.0
         """The length of the rig's unit of length in the scene, at most."""
         sizes = np.sqrt(np.einsum("...ij,...ij->...j", recorded.axes, recorded.axes).max(axis=-1))
@@ -155,13 +155,13 @@ def _keyed_in(
 ) -> tuple[dict[str, Source], dict[str, dict[Channel, bpy.types.FCurve]]]:
     """Return what a slot has of a rig and its bones, by the prefixes of their data paths: sources, and all F-curves."""
     sources: dict[str, Source] = {}
-    places = transforms_in(slot)
-    for place, of_users in zip(places, sources_of_users(places), strict=True):
-        for user, source in zip(place.users, of_users, strict=True):
+    bindings = bindings_in_slot(slot)
+    for binding, of_users in zip(bindings, sources_of_users(bindings), strict=True):
+        for user, source in zip(binding.users, of_users, strict=True):
             if user.animated == rig and isinstance(source, Source) and source.channels and not source.driven:
                 with suppress(Refused):
                     refuse_numbers(user.name, source)
-                    sources[place.prefix] = source
+                    sources[binding.prefix] = source
     curves: dict[str, dict[Channel, bpy.types.FCurve]] = {}
     for fcurve in () if slot.channelbag is None else slot.channelbag.fcurves:
         path = fcurve.data_path

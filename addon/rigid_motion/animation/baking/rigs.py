@@ -17,28 +17,28 @@ from ..actions.channels import copy_fcurve, key_fields
 from ..actions.key_reading import read_keys
 from ..actions.records import record_mode, record_turns_axis, recorded, recorded_mode
 from ..actions.renaming import keep_names
-from ..actions.slots import Slot, SlotTransform, in_action, slots_of, transforms_in
+from ..actions.slots import Binding, Slot, bindings_in_slot, in_action, slots_of
 from ..transforms import SEGMENT_PROPERTIES, WIDTHS, Transform
 from .copies import Lookup, copied, exchange, in_copy, let_rest, note, used_in
 
 
-def move_by_copy(transform: Transform, place: SlotTransform, kind: str) -> SlotTransform:
+def move_by_copy(transform: Transform, binding: Binding, kind: str) -> Binding:
     """Let something of a rig be moved by a copy of what moves it, see `originals.move_by_copy`."""
-    rig, original = transform.animated, place.slot.action
-    changed = _copy_of(rig, place.slot)
+    rig, original = transform.animated, binding.slot.action
+    changed = _copy_of(rig, binding.slot)
     if changed is None:
         # Not in this go, but before: it may be in a copy by now itself.
         before = next(iter(_originals_of(rig, original)), None)
         changed = original
-        if before is None or _is_shared(rig, place.slot) or not _is_as_in(before, place):
-            changed = copied(place.slot, kind)
-            exchange(rig, place.slot, changed)
+        if before is None or _is_shared(rig, binding.slot) or not _is_as_in(before, binding):
+            changed = copied(binding.slot, kind)
+            exchange(rig, binding.slot, changed)
             _rename_in_notes(rig, original, changed)
             keep_names(rig)
         else:
             original = before
     note(transform, kind, changed, original)
-    return in_copy(transform, place, changed)
+    return in_copy(transform, binding, changed)
 
 
 def put_back(transform: Transform, kind: str, lookup: Lookup) -> None:
@@ -52,9 +52,9 @@ def put_back(transform: Transform, kind: str, lookup: Lookup) -> None:
         if entry.kind != kind:
             break
         changed, original = entry.changed, entry.original
-        place, before = (lookup.find(item, transform.prefix) for item in (slot, in_action(original, slot)))
-        let_rest(transform, entry, place, before)
-        _copy_channels(before, place)
+        binding, before = (lookup.find(item, transform.prefix) for item in (slot, in_action(original, slot)))
+        let_rest(transform, entry, binding, before)
+        _copy_channels(before, binding)
         bakes.remove(number)
         _go_back_to(transform.animated, changed, original, slot)
 
@@ -92,27 +92,29 @@ def _is_shared(rig: bpy.types.Object, slot: Slot) -> bool:
     )
 
 
-def _is_as_in(action: bpy.types.Action, place: SlotTransform) -> bool:
+def _is_as_in(action: bpy.types.Action, binding: Binding) -> bool:
     """Return whether a transform has the same keys and modes in another Action."""
-    slot = in_action(action, place.slot)
-    return slot is not None and _is_as(*transforms_in(slot, (place.prefix,)), place)
+    slot = in_action(action, binding.slot)
+    return slot is not None and _is_as(*bindings_in_slot(slot, (binding.prefix,)), binding)
 
 
-def _is_as(one: SlotTransform, other: SlotTransform) -> bool:
+def _is_as(one: Binding, other: Binding) -> bool:
     """Return whether a transform has the same keys and modes in these two."""
-    settings = [(recorded_mode(place), recorded(place).turns_axis) for place in (one, other)]
+    settings = [(recorded_mode(binding), recorded(binding).turns_axis) for binding in (one, other)]
     return settings[0] == settings[1] and _summary(one) == _summary(other)
 
 
-def _animators(place: SlotTransform) -> dict[tuple[str, int], bpy.types.FCurve]:
+def _animators(binding: Binding) -> dict[tuple[str, int], bpy.types.FCurve]:
     """Return the channels that the animator has keyed, those of modes and turns among them."""
     names = (*WIDTHS, *SEGMENT_PROPERTIES)
-    return {channel: curve for channel, curve in place.curves.items() if channel[0].removeprefix(place.prefix) in names}
+    return {
+        channel: curve for channel, curve in binding.curves.items() if channel[0].removeprefix(binding.prefix) in names
+    }
 
 
-def _summary(place: SlotTransform) -> dict:
+def _summary(binding: Binding) -> dict:
     """Return what tells whether channels are the same."""
-    return {channel: _summary_of(fcurve) for channel, fcurve in _animators(place).items()}
+    return {channel: _summary_of(fcurve) for channel, fcurve in _animators(binding).items()}
 
 
 def _summary_of(fcurve: bpy.types.FCurve) -> tuple:
@@ -128,7 +130,7 @@ def _summary_of(fcurve: bpy.types.FCurve) -> tuple:
     )
 
 
-def _copy_channels(source: SlotTransform, target: SlotTransform) -> None:
+def _copy_channels(source: Binding, target: Binding) -> None:
     """Give a transform the keys and modes that it has in another Action."""
     fcurves = target.channelbag.fcurves
     for channel in _animators(target):
@@ -143,8 +145,10 @@ def _go_back_to(rig: bpy.types.Object, changed: bpy.types.Action, original: bpy.
     """Let a rig move by an original again, if all of its keys are what it has by now."""
     if any(entry.changed == changed and entry.original == original for entry in _entries(rig)):
         return
-    here, there = ({place.prefix: place for place in transforms_in(item)} for item in (slot, in_action(original, slot)))
-    if here.keys() == there.keys() and all(_is_as(place, there[prefix]) for prefix, place in here.items()):
+    here, there = (
+        {binding.prefix: binding for binding in bindings_in_slot(item)} for item in (slot, in_action(original, slot))
+    )
+    if here.keys() == there.keys() and all(_is_as(binding, there[prefix]) for prefix, binding in here.items()):
         exchange(rig, slot, original)
         _rename_in_notes(rig, changed, original)
         if not changed.users:

@@ -47,7 +47,7 @@ def largest_errors(
     delta : array, shape (., m)
         The differences at the samples of all: rotations as quaternions or Euler angles.
     samples : sequence of pairs
-        Each source with the place of its samples. All turn by quaternions or all by Euler angles.
+        Each source with the span of its samples. All turn by quaternions or all by Euler angles.
     spans : sequence
         The first and the last of these, counted from frame 0, and how many there are in a frame.
     reaches : sequence of float
@@ -58,7 +58,7 @@ def largest_errors(
     array, shape (sources,)
         Infinite where there are too few samples between two keys to tell.
     """
-    starts = np.array([place.start for _, place in samples])
+    starts = np.array([span.start for _, span in samples])
     lengths = np.diff((*starts, delta.shape[1]))
     errors = np.zeros(delta.shape[1])
     reach = np.repeat(reaches, lengths)
@@ -69,24 +69,24 @@ def largest_errors(
     counts = np.ones(delta.shape[1], dtype=bool)
     counts[starts] = counts[starts + lengths - 1] = False
     corners = []
-    for (source, place), (first, _, rate) in zip(samples, spans, strict=True):
+    for (source, span), (first, _, rate) in zip(samples, spans, strict=True):
         keys = source.key_frames * rate - first
         before = np.floor(keys + 1e-6).astype(int)
         behind = np.ceil(keys - 1e-6).astype(int)
         for at in (before, behind):
-            counts[place][at[(at >= 0) & (at < place.stop - place.start)]] = False
+            counts[span][at[(at >= 0) & (at < span.stop - span.start)]] = False
         corners.append((before, behind))
     largest = np.maximum.reduceat(np.where(counts, errors, 0.0), starts)
     known = np.concatenate(((0,), np.cumsum(counts)))
-    for number, ((source, place), (*_, rate), (before, behind)) in enumerate(zip(samples, spans, corners, strict=True)):
+    for number, ((source, span), (*_, rate), (before, behind)) in enumerate(zip(samples, spans, corners, strict=True)):
         if rate >= MOST_SAMPLES:
             continue
-        count = place.stop - place.start
+        count = span.stop - span.start
         begins, ends = np.clip(behind[:-1], 0, count), np.clip(before[1:] + 1, 0, count)
         # One may begin and end between two samples.
         is_whole = (before[:-1] >= 0) & (behind[1:] < count)
         is_seen = (is_whole | (begins < ends - 1)) & (source.modes != 0)
-        if np.any(is_seen & (known[place.start + begins] == known[place.start + ends])):
+        if np.any(is_seen & (known[span.start + begins] == known[span.start + ends])):
             largest[number] = np.inf
     return largest
 

@@ -13,9 +13,9 @@ from .sources import SAME_FRAME, Source
 
 
 def each(sources: Sequence[Source], counts: Iterator[int]) -> list[tuple[Source, slice]]:
-    """Return each source with the place of what it has this many of."""
+    """Return each source with the span of what it has this many of."""
     bounds = [0, *itertools.accumulate(counts)]
-    return [(source, slice(*place)) for source, place in zip(sources, itertools.pairwise(bounds), strict=True)]
+    return [(source, slice(*span)) for source, span in zip(sources, itertools.pairwise(bounds), strict=True)]
 
 
 def sampled(
@@ -28,22 +28,22 @@ def sampled(
     """Return the channels' own values at the frames of each source, m in all, with a row for each of the `height`."""
     rows = np.empty((height([source for source, _ in samples]), samples[-1][1].stop)) if out is None else out
     curves, times, out, apart = [], [], [], []
-    for (source, place), at in zip(samples, frames, strict=True):
-        _rest(rows[:, place], source)
+    for (source, span), at in zip(samples, frames, strict=True):
+        _rest(rows[:, span], source)
         for own, keys in source.channels:
             if at is source.key_frames and source.is_together:
-                rows[own, place] = keys.values
+                rows[own, span] = keys.values
                 continue
             curves.append(keys)
             times.append(at)
             if own[-1] - own[0] < len(own):
-                out.append(rows[own[0] : own[-1] + 1, place])
+                out.append(rows[own[0] : own[-1] + 1, span])
             else:
                 out.append(np.empty((len(own), len(at))))
-                apart.append((own, place, out[-1]))
+                apart.append((own, span, out[-1]))
     evaluate(curves, times, unit_elastic=unit_elastic, out=out)
-    for own, place, values in apart:
-        rows[own, place] = values
+    for own, span, values in apart:
+        rows[own, span] = values
     return rows
 
 
@@ -54,16 +54,16 @@ def channels_at_ends(
     sources = [source for source, _ in segments]
     keys = each(sources, (len(source.key_frames) for source in sources))
     rows = sampled(keys, [source.key_frames for source in sources], unit_elastic=unit_elastic)
-    begins = np.delete(np.arange(rows.shape[1]), [place.stop - 1 for _, place in keys])
+    begins = np.delete(np.arange(rows.shape[1]), [span.stop - 1 for _, span in keys])
     start, end = rows[:, begins], rows[:, begins + 1]
-    for source, place in segments:
+    for source, span in segments:
         for own, channels in source.channels:
             if channels.cycles is None:
                 continue
             # A cycle whose ends differ jumps: one round ends on its last value, the next starts on its first.
             jumps = _jumps(channels, source.key_frames)
             for row, values in zip(own, channels.values, strict=True):
-                start[row, place][jumps[:-1]], end[row, place][jumps[1:]] = values[0], values[-1]
+                start[row, span][jumps[:-1]], end[row, span][jumps[1:]] = values[0], values[-1]
     return start, end
 
 

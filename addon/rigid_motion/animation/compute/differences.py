@@ -82,7 +82,7 @@ def in_betweens(
         How far the body has come in its segment on these frames, 0 to 1 and beyond, instead of what the channels say.
     """
     frames = np.asarray(frames, dtype=np.float64)
-    moments, places = np.unique(source.held(frames), return_inverse=True) if source.steps else (frames, slice(None))
+    moments, indices = np.unique(source.held(frames), return_inverse=True) if source.steps else (frames, slice(None))
     native, delta = np.empty((2, height([source]), len(moments)))
     delta = delta[: filled_height([source])]
     if len(source.key_frames) > 1:
@@ -93,7 +93,7 @@ def in_betweens(
         sampled([(source, slice(len(moments)))], [moments], out=native)
         turn_into_quaternions(native, source.order)
         delta[:] = source.original[: len(delta), None]
-    native, delta = native[:, places], delta[:, places]
+    native, delta = native[:, indices], delta[:, indices]
 
     def moved_by(deltas: np.ndarray) -> Poses:
         positions = (native[ROWS[LOCATION]] + deltas[ROWS[LOCATION]]).T
@@ -116,7 +116,7 @@ def progress_at(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> list
         samples = each(portion, map(len, own))
         native, delta = np.empty((2, height(portion), samples[-1][1].stop))
         along = _move(portion, own, native, delta[: filled_height(portion)])
-        result.update((id(source), along[place]) for source, place in samples)
+        result.update((id(source), along[span]) for source, span in samples)
     return [result[id(source)] for source in sources]
 
 
@@ -161,23 +161,23 @@ def differences(
         rows, points = np.empty((2, height(portion), samples[-1][1].stop))
         delta = rows[: filled_height(portion)]
         _move(portion, frames, rows, delta)
-        for source, place in samples:
+        for source, span in samples:
             if source.is_on_top and (source.original != REST).any():
-                take_off(delta[:, place], source.original)
+                take_off(delta[:, span], source.original)
         order = portion[0].order
-        partial = [(source, place) for source, place in samples if source.influence is not None]
-        for source, place in partial:
+        partial = [(source, span) for source, span in samples if source.influence is not None]
+        for source, span in partial:
             own = frames_of[id(source)]
-            blended(source, own, sampled([(source, slice(len(own)))], [own]), delta[:, place])
+            blended(source, own, sampled([(source, slice(len(own)))], [own]), delta[:, span])
         if order is not None:
-            for some, place in blocks(np.array((0, *(own.stop for _, own in samples))), BLOCK):
-                starts = [own.start - place.start for _, own in samples[some]]
-                delta[3:6, place] = extrinsic_eulers_from_quaternions(delta[ROWS[ROTATION], place].T, order, starts).T
-            for source, place in partial:
-                undo_blending(source, frames_of[id(source)], delta[3:6, place])
+            for some, span in blocks(np.array((0, *(own.stop for _, own in samples))), BLOCK):
+                starts = [own.start - span.start for _, own in samples[some]]
+                delta[3:6, span] = extrinsic_eulers_from_quaternions(delta[ROWS[ROTATION], span].T, order, starts).T
+            for source, span in partial:
+                undo_blending(source, frames_of[id(source)], delta[3:6, span])
         else:
-            align(delta[ROWS[ROTATION]], [place.start for _, place in samples])
-        starts = [place.start for _, place in samples]
+            align(delta[ROWS[ROTATION]], [span.start for _, span in samples])
+        starts = [span.start for _, span in samples]
         errors = itertools.repeat(0.0)
         if reaches is not None:
             errors = largest_errors(delta, samples, spans, [reach_of[id(source)] for source in portion])
@@ -187,8 +187,8 @@ def differences(
         points = points.view(np.float32).reshape(*rows.shape, 2)[: len(delta)]
         points[..., 0] = np.concatenate(frames)
         points[..., 1] = delta
-        for (source, place), rows_of_source, error in zip(samples, kept, errors, strict=False):
-            own = Samples({row: points[row, place].ravel() for row in rows_of_source})
+        for (source, span), rows_of_source, error in zip(samples, kept, errors, strict=False):
+            own = Samples({row: points[row, span].ravel() for row in rows_of_source})
             own.rate, own.error = rate_of[id(source)], float(error)
             result[id(source)] = own
     return [result[id(source)] for source in sources]
@@ -242,35 +242,35 @@ def _move(
             lacks[:, np.diff(passages.first) > 1] = 0.0
 
     every_frame = np.concatenate(frames)
-    for some, place in blocks(np.concatenate(((0,), np.cumsum(on_paths))), BLOCK):
+    for some, span in blocks(np.concatenate(((0,), np.cumsum(on_paths))), BLOCK):
         parts = some if passages is None else slice(*passages.first[[some.start, some.stop]])
-        progress = np.empty((1, place.stop - place.start))
-        combine(weights[None, :, parts], timing[:, place], counts[parts], progress)
+        progress = np.empty((1, span.stop - span.start))
+        combine(weights[None, :, parts], timing[:, span], counts[parts], progress)
         progress = progress[0] - offsets[parts].repeat(counts[parts])
         bounds = np.concatenate(((0,), np.cumsum(on_paths[some])))
         for number in np.flatnonzero(idle[some] & (on_paths[some] > 0)):
             own = slice(*bounds[number : number + 2])
-            progress[own] = ends.idle_progress(some.start + number, every_frame[place][own], sources)
-        turn_into_quaternions(native[:, place], order)
+            progress[own] = ends.idle_progress(some.start + number, every_frame[span][own], sources)
+        turn_into_quaternions(native[:, span], order)
         default = original[:, ends.owners[some]]
         if lacks is not None:
             first, last = (rows.repeat(on_paths[some]) for rows in ends.times[some].T)
-            elapsed = (every_frame[place] - first) / np.where(last > first, last - first, np.inf)
+            elapsed = (every_frame[span] - first) / np.where(last > first, last - first, np.inf)
             progress = corrected(progress, elapsed, lacks[:, some].repeat(on_paths[some], axis=1))
         if given is not None:
-            progress = given[place]
+            progress = given[span]
         off = None
         if passages is not None:
             progress, off = passages.along(parts, counts[parts], progress)
-        along[place] = progress
-        _fill(delta[:, place], native[:, place], default, modes[some], ends, some, on_paths[some], progress, off)
+        along[span] = progress
+        _fill(delta[:, span], native[:, span], default, modes[some], ends, some, on_paths[some], progress, off)
     # A key is the animator's: nothing is added to it, not even a rounding error.
     delta[:, on_keys] = original[:, owners]
-    for number, (source, place) in enumerate(samples):
+    for number, (source, span) in enumerate(samples):
         if source.cyclic is not None:
             before, after = source.used_up
             outside = (frames[number] < before) | (frames[number] > after)
-            delta[:, place][:, outside] = original[:, number, None]
+            delta[:, span][:, outside] = original[:, number, None]
     return along
 
 

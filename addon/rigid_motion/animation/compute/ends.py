@@ -64,7 +64,7 @@ class Ends:
     def of(cls, start: np.ndarray, end: np.ndarray, segments: list[tuple[Source, slice]], smooth: np.ndarray) -> Ends:
         """Return the ends of the channels (10, S) at both ends, and which of the segments have a smooth mode."""
         sources = [source for source, _ in segments]
-        owners = np.repeat(np.arange(len(sources)), [place.stop - place.start for _, place in segments])
+        owners = np.repeat(np.arange(len(sources)), [span.stop - span.start for _, span in segments])
         firsts, lasts = ([source.key_frames[part] for source in sources] for part in (slice(-1), slice(1, None)))
         times = np.stack((np.concatenate(firsts), np.concatenate(lasts)), axis=1)
         own = np.stack([source.original for source in sources], axis=1)[:, owners]
@@ -150,5 +150,5 @@ def measured_in(times: np.ndarray, segments: list[tuple[Source, slice]]) -> np.n
     """Return the channels' own values in each of S segments at the moments `MEASURED`, shape (., S, 6)."""
     sources = [source for source, _ in segments]
     moments = times[:, :1] + (times[:, 1:] - times[:, :1]) * MEASURED
-    frames = [moments[place].ravel() for _, place in segments]
+    frames = [moments[span].ravel() for _, span in segments]
     return sampled(each(sources, map(len, frames)), frames).reshape(height(sources), -1, len(MEASURED))

@@ -47,9 +47,9 @@ def spins_of_neighbours(
     steps = signs[:, None].repeat(3, axis=1)
     beside = np.stack((spins[:, [0, 0]], spins, spins[:, [1, 1]]), axis=3)
     left, right = pairs
-    for segments, others, place in ((right, left, 0), (left, right, 2)):
-        steps[segments, place] = np.where(holds[others], 1.0, signs[others])
-        beside[:, :, segments, place] = np.where(holds[others], 0.0, spins[:, :, others])
+    for segments, others, side in ((right, left, 0), (left, right, 2)):
+        steps[segments, side] = np.where(holds[others], 1.0, signs[others])
+        beside[:, :, segments, side] = np.where(holds[others], 0.0, spins[:, :, others])
     quaternions[:, 1:] *= np.cumprod(steps, axis=1)[..., None]
     return Poses(around.positions, quaternions, around.scales), beside
 

@@ -44,9 +44,9 @@ def idle_progress(source: Source, frames: np.ndarray, first: np.ndarray, last: n
     goes up by one from each to the next, and rests at a key where handles are: those of the first channel that turns.
     """
     turning = [
-        (row, keys.only([place]))
+        (row, keys.only([index]))
         for rows, keys in source.channels
-        for place, row in enumerate(rows)
+        for index, row in enumerate(rows)
         if PART_OF[row] == ROTATION
     ]
     _, keys = min(turning, key=itemgetter(0), default=(0, source.curves[0].only([0])))

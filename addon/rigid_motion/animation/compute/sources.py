@@ -290,10 +290,10 @@ class Source:
         if self.order is None:
             return False
         angles = (
-            (keys.values, [place for place, row in enumerate(rows) if 3 <= row < 6]) for rows, keys in self.channels
+            (keys.values, [index for index, row in enumerate(rows) if 3 <= row < 6]) for rows, keys in self.channels
         )
         return any(
-            places and np.abs(np.diff(values[places])).max(initial=0.0) >= HALF_TURN for values, places in angles
+            indices and np.abs(np.diff(values[indices])).max(initial=0.0) >= HALF_TURN for values, indices in angles
         )
 
     @cached_property

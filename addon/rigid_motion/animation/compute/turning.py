@@ -227,8 +227,8 @@ def _axis(angles: np.ndarray, axis: np.ndarray, order: str, *, before: bool) -> 
     or in the space around it.
     """
     result = np.eye(3)[axis]
-    place = np.array([order.index(name) for name in "XYZ"])
-    others = place[:, None] < place[axis] if before else place[:, None] > place[axis]
+    turn = np.array([order.index(name) for name in "XYZ"])
+    others = turn[:, None] < turn[axis] if before else turn[:, None] > turn[axis]
     turned = quaternions_from_extrinsic_eulers(np.where(others, angles, 0.0).T, order)
     return rotate(conjugate(turned) if before else turned, result)
 

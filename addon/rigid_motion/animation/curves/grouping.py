@@ -43,14 +43,14 @@ class Group:
     def chunks(self, size: int) -> Iterator[tuple[slice, Group]]:
         """Yield this group with about `size` of the curves at a time, and which these are."""
         begin = first = end = 0
-        for place, (_, channels) in enumerate(self.members, start=1):
+        for stop, (_, channels) in enumerate(self.members, start=1):
             end += channels.stop - channels.start
-            if end - begin >= size or place == len(self.members):
+            if end - begin >= size or stop == len(self.members):
                 chunk = slice(begin, end)
                 offsets = None if self.offsets is None else self.offsets[chunk]
-                members = self.members[first:place]
+                members = self.members[first:stop]
                 yield chunk, replace(self, members=members, curves=self.curves[chunk], offsets=offsets)
-                begin, first = end, place
+                begin, first = end, stop
 
     def write(self, values: np.ndarray, out: Sequence[np.ndarray]) -> None:
         """Write values (c, m) of the rising frames to where they belong, see `evaluate`."""

@@ -13,7 +13,7 @@ import bpy
 from ..actions.reading import sources_of_users
 from ..actions.refusals import refuse_numbers
 from ..actions.renaming import follow_renamed
-from ..actions.slots import SlotTransform, slot_transforms_of
+from ..actions.slots import Binding, bindings_of
 from ..compute.sources import Source
 from ..live import follower
 from ..transforms import Refused, Transform, transform_of
@@ -24,8 +24,8 @@ Target = bpy.types.Object | bpy.types.PoseBone | Transform
 Targets = Target | Iterable[Target]
 """One or several."""
 
-Readings = list[tuple[SlotTransform, Source | Refused]]
-"""The places that move a target, and what is keyed in each of them as it has it; or why that cannot be filled in."""
+Readings = list[tuple[Binding, Source | Refused]]
+"""The bindings that move a target, and what is keyed in each of them as it has it; or why that cannot be filled in."""
 
 Plan = TypeVar("Plan")
 Result = TypeVar("Result")
@@ -68,13 +68,13 @@ def apply_edit(
     """
     transforms = transforms_of(targets)
     readings: dict[Transform, Readings] = {transform: [] for transform in transforms}
-    places = slot_transforms_of(transforms)
-    follow_renamed(places)
-    of_users = sources_of_users(places)
-    for place, sources in zip(places, of_users, strict=True):
-        for user, source in zip(place.users, sources, strict=True):
+    bindings = bindings_of(transforms)
+    follow_renamed(bindings)
+    of_users = sources_of_users(bindings)
+    for binding, sources in zip(bindings, of_users, strict=True):
+        for user, source in zip(binding.users, sources, strict=True):
             if user in readings:
-                readings[user].append((place, source))
+                readings[user].append((binding, source))
     if survey is not None:
         survey(readings)
     plans, refusals = [], []
@@ -94,16 +94,16 @@ def apply_edit(
         follower.refresh(acted)
     else:
         read = [
-            (place, [becomes(source) if isinstance(source, Source) else source for source in sources])
-            for place, sources in zip(places, of_users, strict=True)
-            if not acted.isdisjoint(place.users)
+            (binding, [becomes(source) if isinstance(source, Source) else source for source in sources])
+            for binding, sources in zip(bindings, of_users, strict=True)
+            if not acted.isdisjoint(binding.users)
         ]
         follower.refresh_read(read)
     return results
 
 
-def readable(transform: Transform, readings: Readings) -> list[tuple[SlotTransform, Source]]:
-    """Return what is keyed of a transform in all of its places. `Refused` where one of them cannot be filled in."""
+def readable(transform: Transform, readings: Readings) -> list[tuple[Binding, Source]]:
+    """Return what is keyed of a transform in all of its bindings. `Refused` where one of them cannot be filled in."""
     for _, source in readings:
         if isinstance(source, Refused):
             raise source

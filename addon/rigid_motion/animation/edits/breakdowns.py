@@ -21,7 +21,7 @@ from ..actions.channels import KeyFields, key_fields, set_key_fields
 from ..actions.modifiers import added_values
 from ..actions.reading import read
 from ..actions.refusals import refuse_linked
-from ..actions.slots import SlotTransform
+from ..actions.slots import Binding
 from ..compute.bodies import body_poses
 from ..compute.differences import in_betweens
 from ..compute.modes import DEPENDS_ON_KEYS, MODE_NAMES, MODE_NUMBERS
@@ -30,7 +30,7 @@ from ..compute.turning import needs_turning
 from ..live import follower
 from ..live.inserted_keys import set_key
 from ..live.segment_keys import share_out_turns
-from ..queries.keyed import active_place
+from ..queries.keyed import active_binding
 from ..queries.segments import frame_in_action
 from ..queries.visible_pose import shown_components
 from ..transforms import Channel, Refused, Transform
@@ -74,7 +74,7 @@ class _Between:
     """A transform, and what it is between on a frame."""
 
     transform: Transform
-    place: SlotTransform
+    binding: Binding
 
     source: Source
     """The keys without those of this frame."""
@@ -139,12 +139,12 @@ class _Between:
     def put_back(self) -> None:
         """Give its channels the keys that they had."""
         for channel, fields in self.keys.items():
-            set_key_fields(self.place.curves[channel], fields)
+            set_key_fields(self.binding.curves[channel], fields)
         channel = self.transform.turns_channel
         if self.turns is not None:
-            set_key_fields(self.place.ensure_curve(channel), self.turns)
-        elif channel in self.place.curves:
-            self.place.channelbag.fcurves.remove(self.place.curves.pop(channel))
+            set_key_fields(self.binding.ensure_curve(channel), self.turns)
+        elif channel in self.binding.curves:
+            self.binding.channelbag.fcurves.remove(self.binding.curves.pop(channel))
 
     def key(self, kind: str, factor: float) -> None:
         """Set a key of the pose in all channels that have keys, and share out the turns of the segment.
@@ -156,15 +156,15 @@ class _Between:
             key_type = "BREAKDOWN"
         for row, channel in self.transform.channels.items():
             if channel in self.keys:
-                fcurve = self.place.curves[channel]
+                fcurve = self.binding.curves[channel]
                 before = len(fcurve.keyframe_points)
                 set_key(fcurve, self.frame, components[row])
                 if len(fcurve.keyframe_points) > before:
                     next(point for point in fcurve.keyframe_points if _is_on(point, self.frame)).type = key_type
         if needs_turning(self.source):
-            place = self.place.read_again()
-            share_out_turns(place, read(place), self.source, factor if kind == BREAKDOWN else None)
-            self.place.curves.update(place.curves)
+            binding = self.binding.read_again()
+            share_out_turns(binding, read(binding), self.source, factor if kind == BREAKDOWN else None)
+            self.binding.curves.update(binding.curves)
 
 
 class Breakdowns:
@@ -209,20 +209,20 @@ class Breakdowns:
             yield
         follower.refresh([between.transform for between in self._between])
         for between in self._between:
-            between.place.slot.action.update_tag()
+            between.binding.slot.action.update_tag()
 
     def _plan(self, transform: Transform, readings: Readings) -> _Between:
-        place = active_place(transform, [place for place, _ in readings])
-        if place is None:
+        binding = active_binding(transform, [binding for binding, _ in readings])
+        if binding is None:
             raise Refused(
                 rpt_("{name} has no Action with keys: key it first, or enter a strip (NLA Editor, Tab)").format(
                     name=transform.name
                 )
             )
-        refuse_linked(transform, place)
+        refuse_linked(transform, binding)
         frame = frame_in_action(transform.animated, self._frame)
-        whole = next(source for one, source in readable(transform, readings) if one is place)
-        source, added = _without(whole, frame), added_values(place, transform, whole, np.array([frame]))[:, 0]
+        whole = next(source for one, source in readable(transform, readings) if one is binding)
+        source, added = _without(whole, frame), added_values(binding, transform, whole, np.array([frame]))[:, 0]
         # Copies of keys in cycles are none to set others between.
         first, last = source.keyed_range if source.channels else (np.inf, -np.inf)
         if not first < frame < last:
@@ -237,14 +237,14 @@ class Breakdowns:
         keyed = [transform.channels[row] for rows, _ in source.channels for row in rows]
         return _Between(
             transform,
-            place,
+            binding,
             source,
             frame,
             (float(keys[after - 1]), float(keys[after])),
             (transform.components() if seen is None else seen) - added,
             {name: tuple(getattr(transform.carrier, name)) for name in transform.properties.values()},
-            {channel: key_fields(place.curves[channel]) for channel in keyed},
-            None if (turns := place.curves.get(transform.turns_channel)) is None else key_fields(turns),
+            {channel: key_fields(binding.curves[channel]) for channel in keyed},
+            None if (turns := binding.curves.get(transform.turns_channel)) is None else key_fields(turns),
         )
 
 

@@ -7,7 +7,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..actions.records import recorded, recorded_digest
 from ..actions.refusals import refuse_linked
-from ..actions.slots import places_of, slot_transforms_of
+from ..actions.slots import bindings_for, bindings_of
 from ..live import follower
 from ..transforms import Refused, Transform, transform_of
 from ..transforms.reaches import metres_per_channel_unit
@@ -45,13 +45,13 @@ def set_exact(targets: Targets, is_exact: bool = True, *, refused: list[Refused]
         raise Refused("\n".join(map(str, refusals)))
     if refused is not None:
         refused.extend(refusals)
-    places = slot_transforms_of(chosen)
-    users = dict.fromkeys((*chosen, *(user for place in places for user in place.users)))
+    bindings = bindings_of(chosen)
+    users = dict.fromkeys((*chosen, *(user for binding in bindings for user in binding.users)))
     changed = [user for user in users if user.animated.is_editable and user.motion.is_exact != is_exact]
     if not changed:
         return
     with follower.paused():
-        clear([place for place in places if place.slot.action.is_editable])
+        clear([binding for binding in bindings if binding.slot.action.is_editable])
         for user in changed:
             user.motion.is_exact = is_exact
     follower.refresh([transform_of(user.carrier) for user in changed])
@@ -60,5 +60,5 @@ def set_exact(targets: Targets, is_exact: bool = True, *, refused: list[Refused]
 def error_between_frames(target: bpy.types.Object | bpy.types.PoseBone | Transform) -> float:
     """Return how far something is off between frames at most, as estimated when it was filled in, in metres."""
     transform = transform_of(target)
-    errors = [recorded(place).error for place in places_of(transform) if recorded_digest(place)]
+    errors = [recorded(binding).error for binding in bindings_for(transform) if recorded_digest(binding)]
     return max(errors, default=0.0) * metres_per_channel_unit(transform)

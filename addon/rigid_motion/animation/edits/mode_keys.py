@@ -22,12 +22,12 @@ from ..actions.reading import keyed_in, read
 from ..actions.records import record_mode, record_turns_axis
 from ..actions.refusals import MOST_TURNS, refuse_linked, refuse_numbers
 from ..actions.renaming import follow_renamed
-from ..actions.slots import SlotTransform, slot_transforms_of
+from ..actions.slots import Binding, bindings_of
 from ..compute.modes import MODE_NUMBERS
 from ..compute.sources import TURN_AXES
 from ..live import follower
 from ..live.segment_keys import set_mode_in, set_turns_in
-from ..queries.keyed import active_place, frames_in, modes_in
+from ..queries.keyed import active_binding, frames_in, modes_in
 from ..queries.segments import frame_in_action, segment_at
 from ..transforms import Refused, Transform
 from .apply import Readings, Targets, apply_edit
@@ -56,20 +56,20 @@ def set_mode(
         Where rigid motion cannot act on one of them, and there is no list to take that. Nothing is changed then.
     """
 
-    def plan(transform: Transform, readings: Readings) -> list[SlotTransform]:
-        places = [place for place, _ in readings] if mode == "BLENDER" else able(transform, readings)
+    def plan(transform: Transform, readings: Readings) -> list[Binding]:
+        bindings = [binding for binding, _ in readings] if mode == "BLENDER" else able(transform, readings)
         if frames is None:
-            return places
-        return [_place_of(transform, places)]
+            return bindings
+        return [_binding_of(transform, bindings)]
 
-    def act(transform: Transform, places: list[SlotTransform]) -> None:
-        if not places:
+    def act(transform: Transform, bindings: list[Binding]) -> None:
+        if not bindings:
             set_pending_mode(transform, mode)
-        for place in places:
+        for binding in bindings:
             if frames is not None:
-                set_mode_in(place, mode, frames)
-            elif place.slot.action.is_editable:
-                set_whole(place, mode)
+                set_mode_in(binding, mode, frames)
+            elif binding.slot.action.is_editable:
+                set_whole(binding, mode)
 
     if mode not in MODE_NUMBERS:
         raise Refused(no_such_mode(mode, MODE_NUMBERS))
@@ -107,17 +107,17 @@ def set_turns(
         number of turns, or axis. Nothing is changed then.
     """
 
-    def plan(transform: Transform, readings: Readings) -> SlotTransform:
-        place = _place_of(transform, able(transform, readings))
-        if turns and not any(modes_in(place, frames_in(place) if frames is None else np.asarray(frames))):
+    def plan(transform: Transform, readings: Readings) -> Binding:
+        binding = _binding_of(transform, able(transform, readings))
+        if turns and not any(modes_in(binding, frames_in(binding) if frames is None else np.asarray(frames))):
             text = rpt_("{name}: Blender's own in-betweens make no turns more: choose a mode first")
             raise Refused(text.format(name=transform.name))
-        return place
+        return binding
 
-    def act(_: Transform, place: SlotTransform) -> None:
+    def act(_: Transform, binding: Binding) -> None:
         if axis is not None:
-            record_turns_axis(place, axis)
-        set_turns_in(place, turns, frames_in(place)[:-1] if frames is None else frames)
+            record_turns_axis(binding, axis)
+        set_turns_in(binding, turns, frames_in(binding)[:-1] if frames is None else frames)
 
     if isinstance(turns, bool) or not isinstance(turns, int) or abs(turns) > MOST_TURNS:
         text = rpt_("{turns} is no number of turns: give a whole number from -{most} to {most}")
@@ -128,22 +128,22 @@ def set_turns(
     apply_edit(targets, plan, act, refused)
 
 
-def _place_of(transform: Transform, places: Sequence[SlotTransform]) -> SlotTransform:
+def _binding_of(transform: Transform, bindings: Sequence[Binding]) -> Binding:
     """Return the slot whose keys the editors show. `Refused` where there is none."""
-    place = active_place(transform, places)
-    if place is None:
+    binding = active_binding(transform, bindings)
+    if binding is None:
         raise Refused(
             rpt_(
                 "{name} has no Action with keys to set a mode on: key it first, or enter a strip (NLA Editor, Tab)"
             ).format(name=transform.name)
         )
-    return place
+    return binding
 
 
 def on_turns(transform: Transform) -> None:
     """Take an edit of the property of turns as a choice for the segment on the frame that is shown."""
-    place, turns = active_place(transform), transform.motion.turns
-    source = None if place is None or not place.slot.action.is_editable else read(place)
+    binding, turns = active_binding(transform), transform.motion.turns
+    source = None if binding is None or not binding.slot.action.is_editable else read(binding)
     frame = frame_in_action(transform.animated, bpy.context.scene.frame_current_final)
     segment = segment_at(source, frame) if source is not None and source.channels else None
     if segment is not None:
@@ -153,43 +153,43 @@ def on_turns(transform: Transform) -> None:
 def on_property(transform: Transform) -> None:
     """Take an edit of the mode property as a choice for the whole."""
     mode = transform.motion.mode
-    places = [place for place in slot_transforms_of([transform]) if place.slot.action.is_editable]
-    if not places:
+    bindings = [binding for binding in bindings_of([transform]) if binding.slot.action.is_editable]
+    if not bindings:
         set_pending_mode(transform, mode)
-    follow_renamed(places)
+    follow_renamed(bindings)
     if mode != "BLENDER":
         with suppress(Refused):
-            places = able(transform, list(zip(places, keyed_in(places), strict=True)))
-    for place in places:
-        if not is_keyed(place):
-            record_mode(place, MODE_NUMBERS[mode])
+            bindings = able(transform, list(zip(bindings, keyed_in(bindings), strict=True)))
+    for binding in bindings:
+        if not is_keyed(binding):
+            record_mode(binding, MODE_NUMBERS[mode])
     follower.refresh([transform])
 
 
-def set_whole(place: SlotTransform, mode: str) -> None:
+def set_whole(binding: Binding, mode: str) -> None:
     """Set one mode for all segments of a slot."""
-    channel = place.users[0].mode_channel
-    if channel in place.curves:
-        place.channelbag.fcurves.remove(place.curves.pop(channel))
-    record_mode(place, MODE_NUMBERS[mode])
+    channel = binding.users[0].mode_channel
+    if channel in binding.curves:
+        binding.channelbag.fcurves.remove(binding.curves.pop(channel))
+    record_mode(binding, MODE_NUMBERS[mode])
 
 
-def able(transform: Transform, readings: Readings) -> list[SlotTransform]:
-    """Return the places of a transform, which is keyed so, that can have a mode beside Blender's own.
+def able(transform: Transform, readings: Readings) -> list[Binding]:
+    """Return the bindings of a transform, which is keyed so, that can have a mode beside Blender's own.
 
     That is its Action at least, or one of its strips where it has none: else `Refused`. Other strips keep Blender's.
     """
     transform.rotation  # noqa: B018 - raises where it turns by axis and angle
     refuse_linked(transform)
-    active, result, refusals = active_place(transform, [place for place, _ in readings]), [], []
-    for place, source in readings:
+    active, result, refusals = active_binding(transform, [binding for binding, _ in readings]), [], []
+    for binding, source in readings:
         try:
             if isinstance(source, Refused):
                 raise source
             refuse_numbers(transform.name, replace(source, mode=MODE_NUMBERS["dq_sclerp"]))
-            result.append(place)
+            result.append(binding)
         except Refused as refusal:
-            if place is active:
+            if binding is active:
                 raise
             refusals.append(refusal)
     if refusals and not result:

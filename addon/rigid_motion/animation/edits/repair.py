@@ -8,7 +8,7 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..actions.refusals import refuse_linked
-from ..actions.slots import Slot, SlotTransform, uses_of
+from ..actions.slots import Binding, Slot, uses_of
 from ..transforms import Refused, Transform, transform_of
 from ..writers.table import WRITERS, writer_of
 from .apply import Readings, Targets, apply_edit
@@ -53,20 +53,20 @@ def restore_constraints(targets: Targets, *, refused: list[Refused] | None = Non
         take that. Nothing is changed then.
     """
 
-    def plan(transform: Transform, readings: Readings) -> list[SlotTransform]:
+    def plan(transform: Transform, readings: Readings) -> list[Binding]:
         refuse_linked(transform)
-        places = [place for place, _ in readings if place.filled and writer_of(place).uses_constraints]
-        if not places:
+        bindings = [binding for binding, _ in readings if binding.filled and writer_of(binding).uses_constraints]
+        if not bindings:
             raise Refused(
                 rpt_("{name} has no constraint to restore: choose a mode for keys of a bone first").format(
                     name=transform.name
                 )
             )
-        return [place for place in places if writer_of(place).trouble_of(transform, place)]
+        return [binding for binding in bindings if writer_of(binding).trouble_of(transform, binding)]
 
-    def act(transform: Transform, places: list[SlotTransform]) -> None:
-        for place in places:
-            writer_of(place).restore(transform, place)
+    def act(transform: Transform, bindings: list[Binding]) -> None:
+        for binding in bindings:
+            writer_of(binding).restore(transform, binding)
 
     apply_edit(targets, plan, act, refused)
 
@@ -84,6 +84,6 @@ def _troubles(transforms: Iterable[Transform]) -> Iterator[tuple[Transform, str]
                 if record.handle != handle or not record.digest or (user := same.get(record.prefix)) is None:
                     continue
                 # The constraint alone is looked at, not the channels.
-                place = SlotTransform(slot, user.prefix, None, (user,), dict)
-                if trouble := writer_of(place).trouble_of(user, place):
+                binding = Binding(slot, user.prefix, None, (user,), dict)
+                if trouble := writer_of(binding).trouble_of(user, binding):
                     yield user, trouble

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from ..actions.modifiers import added_values
-from ..actions.slots import SlotTransform
+from ..actions.slots import Binding
 from ..compute.differences import in_betweens
 from ..compute.source_cache import cached_source
 from ..compute.sources import SAME_FRAME, Source
@@ -21,12 +21,12 @@ from ..writers.channel_values import channel_values
 from .inserted_keys import TOLERANCE
 
 
-def keep_motion(place: SlotTransform, before: str, source: Source) -> bool:
+def keep_motion(binding: Binding, before: str, source: Source) -> bool:
     """Give keys that were inserted along Blender's own in-betweens the motion that was seen.
 
     Parameters
     ----------
-    place, source
+    binding, source
         As they are now, with the new keys.
     before : str
         The digest of the source that the slot is filled in from.
@@ -45,23 +45,23 @@ def keep_motion(place: SlotTransform, before: str, source: Source) -> bool:
     inserted = inserted[old.modes_at(inserted) != 0]
     if len(inserted) < 2:
         return False
-    off = _off_curves(source, old, inserted, place)
+    off = _off_curves(source, old, inserted, binding)
     if np.count_nonzero(~off.any(axis=0)) < max(2, 0.5 * len(inserted)):
         return False
     frames = np.union1d(inserted, old.keyed_frames)
-    user = place.users[0]
+    user = binding.users[0]
     values = channel_values(user, old, in_betweens(old, frames))
     chosen, bounds = np.searchsorted(frames, inserted), _bounds(old.keyed_frames, inserted)
     for row, (path, index) in user.channels.items():
-        if path in values and (fcurve := place.curves.get((path, index))) is not None:
+        if path in values and (fcurve := binding.curves.get((path, index))) is not None:
             _set_keys(fcurve, inserted, values[path][chosen, index] + off[row], bounds)
     return True
 
 
 def _without(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Return the frames that are none of the others; both rise."""
-    places = np.clip(np.searchsorted(others, frames)[:, None] - (0, 1), 0, len(others) - 1)
-    return frames[np.abs(others[places] - frames[:, None]).min(axis=1) >= SAME_FRAME]
+    indices = np.clip(np.searchsorted(others, frames)[:, None] - (0, 1), 0, len(others) - 1)
+    return frames[np.abs(others[indices] - frames[:, None]).min(axis=1) >= SAME_FRAME]
 
 
 def _bounds(keyed: np.ndarray, inserted: np.ndarray) -> np.ndarray:
@@ -70,19 +70,19 @@ def _bounds(keyed: np.ndarray, inserted: np.ndarray) -> np.ndarray:
     return keyed[np.diff(is_dense.astype(int), prepend=0, append=0) != 0]
 
 
-def _off_curves(new: Source, old: Source, frames: np.ndarray, place: SlotTransform) -> np.ndarray:
+def _off_curves(new: Source, old: Source, frames: np.ndarray, binding: Binding) -> np.ndarray:
     """Return how far the keys on these frames (m,) are off the curves that were there before,
     0 where none is, (10, m).
     """
     off = np.zeros((10, len(frames)))
     for rows, keys in new.channels:
-        places = np.clip(np.searchsorted(frames, keys.times - SAME_FRAME), 0, len(frames) - 1)
-        here = np.abs(frames[places] - keys.times) < SAME_FRAME
+        indices = np.clip(np.searchsorted(frames, keys.times - SAME_FRAME), 0, len(frames) - 1)
+        here = np.abs(frames[indices] - keys.times) < SAME_FRAME
         shown = old.held(keys.times[here])
-        had = (old.values_at(shown) + added_values(place, place.users[0], new, keys.times[here]))[rows]
+        had = (old.values_at(shown) + added_values(binding, binding.users[0], new, keys.times[here]))[rows]
         by = keys.values[:, here] - had
         by[np.abs(by) <= TOLERANCE * np.maximum(1.0, np.abs(had))] = 0.0
-        off[np.ix_(rows, places[here])] = by
+        off[np.ix_(rows, indices[here])] = by
     return off
 
 
@@ -106,10 +106,10 @@ def _set_keys(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarray, 
         keys.insert(frame, fcurve.evaluate(frame), options={"FAST"})
     fcurve.update()
     times = read("co")[:, 0]
-    places = np.clip(np.searchsorted(times, frames - SAME_FRAME), 0, len(times) - 1)
-    moved = values - read("co")[places, 1]
+    indices = np.clip(np.searchsorted(times, frames - SAME_FRAME), 0, len(times) - 1)
+    moved = values - read("co")[indices, 1]
     for name in ("co", "handle_left", "handle_right"):
         points = read(name)
-        points[places, 1] += moved
+        points[indices, 1] += moved
         keys.foreach_set(name, points.ravel())
     fcurve.update()

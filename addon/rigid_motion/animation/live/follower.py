@@ -17,7 +17,7 @@ from bpy.app.handlers import persistent
 from ..actions.mode_property import adopt_from_properties, show_pending_modes
 from ..actions.reading import leading
 from ..actions.renaming import forget_names
-from ..actions.slots import SlotTransform, choose_slots, filled_places_of, slot_transforms_of, slots_in
+from ..actions.slots import Binding, bindings_of, choose_slots, filled_bindings, slots_in
 from ..compute import source_cache
 from ..compute.sources import Source
 from ..handlers import append_handlers, remove_handlers
@@ -38,7 +38,7 @@ from .inserted_keys import InsertedKeys
 from .left_in_place import LeftInPlace
 from .modes_in_use import has_bones, has_mode, transforms_under, uses_modes
 from .operators import OperatorWatch
-from .refreshing import refresh_places
+from .refreshing import refresh_bindings
 from .seen_in_channels import SeenInChannels, is_baking
 from .separated_slots import SlotNames, are_separated, discard, give_keys_back, notice_slots
 from .snapshots import Snapshots
@@ -132,28 +132,28 @@ class Follower:
             if not is_first:
                 return 0
             separated = give_keys_back(bpy.data.actions, self.slot_names) if targets is None else set()
-            places = slot_transforms_of(transforms)
-            moved = {user for place in places for user in place.users}
+            bindings = bindings_of(transforms)
+            moved = {user for binding in bindings for user in binding.users}
             unmoved = [transform for transform in transforms if transform not in moved]
             with self.left.keep(unmoved):
                 release(unmoved)
             show_pending_modes(unmoved)
             forget_names(unmoved)
-            count = self.refresh_places(places, again=again)
-            notice_slots({place.slot for place in places}, self.slot_names)
+            count = self.refresh_bindings(bindings, again=again)
+            notice_slots({binding.slot for binding in bindings}, self.slot_names)
             discard(separated)
             return count
 
-    def refresh_places(
+    def refresh_bindings(
         self,
-        places: Sequence[SlotTransform],
+        bindings: Sequence[Binding],
         sources: Sequence[Source | Refused | None] | None = None,
         *,
         again: bool = False,
     ) -> int:
-        with self.left.keep(places=places):
+        with self.left.keep(bindings=bindings):
             in_draft = self.drafts and not shows_between_frames()
-            return refresh_places(places, sources, self.inserted, self.frame, again=again, in_draft=in_draft)
+            return refresh_bindings(bindings, sources, self.inserted, self.frame, again=again, in_draft=in_draft)
 
     def finish_drafts(self) -> None:
         """Have all in the file be exact between frames."""
@@ -171,11 +171,11 @@ class Follower:
             return set()
         slots = slots_in(actions)
         notice_slots(slots, self.slot_names)
-        places = [place for slot in slots for place in self.snapshots.edited_in(slot)]
+        bindings = [binding for slot in slots for binding in self.snapshots.edited_in(slot)]
         with self.turn() as is_first:
             if is_first:
-                self.refresh_places(places)
-        return {user for place in places for user in place.users}
+                self.refresh_bindings(bindings)
+        return {user for binding in bindings for user in binding.users}
 
     def refresh_objects(self, depsgraph: bpy.types.Depsgraph, seen: set[Transform]) -> None:
         """Refresh after an edit of scenes, or of other objects than these, and notice how one was posed by hand."""
@@ -222,15 +222,15 @@ class Follower:
             choose_slots(obj)
             if depsgraph is not None:
                 self.left.notice_assignments(obj, depsgraph)
-            for place in filled_places_of(obj):
+            for binding in filled_bindings(obj):
                 with self.turn() as is_first:
                     if is_first:
-                        writer_of(place).prepare(place)
+                        writer_of(binding).prepare(binding)
                 if depsgraph is not None:
-                    for transform in place.users:
+                    for transform in binding.users:
                         with suppress(Refused):
                             if self.inserted.notice_assignment(transform, depsgraph, self.frame, operators):
-                                writer_of(place).hide(place, transform)
+                                writer_of(binding).hide(binding, transform)
         return list(edited)
 
     def look_through(self, *, again: bool = False) -> None:
@@ -309,11 +309,11 @@ class Follower:
         self.channels.forget()
         self.look_again(again=True)
         for obj in filter(uses_modes, bpy.data.objects):
-            for place in filled_places_of(obj) if obj.is_editable else ():
-                for transform in place.users:
+            for binding in filled_bindings(obj) if obj.is_editable else ():
+                for transform in binding.users:
                     self.inserted.notice_undo(transform)
                     if self.inserted.is_whole_again(transform, self.frame):
-                        writer_of(place).hide(place, transform)
+                        writer_of(binding).hide(binding, transform)
 
     def after_load(self, *_: object) -> None:
         source_cache.clear()
@@ -321,7 +321,7 @@ class Follower:
         with self.turn() as is_first:
             if is_first:
                 transforms = transforms_under(bpy.data.objects)
-                moved = {user for place in slot_transforms_of(transforms) for user in place.users}
+                moved = {user for binding in bindings_of(transforms) for user in binding.users}
                 adopt_from_properties(transform for transform in transforms if transform not in moved)
         self.look_again()
 
@@ -375,12 +375,12 @@ def refresh(targets: Targets | None = None) -> int:
     return follower.refresh(targets)
 
 
-def refresh_read(readings: Sequence[tuple[SlotTransform, list[Source | Refused]]]) -> None:
+def refresh_read(readings: Sequence[tuple[Binding, list[Source | Refused]]]) -> None:
     """Bring the in-betweens of these up to date, which are read already, as each of their users has them."""
     with follower.turn() as is_first:
         if is_first:
-            sources = [leading(place, of_users) for place, of_users in readings]
-            follower.refresh_places([place for place, _ in readings], sources)
+            sources = [leading(binding, of_users) for binding, of_users in readings]
+            follower.refresh_bindings([binding for binding, _ in readings], sources)
 
 
 def follow_original(transform: ObjectTransform) -> None:
@@ -388,7 +388,7 @@ def follow_original(transform: ObjectTransform) -> None:
     with follower.turn() as is_first:
         if is_first:
             transform.follow_original()
-            follower.refresh_places(slot_transforms_of([transform]))
+            follower.refresh_bindings(bindings_of([transform]))
 
 
 def show_seen_in_channels(transforms: Iterable[Transform]) -> None:

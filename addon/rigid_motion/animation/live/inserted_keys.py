@@ -33,7 +33,7 @@ import bpy
 import numpy as np
 
 from ..actions.modifiers import added_values
-from ..actions.slots import SlotTransform
+from ..actions.slots import Binding
 from ..compute.components import PART_OF, rows_left_to
 from ..compute.source_cache import cached_source
 from ..compute.sources import SAME_FRAME, Source, values_of
@@ -129,37 +129,37 @@ class InsertedKeys:
         """The whole poses that undo and redo can bring back, by the transform and the components."""
         self._undone: dict[tuple[int, str], bytes] = {}
         """The components that undo or redo has given transforms, which have not been evaluated since."""
-        self._new: defaultdict[SlotTransform, list[_NewKey]] = defaultdict(list)
-        """The keys that were inserted in each place, as each of its users may have them, while edits are looked at."""
+        self._new: defaultdict[Binding, list[_NewKey]] = defaultdict(list)
+        """The keys inserted in each binding, as each of its users may have them, while edits are looked at."""
         self._insertions: list[Insertion] = []
         self._inserted: OrderedDict[tuple[str, str], tuple[np.ndarray, bool, bool]] = OrderedDict()
         """Decisions to keep when undo and redo bring keys back: the components that there were, whether they were all
         of the pose, and whether they were the in-between as it was, by the digests before and after."""
 
-    def look_at(self, changes: Iterable[tuple[SlotTransform, str, Source]], frame: float) -> None:
+    def look_at(self, changes: Iterable[tuple[Binding, str, Source]], frame: float) -> None:
         """Find the keys that were inserted on the frame that is shown, and what the channels of all had there.
 
-        `changes` are places, the digests of what they are filled in from, and what is keyed in them now.
+        `changes` are bindings, the digests of what they are filled in from, and what is keyed in them now.
         """
         self._new.clear()
         result = []
-        for place, before, source in changes:
+        for binding, before, source in changes:
             if (old := _before_insertion(before, source)) is not None:
-                for user in self._by_precedence(place):
+                for user in self._by_precedence(binding):
                     data, own = user.animated.animation_data, frame
                     if data.use_tweak_mode:
                         own = data.nla_tweak_strip_time_to_scene(frame, invert=True)
                     if _is_inserted(old, source, own):
-                        result.append((place, user, old, source, own))
+                        result.append((binding, user, old, source, own))
         had = values_of([old for _, _, old, *_ in result], [old.held(np.array([own])) for _, _, old, _, own in result])
-        for (place, user, old, source, own), values in zip(result, had, strict=True):
+        for (binding, user, old, source, own), values in zip(result, had, strict=True):
             posed = self._posed.get(_identity(user))
             posed = posed if posed is not None and posed.frame == frame else None
-            self._new[place].append(_NewKey(user, posed, old, source, own, values[:, 0]))
+            self._new[binding].append(_NewKey(user, posed, old, source, own, values[:, 0]))
 
-    def _by_precedence(self, place: SlotTransform) -> list[Transform]:
+    def _by_precedence(self, binding: Binding) -> list[Transform]:
         """Return the users of a slot that a key may be of: first what was posed by hand, or else what is active."""
-        users = [user for user in place.users if user.animated.animation_data.action == place.slot.action]
+        users = [user for user in binding.users if user.animated.animation_data.action == binding.slot.action]
         if len(users) > 1:
             layer = bpy.context.view_layer
             active = None if layer is None else layer.objects.active
@@ -255,18 +255,18 @@ class InsertedKeys:
             for transform in transforms:
                 self._posed.pop(_identity(transform), None)
 
-    def keep_pose(self, place: SlotTransform, *, again: bool) -> bool:
-        """Give a key that was found in a place the pose of one of the users of the slot, if it can be of any.
+    def keep_pose(self, binding: Binding, *, again: bool) -> bool:
+        """Give a key that was found in a binding the pose of one of the users of the slot, if it can be of any.
 
         `again` is whether undo or redo brought the key back, and not an edit. Returns whether there was such a key.
         """
-        return any(self._keep_pose_of(place, key, again) for key in self._new.get(place, ()))
+        return any(self._keep_pose_of(binding, key, again) for key in self._new.get(binding, ()))
 
-    def _keep_pose_of(self, place: SlotTransform, key: _NewKey, again: bool) -> bool:
+    def _keep_pose_of(self, binding: Binding, key: _NewKey, again: bool) -> bool:
         user, posed, old, source, frame = key.user, key.posed, key.old, key.source, key.frame
         change = old.digest, source.digest
         decided = self._inserted.get(change) if again else None
-        added = added_values(place, user, source, np.array([frame]))[:, 0]
+        added = added_values(binding, user, source, np.array([frame]))[:, 0]
         if decided is None:
             in_between = key.had + added
             # A property that had no keys at all is where it is.
@@ -282,8 +282,8 @@ class InsertedKeys:
                 self._inserted.popitem(last=False)
         shown, is_whole, is_in_between = decided
         left = rows_left_to(old.driven) if old.driven else ()
-        seen = (shown if is_whole else _seen_components(user, place, old, shown, frame)) - added
-        curves = {row: place.curves[channel] for row, channel in user.channels.items() if channel in place.curves}
+        seen = (shown if is_whole else _seen_components(user, binding, old, shown, frame)) - added
+        curves = {row: binding.curves[channel] for row, channel in user.channels.items() if channel in binding.curves}
         for row, fcurve in curves.items():
             if row in key.numbers and row not in left:
                 fcurve.keyframe_points[key.numbers[row]].co_ui.y = seen[row]
@@ -327,9 +327,9 @@ def _is_same(source: Source, components: np.ndarray, others: np.ndarray) -> bool
     return bool(np.all(np.abs(components - others)[rows] <= TOLERANCE * np.maximum(1.0, np.abs(others[rows]))))
 
 
-def _seen_components(user: Transform, place: SlotTransform, old: Source, shown: np.ndarray, frame: float) -> np.ndarray:
+def _seen_components(user: Transform, binding: Binding, old: Source, shown: np.ndarray, frame: float) -> np.ndarray:
     """Return the components (10,) that, with the original difference alone, look as the screen does."""
-    filled, difference = place.filled, writer_of(place).difference(place, user, frame)
+    filled, difference = binding.filled, writer_of(binding).difference(binding, user, frame)
     parts = {PART_OF[row] for row, channel in user.differences.items() if channel in filled}
     return visible_components(shown, old.original, difference, old.order, parts)
 

@@ -16,7 +16,7 @@ from contextlib import contextmanager, suppress
 import bpy
 import numpy as np
 
-from ..actions.slots import SlotTransform, places_of
+from ..actions.slots import Binding, bindings_for
 from ..compute.components import PART_OF
 from ..queries.visible_pose import shown_components
 from ..transforms import WIDTHS, Refused, Transform, transform_of
@@ -53,19 +53,19 @@ class LeftInPlace:
         self._set.clear()
 
     @contextmanager
-    def keep(self, transforms: Iterable[Transform] = (), places: Iterable[SlotTransform] = ()) -> Iterator[None]:
-        """Keep these, which nothing moves, and the users of these places where they are seen, whatever is taken off."""
+    def keep(self, transforms: Iterable[Transform] = (), bindings: Iterable[Binding] = ()) -> Iterator[None]:
+        """Keep these, which nothing moves, and the users of these bindings where they are seen, whatever goes."""
         animated: defaultdict[Transform, set[str]] = defaultdict(set, {transform: set() for transform in transforms})
-        for place in places:
-            for user in place.users:
+        for binding in bindings:
+            for user in binding.users:
                 with suppress(Refused):
-                    animated[user] |= _animated_parts(user, place)
+                    animated[user] |= _animated_parts(user, binding)
         left = {}
         for transform, parts in animated.items():
             with suppress(Refused):
                 loose = shown_parts(transform) - parts
                 if loose and transform.animated.is_editable:
-                    loose -= set().union(*(_animated_parts(transform, place) for place in places_of(transform)))
+                    loose -= set().union(*(_animated_parts(transform, binding) for binding in bindings_for(transform)))
                     left[transform] = loose, shown_components(transform)
         yield
         for transform, (loose, seen) in left.items():
@@ -73,12 +73,12 @@ class LeftInPlace:
                 transform.set_components(seen, loose - shown_parts(transform) - self._set.get(transform, set()))
 
 
-def _animated_parts(user: Transform, place: SlotTransform) -> set[str]:
-    """Return which of location, rotation and scale a place animates."""
+def _animated_parts(user: Transform, binding: Binding) -> set[str]:
+    """Return which of location, rotation and scale a binding animates."""
     return {
         PART_OF[row]
         for row, channel in user.channels.items()
-        if (fcurve := place.curves.get(channel)) is not None and not (fcurve.mute or fcurve.is_empty)
+        if (fcurve := binding.curves.get(channel)) is not None and not (fcurve.mute or fcurve.is_empty)
     }
 
 

@@ -54,7 +54,7 @@ class _Reader:
 
     def __init__(self, channels: Channels) -> None:
         self.channels = channels
-        self.places = [(0, 0)] * len(channels)
+        self.addresses = [(0, 0)] * len(channels)
         """The addresses of the keys of each channel in memory, and how many bytes they are."""
         self.views = [_NOTHING] * len(channels)
 
@@ -64,12 +64,12 @@ class _Reader:
         size = _Layout.size
         if not size:
             return [_by_property(keys) for keys in self.channels]
-        places = [(keys[0].as_pointer(), size * count) if (count := len(keys)) else (0, 0) for keys in self.channels]
-        if places != self.places:
-            for number, (place, before) in enumerate(zip(places, self.places, strict=True)):
-                if place != before:
-                    self.views[number] = _view(*place) if place[1] else _NOTHING
-            self.places = places
+        addresses = [(keys[0].as_pointer(), size * count) if (count := len(keys)) else (0, 0) for keys in self.channels]
+        if addresses != self.addresses:
+            for number, (address, before) in enumerate(zip(addresses, self.addresses, strict=True)):
+                if address != before:
+                    self.views[number] = _view(*address) if address[1] else _NOTHING
+            self.addresses = addresses
         return [view.tobytes() for view in self.views]
 
 

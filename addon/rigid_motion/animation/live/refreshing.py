@@ -1,4 +1,4 @@
-"""Bringing the in-betweens of places up to date with what is keyed in them.
+"""Bringing the in-betweens of bindings up to date with what is keyed in them.
 
 Whether something has changed that in-betweens depend on, the digest of the source tells: the Action keeps that of what
 it was filled in from. It travels with the file through undo, redo, saving and loading.
@@ -14,7 +14,7 @@ from ..actions.reading import keyed_in
 from ..actions.records import recorded_digest
 from ..actions.refusals import refuse_numbers
 from ..actions.renaming import follow_renamed
-from ..actions.slots import SlotTransform, read_again, slot_transforms_of
+from ..actions.slots import Binding, bindings_of, read_again
 from ..compute.source_cache import cache_source
 from ..compute.sources import Source
 from ..transforms import Refused, Transform
@@ -26,8 +26,8 @@ from .inserted_keys import InsertedKeys
 from .segment_keys import share_out_turns
 
 
-def refresh_places(
-    places: Sequence[SlotTransform],
+def refresh_bindings(
+    bindings: Sequence[Binding],
     sources: Sequence[Source | Refused | None] | None,
     inserted: InsertedKeys,
     frame: float,
@@ -35,11 +35,11 @@ def refresh_places(
     again: bool,
     in_draft: bool,
 ) -> int:
-    """Fill in what has changed in these places, and clear what has no in-betweens any more.
+    """Fill in what has changed in these bindings, and clear what has no in-betweens any more.
 
     Parameters
     ----------
-    places
+    bindings
     sources
         What is keyed in each of them, read already; None to read it here.
     inserted, frame, again
@@ -52,49 +52,49 @@ def refresh_places(
     int
         How many of them had to be filled in anew.
     """
-    follow_renamed(places)
-    show_modes(places)
+    follow_renamed(bindings)
+    show_modes(bindings)
     if sources is None:
-        with_modes = [place for place in places if has_to_do_with_modes(place)]
+        with_modes = [binding for binding in bindings if has_to_do_with_modes(binding)]
         keyed = dict(zip(with_modes, keyed_in(with_modes), strict=True))
-        sources = [keyed.get(place) for place in places]
+        sources = [keyed.get(binding) for binding in bindings]
     stale, idle, emptied, keyed_anew = [], [], [], []
-    read = [(place, recorded_digest(place), source) for place, source in zip(places, sources, strict=True)]
+    read = [(binding, recorded_digest(binding), source) for binding, source in zip(bindings, sources, strict=True)]
     inserted.look_at((change for change in read if isinstance(change[2], Source)), frame)
-    for place, source in zip(places, sources, strict=True):
-        if place.slot.action.is_editable:
-            leave_other_way(place)
-        writer_of(place).show(place)
+    for binding, source in zip(bindings, sources, strict=True):
+        if binding.slot.action.is_editable:
+            leave_other_way(binding)
+        writer_of(binding).show(binding)
         # What is linked has the in-betweens that its own file was saved with.
-        if not place.slot.action.is_editable:
+        if not binding.slot.action.is_editable:
             continue
-        regroup(place)
-        before = recorded_digest(place)
-        if not _is_desired(place, source, before):
+        regroup(binding)
+        before = recorded_digest(binding)
+        if not _is_desired(binding, source, before):
             # Blender can bring differences of bones that no record speaks of: it flips Actions, F-curve by F-curve.
-            if before or (place.kind.has_difference_slot and place.filled):
-                emptied.append(place)
-            idle.append(place)
-        elif source.digest != before or not is_complete(place, source):
-            if inserted.keep_pose(place, again=again) or keep_motion(place, before, source):
-                keyed_anew.append(place)
+            if before or (binding.kind.has_difference_slot and binding.filled):
+                emptied.append(binding)
+            idle.append(binding)
+        elif source.digest != before or not is_complete(binding, source):
+            if inserted.keep_pose(binding, again=again) or keep_motion(binding, before, source):
+                keyed_anew.append(binding)
             else:
-                stale.append((place, source))
+                stale.append((binding, source))
     inserted.keep_timing()
     clear(emptied)
-    release(user for place in idle for user in place.users)
+    release(user for binding in idle for user in binding.users)
     read = read_again(keyed_anew)
     stale += [pair for pair in zip(read, keyed_in(read), strict=True) if _is_desired(*pair, recorded_digest(pair[0]))]
-    if divided := [place for place, source in stale if share_out_turns(place, source)]:
+    if divided := [binding for binding, source in stale if share_out_turns(binding, source)]:
         read = read_again(divided)
         anew = zip(read, keyed_in(read), strict=True)
         stale = [pair for pair in stale if pair[0] not in divided]
         stale += [pair for pair in anew if _is_desired(*pair, recorded_digest(pair[0]))]
     idle += _fill_in(stale, in_draft)
-    editable = [place for place in places if place.slot.action.is_editable]
+    editable = [binding for binding in bindings if binding.slot.action.is_editable]
     # Keys of what has no mode count in the frame range of an Action as well.
-    follow_ranges({place.slot.action for place in editable} - {place.slot.action for place, _ in stale})
-    finish_drafts({place.slot.action for place in editable if place.slot.in_nla})
+    follow_ranges({binding.slot.action for binding in editable} - {binding.slot.action for binding, _ in stale})
+    finish_drafts({binding.slot.action for binding in editable if binding.slot.in_nla})
     _hold(idle, editable)
     # A bone was renamed or deleted: then it is no edit of a single one.
     if len(editable) > 1:
@@ -102,23 +102,23 @@ def refresh_places(
     return len(stale)
 
 
-def _fill_in(readings: Sequence[tuple[SlotTransform, Source]], in_draft: bool) -> list[SlotTransform]:
+def _fill_in(readings: Sequence[tuple[Binding, Source]], in_draft: bool) -> list[Binding]:
     """Fill in these. Those with numbers that make no motion keep Blender's own, and are returned."""
     try:
         fill_in(readings, in_draft=in_draft)
     except ValueError:
         failed = []
-        for place, source in readings:
+        for binding, source in readings:
             try:
-                fill_in([(place, source)])
+                fill_in([(binding, source)])
             except ValueError:
-                clear([place])
-                failed.append(place)
+                clear([binding])
+                failed.append(binding)
         return failed
     return []
 
 
-def _is_desired(place: SlotTransform, source: Source | Refused | None, before: str) -> bool:
+def _is_desired(binding: Binding, source: Source | Refused | None, before: str) -> bool:
     """Return whether there is more to a source than Blender's own in-betweens, and it can be had.
 
     `before` is the digest of what the slot is filled in from: that needs no second examination.
@@ -127,7 +127,7 @@ def _is_desired(place: SlotTransform, source: Source | Refused | None, before: s
         return False
     if source.digest != before:
         try:
-            refuse_numbers(place.name, source)
+            refuse_numbers(binding.name, source)
         except Refused:
             return False
         if not source.is_live:
@@ -136,17 +136,17 @@ def _is_desired(place: SlotTransform, source: Source | Refused | None, before: s
     return True
 
 
-def _hold(idle: Iterable[SlotTransform], edited: Iterable[SlotTransform]) -> None:
+def _hold(idle: Iterable[Binding], edited: Iterable[Binding]) -> None:
     """Have slots hold what the NLA needs of them: all that move what was edited, and those that are not filled in."""
-    tracked = {user for place in edited for user in place.users if len(user.animated.animation_data.nla_tracks)}
-    for place in idle:
-        if tracked.isdisjoint(place.users):
-            hold(place, ())
-    in_nla = slot_transforms_of(tracked) if tracked else []
-    beside: defaultdict[Transform, list[SlotTransform]] = defaultdict(list)
-    for place in in_nla:
-        for user in place.users:
-            beside[user].append(place)
-    for place in in_nla:
-        if place.slot.action.is_editable:
-            hold(place, [other for user in place.users for other in beside[user]])
+    tracked = {user for binding in edited for user in binding.users if len(user.animated.animation_data.nla_tracks)}
+    for binding in idle:
+        if tracked.isdisjoint(binding.users):
+            hold(binding, ())
+    in_nla = bindings_of(tracked) if tracked else []
+    beside: defaultdict[Transform, list[Binding]] = defaultdict(list)
+    for binding in in_nla:
+        for user in binding.users:
+            beside[user].append(binding)
+    for binding in in_nla:
+        if binding.slot.action.is_editable:
+            hold(binding, [other for user in binding.users for other in beside[user]])

@@ -17,7 +17,7 @@ import bpy
 import numpy as np
 from bpy_extras.anim_utils import bake_action_objects_iter
 
-from ..actions.slots import actions_of, slot_transforms_of
+from ..actions.slots import actions_of, bindings_of
 from ..queries.visible_pose import shown_components
 from ..transforms import Refused, Transform, kind_of
 from ..writers.table import shown_differences, writer_of
@@ -56,10 +56,10 @@ class SeenInChannels:
                 differences = shown_differences(transform)
                 if differences and transform.animated.is_editable:
                     seen[transform] = shown_components(transform), set().union(*(parts for _, parts in differences))
-        for place in slot_transforms_of(seen):
-            for user in place.users:
+        for binding in bindings_of(seen):
+            for user in binding.users:
                 if user in seen:
-                    writer_of(place).hide(place, user)
+                    writer_of(binding).hide(binding, user)
         for transform, (components, parts) in seen.items():
             before = transform.components()
             transform.set_components(components, parts)

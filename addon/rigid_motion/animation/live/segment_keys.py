@@ -12,7 +12,7 @@ from ...motion.quaternions import conjugate, rotate
 from ...motion.spins import FULL_TURN
 from ..actions.channels import ensure_group, replace_keys
 from ..actions.records import recorded_digest
-from ..actions.slots import SlotTransform
+from ..actions.slots import Binding
 from ..compute.components import LOCATION, ROWS
 from ..compute.differences import in_betweens
 from ..compute.modes import MODE_NAMES, MODE_NUMBERS
@@ -23,38 +23,38 @@ from ..queries.keyed import frames_in, modes_in, turns_in
 from ..transforms import Channel
 
 
-def set_mode_in(place: SlotTransform, mode: str, frames: Sequence[float]) -> None:
+def set_mode_in(binding: Binding, mode: str, frames: Sequence[float]) -> None:
     """Key the mode channel of a slot on these frames, and behind them where another mode goes on."""
-    _key_segments(place, place.users[0].mode_channel, MODE_NUMBERS[mode], frames, modes_in)
+    _key_segments(binding, binding.users[0].mode_channel, MODE_NUMBERS[mode], frames, modes_in)
 
 
-def set_turns_in(place: SlotTransform, turns: float | Sequence[float], frames: Sequence[float]) -> None:
+def set_turns_in(binding: Binding, turns: float | Sequence[float], frames: Sequence[float]) -> None:
     """Key the channel of turns likewise, with one number on all of these frames or one on each, rising.
 
     Where there are none in any segment, the channel goes.
     """
-    channel = place.users[0].turns_channel
-    _key_segments(place, channel, turns, frames, turns_in)
-    if not any(value for _, value, _ in _keys_in(place.curves[channel])):
-        place.channelbag.fcurves.remove(place.curves.pop(channel))
+    channel = binding.users[0].turns_channel
+    _key_segments(binding, channel, turns, frames, turns_in)
+    if not any(value for _, value, _ in _keys_in(binding.curves[channel])):
+        binding.channelbag.fcurves.remove(binding.curves.pop(channel))
 
 
 def _key_segments(
-    place: SlotTransform,
+    binding: Binding,
     channel: Channel,
     values: float | Sequence[float],
     frames: Sequence[float],
-    values_in: Callable[[SlotTransform, np.ndarray], Sequence[float]],
+    values_in: Callable[[Binding, np.ndarray], Sequence[float]],
 ) -> None:
     """Key values on the frames of keys that begin segments, and behind them where another one goes on.
 
     `values_in` gives those that segments have so far.
     """
-    chosen, keyed = np.asarray(frames, dtype=np.float64), frames_in(place)
+    chosen, keyed = np.asarray(frames, dtype=np.float64), frames_in(binding)
     is_chosen = _is_among(chosen, keyed)
-    desired = np.array(values_in(place, keyed), dtype=np.float64)
+    desired = np.array(values_in(binding, keyed), dtype=np.float64)
     desired[is_chosen] = values
-    fcurve = place.curves.get(channel) or _new(place, channel)
+    fcurve = binding.curves.get(channel) or _new(binding, channel)
     # Muted it has no say. Now it has, and all other segments keep the mode that they had without.
     old = [] if fcurve.mute else _keys_in(fcurve)
     fcurve.mute = False
@@ -90,9 +90,9 @@ def _is_among(chosen: np.ndarray, frames: np.ndarray) -> np.ndarray:
     return np.searchsorted(chosen, frames + SAME_FRAME) > np.searchsorted(chosen, frames - SAME_FRAME, side="right")
 
 
-def _new(place: SlotTransform, channel: Channel) -> bpy.types.FCurve:
-    fcurve = place.ensure_curve(channel)
-    fcurve.group = ensure_group(place.channelbag, place.users[0].group)
+def _new(binding: Binding, channel: Channel) -> bpy.types.FCurve:
+    fcurve = binding.ensure_curve(channel)
+    fcurve.group = ensure_group(binding.channelbag, binding.users[0].group)
     return fcurve
 
 
@@ -106,16 +106,14 @@ SAMPLES = 16
 """Samples of each part of a segment, and of each turn in it, to see how far a motion turns."""
 
 
-def share_out_turns(
-    place: SlotTransform, source: Source, old: Source | None = None, progress: float | None = None
-) -> bool:
+def share_out_turns(binding: Binding, source: Source, old: Source | None = None, progress: float | None = None) -> bool:
     """Share the turns of segments out among the parts that keys divide them into, so that the motion stays as it is.
 
     Where keys go between such parts, these have whole turns together again. Returns whether anything was changed.
 
     Parameters
     ----------
-    place : SlotTransform
+    binding : Binding
     source : Source
         What is keyed by now.
     old : Source, optional
@@ -123,16 +121,16 @@ def share_out_turns(
     progress : float, optional
         How far the pose of the one new key is along its segment, instead of where the body was on its frame.
     """
-    old = cached_source(recorded_digest(place)) if old is None else old
+    old = cached_source(recorded_digest(binding)) if old is None else old
     if old is None or old.order != source.order or source.cyclic is not None or not needs_turning(old):
         return False
     if source.key_count == old.key_count:
         return False
     shared = _divided(old, source, progress) if source.key_count > old.key_count else _joined(old, source)
     chosen = np.array(list(shared))
-    if not shared or np.array_equal(turns_in(place, chosen), list(shared.values())):
+    if not shared or np.array_equal(turns_in(binding, chosen), list(shared.values())):
         return False
-    set_turns_in(place, list(shared.values()), chosen)
+    set_turns_in(binding, list(shared.values()), chosen)
     return True
 
 

@@ -17,7 +17,7 @@ import bpy
 import numpy as np
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
-from ..actions.slots import Curves, Slot, SlotTransform, slots_in, slots_of, transforms_in, transforms_with, uses_of
+from ..actions.slots import Binding, Curves, Slot, bindings_in_slot, bindings_with, slots_in, slots_of, uses_of
 from ..transforms import WIDTHS, Channel, prefix_of, shows_differences, split_path
 from .raw_keys import key_reader
 
@@ -36,20 +36,20 @@ class Snapshots:
         self._slots.clear()
         self._rigs.clear()
 
-    def edited_in(self, slot: Slot) -> list[SlotTransform]:
+    def edited_in(self, slot: Slot) -> list[Binding]:
         """Return what of all that a slot moves has other channels than before; everything where there is no telling."""
         if all(user.pose is None for user in slot.users):
-            return transforms_in(slot)
+            return bindings_in_slot(slot)
         channelbag, key = slot.channelbag, (slot.action.session_uid, slot.handle)
         if channelbag is None:
             self._slots.pop(key, None)
-            return transforms_in(slot)
+            return bindings_in_slot(slot)
         snapshot = self._slots.get(key)
         if snapshot is None or not snapshot.is_of(channelbag):
             self._slots[key] = _SlotSnapshot(channelbag)
-            return transforms_in(slot)
+            return bindings_in_slot(slot)
         changed = dict.fromkeys(snapshot.prefixes[number] for number in sorted(snapshot.update()))
-        return transforms_with(slot, channelbag, {prefix: snapshot.curves_under(prefix) for prefix in changed})
+        return bindings_with(slot, channelbag, {prefix: snapshot.curves_under(prefix) for prefix in changed})
 
     def changed_bones(self, rig: bpy.types.Object, frame: float, *, is_set: bool = True) -> list[bpy.types.PoseBone]:
         """Return the bones of a rig that are other than before: how they are posed, or what moves them.

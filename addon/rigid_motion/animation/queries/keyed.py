@@ -11,53 +11,57 @@ import numpy as np
 from ..actions.reading import keyed_in, read
 from ..actions.records import recorded_mode
 from ..actions.refusals import refuse_numbers
-from ..actions.slots import SlotTransform, places_of, slot_transforms_of
+from ..actions.slots import Binding, bindings_for, bindings_of
 from ..compute.modes import MODE_NAMES, UNKNOWN
 from ..compute.sources import SAME_FRAME, Source, distinct
 from ..transforms import WIDTHS, Refused, Transform, transform_of
 
 
-def active_place(transform: Transform, places: Iterable[SlotTransform] | None = None) -> SlotTransform | None:
+def active_binding(transform: Transform, bindings: Iterable[Binding] | None = None) -> Binding | None:
     """Return the slot whose keys the editors show: that of the Action, in tweak mode that of the strip.
 
-    `places` are those that are known already, else all of the transform's are looked up.
+    `bindings` are those that are known already, else all of the transform's are looked up.
     """
     data = transform.animated.animation_data
     if data is None or data.action is None:
         return None
     active = (data.action, data.action_slot_handle)
-    places = slot_transforms_of([transform]) if places is None else places
+    bindings = bindings_of([transform]) if bindings is None else bindings
     return next(
-        (place for place in places if (place.slot.action, place.slot.handle) == active and transform in place.users),
+        (
+            binding
+            for binding in bindings
+            if (binding.slot.action, binding.slot.handle) == active and transform in binding.users
+        ),
         None,
     )
 
 
-def active_places_of(transforms: Sequence[Transform]) -> dict[Transform, SlotTransform]:
+def active_bindings(transforms: Sequence[Transform]) -> dict[Transform, Binding]:
     """Return `active_place` of each that has one, by a single look."""
     desired, result = set(transforms), {}
-    for place in slot_transforms_of(transforms):
-        for user in place.users:
+    for binding in bindings_of(transforms):
+        for user in binding.users:
             data = user.animated.animation_data
-            if user in desired and (data.action, data.action_slot_handle) == (place.slot.action, place.slot.handle):
-                result[user] = place
+            if user in desired and (data.action, data.action_slot_handle) == (binding.slot.action, binding.slot.handle):
+                result[user] = binding
     return result
 
 
 def source_of(carrier: bpy.types.Object | Transform) -> Source | None:
     """Return what is keyed in the Action, None where nothing is. `Refused` where rigid motion cannot act on it."""
-    place = active_place(transform_of(carrier))
-    source = None if place is None else read(place)
+    binding = active_binding(transform_of(carrier))
+    source = None if binding is None else read(binding)
     return source if source and source.channels else None
 
 
-def sources_of(places: Sequence[SlotTransform]) -> list[Source | None]:
+def sources_of(bindings: Sequence[Binding]) -> list[Source | None]:
     """Return what is keyed in each of these, None where nothing is, it is refused, or a driver moves a part of it."""
     result: list[Source | None] = []
-    for place, source in zip(places, keyed_in(places), strict=True):
+    for binding, source in zip(bindings, keyed_in(bindings), strict=True):
         try:
             if isinstance(source, Source):
-                refuse_numbers(place.name, source)
+                refuse_numbers(binding.name, source)
             is_whole = isinstance(source, Source) and source.channels and not source.driven
             result.append(source if is_whole else None)
         except Refused:
@@ -71,30 +75,30 @@ def key_frames(carrier: bpy.types.Object | Transform, *, selected: bool = False)
     Keys of the channels of modes and turns count among the selected ones.
     """
     transform = transform_of(carrier)
-    place = active_place(transform, places_of(transform))
-    return np.empty(0) if place is None else frames_in(place, selected=selected)
+    binding = active_binding(transform, bindings_for(transform))
+    return np.empty(0) if binding is None else frames_in(binding, selected=selected)
 
 
 def modes_of(carrier: bpy.types.Object | Transform, frames: np.ndarray) -> list[str]:
     """Return the modes of the segments at these frames. Without an Action, the mode that is awaited."""
     transform = transform_of(carrier)
-    place = active_place(transform, places_of(transform))
-    if place is None:
+    binding = active_binding(transform, bindings_for(transform))
+    if binding is None:
         return [transform.motion.mode or "BLENDER"] * len(frames)
-    return [MODE_NAMES[number] for number in modes_in(place, np.asarray(frames, dtype=np.float64))]
+    return [MODE_NAMES[number] for number in modes_in(binding, np.asarray(frames, dtype=np.float64))]
 
 
-def segment_modes(place: SlotTransform) -> list[str]:
+def segment_modes(binding: Binding) -> list[str]:
     """Return the modes of the segments between the keys of a slot, one after the other."""
-    return [MODE_NAMES[number] for number in modes_in(place, frames_in(place)[:-1])]
+    return [MODE_NAMES[number] for number in modes_in(binding, frames_in(binding)[:-1])]
 
 
-def frames_in(place: SlotTransform, *, selected: bool = False) -> np.ndarray:
+def frames_in(binding: Binding, *, selected: bool = False) -> np.ndarray:
     """Return `key_frames` in a slot."""
     result = []
-    transform = place.users[0]
-    for channel, fcurve in place.curves.items():
-        path = channel[0].removeprefix(place.prefix)
+    transform = binding.users[0]
+    for channel, fcurve in binding.curves.items():
+        path = channel[0].removeprefix(binding.prefix)
         if path in WIDTHS or (selected and channel in (transform.mode_channel, transform.turns_channel)):
             keys = fcurve.keyframe_points
             points, chosen = np.empty(2 * len(keys), np.float32), np.ones(len(keys), dtype=bool)
@@ -106,19 +110,19 @@ def frames_in(place: SlotTransform, *, selected: bool = False) -> np.ndarray:
     return distinct(frames)
 
 
-def modes_in(place: SlotTransform, frames: np.ndarray) -> list[int]:
+def modes_in(binding: Binding, frames: np.ndarray) -> list[int]:
     """Return the numbers of the modes at these frames; Blender's own where there is what is no mode."""
-    fcurve = place.curves.get(place.users[0].mode_channel)
+    fcurve = binding.curves.get(binding.users[0].mode_channel)
     if fcurve is None or fcurve.mute or not fcurve.keyframe_points:
-        modes = [recorded_mode(place)] * len(frames)
+        modes = [recorded_mode(binding)] * len(frames)
     else:
         modes = [_mode_at(fcurve, frame) for frame in frames.tolist()]
     return [mode if mode in MODE_NAMES else 0 for mode in modes]
 
 
-def turns_in(place: SlotTransform, frames: np.ndarray) -> np.ndarray:
+def turns_in(binding: Binding, frames: np.ndarray) -> np.ndarray:
     """Return the turns more of the segments at these frames, shape (n,)."""
-    fcurve = place.curves.get(place.users[0].turns_channel)
+    fcurve = binding.curves.get(binding.users[0].turns_channel)
     if fcurve is None or fcurve.mute or not fcurve.keyframe_points:
         return np.zeros(len(frames))
     keys = fcurve.keyframe_points

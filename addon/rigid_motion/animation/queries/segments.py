@@ -11,14 +11,14 @@ import bpy
 import numpy as np
 
 from ..actions.records import recorded_digest
-from ..actions.slots import places_of
+from ..actions.slots import bindings_for
 from ..compute.components import PART_OF
 from ..compute.modes import MODE_NAMES
 from ..compute.sources import SAME_FRAME, Source
 from ..compute.turning import turning_in
 from ..curves import cycled
 from ..transforms import Transform, transform_of
-from .keyed import active_place
+from .keyed import active_binding
 
 HALF_TURN = np.pi + 1e-3
 """Half a turn, and what single precision makes of it."""
@@ -90,17 +90,17 @@ def segment_at(source: Source, frame: float) -> SegmentFacts | None:
     keys = source.key_frames
     if len(keys) < 2 or not keys[0] - SAME_FRAME <= frame <= keys[-1] + SAME_FRAME:
         return None
-    place = int(np.clip(np.searchsorted(keys, frame + SAME_FRAME, side="right") - 1, 0, len(keys) - 2))
-    ends = keys[place : place + 2]
+    index = int(np.clip(np.searchsorted(keys, frame + SAME_FRAME, side="right") - 1, 0, len(keys) - 2))
+    ends = keys[index : index + 2]
     rows = _components(source, ends)
     location, rotation, scale = np.split(rows, (3, 7))
     alike = float(rotation[:, 0] @ rotation[:, 1]) / float(np.prod(np.linalg.norm(rotation, axis=0)) or 1.0)
-    swept, turned = np.abs(np.diff(rotation[:3])), turning_in(source, place)
+    swept, turned = np.abs(np.diff(rotation[:3])), turning_in(source, index)
     return SegmentFacts(
         first=float(ends[0]),
         last=float(ends[1]),
         key=_deciding_key(source, ends[0]),
-        mode=MODE_NAMES[source.modes[place]],
+        mode=MODE_NAMES[source.modes[index]],
         turn=float(turned.totals[0]),
         turns=float(turned.spins.turns[0]),
         distance=float(np.linalg.norm(location[:, 1] - location[:, 0])),
@@ -114,13 +114,13 @@ def segment_at(source: Source, frame: float) -> SegmentFacts | None:
 def is_up_to_date(target: bpy.types.Object | Transform, source: Source) -> bool:
     """Return whether in-betweens are those of the keys as they are, which they need not be while live update is off."""
     transform = transform_of(target)
-    place = active_place(transform, places_of(transform))
-    return place is not None and recorded_digest(place) == (source.digest if source.is_live else "")
+    binding = active_binding(transform, bindings_for(transform))
+    return binding is not None and recorded_digest(binding) == (source.digest if source.is_live else "")
 
 
 def parts_with_in_betweens(transform: Transform) -> set[str]:
     """Return which of location, rotation and scale in-betweens are in. `Refused` where it turns by axis and angle."""
-    filled = {channel for place in places_of(transform) for channel in place.filled}
+    filled = {channel for binding in bindings_for(transform) for channel in binding.filled}
     return {PART_OF[row] for row, channel in transform.differences.items() if channel in filled}
 
 
@@ -132,7 +132,9 @@ def is_blended(transform: Transform) -> bool:
     data = transform.animated.animation_data
     if not transform.has_difference_slot or data is None or not len(data.nla_tracks):
         return False
-    own = {(place.slot.action, place.slot.handle) for place in places_of(transform) if recorded_digest(place)}
+    own = {
+        (binding.slot.action, binding.slot.handle) for binding in bindings_for(transform) if recorded_digest(binding)
+    }
     if (data.action, data.action_slot_handle) in own:
         below = any(track.strips for track in data.nla_tracks)
         if below and (data.action_influence < 1.0 or data.action_blend_type != "REPLACE"):
@@ -153,13 +155,13 @@ def has_edited_differences(transform: Transform, frame: float) -> bool:
     if transform.has_difference_slot:
         # What a constraint adds cannot be edited.
         return False
-    place = active_place(transform, places_of(transform))
-    if place is None or place.slot.in_nla:
+    binding = active_binding(transform, bindings_for(transform))
+    if binding is None or binding.slot.in_nla:
         # Strips are blended with one another.
         return False
     return any(
         abs(transform.animated.path_resolve(path)[index] - fcurve.evaluate(frame)) > SAME_VALUE
-        for (path, index), fcurve in place.filled.items()
+        for (path, index), fcurve in binding.filled.items()
         if not fcurve.mute
     )
 

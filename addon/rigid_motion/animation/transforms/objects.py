@@ -31,8 +31,8 @@ ORIGINALS = {
 
 
 _BITS = {
-    channel: 1 << place
-    for place, channel in enumerate(
+    channel: 1 << bit
+    for bit, channel in enumerate(
         (path, index) for path in ORIGINALS for index in range(4 if path.endswith("quaternion") else 3)
     )
 }

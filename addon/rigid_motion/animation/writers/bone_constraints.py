@@ -7,14 +7,14 @@ from collections.abc import Iterator
 import bpy
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
-from ..actions.slots import Curves, SlotTransform, uses_of
+from ..actions.slots import Binding, Curves, uses_of
 from ..transforms import BoneTransform, Transform, shows_differences
 from .times import constraint_path, name_of, span_of
 
 
-def constraint_of(user: Transform, place: SlotTransform) -> bpy.types.ActionConstraint | None:
+def constraint_of(user: Transform, binding: Binding) -> bpy.types.ActionConstraint | None:
     """Return the constraint that shows the differences of a slot on a bone."""
-    desired = slot_of_differences(place)
+    desired = slot_of_differences(binding)
     return next(
         (
             constraint
@@ -69,55 +69,55 @@ def _last_slot(constraint: bpy.types.ActionConstraint) -> bpy.types.ActionSlot |
     return None if action is None else action.slots.get(constraint.last_slot_identifier)
 
 
-def slot_of_differences(place: SlotTransform) -> tuple[bpy.types.Action, int]:
+def slot_of_differences(binding: Binding) -> tuple[bpy.types.Action, int]:
     """Return the Action and the handle of the slot in it that the differences are in, 0 where there is none yet."""
-    pairs = place.slot.action.rigid_motion.bone_slots
-    handle = next((pair.differences for pair in pairs if pair.handle == place.slot.handle), 0)
-    return place.slot.action, handle
+    pairs = binding.slot.action.rigid_motion.bone_slots
+    handle = next((pair.differences for pair in pairs if pair.handle == binding.slot.handle), 0)
+    return binding.slot.action, handle
 
 
-def has_constraint(user: Transform, place: SlotTransform) -> bool:
+def has_constraint(user: Transform, binding: Binding) -> bool:
     """Return whether a bone has its constraint as it has to be, or it was taken off."""
-    constraint = constraint_of(user, place)
+    constraint = constraint_of(user, binding)
     if constraint is None:
-        return not _may_add_constraint(user, place)
-    return (constraint.name, constraint.frame_start, constraint.frame_end) == (name_of(place), *span_of(place))
+        return not _may_add_constraint(user, binding)
+    return (constraint.name, constraint.frame_start, constraint.frame_end) == (name_of(binding), *span_of(binding))
 
 
-def has_stale_constraint(user: BoneTransform, place: SlotTransform) -> bool:
+def has_stale_constraint(user: BoneTransform, binding: Binding) -> bool:
     """Return whether a bone has a constraint that shows what is shown already,
     or what does not move its rig any more.
     """
     shown = [shown_by(constraint) for constraint in user.carrier.constraints if shows_differences(constraint)]
-    if not shown or shown == [slot_of_differences(place)]:
+    if not shown or shown == [slot_of_differences(binding)]:
         return False
     return len(set(shown)) < len(shown) or not set(shown) <= _in_use(user.animated)
 
 
-def _may_add_constraint(user: Transform, place: SlotTransform) -> bool:
+def _may_add_constraint(user: Transform, binding: Binding) -> bool:
     """Return whether a bone lacks a constraint that was not taken off it."""
-    name = name_of(place)
+    name = name_of(binding)
     present = user.carrier.constraints.get(name)
     return name not in user.motion.mounted.split("\n") or (present is not None and shows_differences(present))
 
 
-def ensure_constraint(user: BoneTransform, place: SlotTransform) -> None:
+def ensure_constraint(user: BoneTransform, binding: Binding) -> None:
     """Have a bone show the differences of a slot, by a constraint that it has already or by a new one."""
-    constraints, name = user.carrier.constraints, name_of(place)
-    constraint = constraint_of(user, place) or constraints.get(name)
-    if constraint is not None and not (shows_differences(constraint) and _can_be_reused(constraint, user, place)):
+    constraints, name = user.carrier.constraints, name_of(binding)
+    constraint = constraint_of(user, binding) or constraints.get(name)
+    if constraint is not None and not (shows_differences(constraint) and _can_be_reused(constraint, user, binding)):
         # This slot gets a constraint of another name when it is written.
         return
     if constraint is None:
         constraint = _new(user, 0, name)
     names = [item for item in user.motion.mounted.split("\n") if item not in ("", name, constraint.name)]
     if constraint.name != name:
-        constraint = _renamed(constraint, name, user, place)
-    action, handle = slot_of_differences(place)
+        constraint = _renamed(constraint, name, user, binding)
+    action, handle = slot_of_differences(binding)
     if shown_by(constraint) != (action, handle):
         constraint.action = action
         constraint.action_slot = next(slot for slot in action.slots if slot.handle == handle)
-    constraint.frame_start, constraint.frame_end = span_of(place)
+    constraint.frame_start, constraint.frame_end = span_of(binding)
     if (mounted := "\n".join((*names, name))) != user.motion.mounted:
         user.motion.mounted = mounted
     if user.is_part and not user.animated.rigid_motion.has_bones:
@@ -138,7 +138,7 @@ def _new(user: BoneTransform, index: int, name: str) -> bpy.types.ActionConstrai
 
 
 def _renamed(
-    constraint: bpy.types.ActionConstraint, name: str, user: BoneTransform, place: SlotTransform
+    constraint: bpy.types.ActionConstraint, name: str, user: BoneTransform, binding: Binding
 ) -> bpy.types.ActionConstraint:
     """Return a constraint of another name in place of one, and channels of it in its slot.
 
@@ -153,17 +153,17 @@ def _renamed(
     constraint = _new(user, index, name)
     for setting, value in settings.items():
         setattr(constraint, setting, value)
-    keyed = place.curves.pop((f"{constraint_path(place, before)}.influence", 0), None)
+    keyed = binding.curves.pop((f"{constraint_path(binding, before)}.influence", 0), None)
     if keyed is not None:
-        keyed.data_path = f"{constraint_path(place, name)}.influence"
-        place.curves[keyed.data_path, 0] = keyed
+        keyed.data_path = f"{constraint_path(binding, name)}.influence"
+        binding.curves[keyed.data_path, 0] = keyed
     return constraint
 
 
-def _can_be_reused(constraint: bpy.types.ActionConstraint, user: BoneTransform, place: SlotTransform) -> bool:
+def _can_be_reused(constraint: bpy.types.ActionConstraint, user: BoneTransform, binding: Binding) -> bool:
     """Return whether a constraint shows a slot already, or one that does not move the rig any more."""
     shown = shown_by(constraint)
-    return shown == slot_of_differences(place) or shown not in _in_use(user.animated)
+    return shown == slot_of_differences(binding) or shown not in _in_use(user.animated)
 
 
 def _in_use(rig: bpy.types.Object) -> set[tuple[bpy.types.Action, int]]:

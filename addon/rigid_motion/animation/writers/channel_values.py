@@ -45,14 +45,14 @@ def channel_values(
         channels["scale"] = np.where(is_even[:, None], poses.scales[:, None] / own[7:].mean(), native)
     # What is left alone before and behind goes on from the animator's values, whatever sign or turn they are in.
     keys, ends = source.keyed_frames, source.values_at(motion.frames[[0, -1]]).T
-    for place, goes_on in (
+    for end, goes_on in (
         (0, keys[0] < motion.frames[0] - SAME_FRAME),
         (-1, keys[-1] > motion.frames[-1] + SAME_FRAME),
     ):
         if goes_on:
             for name, prop in transform.properties.items():
                 if prop in channels:
-                    channels[prop][place] = ends[place, ROWS[name]][: channels[prop].shape[1]]
+                    channels[prop][end] = ends[end, ROWS[name]][: channels[prop].shape[1]]
     return {transform.prefix + prop: values for prop, values in channels.items()}
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from mathutils import Euler, Quaternion
 
 from ..actions.records import record_constraint, recorded_digest
-from ..actions.slots import Curves, Slot, SlotTransform, places_of, slot_transforms_of, uses_of
+from ..actions.slots import Binding, Curves, Slot, bindings_for, bindings_of, uses_of
 from ..compute.components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
 from ..compute.sources import Source
 from ..transforms import (
@@ -69,51 +69,49 @@ class ConstraintWriter(Writer):
     def most_samples(self, source: Source) -> int:
         return most_samples(source)
 
-    def write(
-        self, place: SlotTransform, points: dict[Channel, np.ndarray], layout: Layout | None, pieces: Pieces
-    ) -> None:
-        present = place.filled
+    def write(self, binding: Binding, points: dict[Channel, np.ndarray], layout: Layout | None, pieces: Pieces) -> None:
+        present = binding.filled
         if points:
-            _avoid_names(place)
-            _make_room(place, points)
+            _avoid_names(binding)
+            _make_room(binding, points)
             curves, _ = replace_samples(
-                _channelbag(place), place.kind.difference_group(place.prefix), present, points, layout, pieces
+                _channelbag(binding), binding.kind.difference_group(binding.prefix), present, points, layout, pieces
             )
-            place.has_filled(curves)
-            _keep_at_rest(place, points)
-            write_time(place, layout)
-            for user in place.users:
-                if user.animated.is_editable and not has_constraint(user, place):
-                    ensure_constraint(user, place)
+            binding.has_filled(curves)
+            _keep_at_rest(binding, points)
+            write_time(binding, layout)
+            for user in binding.users:
+                if user.animated.is_editable and not has_constraint(user, binding):
+                    ensure_constraint(user, binding)
         elif present:
-            remove_time(place)
+            remove_time(binding)
             replace_samples(
-                place.slot.bones_channelbag, place.kind.difference_group(place.prefix), present, {}, None, {}
+                binding.slot.bones_channelbag, binding.kind.difference_group(binding.prefix), present, {}, None, {}
             )
-            place.has_filled({})
-            _keep_at_rest(place, {})
-            _remove_slot_if_empty(place.slot)
+            binding.has_filled({})
+            _keep_at_rest(binding, {})
+            _remove_slot_if_empty(binding.slot)
 
-    def is_shown(self, place: SlotTransform, layout: Layout, channels: Collection[Channel]) -> bool:
+    def is_shown(self, binding: Binding, layout: Layout, channels: Collection[Channel]) -> bool:
         if not channels:
             return True
-        time = time_of(place)
-        return time is not None and says(time, layout) and all(has_constraint(user, place) for user in place.users)
+        time = time_of(binding)
+        return time is not None and says(time, layout) and all(has_constraint(user, binding) for user in binding.users)
 
-    def show(self, place: SlotTransform) -> None:
-        for user in place.users:
+    def show(self, binding: Binding) -> None:
+        for user in binding.users:
             if user.animated.is_editable:
-                if place.filled and not has_constraint(user, place):
-                    ensure_constraint(user, place)
-                if has_stale_constraint(user, place):
+                if binding.filled and not has_constraint(user, binding):
+                    ensure_constraint(user, binding)
+                if has_stale_constraint(user, binding):
                     self.release([user])
 
-    def difference(self, place: SlotTransform, user: Transform, frame: float | None) -> np.ndarray:
-        filled, constraint = place.filled, constraint_of(user, place)
+    def difference(self, binding: Binding, user: Transform, frame: float | None) -> np.ndarray:
+        filled, constraint = binding.filled, constraint_of(user, binding)
         if not filled or constraint is None or not constraint.enabled:
             return _no_difference(user)
         time = constraint.eval_time
-        if frame is not None and (fcurve := time_of(place)) is not None:
+        if frame is not None and (fcurve := time_of(binding)) is not None:
             time = min(max(fcurve.evaluate(frame), 0.0), 1.0)
         return _difference_at(constraint, time, filled, user)
 
@@ -126,36 +124,36 @@ class ConstraintWriter(Writer):
     def shown_parts(self, user: Transform) -> set[str]:
         return set().union(*(parts for *_, parts in _shown_on(user)))
 
-    def hide(self, place: SlotTransform, user: Transform) -> None:
-        constraint, time = constraint_of(user, place), time_of(place)
+    def hide(self, binding: Binding, user: Transform) -> None:
+        constraint, time = constraint_of(user, binding), time_of(binding)
         if constraint is not None and time is not None:
-            constraint.eval_time = min(max(time.evaluate(_frame_of_a_key(place)), 0.0), 1.0)
+            constraint.eval_time = min(max(time.evaluate(_frame_of_a_key(binding)), 0.0), 1.0)
 
-    def hold(self, place: SlotTransform, beside: Sequence[SlotTransform]) -> bool:
-        held = held_by(place, beside)
+    def hold(self, binding: Binding, beside: Sequence[Binding]) -> bool:
+        held = held_by(binding, beside)
         # An influence that has keys is the animator's.
         present = {
             channel: fcurve
-            for channel, fcurve in place.curves.items()
-            if channel[0].startswith(constraint_path(place, CONSTRAINT)[:-2])
-            and fcurve != time_of(place)
+            for channel, fcurve in binding.curves.items()
+            if channel[0].startswith(constraint_path(binding, CONSTRAINT)[:-2])
+            and fcurve != time_of(binding)
             and not fcurve.keyframe_points
         }
         for channel, fcurve in present.items():
             if channel not in held or not is_line(fcurve, held[channel]):
-                place.channelbag.fcurves.remove(place.curves.pop(channel))
-        missing = [channel for channel in held if channel not in place.curves]
+                binding.channelbag.fcurves.remove(binding.curves.pop(channel))
+        missing = [channel for channel in held if channel not in binding.curves]
         for path, index in missing:
-            write_line(place, path, held[path, index])
+            write_line(binding, path, held[path, index])
         if len(present) > len(held):
-            remove_if_empty(place.channelbag, place.kind.difference_group(place.prefix))
+            remove_if_empty(binding.channelbag, binding.kind.difference_group(binding.prefix))
         return bool(missing) or len(present) > len(held)
 
-    def trouble_of(self, user: Transform, place: SlotTransform) -> str:
-        return constraint_repair.trouble_of(user, place)
+    def trouble_of(self, user: Transform, binding: Binding) -> str:
+        return constraint_repair.trouble_of(user, binding)
 
-    def restore(self, user: Transform, place: SlotTransform) -> None:
-        constraint_repair.restore(user, place)
+    def restore(self, user: Transform, binding: Binding) -> None:
+        constraint_repair.restore(user, binding)
 
     def remove_orphans(self, slot: Slot) -> None:
         """Take out what a slot has for bones that are in none of its users any more, and are not keyed in it either.
@@ -197,47 +195,49 @@ class ConstraintWriter(Writer):
         if not bones:
             return
         shown: dict[Transform, set[tuple[bpy.types.Action, int]]] = {}
-        for place in slot_transforms_of(bones):
-            if place.filled:
-                for user in place.users:
-                    shown.setdefault(user, set()).add(slot_of_differences(place))
+        for binding in bindings_of(bones):
+            if binding.filled:
+                for user in binding.users:
+                    shown.setdefault(user, set()).add(slot_of_differences(binding))
         for bone in bones:
             if bone.animated.is_editable:
                 remove_constraints(bone, shown.get(bone, set()))
 
 
-def _avoid_names(place: SlotTransform) -> None:
+def _avoid_names(binding: Binding) -> None:
     """Give the constraint of a slot a name that no other constraint of its users has."""
     taken = {
         constraint.name
-        for user in place.users
+        for user in binding.users
         for constraint in user.carrier.constraints
         if not shows_differences(constraint)
     }
     # Where it is all that moves them, nothing else can have the name.
     tracked = [
-        user for user in place.users if len(user.animated.animation_data.nla_tracks) and len(uses_of(user.animated)) > 1
+        user
+        for user in binding.users
+        if len(user.animated.animation_data.nla_tracks) and len(uses_of(user.animated)) > 1
     ]
-    others = (other for user in tracked for other in places_of(user) if not is_same(other, place))
+    others = (other for user in tracked for other in bindings_for(user) if not is_same(other, binding))
     taken |= {name_of(other) for other in others if recorded_digest(other)}
-    if name_of(place) in taken:
-        remove_time(place)
+    if name_of(binding) in taken:
+        remove_time(binding)
         numbered = (f"{CONSTRAINT}.{number:03d}" for number in itertools.count(1))
         name = next(name for name in itertools.chain((CONSTRAINT,), numbered) if name not in taken)
-        record_constraint(place, name)
+        record_constraint(binding, name)
 
 
-def _channelbag(place: SlotTransform) -> bpy.types.ActionChannelbag:
+def _channelbag(binding: Binding) -> bpy.types.ActionChannelbag:
     """Return where the differences of the bones of a slot are; made where there is none yet."""
-    result = place.slot.bones_channelbag
+    result = binding.slot.bones_channelbag
     if result is not None:
         return result
-    action = place.slot.action
+    action = binding.slot.action
     pairs = action.rigid_motion.bone_slots
-    pair = next((pair for pair in pairs if pair.handle == place.slot.handle), None) or pairs.add()
+    pair = next((pair for pair in pairs if pair.handle == binding.slot.handle), None) or pairs.add()
     slot = next((slot for slot in action.slots if slot.handle == pair.differences), None)
     slot = slot or action.slots.new("OBJECT", CONSTRAINT)
-    pair.handle, pair.differences = place.slot.handle, slot.handle
+    pair.handle, pair.differences = binding.slot.handle, slot.handle
     return action.layers[0].strips[0].channelbag(slot, ensure=True)
 
 
@@ -276,12 +276,12 @@ def _difference_at(constraint: bpy.types.ActionConstraint, time: float, filled: 
     return _with_original(_weighted(difference, constraint.influence, user), user)
 
 
-def _frame_of_a_key(place: SlotTransform) -> float:
+def _frame_of_a_key(binding: Binding) -> float:
     """Return a frame on which there is no difference: that of a key, and a whole one if there is any."""
     frames = [
         key.co.x
-        for (path, _), fcurve in place.curves.items()
-        if path.removeprefix(place.prefix) in WIDTHS and not fcurve.mute
+        for (path, _), fcurve in binding.curves.items()
+        if path.removeprefix(binding.prefix) in WIDTHS and not fcurve.mute
         for key in fcurve.keyframe_points
     ]
     return min(frames, key=lambda frame: (abs(frame - round(frame)), frame), default=0.0)
@@ -293,24 +293,24 @@ def _at_rest(channelbag: bpy.types.ActionChannelbag) -> dict[Channel, bpy.types.
     return {} if group is None else {(channel.data_path, channel.array_index): channel for channel in group.channels}
 
 
-def _make_room(place: SlotTransform, points: Collection[Channel]) -> None:
+def _make_room(binding: Binding, points: Collection[Channel]) -> None:
     """Take out what holds quaternions that get samples."""
-    if place.kind.is_part or (channelbag := place.slot.bones_channelbag) is None:
+    if binding.kind.is_part or (channelbag := binding.slot.bones_channelbag) is None:
         return
     present = _at_rest(channelbag)
     for channel in present.keys() & points:
         channelbag.fcurves.remove(present[channel])
 
 
-def _keep_at_rest(place: SlotTransform, points: Collection[Channel]) -> None:
+def _keep_at_rest(binding: Binding, points: Collection[Channel]) -> None:
     """Hold the quaternions that a slot of differences has no samples of.
 
     Blender evaluates the slot on an object whose quaternions are zero, and takes these for half a turn.
     """
-    if place.kind.is_part or (channelbag := place.slot.bones_channelbag) is None:
+    if binding.kind.is_part or (channelbag := binding.slot.bones_channelbag) is None:
         return
     held = set()
-    if points and place.users[0].rotation == "rotation_quaternion":
+    if points and binding.users[0].rotation == "rotation_quaternion":
         held = {("delta_rotation_quaternion", 0)}
         if all(path != "rotation_quaternion" for path, _ in points):
             held.add(("rotation_quaternion", 0))

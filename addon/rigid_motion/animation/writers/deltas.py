@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ..actions.records import recorded_digest
-from ..actions.slots import SlotTransform, is_above, is_filled_in, is_replacing, slot_transforms_of
+from ..actions.slots import Binding, bindings_of, is_above, is_filled_in, is_replacing
 from ..compute.components import PART_OF
 from ..compute.sources import Source
 from ..transforms import GROUP, ORIGINALS, Channel, ObjectTransform, Transform, default_of
@@ -25,30 +25,28 @@ class DeltaWriter(Writer):
     def most_samples(self, source: Source) -> int:
         return 1
 
-    def write(
-        self, place: SlotTransform, points: dict[Channel, np.ndarray], layout: Layout | None, pieces: Pieces
-    ) -> None:
-        for user in place.users:
+    def write(self, binding: Binding, points: dict[Channel, np.ndarray], layout: Layout | None, pieces: Pieces) -> None:
+        for user in binding.users:
             user.note_original(points)
-        curves, gone = replace_samples(place.channelbag, GROUP, place.filled, points, layout, pieces)
+        curves, gone = replace_samples(binding.channelbag, GROUP, binding.filled, points, layout, pieces)
         for channel in gone:
-            place.curves.pop(channel, None)
-        place.curves.update(curves)
-        place.has_filled(curves)
+            binding.curves.pop(channel, None)
+        binding.curves.update(curves)
+        binding.has_filled(curves)
         if gone and points:
-            self.release(place.users)
+            self.release(binding.users)
 
-    def is_shown(self, place: SlotTransform, layout: Layout, channels: Collection[Channel]) -> bool:
-        return all(user.is_recorded(channels) for user in place.users)
+    def is_shown(self, binding: Binding, layout: Layout, channels: Collection[Channel]) -> bool:
+        return all(user.is_recorded(channels) for user in binding.users)
 
-    def prepare(self, place: SlotTransform) -> None:
-        filled = place.filled
-        for user in place.users:
+    def prepare(self, binding: Binding) -> None:
+        filled = binding.filled
+        for user in binding.users:
             user.note_original(filled)
 
-    def show(self, place: SlotTransform) -> None:
-        filled = place.filled
-        for user in place.users if filled else ():
+    def show(self, binding: Binding) -> None:
+        filled = binding.filled
+        for user in binding.users if filled else ():
             if not user.animated.is_editable:
                 continue
             if not user.is_recorded(filled):
@@ -56,8 +54,8 @@ class DeltaWriter(Writer):
             if user.is_more_noted(filled):  # An Action that it had before may have moved more of it.
                 self.release([user])
 
-    def difference(self, place: SlotTransform, user: Transform, frame: float | None) -> np.ndarray:
-        difference, filled = np.zeros(10), {} if frame is None else place.filled
+    def difference(self, binding: Binding, user: Transform, frame: float | None) -> np.ndarray:
+        difference, filled = np.zeros(10), {} if frame is None else binding.filled
         for row, channel in user.differences.items():
             path, index = channel
             fcurve = filled.get(channel)
@@ -76,32 +74,32 @@ class DeltaWriter(Writer):
     def shown_parts(self, user: Transform) -> set[str]:
         return {PART_OF[row] for row, channel in user.differences.items() if user.is_recorded([channel])}
 
-    def hide(self, place: SlotTransform, user: Transform) -> None:
+    def hide(self, binding: Binding, user: Transform) -> None:
         user.show_original()
 
-    def hold(self, place: SlotTransform, beside: Sequence[SlotTransform]) -> bool:
+    def hold(self, binding: Binding, beside: Sequence[Binding]) -> bool:
         """Return whether a slot without in-betweens has come to hold its users' original differences.
 
         It has to while a strip plays whose Action lacks a channel that another strip's has: Blender puts that to its
         default, or leaves what is below.
         """
-        if recorded_digest(place):
+        if recorded_digest(binding):
             return False
-        held, before = _held(place, beside), place.filled
-        for user in place.users:
+        held, before = _held(binding, beside), binding.filled
+        for user in binding.users:
             user.note_original(held)
-        is_new = hold_constants(place, GROUP, before, held)
+        is_new = hold_constants(binding, GROUP, before, held)
         if is_new and before.keys() - held.keys():
-            self.release(place.users)
+            self.release(binding.users)
         return is_new
 
     def release(self, transforms: Iterable[Transform]) -> None:
         noted = [transform for transform in transforms if any(transform.motion.filled)]
         if not noted:
             return
-        places = slot_transforms_of(noted)
+        bindings = bindings_of(noted)
         for transform in noted:
-            filled = [channel for place in places if transform in place.users for channel in place.curves]
+            filled = [channel for binding in bindings if transform in binding.users for channel in binding.curves]
             transform.restore_original(filled)
 
 
@@ -114,19 +112,19 @@ def _is_overwritten(user: ObjectTransform, filled: dict[Channel, bpy.types.FCurv
     )
 
 
-def _held(place: SlotTransform, beside: Sequence[SlotTransform]) -> dict[Channel, float]:
+def _held(binding: Binding, beside: Sequence[Binding]) -> dict[Channel, float]:
     """Return the channels that a slot which is not filled in has to have, and what they hold."""
-    in_nla = [user for user in place.users if len(user.animated.animation_data.nla_tracks)]
-    first, *others = [_held_for(user, place, beside) for user in in_nla] or [{}]
+    in_nla = [user for user in binding.users if len(user.animated.animation_data.nla_tracks)]
+    first, *others = [_held_for(user, binding, beside) for user in in_nla] or [{}]
     if any(held != first for held in others) or any(
         user.original_values(path)[index] != value
-        for user in place.users
+        for user in binding.users
         if user not in in_nla
         for (path, index), value in first.items()
     ):
         return {}
     # What it does not key may be another strip's to move, below it, and then so are the differences of that.
-    animated = {path for (path, _), fcurve in place.curves.items() if not is_filled_in(fcurve)}
+    animated = {path for (path, _), fcurve in binding.curves.items() if not is_filled_in(fcurve)}
     return {
         (path, index): value
         for (path, index), value in first.items()
@@ -134,14 +132,14 @@ def _held(place: SlotTransform, beside: Sequence[SlotTransform]) -> dict[Channel
     }
 
 
-def _held_for(user: ObjectTransform, place: SlotTransform, beside: Sequence[SlotTransform]) -> dict[Channel, float]:
+def _held_for(user: ObjectTransform, binding: Binding, beside: Sequence[Binding]) -> dict[Channel, float]:
     originals = {path: getattr(user.motion, original)[:] for path, (original, _) in ORIGINALS.items()}
     originals = {path: values for path, values in originals.items() if all(map(math.isfinite, values))}
-    if not is_replacing(user.animated, place.slot):
+    if not is_replacing(user.animated, binding.slot):
         return {}
     others = [other for other in beside if user in other.users and recorded_digest(other)]
     filled = {path for other in others for path, _ in other.filled}
-    below = {path for other in others if is_above(user.animated, place.slot, other.slot) for path, _ in other.filled}
+    below = {path for other in others if is_above(user.animated, binding.slot, other.slot) for path, _ in other.filled}
     return {
         (path, index): value
         for path, values in originals.items()

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from ..actions.records import record_in_betweens, recorded, recorded_digest, recorded_rows
-from ..actions.slots import SlotTransform, slot_transforms_in, slots_in
+from ..actions.slots import Binding, bindings_in, slots_in
 from ..compute.source_cache import cached_source
 from ..compute.sources import Source
 from .table import writer_of
@@ -22,34 +22,34 @@ LARGE = 10_000
 """Bones times frames. Blender copies less in a few milliseconds, however many samples a frame there are."""
 
 
-def begin_drafts(readings: Sequence[tuple[SlotTransform, Source]]) -> None:
+def begin_drafts(readings: Sequence[tuple[Binding, Source]]) -> None:
     """Have large Actions that are to be filled in go on in draft."""
-    apart: defaultdict[bpy.types.Action, list[tuple[SlotTransform, Source]]] = defaultdict(list)
-    for place, source in readings:
-        if place.kind.has_difference_slot:
-            apart[place.slot.action].append((place, source))
+    apart: defaultdict[bpy.types.Action, list[tuple[Binding, Source]]] = defaultdict(list)
+    for binding, source in readings:
+        if binding.kind.has_difference_slot:
+            apart[binding.slot.action].append((binding, source))
     for action, own in apart.items():
         if not is_draft(action):
             longest = max(last - first for first, last in (source.frame_range for _, source in own))
             if max(len(own), len(action.rigid_motion.slots)) * longest >= LARGE:
-                _begin_draft(action, [place for place, _ in own])
+                _begin_draft(action, [binding for binding, _ in own])
 
 
-def _begin_draft(action: bpy.types.Action, known: Iterable[SlotTransform]) -> None:
-    """Take out of an Action the samples between frames. `known` are some of its places."""
+def _begin_draft(action: bpy.types.Action, known: Iterable[Binding]) -> None:
+    """Take out of an Action the samples between frames. `known` are some of its bindings."""
     # Strips may show what is between the frames of an Action on whole frames of the scene.
     if any(slot.in_nla for slot in slots_in([action])):
         return
     action.rigid_motion.is_draft = action.rigid_motion.has_longer = True
     if any(record.rate > 1 for record in action.rigid_motion.slots):
-        places = {(place.slot.handle, place.prefix): place for place in (*slot_transforms_in([action]), *known)}
-        for place in places.values():
-            _take_out_between_frames(place)
+        bindings = {(binding.slot.handle, binding.prefix): binding for binding in (*bindings_in([action]), *known)}
+        for binding in bindings.values():
+            _take_out_between_frames(binding)
 
 
-def _take_out_between_frames(place: SlotTransform) -> None:
+def _take_out_between_frames(binding: Binding) -> None:
     """Leave the samples on whole frames, where it is known how they lie."""
-    written, source, rows = recorded(place), cached_source(recorded_digest(place)), recorded_rows(place)
+    written, source, rows = recorded(binding), cached_source(recorded_digest(binding)), recorded_rows(binding)
     if written.rate == 1 or source is None:
         return
     (first, last), (begin, end) = source.sample_range(1), source.sample_range(written.rate)
@@ -57,14 +57,14 @@ def _take_out_between_frames(place: SlotTransform) -> None:
     # Beside the outermost keys, off whole frames, all is as it is on these.
     chosen = np.clip(frames * written.rate - begin, 0, end - begin)
     samples = np.empty(2 * (end - begin + 1), np.float32)
-    layout, points = writer_of(place).layout(source, 1), {}
-    for channel, fcurve in place.filled.items():
+    layout, points = writer_of(binding).layout(source, 1), {}
+    for channel, fcurve in binding.filled.items():
         if 2 * len(fcurve.sampled_points) != len(samples):
             return
         fcurve.sampled_points.foreach_get("co", samples)
         points[channel] = layout.points(np.stack((frames, samples[1::2][chosen]), axis=1, dtype=np.float32).ravel())
-    record_in_betweens(place, source.digest, rows, 1, written.error)
-    writer_of(place).write(place, points, layout, {})
+    record_in_betweens(binding, source.digest, rows, 1, written.error)
+    writer_of(binding).write(binding, points, layout, {})
 
 
 def is_draft(action: bpy.types.Action) -> bool:
@@ -78,12 +78,12 @@ def drafts_among(actions: Iterable[bpy.types.Action]) -> set[bpy.types.Action]:
     return {action for action in actions if is_draft(action) and action.is_editable}
 
 
-def end_drafts(actions: Collection[bpy.types.Action], filled_in: Iterable[SlotTransform]) -> None:
+def end_drafts(actions: Collection[bpy.types.Action], filled_in: Iterable[Binding]) -> None:
     """Have these Actions be in draft no more, all of which is about to be filled in anew but what moves nothing now.
 
     That will be when it does.
     """
-    result = {(place.slot.action, place.slot.handle, place.prefix) for place in filled_in}
+    result = {(binding.slot.action, binding.slot.handle, binding.prefix) for binding in filled_in}
     for action in actions:
         action.rigid_motion.is_draft = False
         for record in action.rigid_motion.slots:

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..actions.reading import keyed_in
 from ..actions.records import record_in_betweens, recorded, recorded_digest, recorded_rows
-from ..actions.slots import SlotTransform, is_filled_in, is_time, slot_transforms_in
+from ..actions.slots import Binding, bindings_in, is_filled_in, is_time
 from ..compute.between_samples import Samples
 from ..compute.components import PART_OF, ROTATION
 from ..compute.sample_rates import Need, error_of, sampled
@@ -40,7 +40,7 @@ SAME_ROTATION = 1e-4
 """Components of rotations that are one, in single precision, and far from those a turn or a sign apart."""
 
 
-def fill_in(readings: Sequence[tuple[SlotTransform, Source]], *, in_draft: bool = False) -> None:
+def fill_in(readings: Sequence[tuple[Binding, Source]], *, in_draft: bool = False) -> None:
     """Compute and write the in-betweens of these; of those that are there already, what has changed.
 
     Large Actions may begin a draft, where `in_draft`.
@@ -48,36 +48,36 @@ def fill_in(readings: Sequence[tuple[SlotTransform, Source]], *, in_draft: bool 
     if in_draft:
         begin_drafts(readings)
     changed, anew = [], []
-    for (place, source), need in zip(readings, _needs(readings), strict=True):
-        edit = _edit_of(place, source, need)
+    for (binding, source), need in zip(readings, _needs(readings), strict=True):
+        edit = _edit_of(binding, source, need)
         if edit is None:
-            anew.append((place, source, need))
+            anew.append((binding, source, need))
         else:
             changed.append(edit)
     anew += _fill_in_changed(changed)
     # However far cycles are seen, one round is all that is written where it repeats.
     rounds = [replace(source, seen=None) if source.repeats else source for _, source, _ in anew]
     longer, emptied = set(), []
-    for (place, source, need), samples in zip(anew, sampled(rounds, [need for *_, need in anew]), strict=True):
-        writer = writer_of(place)
-        layout, channels = writer.layout(source, samples.rate), _channels(place, source)
+    for (binding, source, need), samples in zip(anew, sampled(rounds, [need for *_, need in anew]), strict=True):
+        writer = writer_of(binding)
+        layout, channels = writer.layout(source, samples.rate), _channels(binding, source)
         pieces, error = corners(source, samples, layout, need)
-        error = max(samples.error, error) if math.isfinite(need.tolerance) else recorded(place).error
-        record_in_betweens(place, source.digest, samples, samples.rate, error)
+        error = max(samples.error, error) if math.isfinite(need.tolerance) else recorded(binding).error
+        record_in_betweens(binding, source.digest, samples, samples.rate, error)
         writer.write(
-            place,
+            binding,
             {channels[row]: layout.points(points) for row, points in samples.items()},
             layout,
             {channels[row]: own for row, own in pieces.items()},
         )
-        _tag(place)
+        _tag(binding)
         if not samples:
-            emptied += place.users
+            emptied += binding.users
         first, last = source.keyed_range
         if layout.outermost[0] < first or layout.outermost[1] > last:
-            longer.add(place.slot.action)
+            longer.add(binding.slot.action)
     release(emptied)
-    _limit_ranges({place.slot.action for place, _ in readings}, longer)
+    _limit_ranges({binding.slot.action for binding, _ in readings}, longer)
 
 
 def finish_drafts(actions: Iterable[bpy.types.Action]) -> None:
@@ -85,34 +85,34 @@ def finish_drafts(actions: Iterable[bpy.types.Action]) -> None:
     drafts = drafts_among(actions)
     if not drafts:
         return
-    places = [place for place in slot_transforms_in(drafts) if recorded_digest(place)]
+    bindings = [binding for binding in bindings_in(drafts) if recorded_digest(binding)]
     readings = [
-        (place, source)
-        for place, source in zip(places, keyed_in(places), strict=True)
-        if isinstance(source, Source) and source.digest == recorded_digest(place)
+        (binding, source)
+        for binding, source in zip(bindings, keyed_in(bindings), strict=True)
+        if isinstance(source, Source) and source.digest == recorded_digest(binding)
     ]
-    end_drafts(drafts, [place for place, _ in readings])
+    end_drafts(drafts, [binding for binding, _ in readings])
     fill_in(readings)
 
 
-def _needs(readings: Sequence[tuple[SlotTransform, Source]]) -> list[Need]:
+def _needs(readings: Sequence[tuple[Binding, Source]]) -> list[Need]:
     """Return how exact each of these is to be between frames: in a draft, not at all."""
     reaches: dict[bpy.types.Bone, float] = {}
     needs = []
-    for place, source in readings:
-        if is_draft(place.slot.action):
+    for binding, source in readings:
+        if is_draft(binding.slot.action):
             needs.append(Need(math.inf, 0.0, most=1))
             continue
-        user = place.users[0]
+        user = binding.users[0]
         unit, reach = metres_per_channel_unit(user), reach_at_rest(user, reaches)
-        needs.append(Need(TOLERANCE * max(1.0 / unit, reach), reach, most=writer_of(place).most_samples(source)))
+        needs.append(Need(TOLERANCE * max(1.0 / unit, reach), reach, most=writer_of(binding).most_samples(source)))
     return needs
 
 
 class _Edit(NamedTuple):
-    """A place in which some samples are to be filled in anew, and the rest is as it has to be."""
+    """A binding in which some samples are to be filled in anew, and the rest is as it has to be."""
 
-    place: SlotTransform
+    binding: Binding
     source: Source
     need: Need
     layout: Layout
@@ -122,37 +122,37 @@ class _Edit(NamedTuple):
     """The first and the last of those to be filled in."""
 
 
-def _edit_of(place: SlotTransform, source: Source, need: Need) -> _Edit | None:
-    """Return what has to be filled in of a place, None where all has to be."""
-    old, rate = cached_source(recorded_digest(place)), recorded(place).rate
+def _edit_of(binding: Binding, source: Source, need: Need) -> _Edit | None:
+    """Return what has to be filled in of a binding, None where all has to be."""
+    old, rate = cached_source(recorded_digest(binding)), recorded(binding).rate
     if old is None or old is source or old.sample_range(rate) != source.sample_range(rate):
         return None
-    frames, layout = changed_range(old, source), writer_of(place).layout(source, rate)
-    if frames is None or layout.is_ring or not is_complete(place, source, layout):
+    frames, layout = changed_range(old, source), writer_of(binding).layout(source, rate)
+    if frames is None or layout.is_ring or not is_complete(binding, source, layout):
         return None
     # On a whole frame around it, keys off whole frames leave no sample.
     first, last = (min(max(frame * rate, layout.first), layout.last) for frame in frames)
-    return _Edit(place, source, need, layout, (first, last))
+    return _Edit(binding, source, need, layout, (first, last))
 
 
-def _fill_in_changed(edits: Sequence[_Edit]) -> list[tuple[SlotTransform, Source, Need]]:
+def _fill_in_changed(edits: Sequence[_Edit]) -> list[tuple[Binding, Source, Need]]:
     """Fill in a range of samples of each. Those for which that will not do are returned, and left as they are."""
     others = []
     fixed = [Need(edit.need.tolerance, edit.need.reach, edit.layout.rate, edit.layout.rate) for edit in edits]
     result = sampled([edit.source for edit in edits], fixed, [edit.span for edit in edits])
-    for (place, source, need, layout, (first, last)), samples in zip(edits, result, strict=True):
-        channels, rows, before = _channels(place, source), recorded_rows(place), recorded(place)
+    for (binding, source, need, layout, (first, last)), samples in zip(edits, result, strict=True):
+        channels, rows, before = _channels(binding, source), recorded_rows(binding), recorded(binding)
         if (samples.error > need.tolerance and before.rate < need.most) or not _are_covered(samples, rows):
-            others.append((place, source, need))
+            others.append((binding, source, need))
             continue
-        curves = [place.filled[channels[row]] for row in rows]
+        curves = [binding.filled[channels[row]] for row in rows]
         written = np.empty((len(rows), 2 * layout.count), np.float32)
         for fcurve, points in zip(curves, written, strict=True):
             fcurve.sampled_points.foreach_get("co", points)
         present = written[:, 2 * (first - layout.first) + 1 : 2 * (last - layout.first) + 2 : 2]
         values = np.array([samples[row][1::2] for row in rows]).reshape(present.shape)
         if not _continue(values, present, rows, source):
-            others.append((place, source, need))
+            others.append((binding, source, need))
             continue
         present[:] = values
         all_samples = dict(zip(rows, written, strict=True))
@@ -165,8 +165,8 @@ def _fill_in_changed(edits: Sequence[_Edit]) -> list[tuple[SlotTransform, Source
             if elsewhere > need.tolerance and elsewhere > samples.error:
                 elsewhere = error_of(source, all_samples, before.rate, need.reach)
             elsewhere = max(samples.error, error, elsewhere)
-        record_in_betweens(place, source.digest, rows, before.rate, elsewhere)
-        _tag(place)
+        record_in_betweens(binding, source.digest, rows, before.rate, elsewhere)
+        _tag(binding)
     return others
 
 
@@ -196,26 +196,26 @@ def _continue(values: np.ndarray, before: np.ndarray, rows: Sequence[int], sourc
     return bool(np.abs(new[:, [0, -1]] - old[:, [0, -1]]).max() < SAME_ROTATION)
 
 
-def is_complete(place: SlotTransform, source: Source, layout: Layout | None = None) -> bool:
+def is_complete(binding: Binding, source: Source, layout: Layout | None = None) -> bool:
     """Return whether all F-curves are as they were written for a source, whose samples lie so."""
-    writer, channels, curves = writer_of(place), _channels(place, source), place.filled
-    layout = layout or writer.layout(source, recorded(place).rate)
-    written = [channels.get(row) for row in recorded_rows(place)]
+    writer, channels, curves = writer_of(binding), _channels(binding, source), binding.filled
+    layout = layout or writer.layout(source, recorded(binding).rate)
+    written = [channels.get(row) for row in recorded_rows(binding)]
     return (
         all(channel in curves and layout.fits(curves[channel]) for channel in written)
         and len(curves) == len(written)
-        and writer.is_shown(place, layout, written)
+        and writer.is_shown(binding, layout, written)
     )
 
 
-def clear(places: Sequence[SlotTransform]) -> None:
+def clear(bindings: Sequence[Binding]) -> None:
     """Take the in-betweens out of slots, and give their users their original differences back."""
-    for place in places:
-        writer_of(place).write(place, {}, None, {})
-        _tag(place)
-        record_in_betweens(place, "", ())
-    release(user for place in places for user in place.users)
-    _limit_ranges({place.slot.action for place in places}, set())
+    for binding in bindings:
+        writer_of(binding).write(binding, {}, None, {})
+        _tag(binding)
+        record_in_betweens(binding, "", ())
+    release(user for binding in bindings for user in binding.users)
+    _limit_ranges({binding.slot.action for binding in bindings}, set())
 
 
 def follow_ranges(actions: Iterable[bpy.types.Action]) -> None:
@@ -223,21 +223,21 @@ def follow_ranges(actions: Iterable[bpy.types.Action]) -> None:
     _limit_ranges(actions, set())
 
 
-def hold(place: SlotTransform, beside: Sequence[SlotTransform]) -> None:
+def hold(binding: Binding, beside: Sequence[Binding]) -> None:
     """Have a slot hold what the NLA needs of it beside others that are filled in, which are among these."""
-    if writer_of(place).hold(place, beside):
-        _tag(place)
+    if writer_of(binding).hold(binding, beside):
+        _tag(binding)
 
 
-def _tag(place: SlotTransform) -> None:
-    for user in place.users:
+def _tag(binding: Binding) -> None:
+    for user in binding.users:
         user.animated.update_tag(refresh={"TIME"})
 
 
-def _channels(place: SlotTransform, source: Source) -> dict[int, Channel]:
+def _channels(binding: Binding, source: Source) -> dict[int, Channel]:
     """Return the channels that the differences of a source go into, by their rows."""
     rotation = "rotation_quaternion" if source.order is None else "rotation_euler"
-    return place.users[0].differences_for(rotation)
+    return binding.users[0].differences_for(rotation)
 
 
 def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.types.Action]) -> None:

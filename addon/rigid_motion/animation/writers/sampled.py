@@ -10,7 +10,7 @@ import numpy as np
 
 from ..actions.channels import ensure_group
 from ..actions.records import recorded_rows
-from ..actions.slots import Curves, SlotTransform
+from ..actions.slots import Binding, Curves
 from ..transforms import Channel
 from .layout import Layout, Pieces
 
@@ -66,21 +66,21 @@ def replace_samples(
     return curves, gone
 
 
-def hold_constants(place: SlotTransform, group: str, present: Curves, held: Mapping[Channel, float]) -> bool:
+def hold_constants(binding: Binding, group: str, present: Curves, held: Mapping[Channel, float]) -> bool:
     """Have sampled F-curves of a group in a slot hold these values, and no others. Whether they did not already."""
     if held == {channel: _constant(fcurve) for channel, fcurve in present.items()}:
         return False
     # Where its own keys begin, for the Action to be no longer than it was. A damaged file may have them anywhere.
-    starts = [start for fcurve in place.curves.values() if abs(start := fcurve.range()[0]) < FARTHEST]
+    starts = [start for fcurve in binding.curves.values() if abs(start := fcurve.range()[0]) < FARTHEST]
     first = math.floor(min(starts, default=0.0))
     points = {channel: np.array((first, value, first + 1, value), dtype=np.float32) for channel, value in held.items()}
     for channel in present:
-        place.curves.pop(channel, None)
+        binding.curves.pop(channel, None)
     curves, _ = replace_samples(
-        place.channelbag, group, present, points, Layout(first, first + 1, (first, first + 1)), {}
+        binding.channelbag, group, present, points, Layout(first, first + 1, (first, first + 1)), {}
     )
-    place.curves.update(curves)
-    place.has_filled(curves)
+    binding.curves.update(curves)
+    binding.has_filled(curves)
     return True
 
 
@@ -95,21 +95,21 @@ def hide_fcurve(fcurve: bpy.types.FCurve, group: bpy.types.ActionGroup) -> None:
     fcurve.select = False
 
 
-def regroup(place: SlotTransform) -> None:
+def regroup(binding: Binding) -> None:
     """Take F-curves with in-betweens back that have been put into another group, or into none."""
-    rows = recorded_rows(place)
-    if len(place.filled) >= len(rows):
+    rows = recorded_rows(binding)
+    if len(binding.filled) >= len(rows):
         return
-    channelbag, group = place.home
+    channelbag, group = binding.home
     if channelbag is None:
         return
     rotations = ("rotation_quaternion", "rotation_euler")
-    channels = [place.users[0].differences_for(rotation) for rotation in rotations]
+    channels = [binding.users[0].differences_for(rotation) for rotation in rotations]
     for channel in {of_rotation[row] for of_rotation in channels for row in rows if row in of_rotation}:
         fcurve = channelbag.fcurves.find(channel[0], index=channel[1])
-        if fcurve is not None and channel not in place.filled and not fcurve.keyframe_points:
+        if fcurve is not None and channel not in binding.filled and not fcurve.keyframe_points:
             hide_fcurve(fcurve, ensure_group(channelbag, group))
-            place.has_filled({**place.filled, channel: fcurve})
+            binding.has_filled({**binding.filled, channel: fcurve})
 
 
 def remove_if_empty(channelbag: bpy.types.ActionChannelbag, group: str) -> None:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..actions.slots import Slot, SlotTransform
+from ..actions.slots import Binding, Slot
 from ..transforms import BoneTransform, ExactObjectTransform, ObjectTransform, Transform
 from .constraints import ConstraintWriter
 from .deltas import DeltaWriter
@@ -22,22 +22,22 @@ WRITERS: dict[type[Transform], Writer] = {
 """A row for each of the `transforms.KINDS`."""
 
 
-def writer_of(place: SlotTransform) -> Writer:
+def writer_of(binding: Binding) -> Writer:
     """Return where the differences of a transform go."""
-    return WRITERS[place.kind]
+    return WRITERS[binding.kind]
 
 
-def leave_other_way(place: SlotTransform) -> None:
+def leave_other_way(binding: Binding) -> None:
     """Take the in-betweens of an object out of where they are not to be any more: it came to share a slot, or an Action
     came to it, and so it is exact between frames, or is so no more.
     """
-    if place.kind.is_part:
+    if binding.kind.is_part:
         return
-    kind = ObjectTransform if place.kind is ExactObjectTransform else ExactObjectTransform
-    other = replace(place, users=tuple(kind(user.carrier) for user in place.users))
+    kind = ObjectTransform if binding.kind is ExactObjectTransform else ExactObjectTransform
+    other = replace(binding, users=tuple(kind(user.carrier) for user in binding.users))
     if other.filled:
         WRITERS[kind].write(other, {}, None, {})
-    editable = [user for user in place.users if user.animated.is_editable]
+    editable = [user for user in binding.users if user.animated.is_editable]
     if kind is ObjectTransform:
         WRITERS[kind].release(kind(user.carrier) for user in editable)
     for user in editable:
@@ -64,8 +64,8 @@ def shown_parts(user: Transform) -> set[str]:
     return WRITERS[user.kind].shown_parts(user)
 
 
-def remove_orphans(places: Iterable[SlotTransform]) -> None:
+def remove_orphans(bindings: Iterable[Binding]) -> None:
     """Take out of the slots of these what is left in them of parts that none of their users has any more."""
-    slots: dict[tuple[Slot, Writer], None] = {(place.slot, writer_of(place)): None for place in places}
+    slots: dict[tuple[Slot, Writer], None] = {(binding.slot, writer_of(binding)): None for binding in bindings}
     for slot, writer in slots:
         writer.remove_orphans(slot)

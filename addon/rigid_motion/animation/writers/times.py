@@ -19,7 +19,7 @@ import numpy as np
 from ..actions.channels import add_cycles, ensure_group, replace_keys
 from ..actions.key_reading import read_steps
 from ..actions.records import recorded
-from ..actions.slots import Slot, SlotTransform, strips_of
+from ..actions.slots import Binding, Slot, strips_of
 from ..compute.between_samples import MOST_SAMPLES
 from ..compute.sources import Source
 from ..curves import Cycles, Stepped
@@ -34,36 +34,36 @@ Line = tuple[float, float]
 """The value of a channel at frame 0, and by how much it grows in a frame."""
 
 
-def name_of(place: SlotTransform) -> str:
+def name_of(binding: Binding) -> str:
     """Return what the constraint of a slot is called."""
-    return recorded(place).constraint or CONSTRAINT
+    return recorded(binding).constraint or CONSTRAINT
 
 
-def constraint_path(place: SlotTransform, name: str) -> str:
+def constraint_path(binding: Binding, name: str) -> str:
     """Return the data path of a constraint of this name."""
-    return f'{place.prefix}constraints["{name}"]'
+    return f'{binding.prefix}constraints["{name}"]'
 
 
-def time_path(place: SlotTransform) -> str:
+def time_path(binding: Binding) -> str:
     """Return the data path of the evaluation time of a slot's constraint is."""
-    return f"{constraint_path(place, name_of(place))}.eval_time"
+    return f"{constraint_path(binding, name_of(binding))}.eval_time"
 
 
-def influence_path(place: SlotTransform) -> str:
+def influence_path(binding: Binding) -> str:
     """Return the data path of the influence of a slot's constraint."""
-    return f"{constraint_path(place, name_of(place))}.influence"
+    return f"{constraint_path(binding, name_of(binding))}.influence"
 
 
-def time_of(place: SlotTransform) -> bpy.types.FCurve | None:
+def time_of(binding: Binding) -> bpy.types.FCurve | None:
     """Return the channel of its own constraint's evaluation time."""
-    return place.curves.get((time_path(place), 0)) if place.filled else None
+    return binding.curves.get((time_path(binding), 0)) if binding.filled else None
 
 
-def span_of(place: SlotTransform) -> tuple[int, int]:
+def span_of(binding: Binding) -> tuple[int, int]:
     """Return the frames of the differences that an evaluation time of 0 and one of 1 stand for: there are more than one
     where more than one sample is shown in a frame.
     """
-    (_, last), rate = next(iter(place.filled.values())).range(), recorded(place).rate
+    (_, last), rate = next(iter(binding.filled.values())).range(), recorded(binding).rate
     return 0, _duration(math.ceil(last / rate)) * rate
 
 
@@ -79,36 +79,38 @@ def _duration(last: int) -> int:
     return min(1 << max(last - 1, 0).bit_length(), MOST_FRAMES)
 
 
-def held_by(place: SlotTransform, beside: Sequence[SlotTransform]) -> dict[Channel, Line]:
+def held_by(binding: Binding, beside: Sequence[Binding]) -> dict[Channel, Line]:
     """Return what an Action has of constraints in the NLA of a rig: of its own the influence,
     of the others the time too.
 
     The others are among what is `beside` it there.
     """
     held: dict[Channel, Line] = {}
-    for user in place.users if _moves_bone(place) else ():
+    for user in binding.users if _moves_bone(binding) else ():
         if not len(user.animated.animation_data.nla_tracks):
             continue
-        others = [other for other in beside if user in other.users and not is_same(other, place) and _moves_bone(other)]
+        others = [
+            other for other in beside if user in other.users and not is_same(other, binding) and _moves_bone(other)
+        ]
         for other in others:
             if other.filled:
                 held[influence_path(other), 0] = (0.0, 0.0)
-                held[time_path(other), 0] = _time_seen_from(place, other, user.animated)
-        if others and place.filled:
-            held[influence_path(place), 0] = (1.0, 0.0)
+                held[time_path(other), 0] = _time_seen_from(binding, other, user.animated)
+        if others and binding.filled:
+            held[influence_path(binding), 0] = (1.0, 0.0)
     return held
 
 
-def _moves_bone(place: SlotTransform) -> bool:
-    return any(path.removeprefix(place.prefix) in WIDTHS for path, _ in place.curves)
+def _moves_bone(binding: Binding) -> bool:
+    return any(path.removeprefix(binding.prefix) in WIDTHS for path, _ in binding.curves)
 
 
-def _time_seen_from(place: SlotTransform, other: SlotTransform, rig: bpy.types.Object) -> Line:
+def _time_seen_from(binding: Binding, other: Binding, rig: bpy.types.Object) -> Line:
     """Return the time of another Action's constraint at frames of this one; of its first frame,
     where there is no one time.
     """
     line = next((_line_of(fcurve) for fcurve in (time_of(other),) if fcurve is not None), None)
-    own, others = (_frames_of(rig, item.slot) for item in (place, other))
+    own, others = (_frames_of(rig, item.slot) for item in (binding, other))
     if line is None or own is None or others is None:
         return 0.0, 0.0
     # From this Action's frames to the scene's, on to the other's, and on to its time.
@@ -136,27 +138,27 @@ def _frames_of(rig: bpy.types.Object, slot: Slot) -> Line | None:
     return lines[0] if len(lines) == 1 else None
 
 
-def write_time(place: SlotTransform, layout: Layout) -> None:
-    if (present := time_of(place)) is not None:
+def write_time(binding: Binding, layout: Layout) -> None:
+    if (present := time_of(binding)) is not None:
         if says(present, layout):
             return
-        remove_time(place)
-    path = time_path(place)
+        remove_time(binding)
+    path = time_path(binding)
     if layout.cycles is None:
-        add_modifiers(write_line(place, path, _line(layout)), layout.stepping)
+        add_modifiers(write_line(binding, path, _line(layout)), layout.stepping)
         return
-    fcurve = place.curves[path, 0] = place.channelbag.fcurves.new(path)
+    fcurve = binding.curves[path, 0] = binding.channelbag.fcurves.new(path)
     frames, times = np.array(_seams(layout)).T
     replace_keys(fcurve, frames, times)
     add_cycles(fcurve, _without_offset(layout.cycles))
     add_modifiers(fcurve, layout.stepping)
-    hide_fcurve(fcurve, ensure_group(place.channelbag, place.kind.difference_group(place.prefix)))
+    hide_fcurve(fcurve, ensure_group(binding.channelbag, binding.kind.difference_group(binding.prefix)))
 
 
-def write_line(place: SlotTransform, path: str, line: Line) -> bpy.types.FCurve:
+def write_line(binding: Binding, path: str, line: Line) -> bpy.types.FCurve:
     """Return an F-curve beside those of a transform that is a line, without keys."""
-    group = place.kind.difference_group(place.prefix)
-    fcurve = place.curves[path, 0] = new_line(place.channelbag, group, (path, 0), line)
+    group = binding.kind.difference_group(binding.prefix)
+    fcurve = binding.curves[path, 0] = new_line(binding.channelbag, group, (path, 0), line)
     return fcurve
 
 
@@ -223,12 +225,12 @@ def _without_offset(cycles: Cycles) -> Cycles:
     return Cycles(before, after, cycles.before_count, cycles.after_count)
 
 
-def remove_time(place: SlotTransform) -> None:
-    fcurve = place.curves.pop((time_path(place), 0), None)
+def remove_time(binding: Binding) -> None:
+    fcurve = binding.curves.pop((time_path(binding), 0), None)
     if fcurve is not None:
-        place.channelbag.fcurves.remove(fcurve)
-        remove_if_empty(place.channelbag, place.kind.difference_group(place.prefix))
+        binding.channelbag.fcurves.remove(fcurve)
+        remove_if_empty(binding.channelbag, binding.kind.difference_group(binding.prefix))
 
 
-def is_same(one: SlotTransform, other: SlotTransform) -> bool:
+def is_same(one: Binding, other: Binding) -> bool:
     return (one.slot.action, one.slot.handle) == (other.slot.action, other.slot.handle)

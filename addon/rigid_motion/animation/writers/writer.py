@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..actions.slots import Slot, SlotTransform
+from ..actions.slots import Binding, Slot
 from ..compute.sources import Source
 from ..transforms import Channel, Transform
 from .layout import Layout, Pieces
@@ -29,9 +29,7 @@ class Writer(ABC):
         """Return how many samples a frame there can be."""
 
     @abstractmethod
-    def write(
-        self, place: SlotTransform, points: dict[Channel, np.ndarray], layout: Layout | None, pieces: Pieces
-    ) -> None:
+    def write(self, binding: Binding, points: dict[Channel, np.ndarray], layout: Layout | None, pieces: Pieces) -> None:
         """Replace the in-betweens of a transform by these samples and pieces.
 
         Points are frame and value of each sample alternately. Channels that have none are taken out; without any, its
@@ -39,19 +37,19 @@ class Writer(ABC):
         """
 
     @abstractmethod
-    def is_shown(self, place: SlotTransform, layout: Layout, channels: Collection[Channel]) -> bool:
+    def is_shown(self, binding: Binding, layout: Layout, channels: Collection[Channel]) -> bool:
         """Return whether what is written in these channels, lying so, is to be seen on all users."""
 
-    def prepare(self, place: SlotTransform) -> None:
+    def prepare(self, binding: Binding) -> None:
         """Get users ready that were edited, before Blender evaluates them with what is written."""
         return
 
     @abstractmethod
-    def show(self, place: SlotTransform) -> None:
+    def show(self, binding: Binding) -> None:
         """Have users see what is written that came to the slot after it was."""
 
     @abstractmethod
-    def difference(self, place: SlotTransform, user: Transform, frame: float | None) -> np.ndarray:
+    def difference(self, binding: Binding, user: Transform, frame: float | None) -> np.ndarray:
         """Return what is on top of a user on a frame of the Action, or as it is shown now.
 
         As components (10,): the rotation as the properties have it.
@@ -70,23 +68,23 @@ class Writer(ABC):
         """Return which of location, rotation and scale they are in."""
 
     @abstractmethod
-    def hide(self, place: SlotTransform, user: Transform) -> None:
+    def hide(self, binding: Binding, user: Transform) -> None:
         """Show a user as its properties have it, until Blender evaluates its animation again."""
 
     @abstractmethod
-    def hold(self, place: SlotTransform, beside: Sequence[SlotTransform]) -> bool:
+    def hold(self, binding: Binding, beside: Sequence[Binding]) -> bool:
         """Have a slot hold what the NLA needs of it beside others that are filled in. Whether that was new to it.
 
-        `beside` is what moves the same users in the NLA, the place itself among it.
+        `beside` is what moves the same users in the NLA, the binding itself among it.
         """
 
-    def trouble_of(self, user: Transform, place: SlotTransform) -> str:
+    def trouble_of(self, user: Transform, binding: Binding) -> str:
         """Return why a user is not seen where its in-betweens have it, see `constraint_repair`;
         "" where nothing is amiss.
         """
         return ""
 
-    def restore(self, user: Transform, place: SlotTransform) -> None:
+    def restore(self, user: Transform, binding: Binding) -> None:
         """Have a user show the differences of a slot in full, whatever an animator has done to it."""
         return
 

@@ -16,10 +16,10 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ...animation.actions.slots import SlotTransform
+from ...animation.actions.slots import Binding
 from ...animation.compute.sources import Source
 from ...animation.handlers import append_handlers, remove_handlers
-from ...animation.queries.keyed import active_places_of, frames_in, sources_of
+from ...animation.queries.keyed import active_bindings, frames_in, sources_of
 from ...animation.transforms import Transform, transform_of
 from .ghosts import ghosts_of
 from .kinds import PATH_KINDS
@@ -78,12 +78,12 @@ def paths_of(
         if entry is None or entry.stale or entry.settings != (*settings, b"" if entry.above else _bytes(turn)):
             stale[target] = turn
     if stale:
-        places = active_places_of(list(stale))
-        sources = dict(zip(places, sources_of(list(places.values())), strict=True))
+        bindings = active_bindings(list(stale))
+        sources = dict(zip(bindings, sources_of(list(bindings.values())), strict=True))
         carried = Carried()
         for target, turn in stale.items():
             before = _entries.get(_identity(target))
-            entry = _read(target, places.get(target), sources.get(target), settings, turn, before, carried)
+            entry = _read(target, bindings.get(target), sources.get(target), settings, turn, before, carried)
             _entries[_identity(target)] = entry
     for target in targets:
         _entries.move_to_end(_identity(target))
@@ -107,8 +107,8 @@ def notice_selection(targets: Iterable[bpy.types.Object | Transform]) -> bool:
     """
     entries = {target: entry for target in map(transform_of, targets) if (entry := _entries.get(_identity(target)))}
     drawn = [target for target, entry in entries.items() if entry.path]
-    places = active_places_of(drawn) if drawn else {}
-    changed = [entries[target] for target in drawn if entries[target].selected != _selection(places.get(target))]
+    bindings = active_bindings(drawn) if drawn else {}
+    changed = [entries[target] for target in drawn if entries[target].selected != _selection(bindings.get(target))]
     for entry in changed:
         entry.stale = True
     return bool(changed)
@@ -118,10 +118,10 @@ def _identity(target: Transform) -> tuple[int, str]:
     return target.animated.session_uid, target.prefix
 
 
-def _selection(place: SlotTransform | None) -> bytes:
+def _selection(binding: Binding | None) -> bytes:
     """Return which keys are selected, channel by channel: quicker to have than their frames."""
     result = []
-    for fcurve in place.curves.values() if place is not None else ():
+    for fcurve in binding.curves.values() if binding is not None else ():
         chosen = np.empty(len(fcurve.keyframe_points), bool)
         fcurve.keyframe_points.foreach_get("select_control_point", chosen)
         result.append(chosen.tobytes())
@@ -130,7 +130,7 @@ def _selection(place: SlotTransform | None) -> bytes:
 
 def _read(
     target: Transform,
-    place: SlotTransform | None,
+    binding: Binding | None,
     source: Source | None,
     settings: tuple,
     turn: np.ndarray | None,
@@ -140,7 +140,7 @@ def _read(
     data = target.animated.animation_data
     action = data.action if data else None
     entry = _Entry(None, (), (*settings, _bytes(turn)), action.session_uid if action else 0)
-    if place is None or source is None:
+    if binding is None or source is None:
         # Where it was refused, the panel says why.
         return entry
     parents = None if target.animated.animation_data.use_tweak_mode else Parents(target, carried)
@@ -151,10 +151,10 @@ def _read(
     mode, tick_step, axes_size, ghost_step, *_ = settings
     kind = PATH_KINDS[target.kind]
     point, size = kind.point(target.carrier, source, turn), kind.axis_length(target.carrier, source)
-    entry.selected = _selection(place)
+    entry.selected = _selection(binding)
     # What is not keyed moves the path and not its in-betweens, so it is no part of their digest.
     of_point = () if point is None else (point.moves, point.stays.tobytes(), point.tip.tobytes())
-    selected = frames_in(place, selected=True)
+    selected = frames_in(binding, selected=True)
     stands = [getattr(target.carrier, prop)[:] for name, prop in target.properties.items() if name not in source.keyed]
     entry.digest = (
         *(source.digest, tuple(source.rest.items()), of_point, selected.tobytes(), size, entry.settings),

@@ -12,11 +12,11 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...animation.actions.slots import SlotTransform
+from ...animation.actions.slots import Binding
 from ...animation.baking.channel_maps import shown
 from ...animation.baking.followers import MOVING, NotPromised, not_promised
 from ...animation.compute.sources import Source
-from ...animation.queries.keyed import active_places_of, sources_of
+from ...animation.queries.keyed import active_bindings, sources_of
 from ...animation.transforms import WIDTHS, Transform, shows_differences, transform_of
 from ...animation.transforms.posing import Hierarchy
 from ...motion.affine import AffineMaps
@@ -34,17 +34,17 @@ class Carried:
     def __init__(self) -> None:
         self._followers: dict[bpy.types.Object, NotPromised] = {}
         self._hierarchies: dict[bpy.types.Object, tuple[Hierarchy, dict[str, int]]] = {}
-        self._read: dict[Transform, tuple[SlotTransform | None, Source | None]] = {}
+        self._read: dict[Transform, tuple[Binding | None, Source | None]] = {}
         self._channels: dict[tuple[Transform, bytes], AffineMaps] = {}
         self._posed: dict[tuple[Transform, bytes], AffineMaps] = {}
 
-    def read(self, transforms: Iterable[Transform]) -> dict[Transform, tuple[SlotTransform | None, Source | None]]:
+    def read(self, transforms: Iterable[Transform]) -> dict[Transform, tuple[Binding | None, Source | None]]:
         """Return the place that each moves by, and what is keyed there; None where there is none."""
         transforms = list(transforms)
         if missing := [transform for transform in transforms if transform not in self._read]:
-            places = active_places_of(missing)
-            sources = dict(zip(places, sources_of(list(places.values())), strict=True))
-            self._read |= {item: (places.get(item), sources.get(item)) for item in missing}
+            bindings = active_bindings(missing)
+            sources = dict(zip(bindings, sources_of(list(bindings.values())), strict=True))
+            self._read |= {item: (bindings.get(item), sources.get(item)) for item in missing}
         return {transform: self._read[transform] for transform in transforms}
 
     def follows(self, bone: Transform) -> bool:
@@ -97,12 +97,12 @@ class Parents:
         self.target, self._carried = target, carried
         self._read = carried.read(_above(target))
         self.move_by_keys = any(source is not None for _, source in self._read.values()) and all(
-            _moves_by_keys(one, carried) and (source is not None or not _is_keyed(place))
-            for one, (place, source) in self._read.items()
+            _moves_by_keys(one, carried) and (source is not None or not _is_keyed(binding))
+            for one, (binding, source) in self._read.items()
         )
         """True if they move, and by keys alone."""
         self.ids = {item.animated.session_uid for item in self._read}
-        self.ids |= {place.slot.action.session_uid for place, _ in self._read.values() if place is not None}
+        self.ids |= {binding.slot.action.session_uid for binding, _ in self._read.values() if binding is not None}
         """Session ids of the data-blocks that decide on it."""
 
     @property
@@ -195,8 +195,8 @@ def _hangs_on_a_whole(obj: bpy.types.Object) -> bool:
     return obj.parent_bone in bones and not bones[obj.parent_bone].bone.use_relative_parent
 
 
-def _is_keyed(place: SlotTransform | None) -> bool:
-    return place is not None and any(path.removeprefix(place.prefix) in WIDTHS for path, _ in place.curves)
+def _is_keyed(binding: Binding | None) -> bool:
+    return binding is not None and any(path.removeprefix(binding.prefix) in WIDTHS for path, _ in binding.curves)
 
 
 def _hung(transform: Transform) -> tuple:

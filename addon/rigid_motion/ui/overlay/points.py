@@ -65,9 +65,9 @@ class Followed(NamedTuple):
         """Return what vectors (n, 3) that turn with it are in the space of its location."""
         return vectors if self.turned is None else turned(self.turned, vectors)
 
-    def at(self, places: np.ndarray) -> Followed:
+    def at(self, indices: np.ndarray) -> Followed:
         """Return the point as it is followed at some of the poses."""
-        return self if self.turned is None or self.turned.ndim == 2 else self._replace(turned=self.turned[places])
+        return self if self.turned is None or self.turned.ndim == 2 else self._replace(turned=self.turned[indices])
 
 
 @dataclass(frozen=True, eq=False)

@@ -111,9 +111,9 @@ def _spaced(pixels: np.ndarray, step: int, keys: np.ndarray, clear: float, frame
     across, up = (pixels[:, None] - keys).transpose(2, 0, 1)
     to_keys = np.hypot(across, up).min(axis=1, initial=np.inf)
     allowed = (frames % (between * step) == 0.0) & np.isfinite(pixels).all(axis=1) & (to_keys >= clear)
-    places = np.flatnonzero(allowed)
+    indices = np.flatnonzero(allowed)
     before = (math.inf, math.inf)
-    for place, point in zip(places.tolist(), pixels[places].tolist(), strict=True):
+    for index, point in zip(indices.tolist(), pixels[indices].tolist(), strict=True):
         if math.dist(point, before) >= clear:
-            chosen[place], before = True, point
+            chosen[index], before = True, point
     return chosen
