@@ -158,7 +158,9 @@ def read_again(bindings: Sequence[Binding]) -> list[Binding]:
     for binding in bindings:
         prefixes.setdefault(binding.slot, {})[binding.prefix] = None
     result = {
-        (slot, binding.prefix): binding for slot, own in prefixes.items() for binding in bindings_in_slot(slot, own)
+        (slot, binding.prefix): binding
+        for slot, of_slot in prefixes.items()
+        for binding in bindings_in_slot(slot, of_slot)
     }
     return [result[binding.slot, binding.prefix] for binding in bindings]
 
@@ -184,8 +186,8 @@ def _curves_under(channelbag: bpy.types.ActionChannelbag | None, prefixes: Itera
     curves: dict[str, Curves] = {prefix: {} for prefix in prefixes}
     for fcurve in () if channelbag is None else channelbag.fcurves:
         path = fcurve.data_path
-        if (own := curves.get(split_path(path)[0])) is not None:
-            own[path, fcurve.array_index] = fcurve
+        if (of_prefix := curves.get(split_path(path)[0])) is not None:
+            of_prefix[path, fcurve.array_index] = fcurve
     return curves
 
 
@@ -321,8 +323,8 @@ def counterpart_in(action: bpy.types.Action, slot: bpy.types.ActionSlot) -> bpy.
 
 def in_action(action: bpy.types.Action, slot: Slot) -> Slot | None:
     """Return the same slot in a copy of its Action, or in the original. None where it was taken out of it."""
-    own = next(item for item in slot.action.slots if item.handle == slot.handle)
-    result = counterpart_in(action, own)
+    action_slot = next(item for item in slot.action.slots if item.handle == slot.handle)
+    result = counterpart_in(action, action_slot)
     return None if result is None else replace(slot, action=action, handle=result.handle)
 
 
@@ -401,14 +403,14 @@ def _spans(obj: bpy.types.Object, slot: Slot) -> list[tuple[int, float, float]]:
     """Return where in the NLA of an object a slot plays: the number of the track, that of its Action behind all of
     them, and the frames of the scene.
     """
-    data, own = obj.animation_data, (slot.action, slot.handle)
+    data, used = obj.animation_data, (slot.action, slot.handle)
     spans = [
         (level, strip.frame_start, strip.frame_end)
         for level, track in enumerate(data.nla_tracks)
         for strip in _strips(track.strips)
-        if (strip.action, strip.action_slot_handle) == own
+        if (strip.action, strip.action_slot_handle) == used
     ]
-    if not data.use_tweak_mode and (data.action, data.action_slot_handle) == own:
+    if not data.use_tweak_mode and (data.action, data.action_slot_handle) == used:
         spans.append((len(data.nla_tracks), -math.inf, math.inf))
     return spans
 

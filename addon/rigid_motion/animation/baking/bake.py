@@ -265,21 +265,21 @@ def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarr
     at = old["co"][:, 0]
     before, behind = at < frames[0] - SAME_FRAME, at > frames[-1] + SAME_FRAME
     new = empty_key_fields(len(frames))
-    own = np.flatnonzero(~(before | behind))
-    indices = np.clip(np.searchsorted(frames, at[own]), 1, len(frames) - 1)
-    indices -= at[own] - frames[indices - 1] <= frames[indices] - at[own]
+    inside = np.flatnonzero(~(before | behind))
+    indices = np.clip(np.searchsorted(frames, at[inside]), 1, len(frames) - 1)
+    indices -= at[inside] - frames[indices - 1] <= frames[indices] - at[inside]
     new["type"][:] = code_of("type", "GENERATED")
     for name, numbers in new.items():
-        numbers[indices] = old[name][own]
+        numbers[indices] = old[name][inside]
     new["interpolation"][:] = code_of("interpolation", interpolation)
     points = np.stack((frames, values), axis=1).astype(np.float32)
-    at_end = own[indices == len(frames) - 1]
+    at_end = inside[indices == len(frames) - 1]
     if behind.any() and len(at_end):
         new["interpolation"][-1] = old["interpolation"][at_end[0]]
     # Handles keep their distance from the key, where there were any; the outer ones shape what is left alone.
     for side in ("handle_left", "handle_right"):
         handles = points.copy()
-        handles[indices] += old[side][own] - old["co"][own]
+        handles[indices] += old[side][inside] - old["co"][inside]
         new[side] = handles
     new["co"] = points
     for name in ("handle_left_type", "handle_right_type"):

@@ -266,7 +266,7 @@ def values_on(transform: Transform, source: Source, frames: np.ndarray) -> dict[
         scale = source.values_at(frames)[ROWS[SCALE]].T
         if np.all(_is_constant(scale)):
             by_path[transform.prefix + transform.properties[SCALE]] = scale
-    keyed = {row for own, _ in source.channels for row in own}
+    keyed = {row for rows, _ in source.channels for row in rows}
     columns = {row: by_path[path][:, index] for row, (path, index) in transform.channels.items() if path in by_path}
     return {row: column for row, column in columns.items() if row in keyed or not _is_constant(column)}
 
@@ -289,7 +289,7 @@ def _is_constant(columns: np.ndarray) -> np.ndarray:
 
 def with_keys(source: Source, frames: np.ndarray, values: dict[int, np.ndarray], mode: str) -> Source:
     """Return the source with these keys alone in the channels that have values, straight lines between them."""
-    old = {row: keys for own, keys in source.channels for row in own}
+    old = {row: keys for keyed_rows, keys in source.channels for row in keyed_rows}
     alike: dict[tuple, list[int]] = {}
     for row in values:
         alike.setdefault((old[row].linear, old[row].cycles) if row in old else (False, None), []).append(row)
@@ -299,9 +299,9 @@ def with_keys(source: Source, frames: np.ndarray, values: dict[int, np.ndarray],
         points[..., 0], points[..., 1] = frames, [values[row] for row in rows]
         codes = np.full(points.shape[:2], LINEAR, CODE)
         channels.append((rows, Keys(points, codes, linear=linear, cycles=cycles)))
-    for own, keys in source.channels:
-        indices = [index for index, row in enumerate(own) if row not in values]
+    for keyed_rows, keys in source.channels:
+        indices = [index for index, row in enumerate(keyed_rows) if row not in values]
         if indices:
-            channels.append(([own[index] for index in indices], keys.only(indices)))
+            channels.append(([keyed_rows[index] for index in indices], keys.only(indices)))
     rest = {row: value for row, value in source.rest.items() if row not in values}
     return replace(source, channels=tuple(channels), rest=rest, mode=MODE_NUMBERS[mode], turns=None)

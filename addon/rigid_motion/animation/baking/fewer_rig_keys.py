@@ -98,18 +98,18 @@ def fewer_keys_of_rigs(
                     together.setdefault(key, {})[transform] = binding, source
     plans: Plans = {}
     for (obj, *_), members in together.items():
-        own = members.pop(transform_of(obj), None)
+        of_rig = members.pop(transform_of(obj), None)
         if not members:
             continue
         try:
             rig = _Rig(obj, members, tolerance if count is None else math.inf, radius, hold=hold)
             if count is not None:
-                rig.find_key_poses(mode, count, None if own is None else own[1])
-            if own is not None:
+                rig.find_key_poses(mode, count, None if of_rig is None else of_rig[1])
+            if of_rig is not None:
                 of_object = plans.setdefault(transform_of(obj), [])
-                of_object.append(rig.reduce_own_keys(transform_of(obj), *own, mode, best_of=best_of))
+                of_object.append(rig.reduce_own_keys(transform_of(obj), *of_rig, mode, best_of=best_of))
             fewer = rig.fewer_keys(mode, shared=shared, best_of=best_of)
-            if own is not None and fewer:
+            if of_rig is not None and fewer:
                 # How far it is off counts at the bones, which is known by now.
                 whole = next(iter(fewer.values())).rig
                 of_object[-1] = replace(of_object[-1], largest_error=whole.largest_error)
@@ -210,13 +210,13 @@ class _Rig:
             self.largest_own = plan.largest_error
         return plan
 
-    def find_key_poses(self, mode: str, count: int, own: Source | None) -> None:
+    def find_key_poses(self, mode: str, count: int, of_rig: Source | None) -> None:
         """Find the best moments for so many key poses of all bones, and of the rig itself where it has keys."""
         samples, fixed = np.flatnonzero(self.sampled), self._fixed()
         poses, parents, radii, weights = self.poses, self.skeleton.parents, self.motion.radii, self.weights
-        if own is not None:
+        if of_rig is not None:
             # The bones hang on the rig as on one joint more, which counts by them alone.
-            moved, _ = shown(transform_of(self.rig), own, self.frames)
+            moved, _ = shown(transform_of(self.rig), of_rig, self.frames)
             scale = float(moved.scales[0]) or 1.0
             poses = Poses(
                 np.concatenate((moved.positions[None] / scale, poses.positions)),
@@ -401,8 +401,8 @@ def _united(frames: Iterable[np.ndarray]) -> np.ndarray:
 
 def _follows(bone: bpy.types.PoseBone, grows: bool) -> bool:
     """Return whether a bone is moved by all that its parent does."""
-    own = bone.bone
-    return bool(bone.parent and own.use_inherit_rotation and (own.inherit_scale == "FULL" or not grows))
+    settings = bone.bone
+    return bool(bone.parent and settings.use_inherit_rotation and (settings.inherit_scale == "FULL" or not grows))
 
 
 def _rest(motion: RigMotion, number: int, follows: bool) -> Poses:

@@ -243,7 +243,7 @@ def total_reduction(targets: Targets) -> Reduction | None:
     if result is None or result.rig is None:
         return result
     whole = [_whole_rig(entry) for entry in of_bones]
-    objects = [entry.largest_error for transform, own in of_each if not transform.is_part for entry in own]
+    objects = [entry.largest_error for transform, entries in of_each if not transform.is_part for entry in entries]
     return replace(result, largest_error=max([*objects, *(rig.largest_error for rig in whole)]))
 
 

@@ -84,11 +84,11 @@ class RigMotion:
 
     def carried_by(self, source: Source | None) -> AffineMaps:
         """Return where the rig itself is, by its own keys or as it stands. Its parents are where they are now."""
-        own = transform_of(self.rig)
+        transform = transform_of(self.rig)
         if source is None:
             world = np.array(self.rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
             return AffineMaps(world[None, :3, :3], world[None, :3, 3])
-        return AffineMaps(into_scene(own), np.zeros(3)) @ shown(own, source, self.frames)[1]
+        return AffineMaps(into_scene(transform), np.zeros(3)) @ shown(transform, source, self.frames)[1]
 
     def carry(self, source: Source) -> None:
         """Let the rig itself be moved by other keys."""

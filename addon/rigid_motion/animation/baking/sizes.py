@@ -81,8 +81,8 @@ def into_scene(transform: Transform) -> np.ndarray:
     obj = transform.carrier
     if obj.parent is None and not obj.constraints:
         return np.eye(3)
-    own, world = np.array(obj.matrix_basis.to_3x3()), np.array(_evaluated(obj).matrix_world.to_3x3())
-    if not (size_of(own) > 0.0 and size_of(world) > 0.0):
+    basis, world = np.array(obj.matrix_basis.to_3x3()), np.array(_evaluated(obj).matrix_world.to_3x3())
+    if not (size_of(basis) > 0.0 and size_of(world) > 0.0):
         return np.eye(3)
     # Constraints may turn it anyhow: then only its size counts.
-    return np.eye(3) * size_of(world) / size_of(own) if obj.constraints else world @ np.linalg.inv(own)
+    return np.eye(3) * size_of(world) / size_of(basis) if obj.constraints else world @ np.linalg.inv(basis)

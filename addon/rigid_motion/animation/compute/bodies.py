@@ -26,7 +26,7 @@ def turn_into_quaternions(rows: np.ndarray, order: str | None) -> None:
     quaternions /= lengths
 
 
-def body_poses(rows: np.ndarray, own: np.ndarray, axes: np.ndarray | None, source: Source) -> Poses:
+def body_poses(rows: np.ndarray, original: np.ndarray, axes: np.ndarray | None, source: Source) -> Poses:
     """Return the poses (S, k) of S segments that channels (., S, k) give.
 
     With the objects' own delta transforms (10, S, 1), and along the axes (S, 3, 3) that location has.
@@ -34,10 +34,10 @@ def body_poses(rows: np.ndarray, own: np.ndarray, axes: np.ndarray | None, sourc
     flat = rows.reshape(len(rows), -1).copy()
     turn_into_quaternions(flat, source.order)
     rows = flat.reshape(rows.shape)
-    positions = np.moveaxis(rows[ROWS[LOCATION]] + own[ROWS[LOCATION]], 0, -1)
+    positions = np.moveaxis(rows[ROWS[LOCATION]] + original[ROWS[LOCATION]], 0, -1)
     return Poses(
         positions if axes is None else np.einsum("sij,skj->ski", axes, positions),
-        multiply(np.moveaxis(own[ROWS[ROTATION]], 0, -1), np.moveaxis(rows[ROWS[ROTATION]], 0, -1)),
+        multiply(np.moveaxis(original[ROWS[ROTATION]], 0, -1), np.moveaxis(rows[ROWS[ROTATION]], 0, -1)),
         rows[7] if source.uniform_scale else None,
     )
 
@@ -58,7 +58,7 @@ def location_axes(sources: Sequence[Source], owners: np.ndarray) -> np.ndarray |
     if all(source.location_axes is None for source in sources):
         return None
     same = np.eye(3)
-    return np.stack([same if (own := source.location_axes) is None else own for source in sources])[owners]
+    return np.stack([same if (axes := source.location_axes) is None else axes for source in sources])[owners]
 
 
 def take_off(delta: np.ndarray, original: np.ndarray) -> None:

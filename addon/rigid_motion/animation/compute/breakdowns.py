@@ -71,7 +71,7 @@ class Passages:
         at, off = _nearest(keys[inner, 0], np.bincount(owners[inner], minlength=len(first) - 1), poses_at)
         progress[0, inner] = progress[1, inner - 1] = at
         offs[0][:, inner] = offs[1][:, inner - 1] = off
-        offsets, ends = (_moved(own) for own in offs)
+        offsets, ends = (_moved(offset) for offset in offs)
         changes = np.concatenate((_between(offsets, ends)[:6], offs[1, 6:] - offs[0, 6:]))
         return cls(first, progress, offsets, changes, smooth[owners])
 

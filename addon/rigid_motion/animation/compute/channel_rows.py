@@ -30,20 +30,20 @@ def sampled(
     curves, times, out, apart = [], [], [], []
     for (source, span), at in zip(samples, frames, strict=True):
         _rest(rows[:, span], source)
-        for own, keys in source.channels:
+        for keyed_rows, keys in source.channels:
             if at is source.key_frames and source.is_together:
-                rows[own, span] = keys.values
+                rows[keyed_rows, span] = keys.values
                 continue
             curves.append(keys)
             times.append(at)
-            if own[-1] - own[0] < len(own):
-                out.append(rows[own[0] : own[-1] + 1, span])
+            if keyed_rows[-1] - keyed_rows[0] < len(keyed_rows):
+                out.append(rows[keyed_rows[0] : keyed_rows[-1] + 1, span])
             else:
-                out.append(np.empty((len(own), len(at))))
-                apart.append((own, span, out[-1]))
+                out.append(np.empty((len(keyed_rows), len(at))))
+                apart.append((keyed_rows, span, out[-1]))
     evaluate(curves, times, unit_elastic=unit_elastic, out=out)
-    for own, span, values in apart:
-        rows[own, span] = values
+    for keyed_rows, span, values in apart:
+        rows[keyed_rows, span] = values
     return rows
 
 
@@ -57,12 +57,12 @@ def channels_at_ends(
     begins = np.delete(np.arange(rows.shape[1]), [span.stop - 1 for _, span in keys])
     start, end = rows[:, begins], rows[:, begins + 1]
     for source, span in segments:
-        for own, channels in source.channels:
+        for keyed_rows, channels in source.channels:
             if channels.cycles is None:
                 continue
             # A cycle whose ends differ jumps: one round ends on its last value, the next starts on its first.
             jumps = _jumps(channels, source.key_frames)
-            for row, values in zip(own, channels.values, strict=True):
+            for row, values in zip(keyed_rows, channels.values, strict=True):
                 start[row, span][jumps[:-1]], end[row, span][jumps[1:]] = values[0], values[-1]
     return start, end
 
@@ -79,9 +79,9 @@ def filled_height(sources: Sequence[Source]) -> int:
 
 def _rest(rows: np.ndarray, source: Source) -> None:
     """Fill in what a source does not key."""
-    for name, own in ROWS.items():
-        if name not in source.keyed and own.start < len(rows):
-            rows[own] = REST[own, None]
+    for name, part in ROWS.items():
+        if name not in source.keyed and part.start < len(rows):
+            rows[part] = REST[part, None]
     for row, value in source.rest.items():
         rows[row] = value
     if source.order is not None:

@@ -10,7 +10,7 @@ LOCATION, ROTATION, SCALE = "location", "rotation", "scale"
 ROWS = {LOCATION: slice(0, 3), ROTATION: slice(3, 7), SCALE: slice(7, 10)}
 """The rows of the components of each, in arrays with a row for each of the ten. Euler angles leave row 6 alone."""
 
-PART_OF = tuple(name for name, own in ROWS.items() for _ in range(own.start, own.stop))
+PART_OF = tuple(name for name, rows in ROWS.items() for _ in range(rows.start, rows.stop))
 """The one of them that each row is a component of."""
 
 REST = np.array((0, 0, 0, 1, 0, 0, 0, 1, 1, 1), dtype=np.float64)

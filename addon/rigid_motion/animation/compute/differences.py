@@ -110,12 +110,12 @@ def progress_at(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> list
     """Return how far along its segment of the path, from 0 to 1,
     each source has come on rising frames of its own, (m,).
     """
-    result, of_source = {}, {id(source): own for source, own in zip(sources, frames, strict=True)}
-    for portion in _portions(sources, {name: (0, len(own)) for name, own in of_source.items()}):
-        own = [of_source[id(source)] for source in portion]
-        samples = each(portion, map(len, own))
+    result, of_source = {}, {id(source): times for source, times in zip(sources, frames, strict=True)}
+    for portion in _portions(sources, {name: (0, len(times)) for name, times in of_source.items()}):
+        times = [of_source[id(source)] for source in portion]
+        samples = each(portion, map(len, times))
         native, delta = np.empty((2, height(portion), samples[-1][1].stop))
-        along = _move(portion, own, native, delta[: filled_height(portion)])
+        along = _move(portion, times, native, delta[: filled_height(portion)])
         result.update((id(source), along[span]) for source, span in samples)
     return [result[id(source)] for source in sources]
 
@@ -155,7 +155,7 @@ def differences(
         spans = [(*range_of[id(source)], rate_of[id(source)]) for source in portion]
         of_range = {span: np.arange(span[0], span[1] + 1.0) / span[2] for span in set(spans)}
         frames = [of_range[span] for span in spans]
-        frames_of = {id(source): own for source, own in zip(portion, frames, strict=True)}
+        frames_of = {id(source): times for source, times in zip(portion, frames, strict=True)}
         samples = each(portion, map(len, frames))
         # Both in one array: of smaller ones the C library gives the memory back at once, and asks for it the next time.
         rows, points = np.empty((2, height(portion), samples[-1][1].stop))
@@ -167,11 +167,11 @@ def differences(
         order = portion[0].order
         partial = [(source, span) for source, span in samples if source.influence is not None]
         for source, span in partial:
-            own = frames_of[id(source)]
-            blended(source, own, sampled([(source, slice(len(own)))], [own]), delta[:, span])
+            times = frames_of[id(source)]
+            blended(source, times, sampled([(source, slice(len(times)))], [times]), delta[:, span])
         if order is not None:
-            for some, span in blocks(np.array((0, *(own.stop for _, own in samples))), BLOCK):
-                starts = [own.start - span.start for _, own in samples[some]]
+            for some, span in blocks(np.array((0, *(part.stop for _, part in samples))), BLOCK):
+                starts = [part.start - span.start for _, part in samples[some]]
                 delta[3:6, span] = extrinsic_eulers_from_quaternions(delta[ROWS[ROTATION], span].T, order, starts).T
             for source, span in partial:
                 undo_blending(source, frames_of[id(source)], delta[3:6, span])
@@ -188,9 +188,9 @@ def differences(
         points[..., 0] = np.concatenate(frames)
         points[..., 1] = delta
         for (source, span), rows_of_source, error in zip(samples, kept, errors, strict=False):
-            own = Samples({row: points[row, span].ravel() for row in rows_of_source})
-            own.rate, own.error = rate_of[id(source)], float(error)
-            result[id(source)] = own
+            filled = Samples({row: points[row, span].ravel() for row in rows_of_source})
+            filled.rate, filled.error = rate_of[id(source)], float(error)
+            result[id(source)] = filled
     return [result[id(source)] for source in sources]
 
 
@@ -249,8 +249,8 @@ def _move(
         progress = progress[0] - offsets[parts].repeat(counts[parts])
         bounds = np.concatenate(((0,), np.cumsum(on_paths[some])))
         for number in np.flatnonzero(idle[some] & (on_paths[some] > 0)):
-            own = slice(*bounds[number : number + 2])
-            progress[own] = ends.idle_progress(some.start + number, every_frame[span][own], sources)
+            idle_span = slice(*bounds[number : number + 2])
+            progress[idle_span] = ends.idle_progress(some.start + number, every_frame[span][idle_span], sources)
         turn_into_quaternions(native[:, span], order)
         default = original[:, ends.owners[some]]
         if lacks is not None:
@@ -337,7 +337,7 @@ def _passages(sources: Sequence[Source], modes: np.ndarray, ends: Ends) -> tuple
 def _fill(
     delta: np.ndarray,
     native: np.ndarray,
-    own: np.ndarray,
+    original: np.ndarray,
     modes: np.ndarray,
     ends: Ends,
     segment: slice,
@@ -355,13 +355,13 @@ def _fill(
         some = slice(None) if every else np.repeat(chosen, counts)
         here = counts if every else np.where(chosen, counts, 0)
         if not mode:
-            delta[:, some] = own.repeat(here, axis=1)
+            delta[:, some] = original.repeat(here, axis=1)
             continue
         desired = ends.poses(segment, here, progress[some], MODE_NAMES[mode], None if off is None else off[some])
         part = delta if every else np.empty((len(delta), int(here.sum())))
         differ(desired, native[:, some], part)
         if desired.scales is not None:
-            part[ROWS[SCALE]] *= own[ROWS[SCALE]].repeat(here, axis=1)
+            part[ROWS[SCALE]] *= original[ROWS[SCALE]].repeat(here, axis=1)
         if not every:
             delta[:, some] = part
 
@@ -372,10 +372,10 @@ def _counts(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> tuple[np
     """
     keys = np.concatenate([source.key_frames for source in sources])
     owners = np.repeat(np.arange(len(sources)), [len(source.key_frames) for source in sources])
-    ends = np.cumsum([len(own) for own in frames])
-    begins = ends - [len(own) for own in frames]
+    ends = np.cumsum([len(times) for times in frames])
+    begins = ends - [len(times) for times in frames]
     at = begins[owners] + np.concatenate(
-        [own.searchsorted(source.key_frames) for source, own in zip(sources, frames, strict=True)]
+        [times.searchsorted(source.key_frames) for source, times in zip(sources, frames, strict=True)]
     )
     hits = np.flatnonzero(np.concatenate(frames)[np.minimum(at, ends[owners] - 1)] == keys)
     # A segment begins with the sample on its first key; what is outside of the keys belongs to the outermost ones.

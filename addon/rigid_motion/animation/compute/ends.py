@@ -36,7 +36,7 @@ class Ends:
     axes: np.ndarray | None
     """The axes that location runs along, as columns in those of the poses, shape (S, 3, 3); None where they are one."""
 
-    own: np.ndarray
+    original: np.ndarray
     """The objects' own delta transforms, shape (10, S)."""
 
     pairs: tuple[np.ndarray, np.ndarray] | None = None
@@ -67,13 +67,13 @@ class Ends:
         owners = np.repeat(np.arange(len(sources)), [span.stop - span.start for _, span in segments])
         firsts, lasts = ([source.key_frames[part] for source in sources] for part in (slice(-1), slice(1, None)))
         times = np.stack((np.concatenate(firsts), np.concatenate(lasts)), axis=1)
-        own = np.stack([source.original for source in sources], axis=1)[:, owners]
+        original = np.stack([source.original for source in sources], axis=1)[:, owners]
         axes = location_axes(sources, owners)
-        keys = body_poses(np.stack((start, end), axis=2), own[..., None], axes, sources[0])
+        keys = body_poses(np.stack((start, end), axis=2), original[..., None], axes, sources[0])
         turned = whole = None
         if any(map(needs_turning, sources)):
-            turned, whole = turning_of(sources, start, end, keys, own)
-        ends = cls(owners, times, keys, axes, own, turning=turned, whole=whole)
+            turned, whole = turning_of(sources, start, end, keys, original)
+        ends = cls(owners, times, keys, axes, original, turning=turned, whole=whole)
         if not smooth.any():
             return ends
         holds, pairs = np.concatenate([source.holds for source in sources]), meeting(owners, times, keys)
@@ -95,7 +95,7 @@ class Ends:
         screws = twists.between(
             first.positions, first.quaternions, second.positions, turned, shortest=self.whole is None
         )
-        screws, poses = np.stack((screws, screws)), body_poses(measured, self.own[..., None], self.axes, source)
+        screws, poses = np.stack((screws, screws)), body_poses(measured, self.original[..., None], self.axes, source)
         if self.whole is not None:
             # Angles turn by spins, too. These are known, and what is left is less than half a turn.
             poses = without_spins(poses, self.whole.by_angles, progress)

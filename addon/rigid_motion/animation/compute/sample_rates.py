@@ -46,7 +46,9 @@ def sampled(
         return differences(sources, ranges, rates)
     result = _differences(sources, needs, ranges, rates)
     coarser: dict[int, Samples] = {}
-    pending = [number for number, (own, need) in enumerate(zip(result, needs, strict=True)) if _is_open(own, need)]
+    pending = [
+        number for number, (samples, need) in enumerate(zip(result, needs, strict=True)) if _is_open(samples, need)
+    ]
     while pending:
         rates = [_next_rate(result[number], needs[number]) for number in pending]
         finer_ranges = (
@@ -85,8 +87,8 @@ def error_of(source: Source, points: Mapping[int, np.ndarray], rate: int, reach:
     delta = np.repeat(source.difference_at_keys[:, None], last - first + 1, axis=1)
     if source.order is not None:
         delta[ROWS[ROTATION]] = 0.0
-    for row, own in points.items():
-        delta[row] = own[1::2]
+    for row, samples in points.items():
+        delta[row] = samples[1::2]
     (error,) = largest_errors(delta, [(source, slice(0, last - first + 1))], [(first, last, rate)], [reach])
     return float(error) if math.isfinite(error) else 0.0
 

@@ -438,10 +438,10 @@ class Source:
 def values_of(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> list[np.ndarray]:
     """Return what the channels of each source alone have on frames of its own, shape (10, m)."""
     curves = [keys for source in sources for keys in source.curves]
-    times = [own for source, own in zip(sources, frames, strict=True) for _ in source.channels]
+    times = [times_of_source for source, times_of_source in zip(sources, frames, strict=True) for _ in source.channels]
     evaluated, result = iter(evaluate(curves, times)), []
-    for source, own in zip(sources, frames, strict=True):
-        rows = np.repeat(REST[:, None], len(own), axis=1)
+    for source, times_of_source in zip(sources, frames, strict=True):
+        rows = np.repeat(REST[:, None], len(times_of_source), axis=1)
         for row, value in source.rest.items():
             rows[row] = value
         for of_channels, _ in source.channels:

@@ -79,7 +79,7 @@ def turning(
     start: np.ndarray,
     end: np.ndarray,
     keys: Poses,
-    own: np.ndarray,
+    original: np.ndarray,
     order: str | None,
     turns: np.ndarray,
     axes: np.ndarray,
@@ -93,7 +93,7 @@ def turning(
         The channels at both ends.
     keys : Poses, shape (S, 2)
         What they make of the body.
-    own : array, shape (S, 4)
+    original : array, shape (S, 4)
         The rotations of the objects' own delta transforms, which the channels' are turned by.
     order : str or None
         Of the Euler angles, None for quaternions.
@@ -111,7 +111,7 @@ def turning(
     parts = turns - np.rint(turns)
     if order is not None:
         ends = start[ROWS[ROTATION]][:3], end[ROWS[ROTATION]][:3]
-        senses = _add_angles(result, *ends, own, order, parts)
+        senses = _add_angles(result, *ends, original, order, parts)
     result = replace(result, by_angles=replace(spins, turns=spins.turns.copy()))
     _add_channel(result, turns, senses, axes, backwards)
     return result
@@ -129,7 +129,7 @@ def in_whole_turns(result: Turning, by_angles: Turning) -> Turning:
 
 
 def turning_of(
-    sources: Sequence[Source], start: np.ndarray, end: np.ndarray, keys: Poses, own: np.ndarray
+    sources: Sequence[Source], start: np.ndarray, end: np.ndarray, keys: Poses, original: np.ndarray
 ) -> tuple[Turning, Turning]:
     """Return how S segments of alike sources turn, and the same in whole turns alone.
 
@@ -138,7 +138,7 @@ def turning_of(
     turns = np.concatenate([source.segment_turns for source in sources])
     backwards = np.concatenate([source.run_backwards for source in sources])
     axes = np.repeat([source.turns_axis for source in sources], [len(source.segment_turns) for source in sources])
-    given = (start, end, keys, own[ROWS[ROTATION]].T, sources[0].order)
+    given = (start, end, keys, original[ROWS[ROTATION]].T, sources[0].order)
     result = turning(*given, turns, axes, backwards)
     if np.all(turns == np.rint(turns)):
         return result, result
@@ -147,15 +147,15 @@ def turning_of(
 
 def turning_in(source: Source, segment: int, turns: float | None = None) -> Turning:
     """Return how one of the segments of a source turns, with other turns than those of its channel if so given."""
-    keys, own = source.key_frames[segment : segment + 2], source.original[:, None]
+    keys, original = source.key_frames[segment : segment + 2], source.original[:, None]
     # As seen from within the segment where cycles jump.
     rows = source.values_at(keys if source.cyclic is None else keys + np.array((MOMENT, -MOMENT)))
     start, end = rows[:, :1], rows[:, 1:]
-    poses = body_poses(rows[:, None], own[..., None], None, source)
+    poses = body_poses(rows[:, None], original[..., None], None, source)
     at = slice(segment, segment + 1)
     channel = source.segment_turns[at] if turns is None else np.array([turns])
     axes, backwards = np.array([source.turns_axis]), source.run_backwards[at]
-    return turning(start, end, poses, own[ROWS[ROTATION]].T, source.order, channel, axes, backwards)
+    return turning(start, end, poses, original[ROWS[ROTATION]].T, source.order, channel, axes, backwards)
 
 
 def shortest_turns(first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -182,7 +182,7 @@ def _take_off(result: Turning, some: np.ndarray, parts: np.ndarray) -> None:
 
 
 def _add_angles(
-    result: Turning, start: np.ndarray, end: np.ndarray, own: np.ndarray, order: str, parts: np.ndarray
+    result: Turning, start: np.ndarray, end: np.ndarray, original: np.ndarray, order: str, parts: np.ndarray
 ) -> np.ndarray:
     """Add the turns that Euler angles (3, S) at both ends say, and have half turns go in their sense; in place.
 
@@ -201,7 +201,7 @@ def _add_angles(
         for before in (True, False)
     )
     stands = np.linalg.norm(np.diff(in_space, axis=0)[0], axis=1) < np.linalg.norm(np.diff(in_body, axis=0)[0], axis=1)
-    axes = np.where(stands[:, None], rotate(own[some], _mean(in_space)), _mean(in_body))
+    axes = np.where(stands[:, None], rotate(original[some], _mean(in_space)), _mean(in_body))
     spins.axes[:, some], spins.in_space[some] = axes.T, stands
     part = sense * parts[some]
     _take_off(result, some, part)

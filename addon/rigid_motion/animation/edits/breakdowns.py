@@ -124,8 +124,8 @@ class _Between:
         straight = self.seen + share * (components_near(self.source, towards, native) - self.seen)
         if self.mode == "BLENDER" and self.source.order is not None:
             return straight
-        own, axes = self.source.original[:, None, None], self.source.location_axes
-        now = body_poses(self.seen[:, None, None], own, None if axes is None else axes[None], self.source)[0]
+        original, axes = self.source.original[:, None, None], self.source.location_axes
+        now = body_poses(self.seen[:, None, None], original, None if axes is None else axes[None], self.source)[0]
         ways = Poses(
             np.concatenate((now.positions, towards.positions)),
             np.concatenate((now.quaternions, towards.quaternions)),

@@ -146,16 +146,19 @@ class InsertedKeys:
         for binding, before, source in changes:
             if (old := _before_insertion(before, source)) is not None:
                 for user in self._by_precedence(binding):
-                    data, own = user.animated.animation_data, frame
+                    data, action_frame = user.animated.animation_data, frame
                     if data.use_tweak_mode:
-                        own = data.nla_tweak_strip_time_to_scene(frame, invert=True)
-                    if _is_inserted(old, source, own):
-                        result.append((binding, user, old, source, own))
-        had = values_of([old for _, _, old, *_ in result], [old.held(np.array([own])) for _, _, old, _, own in result])
-        for (binding, user, old, source, own), values in zip(result, had, strict=True):
+                        action_frame = data.nla_tweak_strip_time_to_scene(frame, invert=True)
+                    if _is_inserted(old, source, action_frame):
+                        result.append((binding, user, old, source, action_frame))
+        had = values_of(
+            [old for _, _, old, *_ in result],
+            [old.held(np.array([action_frame])) for _, _, old, _, action_frame in result],
+        )
+        for (binding, user, old, source, action_frame), values in zip(result, had, strict=True):
             posed = self._posed.get(_identity(user))
             posed = posed if posed is not None and posed.frame == frame else None
-            self._new[binding].append(_NewKey(user, posed, old, source, own, values[:, 0]))
+            self._new[binding].append(_NewKey(user, posed, old, source, action_frame, values[:, 0]))
 
     def _by_precedence(self, binding: Binding) -> list[Transform]:
         """Return the users of a slot that a key may be of: first what was posed by hand, or else what is active."""
@@ -323,7 +326,7 @@ def _is_inserted(old: Source, new: Source, frame: float) -> bool:
 
 def _is_same(source: Source, components: np.ndarray, others: np.ndarray) -> bool:
     """Return whether these are the same components (10,), as far as they are keyed."""
-    rows = [row for own, _ in source.channels for row in own]
+    rows = [row for keyed_rows, _ in source.channels for row in keyed_rows]
     return bool(np.all(np.abs(components - others)[rows] <= TOLERANCE * np.maximum(1.0, np.abs(others[rows]))))
 
 

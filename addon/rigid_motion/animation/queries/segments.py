@@ -132,10 +132,10 @@ def is_blended(transform: Transform) -> bool:
     data = transform.animated.animation_data
     if not transform.has_difference_slot or data is None or not len(data.nla_tracks):
         return False
-    own = {
+    slots = {
         (binding.slot.action, binding.slot.handle) for binding in bindings_for(transform) if recorded_digest(binding)
     }
-    if (data.action, data.action_slot_handle) in own:
+    if (data.action, data.action_slot_handle) in slots:
         below = any(track.strips for track in data.nla_tracks)
         if below and (data.action_influence < 1.0 or data.action_blend_type != "REPLACE"):
             return True
@@ -143,8 +143,8 @@ def is_blended(transform: Transform) -> bool:
     return any(
         strip.blend_in or strip.blend_out or strip.use_animated_influence or strip.blend_type != "REPLACE"
         for strip in strips
-        if (strip.action, strip.action_slot_handle) in own
-    ) or bool(own and any(strip.type == "TRANSITION" for strip in strips))
+        if (strip.action, strip.action_slot_handle) in slots
+    ) or bool(slots and any(strip.type == "TRANSITION" for strip in strips))
 
 
 def has_edited_differences(transform: Transform, frame: float) -> bool:

@@ -22,27 +22,27 @@ def channel_values(
 
     `added` is what modifiers add to the channels, shape (10, m), where that is to be in the values as well.
     """
-    own, channels = source.original, {}
+    original, channels = source.original, {}
     poses = motion.desired if added is None else _with_added(source, motion, added)
     shown = source.held(motion.frames)
     first = source.values_at(shown[:1])[:, 0]
     if LOCATION in source.keyed:
         axes = source.location_axes
-        channels["location"] = (poses.positions if axes is None else poses.positions @ axes) - own[:3]
+        channels["location"] = (poses.positions if axes is None else poses.positions @ axes) - original[:3]
     if ROTATION in source.keyed:
         # In the sign and the turn that the animator's first key has.
-        quaternions = align_signs(multiply(conjugate(own[3:7]), poses.quaternions))
+        quaternions = align_signs(multiply(conjugate(original[3:7]), poses.quaternions))
         if source.order is None:
             channels[transform.rotation] = quaternions * (-1.0 if first[3:7] @ quaternions[0] < 0.0 else 1.0)
         else:
             angles = extrinsic_eulers_from_quaternions(quaternions, source.order)
             channels[transform.rotation] = _beginning_near(first[3:6], angles, source.order)
-    if poses.scales is not None and own[7:].mean() != 0.0:
+    if poses.scales is not None and original[7:].mean() != 0.0:
         # Where Blender's own in-betweens stay, each axis may go its own way from key to key.
         segments = np.searchsorted(source.key_frames, shown, side="right") - 1
         is_even = source.modes[np.clip(segments, 0, len(source.modes) - 1)] > 0
         native = source.values_at(shown)[7:].T
-        channels["scale"] = np.where(is_even[:, None], poses.scales[:, None] / own[7:].mean(), native)
+        channels["scale"] = np.where(is_even[:, None], poses.scales[:, None] / original[7:].mean(), native)
     # What is left alone before and behind goes on from the animator's values, whatever sign or turn they are in.
     keys, ends = source.keyed_frames, source.values_at(motion.frames[[0, -1]]).T
     for end, goes_on in (
@@ -74,17 +74,17 @@ def components_near(source: Source, pose: Poses, near: np.ndarray) -> np.ndarray
 
     The rotation is in the sign and the turn that `near` (10,) has, and so is the scale that the modes leave to Blender.
     """
-    own, result = source.original, near.copy()
+    original, result = source.original, near.copy()
     axes = np.eye(3) if source.location_axes is None else source.location_axes
-    result[:3] = (pose.positions @ axes)[0] - own[:3]
-    quaternion = multiply(conjugate(own[3:7]), pose.quaternions)
+    result[:3] = (pose.positions @ axes)[0] - original[:3]
+    quaternion = multiply(conjugate(original[3:7]), pose.quaternions)
     if source.order is None:
         result[3:7] = quaternion[0] * (-1.0 if quaternion[0] @ near[3:7] < 0.0 else 1.0)
     else:
         angles = extrinsic_eulers_from_quaternions(quaternion, source.order)
         result[3:6] = _beginning_near(near[3:6], angles, source.order)[0]
-    if pose.scales is not None and own[7:].mean() != 0.0:
-        result[7:] = pose.scales / own[7:].mean()
+    if pose.scales is not None and original[7:].mean() != 0.0:
+        result[7:] = pose.scales / original[7:].mean()
     return result
 
 

@@ -56,7 +56,9 @@ def corners(source: Source, samples: Mapping[int, np.ndarray], layout: Layout, n
     left = np.delete(errors, chosen)
     knots = _knots(keys[chosen], at[chosen] + layout.first, layout)
     pieces = {row: list(_pieces(knots, lack[chosen], layout)) for row, lack in zip(rows, lacks, strict=True)}
-    return Corners({row: own for row, own in pieces.items() if own}, float(left.max(initial=0.0)))
+    return Corners(
+        {row: pieces_of_row for row, pieces_of_row in pieces.items() if pieces_of_row}, float(left.max(initial=0.0))
+    )
 
 
 def _keys(source: Source, layout: Layout) -> np.ndarray:
@@ -84,10 +86,10 @@ def _at_keys(source: Source, rows: list[int], near: np.ndarray) -> np.ndarray:
     angles = extrinsic_eulers_from_quaternions(original[None, ROWS[ROTATION]], source.order)[0]
     # The same rotation by other angles.
     others = np.where(np.arange(3) == "XYZ".index(source.order[1]), np.pi - angles, angles + np.pi)
-    own = [row - ROWS[ROTATION].start for row in np.array(rows)[turning]]
+    axes = [row - ROWS[ROTATION].start for row in np.array(rows)[turning]]
     candidates = []
     for candidate in (angles, others):
-        turned = candidate[own, None]
+        turned = candidate[axes, None]
         candidates.append(turned + FULL_TURN * np.rint((near[turning] - turned) / FULL_TURN))
     apart = [np.abs(candidate - near[turning]).max(axis=0) for candidate in candidates]
     result[turning] = np.where(apart[0] <= apart[1], *candidates)

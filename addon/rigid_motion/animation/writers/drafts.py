@@ -28,11 +28,11 @@ def begin_drafts(readings: Sequence[tuple[Binding, Source]]) -> None:
     for binding, source in readings:
         if binding.kind.has_difference_slot:
             apart[binding.slot.action].append((binding, source))
-    for action, own in apart.items():
+    for action, large in apart.items():
         if not is_draft(action):
-            longest = max(last - first for first, last in (source.frame_range for _, source in own))
-            if max(len(own), len(action.rigid_motion.slots)) * longest >= LARGE:
-                _begin_draft(action, [binding for binding, _ in own])
+            longest = max(last - first for first, last in (source.frame_range for _, source in large))
+            if max(len(large), len(action.rigid_motion.slots)) * longest >= LARGE:
+                _begin_draft(action, [binding for binding, _ in large])
 
 
 def _begin_draft(action: bpy.types.Action, known: Iterable[Binding]) -> None:

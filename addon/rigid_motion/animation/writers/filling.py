@@ -68,7 +68,7 @@ def fill_in(readings: Sequence[tuple[Binding, Source]], *, in_draft: bool = Fals
             binding,
             {channels[row]: layout.points(points) for row, points in samples.items()},
             layout,
-            {channels[row]: own for row, own in pieces.items()},
+            {channels[row]: points for row, points in pieces.items()},
         )
         _tag(binding)
         if not samples:

@@ -110,11 +110,11 @@ def _time_seen_from(binding: Binding, other: Binding, rig: bpy.types.Object) -> 
     where there is no one time.
     """
     line = next((_line_of(fcurve) for fcurve in (time_of(other),) if fcurve is not None), None)
-    own, others = (_frames_of(rig, item.slot) for item in (binding, other))
-    if line is None or own is None or others is None:
+    frames, others = (_frames_of(rig, item.slot) for item in (binding, other))
+    if line is None or frames is None or others is None:
         return 0.0, 0.0
     # From this Action's frames to the scene's, on to the other's, and on to its time.
-    (begin, speed), (other_begin, other_speed), (time, rate) = own, others, line
+    (begin, speed), (other_begin, other_speed), (time, rate) = frames, others, line
     return (
         time + rate * (begin - other_begin) / other_speed,
         rate * speed / other_speed,
