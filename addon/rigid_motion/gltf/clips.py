@@ -159,7 +159,7 @@ class ClipReduction:
         best, farthest = [], np.inf
         for weight in FEET_WEIGH:
             weights = np.ones((len(self.world.moving), len(self.world.times)))
-            weights[self.feet.places] += (weight - 1.0) * self.feet.stand
+            weights[self.feet.rows] += (weight - 1.0) * self.feet.stand
             keys = search.so_many_key_poses(count, weights)
             tracks = self._stored([keys] * len(self.dense))
             farther = self.feet.farther(self._shown(tracks))
@@ -197,9 +197,9 @@ class ClipReduction:
 
         What moves least by its own rotation comes first.
         """
-        reaches, places = self.world.reaches, self.world.places
+        reaches, rows = self.world.reaches, self.world.rows
         turned = [target for target in (*self.dense, *self.settled) if target[1] == ROTATION]
-        turned.sort(key=lambda target: reaches[places[target[0]]])
+        turned.sort(key=lambda target: reaches[rows[target[0]]])
 
         def taken(count: int) -> float:
             integers, times = frozenset(turned[:count]), self.world.times
@@ -221,7 +221,7 @@ class ClipReduction:
 
     def _samples(self, keys: Sequence[SeparateKeys]) -> list[np.ndarray]:
         """Those that are keys of each dense track."""
-        of_nodes = [(path, keys[self.world.places[node]]) for node, path in self.dense]
+        of_nodes = [(path, keys[self.world.rows[node]]) for node, path in self.dense]
         return [own.rotation if path == ROTATION else own.location for path, own in of_nodes]
 
     def _proven(self, samples: list[np.ndarray]) -> tuple[list[StoredTrack], float] | None:
@@ -232,47 +232,47 @@ class ClipReduction:
         sound: dict[int, tuple[int, float]] = {}
         for _ in range(ROUNDS):
             tracks = self._stored(samples)
-            places, eighths = self._failures(self._shown(tracks), sound)
-            if not len(places):
+            rows, eighths = self._failures(self._shown(tracks), sound)
+            if not len(rows):
                 return tracks, max(error for _, error in sound.values())
-            samples = self._with_more(samples, places, eighths)
+            samples = self._with_more(samples, rows, eighths)
         return None
 
     def _failures(self, tracks: Tracks, sound: dict[int, tuple[int, float]]) -> tuple[np.ndarray, np.ndarray]:
-        """Where tracks break what is promised: places of nodes, and eighths of moments.
+        """Where tracks break what is promised: rows of nodes, and eighths of moments.
 
         What is quickly seen comes first, and hides the rest. Of stretches that are sound, their digest and their
         largest error are noted: they are not looked at again for as long as they stay the same.
         """
         world = self.world
-        places, samples = self.feet.slips(tracks, MORE_SLIDE * self.size)
-        if len(places):
-            return places, PARTS * samples
+        rows, samples = self.feet.slips(tracks, MORE_SLIDE * self.size)
+        if len(rows):
+            return rows, PARTS * samples
         failures = [(NOWHERE, NOWHERE)]
         for number, digest in enumerate(world.digests(tracks)):
             if number in sound and sound[number][0] == digest:
                 continue
             for parts in (1, PARTS):
-                error, places, numbers = world.worst(tracks, self.tolerance, parts=parts, among=(number,))
-                if len(places):
-                    failures.append((places, PARTS // parts * numbers))
+                error, rows, numbers = world.worst(tracks, self.tolerance, parts=parts, among=(number,))
+                if len(rows):
+                    failures.append((rows, PARTS // parts * numbers))
                     break
             else:
                 sound[number] = digest, error
-        all_places, all_numbers = map(np.concatenate, zip(*failures, strict=True))
-        return all_places, all_numbers
+        all_rows, all_numbers = map(np.concatenate, zip(*failures, strict=True))
+        return all_rows, all_numbers
 
-    def _with_more(self, samples: list[np.ndarray], places: np.ndarray, eighths: np.ndarray) -> list[np.ndarray]:
-        """Return samples with those around some eighths, for the nodes at these places and all that they hang on."""
+    def _with_more(self, samples: list[np.ndarray], rows: np.ndarray, eighths: np.ndarray) -> list[np.ndarray]:
+        """Return samples with those around some eighths, for the nodes of these rows and all that they hang on."""
         desired = np.zeros((len(self.world.moving), len(self.world.times)), dtype=bool)
-        desired[places, eighths // PARTS] = desired[places, -(-eighths // PARTS)] = True
-        for place in range(len(desired) - 1, -1, -1):
-            if (parent := self.world.parents[place]) >= 0:
-                desired[parent] |= desired[place]
+        desired[rows, eighths // PARTS] = desired[rows, -(-eighths // PARTS)] = True
+        for row in range(len(desired) - 1, -1, -1):
+            if (parent := self.world.parents[row]) >= 0:
+                desired[parent] |= desired[row]
         if self.options.shared:
             desired[:] = desired.any(axis=0)
         ends = (0, len(self.world.times) - 1)
-        more = [np.flatnonzero(desired[self.world.places[node]]) for node, _ in self.dense]
+        more = [np.flatnonzero(desired[self.world.rows[node]]) for node, _ in self.dense]
         return [
             np.union1d(own, (*ends, *new)).astype(np.int64) if len(new) else own
             for own, new in zip(samples, more, strict=True)

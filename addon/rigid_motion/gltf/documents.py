@@ -175,21 +175,21 @@ def read_document(path: Path, *, in_memory: bool = False) -> Document:
 def chunks_of(content: bytes | FileBytes) -> tuple[tuple[bytes, bytes | FileBytes], ...]:
     """Return the kinds and contents of all chunks of a GLB file, the JSON among them."""
     result: list[tuple[bytes, bytes | FileBytes]] = []
-    place, whole = 12, len(content)
-    if whole >= place:
+    offset, whole = 12, len(content)
+    if whole >= offset:
         version, length = struct.unpack("<II", bytes(content[4:12]))
         if version != 2:
             raise GltfError(f"this is GLB {version}, and 2 is known", "export it as glTF 2.0")
         if length > whole:
             raise GltfError(f"{whole} of {length} bytes are here", "copy the file again, or export it anew")
         whole = length
-    while place + 8 <= whole:
-        length, kind = struct.unpack("<I4s", bytes(content[place : place + 8]))
-        place += 8
-        if place + length > whole:
+    while offset + 8 <= whole:
+        length, kind = struct.unpack("<I4s", bytes(content[offset : offset + 8]))
+        offset += 8
+        if offset + length > whole:
             raise GltfError("a part of this file is longer than the whole")
-        result.append((kind, content[place : place + length]))
-        place += length
+        result.append((kind, content[offset : offset + length]))
+        offset += length
     if JSON_CHUNK not in [kind for kind, _ in result]:
         raise GltfError("this GLB holds no JSON")
     return tuple(result)

@@ -70,15 +70,15 @@ class World:
     """The moments between which all tracks run evenly, shape (m,)."""
 
     @cached_property
-    def places(self) -> dict[int, int]:
-        """Where each node is among those that move."""
-        return {node: place for place, node in enumerate(self.moving.tolist())}
+    def rows(self) -> dict[int, int]:
+        """The row of each node among those that move."""
+        return {node: row for row, node in enumerate(self.moving.tolist())}
 
     @cached_property
     def parents(self) -> np.ndarray:
-        """The place of each node's parent, -1 where that does not move, shape (n,)."""
+        """The row of each node's parent, -1 where that does not move, shape (n,)."""
         above = self.nodes.parents[self.moving].tolist()
-        return np.array([self.places.get(parent, -1) for parent in above], dtype=np.int64)
+        return np.array([self.rows.get(parent, -1) for parent in above], dtype=np.int64)
 
     @cached_property
     def stretches(self) -> list[slice]:
@@ -134,9 +134,9 @@ class World:
     def _above(self, lengths: np.ndarray) -> np.ndarray:
         """Those of nodes' parents, where these are of the nodes, shape (n, ..., 3)."""
         result = lengths[self.parents]
-        for place in np.flatnonzero(self.parents < 0).tolist():
-            parent = self.nodes.parents[self.moving[place]]
-            result[place] = np.linalg.norm(self.nodes.resting.axes[parent], axis=-2) if parent >= 0 else 1.0
+        for row in np.flatnonzero(self.parents < 0).tolist():
+            parent = self.nodes.parents[self.moving[row]]
+            result[row] = np.linalg.norm(self.nodes.resting.axes[parent], axis=-2) if parent >= 0 else 1.0
         return result
 
     @cached_property
@@ -171,9 +171,9 @@ class World:
     def reaches(self) -> np.ndarray:
         """How far what hangs on each node is from it at most, with the balls around it, shape (n,); an upper bound."""
         result, away = self.radii.copy(), self._extremes[2]
-        for place in range(len(result) - 1, -1, -1):
-            if (parent := self.parents[place]) >= 0:
-                result[parent] = max(result[parent], away[place] + result[place])
+        for row in range(len(result) - 1, -1, -1):
+            if (parent := self.parents[row]) >= 0:
+                result[parent] = max(result[parent], away[row] + result[row])
         return result
 
     def largest_error(self, shown: Tracks, *, parts: int = PARTS) -> float:
@@ -188,10 +188,10 @@ class World:
         Returns
         -------
         largest : float
-        places, numbers : array, shape (k,)
+        rows, numbers : array, shape (k,)
             Of nodes, and of the times.
         """
-        largest, places, numbers = 0.0, [NOWHERE], [NOWHERE]
+        largest, rows, numbers = 0.0, [NOWHERE], [NOWHERE]
         for block in self.seen(shown, self.truth, parts=parts, among=among):
             there, truth = (AffineMaps(some.axes @ self._to_balls, some.origins) for some in block.maps)
             bounds = displacement_bound(there, truth, self.radii[:, None])
@@ -206,10 +206,10 @@ class World:
                 largest = max(largest, float(np.max(errors.flat[some])))
             padded = np.pad(errors, ((0, 0), (1, 1)))
             peaks = (errors > tolerance) & (errors >= padded[:, :-2]) & (errors >= padded[:, 2:])
-            place, number = np.nonzero(peaks)
-            places.append(place)
+            row, number = np.nonzero(peaks)
+            rows.append(row)
             numbers.append(number + block.first)
-        return largest, np.concatenate(places), np.concatenate(numbers)
+        return largest, np.concatenate(rows), np.concatenate(numbers)
 
     def _displacements(self, there: AffineMaps, truth: AffineMaps, some: np.ndarray) -> np.ndarray:
         """Those of some of the balls, by their numbers, in the shape of these."""

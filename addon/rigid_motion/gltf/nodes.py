@@ -55,9 +55,9 @@ class Nodes:
         """Return what a track of the node's takes the place of, shape (width,)."""
         if path in self.rest:
             return self.rest[path][node]
-        own = self.document.json["nodes"][node]
-        mesh = entry(self.document.json, "meshes", own["mesh"]) if "mesh" in own else {}
-        return np.array(own.get("weights", mesh.get("weights", ())), dtype=np.float64)
+        described = self.document.json["nodes"][node]
+        mesh = entry(self.document.json, "meshes", described["mesh"]) if "mesh" in described else {}
+        return np.array(described.get("weights", mesh.get("weights", ())), dtype=np.float64)
 
     def below(self, moved: np.ndarray) -> np.ndarray:
         """Return the nodes that move where these (m,) do, parents before their children, shape (n,)."""
@@ -88,8 +88,8 @@ class Nodes:
             result[node] = local if above is None else above @ local
         shape = (len(nodes), len(times))
         axes, origins = np.empty((*shape, 3, 3)), np.empty((*shape, 3))
-        for place, node in enumerate(nodes.tolist()):
-            axes[place], origins[place] = result[node].axes, result[node].origins
+        for row, node in enumerate(nodes.tolist()):
+            axes[row], origins[row] = result[node].axes, result[node].origins
         return AffineMaps(axes, origins)
 
     def _local(self, node: int, tracks: Tracks, times: np.ndarray) -> AffineMaps:

@@ -119,10 +119,10 @@ class _Rewriting:
 
     def _views_without(self, unused: set[int], of_animations: set[int]) -> set[int]:
         """Return the views that animations alone use, and some of which they use no more."""
-        places = [(container, container[key]) for container, key in _view_slots(self.json)]
+        uses = [(container, container[key]) for container, key in _view_slots(self.json)]
         owned = {view for number in of_animations for view in _views_of(self.accessors[number])}
         counted = dict.fromkeys(owned, 0)
-        for _, view in places:
+        for _, view in uses:
             if view in counted:
                 counted[view] += 1
         for number in of_animations:
@@ -259,21 +259,21 @@ def _range(view: Json) -> Range:
 
 def _cuts(removed: list[Range], kept: list[Range]) -> list[Range]:
     """Return what can go out of a buffer: ranges without those that stay, aligned, rising."""
-    edges = sorted({place for some in (removed, kept) for item in some for place in item})
+    edges = sorted({offset for some in (removed, kept) for item in some for offset in item})
     if not edges:
         return []
-    places = np.array(edges)
+    offsets = np.array(edges)
     counts = np.zeros((2, len(edges)), dtype=np.int64)
     for row, some in enumerate((removed, kept)):
         for first, end in some:
-            counts[row, np.searchsorted(places, first)] += 1
-            counts[row, np.searchsorted(places, end)] -= 1
+            counts[row, np.searchsorted(offsets, first)] += 1
+            counts[row, np.searchsorted(offsets, end)] -= 1
     goes, stays = np.cumsum(counts, axis=1) > 0
     free = goes & ~stays
     # Padding between two ranges that go, which nothing names, goes with them.
-    free[1:-1] |= ~stays[1:-1] & free[:-2] & free[2:] & (np.diff(places)[1:] < ALIGNED)
+    free[1:-1] |= ~stays[1:-1] & free[:-2] & free[2:] & (np.diff(offsets)[1:] < ALIGNED)
     result: list[Range] = []
-    for first, end in zip(places[:-1][free[:-1]].tolist(), places[1:][free[:-1]].tolist(), strict=True):
+    for first, end in zip(offsets[:-1][free[:-1]].tolist(), offsets[1:][free[:-1]].tolist(), strict=True):
         if result and result[-1][1] == first:
             first = result.pop()[0]
         result.append((first, end))

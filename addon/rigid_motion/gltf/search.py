@@ -73,8 +73,8 @@ class Search:
         world, times = self.world, self.world.times[samples]
         shape = (len(world.moving), len(times))
         positions, quaternions = np.empty((*shape, 3)), np.empty((*shape, 4))
-        for place, node in enumerate(world.moving.tolist()):
-            positions[place], quaternions[place] = _pose(world, self.tracks, node, times)
+        for row, node in enumerate(world.moving.tolist()):
+            positions[row], quaternions[row] = _pose(world, self.tracks, node, times)
         return Poses(positions * world.lengths_above(times), align_signs(quaternions))
 
 

@@ -45,7 +45,7 @@ def moments(world: World, clip: Clip, tolerance: float) -> np.ndarray:
                 # A spline that passes near 0 comes out on the other side: nearly a whole turn in no time.
                 halved |= (cosines if track.interpolation == CUBICSPLINE else np.abs(cosines)) < np.cos(WIDE / 2)
             if track.interpolation == CUBICSPLINE and reaches is not None:
-                reach = 1.0 if track.path not in (ROTATION, SCALE) else 2.0 * reaches[world.places[track.node]]
+                reach = 1.0 if track.path not in (ROTATION, SCALE) else 2.0 * reaches[world.rows[track.node]]
                 halved |= _bows(track, times, values) * reach > BOW * tolerance
         middles = ((times[:-1] + times[1:]) / 2)[halved].astype(np.float32).astype(np.float64)
         more = np.union1d(times, middles)
@@ -83,7 +83,7 @@ class _Settling:
         curved = track.interpolation == CUBICSPLINE
         self.times = np.union1d(world.times, track.times) if curved else track.times
         self.values = track.at(self.times)
-        self.place = world.places.get(track.node, -1)
+        self.row = world.rows.get(track.node, -1)
 
     @property
     def rests(self) -> bool:
@@ -102,7 +102,7 @@ class _Settling:
         """How far off the numbers of scales or weights may be."""
         if self.track.path == WEIGHTS:
             return WITHIN_WEIGHTS
-        return OF_SCALES * self.tolerance / self.world.reaches[self.place] * float(np.abs(self.values).max())
+        return OF_SCALES * self.tolerance / self.world.reaches[self.row] * float(np.abs(self.values).max())
 
     def _is_at(self, value: np.ndarray) -> bool:
         if self.track.path == WEIGHTS:
@@ -111,13 +111,13 @@ class _Settling:
 
     def _displacements(self, value: np.ndarray) -> np.ndarray:
         """How far what hangs on the node is moved at most from where one value has it, shape (m,)."""
-        values, reach = self.values, self.world.reaches[self.place]
+        values, reach = self.values, self.world.reaches[self.row]
         if self.track.path == ROTATION:
             # Of both signs, for noise is smaller than what is left of 1 less a cosine.
             return 2.0 * reach * np.minimum(*(np.linalg.norm(values + sign * value, axis=1) for sign in (1.0, -1.0)))
         if self.track.path == SCALE:
             return reach * np.abs(values / np.where(value == 0.0, 1.0, value) - 1.0).max(axis=1)
-        return np.linalg.norm(values - value, axis=1) * self.world.longest_above[self.place]
+        return np.linalg.norm(values - value, axis=1) * self.world.longest_above[self.row]
 
 
 def _bows(track: Track, times: np.ndarray, values: np.ndarray) -> np.ndarray:

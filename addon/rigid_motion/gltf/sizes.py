@@ -52,14 +52,14 @@ def radii_of(nodes: Nodes, moved: np.ndarray, size: float) -> np.ndarray:
     Of a mesh it is that of the mesh, of what looks or shines the size of the whole, and of all else a share of it.
     """
     document, result = nodes.document, np.full(len(moved), SHELL * size)
-    for place, node in enumerate(moved.tolist()):
+    for row, node in enumerate(moved.tolist()):
         own = document.json["nodes"][node]
         corners = corners_of(document, node)
         if corners is not None:
             away = nodes.resting[node].at(corners) - nodes.resting.origins[node]
-            result[place] = np.linalg.norm(away, axis=1).max()
+            result[row] = np.linalg.norm(away, axis=1).max()
         elif "camera" in own or "KHR_lights_punctual" in own.get("extensions", {}):
-            result[place] = size
+            result[row] = size
     return result
 
 
@@ -86,5 +86,5 @@ def _bounds(document: Document, primitive: Json) -> tuple[np.ndarray, np.ndarray
     accessor = entry(document.json, "accessors", position)
     if "min" in accessor and "max" in accessor and not accessor.get("normalized"):
         return np.array(accessor["min"], dtype=np.float64), np.array(accessor["max"], dtype=np.float64)
-    places = numbers(document, position)
-    return places.min(axis=0), places.max(axis=0)
+    positions = numbers(document, position)
+    return positions.min(axis=0), positions.max(axis=0)

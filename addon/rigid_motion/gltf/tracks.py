@@ -159,24 +159,24 @@ def _clip(document: Document, number: int) -> Clip:
     name = name if isinstance(name, str) and name else f"animation {number}"
     tracks, targets = [], set()
     times: dict[int, np.ndarray] = {}
-    for place, channel in enumerate(objects(animation, "channels")):
+    for index, channel in enumerate(objects(animation, "channels")):
         target = channel.get("target")
         if not isinstance(target, dict):
-            raise GltfError(f"{shown(name)}: channel {place} has no target")
+            raise GltfError(f"{shown(name)}: channel {index} has no target")
         if "node" not in target or target.get("path") not in PATHS:
             continue
         try:
-            track = _track(document, animation, place, channel, times)
+            track = _track(document, animation, index, channel, times)
         except GltfError as error:
-            raise GltfError(f"{shown(name)}: channel {place}: {error.problem}", error.way_out) from None
+            raise GltfError(f"{shown(name)}: channel {index}: {error.problem}", error.way_out) from None
         if (track.node, track.path) in targets:
-            raise GltfError(f"{shown(name)}: channel {place} is the second {track.path} of node {track.node}")
+            raise GltfError(f"{shown(name)}: channel {index} is the second {track.path} of node {track.node}")
         targets.add((track.node, track.path))
         tracks.append(track)
     return Clip(number, name, tuple(tracks))
 
 
-def _track(document: Document, animation: Json, place: int, channel: Json, known: dict[int, np.ndarray]) -> Track:
+def _track(document: Document, animation: Json, index: int, channel: Json, known: dict[int, np.ndarray]) -> Track:
     """Return a channel as a track, with the times that are known of the accessor, or that are so from now on."""
     node, path = channel["target"]["node"], channel["target"]["path"]
     moved = entry(document.json, "nodes", node)
@@ -199,7 +199,7 @@ def _track(document: Document, animation: Json, place: int, channel: Json, known
         raise GltfError("it has numbers that are too large")
     shape: tuple[int, ...] = (3, width) if interpolation == CUBICSPLINE else (width,)
     rows = Rows(document, sampler["output"], len(times), shape, TO_WXYZ if path == ROTATION else EVERY)
-    track = Track(place, node, path, interpolation, times, rows)
+    track = Track(index, node, path, interpolation, times, rows)
     if path == ROTATION and not np.linalg.norm(track.points, axis=1).all():
         raise GltfError("it has a quaternion of length zero")
     return track

@@ -47,12 +47,12 @@ def largest_displacement(world: World, shown: Tracks) -> float | None:
 
 
 def _of_skin(world: World, shown: Tracks, skin: Skin, least: float) -> float:
-    places = np.array([world.places.get(node, -1) for node in skin.joints.tolist()])
-    moves = places >= 0
+    rows = np.array([world.rows.get(node, -1) for node in skin.joints.tolist()])
+    moves = rows >= 0
     for block in world.seen(shown, world.truth):
-        differences = np.zeros((len(places), len(block.times), 3, 4))
+        differences = np.zeros((len(rows), len(block.times), 3, 4))
         for maps, sign in zip(block.maps, (1.0, -1.0), strict=True):
-            own = maps[places[moves]]
+            own = maps[rows[moves]]
             differences[moves] += sign * np.concatenate((own.axes, own.origins[..., None]), axis=-1)
         least = _largest(np.einsum("jmab,jbc->jmac", differences, skin.inverse), skin, least)
     return least
@@ -109,10 +109,10 @@ def _attributes(document: Document, primitive: Json) -> tuple[np.ndarray, np.nda
     attributes = primitive["attributes"]
     if DRACO in primitive.get("extensions", {}) or "POSITION" not in attributes:
         raise GltfError("this mesh is compressed")
-    places = numbers(document, attributes["POSITION"])
+    positions = numbers(document, attributes["POSITION"])
     sets = [number for number in range(len(attributes)) if f"JOINTS_{number}" in attributes]
     carriers = np.concatenate([raw_numbers(document, attributes[f"JOINTS_{number}"]) for number in sets], axis=1)
     raw = [raw_numbers(document, attributes[f"WEIGHTS_{number}"]) for number in sets]
     shares = np.concatenate([part if part.dtype.kind == "f" else denormalised(part) for part in raw], axis=1)
     shares = shares / np.maximum(shares.sum(axis=1, keepdims=True), np.finfo(np.float32).tiny)
-    return np.column_stack((places, np.ones(len(places)))), carriers.astype(np.int64), shares
+    return np.column_stack((positions, np.ones(len(positions)))), carriers.astype(np.int64), shares

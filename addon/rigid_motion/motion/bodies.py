@@ -105,9 +105,9 @@ class Body:
         result = balls.copy()
         with_more = [(joint, self.skeleton.below(joint)) for joint in np.flatnonzero(self.skeleton.sizes > 1).tolist()]
         for some in self._blocks:
-            places = components(self.truth.positions[:, some])
+            positions = components(self.truth.positions[:, some])
             for joint, below in with_more:
-                away = places[:, below] - places[:, [joint]]
+                away = positions[:, below] - positions[:, [joint]]
                 away *= away
                 reached = np.sqrt(away[0] + away[1] + away[2]) + balls[below, some]
                 result[joint, some] = reached.max(axis=0)

@@ -169,14 +169,14 @@ class Poses:
             uneven = np.abs(np.einsum("...ij,...ik->...jk", rotations, rotations) - np.eye(3)).max(axis=(-2, -1))
             wrong = (scales <= 0.0) | (uneven > UNEVEN)
             if wrong.any():
-                place = tuple(map(int, np.argwhere(wrong)[0]))
-                if scales[place] < 0.0:
+                index = tuple(map(int, np.argwhere(wrong)[0]))
+                if scales[index] < 0.0:
                     fault = "mirrors"
-                elif scales[place] == 0.0:
+                elif scales[index] == 0.0:
                     fault = "has no scale"
                 else:
                     fault = "shears or scales unevenly"
-                raise ValueError(f"the matrix at {place[0] if len(place) == 1 else place} {fault}, which no pose does")
+                raise ValueError(f"the matrix at {index[0] if len(index) == 1 else index} {fault}, which no pose does")
             scaled = (np.abs(scales - 1.0) > UNSCALED).any()
             return cls(matrices[..., :3, 3], from_matrices(rotations), scales if scaled else None)
 

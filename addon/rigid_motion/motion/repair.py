@@ -186,10 +186,10 @@ def rising(times: np.ndarray) -> np.ndarray:
     lasts: list[tuple[float, int]] = []
     before = np.full(len(times), -1)
     for row, time in enumerate(times.tolist()):
-        place = bisect_left(lasts, (time, row))
-        if place:
-            before[row] = lasts[place - 1][1]
-        lasts[place : place + 1] = [(time, row)]
+        index = bisect_left(lasts, (time, row))
+        if index:
+            before[row] = lasts[index - 1][1]
+        lasts[index : index + 1] = [(time, row)]
     kept = np.zeros(len(times), dtype=bool)
     row = lasts[-1][1]
     while row >= 0:

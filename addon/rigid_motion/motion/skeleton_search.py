@@ -87,8 +87,8 @@ class OwnKeys:
         """Note and show the keys of joints that were tracks."""
         count = len(self.body.times)
         bounds = np.searchsorted(keys.indices, count * np.arange(len(joints) + 1))
-        for place, joint in enumerate(joints.tolist()):
-            self._show(joint, keys.indices[bounds[place] : bounds[place + 1]] - count * place)
+        for number, joint in enumerate(joints.tolist()):
+            self._show(joint, keys.indices[bounds[number] : bounds[number + 1]] - count * number)
 
     def _show(self, joint: int, keys: np.ndarray) -> None:
         self.keys[joint] = keys
@@ -108,7 +108,7 @@ class OwnKeys:
         if len(joints):
             count = len(self.body.times)
             search = Search(self._level(joints) if rests.any() else level)
-            tracks = [count * place + self.keys[joint] for place, joint in enumerate(joints.tolist())]
+            tracks = [count * number + self.keys[joint] for number, joint in enumerate(joints.tolist())]
             self._take(joints, search.refined(search.thinned(search.measured(np.concatenate(tracks)), 1.0)))
 
     @property

@@ -102,8 +102,8 @@ class Skeleton:
         return sizes
 
     @cached_property
-    def _places(self) -> tuple[np.ndarray, np.ndarray]:
-        """The place of each joint, (joints,), in an order that has all that hangs on a joint behind it, and that."""
+    def _depth_first(self) -> tuple[np.ndarray, np.ndarray]:
+        """The rank of each joint, (joints,), in an order that has all that hangs on a joint behind it, and that."""
         first, order = np.zeros(len(self), dtype=np.int64), np.empty(len(self), dtype=np.int64)
         for joints in self.levels:
             parents = self.parents[joints]
@@ -117,7 +117,7 @@ class Skeleton:
 
     def below(self, joint: int) -> np.ndarray:
         """Return a joint and all that hang on it, rising, shape (sizes[joint],)."""
-        first, order = self._places
+        first, order = self._depth_first
         return np.sort(order[first[joint] : first[joint] + self.sizes[joint]])
 
     def longest_chains(self, counts: np.ndarray) -> np.ndarray:
