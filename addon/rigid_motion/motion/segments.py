@@ -277,7 +277,7 @@ def prepare_within(
 ) -> Within:
     """Return what makes poses between keys where each segment says how many are in it, and each how far it is.
 
-    `key_times` and keys are (..., n), at least two a row and with unit quaternions; of each row, the `wanted` segments
+    `key_times` and keys are (..., n), at least two a row and with unit quaternions; of each row, the `desired` segments
     are counted throughout. Progress is 0 at a segment's first key and 1 at its second, and may pass both. Where
     `is_aligned`, the signs of the quaternions say which way round a segment turns, which matters at half a turn.
     """

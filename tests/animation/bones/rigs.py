@@ -189,11 +189,11 @@ def key_desired(
     twin: bpy.types.Object, rig: bpy.types.Object, frames: np.ndarray, bases: dict[str, np.ndarray] | None = None
 ) -> None:
     """Give a twin real keys on all frames, of where each bone of the rig has to be in the space of its channels."""
-    for name, matrices in (bases or wanted_bases(rig, frames)).items():
+    for name, matrices in (bases or expected_basis_matrices(rig, frames)).items():
         write_basis(twin.pose.bones[name], frames, matrices)
 
 
-def wanted_bases(rig: bpy.types.Object, frames: np.ndarray) -> dict[str, np.ndarray]:
+def expected_basis_matrices(rig: bpy.types.Object, frames: np.ndarray) -> dict[str, np.ndarray]:
     """Where each bone has to be in the space of its channels, matrices of (m, 4, 4)."""
     return {pose_bone.name: expected_bases(pose_bone, frames) for pose_bone in rig.pose.bones}
 

@@ -15,7 +15,7 @@ import rigid_motion
 from rigid_motion.animation import bake, reduce_keys_of, refresh, set_mode
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
-from tests.animation.bones.rigs import ARM, FRAMES, PLAYED, Rest, key_all, key_desired, new_rig, wanted_bases
+from tests.animation.bones.rigs import ARM, FRAMES, PLAYED, Rest, key_all, key_desired, new_rig, expected_basis_matrices
 from tests.animation.keyed import snapshot
 from tests.animation.scenes import enabled, push_down
 
@@ -91,7 +91,7 @@ def test_an_export_has_every_mode_in_one_animation_of_the_actions_own_range(expo
 @pytest.mark.parametrize("order", ["QUATERNION", "ZXY"])
 def test_an_fbx_export_that_leaves_keys_out_is_that_of_real_keys(exporter, tmp_path, order):
     rig = every_mode(order)
-    expected = wanted_bases(rig, EXPORTED)
+    expected = expected_basis_matrices(rig, EXPORTED)
     shown = moved(imported("fbx", export("fbx", tmp_path / "mode.fbx")))
     ranges = [tuple(action.curve_frame_range) for action in bpy.data.actions]
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)

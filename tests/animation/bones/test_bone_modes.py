@@ -21,7 +21,7 @@ from tests.animation.bones.rigs import (
     moving_rig,
     new_rig,
     twin_of,
-    wanted_bases,
+    expected_basis_matrices,
     with_edit_bones,
 )
 from tests.animation.keyed import curves_of, key_frames, snapshot
@@ -70,7 +70,7 @@ def test_every_mode_is_exact_in_every_setting_on_every_frame(live_file, order, s
     rig = pairs(order, "even", setting)
     keys = [snapshot(pose_bone) for pose_bone in rig.pose.bones]
     assert {problem_of(pose_bone) for pose_bone in rig.pose.bones} == {""}
-    bases, twin = wanted_bases(rig, PLAYED), twin_of(rig)
+    bases, twin = expected_basis_matrices(rig, PLAYED), twin_of(rig)
     key_desired(twin, rig, PLAYED, bases)
     shown, real = shown_poses([rig, twin], PLAYED)
     assert_same_poses(rig, PLAYED, shown, expected_poses(rig, PLAYED, bases))

@@ -199,9 +199,9 @@ def _portions(sources: Sequence[Source], range_of: dict[int, tuple[int, int]]) -
     alike: dict[tuple, list[Source]] = {}
     for source in sources:
         alike.setdefault((source.order, source.uniform_scale), []).append(source)
-    for kin in alike.values():
+    for group in alike.values():
         portion, samples = [], 0
-        for source in kin:
+        for source in group:
             portion.append(source)
             first, last = range_of[id(source)]
             samples += last - first + 1

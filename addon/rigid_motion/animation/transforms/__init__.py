@@ -1,7 +1,7 @@
 """What is moved: one small interface for whatever has location, rotation and scale, and the kinds that have it.
 
 A transform knows whose Action animates it, on which property its channels are, and where the difference between
-Blender's in-betweens and the wanted ones goes.
+Blender's in-betweens and the desired ones goes.
 
 transform  the interface: channels, and where differences go
 objects    objects, by their delta transforms, or by a constraint where they are to be exact between frames

@@ -1,4 +1,4 @@
-"""From wanted poses back to the values of channels: what keys have to have for the same motion without in-betweens."""
+"""From desired poses back to the values of channels: what keys have to have for the same motion without in-betweens."""
 
 from __future__ import annotations
 
