@@ -15,7 +15,7 @@ import rigid_motion
 from rigid_motion.animation import bake, reduce_keys_of, refresh, set_mode
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
-from tests.animation.bones.rigs import ARM, FRAMES, PLAYED, Rest, key_all, key_desired, new_rig, expected_basis_matrices
+from tests.animation.bones.rigs import ARM, FRAMES, PLAYED, Rest, expected_basis_matrices, key_all, key_desired, new_rig
 from tests.animation.keyed import snapshot
 from tests.animation.scenes import enabled, push_down
 

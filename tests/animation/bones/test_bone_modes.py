@@ -14,6 +14,7 @@ from tests.animation.bones.rigs import (
     ORDERS,
     PLAYED,
     Rest,
+    expected_basis_matrices,
     in_turn,
     key_all,
     key_bone,
@@ -21,7 +22,6 @@ from tests.animation.bones.rigs import (
     moving_rig,
     new_rig,
     twin_of,
-    expected_basis_matrices,
     with_edit_bones,
 )
 from tests.animation.keyed import curves_of, key_frames, snapshot
