@@ -8,7 +8,7 @@ import pytest
 from mathutils import Vector
 
 from rigid_motion import animation
-from rigid_motion.animation import is_reduced, reduce_keys_of, total_reduction, write_channel
+from rigid_motion.animation import is_reduced, reduce_keys_of, reduction_of, total_reduction, write_channel
 from rigid_motion.animation.baking.followers import not_promised
 from rigid_motion.animation.baking.sizes import first_tolerance, reach_of, rig_size
 from rigid_motion.animation.transforms import transform_of
@@ -70,6 +70,14 @@ def test_a_driven_bone_is_named_unless_its_driver_is_muted(live_file):
 
 
 # What is reported
+
+
+def test_the_largest_error_counts_reduced_bones_that_hang_on_a_constraint(live_file):
+    rig = recorded_rig(still=("Root",))
+    rig.pose.bones["Spine"].constraints.new("DAMPED_TRACK")
+    reduce_keys_of(bones(rig, *NAMES[1:]), "motor_spline", TOLERANCE, RADIUS)
+    largest = max(reduction_of(bone).largest_error for bone in bones(rig, *NAMES[1:]))
+    assert total_reduction(bones(rig)).largest_error == largest > 0.0
 
 
 def test_the_largest_error_is_that_of_a_bone_without_keys_where_that_is_off_the_most(live_file):

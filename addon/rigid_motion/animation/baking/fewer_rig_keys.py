@@ -277,11 +277,16 @@ class _Rig:
             self._mix(fewer)
         errors = [self.motion.largest_error(number) for number in range(len(self.motion.bones))]
         excepted = not_promised(self.rig)
-        promised = [error for bone, error in zip(self.motion.bones, errors, strict=True) if bone.name not in excepted]
+        # Of what is not promised, that counts which has fewer keys.
+        counted = [
+            error
+            for number, (bone, error) in enumerate(zip(self.motion.bones, errors, strict=True))
+            if number in fewer or bone.name not in excepted
+        ]
         as_whole = WholeRig(
             len(_united(distinct(source.keyed_frames) for source in fewer.values())),
             *(slide(maps.origins, self.stands) for maps in (self.motion.truth, self.motion.now())),
-            max(promised or errors),
+            max(counted),
             excepted,
         )
         return {
