@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import astuple, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, TypeVar
 
 from rigid_motion_batch.files import replacing
 
@@ -46,14 +46,3 @@ def write_rows(path: Path, kind: type[Row], rows: Iterable[Row]) -> None:
         stream.write(line_of(field.name for field in fields(kind)))
         for row in rows:
             stream.write(line_of(astuple(row)))
-
-
-READERS: dict[str, Callable[[str], Any]] = {"str": meant, "int": int, "float": float}
-
-
-def read_rows(path: Path, kind: type[Row]) -> list[Row]:
-    """Read what `write_rows` wrote."""
-    with path.open(encoding="utf-8", newline="") as stream:
-        lines = list(csv.reader(stream))[1:]
-    readers = [READERS[cast(str, field.type)] for field in fields(kind)]
-    return [kind(*(read(cell) for read, cell in zip(readers, line, strict=True))) for line in lines]
