@@ -61,7 +61,8 @@ def read_radii(text: str) -> Radii:
         With the line of the table, what is wrong, and the way out.
     """
     try:
-        return Radii(rigid=radius_in_metres(text), joint=radius_in_metres(text))
+        radius = radius_in_metres(text)
+        return Radii(rigid=radius, joint=radius)
     except ValueError:
         # Not that of pathlib, for which a name that is too long for a file is an error.
         if not os.path.isfile(text):
@@ -109,7 +110,10 @@ def radius_in_metres(text: str) -> float:
     parts = re.fullmatch(rf"(.*?)\s*({'|'.join(METRES)})?\s*", text, re.DOTALL)
     assert parts is not None  # which any text fits
     number, unit = parts.groups()
-    return _above_zero(float(number) * METRES[unit or "m"])
+    try:
+        return _above_zero(float(number) * METRES[unit or "m"])
+    except ValueError:
+        raise ValueError(f"{text!r} is not a length above 0, such as 3cm or 0.03") from None
 
 
 def _above_zero(radius: float) -> float:

@@ -12,7 +12,7 @@ import argparse
 from dataclasses import dataclass
 from pathlib import Path
 
-from rigid_motion_batch.command_line import not_empty, parser_of, program_of
+from rigid_motion_batch.command_line import not_empty, parser_of, program_of, whole
 from rigid_motion_batch.system_libraries import require_blender
 
 SCRIPT = "reduce.py"
@@ -139,7 +139,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     keys = parser.add_argument_group("keys")
     keys.add_argument(
         "--tolerance",
-        type=_tolerance,
+        type=Tolerance,
         metavar="LENGTH",
         help="largest error on any frame: 5mm, 0.5cm, 0.005m; a plain number is in the unit of the file (in .blend "
         f"files 1mm for objects and {OF_A_BODY:.1%}% of the size of a rig; for recordings {TOLERANCE.written}, with "
@@ -149,14 +149,14 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     keys.add_argument(
         "--keys",
         "--key-poses",
-        type=_count,
+        type=whole("number of keys", 2, MOST),
         metavar="N",
         help="instead of a tolerance: N keys of each object, or N key poses of each rig, where the error is smallest",
     )
     keys.add_argument("--mode", choices=KEYFRAME_MODES, help=f"mode between the keys ({MODE}; glTF knows one)")
     keys.add_argument(
         "--radius",
-        type=_radius,
+        type=radius_in_metres,
         metavar="LENGTH",
         help="how far around the origin no point is off by more: 3cm, or 0.03 for metres (the size of an object, the "
         f"length of a bone; for rigid recordings {RIGID})",
@@ -172,7 +172,10 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     recordings = parser.add_argument_group("recordings")
     recordings.add_argument("--blend", action="store_true", help="also write rigid motions as .blend files")
     recordings.add_argument(
-        "--fps", type=_fps, metavar="N", help="frames a second of .blend and GLB files (the rate of the recording)"
+        "--fps",
+        type=whole("number of frames a second", *RATES),
+        metavar="N",
+        help="frames a second of .blend and GLB files (the rate of the recording)",
     )
     add_reading_options(parser)
     gltf = parser.add_argument_group("glTF files")
@@ -324,29 +327,3 @@ def _is_gltf(path: Path) -> bool:
 
 def _is_result(path: Path) -> bool:
     return path.stem.endswith(GLB_SUFFIX) or is_made(path)
-
-
-def _tolerance(text: str) -> Tolerance:
-    try:
-        return Tolerance(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from None
-
-
-def _count(text: str) -> int:
-    if not (text.isascii() and text.isdigit() and 2 <= int(text) <= MOST):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 2 to {MOST}")
-    return int(text)
-
-
-def _radius(text: str) -> float:
-    try:
-        return radius_in_metres(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a length above 0, such as 3cm or 0.03") from None
-
-
-def _fps(text: str) -> int:
-    if not (text.isascii() and text.isdigit() and RATES[0] <= int(text) <= RATES[1]):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from {RATES[0]} to {RATES[1]}")
-    return int(text)
