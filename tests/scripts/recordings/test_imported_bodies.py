@@ -226,7 +226,7 @@ def test_too_much_is_refused(exported, refusal, monkeypatch: pytest.MonkeyPatch)
     assert refusal(str(path))[1].startswith("5 joints in 20 frames are more than 99 poses; name one joint with ")
     assert len(read_trajectories(f"{path}:Hand").trajectories) == 1
     monkeypatch.setattr(gltf, "MOST_POSES", 99)
-    assert "numbers, vectors and matrices are more than 99; " in refusal(str(path))[1]
+    assert "numbers, vectors and matrices are more than the 99 that are read; " in refusal(str(path))[1]
 
 
 def test_an_fbx_that_claims_more_than_it_holds_is_refused_before_room_is_made_for_it(exported, refusal) -> None:
