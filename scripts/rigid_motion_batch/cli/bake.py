@@ -19,11 +19,11 @@ PROGRAM = program_of(SCRIPT)
 require_blender(SCRIPT)
 
 from rigid_motion_batch.keying.baking import BAKED, UNBAKED, baking, unbaking
-from rigid_motion_batch.keying.jobs import BlendRun
+from rigid_motion_batch.keying.jobs import do_blend
 from rigid_motion_batch.keying.options import add_file_options, add_target_options, refuse_odd_places
 from rigid_motion_batch.keying.planning import Job, named_file, planned
-from rigid_motion_batch.keying.records import Record, is_made
-from rigid_motion_batch.keying.sessions import Note, Outcome, Work, do_all
+from rigid_motion_batch.keying.records import is_made
+from rigid_motion_batch.keying.sessions import Doing, Work, do_all
 
 STEPS = 0.01, 1e6
 """Frames from key to key: keys closer than that are one key to Blender."""
@@ -153,9 +153,8 @@ class Bake(Work):
     def needs_blender(self, job: Job) -> bool:
         return True
 
-    def do(self, job: Job, record: Record, note: Note) -> Outcome:
-        action = unbaking() if self.unbake else baking(self.step, self.first, self.last, self.interpolation)
-        return BlendRun(self, action, record, note).do(job)
+    def do(self, doing: Doing) -> None:
+        do_blend(doing, unbaking() if self.unbake else baking(self.step, self.first, self.last, self.interpolation))
 
 
 def _planned(options: argparse.Namespace) -> list[Job]:

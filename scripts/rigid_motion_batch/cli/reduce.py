@@ -9,7 +9,6 @@ result is a new file; the input stays as it is.
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
 from pathlib import Path
 
 from rigid_motion_batch.command_line import not_empty, parser_of, program_of, whole
@@ -22,13 +21,11 @@ from rigid_motion.gltf.sizes import OF_A_BODY, OF_KEY_POSES
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.radii import RIGID, radius_in_metres
-from rigid_motion_batch.keying.gltf_files import ENDINGS, GltfRun
 from rigid_motion_batch.keying.options import add_file_options, add_target_options, refuse_odd_places
 from rigid_motion_batch.keying.planning import Job, file_and_body, named_file, planned
-from rigid_motion_batch.keying.recorded import GLB_SUFFIX, RATES, SUFFIX, TOLERANCE, Reading, Writing, name_of
-from rigid_motion_batch.keying.records import Record, is_made
-from rigid_motion_batch.keying.sessions import Note, Outcome, Work, do_all
-from rigid_motion_batch.keying.wishes import Wishes
+from rigid_motion_batch.keying.records import is_made
+from rigid_motion_batch.keying.reductions import ENDINGS, GLB_SUFFIX, RATES, SUFFIX, TOLERANCE, Reduce, name_of
+from rigid_motion_batch.keying.sessions import do_all
 from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
 
 IN_FOLDERS = (".blend", ".bvh", ".csv", ".fbx", ".glb", ".gltf", ".tsv", ".tum")
@@ -193,17 +190,18 @@ def parse(arguments: list[str]) -> argparse.Namespace:
             objects=options.objects,
             overwrite=options.overwrite,
             dry_run=options.dry_run,
-            wishes=Wishes(
-                options.mode or MODE,
-                options.tolerance,
-                options.radius,
-                options.shared,
-                options.discard,
-                options.keys,
-                options.vertices,
-            ),
-            reading=Reading(options.axes, reading_options(options)),
-            writing=Writing(options.blend, options.fps, options.glb),
+            mode=options.mode or MODE,
+            tolerance=options.tolerance,
+            radius=options.radius,
+            shared=options.shared,
+            discard=options.discard,
+            count=options.keys,
+            vertices=options.vertices,
+            axes=options.axes,
+            reading=reading_options(options),
+            blend=options.blend,
+            fps=options.fps,
+            glb=options.glb,
         )
         options.todo = _planned(options)
         _refuse_odd(options)
@@ -218,33 +216,6 @@ def main(arguments: list[str]) -> int:
     if any(map(options.work.needs_blender, options.todo)):
         require_blender(SCRIPT)
     return do_all(PROGRAM, options.todo, options.work, options.jobs)
-
-
-@dataclass(frozen=True)
-class Reduce(Work):
-    """Keeping few keys."""
-
-    wishes: Wishes
-    reading: Reading
-    writing: Writing
-
-    def needs_blender(self, job: Job) -> bool:
-        return not job.problem and (job.is_recording or not _is_gltf(job.file))
-
-    def do(self, job: Job, record: Record, note: Note) -> Outcome:
-        gltf = GltfRun(self.wishes, record, note, dry_run=self.dry_run, processes=self.processes)
-        if not self.needs_blender(job):
-            return gltf.do(job)
-        from rigid_motion_batch.keying.exporting import export_file
-        from rigid_motion_batch.keying.jobs import BlendRun
-        from rigid_motion_batch.keying.recordings import RecordingRun
-        from rigid_motion_batch.keying.reducing import reducing
-
-        if job.is_recording:
-            return RecordingRun(self.wishes, self.reading, self.writing, record, note, dry_run=self.dry_run).do(job)
-        if self.writing.glb:
-            return export_file(job, gltf, note)
-        return BlendRun(self, reducing(self.wishes, self.objects), record, note).do(job)
 
 
 def _planned(options: argparse.Namespace) -> list[Job]:

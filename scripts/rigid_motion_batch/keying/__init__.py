@@ -5,4 +5,5 @@ sessions     inputs side by side, each wholly or not at all         jobs        
 targets      which objects and bones of it are meant                baking      keys instead of modes, and back
 reducing     few keys instead of many                               recordings  few keys of a recording
 blend_files  opening files safely, saving them whole                keyed_files recordings as files of their own
+reductions   how few keys, of what, and how they are spoken of      gltf_files  glTF files with fewer keys
 """

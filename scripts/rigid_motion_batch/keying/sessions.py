@@ -27,6 +27,7 @@ from rigid_motion_batch.pipeline.performing import Executor, ExecutorError, Made
 from rigid_motion_batch.progress import Progress, Stage
 from rigid_motion_batch.supervising import blender_program, report, stop_signals, written_of
 
+from .output_files import FileProblem, Unreadable, refuse_read_only
 from .planning import Job
 from .records import Record
 
@@ -78,7 +79,7 @@ class Work(ABC):
     def needs_blender(self, job: Job) -> bool: ...
 
     @abstractmethod
-    def do(self, job: Job, record: Record, note: Note) -> Outcome:
+    def do(self, doing: Doing) -> None:
         """Do one input, and write what comes of it."""
 
     def task(self, job: Job) -> steps.Task:
@@ -142,6 +143,59 @@ class Outcome:
         return bool(self.written) and not (self.failed or self.refused or self.incomplete)
 
 
+class Doing:
+    """An input while it is done: what is said of it, and what comes of it."""
+
+    def __init__(self, work: Work, job: Job, note: Note) -> None:
+        self.work, self.job, self.note = work, job, note
+        self.title = job.source
+        self.record = _record_of(work, job)
+        self.would = "would be " if work.dry_run else ""
+        self.outcome = Outcome(job.source)
+
+    def say(self, text: object) -> None:
+        self.note(f"{self.title}: {text}")
+
+    @contextmanager
+    def failing(self) -> Iterator[None]:
+        """Say why the block fails, where it does, also where that was not foreseen: others are to be done."""
+        try:
+            yield
+        except FileProblem as problem:
+            self.outcome.failed = True
+            self.outcome.unreadable = isinstance(problem, Unreadable) and not self.outcome.written
+            self.say(problem)
+        except Exception as error:
+            self.outcome.failed = True
+            self.say(f"not written, for this program failed ({type(error).__name__}: {error}):")
+            for line in "".join(traceback.format_exception(error)).splitlines():
+                self.note(line)
+
+    def refuse(self, name: str, reason: str, count: int = 1) -> None:
+        """Say that so many objects or bones are not done, and why."""
+        self.outcome.refused += count
+        self.say(f"{name}: not {self.work.done}: {reason}")
+
+    def require_free(self, path: Path) -> None:
+        """Raise FileProblem where a file must not or cannot be written: better said before hours go into it."""
+        self.record.refuse_to_replace(path)
+        refuse_read_only(path)
+
+    @contextmanager
+    def writing(self, path: Path) -> Iterator[Path]:
+        """Yield a path for a file that takes its place when the block ends well. Raises FileProblem where it cannot."""
+        try:
+            with self.record.writing(path) as beside:
+                yield beside
+        except OSError as error:
+            reason = error.strerror or error
+            raise FileProblem(f"{path} could not be written ({reason}): write elsewhere with --output") from None
+
+    def tell_written(self, path: Path) -> None:
+        self.say(f"{self.would}written to {path}")
+        self.outcome.add_written(path)
+
+
 @steps.step(rooms=ROOMS)
 def keyed(task: steps.Job, parameters: tuple[Work, Job]) -> dict[str, Outcome]:
     """Do one input, wherever that is."""
@@ -151,8 +205,14 @@ def keyed(task: steps.Job, parameters: tuple[Work, Job]) -> dict[str, Outcome]:
         import bpy  # noqa: F401  It brings addon_utils.
 
         blender = _extension()
-    with blender:
-        return {"outcome": work.do(job, _record_of(work, job), task.note)}
+    doing = Doing(work, job, task.note)
+    try:
+        with blender:
+            work.do(doing)
+    except Stopped as stopped:
+        stopped.partly = doing.outcome
+        raise
+    return {"outcome": doing.outcome}
 
 
 def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = None) -> int:
@@ -354,13 +414,6 @@ def _summary(outcomes: Sequence[Outcome], count: int, work: Work, *, interrupted
 def counted(count: int, what: str) -> str:
     """Return how many there are of something, "1 bone" or "24 bones"."""
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
-
-
-def tell_failure(note: Note, title: object, error: Exception) -> None:
-    """Say where the program failed: what was not foreseen in one input must not keep the others from being done."""
-    note(f"{title}: not written, for this program failed ({type(error).__name__}: {error}):")
-    for line in "".join(traceback.format_exception(error)).splitlines():
-        note(line)
 
 
 @contextmanager

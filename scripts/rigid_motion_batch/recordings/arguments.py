@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from dataclasses import fields
+from typing import Any
 
 from rigid_motion_batch.axes import AXES
 from rigid_motion_batch.command_line import number
@@ -69,6 +70,6 @@ def _columns(text: str) -> tuple[tuple[str, str], ...]:
     return ReadingOptions(columns=tuple((meaning.strip(), column.strip()) for meaning, _, column in pairs)).columns
 
 
-def _field(name: str, convert: Callable[[str], object]) -> Callable[[str], object]:
+def _field(name: str, convert: Callable[[str], Any]) -> Callable[[str], object]:
     """Return a function that reads one field of `ReadingOptions`, which checks it."""
     return lambda text: getattr(ReadingOptions(**{name: convert(text)}), name)

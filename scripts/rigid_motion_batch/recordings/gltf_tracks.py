@@ -83,9 +83,9 @@ def straightened(document: Document) -> tuple[Document, np.ndarray]:
         return document, made[0]
     view.json |= {"buffer": len(document.buffers), "byteLength": len(view.data)}
     json["buffers"].append({"byteLength": len(view.data), "uri": "made.bin"})
-    all_known, times = (np.concatenate(some).astype(np.float32) for some in (known, made))
+    before, moments = (np.concatenate(some).astype(np.float32) for some in (known, made))
     result = replace(document, buffers=(*document.buffers, bytes(view.data)))
-    return result, np.setdiff1d(times, all_known).astype(np.float64)
+    return result, np.setdiff1d(moments, before).astype(np.float64)
 
 
 def _track(document: Document, sampler: Json, path: str) -> Track:

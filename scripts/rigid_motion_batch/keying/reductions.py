@@ -1,0 +1,115 @@
+"""Reducing keys: how few, of what and how written, and how they are spoken of. No Blender is needed to say so."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from rigid_motion_batch.analysis.choices import Tolerance
+from rigid_motion_batch.recordings import ReadingOptions
+from rigid_motion_batch.recordings.clip_reading import folder_names
+from rigid_motion_batch.recordings.rest_bodies import unit_of
+
+from .planning import Job
+from .sessions import Doing, Work
+
+RATES = 1, 240
+"""Frames a second that a .blend file may be given for the rate of its recording."""
+
+TOLERANCE = Tolerance("5mm")
+"""The tolerance where none is given, of tables and .blend files."""
+
+SUFFIX, GLB_SUFFIX = "-keys", "-reduced"
+"""Endings of the names of files that are written, and of GLB files."""
+
+ENDINGS = (".glb", ".gltf")
+"""Those of glTF files."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reduce(Work):
+    """Keeping few keys."""
+
+    mode: str
+    tolerance: Tolerance | None
+    """The tolerance; where None, what each thing begins with in Blender's window, or `reduce.py` with recordings."""
+
+    radius: float | None
+    """The radius of the shell in metres; what each object and bone measures,
+    or what `compare` takes of recordings, where None."""
+
+    shared: bool
+    """True if all bones of a rig get keys on the same frames."""
+
+    discard: bool
+    """True if the dense keys go out of the file, so that Restore Keys cannot give them back."""
+
+    count: int | None
+    """So many keys of each object, or key poses of each rig, instead of a tolerance."""
+
+    vertices: bool
+    """True if the vertices of skins are measured, in glTF files."""
+
+    axes: str | None
+    """Of recordings; None for those of each format."""
+
+    reading: ReadingOptions
+
+    blend: bool
+    """True if rigid motions become .blend files too."""
+
+    fps: int | None
+    """Of files that are made of recordings; None for the rate of each."""
+
+    glb: bool
+    """True if GLB files are written, and nothing else."""
+
+    def needs_blender(self, job: Job) -> bool:
+        return not job.problem and (job.is_recording or job.file.suffix.lower() not in ENDINGS)
+
+    def do(self, doing: Doing) -> None:
+        from .gltf_files import do_gltf
+
+        if not self.needs_blender(doing.job):
+            do_gltf(doing, self)
+            return
+        from .exporting import export_file
+        from .jobs import do_blend
+        from .recordings import do_recording
+        from .reducing import reducing
+
+        if doing.job.is_recording:
+            do_recording(doing, self)
+        elif self.glb:
+            export_file(doing, self)
+        else:
+            do_blend(doing, reducing(self, self.objects))
+
+
+def name_of(file: Path, body: str | None) -> str:
+    """Return what the files of a body are called: as the recording, and where the body was named, as that too."""
+    return "-".join([file.stem, *(folder_names([body]) if body else [])])
+
+
+def doubt(size: float, tolerance: Tolerance | None, per_unit: float) -> str:
+    """Return what to think of where a tolerance is in metres, and a body of this size in metres hardly is;
+    mostly nothing.
+    """
+    name, length = unit_of(size)
+    if tolerance is None or not tolerance.is_length or length == 1.0:
+        return ""
+    meant = tolerance.metres(per_unit) / (per_unit * length)
+    return f"; it is {size:.3g} m large in this file: if these are {name}, give --tolerance {meant:.6g}"
+
+
+def fewer(before: int, after: int) -> str:
+    """Return how many keys became how many."""
+    return f", {before} -> {after} keys"
+
+
+def off(tolerance: Tolerance, metres: float, per_unit: float, *, by_number: bool) -> str:
+    """Return how far off that is, in the unit of the tolerance, which is of so many metres where it says none."""
+    if by_number:
+        return f", {tolerance.alike(metres, per_unit)} off at most"
+    allowed = tolerance.alike(tolerance.metres(per_unit), per_unit)
+    return f", {tolerance.alike(metres, per_unit)} off at most ({allowed} allowed)"
