@@ -23,7 +23,8 @@ from rigid_motion_batch.keying.jobs import do_blend
 from rigid_motion_batch.keying.options import add_file_options, add_target_options, refuse_odd_places
 from rigid_motion_batch.keying.planning import Job, named_file, planned
 from rigid_motion_batch.keying.records import is_made
-from rigid_motion_batch.keying.sessions import Doing, Work, do_all
+from rigid_motion_batch.keying.sessions import do_all
+from rigid_motion_batch.keying.work import Doing, Work
 
 STEPS = 0.01, 1e6
 """Frames from key to key: keys closer than that are one key to Blender."""

@@ -9,6 +9,7 @@ result is a new file; the input stays as it is.
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
 
 from rigid_motion_batch.command_line import not_empty, parser_of, program_of, whole
@@ -21,11 +22,13 @@ from rigid_motion.gltf.sizes import OF_A_BODY, OF_KEY_POSES
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.radii import RIGID, radius_in_metres
+from rigid_motion_batch.keying.gltf_files import do_gltf
 from rigid_motion_batch.keying.options import add_file_options, add_target_options, refuse_odd_places
 from rigid_motion_batch.keying.planning import Job, file_and_body, named_file, planned
 from rigid_motion_batch.keying.records import is_made
-from rigid_motion_batch.keying.reductions import ENDINGS, GLB_SUFFIX, RATES, SUFFIX, TOLERANCE, Reduce, name_of
+from rigid_motion_batch.keying.reductions import ENDINGS, GLB_SUFFIX, RATES, SUFFIX, TOLERANCE, Reductions, name_of
 from rigid_motion_batch.keying.sessions import do_all
+from rigid_motion_batch.keying.work import Doing, Work
 from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
 
 IN_FOLDERS = (".blend", ".bvh", ".csv", ".fbx", ".glb", ".gltf", ".tsv", ".tum")
@@ -190,18 +193,20 @@ def parse(arguments: list[str]) -> argparse.Namespace:
             objects=options.objects,
             overwrite=options.overwrite,
             dry_run=options.dry_run,
-            mode=options.mode or MODE,
-            tolerance=options.tolerance,
-            radius=options.radius,
-            shared=options.shared,
-            discard=options.discard,
-            count=options.keys,
-            vertices=options.vertices,
-            axes=options.axes,
-            reading=reading_options(options),
-            blend=options.blend,
-            fps=options.fps,
-            glb=options.glb,
+            how=Reductions(
+                mode=options.mode or MODE,
+                tolerance=options.tolerance,
+                radius=options.radius,
+                shared=options.shared,
+                discard=options.discard,
+                count=options.keys,
+                vertices=options.vertices,
+                axes=options.axes,
+                reading=reading_options(options),
+                blend=options.blend,
+                fps=options.fps,
+                glb=options.glb,
+            ),
         )
         options.todo = _planned(options)
         _refuse_odd(options)
@@ -216,6 +221,32 @@ def main(arguments: list[str]) -> int:
     if any(map(options.work.needs_blender, options.todo)):
         require_blender(SCRIPT)
     return do_all(PROGRAM, options.todo, options.work, options.jobs)
+
+
+@dataclass(frozen=True)
+class Reduce(Work):
+    """Keeping few keys."""
+
+    how: Reductions
+
+    def needs_blender(self, job: Job) -> bool:
+        return not job.problem and (job.is_recording or not _is_gltf(job.file))
+
+    def do(self, doing: Doing) -> None:
+        if not self.needs_blender(doing.job):
+            do_gltf(doing, self.how)
+            return
+        from rigid_motion_batch.keying.exporting import export_file
+        from rigid_motion_batch.keying.jobs import do_blend
+        from rigid_motion_batch.keying.recordings import do_recording
+        from rigid_motion_batch.keying.reducing import reducing
+
+        if doing.job.is_recording:
+            do_recording(doing, self.how)
+        elif self.how.glb:
+            export_file(doing, self.how)
+        else:
+            do_blend(doing, reducing(self.how, self.objects))
 
 
 def _planned(options: argparse.Namespace) -> list[Job]:

@@ -19,8 +19,9 @@ from rigid_motion_batch.silencing import silenced
 from .blend_files import missing_data, open_file
 from .gltf_files import do_gltf
 from .output_files import FileProblem, Unreadable
-from .reductions import Reduce
-from .sessions import Doing, stop_if_asked
+from .reductions import Reductions
+from .sessions import stop_if_asked
+from .work import Doing
 
 GLTF_ADDON = "io_scene_gltf2"
 
@@ -48,7 +49,7 @@ def _asking_extension() -> Iterator[None]:
         addons.remove(entry)
 
 
-def export_file(doing: Doing, work: Reduce) -> None:
+def export_file(doing: Doing, how: Reductions) -> None:
     """Open or import a .blend or FBX file, and write what it shows as GLB with few keys."""
     job = doing.job
 
@@ -65,7 +66,7 @@ def export_file(doing: Doing, work: Reduce) -> None:
         stop_if_asked()
         export_glb(path)
 
-    do_gltf(doing, work, export)
+    do_gltf(doing, how, export)
 
 
 def _import_fbx(path: Path) -> None:

@@ -12,23 +12,24 @@ from rigid_motion_batch.command_line import printable
 
 from .output_files import Unreadable
 from .planning import place_of
-from .reductions import Reduce, doubt, fewer, off
-from .sessions import Doing, stop_if_asked
+from .reductions import Reductions, doubt, fewer, off
+from .sessions import stop_if_asked
 from .side_by_side import side_by_side
+from .work import Doing
 
 MILLIMETRES = 1e3
 """In a metre."""
 
 
-def do_gltf(doing: Doing, work: Reduce, export: Callable[[Path], None] | None = None) -> None:
+def do_gltf(doing: Doing, how: Reductions, export: Callable[[Path], None] | None = None) -> None:
     """Read a file, or what `export` makes of it at a path, reduce its clips, and write it."""
     with doing.failing():
         doing.require_free(doing.job.output)
-        reduce_gltf(doing, work, doing.job.output, export)
+        reduce_gltf(doing, how, doing.job.output, export)
 
 
 def reduce_gltf(
-    doing: Doing, work: Reduce, output: Path, export: Callable[[Path], None] | None = None, per_unit: float = 1.0
+    doing: Doing, how: Reductions, output: Path, export: Callable[[Path], None] | None = None, per_unit: float = 1.0
 ) -> None:
     """Reduce without refusals of places; raises FileProblem. A tolerance without a unit is in `per_unit` metres.
 
@@ -40,20 +41,20 @@ def reduce_gltf(
         if job.is_found and not document.json.get("animations"):
             doing.say("no animations; left alone")
             return
-        tolerance = None if work.tolerance is None else work.tolerance.metres(per_unit)
+        tolerance = None if how.tolerance is None else how.tolerance.metres(per_unit)
         with side_by_side(doing.work.processes) as run:
-            report = reduced(document, Options(tolerance, work.radius, work.shared, work.count, work.vertices, run))
+            report = reduced(document, Options(tolerance, how.radius, how.shared, how.count, how.vertices, run))
     except GltfError as error:
         raise Unreadable(str(error)) from None
     except OSError as error:  # It is read while it is worked on.
         raise _unreadable(error) from None
     stop_if_asked()
-    length = work.tolerance or Tolerance(f"{MILLIMETRES * report.tolerance:.6f}mm")
+    length = how.tolerance or Tolerance(f"{MILLIMETRES * report.tolerance:.6f}mm")
     for clip in report.clips:
-        summary = _summary(clip, length, per_unit, doing.would, by_number=work.count is not None)
+        summary = _summary(clip, length, per_unit, doing.would, by_number=how.count is not None)
         doing.say(f"{printable(clip.name)}: {summary}")
     if report.size:
-        doing.say(f"{report.size:.3g} m large{doubt(report.size, work.tolerance, per_unit)}")
+        doing.say(f"{report.size:.3g} m large{doubt(report.size, how.tolerance, per_unit)}")
     outcome.clips += sum(clip.tracks is not None for clip in report.clips)
     if not outcome.clips and export is None:
         doing.say("nothing could be reduced; left alone")

@@ -18,8 +18,9 @@ from rigid_motion_batch.keying.blend_files import (
     write_file,
 )
 from rigid_motion_batch.keying.output_files import changed_at, refuse_long_name, refuse_read_only
-from rigid_motion_batch.keying.sessions import Doing, Outcome, stop_if_asked
+from rigid_motion_batch.keying.sessions import stop_if_asked
 from rigid_motion_batch.keying.targets import Action, groups_of, matching, matching_missing, title_of
+from rigid_motion_batch.keying.work import Doing, Outcome
 
 
 def do_blend(doing: Doing, action: Action) -> None:

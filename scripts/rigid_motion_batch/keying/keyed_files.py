@@ -16,7 +16,7 @@ from rigid_motion.animation.transforms import transform_of
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.keying.output_files import FileProblem
 from rigid_motion_batch.keying.reducing import reduced
-from rigid_motion_batch.keying.reductions import RATES, Reduce
+from rigid_motion_batch.keying.reductions import RATES, Reductions
 from rigid_motion_batch.keying.targets import Result
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.rigs import LAST_FRAME
@@ -102,7 +102,7 @@ def key_object(clip: Clip, keys: np.ndarray, frames: np.ndarray, mode: str, name
     return obj
 
 
-def key_body(clip: Clip, frames: np.ndarray, work: Reduce, name: str) -> Result:
+def key_body(clip: Clip, frames: np.ndarray, how: Reductions, name: str) -> Result:
     """Put a rig into the open file that moves as a whole body did, its samples on frames (n,), with few keys.
 
     Returns
@@ -115,7 +115,7 @@ def key_body(clip: Clip, frames: np.ndarray, work: Reduce, name: str) -> Result:
     keyed = [bone for bone in bones if len(animation.key_frames(bone))]
     if not keyed:
         return Result()
-    return reduced(keyed, replace(work, discard=True))  # The recording has the dense keys.
+    return reduced(keyed, replace(how, discard=True))  # The recording has the dense keys.
 
 
 def _axes(name: str) -> bpy.types.Object:

@@ -22,21 +22,22 @@ from rigid_motion_batch.keying.gltf_files import reduce_gltf
 from rigid_motion_batch.keying.keyed_files import key_body, key_densely, key_object, new_file
 from rigid_motion_batch.keying.output_files import FileProblem, Unreadable
 from rigid_motion_batch.keying.planning import ALL
-from rigid_motion_batch.keying.reductions import GLB_SUFFIX, SUFFIX, TOLERANCE, Reduce, fewer, name_of, off
-from rigid_motion_batch.keying.sessions import Doing, counted, stop_if_asked
+from rigid_motion_batch.keying.reductions import GLB_SUFFIX, SUFFIX, TOLERANCE, Reductions, fewer, name_of, off
+from rigid_motion_batch.keying.sessions import counted, stop_if_asked
+from rigid_motion_batch.keying.work import Doing
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import folder_names, read_source
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.recordings import NoMotion
 
 
-def do_recording(doing: Doing, work: Reduce) -> None:
+def do_recording(doing: Doing, how: Reductions) -> None:
     """Read a recording, and write the keys of each of its bodies."""
     job, outcome = doing.job, doing.outcome
     clips: list[Clip] = []
     with doing.failing():
         try:
-            clips, note = read_source(job.source, work.axes, work.reading)
+            clips, note = read_source(job.source, how.axes, how.reading)
         except TrajectoryError as error:
             if job.is_found and isinstance(error, NoMotion):
                 doing.say(f"{error.problem}; left alone")
@@ -47,54 +48,52 @@ def do_recording(doing: Doing, work: Reduce) -> None:
         if note:
             doing.note(note)
     for clip, name in zip(clips, _names(job.file, clips), strict=True):
-        suffix = GLB_SUFFIX if work.glb else SUFFIX
+        suffix = GLB_SUFFIX if how.glb else SUFFIX
         doing.title = job.source if len(clips) == 1 else f"{job.source} ({clip.name})"
         stop_if_asked()
         with doing.failing():
-            _Clip(doing, work, clip, name).do(
-                job.folder / f"{name}{suffix}" if job.source.endswith(ALL) else job.output
-            )
+            _Clip(doing, how, clip, name).do(job.folder / f"{name}{suffix}" if job.source.endswith(ALL) else job.output)
 
 
 class _Clip:
     """A body whose keys are written."""
 
-    def __init__(self, doing: Doing, work: Reduce, clip: Clip, name: str) -> None:
+    def __init__(self, doing: Doing, how: Reductions, clip: Clip, name: str) -> None:
         self.doing, self.clip, self.name = doing, clip, name
         # Key poses are few by what is large for the body.
-        self.given, self.tolerance = work.tolerance, work.tolerance or TOLERANCE
-        self.work = work if work.shared else replace(work, tolerance=self.tolerance)
-        self.radius = work.radius or RIGID
+        self.given, self.tolerance = how.tolerance, how.tolerance or TOLERANCE
+        self.how = how if how.shared else replace(how, tolerance=self.tolerance)
+        self.radius = how.radius or RIGID
 
     def do(self, output: Path) -> None:
         """Write the keys, into files that are called as `output` and may have to end as the job says."""
         clip, ending = self.clip, self.doing.job.ending
         for repair in clip.repairs:
             self.doing.say(repair)
-        if self.given and self.work.count is None:
+        if self.given and self.how.count is None:
             try:
                 self.given.require_within(clip, self.radius)
             except ValueError as error:
                 raise Unreadable(str(error)) from None
         table, scene, glb = (output.with_name(f"{output.name}{end}") for end in (ending or ".csv", ".blend", ".glb"))
-        if self.work.glb:
+        if self.how.glb:
             self._glb(glb)
         elif clip.rest_body is not None:
             if ending not in ("", ".blend"):
                 raise FileProblem(f"a whole body becomes a .blend file: name that with --output, and not {ending}")
             self._body(scene)
         else:
-            if table == scene and not self.work.blend:
+            if table == scene and not self.how.blend:
                 raise FileProblem("a rigid motion becomes a table: name a .csv file with --output, or add --blend")
             table = output.with_name(f"{output.name}.csv") if table == scene else table
-            self._rigid(table, scene if self.work.blend else None)
+            self._rigid(table, scene if self.how.blend else None)
 
     def _rigid(self, table: Path, scene: Path | None) -> None:
         for path in filter(None, (table, scene)):
             self.doing.require_free(path)
-        clip, mode, tolerance = self.clip, self.work.mode, self.tolerance
+        clip, mode, tolerance = self.clip, self.how.mode, self.tolerance
         frames = self._new_file() if scene else None
-        count = self.work.count
+        count = self.how.count
         if count is None:
             keys = tolerance.keys(clip, mode, self.radius)
         else:
@@ -106,7 +105,7 @@ class _Clip:
             key_object(clip, keys, frames, mode, self.name)
         error = off(tolerance, largest, clip.metres_per_unit, by_number=count is not None)
         self.doing.say(f"{self.doing.would}reduced{fewer(len(clip.times), len(keys))}{error}")
-        if not self.work.dry_run:
+        if not self.doing.work.dry_run:
             with self.doing.writing(table) as beside:
                 write_poses(beside, clip.times[keys], clip.poses[keys])
         self.doing.outcome.objects += 1
@@ -117,7 +116,7 @@ class _Clip:
     def _body(self, scene: Path) -> None:
         doing = self.doing
         doing.require_free(scene)
-        result = key_body(self.clip, self._new_file(), self.work, self.name)
+        result = key_body(self.clip, self._new_file(), self.how, self.name)
         stop_if_asked()
         for bones, reason, count in result.refusals():
             doing.refuse(bones, reason, count)
@@ -136,14 +135,14 @@ class _Clip:
         self.doing.require_free(path)
         key_densely(self.clip, self._new_file(), self.name)
         stop_if_asked()
-        work = self.work if self.clip.rest_body else replace(self.work, radius=self.radius)
-        reduce_gltf(self.doing, work, path, export_glb, self.clip.metres_per_unit)
+        how = self.how if self.clip.rest_body else replace(self.how, radius=self.radius)
+        reduce_gltf(self.doing, how, path, export_glb, self.clip.metres_per_unit)
 
     def _new_file(self) -> np.ndarray:
-        return new_file(self.clip, self.tolerance.tolerance(self.clip), self.work.fps)
+        return new_file(self.clip, self.tolerance.tolerance(self.clip), self.how.fps)
 
     def _save(self, scene: Path) -> None:
-        if not self.work.dry_run:
+        if not self.doing.work.dry_run:
             write_file(scene, self.doing.record)
         self.doing.tell_written(scene)
 

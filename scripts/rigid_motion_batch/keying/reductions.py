@@ -1,4 +1,4 @@
-"""Reducing keys: how few, of what and how written, and how they are spoken of. No Blender is needed to say so."""
+"""Reducing keys: how few, of what and how written, and how they are spoken of. No Blender is needed here."""
 
 from __future__ import annotations
 
@@ -9,9 +9,6 @@ from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.recordings import ReadingOptions
 from rigid_motion_batch.recordings.clip_reading import folder_names
 from rigid_motion_batch.recordings.rest_bodies import unit_of
-
-from .planning import Job
-from .sessions import Doing, Work
 
 RATES = 1, 240
 """Frames a second that a .blend file may be given for the rate of its recording."""
@@ -27,8 +24,8 @@ ENDINGS = (".glb", ".gltf")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reduce(Work):
-    """Keeping few keys."""
+class Reductions:
+    """How few keys are to be kept, of what, and how they are written: plain data."""
 
     mode: str
     tolerance: Tolerance | None
@@ -63,27 +60,6 @@ class Reduce(Work):
 
     glb: bool
     """True if GLB files are written, and nothing else."""
-
-    def needs_blender(self, job: Job) -> bool:
-        return not job.problem and (job.is_recording or job.file.suffix.lower() not in ENDINGS)
-
-    def do(self, doing: Doing) -> None:
-        from .gltf_files import do_gltf
-
-        if not self.needs_blender(doing.job):
-            do_gltf(doing, self)
-            return
-        from .exporting import export_file
-        from .jobs import do_blend
-        from .recordings import do_recording
-        from .reducing import reducing
-
-        if doing.job.is_recording:
-            do_recording(doing, self)
-        elif self.glb:
-            export_file(doing, self)
-        else:
-            do_blend(doing, reducing(self, self.objects))
 
 
 def name_of(file: Path, body: str | None) -> str:

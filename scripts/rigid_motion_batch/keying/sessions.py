@@ -12,12 +12,10 @@ import os
 import signal
 import sys
 import tempfile
-import traceback
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
@@ -27,9 +25,9 @@ from rigid_motion_batch.pipeline.performing import Executor, ExecutorError, Made
 from rigid_motion_batch.progress import Progress, Stage
 from rigid_motion_batch.supervising import blender_program, report, stop_signals, written_of
 
-from .output_files import FileProblem, Unreadable, refuse_read_only
 from .planning import Job
 from .records import Record
+from .work import Doing, Outcome, Work
 
 EXTENSION = "rigid_motion"
 """The id in blender_manifest.toml, which the name of the installed module ends with."""
@@ -50,150 +48,6 @@ ROOMS = (
     "scenes/armature.py",
 )
 """The packages that the files that are written depend on."""
-
-Note = Callable[[str], None]
-"""Writes a line for the user."""
-
-
-@dataclass(frozen=True)
-class Work(ABC):
-    """What is done to inputs, and how: plain data, which goes to worker processes and into the keys of results."""
-
-    doing: str
-    """As a heading: "Baking"."""
-
-    done: str
-    """The word for what becomes of objects: "baked"."""
-
-    objects: Sequence[str] | None
-    """The names and patterns of the objects that are meant; None for all."""
-
-    overwrite: bool
-    """True if files that were not made of an input may be replaced."""
-
-    dry_run: bool
-    processes: int = field(default=1, kw_only=True)
-    """For one input, where it has parts."""
-
-    @abstractmethod
-    def needs_blender(self, job: Job) -> bool: ...
-
-    @abstractmethod
-    def do(self, doing: Doing) -> None:
-        """Do one input, and write what comes of it."""
-
-    def task(self, job: Job) -> steps.Task:
-        """Return what has the key of a result: the input, these options, the version of the program and of Blender."""
-        blender = ""
-        if self.needs_blender(job):
-            import bpy
-
-            blender = bpy.app.version_string
-        options = replace(self, overwrite=False, dry_run=False, processes=1)
-        body = job.source.removeprefix(os.fspath(job.file))
-        return steps.Task(keyed, (options, body, job.output.name, blender), job.title, inputs=_inputs(job))
-
-
-@dataclass
-class Outcome:
-    """What became of an input."""
-
-    source: str
-
-    objects: int = 0
-    bones: int = 0
-    clips: int = 0
-    """The number of them that were done."""
-
-    refused: int = 0
-    """The number of objects and bones that were not."""
-
-    failed: bool = False
-    unreadable: bool = False
-    incomplete: bool = False
-    """True if there may be objects in it that cannot be looked at, for a library is missing."""
-
-    is_old: bool = False
-    """True if it was done by an earlier run."""
-
-    written: list[Path] = field(default_factory=list)
-    """The files that were written, or would have been."""
-
-    beside: list[Path] = field(default_factory=list)
-    """Files that belong to those."""
-
-    read: list[Path] = field(default_factory=list)
-    """The files that were read beside the input."""
-
-    matched: set[str] = field(default_factory=set)
-    """The names and patterns among those requested that there was an object or a bone for."""
-
-    def add_written(self, path: Path) -> None:
-        """Note that a file is complete at its place."""
-        self.written.append(path)
-        report(written=os.fspath(path), source=self.source)
-
-    @property
-    def done(self) -> int:
-        return self.objects + self.bones + self.clips
-
-    @property
-    def is_whole(self) -> bool:
-        """Return whether something was written, and nothing is left to be done."""
-        return bool(self.written) and not (self.failed or self.refused or self.incomplete)
-
-
-class Doing:
-    """An input while it is done: what is said of it, and what comes of it."""
-
-    def __init__(self, work: Work, job: Job, note: Note) -> None:
-        self.work, self.job, self.note = work, job, note
-        self.title = job.source
-        self.record = _record_of(work, job)
-        self.would = "would be " if work.dry_run else ""
-        self.outcome = Outcome(job.source)
-
-    def say(self, text: object) -> None:
-        self.note(f"{self.title}: {text}")
-
-    @contextmanager
-    def failing(self) -> Iterator[None]:
-        """Say why the block fails, where it does, also where that was not foreseen: others are to be done."""
-        try:
-            yield
-        except FileProblem as problem:
-            self.outcome.failed = True
-            self.outcome.unreadable = isinstance(problem, Unreadable) and not self.outcome.written
-            self.say(problem)
-        except Exception as error:
-            self.outcome.failed = True
-            self.say(f"not written, for this program failed ({type(error).__name__}: {error}):")
-            for line in "".join(traceback.format_exception(error)).splitlines():
-                self.note(line)
-
-    def refuse(self, name: str, reason: str, count: int = 1) -> None:
-        """Say that so many objects or bones are not done, and why."""
-        self.outcome.refused += count
-        self.say(f"{name}: not {self.work.done}: {reason}")
-
-    def require_free(self, path: Path) -> None:
-        """Raise FileProblem where a file must not or cannot be written: better said before hours go into it."""
-        self.record.refuse_to_replace(path)
-        refuse_read_only(path)
-
-    @contextmanager
-    def writing(self, path: Path) -> Iterator[Path]:
-        """Yield a path for a file that takes its place when the block ends well. Raises FileProblem where it cannot."""
-        try:
-            with self.record.writing(path) as beside:
-                yield beside
-        except OSError as error:
-            reason = error.strerror or error
-            raise FileProblem(f"{path} could not be written ({reason}): write elsewhere with --output") from None
-
-    def tell_written(self, path: Path) -> None:
-        self.say(f"{self.would}written to {path}")
-        self.outcome.add_written(path)
 
 
 @steps.step(rooms=ROOMS)
@@ -329,7 +183,7 @@ class _Session:
             self._note(f"{job.source}: {job.problem}")
             self._outcomes[place] = Outcome(job.source, failed=True, unreadable=True)
             return
-        task = self._work.task(job)
+        task = _task(self._work, job)
         key = task.key if task.inputs else ""
         if key and (result := _record_of(self._work, job).done(key)):
             written, facts = result
@@ -361,6 +215,18 @@ class _Session:
                 facts = {"matched": sorted(outcome.matched)}
                 _record_of(self._work, job).keep(key, outcome.written, outcome.beside, outcome.read, facts)
         self._outcomes[place] = outcome
+
+
+def _task(work: Work, job: Job) -> steps.Task:
+    """Return what has the key of a result: the input, these options, the version of the program and of Blender."""
+    blender = ""
+    if work.needs_blender(job):
+        import bpy
+
+        blender = bpy.app.version_string
+    options = replace(work, overwrite=False, dry_run=False, processes=1)
+    body = job.source.removeprefix(os.fspath(job.file))
+    return steps.Task(keyed, (options, body, job.output.name, blender), job.title, inputs=_inputs(job))
 
 
 def _record_of(work: Work, job: Job) -> Record:
