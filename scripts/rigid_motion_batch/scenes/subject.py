@@ -122,15 +122,11 @@ def _own_materials(mesh: bpy.types.Mesh) -> dict[bpy.types.Material, str]:
 def _discard_all_but(mesh: bpy.types.Mesh | None, before: set[bpy.types.ID]) -> None:
     """Remove what came with the object, except what the mesh uses: its materials and their images."""
     arrived = set(bpy.data.user_map()) - before
+    kept = {mesh}
     for block in arrived:
         if getattr(block, "animation_data", None) is not None:
             block.animation_data_clear()
     users = bpy.data.user_map(subset=arrived)
-    needed: set[bpy.types.ID] = set()
-    result = arrived & {mesh}
-    while result:
-        needed |= result
-        result = {
-            block for block in arrived - needed if users[block] & needed and not isinstance(block, bpy.types.Text)
-        }
-    bpy.data.batch_remove(arrived - needed)
+    while more := {block for block in arrived - kept if users[block] & kept and not isinstance(block, bpy.types.Text)}:
+        kept |= more
+    bpy.data.batch_remove(arrived - kept)
