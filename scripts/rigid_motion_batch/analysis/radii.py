@@ -27,7 +27,7 @@ MOST_BYTES = 1 << 20
 
 @dataclass(frozen=True)
 class Radii:
-    """As plain data, which is how tasks are told."""
+    """Plain data, as parameters of tasks."""
 
     rigid: float = RIGID
     """Of a single rigid body."""

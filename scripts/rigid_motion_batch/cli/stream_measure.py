@@ -38,7 +38,7 @@ examples:
   python scripts/stream.py measure walk.bvh --tolerance 5mm --delay 0.2 --loss 0.01 --output shown.bvh --json
   python scripts/stream.py measure log.csv:left --output shown.csv
 
-Bytes a second leave out what somebody who joins is told once (names, parents, rest
+Bytes a second leave out what somebody who joins gets once (names, parents, rest
 poses); they are a line of their own. Headers are those of UDP and IPv4, 28 bytes a datagram. shown.bvh is what was
 shown at the recording's moments, in its units and axes.
 """

@@ -287,9 +287,9 @@ def _read_motion(path: Path, motion: int, joints: list[Joint]) -> tuple[np.ndarr
         if lost:
             warnings.append(ClipWarning(f"{path.name}:{cut[0][0]}: the file is cut off in this row, which is left out"))
     if count != len(values):
-        told = f"Frames: says {count:g} and {len(values)} whole rows follow, which are read"
+        text = f"Frames: says {count:g} and {len(values)} whole rows follow, which are read"
         way_out = "export the BVH again if that is not all"
-        warnings.append(ClipWarning(f"{path.name}:{settings[0][0]}: {told}", way_out))
+        warnings.append(ClipWarning(f"{path.name}:{settings[0][0]}: {text}", way_out))
     return values, frame_time, tuple(warnings)
 
 
