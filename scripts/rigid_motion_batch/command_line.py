@@ -96,9 +96,9 @@ class Parser(argparse.ArgumentParser):
 
 def did_you_mean(word: str, words: Iterable[str]) -> str:
     """Return what may have been meant by a word, as the end of a complaint; empty where none of these is near."""
-    plain = {name.lower().lstrip("-"): name for name in words}
-    near = difflib.get_close_matches(word.lower().lstrip("-"), plain, n=1, cutoff=0.7)
-    return f": did you mean {plain[near[0]]}?" if near else ""
+    known = {name.lower().lstrip("-"): name for name in words}
+    near = difflib.get_close_matches(word.lower().lstrip("-"), known, n=1, cutoff=0.7)
+    return f": did you mean {known[near[0]]}?" if near else ""
 
 
 def parser_of(script: str, description: str, epilog: str = "", **options: Any) -> Parser:

@@ -21,20 +21,20 @@ FORMULA = ("=", "+", "-", "@", "\t", "\r")
 strangers' files."""
 
 
-def plain(text: str) -> str:
+def escaped(text: str) -> str:
     """Return a text that no spreadsheet takes for a formula: with an apostrophe before it, where it would be one."""
     return f"'{text}" if text.lstrip("'").startswith(FORMULA) else text
 
 
-def meant(cell: str) -> str:
-    """Return what `plain` made this of."""
-    return cell[1:] if cell.startswith("'") and plain(cell) != cell else cell
+def unescaped(cell: str) -> str:
+    """Return what `escaped` made this of."""
+    return cell[1:] if cell.startswith("'") and escaped(cell) != cell else cell
 
 
 def line_of(cells: Iterable[object]) -> str:
-    """Return cells as a line of CSV, which ends with LF; texts are `plain`."""
+    """Return cells as a line of CSV, which ends with LF; texts are `escaped`."""
     line = io.StringIO()
-    cells = [plain(cell) if isinstance(cell, str) else cell for cell in cells]
+    cells = [escaped(cell) if isinstance(cell, str) else cell for cell in cells]
     # Before Python 3.13, csv quotes no ends of lines but those it writes itself. A joint's name may have any.
     csv.writer(line, lineterminator="\r\n").writerow(cells)
     return f"{line.getvalue()[:-2]}\n"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigid_motion_batch.rows import line_of, meant, plain, write_rows
+from rigid_motion_batch.rows import escaped, line_of, unescaped, write_rows
 
 
 @dataclass
@@ -18,8 +18,8 @@ class Row:
 
 @given(st.text(max_size=6, alphabet="'=+-@\t\rab 1"))
 def test_what_was_meant_comes_back(text):
-    assert meant(plain(text)) == text
-    assert not plain(text).startswith(("=", "+", "-", "@", "\t", "\r"))
+    assert unescaped(escaped(text)) == text
+    assert not escaped(text).startswith(("=", "+", "-", "@", "\t", "\r"))
 
 
 def test_numbers_stay_numbers_and_rows_come_back(tmp_path):
@@ -28,6 +28,6 @@ def test_numbers_stay_numbers_and_rows_come_back(tmp_path):
     with (tmp_path / "rows.csv").open(encoding="utf-8", newline="") as stream:
         header, *lines = csv.reader(stream)
     assert header == ["name", "value", "count"]
-    assert [Row(meant(name), float(value), int(count)) for name, value, count in lines] == rows
+    assert [Row(unescaped(name), float(value), int(count)) for name, value, count in lines] == rows
     assert lines[0] == ["'=1+1", "-2.5", "-3"]
     assert line_of(["-a", -1.0]) == "'-a,-1.0\n"

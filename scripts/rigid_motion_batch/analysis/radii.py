@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from rigid_motion_batch.command_line import printable
-from rigid_motion_batch.rows import meant
+from rigid_motion_batch.rows import unescaped
 
 from .choices import METRES
 
@@ -95,7 +95,7 @@ def _read_table(path: Path) -> dict[str, float]:
             continue
         if len(cells) <= max(columns):
             raise ValueError(f"{path}:{number}: {len(cells)} cells where {len(header)} are expected")
-        joint, radius = meant(cells[columns[0]]).strip(), cells[columns[1]].strip()
+        joint, radius = unescaped(cells[columns[0]]).strip(), cells[columns[1]].strip()
         if joint in radii:
             raise ValueError(f"{path}:{number}: the joint {joint!r} comes a second time; leave one")
         try:

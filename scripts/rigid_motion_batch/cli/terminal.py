@@ -18,7 +18,6 @@ from rich.text import Text
 
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.report.numbers import MEASURES, Numbers, digits
-from rigid_motion_batch.report.verdict import plain as plain
 
 RMS, WORST, KEYS = "rms_shell_m", "max_shell_m", "keys_per_s"
 """The measures that are shown."""

@@ -53,8 +53,8 @@ def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE
         beside = {buffer.path for buffer in document.buffers if isinstance(buffer, FileBytes)} - {path}
         refuse_too_large(path, *beside)
         _refuse_too_many(path, document.json)
-        plain = {name: _plain(part) for name, part in document.json.items() if name in PARTS}
-        copy, made = straightened(replace(document, json=plain))
+        parts = {name: _stripped(part) for name, part in document.json.items() if name in PARTS}
+        copy, made = straightened(replace(document, json=parts))
         name = f"copy{'.gltf' if copy.chunks is None else '.glb'}"
         # Buffers in files of their own are written beside the copy.
         files = replace(copy, changed=frozenset(range(len(copy.buffers)))).files(name)
@@ -113,19 +113,19 @@ def _depth(nodes: list[Json]) -> int:
     return depth
 
 
-def _plain(part: Any) -> Any:
+def _stripped(part: Any) -> Any:
     """Return a part of the document without materials, extras, and extensions that do more than compress."""
     if isinstance(part, list):
-        return [_plain(item) for item in part]
+        return [_stripped(item) for item in part]
     if not isinstance(part, dict):
         return part
-    plain = {name: _plain(below) for name, below in part.items() if name not in ("extensions", "extras", "material")}
+    kept = {name: _stripped(below) for name, below in part.items() if name not in ("extensions", "extras", "material")}
     extensions = part.get("extensions")
     if isinstance(extensions, dict) and (
-        kept := {name: extensions[name] for name in COMPRESSIONS if name in extensions}
+        known := {name: extensions[name] for name in COMPRESSIONS if name in extensions}
     ):
-        plain["extensions"] = kept
-    return plain
+        kept["extensions"] = known
+    return kept
 
 
 def _import(copy: Path) -> None:

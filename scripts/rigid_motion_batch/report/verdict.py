@@ -69,10 +69,10 @@ class Verdict:
     facts: tuple[Text, ...] = ()
 
     def __str__(self) -> str:
-        return plain(self.sentence)
+        return as_text(self.sentence)
 
 
-def plain(text: Text) -> str:
+def as_text(text: Text) -> str:
     """Return the words alone, as a terminal shows them."""
     return "".join(part.text for part in text).replace("\u00a0", " ")
 
