@@ -18,7 +18,7 @@ from . import aframe, blend, bvh, euroc, fbx, gltf, motive, named_csv, tum
 from .clips import ClipWarning
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .recordings import Recording, Selection, Trajectory, TrajectoryError, shown
-from .rest_bodies import BELIEVED, NOTHING, size_of, sureness, unit_of
+from .rest_bodies import PLAUSIBLE, NOTHING, size_of, sureness, unit_of
 from .sense import doubts
 from .tables import encoding_of
 
@@ -155,7 +155,7 @@ def _sized(path: Path, trajectory: Trajectory, *, unit_given: bool) -> Trajector
         taken = f"{shown(path.name)} is {size:.4g} units large, which are taken for {unit}: {metres:.3g} m"
         taken += f", {sureness(size, length)} (otherwise: --scale METRES)"
         remark = "; ".join(filter(None, (taken, remark)))
-    if not BELIEVED[0] <= metres <= BELIEVED[1]:
+    if not PLAUSIBLE[0] <= metres <= PLAUSIBLE[1]:
         doubt = f"it is {metres:.3g} m large if its unit, which the file does not tell, is that of {unit}"
         warnings += (ClipWarning(doubt, "if not, say how long it is: --scale METRES"),)
     return replace(trajectory, metres_per_unit=trajectory.metres_per_unit * length, remark=remark, warnings=warnings)
