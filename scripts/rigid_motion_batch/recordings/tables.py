@@ -70,9 +70,9 @@ class Table:
 
     def parse(self, columns: Sequence[str], dtype: type = np.float64) -> np.ndarray:
         """Return the numbers in these columns, shape (rows, columns). Empty cells are NaN."""
-        wanted = {name: self.columns[name] for name in columns}
+        chosen = {name: self.columns[name] for name in columns}
         needed = max(self.columns.values()) + 1
-        return parse_rows(self.path, self.rows(), self.separator, wanted, self.width, dtype, needed=needed)
+        return parse_rows(self.path, self.rows(), self.separator, chosen, self.width, dtype, needed=needed)
 
     def cells(self, column: str) -> Iterator[tuple[int, str]]:
         """Yield the cells of a column, without quotes, with their lines; empty where a row is too short."""
