@@ -18,7 +18,7 @@ from . import aframe, blend, bvh, euroc, fbx, gltf, motive, named_csv, tum
 from .clips import ClipWarning
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .recordings import Recording, Selection, Trajectory, TrajectoryError, shown
-from .rest_bodies import PLAUSIBLE, NOTHING, size_of, sureness, unit_of
+from .rest_bodies import NOTHING, PLAUSIBLE, size_of, sureness, unit_of
 from .sense import doubts
 from .tables import encoding_of
 
