@@ -12,6 +12,7 @@ import sys
 import webbrowser
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from itertools import chain, count, groupby
@@ -414,7 +415,7 @@ class _Comparing:
             "exit_code": code,
             "verdict": str(said) if said else None,
             "facts": [as_text(fact) for fact in said.facts] if said else [],
-            "table": terminal.as_data(terminal.lines_of(numbers)) if numbers else [],
+            "table": [asdict(line) for line in terminal.lines_of(numbers)] if numbers else [],
             "clips": list(numbers.clips) if numbers else [],
             "notes": self.notes,
             "failures": self.work.failures,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TextIO
 
 import numpy as np
@@ -101,11 +101,6 @@ def table_of(lines: Sequence[Line], clips: int) -> Table:
             end_section=last,
         )
     return table
-
-
-def as_data(lines: Sequence[Line]) -> list[dict[str, object]]:
-    """Return the table for JSON."""
-    return [asdict(line) for line in lines]
 
 
 def show(*what: Table | str, stream: TextIO | None = None) -> None:
