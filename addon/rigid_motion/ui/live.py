@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
@@ -122,9 +122,10 @@ def _match(live: LiveSettings, joints: tuple[str, ...], rig: bpy.types.Object) -
 
 
 class _Registered:
-    bl_options: ClassVar[set[str]] = {"REGISTER"}
+    bl_options: Any = {"REGISTER"}  # noqa: RUF012 - Blender reads it
+    report: Any
 
-    def refuse(self, error: OSError | NotAllowed, text: str = "", **facts: object) -> set[str]:
+    def refuse(self, error: OSError | NotAllowed, text: str = "", **facts: object) -> Any:
         """Report why a port cannot be opened, and cancel."""
         why = getattr(error, "strerror", None) or error
         self.report({"ERROR"}, text.format(**facts, why=why) if text else str(error))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from typing import ClassVar
+from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
@@ -39,12 +39,12 @@ SPACES = ("VIEW_3D", "DOPESHEET_EDITOR", "GRAPH_EDITOR")
 
 
 class InSidebar:
-    bl_region_type = "UI"
+    bl_region_type: Any = "UI"
     bl_category = CATEGORY
 
 
 class Folded(InSidebar):
-    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+    bl_options: Any = {"DEFAULT_CLOSED"}  # noqa: RUF012 - Blender reads it
 
 
 class _Main(InSidebar):

@@ -124,7 +124,7 @@ def _own_materials(mesh: bpy.types.Mesh) -> dict[bpy.types.Material, str]:
 def _discard_all_but(mesh: bpy.types.Mesh | None, before: set[bpy.types.ID]) -> None:
     """Remove what came with the object, except what the mesh uses: its materials and their images."""
     arrived = set(bpy.data.user_map()) - before
-    kept = {mesh}
+    kept: set[bpy.types.ID | None] = {mesh}
     for block in arrived:
         if getattr(block, "animation_data", None) is not None:
             block.animation_data_clear()
