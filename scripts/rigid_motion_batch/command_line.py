@@ -78,7 +78,10 @@ class Parser(argparse.ArgumentParser):
         ]
 
     def _get_value(self, action: argparse.Action, text: str) -> Any:
-        value = super()._get_value(action, text)
+        try:
+            value = self._registry_get("type", action.type, action.type)(text)
+        except ValueError as error:  # It says what is wrong, where that of argparse names the type.
+            raise argparse.ArgumentError(action, str(error)) from None
         if action.choices is None or isinstance(action, argparse._SubParsersAction) or not isinstance(value, str):
             return value
         fitting = (choice for choice in action.choices if str(choice).lower() == value.lower())
@@ -93,9 +96,9 @@ class Parser(argparse.ArgumentParser):
 
 def did_you_mean(word: str, words: Iterable[str]) -> str:
     """Return what may have been meant by a word, as the end of a complaint; empty where none of these is near."""
-    plain = {name.lower().lstrip("-"): name for name in words}
-    near = difflib.get_close_matches(word.lower().lstrip("-"), plain, n=1, cutoff=0.7)
-    return f": did you mean {plain[near[0]]}?" if near else ""
+    known = {name.lower().lstrip("-"): name for name in words}
+    near = difflib.get_close_matches(word.lower().lstrip("-"), known, n=1, cutoff=0.7)
+    return f": did you mean {known[near[0]]}?" if near else ""
 
 
 def parser_of(script: str, description: str, epilog: str = "", **options: Any) -> Parser:
@@ -118,6 +121,9 @@ def as_typed(program: str, arguments: Sequence[str], inputs: Sequence[str]) -> s
     return f"{typed} # and {len(left_out)} more" if left_out else typed
 
 
+# Types of arguments: each raises ValueError with what is wrong and the way out, which `Parser` prints.
+
+
 def number(text: str) -> float:
     """Return the number that an option says; NaN, which is within no bounds, where it is none."""
     try:
@@ -132,23 +138,34 @@ def bounded(what: str, least: float, most: float, above: bool = False) -> Callab
     def parse_number(text: str) -> float:
         value = number(text)
         if not least <= value <= most or (above and value == least):
-            raise argparse.ArgumentTypeError(f"{text!r} is no {what}; give {'more than ' * above}{least:g} to {most:g}")
+            raise ValueError(f"{text!r} is no {what}; give {'more than ' * above}{least:.7g} to {most:.7g}")
         return value
 
     return parse_number
 
 
+def whole(what: str, least: int, most: int) -> Callable[[str], int]:
+    """Return a type of argument: a whole number from the least to the most."""
+
+    def parse_whole(text: str) -> int:
+        if not (text.isascii() and text.isdecimal() and least <= float(text) <= most):
+            raise ValueError(f"{text!r} is no {what}; give a whole number from {least} to {most}")
+        return int(text)
+
+    return parse_whole
+
+
 def folder_path(text: str) -> Path:
     """Return the folder that an option says."""
     if not text.strip() or "\0" in text:
-        raise argparse.ArgumentTypeError(f"{text!r} is no folder; give one such as renders/hand, or . for this one")
+        raise ValueError(f"{text!r} is no folder; give one such as renders/hand, or . for this one")
     return Path(text)
 
 
 def not_empty(text: str) -> str:
     """Return the file that an argument says."""
     if not text.strip():
-        raise argparse.ArgumentTypeError(f"{text!r} is no file: a variable of a script may be empty")
+        raise ValueError(f"{text!r} is no file: a variable of a script may be empty")
     return text
 
 

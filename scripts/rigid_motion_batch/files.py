@@ -91,12 +91,9 @@ def _move_to_free(source: Path, target: Path) -> None:
 
 
 @contextmanager
-def replacing(path: Path, *, overwrite: bool = True) -> Iterator[TextIOWrapper]:
+def replacing(path: Path) -> Iterator[TextIOWrapper]:
     """Open a text file that takes the place of `path` when the block ends well: see `written_beside`."""
-    with (
-        written_beside(path, overwrite=overwrite) as beside,
-        beside.open("w", encoding="utf-8", newline="\n") as stream,
-    ):
+    with written_beside(path) as beside, beside.open("w", encoding="utf-8", newline="\n") as stream:
         yield stream
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import astuple, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, TypeVar
 
 from rigid_motion_batch.files import replacing
 
@@ -21,20 +21,20 @@ FORMULA = ("=", "+", "-", "@", "\t", "\r")
 strangers' files."""
 
 
-def plain(text: str) -> str:
+def escaped(text: str) -> str:
     """Return a text that no spreadsheet takes for a formula: with an apostrophe before it, where it would be one."""
     return f"'{text}" if text.lstrip("'").startswith(FORMULA) else text
 
 
-def meant(cell: str) -> str:
-    """Return what `plain` made this of."""
-    return cell[1:] if cell.startswith("'") and plain(cell) != cell else cell
+def unescaped(cell: str) -> str:
+    """Return what `escaped` made this of."""
+    return cell[1:] if cell.startswith("'") and escaped(cell) != cell else cell
 
 
 def line_of(cells: Iterable[object]) -> str:
-    """Return cells as a line of CSV, which ends with LF; texts are `plain`."""
+    """Return cells as a line of CSV, which ends with LF; texts are `escaped`."""
     line = io.StringIO()
-    cells = [plain(cell) if isinstance(cell, str) else cell for cell in cells]
+    cells = [escaped(cell) if isinstance(cell, str) else cell for cell in cells]
     # Before Python 3.13, csv quotes no ends of lines but those it writes itself. A joint's name may have any.
     csv.writer(line, lineterminator="\r\n").writerow(cells)
     return f"{line.getvalue()[:-2]}\n"
@@ -46,14 +46,3 @@ def write_rows(path: Path, kind: type[Row], rows: Iterable[Row]) -> None:
         stream.write(line_of(field.name for field in fields(kind)))
         for row in rows:
             stream.write(line_of(astuple(row)))
-
-
-READERS: dict[str, Callable[[str], Any]] = {"str": meant, "int": int, "float": float}
-
-
-def read_rows(path: Path, kind: type[Row]) -> list[Row]:
-    """Read what `write_rows` wrote."""
-    with path.open(encoding="utf-8", newline="") as stream:
-        lines = list(csv.reader(stream))[1:]
-    readers = [READERS[cast(str, field.type)] for field in fields(kind)]
-    return [kind(*(read(cell) for read, cell in zip(readers, line, strict=True))) for line in lines]

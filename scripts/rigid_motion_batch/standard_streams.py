@@ -12,7 +12,7 @@ import sys
 from contextlib import suppress
 from typing import Any, TextIO
 
-NOBODY_READS = {errno.EPIPE, errno.ECONNRESET, *([errno.EINVAL] if os.name == "nt" else [])}
+READER_GONE = {errno.EPIPE, errno.ECONNRESET, *([errno.EINVAL] if os.name == "nt" else [])}
 """Errors of a pipe whose reader has gone, as `head` does when it has its lines."""
 
 
@@ -53,7 +53,7 @@ def finish(program: str, code: int) -> int:
             stream.flush()
     raw = getattr(getattr(sys.stdout, "buffer", None), "raw", None)
     error = raw.error if isinstance(raw, _Descriptor) else None
-    if error is None or error.errno in NOBODY_READS:
+    if error is None or error.errno in READER_GONE:
         return code
     print(f"{program}: standard output: {error.strerror}; what is printed there is lost", file=sys.stderr, flush=True)
     return code or 1

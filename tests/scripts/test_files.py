@@ -59,10 +59,10 @@ def test_what_has_come_meanwhile_is_not_replaced(tmp_path: Path, monkeypatch: py
     if not links:
         monkeypatch.setattr("os.link", refuse_links)
     path = tmp_path / "keys.csv"
-    with replacing(path, overwrite=False) as stream:
-        stream.write("first")
-    with pytest.raises(FileExistsError) as raised, replacing(path, overwrite=False) as stream:
-        stream.write("second")
+    with written_beside(path, overwrite=False) as beside:
+        beside.write_text("first")
+    with pytest.raises(FileExistsError) as raised, written_beside(path, overwrite=False) as beside:
+        beside.write_text("second")
     assert raised.value.filename == str(path)
     assert [(item.name, item.read_text()) for item in tmp_path.iterdir()] == [("keys.csv", "first")]
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import bpy
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -15,7 +13,6 @@ from ..animation.properties import OWN_WORDS
 from ..animation.queries.polls import with_in_betweens
 from ..animation.transforms import Transform
 from .on_targets import OnTargets
-from .targets import targets_of
 
 
 class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
@@ -27,6 +24,7 @@ class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
     )
 
     nothing_to_do = n_("There are no rigid in-betweens to bake: choose a mode for keys of these objects first")
+    with_work = staticmethod(with_in_betweens)
 
     step: FloatProperty(
         name="Step",
@@ -60,10 +58,6 @@ class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
     first: FloatProperty(name="Start", description="First frame to bake", default=1.0, step=100, precision=2)
     last: FloatProperty(name="End", description="Last frame to bake", default=250.0, step=100, precision=2)
 
-    @classmethod
-    def with_work(cls, targets: Iterable[Transform]) -> Iterable[Transform]:
-        return with_in_betweens(targets)
-
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if self.frames != "CUSTOM":
             self.first, self.last = _range_of(context.scene)
@@ -82,23 +76,24 @@ class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
             column.prop(self, "last")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
+        first, last = self._range(context)
+        if first is not None and first > last:
+            text = rpt_("The range to bake ends on frame {last:g}, before its start, {first:g}")
+            self.report({"ERROR"}, text.format(last=last, first=first))
+            return {"CANCELLED"}
+        return super().execute(context)
+
+    def do(self, context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
+        first, last = self._range(context)
+        begin, end = animation.bake(
+            targets, step=self.step, first=first, last=last, interpolation=self.interpolation, refused=refused
+        )
+        return rpt_("baked from frame {first:g} to {last:g}").format(first=begin, last=end)
+
+    def _range(self, context: bpy.types.Context) -> tuple[float, float] | tuple[None, None]:
         if self.frames == "ACTION":
-            first = last = None
-        else:
-            first, last = _range_of(context.scene) if self.frames == "SCENE" else (self.first, self.last)
-            if first > last:
-                text = rpt_("The range to bake ends on frame {last:g}, before its start, {first:g}")
-                self.report({"ERROR"}, text.format(last=last, first=first))
-                return {"CANCELLED"}
-        targets = targets_of(context)
-
-        def bake(refused: list[Refused]) -> str:
-            begin, end = animation.bake(
-                targets, step=self.step, first=first, last=last, interpolation=self.interpolation, refused=refused
-            )
-            return rpt_("baked from frame {first:g} to {last:g}").format(first=begin, last=end)
-
-        return self.act(targets, bake)
+            return None, None
+        return _range_of(context.scene) if self.frames == "SCENE" else (self.first, self.last)
 
 
 def _range_of(scene: bpy.types.Scene) -> tuple[int, int]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import ClassVar
 
 import bpy
@@ -30,6 +29,7 @@ class _Breakdown(OnTargets):
     nothing_to_do = n_(
         "These objects have Blender's own in-betweens: choose a mode first, or take Blender's Pose > In-Betweens"
     )
+    with_work = staticmethod(with_modes)
     kind: ClassVar[str]
     short: ClassVar[str]
 
@@ -45,18 +45,9 @@ class _Breakdown(OnTargets):
         options={"SKIP_SAVE"},
     )
 
-    @classmethod
-    def with_work(cls, targets: Iterable[Transform]) -> Iterable[Transform]:
-        return with_modes(targets)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        targets = targets_of(context)
-
-        def key(refused: list[Refused]) -> str:
-            animation.breakdown(targets, self.factor, self.kind, refused=refused)
-            return self._summary()
-
-        return self.act(targets, key)
+    def do(self, _context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
+        animation.breakdown(targets, self.factor, self.kind, refused=refused)
+        return self._summary()
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if context.area is None:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from typing import ClassVar
-
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
@@ -16,7 +13,6 @@ from ..animation.transforms import OWN_WORDS, Refused, Transform
 from ..animation.transforms.reaches import metres_per_unit
 from .on_targets import OnTargets
 from .rows import labelled
-from .targets import each_target
 from .wording import length
 
 PROMISED = 0.0001
@@ -33,8 +29,9 @@ class RIGID_MOTION_OT_exact(OnTargets, bpy.types.Operator):
         "Follow the modes between whole frames as well, for motion blur, strips in slow motion and fast moves: "
         "by a constraint in place of delta transforms"
     )
-    bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
     nothing_to_do = n_("What is selected is exact between frames anyway")
+    with_work = staticmethod(lambda targets: (target for target in targets if not target.is_part))
+    leaves_others = True
 
     is_exact: BoolProperty(
         name="Exact",
@@ -42,18 +39,9 @@ class RIGID_MOTION_OT_exact(OnTargets, bpy.types.Operator):
         default=True,
     )
 
-    @classmethod
-    def with_work(cls, targets: Iterable[Transform]) -> Iterator[Transform]:
-        return (target for target in targets if not target.is_part)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        targets = list(self.with_work(each_target(context)))
-
-        def switch(refused: list[Refused]) -> str:
-            animation.set_exact(targets, self.is_exact, refused=refused)
-            return rpt_("exact between frames") if self.is_exact else rpt_("exact on whole frames")
-
-        return self.act(targets, switch)
+    def do(self, _context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
+        animation.set_exact(targets, self.is_exact, refused=refused)
+        return rpt_("exact between frames") if self.is_exact else rpt_("exact on whole frames")
 
 
 def draw(context: bpy.types.Context, layout: bpy.types.UILayout, target: Transform) -> None:

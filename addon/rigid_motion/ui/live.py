@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
@@ -16,7 +17,7 @@ from ..live.retargeting import matched
 from ..live.sockets import NotAllowed
 from ..streams import Body
 from ..streams.vmc import PORT
-from .panels import CATEGORY
+from .panels import Folded
 from .rows import draw_text, labelled
 
 HOST = "127.0.0.1"
@@ -120,10 +121,20 @@ def _match(live: LiveSettings, joints: tuple[str, ...], rig: bpy.types.Object) -
     _is_matching = False
 
 
-class RIGID_MOTION_OT_live_listen(bpy.types.Operator):
+class _Registered:
+    bl_options: Any = {"REGISTER"}  # noqa: RUF012 - Blender reads it
+    report: Any
+
+    def refuse(self, error: OSError | NotAllowed, text: str = "", **facts: object) -> Any:
+        """Report why a port cannot be opened, and cancel."""
+        why = getattr(error, "strerror", None) or error
+        self.report({"ERROR"}, text.format(**facts, why=why) if text else str(error))
+        return {"CANCELLED"}
+
+
+class RIGID_MOTION_OT_live_listen(_Registered, bpy.types.Operator):
     bl_idname = "rigid_motion.live_listen"
     bl_label = "Listen"
-    bl_options = {"REGISTER"}  # noqa: RUF012 - Blender reads it
     bl_description = "Show bodies that other programs send to this port: as new objects, or on the rig below"
 
     @classmethod
@@ -135,14 +146,12 @@ class RIGID_MOTION_OT_live_listen(bpy.types.Operator):
         try:
             receiving.start(live.host, live.port, _settings, _pairs)
         except NotAllowed as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return self.refuse(error)
         except OSError as error:
             text = rpt_(
                 "Port {port} of {host} cannot be listened to, maybe another program does: choose another ({why})"
             )
-            self.report({"ERROR"}, text.format(port=live.port, host=live.host, why=error.strerror or error))
-            return {"CANCELLED"}
+            return self.refuse(error, text, port=live.port, host=live.host)
         return {"FINISHED"}
 
 
@@ -152,10 +161,9 @@ class _WhileListening:
         return receiving.listening() is not None
 
 
-class RIGID_MOTION_OT_live_stop(_WhileListening, bpy.types.Operator):
+class RIGID_MOTION_OT_live_stop(_Registered, _WhileListening, bpy.types.Operator):
     bl_idname = "rigid_motion.live_stop"
     bl_label = "Stop Listening"
-    bl_options = {"REGISTER"}  # noqa: RUF012 - Blender reads it
     bl_description = "Close the port. Everything stays as it is shown; a recording that is not finished is given up"
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
@@ -163,10 +171,9 @@ class RIGID_MOTION_OT_live_stop(_WhileListening, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class RIGID_MOTION_OT_live_record(_WhileListening, bpy.types.Operator):
+class RIGID_MOTION_OT_live_record(_Registered, _WhileListening, bpy.types.Operator):
     bl_idname = "rigid_motion.live_record"
     bl_label = "Record"
-    bl_options = {"REGISTER"}  # noqa: RUF012 - Blender reads it
     bl_description = "Keep what comes from now on, from the current frame on, as keys"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -211,10 +218,9 @@ class RIGID_MOTION_OT_live_match(_WhileListening, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class RIGID_MOTION_OT_live_send(bpy.types.Operator):
+class RIGID_MOTION_OT_live_send(_Registered, bpy.types.Operator):
     bl_idname = "rigid_motion.live_send"
     bl_label = "Send Selected"
-    bl_options = {"REGISTER"}  # noqa: RUF012 - Blender reads it
     bl_description = (
         "Send the selected rigs as VMC performers and all other selected objects as VMC trackers, as they are seen"
     )
@@ -230,19 +236,15 @@ class RIGID_MOTION_OT_live_send(bpy.types.Operator):
         try:
             sending.start(live.to_host, live.to_port, context.selected_objects)
         except NotAllowed as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return self.refuse(error)
         except OSError as error:
-            text = rpt_("{host} is no address that can be sent to ({why})")
-            self.report({"ERROR"}, text.format(host=live.to_host, why=error.strerror or error))
-            return {"CANCELLED"}
+            return self.refuse(error, rpt_("{host} is no address that can be sent to ({why})"), host=live.to_host)
         return {"FINISHED"}
 
 
-class RIGID_MOTION_OT_live_stop_sending(bpy.types.Operator):
+class RIGID_MOTION_OT_live_stop_sending(_Registered, bpy.types.Operator):
     bl_idname = "rigid_motion.live_stop_sending"
     bl_label = "Stop Sending"
-    bl_options = {"REGISTER"}  # noqa: RUF012 - Blender reads it
     bl_description = "Send nothing any more, and close the port"
 
     @classmethod
@@ -272,13 +274,10 @@ class RIGID_MOTION_UL_live_bones(bpy.types.UIList):
             split.prop_search(item, "bone", rig.data, "bones", text="", icon="BONE_DATA")
 
 
-class RIGID_MOTION_PT_live(bpy.types.Panel):
+class RIGID_MOTION_PT_live(Folded, bpy.types.Panel):
     bl_label = "Live"
     bl_description = "Bodies from other programs, over a network: shown, recorded as keys, and sent"
     bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = CATEGORY
-    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012 - Blender reads it
 
     def draw_header(self, _context: bpy.types.Context) -> None:
         if receiving.listening() is None:
@@ -318,13 +317,10 @@ class RIGID_MOTION_PT_live(bpy.types.Panel):
             layout.operator("rigid_motion.live_record", icon="REC")
 
 
-class RIGID_MOTION_PT_live_bones(bpy.types.Panel):
+class RIGID_MOTION_PT_live_bones(Folded, bpy.types.Panel):
     bl_label = "Bones"
     bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = CATEGORY
     bl_parent_id = RIGID_MOTION_PT_live.__name__
-    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012 - Blender reads it
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -337,13 +333,10 @@ class RIGID_MOTION_PT_live_bones(bpy.types.Panel):
         self.layout.operator("rigid_motion.live_match")
 
 
-class RIGID_MOTION_PT_live_send(bpy.types.Panel):
+class RIGID_MOTION_PT_live_send(Folded, bpy.types.Panel):
     bl_label = "Send"
     bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = CATEGORY
     bl_parent_id = RIGID_MOTION_PT_live.__name__
-    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012 - Blender reads it
 
     def draw(self, context: bpy.types.Context) -> None:
         live = context.scene.rigid_motion_live

@@ -8,7 +8,7 @@ undo step.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import bpy
 from bpy.app.translations import pgettext_n as n_
@@ -45,20 +45,21 @@ MOST_REFUSALS = 8
 class OnTargets:
     """Operators on the selected objects or bones, or on those that the editor shows. Their texts are about objects."""
 
-    bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
+    bl_options: Any = {"REGISTER", "UNDO"}  # noqa: RUF012 - Blender reads it
 
     nothing_to_do: ClassVar[str] = ""
     """The reason why the operator is greyed out where it has nothing to do on any target."""
+
+    with_work: Any = staticmethod(iter)
+    """A function of targets that returns those on which there is something to do."""
+
+    leaves_others: ClassVar[bool] = False
+    """True if it does nothing to other targets; otherwise these say why nothing could be done."""
 
     @classmethod
     def each_target(cls, context: bpy.types.Context) -> Iterator[Transform]:
         """Return what the operator acts on here, one after the other."""
         return each_target(context)
-
-    @classmethod
-    def with_work(cls, targets: Iterable[Transform]) -> Iterable[Transform]:
-        """Return the targets on which there is something to do."""
-        return targets
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -84,6 +85,16 @@ class OnTargets:
     @classmethod
     def description(cls, context: bpy.types.Context, _properties: bpy.types.OperatorProperties) -> str:
         return tip_(spoken_of(cls.bl_description, "bones" if is_posing(context) else "objects"))
+
+    def execute(self, context: bpy.types.Context) -> Any:
+        targets = list(self.each_target(context))
+        if self.leaves_others:
+            targets = list(self.with_work(targets))
+        return self.act(targets, lambda refused: self.do(context, targets, refused))
+
+    def do(self, context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
+        """Do it to all targets, put refusals into the list, and return in words what was done: a verb of `act`."""
+        raise NotImplementedError
 
     def act(self, targets: Sequence[Transform], verb: Callable[[list[Refused]], str]) -> set[str]:
         """Do something to all targets at once, and report it.

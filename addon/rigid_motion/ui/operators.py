@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from contextlib import nullcontext
 from typing import ClassVar
 
@@ -27,7 +26,6 @@ from .targets import (
     SCOPES,
     SELECTED,
     WHOLE,
-    each_target,
     grouped_by_frames,
     is_posing,
     scope_for,
@@ -112,19 +110,12 @@ class RIGID_MOTION_OT_clear(OnTargets, bpy.types.Operator):
         "Keys of location, rotation and scale stay"
     )
     nothing_to_do = n_("These objects have Blender's own in-betweens already")
+    with_work = staticmethod(with_modes)
+    leaves_others = True
 
-    @classmethod
-    def with_work(cls, targets: Iterable[Transform]) -> Iterable[Transform]:
-        return with_modes(targets)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        targets = list(with_modes(each_target(context)))
-
-        def clear(refused: list[Refused]) -> str:
-            animation.set_mode(targets, "BLENDER", refused=refused)
-            return rpt_("Blender's own in-betweens")
-
-        return self.act(targets, clear)
+    def do(self, _context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
+        animation.set_mode(targets, "BLENDER", refused=refused)
+        return rpt_("Blender's own in-betweens")
 
 
 class RIGID_MOTION_OT_unbake(OnChanged, bpy.types.Operator):
@@ -145,19 +136,12 @@ class RIGID_MOTION_OT_mend(OnTargets, bpy.types.Operator):
         "first in the stack, unmuted, with full influence"
     )
     nothing_to_do = n_("None of these objects lacks its constraint")
+    with_work = staticmethod(with_troubles)
+    leaves_others = True
 
-    @classmethod
-    def with_work(cls, targets: Iterable[Transform]) -> Iterable[Transform]:
-        return with_troubles(targets)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        targets = list(with_troubles(each_target(context)))
-
-        def restore(refused: list[Refused]) -> str:
-            animation.restore_constraints(targets, refused=refused)
-            return rpt_("constraint restored")
-
-        return self.act(targets, restore)
+    def do(self, _context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
+        animation.restore_constraints(targets, refused=refused)
+        return rpt_("constraint restored")
 
 
 class RIGID_MOTION_OT_refresh(bpy.types.Operator):

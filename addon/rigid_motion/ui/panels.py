@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
+from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
@@ -37,10 +38,17 @@ CATEGORY = "Animation"
 SPACES = ("VIEW_3D", "DOPESHEET_EDITOR", "GRAPH_EDITOR")
 
 
-class _Main:
-    bl_label = "Rigid Motion"
-    bl_region_type = "UI"
+class InSidebar:
+    bl_region_type: Any = "UI"
     bl_category = CATEGORY
+
+
+class Folded(InSidebar):
+    bl_options: Any = {"DEFAULT_CLOSED"}  # noqa: RUF012 - Blender reads it
+
+
+class _Main(InSidebar):
+    bl_label = "Rigid Motion"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -80,15 +88,12 @@ class _Main:
         _draw_reduction(context, layout, target)
 
 
-class _Shown:
+class _Shown(Folded):
     bl_label = "Transform on Screen"
     bl_description = (
         "Where the object or bone is seen on this frame, with the in-betweens. "
         "The Item tab has Blender's own values, without"
     )
-    bl_region_type = "UI"
-    bl_category = CATEGORY
-    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012 - Blender reads it
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -122,11 +127,8 @@ class RIGID_MOTION_PT_parent_switch(bpy.types.Panel):
         draw_parent_switch(self.layout, context)
 
 
-class _Path:
+class _Path(Folded):
     bl_label = "Path"
-    bl_region_type = "UI"
-    bl_category = CATEGORY
-    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012 - Blender reads it
 
     def draw_header(self, context: bpy.types.Context) -> None:
         self.layout.prop(context.scene.rigid_motion_overlay, "show_paths", text="")
@@ -135,12 +137,9 @@ class _Path:
         overlay.draw_settings(self.layout, context)
 
 
-class _Delta:
+class _Delta(Folded):
     bl_label = "Delta Transform"
     bl_description = "The delta transforms that the object has of its own, to which the in-betweens are added"
-    bl_region_type = "UI"
-    bl_category = CATEGORY
-    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012 - Blender reads it
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

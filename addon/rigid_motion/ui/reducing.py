@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
+from functools import partial
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
@@ -45,6 +46,7 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
         "None of these objects has more than two keys. Constraints, drivers and simulations are turned into keys first "
         "(Object > Animation > Bake Action, with Visual Keying)"
     )
+    with_work = staticmethod(partial(with_more_keys_than, count=2))
 
     by: EnumProperty(
         name="Reduce By",
@@ -152,19 +154,16 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
         for label, text in reduction_rows(scene, reduction):
             labelled(column, label).label(text=text, translate=False)
 
-    @classmethod
-    def with_work(cls, targets: Iterable[Transform]) -> Iterable[Transform]:
-        return with_more_keys_than(targets, 2)
-
     def execute(self, context: bpy.types.Context) -> set[str]:
         targets = list(self.each_target(context))
         if not self.properties.is_property_set("tolerance") or self.tolerance == self.offered:
             self.tolerance = self.offered = first_tolerance(context.scene, targets, shared=self.shared)
         if not self.radius and len(targets) == 1:
             self.radius = animation.radius_of(targets[0].carrier)
-        return self.act(targets, lambda refused: self._reduce(context.scene, targets, refused))
+        return super().execute(context)
 
-    def _reduce(self, scene: bpy.types.Scene, targets: list[Transform], refused: list[Refused]) -> str:
+    def do(self, context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
+        scene = context.scene
         before = [len(target.motion.bakes) for target in targets]
         animation.reduce_keys_of(
             targets,

@@ -11,8 +11,9 @@ from ..animation import Refused
 from ..animation.actions.records import recorded
 from ..animation.properties import MOST_TURNS, OWN_WORDS, SCREW_AXIS, TURN_AXIS_ITEMS
 from ..animation.queries.keyed import active_binding
+from ..animation.transforms import Transform
 from .on_targets import OnTargets
-from .targets import CURRENT, SELECTED, WHOLE, active_target, grouped_by_frames, is_key_editor, targets_of
+from .targets import CURRENT, SELECTED, WHOLE, active_target, grouped_by_frames, is_key_editor
 
 TURN_SCOPES = [
     (WHOLE, "All Segments", "All segments get so many turns"),
@@ -67,16 +68,11 @@ class RIGID_MOTION_OT_set_turns(OnTargets, bpy.types.Operator):
         for name in ("turns", "axis", "on"):
             layout.prop(self, name)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        targets = targets_of(context)
+    def do(self, context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
         axis = self.axis if self.properties.is_property_set("axis") else None
-
-        def set_turns(refused: list[Refused]) -> str:
-            for frames, group in grouped_by_frames(context, targets, self.on, refused).items():
-                animation.set_turns(group, self.turns, frames, axis=axis, refused=refused)
-            return rpt_("{turns} turns more").format(turns=self.turns)
-
-        return self.act(targets, set_turns)
+        for frames, group in grouped_by_frames(context, targets, self.on, refused).items():
+            animation.set_turns(group, self.turns, frames, axis=axis, refused=refused)
+        return rpt_("{turns} turns more").format(turns=self.turns)
 
 
 CLASSES = (RIGID_MOTION_OT_set_turns,)

@@ -8,6 +8,7 @@ better; how many is searched for.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 from operator import itemgetter
 from typing import cast
 
@@ -18,7 +19,7 @@ from rigid_motion_batch.recordings.clips import Clip
 
 from .bodies import BodyReconstruction, rms_of_body, same_body_motions
 from .choices import Uniform
-from .needed import DECIMATIONS, OfRigidBody, Ways, evenly_spaced, part_of
+from .needed import DECIMATIONS, OfRigidBody, Ways, evenly_spaced, fewest, part_of
 from .radii import Radii
 from .reconstructions import Groups
 
@@ -51,19 +52,10 @@ class OfBody:
     def by_motion(self, mode: str, target: float, evenly: int) -> list[tuple[np.ndarray, float]]:
         """Key poses: as many as evenly spaced ones at most, if those of the motion are any better."""
         samples = len(self.clip.times)
-        too_few, enough = 1, min(evenly, samples)
-        keys, error = self._best_of(enough, mode)
-        while error > target and enough < samples:
-            too_few, enough = enough, min(2 * enough, samples)
-            keys, error = self._best_of(enough, mode)
-        while enough - too_few > max(1, NEAR * enough):
-            middle = (enough + too_few) // 2
-            tried, result = self._best_of(middle, mode)
-            if result <= target:
-                enough, keys, error = middle, tried, result
-            else:
-                too_few = middle
-        return [(keys, error)]
+        best_of = cache(lambda budget: self._best_of(budget, mode))
+        start = min(evenly, samples)
+        enough = fewest(lambda budget: best_of(budget)[1] <= target, start, samples, too_few=1, near=NEAR)
+        return [best_of(enough)]
 
     def _best_of(self, budget: int, mode: str) -> tuple[np.ndarray, float]:
         """Return so many key poses at most, and their error."""

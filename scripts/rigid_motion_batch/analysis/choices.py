@@ -34,7 +34,7 @@ NUMBER = r"\d{1,6}(?:\.\d{1,6})?"
 
 @dataclass(frozen=True)
 class Choice(ABC):
-    """A way to choose keys, and how much of it is wanted."""
+    """A way to choose keys, and how much of it."""
 
     written: str
     """The amount as the user wrote it: "7.5", "5mm"."""

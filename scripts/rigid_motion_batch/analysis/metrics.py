@@ -161,9 +161,7 @@ def write_metrics(path: Path, rows: Iterable[Metrics]) -> None:
     write_rows(path, Metrics, rows)
 
 
-def write_poses(
-    path: Path, times: np.ndarray, poses: Poses, modes: Sequence[str] = (), *, overwrite: bool = True
-) -> None:
+def write_poses(path: Path, times: np.ndarray, poses: Poses, modes: Sequence[str] = ()) -> None:
     """Write a table of poses: `t,x,y,z,qw,qx,qy,qz`, and `s` where the poses have scales.
 
     Under a name that ends in `.tum` the table is as evo and others read it, `t x y z qx qy qz qw`, without scales and
@@ -176,18 +174,16 @@ def write_poses(
     poses : Poses, shape (n,)
     modes : sequence of str, n - 1 of them, optional
         Of the segments that the poses begin, for a last column, `mode`. The last pose begins none.
-    overwrite : bool
-        Whether to replace what is there. Otherwise FileExistsError is raised.
     """
     if path.suffix == ".tum":
-        _write_tum(path, times, poses, overwrite)
+        _write_tum(path, times, poses)
         return
     columns = [times, *poses.positions.T, *poses.quaternions.T]
     header = "t,x,y,z,qw,qx,qy,qz"
     if poses.scales is not None:
         columns.append(poses.scales)
         header += ",s"
-    with replacing(path, overwrite=overwrite) as stream:
+    with replacing(path) as stream:
         stream.write(f"{header},mode\n" if modes else f"{header}\n")
         for first, lines in lines_of_poses(columns):
             if modes:
@@ -197,9 +193,9 @@ def write_poses(
             stream.write("\n".join([*lines, ""]))
 
 
-def _write_tum(path: Path, times: np.ndarray, poses: Poses, overwrite: bool) -> None:
+def _write_tum(path: Path, times: np.ndarray, poses: Poses) -> None:
     columns = [times, *poses.positions.T, *poses.quaternions.T[[1, 2, 3, 0]]]
-    with replacing(path, overwrite=overwrite) as stream:
+    with replacing(path) as stream:
         stream.write("# timestamp tx ty tz qx qy qz qw\n")
         for _, lines in lines_of_poses(columns):
             stream.writelines(line.replace(",", " ") + "\n" for line in lines)

@@ -178,18 +178,21 @@ def _fewest_evenly(ways: Ways, mode: str, target: float, start: np.ndarray) -> n
         return ways.error(evenly_spaced(ways.clip, segments), mode) <= target
 
     # Twice the samples are ticks enough for every sample to be a key, which is always good.
-    most = 2 * len(ways.clip.times)
-    enough = len(start) - 1
-    too_few = 0
-    while enough < most and not good(enough):
+    return evenly_spaced(ways.clip, fewest(good, len(start) - 1, 2 * len(ways.clip.times)))
+
+
+def fewest(is_enough: Callable[[int], bool], start: int, most: int, *, too_few: int = 0, near: float = 0.0) -> int:
+    """Return the least number that is enough, known to a share of it, as if all above were; the most always is."""
+    enough = start
+    while enough < most and not is_enough(enough):
         too_few, enough = enough, min(2 * enough, most)
-    while enough - too_few > 1:
+    while enough - too_few > max(1, near * enough):
         middle = (enough + too_few) // 2
-        if good(middle):
+        if is_enough(middle):
             enough = middle
         else:
             too_few = middle
-    return evenly_spaced(ways.clip, enough)
+    return enough
 
 
 def part_of(clip: Clip, first: int, last: int) -> Clip:

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from rigid_motion_batch.command_line import printable
-from rigid_motion_batch.rows import meant
+from rigid_motion_batch.rows import unescaped
 
 from .choices import METRES
 
@@ -27,7 +27,7 @@ MOST_BYTES = 1 << 20
 
 @dataclass(frozen=True)
 class Radii:
-    """As plain data, which is how tasks are told."""
+    """Plain data, as parameters of tasks."""
 
     rigid: float = RIGID
     """Of a single rigid body."""
@@ -61,7 +61,8 @@ def read_radii(text: str) -> Radii:
         With the line of the table, what is wrong, and the way out.
     """
     try:
-        return Radii(rigid=radius_in_metres(text), joint=radius_in_metres(text))
+        radius = radius_in_metres(text)
+        return Radii(rigid=radius, joint=radius)
     except ValueError:
         # Not that of pathlib, for which a name that is too long for a file is an error.
         if not os.path.isfile(text):
@@ -94,7 +95,7 @@ def _read_table(path: Path) -> dict[str, float]:
             continue
         if len(cells) <= max(columns):
             raise ValueError(f"{path}:{number}: {len(cells)} cells where {len(header)} are expected")
-        joint, radius = meant(cells[columns[0]]).strip(), cells[columns[1]].strip()
+        joint, radius = unescaped(cells[columns[0]]).strip(), cells[columns[1]].strip()
         if joint in radii:
             raise ValueError(f"{path}:{number}: the joint {joint!r} comes a second time; leave one")
         try:
@@ -109,7 +110,10 @@ def radius_in_metres(text: str) -> float:
     parts = re.fullmatch(rf"(.*?)\s*({'|'.join(METRES)})?\s*", text, re.DOTALL)
     assert parts is not None  # which any text fits
     number, unit = parts.groups()
-    return _above_zero(float(number) * METRES[unit or "m"])
+    try:
+        return _above_zero(float(number) * METRES[unit or "m"])
+    except ValueError:
+        raise ValueError(f"{text!r} is not a length above 0, such as 3cm or 0.03") from None
 
 
 def _above_zero(radius: float) -> float:

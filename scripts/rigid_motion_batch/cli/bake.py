@@ -7,11 +7,10 @@ stay in the file, so that it can be un-baked. The result is a new file beside th
 from __future__ import annotations
 
 import argparse
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from rigid_motion_batch.command_line import not_empty, number, parser_of, program_of
+from rigid_motion_batch.command_line import bounded, not_empty, parser_of, program_of
 from rigid_motion_batch.system_libraries import require_blender
 
 SCRIPT = "bake.py"
@@ -20,14 +19,18 @@ PROGRAM = program_of(SCRIPT)
 require_blender(SCRIPT)
 
 from rigid_motion_batch.keying.baking import BAKED, UNBAKED, baking, unbaking
-from rigid_motion_batch.keying.jobs import BlendRun
+from rigid_motion_batch.keying.jobs import do_blend
 from rigid_motion_batch.keying.options import add_file_options, add_target_options, refuse_odd_places
 from rigid_motion_batch.keying.planning import Job, named_file, planned
-from rigid_motion_batch.keying.records import Record, is_made
-from rigid_motion_batch.keying.sessions import Note, Outcome, Work, do_all
+from rigid_motion_batch.keying.records import is_made
+from rigid_motion_batch.keying.sessions import do_all
+from rigid_motion_batch.keying.work import Doing, Work
 
-SMALLEST_STEP = 0.01
-"""Keys closer than that are one key to Blender."""
+STEPS = 0.01, 1e6
+"""Frames from key to key: keys closer than that are one key to Blender."""
+
+LAST_FRAME = 1048574
+"""Of Blender's frames, which begin as far before 0."""
 
 EPILOG = """
 examples:
@@ -88,8 +91,12 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     add_target_options(parser, "modes")
     keys = parser.add_argument_group("keys")
     keys.add_argument(
-        "--step", type=_step, metavar="N", help="frames from key to key; 0.25 for keys between the frames (1)"
+        "--step",
+        type=bounded("number of frames", *STEPS),
+        metavar="N",
+        help="frames from key to key; 0.25 for keys between the frames (1)",
     )
+    frame = bounded("frame", -LAST_FRAME, LAST_FRAME)
     keys.add_argument(
         "--hold",
         action="store_true",
@@ -98,11 +105,11 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     )
     keys.add_argument(
         "--first",
-        type=_frame,
+        type=frame,
         metavar="FRAME",
         help="bake from here on, widened to whole segments, and over smooth ones beside them (first key)",
     )
-    keys.add_argument("--last", type=_frame, metavar="FRAME", help="bake up to here (last key)")
+    keys.add_argument("--last", type=frame, metavar="FRAME", help="bake up to here (last key)")
     add_file_options(parser)
     options = parser.parse_args(arguments)
     if options.unbake:
@@ -147,9 +154,8 @@ class Bake(Work):
     def needs_blender(self, job: Job) -> bool:
         return True
 
-    def do(self, job: Job, record: Record, note: Note) -> Outcome:
-        action = unbaking() if self.unbake else baking(self.step, self.first, self.last, self.interpolation)
-        return BlendRun(self, action, record, note).do(job)
+    def do(self, doing: Doing) -> None:
+        do_blend(doing, unbaking() if self.unbake else baking(self.step, self.first, self.last, self.interpolation))
 
 
 def _planned(options: argparse.Namespace) -> list[Job]:
@@ -167,17 +173,3 @@ def _planned(options: argparse.Namespace) -> list[Job]:
         return path.stem.endswith((BAKED, UNBAKED)) or is_made(path)
 
     return planned(options.files, None if named else options.output, (".blend",), is_result, job_of)
-
-
-def _frame(text: str) -> float:
-    frame = number(text)
-    if not math.isfinite(frame):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a frame")
-    return frame
-
-
-def _step(text: str) -> float:
-    step = number(text)
-    if not SMALLEST_STEP <= step < math.inf:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of frames, {SMALLEST_STEP} or more")
-    return step

@@ -12,6 +12,7 @@ import sys
 import webbrowser
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from itertools import chain, count, groupby
@@ -47,7 +48,7 @@ from rigid_motion_batch.recordings.clip_reading import folder_names
 from rigid_motion_batch.recordings.reading import split_source
 from rigid_motion_batch.report.numbers import Gathering, Numbers
 from rigid_motion_batch.report.settings import Settings
-from rigid_motion_batch.report.verdict import Verdict, verdict
+from rigid_motion_batch.report.verdict import Verdict, as_text, verdict
 from rigid_motion_batch.scenes.settings import MODELS, SubjectError
 from rigid_motion_batch.supervising import blender_program, report
 from rigid_motion_batch.system_libraries import missing_for_rendering, way_out, without_blender
@@ -413,8 +414,8 @@ class _Comparing:
             "report": os.fspath(page) if page else None,
             "exit_code": code,
             "verdict": str(said) if said else None,
-            "facts": [terminal.plain(fact) for fact in said.facts] if said else [],
-            "table": terminal.as_data(terminal.lines_of(numbers)) if numbers else [],
+            "facts": [as_text(fact) for fact in said.facts] if said else [],
+            "table": [asdict(line) for line in terminal.lines_of(numbers)] if numbers else [],
             "clips": list(numbers.clips) if numbers else [],
             "notes": self.notes,
             "failures": self.work.failures,

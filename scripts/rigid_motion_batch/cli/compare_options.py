@@ -6,14 +6,13 @@ import argparse
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import Any
 
 from rigid_motion.motion import KEYFRAME_MODES, MODES
 from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform, distinct
 from rigid_motion_batch.analysis.metrics import FORMS
 from rigid_motion_batch.analysis.modes import BEST_OF, single_modes
-from rigid_motion_batch.analysis.radii import EVERYWHERE, JOINT, RIGID, Radii, read_radii
-from rigid_motion_batch.command_line import did_you_mean, folder_path, not_empty, number, parser_of
+from rigid_motion_batch.analysis.radii import EVERYWHERE, JOINT, RIGID, read_radii
+from rigid_motion_batch.command_line import bounded, did_you_mean, folder_path, not_empty, parser_of, whole
 from rigid_motion_batch.palette import THEMES
 from rigid_motion_batch.pipeline.bundle import STAGES
 from rigid_motion_batch.places import ASSETS, from_here
@@ -154,7 +153,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     )
     parser.add_argument(
         "--radius",
-        type=_radii,
+        type=read_radii,
         default=EVERYWHERE,
         metavar="LENGTH|CSV",
         help=f"radius of the shell error: 3cm, or 0.03 for metres ({RIGID}, around the joints of bodies {JOINT}); or a "
@@ -170,7 +169,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     workers = parser.add_mutually_exclusive_group()
     workers.add_argument(
         "--jobs",
-        type=_jobs,
+        type=whole("number of processes", 0, 999),
         metavar="N",
         help="worker processes; 0 to work in this one (one for each processor)",
     )
@@ -229,10 +228,15 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     video.add_argument(
         "--resolution", type=_resolution, default="1280x720", metavar="WxH", help="in pixels (%(default)s)"
     )
-    video.add_argument("--fps", type=int, default=30, help="frames a second (%(default)s)")
     video.add_argument(
-        "--slow-motion", type=_positive, default=1.0, metavar="N", help="play N times slower (%(default)s)"
+        "--fps",
+        type=whole("number of frames a second", 1, 240),
+        default=30,
+        metavar="N",
+        help="frames a second (%(default)s)",
     )
+    factor = bounded("number above 0", 0.0, 1e6, above=True)
+    video.add_argument("--slow-motion", type=factor, default=1.0, metavar="N", help="play N times slower (%(default)s)")
     video.add_argument(
         "--object",
         dest="subject",
@@ -249,7 +253,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     video.add_argument("--theme", choices=THEMES, default="dark", help="colours of the videos (%(default)s)")
     video.add_argument(
         "--deviation",
-        type=_positive,
+        type=factor,
         metavar="N",
         help="magnify errors N times; 1 shows them as they are (a round number that shows them well)",
     )
@@ -258,7 +262,13 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         choices=ANTIALIASING,
         help="for workbench: OFF, FXAA or a number of samples; 8 for a talk (softened by the compositor)",
     )
-    video.add_argument("--samples", type=int, default=16, help="samples for eevee and cycles (%(default)s)")
+    video.add_argument(
+        "--samples",
+        type=whole("number of samples", 1, 4096),
+        default=16,
+        metavar="N",
+        help="samples for eevee and cycles (%(default)s)",
+    )
     options = parser.parse_args(arguments)
     try:
         options.distinct = options.modes.distinct
@@ -318,11 +328,7 @@ def _amounts(kind: type[Choice]) -> Callable[[str], list[Choice]]:
     """Return how a list of amounts is read: each as a choice of that kind."""
 
     def parse_amounts(text: str) -> list[Choice]:
-        written = ["".join(part.split()) for part in text.split(",") if part.strip()] or [text]
-        try:
-            return distinct(map(kind, written))
-        except ValueError as error:
-            raise argparse.ArgumentTypeError(str(error)) from None
+        return distinct(map(kind, ["".join(part.split()) for part in text.split(",") if part.strip()] or [text]))
 
     return parse_amounts
 
@@ -344,44 +350,30 @@ def _modes(text: str) -> Modes:
     if wrong or not named:
         known, name = (*MODES, DISTINCT, ALL, BEST_OF), wrong[0] if wrong else text
         near = did_you_mean(name, known) or f"; there are {', '.join(known)}"
-        raise argparse.ArgumentTypeError(f"there is no mode {name!r}{near}")
+        raise ValueError(f"there is no mode {name!r}{near}")
     share = DISTINCT in written
     if BEST_OF not in named:
         return Modes(tuple(modes), share)
     if len(modes) < 2:
-        raise argparse.ArgumentTypeError(
+        raise ValueError(
             f"{BEST_OF} chooses among the other modes that are named: name two or more, or {ALL},{BEST_OF}"
         )
     return Modes((*modes, BEST_OF), share)
 
 
-def _whole(pattern: str, what: str, fits: Callable[..., bool] = lambda *_: True) -> Callable[[str], Any]:
-    """Return how whole numbers are read: those in the groups of a pattern, or the single one."""
-
-    def parse_whole(text: str) -> int | tuple[int, ...]:
-        result = re.fullmatch(pattern, text, re.ASCII)
-        numbers = tuple(map(int, result.groups())) if result else ()
-        if not (numbers and fits(*numbers)):
-            raise argparse.ArgumentTypeError(f"{text!r} is no {what}")
-        return numbers if len(numbers) > 1 else numbers[0]
-
-    return parse_whole
+def _part(text: str) -> tuple[int, int]:
+    part, of = _two(text, "/", "share; give one such as 1/8")
+    if not 1 <= part <= of:
+        raise ValueError(f"{text!r} is no share; give one such as 1/8")
+    return part, of
 
 
-_jobs = _whole(r"(\d{1,3})", "number of processes; give 0, 1, 2, ...")
-_part = _whole(r"(\d{1,6})/(\d{1,6})", "share; give one such as 1/8", lambda number, of: 1 <= number <= of)
-_resolution = _whole(r"(\d{1,5})x(\d{1,5})", "resolution; give one such as 1280x720")
+def _resolution(text: str) -> tuple[int, int]:
+    return _two(text, "x", "resolution; give one such as 1280x720")
 
 
-def _positive(text: str) -> float:
-    positive = number(text)
-    if not 0.0 < positive < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
-    return positive
-
-
-def _radii(text: str) -> Radii:
-    try:
-        return read_radii(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from None
+def _two(text: str, between: str, what: str) -> tuple[int, int]:
+    """Return two whole numbers."""
+    if not (numbers := re.fullmatch(rf"(\d{{1,6}}){between}(\d{{1,6}})", text, re.ASCII)):
+        raise ValueError(f"{text!r} is no {what}")
+    return int(numbers[1]), int(numbers[2])

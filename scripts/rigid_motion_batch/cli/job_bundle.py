@@ -13,7 +13,7 @@ from pathlib import Path
 
 from rigid_motion_batch.cli.compare_options import parse as parse_comparison
 from rigid_motion_batch.cli.compare_options import without
-from rigid_motion_batch.command_line import complain, parser_of, program_of
+from rigid_motion_batch.command_line import complain, parser_of, program_of, whole
 from rigid_motion_batch.pipeline.bundle import MOST_PARTS, STAGES, write_bundle
 from rigid_motion_batch.places import output_folder
 
@@ -69,15 +69,9 @@ def _parse(arguments: list[str]) -> tuple[argparse.Namespace, list[str]]:
     )
     parser.add_argument(
         "--parts",
-        type=_count,
+        type=whole("number of tasks", 1, MOST_PARTS),
         default=PARTS,
         metavar="N",
         help=f"tasks that each stage is split into, at most {MOST_PARTS} (%(default)s)",
     )
     return parser.parse_known_args(arguments)
-
-
-def _count(text: str) -> int:
-    if not (text.isascii() and text.isdecimal() and 1 <= int(text) <= MOST_PARTS):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of tasks; give 1 to {MOST_PARTS}")
-    return int(text)

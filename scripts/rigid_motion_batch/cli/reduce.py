@@ -12,7 +12,7 @@ import argparse
 from dataclasses import dataclass
 from pathlib import Path
 
-from rigid_motion_batch.command_line import not_empty, parser_of, program_of
+from rigid_motion_batch.command_line import not_empty, parser_of, program_of, whole
 from rigid_motion_batch.system_libraries import require_blender
 
 SCRIPT = "reduce.py"
@@ -22,13 +22,13 @@ from rigid_motion.gltf.sizes import OF_A_BODY, OF_KEY_POSES
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.radii import RIGID, radius_in_metres
-from rigid_motion_batch.keying.gltf_files import ENDINGS, GltfRun
+from rigid_motion_batch.keying.gltf_files import do_gltf
 from rigid_motion_batch.keying.options import add_file_options, add_target_options, refuse_odd_places
 from rigid_motion_batch.keying.planning import Job, file_and_body, named_file, planned
-from rigid_motion_batch.keying.recorded import GLB_SUFFIX, RATES, SUFFIX, TOLERANCE, Reading, Writing, name_of
-from rigid_motion_batch.keying.records import Record, is_made
-from rigid_motion_batch.keying.sessions import Note, Outcome, Work, do_all
-from rigid_motion_batch.keying.wishes import Wishes
+from rigid_motion_batch.keying.records import is_made
+from rigid_motion_batch.keying.reductions import ENDINGS, GLB_SUFFIX, RATES, SUFFIX, TOLERANCE, Reductions, name_of
+from rigid_motion_batch.keying.sessions import do_all
+from rigid_motion_batch.keying.work import Doing, Work
 from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
 
 IN_FOLDERS = (".blend", ".bvh", ".csv", ".fbx", ".glb", ".gltf", ".tsv", ".tum")
@@ -139,7 +139,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     keys = parser.add_argument_group("keys")
     keys.add_argument(
         "--tolerance",
-        type=_tolerance,
+        type=Tolerance,
         metavar="LENGTH",
         help="largest error on any frame: 5mm, 0.5cm, 0.005m; a plain number is in the unit of the file (in .blend "
         f"files 1mm for objects and {OF_A_BODY:.1%}% of the size of a rig; for recordings {TOLERANCE.written}, with "
@@ -149,14 +149,14 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     keys.add_argument(
         "--keys",
         "--key-poses",
-        type=_count,
+        type=whole("number of keys", 2, MOST),
         metavar="N",
         help="instead of a tolerance: N keys of each object, or N key poses of each rig, where the error is smallest",
     )
     keys.add_argument("--mode", choices=KEYFRAME_MODES, help=f"mode between the keys ({MODE}; glTF knows one)")
     keys.add_argument(
         "--radius",
-        type=_radius,
+        type=radius_in_metres,
         metavar="LENGTH",
         help="how far around the origin no point is off by more: 3cm, or 0.03 for metres (the size of an object, the "
         f"length of a bone; for rigid recordings {RIGID})",
@@ -172,7 +172,10 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     recordings = parser.add_argument_group("recordings")
     recordings.add_argument("--blend", action="store_true", help="also write rigid motions as .blend files")
     recordings.add_argument(
-        "--fps", type=_fps, metavar="N", help="frames a second of .blend and GLB files (the rate of the recording)"
+        "--fps",
+        type=whole("number of frames a second", *RATES),
+        metavar="N",
+        help="frames a second of .blend and GLB files (the rate of the recording)",
     )
     add_reading_options(parser)
     gltf = parser.add_argument_group("glTF files")
@@ -190,17 +193,20 @@ def parse(arguments: list[str]) -> argparse.Namespace:
             objects=options.objects,
             overwrite=options.overwrite,
             dry_run=options.dry_run,
-            wishes=Wishes(
-                options.mode or MODE,
-                options.tolerance,
-                options.radius,
-                options.shared,
-                options.discard,
-                options.keys,
-                options.vertices,
+            how=Reductions(
+                mode=options.mode or MODE,
+                tolerance=options.tolerance,
+                radius=options.radius,
+                shared=options.shared,
+                discard=options.discard,
+                count=options.keys,
+                vertices=options.vertices,
+                axes=options.axes,
+                reading=reading_options(options),
+                blend=options.blend,
+                fps=options.fps,
+                glb=options.glb,
             ),
-            reading=Reading(options.axes, reading_options(options)),
-            writing=Writing(options.blend, options.fps, options.glb),
         )
         options.todo = _planned(options)
         _refuse_odd(options)
@@ -221,27 +227,26 @@ def main(arguments: list[str]) -> int:
 class Reduce(Work):
     """Keeping few keys."""
 
-    wishes: Wishes
-    reading: Reading
-    writing: Writing
+    how: Reductions
 
     def needs_blender(self, job: Job) -> bool:
         return not job.problem and (job.is_recording or not _is_gltf(job.file))
 
-    def do(self, job: Job, record: Record, note: Note) -> Outcome:
-        gltf = GltfRun(self.wishes, record, note, dry_run=self.dry_run, processes=self.processes)
-        if not self.needs_blender(job):
-            return gltf.do(job)
+    def do(self, doing: Doing) -> None:
+        if not self.needs_blender(doing.job):
+            do_gltf(doing, self.how)
+            return
         from rigid_motion_batch.keying.exporting import export_file
-        from rigid_motion_batch.keying.jobs import BlendRun
-        from rigid_motion_batch.keying.recordings import RecordingRun
+        from rigid_motion_batch.keying.jobs import do_blend
+        from rigid_motion_batch.keying.recordings import do_recording
         from rigid_motion_batch.keying.reducing import reducing
 
-        if job.is_recording:
-            return RecordingRun(self.wishes, self.reading, self.writing, record, note, dry_run=self.dry_run).do(job)
-        if self.writing.glb:
-            return export_file(job, gltf, note)
-        return BlendRun(self, reducing(self.wishes, self.objects), record, note).do(job)
+        if doing.job.is_recording:
+            do_recording(doing, self.how)
+        elif self.how.glb:
+            export_file(doing, self.how)
+        else:
+            do_blend(doing, reducing(self.how, self.objects))
 
 
 def _planned(options: argparse.Namespace) -> list[Job]:
@@ -324,29 +329,3 @@ def _is_gltf(path: Path) -> bool:
 
 def _is_result(path: Path) -> bool:
     return path.stem.endswith(GLB_SUFFIX) or is_made(path)
-
-
-def _tolerance(text: str) -> Tolerance:
-    try:
-        return Tolerance(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from None
-
-
-def _count(text: str) -> int:
-    if not (text.isascii() and text.isdigit() and 2 <= int(text) <= MOST):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 2 to {MOST}")
-    return int(text)
-
-
-def _radius(text: str) -> float:
-    try:
-        return radius_in_metres(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a length above 0, such as 3cm or 0.03") from None
-
-
-def _fps(text: str) -> int:
-    if not (text.isascii() and text.isdigit() and RATES[0] <= int(text) <= RATES[1]):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from {RATES[0]} to {RATES[1]}")
-    return int(text)

@@ -11,7 +11,6 @@ from contextlib import AbstractContextManager, closing, contextmanager, nullcont
 from rigid_motion.motion import rms
 from rigid_motion.streams import Body, Sender
 from rigid_motion.streams.paths import Path
-from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.command_line import complain, path_line
 from rigid_motion_batch.progress import Progress, Stage
 from rigid_motion_batch.recordings import TrajectoryError
@@ -74,7 +73,7 @@ def send(options: argparse.Namespace, stopped: list[int]) -> None:
         return
     bodies, moments, poses = together(clips, options.rate)
     delay = options.delay or (1.0 / options.rate if options.rate else DELAY)
-    sender = sender_of(bodies, moments, Tolerance(options.tolerance).tolerance(clips[0]), delay, options.rate)
+    sender = sender_of(bodies, moments, options.tolerance.tolerance(clips[0]), delay, options.rate)
     with _room(options) as room, Progress() as progress:
         sending = Sending(room, options.user, sender)
         _say(f"{options.user} sends {', '.join(body.name for body in bodies)} to {options.room}")
@@ -101,7 +100,7 @@ def send(options: argparse.Namespace, stopped: list[int]) -> None:
 
 def send_performer(options: argparse.Namespace, stopped: list[int]) -> None:
     """Send what another program performs until that is to end. Raises what says why it could not be."""
-    tolerance, delay = Tolerance(options.tolerance).metres(1.0), options.delay or DELAY
+    tolerance, delay = options.tolerance.metres(1.0), options.delay or DELAY
     sending: Sending | None = None
     sent: tuple[Body, ...] = ()
     with _room(options) as room, vmc.Performers(options.from_vmc) as performers:

@@ -38,7 +38,7 @@ examples:
   python scripts/stream.py measure walk.bvh --tolerance 5mm --delay 0.2 --loss 0.01 --output shown.bvh --json
   python scripts/stream.py measure log.csv:left --output shown.csv
 
-Bytes a second leave out what somebody who joins is told once (names, parents, rest
+Bytes a second leave out what somebody who joins gets once (names, parents, rest
 poses); they are a line of their own. Headers are those of UDP and IPv4, 28 bytes a datagram. shown.bvh is what was
 shown at the recording's moments, in its units and axes.
 """
@@ -52,7 +52,8 @@ _share = bounded("part of all", 0.0, 0.99)
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options beside those of reading."""
     parser.add_argument("recording", metavar="RECORDING", help="a recording of a body; FILE:BODY takes one of several")
-    parser.add_argument("--tolerance", default="5mm", metavar="LENGTH", help="largest error: 5mm, 0.5cm (%(default)s)")
+    help = "largest error: 5mm, 0.5cm (%(default)s)"
+    parser.add_argument("--tolerance", type=Tolerance, default="5mm", metavar="LENGTH", help=help)
     parser.add_argument("--delay", type=_delay, default=0.1, metavar="S", help="seconds of delay (%(default)s)")
     parser.add_argument("--radius", type=_delay, default=RADIUS, metavar="M", help="of each joint's ball (%(default)s)")
     parser.add_argument("--loss", type=_share, default=0.0, metavar="P", help="part of the datagrams to lose: 0.01")
@@ -70,7 +71,7 @@ def run(options: argparse.Namespace) -> None:
     clips, _ = read_clips([options.recording], options.axes, options.reading)
     if len(clips) > 1:
         raise TrajectoryError(options.recording, f"{len(clips)} bodies", "name one, as FILE:BODY")
-    clip, tolerance = clips[0], Tolerance(options.tolerance).tolerance(clips[0])
+    clip, tolerance = clips[0], options.tolerance.tolerance(clips[0])
     times, poses = samples_of(clip)
     body = body_of(clip, poses, options.radius)
     if options.output and (options.output.suffix.lower() == ".bvh") != (clip.rest_body is not None):

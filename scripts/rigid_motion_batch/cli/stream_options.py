@@ -92,7 +92,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     _add_room(sending, "to send")
     help = "play it to this program by VMC instead: Blender's panel Live, VSeeFace, Warudo, Unity"
     sending.add_argument("--to-vmc", type=_address, metavar="HOST:PORT", help=help)
-    sending.add_argument("--tolerance", default="5mm", metavar="LENGTH", help="largest error: 5mm, 0.5cm (%(default)s)")
+    help = "largest error: 5mm, 0.5cm (%(default)s)"
+    sending.add_argument("--tolerance", type=Tolerance, default="5mm", metavar="LENGTH", help=help)
     sending.add_argument("--rate", type=_positive, metavar="HZ", help="send a key at each of so many ticks a second")
     help = f"seconds by which it is shown later ({DELAY}; with --rate one interval)"
     sending.add_argument("--delay", type=_delay, metavar="S", help=help)
@@ -150,7 +151,6 @@ def _check(options: argparse.Namespace) -> None:
     if options.command == "measure":
         return
     if options.command == "send":
-        Tolerance(options.tolerance)
         if bool(options.recordings) == (options.from_vmc is not None):
             raise ValueError("give recordings, or --from-vmc PORT, and not both")
         if options.to_vmc and (options.room or len(options.recordings) != 1):
@@ -202,7 +202,7 @@ _fps = bounded("number of frames a second", 1.0, 1000.0)
 def _named(pattern: re.Pattern[str], what: str) -> Callable[[str], str]:
     def parse_name(text: str) -> str:
         if not pattern.fullmatch(text):
-            raise argparse.ArgumentTypeError(f"{text!r} is no name of a {what}; letters, digits, _, - and . are")
+            raise ValueError(f"{text!r} is no name of a {what}; letters, digits, _, - and . are")
         return text
 
     return parse_name
@@ -211,7 +211,7 @@ def _named(pattern: re.Pattern[str], what: str) -> Callable[[str], str]:
 def _address(text: str) -> tuple[str, int]:
     host, _, port = text.rpartition(":")
     if not (host and port.isascii() and port.isdecimal() and 0 < int(port) <= 65535):
-        raise argparse.ArgumentTypeError(f"{text!r} is no address; give one such as {HERE}:39539")
+        raise ValueError(f"{text!r} is no address; give one such as {HERE}:39539")
     return host.strip("[]"), int(port)
 
 
@@ -222,5 +222,5 @@ def _port(text: str) -> int:
 def _file(text: str) -> Path:
     path = Path(text)
     if not text.strip() or "\0" in text or path.is_dir() or path.suffix.lower() not in ENDINGS:
-        raise argparse.ArgumentTypeError(f"{text!r} is no file to write; give one that ends in {', '.join(ENDINGS)}")
+        raise ValueError(f"{text!r} is no file to write; give one that ends in {', '.join(ENDINGS)}")
     return path

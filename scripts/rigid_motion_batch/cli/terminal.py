@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TextIO
 
 import numpy as np
@@ -18,7 +18,6 @@ from rich.text import Text
 
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.report.numbers import MEASURES, Numbers, digits
-from rigid_motion_batch.report.verdict import plain as plain
 
 RMS, WORST, KEYS = "rms_shell_m", "max_shell_m", "keys_per_s"
 """The measures that are shown."""
@@ -102,11 +101,6 @@ def table_of(lines: Sequence[Line], clips: int) -> Table:
             end_section=last,
         )
     return table
-
-
-def as_data(lines: Sequence[Line]) -> list[dict[str, object]]:
-    """Return the table for JSON."""
-    return [asdict(line) for line in lines]
 
 
 def show(*what: Table | str, stream: TextIO | None = None) -> None:

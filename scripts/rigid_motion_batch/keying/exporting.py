@@ -17,10 +17,11 @@ from rigid_motion_batch.recordings.importing import enabled, refuse_too_large
 from rigid_motion_batch.silencing import silenced
 
 from .blend_files import missing_data, open_file
-from .gltf_files import GltfRun
+from .gltf_files import do_gltf
 from .output_files import FileProblem, Unreadable
-from .planning import Job
-from .sessions import Note, Outcome, stop_if_asked
+from .reductions import Reductions
+from .sessions import stop_if_asked
+from .work import Doing
 
 GLTF_ADDON = "io_scene_gltf2"
 
@@ -48,28 +49,24 @@ def _asking_extension() -> Iterator[None]:
         addons.remove(entry)
 
 
-def export_file(job: Job, gltf: GltfRun, note: Note) -> Outcome:
+def export_file(doing: Doing, how: Reductions) -> None:
     """Open or import a .blend or FBX file, and write what it shows as GLB with few keys."""
-    read: list[Path] = []
-    incomplete = False
+    job = doing.job
 
     def export(path: Path) -> None:
-        nonlocal incomplete
         if job.file.suffix.lower() == ".fbx":
             _import_fbx(job.file)
         else:
             open_file(job.file)
             missing = missing_data()
             for library in missing.libraries:
-                note(f"{job.source}: {library}")
-            incomplete = missing.hides_objects
-        read.extend(map(Path, bpy.utils.blend_paths(absolute=True)))
+                doing.say(library)
+            doing.outcome.incomplete = missing.hides_objects
+        doing.outcome.read = list(map(Path, bpy.utils.blend_paths(absolute=True)))
         stop_if_asked()
         export_glb(path)
 
-    outcome = gltf.do(job, export)
-    outcome.incomplete, outcome.read = incomplete, read
-    return outcome
+    do_gltf(doing, how, export)
 
 
 def _import_fbx(path: Path) -> None:

@@ -10,104 +10,76 @@ from rigid_motion.gltf import Document, GltfError, Options, ReducedClip, Report,
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.command_line import printable
 
-from .output_files import FileProblem, Unreadable, refuse_read_only
-from .planning import Job, place_of
-from .records import Record
-from .sessions import Note, Outcome, stop_if_asked, tell_failure
+from .output_files import Unreadable
+from .planning import place_of
+from .reductions import Reductions, doubt, fewer, off
+from .sessions import stop_if_asked
 from .side_by_side import side_by_side
-from .wishes import Wishes, doubt, fewer, off
-
-ENDINGS = (".glb", ".gltf")
+from .work import Doing
 
 MILLIMETRES = 1e3
 """In a metre."""
 
 
-class GltfRun:
-    """Doing a glTF file."""
+def do_gltf(doing: Doing, how: Reductions, export: Callable[[Path], None] | None = None) -> None:
+    """Read a file, or what `export` makes of it at a path, reduce its clips, and write it."""
+    with doing.failing():
+        doing.require_free(doing.job.output)
+        reduce_gltf(doing, how, doing.job.output, export)
 
-    def __init__(self, wishes: Wishes, record: Record, note: Note, *, dry_run: bool, processes: int = 1) -> None:
-        self.wishes, self.dry_run, self.processes = wishes, dry_run, processes
-        self._record, self._note = record, note
-        self._would = "would be " if dry_run else ""
 
-    def do(self, job: Job, export: Callable[[Path], None] | None = None) -> Outcome:
-        """Read a file, or what `export` makes of it at a path, reduce its clips, and write it."""
-        outcome = Outcome(job.source)
-        try:
-            self._record.refuse_to_replace(job.output)
-            refuse_read_only(job.output)
-            self.reduce(job, outcome, export)
-        except FileProblem as problem:
-            outcome.failed, outcome.unreadable = True, isinstance(problem, Unreadable)
-            self._note(f"{job.source}: {problem}")
-        except Exception as error:
-            outcome.failed = True
-            tell_failure(self._note, job.source, error)
-        return outcome
+def reduce_gltf(
+    doing: Doing, how: Reductions, output: Path, export: Callable[[Path], None] | None = None, per_unit: float = 1.0
+) -> None:
+    """Reduce without refusals of places; raises FileProblem. A tolerance without a unit is in `per_unit` metres.
 
-    def reduce(
-        self, job: Job, outcome: Outcome, export: Callable[[Path], None] | None = None, per_unit: float = 1.0
-    ) -> None:
-        """Reduce without refusals of places; raises FileProblem. A tolerance without a unit is in `per_unit` metres.
-
-        What was exported is written also where nothing of it could be reduced.
-        """
-        wishes = self.wishes
-        try:
-            document = _read(job.file) if export is None else _exported(export)
-            if job.is_found and not document.json.get("animations"):
-                self._note(f"{job.source}: no animations; left alone")
-                return
-            tolerance = None if wishes.tolerance is None else wishes.tolerance.metres(per_unit)
-            with side_by_side(self.processes) as run:
-                report = reduced(
-                    document,
-                    Options(tolerance, wishes.radius, wishes.shared, wishes.count, wishes.vertices, run),
-                )
-        except GltfError as error:
-            raise Unreadable(str(error)) from None
-        except OSError as error:  # It is read while it is worked on.
-            raise _unreadable(error) from None
-        stop_if_asked()
-        length = wishes.tolerance or Tolerance(f"{MILLIMETRES * report.tolerance:.6f}mm")
-        by_number = wishes.count is not None
-        for clip in report.clips:
-            summary = _summary(clip, length, per_unit, self._would, by_number=by_number)
-            self._note(f"{job.source}: {printable(clip.name)}: {summary}")
-        if report.size:
-            size = f"{report.size:.3g} m large"
-            self._note(f"{job.source}: {size}{doubt(report.size, wishes.tolerance, per_unit)}")
-        outcome.clips += sum(clip.tracks is not None for clip in report.clips)
-        if not outcome.clips and export is None:
-            self._note(f"{job.source}: nothing could be reduced; left alone")
+    What was exported is written also where nothing of it could be reduced.
+    """
+    job, outcome = doing.job, doing.outcome
+    try:
+        document = _read(job.file) if export is None else _exported(export)
+        if job.is_found and not document.json.get("animations"):
+            doing.say("no animations; left alone")
             return
-        self._write(job, document, report, outcome)
-        self._note(f"{job.source}: {self._would}written to {job.output}")
-        outcome.add_written(job.output)
+        tolerance = None if how.tolerance is None else how.tolerance.metres(per_unit)
+        with side_by_side(doing.work.processes) as run:
+            report = reduced(document, Options(tolerance, how.radius, how.shared, how.count, how.vertices, run))
+    except GltfError as error:
+        raise Unreadable(str(error)) from None
+    except OSError as error:  # It is read while it is worked on.
+        raise _unreadable(error) from None
+    stop_if_asked()
+    length = how.tolerance or Tolerance(f"{MILLIMETRES * report.tolerance:.6f}mm")
+    for clip in report.clips:
+        summary = _summary(clip, length, per_unit, doing.would, by_number=how.count is not None)
+        doing.say(f"{printable(clip.name)}: {summary}")
+    if report.size:
+        doing.say(f"{report.size:.3g} m large{doubt(report.size, how.tolerance, per_unit)}")
+    outcome.clips += sum(clip.tracks is not None for clip in report.clips)
+    if not outcome.clips and export is None:
+        doing.say("nothing could be reduced; left alone")
+        return
+    _write(doing, output, document, report)
+    doing.tell_written(output)
 
-    def _write(self, job: Job, document: Document, report: Report, outcome: Outcome) -> None:
-        files = report.document.files(job.output.name)
-        if document.chunks is None:
-            companions = document.companions(job.file.parent)
-            outcome.read = [job.file.parent / name for name in companions]
-            if place_of(job.output.parent) != place_of(job.file.parent):
-                files = report.document.companions(job.file.parent) | files
-        if self.dry_run:
-            return
-        for name, content in files.items():
-            place = job.output.parent / name
-            try:
-                if place != job.output:
-                    outcome.beside.append(place)
-                    if _holds(place, content):
-                        continue  # Several files may share an image.
-                    self._record.refuse_to_replace(place)
-                with self._record.writing(place) as beside:
-                    beside.write_bytes(content)
-            except OSError as error:
-                reason = error.strerror or error
-                raise FileProblem(f"{place} could not be written ({reason}): write elsewhere with --output") from None
+
+def _write(doing: Doing, output: Path, document: Document, report: Report) -> None:
+    files, folder = report.document.files(output.name), doing.job.file.parent
+    if document.chunks is None:
+        doing.outcome.read = [folder / name for name in document.companions(folder)]
+        if place_of(output.parent) != place_of(folder):
+            files = report.document.companions(folder) | files
+    if doing.work.dry_run:
+        return
+    for name, content in files.items():
+        place = output.parent / name
+        if place != output:
+            doing.outcome.beside.append(place)
+            if _holds(place, content):
+                continue  # Several files may share an image.
+            doing.record.refuse_to_replace(place)
+        with doing.writing(place) as beside:
+            beside.write_bytes(content)
 
 
 def _read(path: Path) -> Document:

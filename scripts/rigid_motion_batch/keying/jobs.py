@@ -11,131 +11,93 @@ import bpy
 from rigid_motion.animation.transforms import BoneTransform, Transform
 from rigid_motion_batch.keying.blend_files import (
     HERE,
-    Missing,
     missing_data,
     named,
     only_overridden,
     open_file,
     write_file,
 )
-from rigid_motion_batch.keying.output_files import (
-    FileProblem,
-    Unreadable,
-    changed_at,
-    refuse_long_name,
-    refuse_read_only,
-)
-from rigid_motion_batch.keying.planning import Job
-from rigid_motion_batch.keying.records import Record
-from rigid_motion_batch.keying.sessions import Note, Outcome, Work, stop_if_asked, tell_failure
-from rigid_motion_batch.keying.targets import Action, Result, groups_of, matching, matching_missing, title_of
+from rigid_motion_batch.keying.output_files import changed_at, refuse_long_name, refuse_read_only
+from rigid_motion_batch.keying.sessions import stop_if_asked
+from rigid_motion_batch.keying.targets import Action, groups_of, matching, matching_missing, title_of
+from rigid_motion_batch.keying.work import Doing, Outcome
 
 
-class BlendRun:
-    """Doing a file."""
+def do_blend(doing: Doing, action: Action) -> None:
+    """Open a file, do what is in it, and write it. Where that fails, nothing in it counts as done."""
+    with doing.failing():
+        _do_file(doing, action)
+    if doing.outcome.failed:
+        before = doing.outcome
+        doing.outcome = Outcome(before.source, failed=True, unreadable=before.unreadable, matched=before.matched)
 
-    def __init__(self, work: Work, action: Action, record: Record, note: Note) -> None:
-        self.work, self.action = work, action
-        self._record, self._note = record, note
-        self._would = "would be " if work.dry_run else ""
-        self._changed: int | None = None
 
-    def do(self, job: Job) -> Outcome:
-        """Open a file, do what is in it, and write it."""
-        outcome = Outcome(job.source)
-        try:
-            if job.in_place:
-                refuse_long_name(job.file.with_name(f"{job.file.name}1"))
-            else:
-                self._record.refuse_to_replace(job.output)
-            self._changed = changed_at(job.file)
-            open_file(job.file)
-            outcome.read = [Path(bpy.path.abspath(library.filepath)) for library in bpy.data.libraries]
-            stop_if_asked()
-            missing = missing_data()
-            for library in missing.libraries:
-                self._note(f"{job.source}: {library}")
-            if missing.hides_objects and self.work.objects is None:
-                outcome.incomplete = True
-                self._note(
-                    f"{job.source}: incomplete, for there may be objects to be {self.action.done} in what is missing"
-                )
-            self._do_objects(job, outcome, missing)
-            self._finish(job, outcome)
-        except FileProblem as problem:
-            outcome = Outcome(
-                job.source, failed=True, unreadable=isinstance(problem, Unreadable), matched=outcome.matched
-            )
-            self._note(f"{job.source}: {problem}")
-        except Exception as error:
-            outcome = Outcome(job.source, failed=True, matched=outcome.matched)
-            tell_failure(self._note, job.source, error)
-        return outcome
+def _do_file(doing: Doing, action: Action) -> None:
+    job, outcome = doing.job, doing.outcome
+    if job.in_place:
+        refuse_long_name(job.file.with_name(f"{job.file.name}1"))
+    else:
+        doing.record.refuse_to_replace(job.output)
+    changed = changed_at(job.file)
+    open_file(job.file)
+    outcome.read = [Path(bpy.path.abspath(library.filepath)) for library in bpy.data.libraries]
+    stop_if_asked()
+    missing = missing_data()
+    for library in missing.libraries:
+        doing.say(library)
+    if missing.hides_objects and doing.work.objects is None:
+        outcome.incomplete = True
+        doing.say(f"incomplete, for there may be objects to be {action.done} in what is missing")
+    _do_objects(doing, action, missing.reasons)
+    if not outcome.done:
+        why = "nothing could be" if outcome.refused else "nothing to be"
+        doing.say(f"{why} {action.done}; left alone")
+        return
+    if (before := cast(Any, bpy.data.version)[:2]) < HERE:
+        doing.say(f"was saved by Blender {named(before)}; what is written is of Blender {named(HERE)}")
+    if not doing.work.dry_run:
+        write_file(job.output, None if job.in_place else doing.record, changed)
+    doing.tell_written(job.output)
 
-    def _do_objects(self, job: Job, outcome: Outcome, missing: Missing) -> None:
-        overridden = only_overridden()
-        for obj in [obj for obj in bpy.data.objects if obj not in overridden]:
-            if obj in missing.reasons:
-                fitting = {"*"} if self._asked is None else matching_missing(obj, self._asked)
-                if fitting:
-                    self._begin(job, outcome, fitting)
-                    self._refuse(job, outcome, obj.name, missing.reasons[obj])
-                continue
-            for targets in groups_of(obj, whole_rigs=self.action.whole_rigs):
-                fit = {target: {"*"} if self._asked is None else matching(target, self._asked) for target in targets}
-                concerned = self.action.concerned([target for target, names in fit.items() if names])
-                if concerned:
-                    self._begin(job, outcome, set().union(*(fit[target] for target in concerned)))
-                    self._do_targets(job, outcome, concerned)
-                    stop_if_asked()
 
-    @property
-    def _asked(self) -> Sequence[str] | None:
-        return self.work.objects
+def _do_objects(doing: Doing, action: Action, missing: dict[bpy.types.Object, str]) -> None:
+    asked, overridden = doing.work.objects, only_overridden()
+    for obj in [obj for obj in bpy.data.objects if obj not in overridden]:
+        if obj in missing:
+            if fitting := {"*"} if asked is None else matching_missing(obj, asked):
+                _begin(doing, fitting)
+                doing.refuse(obj.name, missing[obj])
+            continue
+        for targets in groups_of(obj, whole_rigs=action.whole_rigs):
+            fit = {target: {"*"} if asked is None else matching(target, asked) for target in targets}
+            if concerned := action.concerned([target for target, names in fit.items() if names]):
+                _begin(doing, set().union(*(fit[target] for target in concerned)))
+                _do_targets(doing, action, concerned)
+                stop_if_asked()
 
-    def _begin(self, job: Job, outcome: Outcome, fitting: set[str]) -> None:
-        """Note which names and patterns there is something to do for."""
-        if not outcome.matched:  # Only a file in which there is something to do is written.
-            refuse_read_only(job.output)
-        outcome.matched |= fitting
 
-    def _do_targets(self, job: Job, outcome: Outcome, targets: Sequence[Transform]) -> None:
-        """Do an object, or bones of a rig."""
-        library = targets[0].animated.library
-        if library is not None:
-            reason = f"it is linked from {library.filepath}: use --in-place on that file, or make it local"
-            self._refuse(job, outcome, title_of(targets), reason, len(targets))
-            return
-        result = self.action.act(targets)
-        for name, reason, count in result.refusals():
-            self._refuse(job, outcome, name, reason, count)
-        if result.done:
-            self._tell_done(job, outcome, result)
-        if result.left:
-            self._note(f"{job.source}: {result.describe_kept()}")
+def _begin(doing: Doing, fitting: set[str]) -> None:
+    """Note which names and patterns there is something to do for."""
+    if not doing.outcome.matched:  # Only a file in which there is something to do is written.
+        refuse_read_only(doing.job.output)
+    doing.outcome.matched |= fitting
 
-    def _refuse(self, job: Job, outcome: Outcome, name: str, reason: str, count: int = 1) -> None:
-        outcome.refused += count
-        self._note(f"{job.source}: {name}: not {self.action.done}: {reason}")
 
-    def _tell_done(self, job: Job, outcome: Outcome, result: Result) -> None:
-        targets = result.done
-        bones = sum(isinstance(target, BoneTransform) for target in targets)
-        outcome.bones += bones
-        outcome.objects += len(targets) - bones
-        summary = f"{self._would}{self.action.done}{result.summary}"
-        self._note(f"{job.source}: {title_of(targets)}{' ' if len(targets) > 1 else ': '}{summary}")
-
-    def _finish(self, job: Job, outcome: Outcome) -> None:
-        if not outcome.done:
-            why = "nothing could be" if outcome.refused else "nothing to be"
-            self._note(f"{job.source}: {why} {self.action.done}; left alone")
-            return
-        if (before := cast(Any, bpy.data.version)[:2]) < HERE:
-            self._note(
-                f"{job.source}: was saved by Blender {named(before)}; what is written is of Blender {named(HERE)}"
-            )
-        if not self.work.dry_run:
-            write_file(job.output, None if job.in_place else self._record, self._changed)
-        self._note(f"{job.source}: {self._would}written to {job.output}")
-        outcome.add_written(job.output)
+def _do_targets(doing: Doing, action: Action, targets: Sequence[Transform]) -> None:
+    """Do an object, or bones of a rig."""
+    library = targets[0].animated.library
+    if library is not None:
+        reason = f"it is linked from {library.filepath}: use --in-place on that file, or make it local"
+        doing.refuse(title_of(targets), reason, len(targets))
+        return
+    result = action.act(targets)
+    for name, reason, count in result.refusals():
+        doing.refuse(name, reason, count)
+    if result.done:
+        bones = sum(isinstance(target, BoneTransform) for target in result.done)
+        doing.outcome.bones += bones
+        doing.outcome.objects += len(result.done) - bones
+        between = " " if len(result.done) > 1 else ": "
+        doing.say(f"{title_of(result.done)}{between}{doing.would}{action.done}{result.summary}")
+    if result.left:
+        doing.say(result.describe_kept())

@@ -15,10 +15,9 @@ from rigid_motion import animation
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.keying.output_files import FileProblem
-from rigid_motion_batch.keying.recorded import RATES
 from rigid_motion_batch.keying.reducing import reduced
+from rigid_motion_batch.keying.reductions import RATES, Reductions
 from rigid_motion_batch.keying.targets import Result
-from rigid_motion_batch.keying.wishes import Wishes
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.rigs import LAST_FRAME
 from rigid_motion_batch.scenes.armature import Rest, Rig
@@ -103,7 +102,7 @@ def key_object(clip: Clip, keys: np.ndarray, frames: np.ndarray, mode: str, name
     return obj
 
 
-def key_body(clip: Clip, frames: np.ndarray, wishes: Wishes, name: str) -> Result:
+def key_body(clip: Clip, frames: np.ndarray, how: Reductions, name: str) -> Result:
     """Put a rig into the open file that moves as a whole body did, its samples on frames (n,), with few keys.
 
     Returns
@@ -116,7 +115,7 @@ def key_body(clip: Clip, frames: np.ndarray, wishes: Wishes, name: str) -> Resul
     keyed = [bone for bone in bones if len(animation.key_frames(bone))]
     if not keyed:
         return Result()
-    return reduced(keyed, replace(wishes, discard=True))  # The recording has the dense keys.
+    return reduced(keyed, replace(how, discard=True))  # The recording has the dense keys.
 
 
 def _axes(name: str) -> bpy.types.Object:

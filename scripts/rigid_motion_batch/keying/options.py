@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from rigid_motion_batch.command_line import folder_path
+from rigid_motion_batch.command_line import folder_path, whole
 
 
 def add_target_options(parser: argparse.ArgumentParser, which: str) -> None:
@@ -34,7 +34,7 @@ def add_file_options(parser: argparse.ArgumentParser) -> None:
     places.add_argument("--in-place", action="store_true", help="save the .blend files themselves")
     places.add_argument(
         "--jobs",
-        type=_jobs,
+        type=whole("number of processes", 0, 999),
         metavar="N",
         help="worker processes for several inputs; 0 to work in this one (one for each processor)",
     )
@@ -46,14 +46,8 @@ def refuse_odd_places(options: argparse.Namespace) -> None:
         raise ValueError("--in-place saves the files themselves, --output writes others: give one of them")
 
 
-def _jobs(text: str) -> int:
-    if not (text.isascii() and text.isdigit() and len(text) <= 3):
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of processes; give 0, 1, 2, ...")
-    return int(text)
-
-
 def _names(text: str) -> list[str]:
     names = [name.strip() for name in text.split(",") if name.strip()]
     if not names:
-        raise argparse.ArgumentTypeError("name an object, or several as in Camera,'Tool*','Rig/*'")
+        raise ValueError("name an object, or several as in Camera,'Tool*','Rig/*'")
     return names

@@ -48,11 +48,3 @@ def refuse_read_only(path: Path) -> None:
         raise FileProblem(
             f"{path} cannot be written, for {place} is read-only: allow it, or write elsewhere with --output"
         )
-
-
-def refuse_came_meanwhile(path: Path, error: OSError) -> None:
-    """Raise `FileProblem` where an error of writing a file is that there is one by now."""
-    if isinstance(error, FileExistsError) and error.filename == str(path):
-        raise FileProblem(
-            f"{path} has come there meanwhile, from another run perhaps: add --overwrite, or another --output"
-        ) from None

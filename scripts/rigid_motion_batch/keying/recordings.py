@@ -10,170 +10,141 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from rigid_motion.motion import reduce_keys
 from rigid_motion_batch.analysis.metrics import write_poses
 from rigid_motion_batch.analysis.radii import RIGID
 from rigid_motion_batch.analysis.reconstructions import fill_in
 from rigid_motion_batch.keying.blend_files import write_file
 from rigid_motion_batch.keying.exporting import export_glb
-from rigid_motion_batch.keying.gltf_files import GltfRun
+from rigid_motion_batch.keying.gltf_files import reduce_gltf
 from rigid_motion_batch.keying.keyed_files import key_body, key_densely, key_object, new_file
-from rigid_motion_batch.keying.output_files import FileProblem, Unreadable, refuse_read_only
-from rigid_motion_batch.keying.planning import ALL, Job
-from rigid_motion_batch.keying.recorded import GLB_SUFFIX, SUFFIX, TOLERANCE, Reading, Writing, name_of
-from rigid_motion_batch.keying.records import Record
-from rigid_motion_batch.keying.sessions import Note, Outcome, Stopped, counted, stop_if_asked, tell_failure
-from rigid_motion_batch.keying.wishes import Wishes, fewer, off
+from rigid_motion_batch.keying.output_files import FileProblem, Unreadable
+from rigid_motion_batch.keying.planning import ALL
+from rigid_motion_batch.keying.reductions import GLB_SUFFIX, SUFFIX, TOLERANCE, Reductions, fewer, name_of, off
+from rigid_motion_batch.keying.sessions import counted, stop_if_asked
+from rigid_motion_batch.keying.work import Doing
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import folder_names, read_source
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.recordings import NoMotion
 
 
-class RecordingRun:
-    """Doing a recording."""
-
-    def __init__(
-        self, wishes: Wishes, reading: Reading, writing: Writing, record: Record, note: Note, *, dry_run: bool
-    ) -> None:
-        self.wishes, self.reading, self.writing, self.dry_run = wishes, reading, writing, dry_run
-        self._record, self._note = record, note
-        self._would = "would be " if dry_run else ""
-
-    @property
-    def _wishes(self) -> Wishes:
-        """With a tolerance; but key poses are few by what is large for the body."""
-        return self.wishes if self.wishes.shared else replace(self.wishes, tolerance=self.wishes.tolerance or TOLERANCE)
-
-    def do(self, job: Job) -> Outcome:
-        """Read a recording, and write the keys of each of its bodies."""
-        outcome = Outcome(job.source)
+def do_recording(doing: Doing, how: Reductions) -> None:
+    """Read a recording, and write the keys of each of its bodies."""
+    job, outcome = doing.job, doing.outcome
+    clips: list[Clip] = []
+    with doing.failing():
         try:
-            clips, note = read_source(job.source, self.reading.axes, self.reading.options)
+            clips, note = read_source(job.source, how.axes, how.reading)
         except TrajectoryError as error:
             if job.is_found and isinstance(error, NoMotion):
-                self._note(f"{job.source}: {error.problem}; left alone")
-                return outcome
-            self._note(str(error))
-            return Outcome(job.source, failed=True, unreadable=True)
-        except Exception as error:
-            tell_failure(self._note, job.source, error)
-            return Outcome(job.source, failed=True)
+                doing.say(f"{error.problem}; left alone")
+                return
+            outcome.failed = outcome.unreadable = True
+            doing.note(str(error))
+            return
         if note:
-            self._note(note)
-        suffix = GLB_SUFFIX if self.writing.glb else SUFFIX
-        for clip, name in zip(clips, _names(job.file, clips), strict=True):
-            output = job.folder / f"{name}{suffix}" if job.source.endswith(ALL) else job.output
-            title = job.source if len(clips) == 1 else f"{job.source} ({clip.name})"
-            try:
-                stop_if_asked()
-                self._do_clip(title, clip, name, output, job.ending, outcome)
-            except Stopped as stopped:
-                stopped.partly = outcome
-                raise
-            except FileProblem as problem:
-                outcome.failed = True
-                outcome.unreadable = isinstance(problem, Unreadable) and not outcome.written
-                self._note(f"{title}: {problem}")
-            except Exception as error:
-                outcome.failed = True
-                tell_failure(self._note, title, error)
-        return outcome
+            doing.note(note)
+    for clip, name in zip(clips, _names(job.file, clips), strict=True):
+        suffix = GLB_SUFFIX if how.glb else SUFFIX
+        doing.title = job.source if len(clips) == 1 else f"{job.source} ({clip.name})"
+        stop_if_asked()
+        with doing.failing():
+            _Clip(doing, how, clip, name).do(job.folder / f"{name}{suffix}" if job.source.endswith(ALL) else job.output)
 
-    def _do_clip(self, title: str, clip: Clip, name: str, output: Path, ending: str, outcome: Outcome) -> None:
-        """Write the keys of a body, into files that are called as `output` and may have to end as this."""
+
+class _Clip:
+    """A body whose keys are written."""
+
+    def __init__(self, doing: Doing, how: Reductions, clip: Clip, name: str) -> None:
+        self.doing, self.clip, self.name = doing, clip, name
+        # Key poses are few by what is large for the body.
+        self.given, self.tolerance = how.tolerance, how.tolerance or TOLERANCE
+        self.how = how if how.shared else replace(how, tolerance=self.tolerance)
+        self.radius = how.radius or RIGID
+
+    def do(self, output: Path) -> None:
+        """Write the keys, into files that are called as `output` and may have to end as the job says."""
+        clip, ending = self.clip, self.doing.job.ending
         for repair in clip.repairs:
-            self._note(f"{title}: {repair}")
-        if self.wishes.tolerance and self.wishes.count is None:
+            self.doing.say(repair)
+        if self.given and self.how.count is None:
             try:
-                self.wishes.tolerance.require_within(clip, self.wishes.radius or RIGID)
+                self.given.require_within(clip, self.radius)
             except ValueError as error:
                 raise Unreadable(str(error)) from None
         table, scene, glb = (output.with_name(f"{output.name}{end}") for end in (ending or ".csv", ".blend", ".glb"))
-        if self.writing.glb:
-            self._do_glb(title, clip, name, glb, outcome)
+        if self.how.glb:
+            self._glb(glb)
         elif clip.rest_body is not None:
             if ending not in ("", ".blend"):
                 raise FileProblem(f"a whole body becomes a .blend file: name that with --output, and not {ending}")
-            self._do_body(title, clip, name, scene, outcome)
+            self._body(scene)
         else:
-            if table == scene and not self.writing.blend:
+            if table == scene and not self.how.blend:
                 raise FileProblem("a rigid motion becomes a table: name a .csv file with --output, or add --blend")
             table = output.with_name(f"{output.name}.csv") if table == scene else table
-            self._do_rigid(title, clip, name, table, scene if self.writing.blend else None, outcome)
+            self._rigid(table, scene if self.how.blend else None)
 
-    def _do_rigid(self, title: str, clip: Clip, name: str, table: Path, scene: Path | None, outcome: Outcome) -> None:
+    def _rigid(self, table: Path, scene: Path | None) -> None:
         for path in filter(None, (table, scene)):
-            self._refuse(path)
-        mode, radius, tolerance = self.wishes.mode, self.wishes.radius or RIGID, self.wishes.tolerance or TOLERANCE
-        frames = new_file(clip, tolerance.tolerance(clip), self.writing.fps) if scene else None
-        count = self.wishes.count
+            self.doing.require_free(path)
+        clip, mode, tolerance = self.clip, self.how.mode, self.tolerance
+        frames = self._new_file() if scene else None
+        count = self.how.count
         if count is None:
-            keys = tolerance.keys(clip, mode, radius)
+            keys = tolerance.keys(clip, mode, self.radius)
         else:
             budget = min(count, len(clip.times))
-            keys = reduce_keys(clip.times, clip.poses, mode, radius=radius / clip.metres_per_unit, budget=budget)
-        largest = float(fill_in(clip, tolerance, {mode: keys}, radius).errors[mode].shell.max())
+            keys = reduce_keys(clip.times, clip.poses, mode, radius=self.radius / clip.metres_per_unit, budget=budget)
+        largest = float(fill_in(clip, tolerance, {mode: keys}, self.radius).errors[mode].shell.max())
         stop_if_asked()
         if frames is not None:
-            key_object(clip, keys, frames, mode, name)
-        summary = fewer(len(clip.times), len(keys)) + off(
-            tolerance, largest, clip.metres_per_unit, by_number=count is not None
-        )
-        self._note(f"{title}: {self._would}reduced{summary}")
-        if not self.dry_run:
-            try:
-                with self._record.writing(table) as beside:
-                    write_poses(beside, clip.times[keys], clip.poses[keys])
-            except OSError as error:
-                raise FileProblem(f"{table} could not be written ({error.strerror}): use another --output") from None
-        outcome.objects += 1
-        self._tell_written(title, table, outcome)
+            key_object(clip, keys, frames, mode, self.name)
+        error = off(tolerance, largest, clip.metres_per_unit, by_number=count is not None)
+        self.doing.say(f"{self.doing.would}reduced{fewer(len(clip.times), len(keys))}{error}")
+        if not self.doing.work.dry_run:
+            with self.doing.writing(table) as beside:
+                write_poses(beside, clip.times[keys], clip.poses[keys])
+        self.doing.outcome.objects += 1
+        self.doing.tell_written(table)
         if scene:
             self._save(scene)
-            self._tell_written(title, scene, outcome)
 
-    def _do_body(self, title: str, clip: Clip, name: str, scene: Path, outcome: Outcome) -> None:
-        self._refuse(scene)
-        frames = new_file(clip, (self.wishes.tolerance or TOLERANCE).tolerance(clip), self.writing.fps)
-        result = key_body(clip, frames, self._wishes, name)
+    def _body(self, scene: Path) -> None:
+        doing = self.doing
+        doing.require_free(scene)
+        result = key_body(self.clip, self._new_file(), self.how, self.name)
         stop_if_asked()
         for bones, reason, count in result.refusals():
-            outcome.refused += count
-            self._note(f"{title}: {bones}: not reduced: {reason}")
+            doing.refuse(bones, reason, count)
         if result.left:
-            self._note(f"{title}: {result.describe_kept()}")
+            doing.say(result.describe_kept())
         if result.done:
-            self._note(f"{title}: {counted(len(result.done), 'bone')} {self._would}reduced{result.summary}")
+            doing.say(f"{counted(len(result.done), 'bone')} {doing.would}reduced{result.summary}")
         if not (result.done or result.left):
             why = "nothing could be reduced" if result.refused else "nothing of this body moves"
-            self._note(f"{title}: {why}; left alone")
+            doing.say(f"{why}; left alone")
             return
         self._save(scene)
-        outcome.bones += len(result.done)
-        self._tell_written(title, scene, outcome)
+        doing.outcome.bones += len(result.done)
 
-    def _do_glb(self, title: str, clip: Clip, name: str, path: Path, outcome: Outcome) -> None:
-        self._refuse(path)
-        frames = new_file(clip, (self.wishes.tolerance or TOLERANCE).tolerance(clip), self.writing.fps)
-        key_densely(clip, frames, name)
+    def _glb(self, path: Path) -> None:
+        self.doing.require_free(path)
+        key_densely(self.clip, self._new_file(), self.name)
         stop_if_asked()
-        wishes = self._wishes if clip.rest_body else replace(self._wishes, radius=self.wishes.radius or RIGID)
-        gltf = GltfRun(wishes, self._record, self._note, dry_run=self.dry_run)
-        gltf.reduce(Job(title, path.parent, path), outcome, export_glb, clip.metres_per_unit)
+        how = self.how if self.clip.rest_body else replace(self.how, radius=self.radius)
+        reduce_gltf(self.doing, how, path, export_glb, self.clip.metres_per_unit)
 
-    def _refuse(self, path: Path) -> None:
-        """Raise FileProblem where a file must not or cannot be written: better said before hours go into it."""
-        self._record.refuse_to_replace(path)
-        refuse_read_only(path)
+    def _new_file(self) -> np.ndarray:
+        return new_file(self.clip, self.tolerance.tolerance(self.clip), self.how.fps)
 
     def _save(self, scene: Path) -> None:
-        if not self.dry_run:
-            write_file(scene, self._record)
-
-    def _tell_written(self, title: str, path: Path, outcome: Outcome) -> None:
-        self._note(f"{title}: {self._would}written to {path}")
-        outcome.add_written(path)
+        if not self.doing.work.dry_run:
+            write_file(scene, self.doing.record)
+        self.doing.tell_written(scene)
 
 
 def _names(file: Path, clips: Sequence[Clip]) -> list[str]:

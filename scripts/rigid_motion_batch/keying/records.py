@@ -17,7 +17,7 @@ from typing import Any
 from rigid_motion_batch.files import append_lines, lines_of, written_beside
 from rigid_motion_batch.pipeline.steps import OWN, sha256_in, sha256_of
 
-from .output_files import FileProblem, refuse_came_meanwhile, refuse_long_name
+from .output_files import FileProblem, refuse_long_name
 
 NAME = "keyed.jsonl"
 
@@ -64,9 +64,12 @@ class Record:
                 # Killed from here on, what was moved is known to be the program's own.
                 line = {"file": _from(self.folder, path), "sha256": sha256_of(beside), "source": self._source}
                 append_lines(self._file, [line])
-        except OSError as error:
-            refuse_came_meanwhile(path, error)
-            raise
+        except FileExistsError as error:
+            if error.filename != str(path):
+                raise
+            raise FileProblem(
+                f"{path} has come there meanwhile, from another run perhaps: add --overwrite, or another --output"
+            ) from None
 
     def keep(
         self, key: str, written: Sequence[Path], beside: Iterable[Path], read: Iterable[Path], facts: Mapping[str, Any]
@@ -93,11 +96,8 @@ class Record:
         return None
 
     def _may_replace(self, path: Path) -> bool:
-        return self.overwrite or self._is_own(path)
-
-    def _is_own(self, path: Path) -> bool:
-        """Return whether a file is there as it was made of this input."""
-        return _is_among(path, _from(self.folder, path), self._lines)
+        """Return whether a file may be replaced: as a rule, where it is as it was made of this input."""
+        return self.overwrite or _is_among(path, _from(self.folder, path), self._lines)
 
     @property
     def _lines(self) -> list[dict[str, Any]]:

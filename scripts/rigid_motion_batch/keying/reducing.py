@@ -14,9 +14,9 @@ from rigid_motion.animation.queries.polls import with_more_keys_than
 from rigid_motion.animation.transforms import Transform
 from rigid_motion.animation.transforms.reaches import metres_per_unit
 from rigid_motion_batch.analysis.choices import Tolerance
+from rigid_motion_batch.keying.reductions import Reductions, doubt, fewer, off
 from rigid_motion_batch.keying.sessions import counted
 from rigid_motion_batch.keying.targets import Action, Result
-from rigid_motion_batch.keying.wishes import Wishes, doubt, fewer, off
 
 FEWEST = 2
 """So many keys are as few as a motion has."""
@@ -25,7 +25,7 @@ LEAST = 1e-6
 """Millimetres: no tolerance is smaller."""
 
 
-def reducing(wishes: Wishes, asked: Sequence[str] | None = None) -> Action:
+def reducing(how: Reductions, asked: Sequence[str] | None = None) -> Action:
     """Return the action that makes fewer keys for what has more than two; and for what was asked for by its very name,
     if only to say why not.
     """
@@ -36,37 +36,37 @@ def reducing(wishes: Wishes, asked: Sequence[str] | None = None) -> Action:
         return [target for target in targets if target in keyed or (target.name in named and not _has_bones(target))]
 
     def reduce(targets: Sequence[Transform]) -> Result:
-        return reduced(targets, wishes)
+        return reduced(targets, how)
 
     return Action("Reducing", "reduced", concerned, reduce, whole_rigs=True)
 
 
-def reduced(targets: Sequence[Transform], wishes: Wishes) -> Result:
+def reduced(targets: Sequence[Transform], how: Reductions) -> Result:
     """Leave targets of the open file the few keys that they need."""
     scene = cast(bpy.types.Scene, bpy.context.scene)
     unit = metres_per_unit(scene)
-    tolerance = wishes.tolerance or _written(first_tolerance(scene, targets, shared=wishes.shared) * unit)
+    tolerance = how.tolerance or _written(first_tolerance(scene, targets, shared=how.shared) * unit)
     before = list(map(_bakes, targets))
     refusals: list[Refused] = []
     animation.reduce_keys_of(
         targets,
-        wishes.mode,
+        how.mode,
         tolerance.metres(unit) / unit,
-        None if wishes.radius is None else wishes.radius / unit,
-        shared=wishes.shared,
-        count=wishes.count,
+        None if how.radius is None else how.radius / unit,
+        shared=how.shared,
+        count=how.count,
         refused=refusals,
     )
     done = [target for target, count in zip(targets, before, strict=True) if _bakes(target) > count]
     # Refusals come in the order of what refused.
     problems = dict(zip([target for target in targets if target not in done], refusals, strict=True))
-    doubt = _doubt(targets, wishes.tolerance, unit)
+    doubt = _doubt(targets, how.tolerance, unit)
     left = {target for target, refusal in problems.items() if isinstance(refusal, NeedsItsKeys)}
     reasons = {target: _reason(target, refusal) for target, refusal in problems.items()}
-    by_number = wishes.count is not None
+    by_number = how.count is not None
     reduction = animation.total_reduction(done)
     summary = f"{_described(reduction, tolerance, unit, by_number=by_number)}{doubt}" if reduction else ""
-    if wishes.discard and done:
+    if how.discard and done:
         animation.discard_dense_keys(done)
     return Result(
         done,

@@ -12,12 +12,10 @@ import os
 import signal
 import sys
 import tempfile
-import traceback
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
@@ -29,6 +27,7 @@ from rigid_motion_batch.supervising import blender_program, report, stop_signals
 
 from .planning import Job
 from .records import Record
+from .work import Doing, Outcome, Work
 
 EXTENSION = "rigid_motion"
 """The id in blender_manifest.toml, which the name of the installed module ends with."""
@@ -50,97 +49,6 @@ ROOMS = (
 )
 """The packages that the files that are written depend on."""
 
-Note = Callable[[str], None]
-"""Writes a line for the user."""
-
-
-@dataclass(frozen=True)
-class Work(ABC):
-    """What is done to inputs, and how: plain data, which goes to worker processes and into the keys of results."""
-
-    doing: str
-    """As a heading: "Baking"."""
-
-    done: str
-    """The word for what becomes of objects: "baked"."""
-
-    objects: Sequence[str] | None
-    """The names and patterns of the objects that are meant; None for all."""
-
-    overwrite: bool
-    """True if files that were not made of an input may be replaced."""
-
-    dry_run: bool
-    processes: int = field(default=1, kw_only=True)
-    """For one input, where it has parts."""
-
-    @abstractmethod
-    def needs_blender(self, job: Job) -> bool: ...
-
-    @abstractmethod
-    def do(self, job: Job, record: Record, note: Note) -> Outcome:
-        """Do one input, and write what comes of it."""
-
-    def task(self, job: Job) -> steps.Task:
-        """Return what has the key of a result: the input, these options, the version of the program and of Blender."""
-        blender = ""
-        if self.needs_blender(job):
-            import bpy
-
-            blender = bpy.app.version_string
-        options = replace(self, overwrite=False, dry_run=False, processes=1)
-        body = job.source.removeprefix(os.fspath(job.file))
-        return steps.Task(keyed, (options, body, job.output.name, blender), job.title, inputs=_inputs(job))
-
-
-@dataclass
-class Outcome:
-    """What became of an input."""
-
-    source: str
-
-    objects: int = 0
-    bones: int = 0
-    clips: int = 0
-    """The number of them that were done."""
-
-    refused: int = 0
-    """The number of objects and bones that were not."""
-
-    failed: bool = False
-    unreadable: bool = False
-    incomplete: bool = False
-    """True if there may be objects in it that cannot be looked at, for a library is missing."""
-
-    is_old: bool = False
-    """True if it was done by an earlier run."""
-
-    written: list[Path] = field(default_factory=list)
-    """The files that were written, or would have been."""
-
-    beside: list[Path] = field(default_factory=list)
-    """Files that belong to those."""
-
-    read: list[Path] = field(default_factory=list)
-    """The files that were read beside the input."""
-
-    matched: set[str] = field(default_factory=set)
-    """The names and patterns among those requested that there was an object or a bone for."""
-
-    def add_written(self, path: Path) -> None:
-        """Note that a file is complete at its place."""
-        self.written.append(path)
-        report(written=os.fspath(path), source=self.source)
-
-    @property
-    def done(self) -> int:
-        return self.objects + self.bones + self.clips
-
-    @property
-    def is_whole(self) -> bool:
-        """Return whether something was written, and nothing is left to be done."""
-        return bool(self.written) and not (self.failed or self.refused or self.incomplete)
-
 
 @steps.step(rooms=ROOMS)
 def keyed(task: steps.Job, parameters: tuple[Work, Job]) -> dict[str, Outcome]:
@@ -151,8 +59,14 @@ def keyed(task: steps.Job, parameters: tuple[Work, Job]) -> dict[str, Outcome]:
         import bpy  # noqa: F401  It brings addon_utils.
 
         blender = _extension()
-    with blender:
-        return {"outcome": work.do(job, _record_of(work, job), task.note)}
+    doing = Doing(work, job, task.note)
+    try:
+        with blender:
+            work.do(doing)
+    except Stopped as stopped:
+        stopped.partly = doing.outcome
+        raise
+    return {"outcome": doing.outcome}
 
 
 def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = None) -> int:
@@ -269,7 +183,7 @@ class _Session:
             self._note(f"{job.source}: {job.problem}")
             self._outcomes[place] = Outcome(job.source, failed=True, unreadable=True)
             return
-        task = self._work.task(job)
+        task = _task(self._work, job)
         key = task.key if task.inputs else ""
         if key and (result := _record_of(self._work, job).done(key)):
             written, facts = result
@@ -301,6 +215,18 @@ class _Session:
                 facts = {"matched": sorted(outcome.matched)}
                 _record_of(self._work, job).keep(key, outcome.written, outcome.beside, outcome.read, facts)
         self._outcomes[place] = outcome
+
+
+def _task(work: Work, job: Job) -> steps.Task:
+    """Return what has the key of a result: the input, these options, the version of the program and of Blender."""
+    blender = ""
+    if work.needs_blender(job):
+        import bpy
+
+        blender = bpy.app.version_string
+    options = replace(work, overwrite=False, dry_run=False, processes=1)
+    body = job.source.removeprefix(os.fspath(job.file))
+    return steps.Task(keyed, (options, body, job.output.name, blender), job.title, inputs=_inputs(job))
 
 
 def _record_of(work: Work, job: Job) -> Record:
@@ -354,13 +280,6 @@ def _summary(outcomes: Sequence[Outcome], count: int, work: Work, *, interrupted
 def counted(count: int, what: str) -> str:
     """Return how many there are of something, "1 bone" or "24 bones"."""
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
-
-
-def tell_failure(note: Note, title: object, error: Exception) -> None:
-    """Say where the program failed: what was not foreseen in one input must not keep the others from being done."""
-    note(f"{title}: not written, for this program failed ({type(error).__name__}: {error}):")
-    for line in "".join(traceback.format_exception(error)).splitlines():
-        note(line)
 
 
 @contextmanager

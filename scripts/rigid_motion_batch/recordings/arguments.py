@@ -66,18 +66,10 @@ def reading_options(options: argparse.Namespace) -> ReadingOptions:
 def _columns(text: str) -> tuple[tuple[str, str], ...]:
     pairs = [part.partition("=") for part in text.split(",")]
     if not all(separator and column.strip() for _, separator, column in pairs):
-        raise argparse.ArgumentTypeError(f"{text!r} names no columns; write t=timestamp_ms,x=pos_x,...")
-    columns = tuple((meaning.strip(), column.strip()) for meaning, _, column in pairs)
-    return _checked(columns=columns).columns
+        raise ValueError(f"{text!r} names no columns; write t=timestamp_ms,x=pos_x,...")
+    return ReadingOptions(columns=tuple((meaning.strip(), column.strip()) for meaning, _, column in pairs)).columns
 
 
-def _field(name: str, convert: Callable[[str], object]) -> Callable[[str], object]:
-    """Return a function that reads one field of `ReadingOptions`."""
-    return lambda text: getattr(_checked(**{name: convert(text)}), name)
-
-
-def _checked(**said: Any) -> ReadingOptions:
-    try:
-        return ReadingOptions(**said)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from None
+def _field(name: str, convert: Callable[[str], Any]) -> Callable[[str], object]:
+    """Return a function that reads one field of `ReadingOptions`, which checks it."""
+    return lambda text: getattr(ReadingOptions(**{name: convert(text)}), name)

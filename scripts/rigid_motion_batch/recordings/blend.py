@@ -176,7 +176,7 @@ def _sample(path: Path, body: Body, scenes: list[bpy.types.Scene], scale: float 
         )
     poses = seen.poses[0]
     trajectory = Trajectory(body.name, moments.times(seen.frames), poses, metres, _remark(body, poses))
-    return seen.told(trajectory, moments, scale or metres)
+    return seen.described(trajectory, moments, scale or metres)
 
 
 def _sample_whole(path: Path, rig: bpy.types.Object, scenes: list[bpy.types.Scene], scale: float | None) -> Trajectory:

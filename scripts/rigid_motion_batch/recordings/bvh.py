@@ -11,8 +11,7 @@ Source: Meredith and Maddock, Motion capture file formats explained, Sheffield 2
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
@@ -20,8 +19,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from rigid_motion.motion import Poses
-from rigid_motion.motion.poses import placed
+from rigid_motion.motion import Poses, Skeleton
 from rigid_motion.motion.quaternions import align_signs
 
 from .clips import ClipWarning
@@ -76,7 +74,9 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
     with np.errstate(invalid="ignore", over="ignore"):
         times = np.arange(len(values)) * frame_time
         if as_body:
-            body = Trajectory(path.stem, times, _local_poses(joints, values), rest_body=rest_body_of(joints))
+            body = Trajectory(
+                path.stem, times, _local_poses(joints, values, range(len(joints))), rest_body=rest_body_of(joints)
+            )
             return [replace(body, warnings=warnings)]
         poses = world_poses(joints, values, taken)
     first, *others = (Trajectory(name, times, poses[name]) for name in taken)
@@ -102,14 +102,14 @@ def rest_body_of(joints: list[Joint]) -> RestBody:
 
 
 def world_poses(joints: list[Joint], values: np.ndarray, requested: Iterable[str]) -> dict[str, Poses]:
-    """Return the world poses of some joints, by forward kinematics.
+    """Return the world poses of some joints, by forward kinematics of what they hang on.
 
     Parameters
     ----------
     joints : list of Joint
         Parents before their children, names unique.
     values : array, shape (n, channels of all joints)
-    wanted : iterable of str
+    requested : iterable of str
         Names of joints.
 
     Returns
@@ -117,48 +117,28 @@ def world_poses(joints: list[Joint], values: np.ndarray, requested: Iterable[str
     dict of Poses, each of shape (n,)
         By name, in the order of `joints`.
     """
-    requested = set(requested)
-    begins = _begins(joints)
-    children = Counter(_needed(joints, requested))
-    world: dict[int, Poses] = {}
-    for index, joint in enumerate(joints):
-        if joint.name not in requested and not children[index]:
-            continue
-        own = _local(joint, values[:, begins[index] : begins[index + 1]])
-        world[index] = own if joint.parent is None else placed(world[joint.parent], own)
-        # An hour of a whole skeleton is much: what nothing more hangs on is let go.
-        children[joint.parent] -= 1
-        if joint.parent is not None and not children[joint.parent] and joints[joint.parent].name not in requested:
-            del world[joint.parent]
-    return {joints[index].name: poses for index, poses in world.items()}
-
-
-def _needed(joints: list[Joint], requested: set[str]) -> Iterator[int | None]:
-    """Yield the parent of each joint that is requested or carries a requested one, once for each such joint."""
-    carrying = [joint.name in requested for joint in joints]
+    names = set(requested)
+    kept = {index for index, joint in enumerate(joints) if joint.name in names}
     for index in reversed(range(len(joints))):
-        if carrying[index]:
-            parent = joints[index].parent
-            yield parent
-            if parent is not None:
-                carrying[parent] = True
+        if index in kept and (parent := joints[index].parent) is not None:
+            kept.add(parent)
+    chain = sorted(kept)
+    numbers: dict[int | None, int] = {index: number for number, index in enumerate(chain)}
+    skeleton = Skeleton([numbers.get(joints[index].parent, -1) for index in chain])
+    world = skeleton.in_root_space(_local_poses(joints, values, chain))
+    return {joint.name: world[numbers[index]] for index, joint in enumerate(joints) if joint.name in names}
 
 
-def _local_poses(joints: list[Joint], values: np.ndarray) -> Poses:
-    """Return all joints in their parents' space, shape (joints, n), from values of shape (n, channels of all joints).
+def _local_poses(joints: list[Joint], values: np.ndarray, chosen: Sequence[int]) -> Poses:
+    """Return chosen joints in their parents' space, shape (joints, n), from values (n, channels of all joints).
 
     The signs of quaternions that Euler angles give say nothing, and are aligned.
     """
-    begins = _begins(joints)
-    poses = Poses(np.empty((len(joints), len(values), 3)), np.empty((len(joints), len(values), 4)))
-    for index, joint in enumerate(joints):
-        poses[index] = _local(joint, values[:, begins[index] : begins[index + 1]])
+    begins = np.cumsum([0, *(len(joint.channels) for joint in joints)]).tolist()
+    poses = Poses(np.empty((len(chosen), len(values), 3)), np.empty((len(chosen), len(values), 4)))
+    for number, index in enumerate(chosen):
+        poses[number] = _local(joints[index], values[:, begins[index] : begins[index + 1]])
     return Poses(poses.positions, align_signs(poses.quaternions))
-
-
-def _begins(joints: list[Joint]) -> list[int]:
-    """Return the first column of each joint, and the end of the last one."""
-    return np.cumsum([0, *(len(joint.channels) for joint in joints)]).tolist()
 
 
 def _local(joint: Joint, own: np.ndarray) -> Poses:
@@ -307,9 +287,9 @@ def _read_motion(path: Path, motion: int, joints: list[Joint]) -> tuple[np.ndarr
         if lost:
             warnings.append(ClipWarning(f"{path.name}:{cut[0][0]}: the file is cut off in this row, which is left out"))
     if count != len(values):
-        told = f"Frames: says {count:g} and {len(values)} whole rows follow, which are read"
+        text = f"Frames: says {count:g} and {len(values)} whole rows follow, which are read"
         way_out = "export the BVH again if that is not all"
-        warnings.append(ClipWarning(f"{path.name}:{settings[0][0]}: {told}", way_out))
+        warnings.append(ClipWarning(f"{path.name}:{settings[0][0]}: {text}", way_out))
     return values, frame_time, tuple(warnings)
 
 

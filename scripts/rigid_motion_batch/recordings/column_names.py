@@ -38,7 +38,7 @@ METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 """Units of length."""
 
 UNITS_AS_WORDS = {word for word, unit in UNIT_OF.items() if unit not in TICKS} - {"in", "feet"}
-"""Units that need no brackets to be told from parts of a body."""
+"""Units that need no brackets to be distinguished from parts of a body."""
 
 KINDS = {
     "position": "p pos position positions t trans translation translate loc location coord coords coordinate",

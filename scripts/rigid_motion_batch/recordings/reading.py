@@ -18,7 +18,7 @@ from . import aframe, blend, bvh, euroc, fbx, gltf, motive, named_csv, tum
 from .clips import ClipWarning
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .recordings import Recording, Selection, Trajectory, TrajectoryError, shown
-from .rest_bodies import BELIEVED, NOTHING, size_of, sureness, unit_of
+from .rest_bodies import NOTHING, PLAUSIBLE, size_of, sureness, unit_of
 from .sense import doubts
 from .tables import encoding_of
 
@@ -132,13 +132,13 @@ def _read(result: Format, path: Path, selection: Selection, options: ReadingOpti
     if options.scale is not None:
         trajectories = [replace(trajectory, metres_per_unit=options.scale) for trajectory in trajectories]
     else:
-        trajectories = [_sized(path, trajectory, told=result.in_metres) for trajectory in trajectories]
+        trajectories = [_sized(path, trajectory, unit_given=result.in_metres) for trajectory in trajectories]
     if result.measured:
         trajectories = [_doubted(trajectory, "time_unit" in result.honours) for trajectory in trajectories]
     return trajectories
 
 
-def _sized(path: Path, trajectory: Trajectory, *, told: bool) -> Trajectory:
+def _sized(path: Path, trajectory: Trajectory, *, unit_given: bool) -> Trajectory:
     """Return a whole body in the unit that it is likely to be in by its size, where that is not given or cannot be."""
     if trajectory.rest_body is None:
         return trajectory
@@ -148,14 +148,14 @@ def _sized(path: Path, trajectory: Trajectory, *, told: bool) -> Trajectory:
     size = size_of(trajectory.rest_body.parents, places) * trajectory.metres_per_unit
     unit, length = unit_of(size)
     metres = size * length
-    if size < NOTHING or (told and length == 1.0):
+    if size < NOTHING or (unit_given and length == 1.0):
         return trajectory
     remark, warnings = trajectory.remark, trajectory.warnings
     if length != 1.0:
         taken = f"{shown(path.name)} is {size:.4g} units large, which are taken for {unit}: {metres:.3g} m"
         taken += f", {sureness(size, length)} (otherwise: --scale METRES)"
         remark = "; ".join(filter(None, (taken, remark)))
-    if not BELIEVED[0] <= metres <= BELIEVED[1]:
+    if not PLAUSIBLE[0] <= metres <= PLAUSIBLE[1]:
         doubt = f"it is {metres:.3g} m large if its unit, which the file does not tell, is that of {unit}"
         warnings += (ClipWarning(doubt, "if not, say how long it is: --scale METRES"),)
     return replace(trajectory, metres_per_unit=trajectory.metres_per_unit * length, remark=remark, warnings=warnings)
@@ -186,7 +186,7 @@ def files_of(source: str) -> list[str]:
             return [source]
         names = sorted(entry.name for entry in os.scandir(source) if entry.is_file())
     except (OSError, ValueError):
-        return [source]  # What is wrong with it is told when it is read.
+        return [source]  # What is wrong with it is said when it is read.
     known = tuple(extension for known in FORMATS for extension in known.extensions)
     return [os.path.join(source, name) for name in names if name.lower().endswith(known)] or [source]
 
@@ -230,7 +230,7 @@ def _what_is_no_file(path: str) -> tuple[str, str] | None:
         stat.S_ISCHR: ("this is a device, not a file", "name a file"),
         stat.S_ISBLK: ("this is a device, not a file", "name a file"),
     }
-    return next((told for is_kind, told in kinds.items() if is_kind(mode)), None)
+    return next((answer for is_kind, answer in kinds.items() if is_kind(mode)), None)
 
 
 def format_of(path: Path) -> Format:

@@ -34,7 +34,7 @@ GROWN_UP = 0.9, 2.3
 TYPICAL = 1.7
 """Metres; where no unit makes a body that large, that is taken which comes nearest."""
 
-BELIEVED = 0.5, 2.5
+PLAUSIBLE = 0.5, 2.5
 """Metres: children and giants. A body of another size is hardly in the unit that was guessed."""
 
 MOST_NAMED = 5

@@ -118,7 +118,7 @@ def whole_body(
         rest_body = _rest_body(rig, joints, look.first, meshes, made_up=made_up)
         poses = _in_parents(_filled(seen.poses), joints.parents)
     body = Trajectory(name, moments.times(seen.frames), poses, metres_per_unit, joints.remark, rest_body=rest_body)
-    return seen.told(body, moments, metres)
+    return seen.described(body, moments, metres)
 
 
 def single_joints(
@@ -134,7 +134,7 @@ def single_joints(
         Trajectory(name, times, Poses(poses.positions[joint], align_signs(poses.quaternions[joint])), rate=rate)
         for joint, name in enumerate(bones)
     )
-    return [seen.told(first, moments, metres), *others]
+    return [seen.described(first, moments, metres), *others]
 
 
 def _metres(rig: bpy.types.Object, metres_per_unit: float) -> float:

@@ -128,7 +128,7 @@ class Sampled:
     flips: int = 0
     """Gaps in which something turns over and back."""
 
-    def told(self, trajectory: Trajectory, moments: Moments, metres: float) -> Trajectory:
+    def described(self, trajectory: Trajectory, moments: Moments, metres: float) -> Trajectory:
         """Return a trajectory of these samples with its rate and what there is to say; its unit has so many metres."""
         remarks, warnings = [trajectory.remark], trajectory.warnings
         if self.added:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import codecs
 import csv
 import io
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
@@ -68,11 +68,11 @@ class Table:
     vectors: bool = False
     """True if cells hold vectors, which count as several columns."""
 
-    def parse(self, columns: Sequence[str], dtype: type = np.float64) -> np.ndarray:
+    def parse(self, columns: Sequence[str]) -> np.ndarray:
         """Return the numbers in these columns, shape (rows, columns). Empty cells are NaN."""
-        wanted = {name: self.columns[name] for name in columns}
+        chosen = {name: self.columns[name] for name in columns}
         needed = max(self.columns.values()) + 1
-        return parse_rows(self.path, self.rows(), self.separator, wanted, self.width, dtype, needed=needed)
+        return parse_rows(self.path, self.rows(), self.separator, chosen, self.width, needed=needed)
 
     def cells(self, column: str) -> Iterator[tuple[int, str]]:
         """Yield the cells of a column, without quotes, with their lines; empty where a row is too short."""
@@ -249,7 +249,6 @@ def parse_rows(
     separator: str | None,
     columns: Mapping[str, int],
     width: int,
-    dtype: type = np.float64,
     *,
     needed: int = 0,
 ) -> np.ndarray:
@@ -266,8 +265,6 @@ def parse_rows(
         Which columns, in which order.
     width : int
         How many cells a row may have. Empty ones beyond are no matter; too few matter where a requested one is missing.
-    dtype : type
-        Of the result.
     needed : int
         How many cells a row has to have; all up to the last requested one in any case.
 
@@ -282,11 +279,10 @@ def parse_rows(
         With the number of the line.
     """
     needed = max(needed, *(index + 1 for index in columns.values()))
-    convert: Callable[[str], float | np.int64] = float if dtype is np.float64 else _whole
     indices = [*columns.values()]
     pick = itemgetter(*indices) if len(indices) > 1 else lambda cells: [cells[indices[0]]]
     rows, count = iter(rows), 0
-    blocks: list[np.ndarray] = [np.empty((0, len(columns)), dtype)]
+    blocks: list[np.ndarray] = [np.empty((0, len(columns)))]
     while block := list(islice(rows, BLOCK)):
         count += len(block)
         if count > MOST_ROWS:
@@ -306,29 +302,22 @@ def parse_rows(
             try:
                 if "_" in line:
                     raise ValueError("Python's own way of writing numbers")
-                numbers.append([*map(convert, pick(cells))])
-            except (ValueError, OverflowError):
+                numbers.append([*map(float, pick(cells))])
+            except ValueError:
                 named = zip(columns, pick(cells), strict=True)
-                numbers.append([_number(path, number, name, cell, convert) for name, cell in named])
-        blocks.append(np.array(numbers, dtype))
+                numbers.append([_number(path, number, name, cell) for name, cell in named])
+        blocks.append(np.array(numbers))
     return np.concatenate(blocks)
 
 
-def _whole(cell: str) -> np.int64:
-    return np.int64(int(cell))
-
-
-def _number(
-    path: Path, line: int, name: str, cell: str, convert: Callable[[str], float | np.int64]
-) -> float | np.int64:
+def _number(path: Path, line: int, name: str, cell: str) -> float:
     """Return the number in a cell, which may be empty or have a decimal comma in quotes."""
     try:
-        if not cell.strip(" ") and convert is float:
+        if not cell.strip(" "):
             return np.nan
         if "_" in cell:
             raise ValueError
-        return convert(cell.replace(",", "."))
-    except (ValueError, OverflowError):
-        kind = "a number" if convert is float else "a whole number"
-        problem = f"{name} is {shown(cell.strip())}, not {kind}"
+        return float(cell.replace(",", "."))
+    except ValueError:
+        problem = f"{name} is {shown(cell.strip())}, not a number"
         raise TrajectoryError(path, problem, "correct or delete the line", line) from None

@@ -56,7 +56,7 @@ def seconds_of(table: Table, ticks: np.ndarray, unit: str) -> np.ndarray:
     Parameters
     ----------
     table : Table
-        With a column t, which is parsed again where a float64 cannot hold its numbers.
+        With a column t, which is read again where a float64 cannot hold its numbers.
     ticks : array, shape (n,)
         That column.
     unit : str
@@ -72,8 +72,8 @@ def seconds_of(table: Table, ticks: np.ndarray, unit: str) -> np.ndarray:
         return ticks
     if EXACT < np.nanmax(np.abs(ticks)) < LARGEST_WHOLE:
         # With fractions, or without a number in some row, they are not whole, and as near as floats are.
-        with suppress(TrajectoryError):
-            ticks = table.parse(["t"], np.int64)[:, 0]
+        with suppress(ValueError, OverflowError):
+            ticks = np.fromiter((int(cell) for _, cell in table.cells("t")), np.int64)
     with np.errstate(over="ignore", invalid="ignore"):
         return (ticks - earliest(ticks)) / TICKS[unit]
 

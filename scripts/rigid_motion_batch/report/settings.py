@@ -1,4 +1,4 @@
-"""What the reader of a report needs to know of a run, beyond the numbers themselves. Plain, for tasks are told so."""
+"""What the reader of a report needs to know of a run, beyond the numbers. Plain data, as parameters of tasks."""
 
 from __future__ import annotations
 

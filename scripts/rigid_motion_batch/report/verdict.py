@@ -69,10 +69,10 @@ class Verdict:
     facts: tuple[Text, ...] = ()
 
     def __str__(self) -> str:
-        return plain(self.sentence)
+        return as_text(self.sentence)
 
 
-def plain(text: Text) -> str:
+def as_text(text: Text) -> str:
     """Return the words alone, as a terminal shows them."""
     return "".join(part.text for part in text).replace("\u00a0", " ")
 
@@ -252,7 +252,7 @@ def _within(contest: _Contest) -> Text | None:
         return None
     result = _best(contest)
     if not result:
-        return _nobody(contest)
+        return _no_winner(contest)
     best, rival, ratios = result
     at = int(np.nanargmin(ratios))
     phrase = contest.phrase(at)
@@ -273,7 +273,7 @@ def _lower_error(contest: _Contest) -> Text | None:
         return None
     result = _best(contest)
     if not result:
-        return _nobody(contest)
+        return _no_winner(contest)
     best, rival, ratios = result
     at = int(np.nanargmin(ratios))
     return _say(
@@ -286,7 +286,7 @@ def _lower_error(contest: _Contest) -> Text | None:
     )
 
 
-def _nobody(contest: _Contest) -> Text:
+def _no_winner(contest: _Contest) -> Text:
     """Where no mode is better than the reference, or than all others; the choice with the most keys speaks."""
     means, within = contest.means, contest.kind is Tolerance
     known = np.flatnonzero(np.isfinite(means).all(axis=1))

@@ -106,13 +106,6 @@ def readout_group(name: str, decimals: int, material: bpy.types.Material) -> bpy
     return _lettered(group, curves, material)
 
 
-def readout(
-    name: str, group: bpy.types.NodeTree, size: float, frames: np.ndarray, values: np.ndarray
-) -> bpy.types.Object:
-    """Return a number that has `values` at `frames`, both of shape (n,)."""
-    return _written(name, group, size, frames, values)
-
-
 def decimals_for(largest: float) -> int:
     """Return the decimals that leave the largest of some numbers three digits, or one decimal up to a thousand."""
     if largest <= 0.0:
@@ -137,7 +130,7 @@ def choice(
     name: str, group: bpy.types.NodeTree, size: float, frames: np.ndarray, chosen: np.ndarray
 ) -> bpy.types.Object:
     """Return a text that is number `chosen` of those of the group at `frames`, both of shape (n,)."""
-    return _written(name, group, size, *_changes(frames, chosen), interpolation="CONSTANT")
+    return readout(name, group, size, *_changes(frames, chosen), interpolation="CONSTANT")
 
 
 def _lettered(group: Group, curves: Socket, material: bpy.types.Material) -> bpy.types.NodeTree:
@@ -151,7 +144,7 @@ def _changes(frames: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.nda
     return frames[new], values[new]
 
 
-def _written(
+def readout(
     name: str,
     group: bpy.types.NodeTree,
     size: float,
@@ -159,7 +152,7 @@ def _written(
     values: np.ndarray,
     interpolation: str = "LINEAR",
 ) -> bpy.types.Object:
-    """Return an object with a group, in which `Value` has these values at `frames`, both of shape (n,)."""
+    """Return a number, or another object of a group, in which `Value` has these values at `frames`, each (n,)."""
     obj = bpy.data.objects.new(name, bpy.data.meshes.new(name))
     obj.scale = (size, size, size)
     modifier = apply_group(obj, group, Value=float(values[0]))

@@ -128,7 +128,7 @@ def swept_points(poses: Poses, points: np.ndarray) -> np.ndarray:
 def telling_point(poses: Poses, points: np.ndarray) -> np.ndarray:
     """Return the point whose path is drawn, shape (3,): the tip of the object, where that moves.
 
-    The tip is the point furthest from the origin. A tool that pivots about it is better told by another point: the
+    The tip is the point furthest from the origin. A tool that pivots about it is better shown by another point: the
     one that travels furthest, if that is more than twice as far.
     """
     paths = swept_points(poses, points).reshape(len(poses), len(points), 3)

@@ -23,7 +23,7 @@ from .deviations import largest_deviation, magnification, magnified
 from .framing import SMOOTHING, Framing, Solid
 from .lanes import Actors, Cast, Lanes
 from .settings import MODELS, SceneSettings
-from .solids import Shape, Solids
+from .solids import Solids
 from .subject import load_subject, vertices_of
 from .timeline import ShownMotion, Timeline
 
@@ -74,9 +74,9 @@ def build_scene(reconstruction: Reconstruction, settings: SceneSettings) -> bpy.
         sampled=sampled,
         sample_frames=timeline.frames_of(reconstruction.times),
     )
-    shape = Shape(motion, deviated, mesh, layout.telling_point(motion.recording, outline))
+    solids = Solids(cast, motion, deviated, mesh, layout.telling_point(motion.recording, outline))
     header = Header(reconstruction.clip.name, reconstruction.choice.title, _legend(cast, settings, deviation, enlarged))
-    scene = assemble_scene(settings, cast, lanes_of, Solids(cast, shape), header, motion.centre)
+    scene = assemble_scene(settings, cast, lanes_of, solids, header, motion.centre)
     # Our own models are closed: what faces away costs time and is never seen.
     scene.display.shading.show_backface_culling = settings.subject in MODELS
     scene["deviation_shown_times"] = deviation

@@ -5,8 +5,6 @@ An object's own channels are the poses of `timeline.ShownMotion`, within its lan
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import bpy
 import numpy as np
 
@@ -33,36 +31,34 @@ PATH_RADIUS = 0.0014
 MARK_RADIUS = 0.0052
 
 
-@dataclass(frozen=True, eq=False)
-class Shape:
-    """What moves, and how."""
-
-    motion: ShownMotion
-
-    deviated: dict[str, Poses]
-    """Mode id to poses at the fine frames, as far off from the recording as is shown."""
-
-    mesh: bpy.types.Mesh
-
-    traced: np.ndarray
-    """The point of the object whose path is drawn, shape (3,)."""
-
-    def path_of(self, poses: Poses) -> np.ndarray:
-        """Return the way of the traced point, shape (n, 3)."""
-        return layout.swept_points(poses, self.traced[None])
-
-
 class Solids:
-    """Rigid objects for the lanes, out of materials, groups and meshes that they share."""
+    """Rigid objects for the lanes, out of materials, groups and meshes that they share.
 
-    def __init__(self, cast: Cast, shape: Shape) -> None:
-        self.cast, self.shape = cast, shape
+    Parameters
+    ----------
+    cast : Cast
+    motion : ShownMotion
+    deviated : dict of Poses
+        Mode id to poses at the fine frames, as far off from the recording as is shown.
+    mesh : bpy.types.Mesh
+    traced : array, shape (3,)
+        The point of the object whose path is drawn.
+    """
+
+    def __init__(
+        self, cast: Cast, motion: ShownMotion, deviated: dict[str, Poses], mesh: bpy.types.Mesh, traced: np.ndarray
+    ) -> None:
+        self.cast, self.motion, self.deviated, self.mesh, self.traced = cast, motion, deviated, mesh, traced
         self.ghost = ghost(cast.theme)
         self.ghost_action: bpy.types.Action | None = None
         self.cut_group = trails.cut_group() if cast.extent.cut else None
         self.trail_group, self.marks_group = trails.trail_group(windowed=True), trails.marks_group()
-        recording = shape.path_of(shape.motion.recording)
+        recording = self._path_of(motion.recording)
         self.path = trails.polyline("Recording path", cast.timeline.fine_frames, recording)
+
+    def _path_of(self, poses: Poses) -> np.ndarray:
+        """Return the way of the traced point, shape (n, 3)."""
+        return layout.swept_points(poses, self.traced[None])
 
     def enter(self, lane: Lane) -> None:
         """Add the object, its ghost, trails and marks."""
@@ -71,16 +67,16 @@ class Solids:
         self._add_trails(lane)
 
     def _add_actors(self, lane: Lane) -> None:
-        mode, motion = lane.mode, self.shape.motion
+        mode, motion = lane.mode, self.motion
         frames, steps = self.cast.timeline.frames, self.cast.timeline.steps
         material = surface(f"Mode {mode}", colour_on(self.cast.theme, mode))
         self._add_actor(mode, lane, motion.modes[mode][::steps], material)
-        if self.shape.deviated[mode] is not motion.modes[mode]:
+        if self.deviated[mode] is not motion.modes[mode]:
             # The motion itself is there for whoever opens the file; its deviation is what is seen.
             bpy.data.objects[mode].hide_render = bpy.data.objects[mode].hide_viewport = True
-            self._add_actor(f"{mode} deviating", lane, self.shape.deviated[mode][::steps], material)
+            self._add_actor(f"{mode} deviating", lane, self.deviated[mode][::steps], material)
 
-        ghost = lane.child(f"{mode} recording", self.shape.mesh)
+        ghost = lane.child(f"{mode} recording", self.mesh)
         ghost.rotation_mode = "QUATERNION"
         ghost.delta_location = self.cast.behind
         _paint(ghost, range(len(ghost.material_slots)), self.ghost)
@@ -93,23 +89,21 @@ class Solids:
             ghost.animation_data.action_slot = self.ghost_action.slots[0]
 
     def _add_actor(self, name: str, lane: Lane, poses: Poses, material: bpy.types.Material) -> None:
-        actor = lane.child(name, self.shape.mesh)
+        actor = lane.child(name, self.mesh)
         actor.rotation_mode = "QUATERNION"
-        _paint(actor, tinted_slots(self.shape.mesh), material)
+        _paint(actor, tinted_slots(self.mesh), material)
         bake_poses(actor, self.cast.timeline.frames, poses)
         actor.animation_data.action.name = name
         if self.cut_group:
             apply_group(actor, self.cut_group, **self.window)
 
     def _add_trails(self, lane: Lane) -> None:
-        mode, motion = lane.mode, self.shape.motion
+        mode, motion = lane.mode, self.motion
         cast, rate, metres = self.cast, self.cast.timeline.rate, self.cast.layout.metres
-        trail = trails.polyline(
-            f"{mode} trail", cast.timeline.fine_frames, self.shape.path_of(self.shape.deviated[mode])
-        )
+        trail = trails.polyline(f"{mode} trail", cast.timeline.fine_frames, self._path_of(self.deviated[mode]))
         window = {"Past": PATH_BEHIND_SECONDS * rate, "Ahead": PATH_AHEAD_SECONDS * rate}
         keys = motion.keys[mode]
-        marks = trails.polyline(f"{mode} keys", motion.key_frames[mode], self.shape.path_of(keys), joined=False)
+        marks = trails.polyline(f"{mode} keys", motion.key_frames[mode], self._path_of(keys), joined=False)
         crowded = max(1.0, sum(window.values()) / (MARKS_SHOWN * cast.timeline.frames_per_key(len(keys))))
         apply_group(
             lane.child(f"{mode} trail", trail),

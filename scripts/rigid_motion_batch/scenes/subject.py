@@ -43,11 +43,13 @@ def vertices_of(mesh: bpy.types.Mesh) -> np.ndarray:
 
 def tinted_slots(mesh: bpy.types.Mesh) -> list[int]:
     """Return the material slots that take the colour of the lane: those named `TINTED`, or else the first."""
-    named = [index for index, material in enumerate(mesh.materials) if material and _plain(material.name) == TINTED]
+    named = [
+        index for index, material in enumerate(mesh.materials) if material and _without_number(material.name) == TINTED
+    ]
     return named or [0]
 
 
-def _plain(name: str) -> str:
+def _without_number(name: str) -> str:
     """Return the name without the number that Blender adds to make it unique."""
     stem, dot, number = name.rpartition(".")
     return stem if dot and number.isdecimal() else name
@@ -72,8 +74,8 @@ def _read_mesh(file: Path, name: str) -> bpy.types.Mesh:
     if mesh is None:
         raise SubjectError(f"{file}: {name!r} has no faces to show; name a mesh, curve, surface or text object")
     mesh.name = name
-    for material, plain in names.items():
-        material.name = plain
+    for material, original in names.items():
+        material.name = original
     if not mesh.materials:
         mesh.materials.append(None)
     return mesh
@@ -122,15 +124,11 @@ def _own_materials(mesh: bpy.types.Mesh) -> dict[bpy.types.Material, str]:
 def _discard_all_but(mesh: bpy.types.Mesh | None, before: set[bpy.types.ID]) -> None:
     """Remove what came with the object, except what the mesh uses: its materials and their images."""
     arrived = set(bpy.data.user_map()) - before
+    kept: set[bpy.types.ID | None] = {mesh}
     for block in arrived:
         if getattr(block, "animation_data", None) is not None:
             block.animation_data_clear()
     users = bpy.data.user_map(subset=arrived)
-    needed: set[bpy.types.ID] = set()
-    result = arrived & {mesh}
-    while result:
-        needed |= result
-        result = {
-            block for block in arrived - needed if users[block] & needed and not isinstance(block, bpy.types.Text)
-        }
-    bpy.data.batch_remove(arrived - needed)
+    while more := {block for block in arrived - kept if users[block] & kept and not isinstance(block, bpy.types.Text)}:
+        kept |= more
+    bpy.data.batch_remove(arrived - kept)

@@ -18,7 +18,7 @@ from rigid_motion_batch.analysis.body_metrics import (
 )
 from rigid_motion_batch.analysis.choices import Choice, Tolerance, Uniform
 from rigid_motion_batch.analysis.metrics import body_table_names
-from rigid_motion_batch.rows import meant
+from rigid_motion_batch.rows import unescaped
 from tests.scripts.clips.bodies import JOINTS, swinging_body
 
 HEADER = (
@@ -58,7 +58,7 @@ def cells_of(path: Path) -> list[list[str]]:
     assert not any(
         cell.startswith(("=", "+", "-", "@", "\t", "\r")) for row in rows for cell in row if not number(cell)
     )
-    return [[meant(cell) for cell in row] for row in rows]
+    return [[unescaped(cell) for cell in row] for row in rows]
 
 
 def number(cell: str) -> bool:

@@ -22,7 +22,7 @@ from rigid_motion_batch.scenes.physique import body_size
 from rigid_motion_batch.silencing import silenced
 from tests.blank import blank
 from tests.scripts.recordings.blends import empty, key, on_frames, rig
-from tests.scripts.recordings.glbs import soldier
+from tests.scripts.recordings.glbs import curved, soldier
 from tests.scripts.recordings.skeletons import (
     BONES,
     CARRYING,
@@ -217,16 +217,27 @@ def test_what_is_no_such_file_is_told_in_one_line(write, refusal, ending: str, c
     assert refusal(write(f"walk{ending}", content))[1]
 
 
+def test_a_joint_by_name_is_sampled_alike_whatever_unit_its_body_is_in(tmp_path: Path) -> None:
+    metres = curved().write(tmp_path / "metres.glb")
+    centimetres = replace(curved(0.01), size=1.0).write(tmp_path / "centimetres.glb")
+    tips = [read_trajectories(f"{path}:Joint3").trajectories[0] for path in (metres, centimetres)]
+    assert len(tips[0].times) == len(tips[1].times)
+    np.testing.assert_allclose(100.0 * tips[0].poses.positions, tips[1].poses.positions, atol=1e-2)
+
+
 def test_too_much_is_refused(exported, refusal, monkeypatch: pytest.MonkeyPatch) -> None:
     path, _ = exported(".glb")
     monkeypatch.setattr(importing, "LARGEST_FILE", 100)
     assert "bytes are more than the 100 that are read; " in refusal(str(path))[1]
+    beside, _ = exported(".gltf")
+    monkeypatch.setattr(importing, "LARGEST_FILE", beside.stat().st_size)
+    assert "that are read; export the skeleton without its meshes" in refusal(str(beside))[1]
     monkeypatch.undo()
     monkeypatch.setattr(rigs, "MOST_POSES", 99)
     assert refusal(str(path))[1].startswith("5 joints in 20 frames are more than 99 poses; name one joint with ")
     assert len(read_trajectories(f"{path}:Hand").trajectories) == 1
     monkeypatch.setattr(gltf, "MOST_POSES", 99)
-    assert "numbers, vectors and matrices are more than 99; " in refusal(str(path))[1]
+    assert "numbers, vectors and matrices are more than the 99 that are read; " in refusal(str(path))[1]
 
 
 def test_an_fbx_that_claims_more_than_it_holds_is_refused_before_room_is_made_for_it(exported, refusal) -> None:

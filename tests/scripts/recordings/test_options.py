@@ -1,11 +1,11 @@
 """What a user says of recordings: checked when it is said, and the same when it has travelled with a task."""
 
-import argparse
 import json
 from dataclasses import asdict
 
 import pytest
 
+from rigid_motion_batch.command_line import Parser
 from rigid_motion_batch.recordings import ReadingOptions
 from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
 
@@ -14,7 +14,7 @@ MEANT = ReadingOptions((("t", "when"), ("x", "a"), ("device", "who")), "ms", 0.0
 
 
 def parsed(*arguments: str) -> ReadingOptions:
-    parser = argparse.ArgumentParser()
+    parser = Parser()
     add_reading_options(parser)
     return reading_options(parser.parse_args(arguments))
 

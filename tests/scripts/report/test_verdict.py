@@ -8,7 +8,7 @@ import pytest
 from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform
 from rigid_motion_batch.analysis.needed import RATES, KeysNeeded
 from rigid_motion_batch.report.numbers import ERROR, KEYS, MEASURES, Numbers
-from rigid_motion_batch.report.verdict import plain, verdict
+from rigid_motion_batch.report.verdict import as_text, verdict
 
 FIVE, TEN, TWENTY = map(Uniform, ("5", "10", "20"))
 
@@ -138,7 +138,7 @@ def test_the_keys_needed_come_first_where_they_were_looked_for(needed: KeysNeede
 
 
 def facts(run: Numbers) -> list[str]:
-    return [plain(fact) for fact in verdict(run).facts]
+    return [as_text(fact) for fact in verdict(run).facts]
 
 
 def test_facts_are_the_gain_the_wins_and_what_did_not_pay() -> None:

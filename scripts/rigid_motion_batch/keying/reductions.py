@@ -1,16 +1,31 @@
-"""How few keys are wanted, and how they are spoken of. No Blender is needed here."""
+"""Reducing keys: how few, of what and how written, and how they are spoken of. No Blender is needed here."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from rigid_motion_batch.analysis.choices import Tolerance
+from rigid_motion_batch.recordings import ReadingOptions
+from rigid_motion_batch.recordings.clip_reading import folder_names
 from rigid_motion_batch.recordings.rest_bodies import unit_of
 
+RATES = 1, 240
+"""Frames a second that a .blend file may be given for the rate of its recording."""
 
-@dataclass(frozen=True)
-class Wishes:
-    """How few keys are wanted, of what."""
+TOLERANCE = Tolerance("5mm")
+"""The tolerance where none is given, of tables and .blend files."""
+
+SUFFIX, GLB_SUFFIX = "-keys", "-reduced"
+"""Endings of the names of files that are written, and of GLB files."""
+
+ENDINGS = (".glb", ".gltf")
+"""Those of glTF files."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reductions:
+    """How few keys are to be kept, of what, and how they are written: plain data."""
 
     mode: str
     tolerance: Tolerance | None
@@ -23,14 +38,33 @@ class Wishes:
     shared: bool
     """True if all bones of a rig get keys on the same frames."""
 
-    discard: bool = False
+    discard: bool
     """True if the dense keys go out of the file, so that Restore Keys cannot give them back."""
 
-    count: int | None = None
+    count: int | None
     """So many keys of each object, or key poses of each rig, instead of a tolerance."""
 
-    vertices: bool = False
+    vertices: bool
     """True if the vertices of skins are measured, in glTF files."""
+
+    axes: str | None
+    """Of recordings; None for those of each format."""
+
+    reading: ReadingOptions
+
+    blend: bool
+    """True if rigid motions become .blend files too."""
+
+    fps: int | None
+    """Of files that are made of recordings; None for the rate of each."""
+
+    glb: bool
+    """True if GLB files are written, and nothing else."""
+
+
+def name_of(file: Path, body: str | None) -> str:
+    """Return what the files of a body are called: as the recording, and where the body was named, as that too."""
+    return "-".join([file.stem, *(folder_names([body]) if body else [])])
 
 
 def doubt(size: float, tolerance: Tolerance | None, per_unit: float) -> str:

@@ -1,0 +1,150 @@
+"""What is done to inputs, an input while it is done, and what comes of it."""
+
+from __future__ import annotations
+
+import os
+import traceback
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rigid_motion_batch.supervising import report
+
+from .output_files import FileProblem, Unreadable, refuse_read_only
+from .planning import Job
+from .records import Record
+
+Note = Callable[[str], None]
+"""Writes a line for the user."""
+
+
+@dataclass(frozen=True)
+class Work(ABC):
+    """What is done to inputs, and how: plain data, which goes to worker processes and into the keys of results."""
+
+    doing: str
+    """As a heading: "Baking"."""
+
+    done: str
+    """The word for what becomes of objects: "baked"."""
+
+    objects: Sequence[str] | None
+    """The names and patterns of the objects that are meant; None for all."""
+
+    overwrite: bool
+    """True if files that were not made of an input may be replaced."""
+
+    dry_run: bool
+    processes: int = field(default=1, kw_only=True)
+    """For one input, where it has parts."""
+
+    @abstractmethod
+    def needs_blender(self, job: Job) -> bool: ...
+
+    @abstractmethod
+    def do(self, doing: Doing) -> None:
+        """Do one input, and write what comes of it."""
+
+
+@dataclass
+class Outcome:
+    """What became of an input."""
+
+    source: str
+
+    objects: int = 0
+    bones: int = 0
+    clips: int = 0
+    """The number of them that were done."""
+
+    refused: int = 0
+    """The number of objects and bones that were not."""
+
+    failed: bool = False
+    unreadable: bool = False
+    incomplete: bool = False
+    """True if there may be objects in it that cannot be looked at, for a library is missing."""
+
+    is_old: bool = False
+    """True if it was done by an earlier run."""
+
+    written: list[Path] = field(default_factory=list)
+    """The files that were written, or would have been."""
+
+    beside: list[Path] = field(default_factory=list)
+    """Files that belong to those."""
+
+    read: list[Path] = field(default_factory=list)
+    """The files that were read beside the input."""
+
+    matched: set[str] = field(default_factory=set)
+    """The names and patterns among those requested that there was an object or a bone for."""
+
+    def add_written(self, path: Path) -> None:
+        """Note that a file is complete at its place."""
+        self.written.append(path)
+        report(written=os.fspath(path), source=self.source)
+
+    @property
+    def done(self) -> int:
+        return self.objects + self.bones + self.clips
+
+    @property
+    def is_whole(self) -> bool:
+        """Return whether something was written, and nothing is left to be done."""
+        return bool(self.written) and not (self.failed or self.refused or self.incomplete)
+
+
+class Doing:
+    """An input while it is done: what is said of it, and what comes of it."""
+
+    def __init__(self, work: Work, job: Job, note: Note) -> None:
+        self.work, self.job, self.note = work, job, note
+        self.title = job.source
+        self.record = Record(job.folder, job.source, overwrite=work.overwrite)
+        self.would = "would be " if work.dry_run else ""
+        self.outcome = Outcome(job.source)
+
+    def say(self, text: object) -> None:
+        self.note(f"{self.title}: {text}")
+
+    @contextmanager
+    def failing(self) -> Iterator[None]:
+        """Say why the block fails, where it does, also where that was not foreseen: others are to be done."""
+        try:
+            yield
+        except FileProblem as problem:
+            self.outcome.failed = True
+            self.outcome.unreadable = isinstance(problem, Unreadable) and not self.outcome.written
+            self.say(problem)
+        except Exception as error:
+            self.outcome.failed = True
+            self.say(f"not written, for this program failed ({type(error).__name__}: {error}):")
+            for line in "".join(traceback.format_exception(error)).splitlines():
+                self.note(line)
+
+    def refuse(self, name: str, reason: str, count: int = 1) -> None:
+        """Say that so many objects or bones are not done, and why."""
+        self.outcome.refused += count
+        self.say(f"{name}: not {self.work.done}: {reason}")
+
+    def require_free(self, path: Path) -> None:
+        """Raise FileProblem where a file must not or cannot be written: better said before hours go into it."""
+        self.record.refuse_to_replace(path)
+        refuse_read_only(path)
+
+    @contextmanager
+    def writing(self, path: Path) -> Iterator[Path]:
+        """Yield a path for a file that takes its place when the block ends well. Raises FileProblem where it cannot."""
+        try:
+            with self.record.writing(path) as beside:
+                yield beside
+        except OSError as error:
+            reason = error.strerror or error
+            raise FileProblem(f"{path} could not be written ({reason}): write elsewhere with --output") from None
+
+    def tell_written(self, path: Path) -> None:
+        self.say(f"{self.would}written to {path}")
+        self.outcome.add_written(path)
