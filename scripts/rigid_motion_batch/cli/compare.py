@@ -302,7 +302,8 @@ class _Comparing:
         self.store.note(RECORD, dict(zip(_places([*digests], self.store.output), digests.values(), strict=True)))
         # What an earlier run found is no finding of this.
         self.store.withdraw({METRICS, JOINT_METRICS, DECIMATED, KEYS_NEEDED} - self.plan.tables)
-        if any(frames for _, frames in survey(self.plan.tasks, self.store)[0].values()):
+        stage, tasks = self.plan.comparison.stage, self.plan.tasks
+        if stage and any(frames for _, frames in survey(tasks, self.store)[0].values()):
             # The numbers take seconds, and films minutes: nobody has to wait for the one to see the other.
             self._do("Measuring", lambda: self.plan.tasks(films=False))
             if self.work.interrupted or self.work.problem:

@@ -80,10 +80,10 @@ class DaskExecutor(Executor):
         if time.monotonic() - self._looked_at > LOOK:
             self._look()
             self._looked_at = time.monotonic()
-        return sum(self._fit.values())
+        return sum(self._fit.get(address, 0) for address in self._executors)
 
     def submit(self, job: Job) -> Future[Made]:
-        address = max(self._fit, key=lambda address: (self._idle.count(address), self._fit[address]))
+        address = max(self._executors, key=lambda address: (self._idle.count(address), self._fit.get(address, 0)))
         with suppress(ValueError):
             self._idle.remove(address)
         future: Future[Made] = self._executors[address].submit(do, job)
@@ -109,7 +109,7 @@ class DaskExecutor(Executor):
 
     def _hear(self, address: str, threads: int, answer: Future[str]) -> None:
         """Take the answer of a worker."""
-        if not answer.cancelled():  # It is gone.
+        if not answer.cancelled():  # Otherwise it is gone.
             said = str(answer.exception() or answer.result())
             self._idle += [] if said else [address] * threads
             self._fit[address] = 0 if said else threads

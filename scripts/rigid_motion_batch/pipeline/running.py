@@ -274,8 +274,8 @@ def _difference(before: Mapping[str, Any] | None, task: Task, changed: Mapping[s
         old, new = dict(_leaves(before.get(part))), dict(_leaves(now[part]))
         names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
         if part == "parameters":
-            values = [f"{old.get(name)} -> {new.get(name)}" for name in names]
-            names = [f"{name}: {v}" if len(v) < 60 else name for name, v in zip(names, values, strict=True)]
+            both = {name: f"{name}: {old.get(name)} -> {new.get(name)}" for name in names}
+            names = [said if len(said) < 80 else name for name, said in both.items()]
         reasons += [f"{title} changed ({few(names)})"] if names else []
     if before.get("after") != now["after"]:
         anew = [changed[key] for key in task.after if key in changed]
