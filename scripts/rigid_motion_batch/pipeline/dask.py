@@ -12,7 +12,7 @@ import multiprocessing
 import os
 import time
 from collections.abc import Callable
-from concurrent.futures import CancelledError, Future, wait
+from concurrent.futures import CancelledError, Future, InvalidStateError, wait
 from contextlib import suppress
 from functools import cache, partial
 from pathlib import Path
@@ -66,11 +66,11 @@ class DaskExecutor(Executor):
     def __init__(self, address: str, folder: Path, note: Callable[[str], object]) -> None:
         self._address, self._folder, self._note = address, os.fspath(folder), note
         self._executors: dict[str, ClientExecutor] = {}
-        """Address of a worker to what gives jobs to it alone: where it is gone, they are seen to be lost."""
+        """Address of a worker to what gives jobs to it alone."""
         self._fit: dict[str, int] = {}
         """Address of a worker that has answered to how many threads it has; 0 where it does not fit."""
-        self._idle: list[str] = []
-        """The address of a worker for each of its threads that has no job."""
+        self._jobs: dict[str, list[Future[Made]]] = {}
+        """Address of a worker to what it is doing: where it is gone, this is seen to be lost."""
         self._looked_at = 0.0
         self._client: Client
 
@@ -83,11 +83,11 @@ class DaskExecutor(Executor):
         return sum(self._fit.get(address, 0) for address in self._executors)
 
     def submit(self, job: Job) -> Future[Made]:
-        address = max(self._executors, key=lambda address: (self._idle.count(address), self._fit.get(address, 0)))
-        with suppress(ValueError):
-            self._idle.remove(address)
-        future: Future[Made] = self._executors[address].submit(do, job)
-        future.add_done_callback(lambda _: self._idle.append(address))
+        self._jobs = {address: [job for job in jobs if not job.done()] for address, jobs in self._jobs.items()}
+        address = max(self._executors, key=lambda address: self._fit.get(address, 0) - len(self._jobs[address]))
+        future: Future[Made] = Future()
+        self._jobs[address].append(future)
+        self._executors[address].submit(do, job).add_done_callback(partial(_hand_over, future))
         return future
 
     def _look(self) -> None:
@@ -95,11 +95,15 @@ class DaskExecutor(Executor):
         threads, before = self._threads(), bool(self._executors)
         for address in self._executors.keys() - threads.keys():
             with suppress(*UNREACHABLE):
-                self._executors.pop(address).shutdown(wait=False)  # Its jobs are cancelled.
+                self._executors.pop(address).shutdown(wait=False)
+            for future in self._jobs.pop(address):  # Dask does not always say that they are cancelled.
+                with suppress(InvalidStateError):
+                    future.set_exception(CancelledError())
             if self._fit.pop(address, 0):
                 self._note(f"worker {address} is gone; others go on with its tasks")
         for address in threads.keys() - self._executors.keys():
             executor = self._executors[address] = self._client.get_executor(pure=False, workers=[address])
+            self._jobs[address] = []
             answer = executor.submit(_asker(version_here(), self._folder))
             answer.add_done_callback(partial(self._hear, address, threads[address]))
         if self._fit and self._fit.keys() == threads.keys() and not any(self._fit.values()):
@@ -111,7 +115,6 @@ class DaskExecutor(Executor):
         """Take the answer of a worker."""
         if not answer.cancelled():  # Otherwise it is gone.
             said = str(answer.exception() or answer.result())
-            self._idle += [] if said else [address] * threads
             self._fit[address] = 0 if said else threads
             if said:
                 self._note(f"worker {address}: {said}; it is left out")
@@ -125,7 +128,7 @@ class DaskExecutor(Executor):
         raise ExecutorError(f"{self._address}: the Dask scheduler is gone")
 
     def __enter__(self) -> Self:
-        for name in ("distributed", "distributed.client"):
+        for name in ("distributed", "distributed.client", "tornado.application"):
             # What there is to say of the connection is said here, in one line.
             logging.getLogger(name).setLevel(logging.CRITICAL)
         try:
@@ -142,6 +145,16 @@ class DaskExecutor(Executor):
     def __exit__(self, *_: object) -> None:
         with suppress(*UNREACHABLE):
             self._client.close(timeout=2.0)  # Then nobody wants what is at work, and it is cancelled.
+
+
+def _hand_over(future: Future[Made], theirs: Future[Made]) -> None:
+    """Give a future what came of one of Dask's."""
+    error = CancelledError() if theirs.cancelled() else theirs.exception()
+    with suppress(InvalidStateError):  # Its worker was taken for gone.
+        if error:
+            future.set_exception(error)
+        else:
+            future.set_result(theirs.result())
 
 
 async def _knock(address: str) -> None:
