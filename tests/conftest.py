@@ -60,7 +60,7 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    from rigid_motion_batch.pipeline.performing import processors
+    from rigid_motion_batch.pipeline.executors import processors
 
     return min(processors(), WORKERS)
 
@@ -71,7 +71,7 @@ def pytest_xdist_setupnodes(specs: list) -> None:
     for name in BLENDERS_OWN:
         if name not in os.environ:
             os.unsetenv(name)
-    from rigid_motion_batch.pipeline.performing import processors
+    from rigid_motion_batch.pipeline.executors import processors
 
     for name in THREADS:
         os.environ.setdefault(name, str(max(1, processors() // len(specs))))

@@ -188,3 +188,9 @@ def path_line(path: str | os.PathLike[str]) -> str:
     text = os.fspath(path)
     odd = text.startswith('"') or any(unicodedata.category(c) in BREAK_LINES for c in text)
     return json.dumps(text) if odd else text
+
+
+def few(names: Iterable[str], most: int = 3) -> str:
+    """Return the first of several names, and how many more there are."""
+    names = [*names]
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

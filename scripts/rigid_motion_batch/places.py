@@ -18,16 +18,6 @@ ASSETS = CHECKOUT / "assets" if CHECKOUT else PACKAGE / "assets"
 MANIFEST = (CHECKOUT or EXTENSION) / "blender_manifest.toml"
 LICENSE = (CHECKOUT or EXTENSION) / "LICENSE"
 
-NAMED = {
-    "assets": ASSETS,
-    "blender_manifest.toml": MANIFEST,
-    "rigid_motion": EXTENSION,
-    "rigid_motion_batch": PACKAGE,
-    **({"research": CHECKOUT / "scripts" / "research", "tests": CHECKOUT / "tests"} if CHECKOUT else {}),
-}
-"""The folders and files that the program is made of, by names that are the same wherever it is; a folder that is in
-another comes first."""
-
 
 def output_folder(name: str) -> Path:
     """Return where a command writes unless requested otherwise: `renders/` of the checkout,
@@ -47,15 +37,8 @@ def from_here(place: Path) -> Path:
 
 
 def place_of(name: str) -> Path:
-    """Return the file or folder of a name such as "rigid_motion/motion/poses.py".
-
-    Raises
-    ------
-    KeyError
-        Where the program has no part of that name.
-    """
-    part, _, rest = name.partition("/")
-    return NAMED[part] / rest if rest else NAMED[part]
+    """Return the file or folder of a part of the program: "rigid_motion/motion", or "analysis" of this package."""
+    return EXTENSION.parent / name if name.startswith(f"{EXTENSION.name}/") else PACKAGE / name
 
 
 @cache

@@ -226,7 +226,7 @@ def test_processes_do_the_same_as_one_and_a_bad_file_stops_nobody(tmp_path):
 
 
 def test_blenders_own_python_does_one_after_the_other(tmp_path, capsys, monkeypatch):
-    monkeypatch.setitem(sys.modules, "rigid_motion_batch.pipeline.executors", None)
+    monkeypatch.setitem(sys.modules, "pebble", None)
     paths = [str(glb(tmp_path / f"{name}.glb")) for name in ("a", "b")]
     assert reduce.main([*paths, "--jobs", "2"]) == 2
     assert "; leave it out, and inputs are done one by one" in capsys.readouterr().err

@@ -12,7 +12,7 @@ from typing import cast
 
 from rigid_motion_batch import standard_streams
 from rigid_motion_batch.command_line import INSTALLED, did_you_mean, own_arguments, printable, program_of
-from rigid_motion_batch.places import NAMED, manifest
+from rigid_motion_batch.places import EXTENSION, PACKAGE, manifest
 from rigid_motion_batch.supervising import begin_child, blender_program, ended_at_once, stop_signals, supervise
 from rigid_motion_batch.system_libraries import way_out
 
@@ -117,7 +117,7 @@ def _main(arguments: list[str]) -> int:
     try:
         return _run(f".{COMMANDS[name].module}", rest)
     except ModuleNotFoundError as error:
-        if not error.name or error.name.partition(".")[0] in NAMED:
+        if not error.name or error.name.partition(".")[0] in (EXTENSION.name, PACKAGE.name, "research"):
             raise
         print(f"{sys.argv[0]}: {error}\n{way_out(str(error))}", file=sys.stderr)
         return 2

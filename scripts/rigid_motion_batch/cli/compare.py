@@ -8,6 +8,8 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
+import subprocess
 import sys
 import webbrowser
 from collections.abc import Iterator
@@ -17,7 +19,7 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from itertools import chain, count, groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.needed import KeysNeeded
@@ -35,10 +37,8 @@ from rigid_motion_batch.pipeline.comparison import (
     Comparison,
     ComparisonPlan,
 )
-from rigid_motion_batch.pipeline.executors import ProcessExecutor
-from rigid_motion_batch.pipeline.explain import explain
-from rigid_motion_batch.pipeline.performing import Executor, ExecutorError, processors
-from rigid_motion_batch.pipeline.running import FAILED, STATES, Plan, Run, Share, Survey
+from rigid_motion_batch.pipeline.executors import Executor, ExecutorError, ProcessExecutor, processors
+from rigid_motion_batch.pipeline.running import FAILED, STATES, Plan, Run, explain, share_of, survey
 from rigid_motion_batch.pipeline.steps import OWN, Task
 from rigid_motion_batch.pipeline.store import OutputError, Store
 from rigid_motion_batch.places import CHECKOUT, manifest, output_folder
@@ -59,6 +59,9 @@ PROGRAM = program_of(SCRIPT)
 
 SAYING = ("--explain", "--json", "--open", "--quiet")
 """Options that are about what is printed, and are no part of the command that a report names."""
+
+STARTING = 120.0
+"""Seconds that a Blender has to say which it is."""
 
 RECORD = "comparison.json"
 """The file that says what a folder is the comparison of, among the files of the store: its recordings,
@@ -82,7 +85,7 @@ def main(arguments: list[str]) -> int:
         with Store(output, alone=not options.only, overwrite=options.overwrite) as store:
             plan = ComparisonPlan(comparison, store)
             if options.explain:
-                return _explain(plan, store, _share(options))
+                return _explain(plan, store, options)
             with (
                 Progress(quiet=options.quiet, program=PROGRAM) as progress,
                 _executor(options, store, progress) as executor,
@@ -157,12 +160,7 @@ def _is_same(folder: Path, sources: list[str]) -> bool:
 
 def _held(folder: Path) -> dict[str, str] | None:
     """Return the recordings that a folder holds the comparison of, and their digests; None where it holds none."""
-    if not (folder / OWN).is_dir():
-        return None
-    try:
-        return dict(json.loads((folder / OWN / RECORD).read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError):
-        return {}
+    return Store(folder).noted(RECORD) if (folder / OWN).is_dir() else None
 
 
 def _places(sources: list[str], folder: Path) -> list[str]:
@@ -193,7 +191,7 @@ def _digests(sources: list[str], store: Store) -> dict[str, str]:
     result = {}
     for source in sources:
         with suppress(TrajectoryError):
-            result[source] = store.input(split_source(source)[0]).sha256
+            (result[source],) = store.inputs(split_source(source)[0]).values()
     return result
 
 
@@ -205,7 +203,7 @@ def _blender(options: argparse.Namespace) -> str:
 
     Raises
     ------
-    Refused, ExecutorError, SubjectError
+    Refused, SubjectError
         Where one is needed that there is not, with the way out.
     """
     read = next((item for item in [*options.inputs, options.against or ""] if _suffix(item) in IN_BLENDER), None)
@@ -218,8 +216,6 @@ def _blender(options: argparse.Namespace) -> str:
     if on_screen and (missing := missing_for_rendering()):
         raise Refused(f"{way_out(missing)}\nOr go without videos: --no-video")
     if options.blender:
-        from rigid_motion_batch.pipeline.blender import version_of
-
         return version_of(options.blender)
     if options.stage and options.subject not in MODELS:
         # Only here is Blender loaded, which takes longer than all else before the work begins.
@@ -232,6 +228,18 @@ def _blender(options: argparse.Namespace) -> str:
         import bpy
 
         return ".".join(map(str, bpy.app.version))
+
+
+def version_of(blender: str) -> str:
+    """Return the version of a Blender program, "5.2.3". Raises Refused if it cannot be run or is no Blender."""
+    reason = "this does not say that it is Blender"
+    try:
+        ended = subprocess.run([blender, "--version"], capture_output=True, timeout=STARTING, check=False)
+        if said := re.search(rb"^Blender (\d+\.\d+\.\d+)", ended.stdout, re.MULTILINE):
+            return said[1].decode()
+    except (OSError, ValueError, subprocess.TimeoutExpired) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+    raise Refused(f"{blender}: {reason}; give the path of a Blender program")
 
 
 def _suffix(source: str) -> str:
@@ -263,7 +271,7 @@ class _Comparing:
     ) -> None:
         self.options, self.plan, self.store = options, plan, plan.store
         self.progress, self.notes = progress, list[str]()
-        self.work = Run(plan.store, executor, progress, _share(options), options.blender or "")
+        self.work = Run(plan.store, executor, progress, options.blender or "")
         self.page = False
         """True if there is one of this run."""
 
@@ -295,7 +303,8 @@ class _Comparing:
         self.store.note(RECORD, dict(zip(_places([*digests], self.store.output), digests.values(), strict=True)))
         # What an earlier run found is no finding of this.
         self.store.withdraw({METRICS, JOINT_METRICS, DECIMATED, KEYS_NEEDED} - self.plan.tables)
-        if self.plan.comparison.stage and Survey.of(self.plan.tasks, self.store).frames:
+        stage, tasks = self.plan.comparison.stage, self.plan.tasks
+        if stage and any(frames for _, frames in survey(tasks, self.store)[0].values()):
             # The numbers take seconds, and films minutes: nobody has to wait for the one to see the other.
             self._do("Measuring", lambda: self.plan.tasks(films=False))
             if self.work.interrupted or self.work.problem:
@@ -311,7 +320,7 @@ class _Comparing:
         return self._end()
 
     def _do(self, title: str, tasks: Plan) -> None:
-        self.work.do(tasks, title)
+        self.work.do(lambda: share_of(tasks, self.options.only or "", *self.options.part), title)
         self.page |= bool(self.plan.studies) and not self.work.interrupted
 
     def _note(self, text: str, style: str = "") -> None:
@@ -333,7 +342,7 @@ class _Comparing:
         for task in tasks:
             if not self.store.index_of(task.key):
                 self.work.failures[task.name] = "not done: its own stage said why"
-                complain(PROGRAM, f"{task.shown}: {self.work.failures[task.name]}")
+                complain(PROGRAM, f"{task.name}: {self.work.failures[task.name]}")
 
     def _require_tolerances(self) -> None:
         """Raise Refused where a tolerance is larger than the motion of every clip."""
@@ -364,12 +373,12 @@ class _Comparing:
     def _numbers(self) -> tuple[Numbers | None, Verdict | None]:
         """Return all numbers that there are, and what they come to."""
         gathering, needed = Gathering(), []
-        for name, tasks in groupby(self._measuring(), key=lambda task: task.parameters.clip.name):
+        for name, tasks in groupby(self._measuring(), key=lambda task: cast(steps.Measure, task.step).clip.name):
             choices = []
             for task in tasks:
                 folder = self.store.folder_of(task.key)
                 with suppress(OSError, ValueError, KeyError):  # What could not be made.
-                    if task.step is steps.count_keys:
+                    if isinstance(task.step, steps.CountKeys):
                         needed.append(values.read(KeysNeeded, folder / "needed"))
                     else:
                         choices.append(values.read(ChoiceNumbers, folder / "numbers"))
@@ -382,7 +391,8 @@ class _Comparing:
         return numbers, verdict(numbers, needed)
 
     def _measuring(self) -> Iterator[Task]:
-        return (task for task in self.plan.tasks(films=False) if task.step in (steps.measure, steps.count_keys))
+        numbers = steps.Measure, steps.CountKeys
+        return (task for task in self.plan.tasks(films=False) if type(task.step) in numbers)
 
     def _end(self) -> int:
         """Say what came of it, and last the path of the report; the exit code."""
@@ -423,19 +433,19 @@ class _Comparing:
         }
 
 
-def _share(options: argparse.Namespace) -> Share:
-    """Return what is to be done here."""
-    return Share(options.only or "", *options.part)
-
-
-def _explain(plan: ComparisonPlan, store: Store, share: Share) -> int:
+def _explain(plan: ComparisonPlan, store: Store, options: argparse.Namespace) -> int:
     """Print what a run would do, and why."""
-    lines = [f"{task.name}: {why}" for task, why in explain(plan.reading, store, share)]
+
+    def reasons(tasks: Plan) -> list[str]:
+        chosen = {task.name for task in share_of(tasks, options.only or "", *options.part)}
+        return [f"{task.name}: {why}" for task, why in explain(tasks, store) if task.name in chosen]
+
+    lines = reasons(plan.reading)
     if any(not store.index_of(task.key) for task in plan.reading()):
-        if share.stage != "read":
+        if options.only != "read":
             lines.append("What follows from these recordings is known when they have been read.")
-    elif share.stage != "read":
+    elif options.only != "read":
         plan.look_into()
-        lines += [f"{task.name}: {why}" for task, why in explain(plan.tasks, store, share)]
+        lines += reasons(plan.tasks)
     print(*(lines or ["nothing to do"]), sep="\n")
     return 0

@@ -9,12 +9,14 @@ from __future__ import annotations
 import argparse
 import os
 import shlex
+from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 from rigid_motion_batch.cli.compare_options import parse as parse_comparison
 from rigid_motion_batch.cli.compare_options import without
 from rigid_motion_batch.command_line import complain, parser_of, program_of, whole
-from rigid_motion_batch.pipeline.bundle import MOST_PARTS, STAGES, write_bundle
+from rigid_motion_batch.pipeline.bundle import INPUTS, MOST_PARTS, STAGES, write_bundle
 from rigid_motion_batch.places import output_folder
 
 SCRIPT = "job_bundle.py"
@@ -48,7 +50,8 @@ def main(arguments: list[str]) -> int:
     stages = [stage for stage in STAGES if options.stage or stage not in FILMING]
     parts = {stage: 1 if stage == "report" else own.parts for stage in stages}
     try:
-        values = write_bundle(own.bundle.absolute(), without(rest, "-o", "--output"), output, parts, output.name)
+        rest, inputs = below_inputs(without(rest, "-o", "--output"))
+        values = write_bundle(own.bundle.absolute(), rest, inputs, output.absolute(), parts)
     except ValueError as error:
         complain(PROGRAM, error)
         return 2
@@ -58,6 +61,35 @@ def main(arguments: list[str]) -> int:
     given = (f"-p {shlex.quote(f'{name}={value}')}" for name, value in values.items())
     print("openjd run", shlex.quote(os.fspath(own.bundle.absolute() / "template.json")), *given)
     return 0
+
+
+def below_inputs(arguments: Sequence[str]) -> tuple[list[str], Path]:
+    """Return arguments with their files, FILE, FILE:BODY or --option=FILE, as the job finds them, and where.
+
+    The program of `--blender` is none of the inputs. Raises ValueError where an argument would be taken for an
+    expression of the template, or no folder has all inputs, on Windows.
+    """
+    if braced := next((argument for argument in arguments if "{{" in argument), None):
+        raise ValueError(f"{braced!r}: a job cannot have this name, for its braces; rename it")
+    parts = [_file_in(one, before) for before, one in pairwise(["", *arguments])]
+    places = [os.path.abspath(file) for _, file, _ in parts if file]
+    inputs = Path(os.path.commonpath([Path(place).parent for place in places])) if places else Path.cwd()
+
+    def moved(file: str) -> str:
+        return f"{INPUTS}/{Path(os.path.abspath(file)).relative_to(inputs).as_posix()}" if file else ""
+
+    return [option + moved(file) + rest for option, file, rest in parts], inputs
+
+
+def _file_in(argument: str, before: str) -> tuple[str, str, str]:
+    """Return what stands before the file in an argument, the file or folder, and what is behind it; "" for none."""
+    option, equals, value = argument.partition("=") if argument.startswith("-") else ("", "", argument)
+    # A number is no file, whatever lies in the current folder.
+    if "--blender" in (option, before) or "\0" in value or value.replace(".", "").isdigit():
+        return argument, "", ""
+    ends = [len(value), *(place for place in range(len(value) - 1, 0, -1) if value[place] == ":")]
+    end = next((end for end in ends if os.path.exists(value[:end])), 0)
+    return option + equals, value[:end], value[end:]
 
 
 def _parse(arguments: list[str]) -> tuple[argparse.Namespace, list[str]]:

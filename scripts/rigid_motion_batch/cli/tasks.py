@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 
 from rigid_motion_batch.command_line import complain, parser_of, printable, program_of
@@ -30,7 +29,7 @@ def main(arguments: list[str]) -> int:
         complain(program_of(SCRIPT), f"{options.output}: no comparison was made in this folder")
         return 2
     store = Store(options.output, alone=False)
-    failures = _failures(options.output / OWN / "failures.json")
+    failures = store.noted("failures.json")
     for name, key in store.latest().items():
         index = store.index_of(key) or {}
         if not (name in failures or options.failed):
@@ -40,13 +39,6 @@ def main(arguments: list[str]) -> int:
         if options.failed and failure.get("details"):
             print(failure["details"])
     return int(bool(failures))
-
-
-def _failures(path: Path) -> dict[str, dict[str, str]]:
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
 
 
 def _parse(arguments: list[str]) -> argparse.Namespace:

@@ -15,13 +15,15 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import cast
 
-from rigid_motion_batch.command_line import complain, path_line, printable
+from rigid_motion_batch.command_line import complain, few, path_line, printable
+from rigid_motion_batch.files import append_lines, lines_of
 from rigid_motion_batch.pipeline import steps
-from rigid_motion_batch.pipeline.performing import Executor, ExecutorError, Made, loss, processors
+from rigid_motion_batch.pipeline.executors import Executor, ExecutorError, Made, ProcessExecutor, loss, processors
 from rigid_motion_batch.progress import Progress, Stage
 from rigid_motion_batch.supervising import blender_program, report, stop_signals, written_of
 
@@ -49,24 +51,42 @@ ROOMS = (
 )
 """The packages that the files that are written depend on."""
 
+NOTES = "notes"
+"""The file of what is said of an input while it is done."""
 
-@steps.step(rooms=ROOMS)
-def keyed(task: steps.Job, parameters: tuple[Work, Job]) -> dict[str, Outcome]:
+
+@dataclass(frozen=True)
+class Keyed(steps.Step, rooms=ROOMS):
     """Do one input, wherever that is."""
-    work, job = parameters
-    blender: AbstractContextManager[None] = nullcontext()
-    if work.needs_blender(job):
-        import bpy  # noqa: F401  It brings addon_utils.
 
-        blender = _extension()
-    doing = Doing(work, job, task.note)
-    try:
-        with blender:
-            work.do(doing)
-    except Stopped as stopped:
-        stopped.partly = doing.outcome
-        raise
-    return {"outcome": doing.outcome}
+    work: Work
+    body: str
+    """The body that is meant of the input."""
+
+    output: str
+    """The name of what is written."""
+
+    version: str
+    """The version of Blender, where it is needed."""
+
+    job: Job | None = None
+    """The input, which has no part in the key: the same in another place is done."""
+
+    def make(self, job: steps.Job) -> dict[str, Outcome]:
+        given = cast(Job, self.job)
+        blender: AbstractContextManager[None] = nullcontext()
+        if self.work.needs_blender(given):
+            import bpy  # noqa: F401  It brings addon_utils.
+
+            blender = _extension()
+        doing = Doing(self.work, given, partial(_keep_note, job.place))
+        try:
+            with blender:
+                self.work.do(doing)
+        except Stopped as stopped:
+            stopped.partly = doing.outcome
+            raise
+        return {"outcome": doing.outcome}
 
 
 def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = None) -> int:
@@ -116,8 +136,7 @@ def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = 
             print(path_line(path), flush=True)
     failed = [outcome.source for outcome in outcomes if outcome.failed]
     if failed and len(jobs) > NAMED:  # What was said of them is far above.
-        more = f" and {len(failed) - NAMED} more" if len(failed) > NAMED else ""
-        print(f"Failed: {printable(', '.join(failed[:NAMED]))}{more}", file=sys.stderr)
+        print(f"Failed: {printable(few(failed, NAMED))}", file=sys.stderr)
     print(_summary(outcomes, len(jobs), work, interrupted=stopped is not None), file=sys.stderr, flush=True)
     if stopped is not None:
         return 128 + stopped
@@ -192,7 +211,8 @@ class _Session:
             for path in written:
                 outcome.add_written(path)
             return
-        request = steps.Job(replace(task, parameters=(self._work, job)), self._scratch / str(place), job.folder)
+        step = replace(cast(Keyed, task.step), work=self._work, job=job)
+        request = steps.Job(replace(task, step=step), self._scratch / str(place), job.folder)
         self._at_work[place] = key
         self._show(stage)
         stop_if_asked()
@@ -201,8 +221,8 @@ class _Session:
     def _end(self, future: Future[Made], place: int, request: steps.Job) -> None:
         """Take what came of an input."""
         job, key = self._jobs[place], self._at_work.pop(place)
-        for note in request.notes():
-            self._note(note)
+        for line in lines_of(request.place / NOTES):  # Also of one that was killed.
+            self._note(str(line.get("note")))
         outcome = Outcome(job.source, failed=True)
         try:
             outcome = future.result()["facts"]["outcome"]
@@ -226,17 +246,21 @@ def _task(work: Work, job: Job) -> steps.Task:
         blender = bpy.app.version_string
     options = replace(work, overwrite=False, dry_run=False, processes=1)
     body = job.source.removeprefix(os.fspath(job.file))
-    return steps.Task(keyed, (options, body, job.output.name, blender), job.title, inputs=_inputs(job))
+    return steps.Task(Keyed(options, body, job.output.name, blender), job.title, inputs=_inputs(job))
+
+
+def _keep_note(place: Path, text: str) -> None:
+    append_lines(place / NOTES, [{"note": text}])
 
 
 def _record_of(work: Work, job: Job) -> Record:
     return Record(job.folder, job.source, overwrite=work.overwrite)
 
 
-def _inputs(job: Job) -> tuple[steps.Input, ...]:
+def _inputs(job: Job) -> dict[str, str]:
     """Return the file of an input as it is now; none where that is no file, or is to be replaced."""
     digest = "" if job.in_place else steps.sha256_in(job.file)
-    return (steps.Input(os.fspath(job.file), digest),) if digest else ()
+    return {os.fspath(job.file): digest} if digest else {}
 
 
 def _executor(workers: int | None, count: int) -> Executor:
@@ -246,12 +270,11 @@ def _executor(workers: int | None, count: int) -> Executor:
     try:
         if blender_program():
             raise ImportError("Blender itself starts no workers")
-        from rigid_motion_batch.pipeline.executors import ProcessExecutor
+        return ProcessExecutor(min(workers or processors(), count))
     except ImportError as error:
         if workers is None:
             return Executor()
         raise ExecutorError(f"--jobs {workers}: {error}; leave it out, and inputs are done one by one") from None
-    return ProcessExecutor(min(workers or processors(), count))
 
 
 def _summary(outcomes: Sequence[Outcome], count: int, work: Work, *, interrupted: bool) -> str:

@@ -33,7 +33,7 @@ from rigid_motion_batch.scenes.timeline import Timeline
 from . import comparison_steps as steps
 from . import values
 from .comparison_steps import ClipOf, Page, Part
-from .steps import Input, Step, Task
+from .steps import Task
 from .store import OutputError, Store
 
 METRICS, JOINT_METRICS, DECIMATED, KEYS_NEEDED = "metrics.csv", "metrics_joints.csv", "decimated.csv", "keys_needed.csv"
@@ -169,16 +169,16 @@ class ComparisonPlan:
 
     def _reader(self, source: str) -> Task:
         comparison = self.comparison
-        inputs: tuple[Input, ...] = ()
-        step, called = steps.read, ""
+        inputs: dict[str, str] = {}
+        kind, called = steps.Read, ""
         with suppress(TrajectoryError):  # Whoever reads it will say that there is no such file.
             paths = [split_source(item)[0] for item in (source, comparison.against) if item]
             called = name_of_other(paths[-1].stem) if comparison.against else ""
-            inputs = tuple(map(self.store.input, paths))
-            step = steps.read_in_blender if any(path.suffix.lower() in IN_BLENDER for path in paths) else step
-        blender = comparison.blender if step is steps.read_in_blender else ""
-        parameters = steps.Read(source, comparison.axes, comparison.reading, blender, comparison.against, called)
-        return Task(step, parameters, f"read {source}", inputs=inputs, title=source, weight=0.3)
+            inputs = self.store.inputs(*paths)
+            kind = steps.ReadInBlender if any(path.suffix.lower() in IN_BLENDER for path in paths) else kind
+        blender = comparison.blender if kind.blender else ""
+        step = kind(source, comparison.axes, comparison.reading, blender, comparison.against, called)
+        return Task(step, f"read {source}", inputs=inputs, seconds=0.3)
 
     def look_into(self) -> list[str]:
         """See what clips there are in the recordings that were read, and return what the user should know of them.
@@ -284,9 +284,8 @@ class ComparisonPlan:
                 yield (task := self._model(study, choice, keys[Part("measure", study.clip, choice.name)]))
                 keys[Part("model", study.clip, choice.name)] = task.key
         for table, after in tables.items():
-            parameters = steps.Join(steps.JOINT_ROWS if table == JOINT_METRICS else steps.ROWS)
-            publish, weight = {"table.csv": table}, 0.002 * len(after)
-            yield Task(steps.tabulate, parameters, table, tuple(after), publish=publish, weight=weight)
+            step = steps.Tabulate(steps.JOINT_ROWS if table == JOINT_METRICS else steps.ROWS)
+            yield Task(step, table, tuple(after), publish={"table.csv": table}, seconds=0.002 * len(after))
         filmed: dict[Part, str] = {}
         for study in self.studies:
             for choice in self.filmed(study):
@@ -326,35 +325,30 @@ class ComparisonPlan:
         joints, size = study.facts.joints, study.facts.samples * max(study.facts.joints, 1)
         modes = single_modes(comparison.modes) if joints else comparison.modes
         for choice in study.choices:
-            folder, title = f"{name}/{choice.name}", f"{name} {choice.phrase}"
+            folder = f"{name}/{choice.name}"
             names = table_names(choice, modes, comparison.form, study.facts.against)
             publish = {table: f"{folder}/{table}" for table in (body_table_names(choice, modes) if joints else names)}
-            parameters = steps.Measure(clip, choice, tuple(modes), comparison.radii, comparison.shared, comparison.form)
-            weight = 0.02 + 6e-6 * size * len(modes) * (1.0 if choice.decimation == "uniform" else 45.0)
-            about: dict[str, Any] = {"title": title, "weight": weight, "group": name}
-            measuring = Task(steps.measure, parameters, f"measure {folder}", after, publish=publish, **about)
+            how = clip, choice, tuple(modes), comparison.radii, comparison.shared, comparison.form
+            seconds = 0.02 + 6e-6 * size * len(modes) * (1.0 if choice.decimation == "uniform" else 45.0)
+            measuring = Task(steps.Measure(*how), f"measure {folder}", after, publish=publish, seconds=seconds)
             yield Part("measure", clip, choice.name), measuring
             if choice in study.decimated:
-                about = {"title": f"{title}, Decimate", "weight": 0.5 + 8e-3 * size, "group": name}
-                decimating = Task(steps.decimate, parameters, f"decimate {folder}", (*after, measuring.key), **about)
+                keys, seconds = (*after, measuring.key), 0.5 + 8e-3 * size
+                decimating = Task(steps.Decimate(*how), f"decimate {folder}", keys, seconds=seconds)
                 yield Part("decimate", clip, choice.name), decimating
         if comparison.count_keys:
             fit = comparison.fit and not joints
-            counting = steps.CountKeys(clip, comparison.modes, comparison.radii, fit)
-            about = {"title": f"{name}, keys needed", "weight": size * (0.03 if fit else 0.008), "group": name}
-            yield Part("count_keys", clip), Task(steps.count_keys, counting, f"count keys {name}", after, **about)
+            step, seconds = steps.CountKeys(clip, comparison.modes, comparison.radii, fit), 0.03 if fit else 0.008
+            yield Part("count_keys", clip), Task(step, f"count keys {name}", after, seconds=seconds * size)
 
     def _model(self, study: Study, choice: Choice, measured: str) -> Task:
         comparison, folder = self.comparison, f"{study.name}/{choice.name}"
         return Task(
-            steps.model,
             steps.Model(study.clip, comparison.radii, comparison.shared),
             f"model {folder}",
             after=(study.reader, measured),
             publish={steps.GLB: f"{folder}/{steps.GLB}"},
-            title=f"{study.name} {choice.phrase}, {steps.GLB}",
-            weight=0.1 + 5e-4 * study.facts.samples * max(study.facts.joints, 1),
-            group=study.name,
+            seconds=0.1 + 5e-4 * study.facts.samples * max(study.facts.joints, 1),
         )
 
     def _film(self, study: Study, choice: Choice, measured: str) -> Iterator[Task]:
@@ -362,46 +356,37 @@ class ComparisonPlan:
         comparison, stage = self.comparison, cast(SceneSettings, self.comparison.stage)
         seconds = 0.03 + 4e-7 * stage.resolution[0] * stage.resolution[1]
         folder, title = f"{study.name}/{choice.name}", f"{study.name} {choice.phrase}"
-        how = comparison.radii, comparison.shared, stage, comparison.blender
         building = Task(
-            steps.build,
-            steps.Build(study.clip, *how),
+            steps.Build(study.clip, comparison.radii, comparison.shared, stage, comparison.blender),
             f"build {folder}",
             after=(study.reader, measured),
-            inputs=() if study.facts.joints else self._subject_file(),
+            inputs={} if study.facts.joints else self._subject_file(),
             publish={steps.BLEND: f"{folder}/{steps.BLEND}"},
-            title=title,
-            group=folder,
         )
         yield building
         count = Timeline.between(*study.choices[choice], stage.fps, stage.slow_motion).count
         pieces = math.ceil(count / PIECE)
         firsts = [1 + count * number // pieces for number in range(pieces + 1)]
         rendering: list[Task] = []
-        about: dict[str, Any] = {"title": title, "group": study.name}
         for first, following in itertools.pairwise(firsts):
-            frames, name = following - first, f"{folder} from {first}"
-            part = steps.Frames(title, first, following - 1)
-            about |= {"weight": seconds * frames, "frames": frames}
-            rendering.append(Task(steps.render, part, f"render {name}", (building.key,), **about))
+            frames, step = following - first, steps.Render(title, first, following - 1)
+            about: dict[str, Any] = {"seconds": seconds * frames, "frames": frames}
+            rendering.append(Task(step, f"render {folder} from {first}", (building.key,), **about))
         keys = tuple(task.key for task in rendering)
         encoding = Task(
-            steps.encode,
-            steps.Frames(title, 1, count),
+            steps.Encode(title, 1, count),
             f"encode {folder}",
             after=(building.key, *keys),
             spends=keys,
             publish={steps.FILM: f"{folder}/{steps.FILM}"},
-            title=title,
-            weight=seconds * count * 0.06,
-            group=folder,
+            seconds=seconds * count * 0.06,
         )
         if not self.store.index_of(encoding.key):
             yield from rendering
         yield encoding
 
-    def _subject_file(self) -> tuple[Input]:
-        return (self.store.input(place_of_subject(self.comparison.subject)[0]),)
+    def _subject_file(self) -> dict[str, str]:
+        return self.store.inputs(place_of_subject(self.comparison.subject)[0])
 
     # -- pages --------------------------------------------------------------------------------------------------------
 
@@ -409,12 +394,11 @@ class ComparisonPlan:
         """Yield the page of a few clips, or a page for each of many and one that leads to them."""
         comparison, subject = self.comparison, self.comparison.subject
         if comparison.blender and self._shows_object:
-            parameters = steps.Subject(subject, comparison.blender)
-            task = Task(steps.subject, parameters, f"object {subject}", inputs=self._subject_file(), title=subject)
-            yield task
+            step = steps.Subject(subject, comparison.blender)
+            yield (task := Task(step, f"object {subject}", inputs=self._subject_file()))
             keys |= {Part("subject"): task.key}
         if len(self.studies) <= ON_ONE_PAGE:
-            yield self._page(steps.page, keys | filmed, coming=not films)
+            yield self._page(Page, keys | filmed, coming=not films)
             return
         of_clips: dict[ClipOf, dict[Part, str]] = {}
         for part, key in (keys | filmed).items():
@@ -423,21 +407,19 @@ class ComparisonPlan:
         for clip, own in of_clips.items():
             films_of = {part: own.pop(part) for part in [*own] if part in filmed}
             page = {"overview": f"../{steps.PAGE}", "folder": clip.name}
-            yield (task := self._page(steps.page, own | shared | films_of, coming=not films, **page))
+            yield (task := self._page(Page, own | shared | films_of, coming=not films, **page))
             pages.append(task.key)
-        yield self._page(steps.overview, keys, pages)
+        yield self._page(steps.Overview, keys, pages)
 
-    def _page(self, step: Step, parts: dict[Part, str], pages: Iterable[str] = (), **how: Any) -> Task:
-        parameters = Page(tuple(parts), cast(Settings, self.comparison.about), **how)
-        folder, place = parameters.folder, f"{parameters.folder}/" if parameters.folder else ""
+    def _page(self, kind: type[Page], parts: dict[Part, str], pages: Iterable[str] = (), **how: Any) -> Task:
+        step = kind(tuple(parts), cast(Settings, self.comparison.about), **how)
+        place = f"{step.folder}/" if step.folder else ""
         return Task(
             step,
-            parameters,
-            f"page {folder}" if folder else steps.PAGE,
+            f"page {step.folder}" if step.folder else steps.PAGE,
             after=(*filter(None, parts.values()), *pages),
             publish={name: place + name for name in (steps.PAGE, steps.PAGE_DATA)},
-            title=f"{place}{steps.PAGE}",
-            weight=0.02 * len(parameters.clips),
+            seconds=0.02 * len(step.clips),
         )
 
 

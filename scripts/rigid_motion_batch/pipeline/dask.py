@@ -1,8 +1,7 @@
 """Many machines: the workers of a Dask scheduler do jobs, each in processes of its own, as they are done here.
 
 The output folder is on a disk that all share. Every worker is asked first whether it has this version of the program,
-and sees the folder. Those that fit get a resource of Dask's, which jobs need: so Dask sends them there alone, and those
-of a worker that dies to another.
+and sees the folder. A job is for one worker that fits, and is lost with it: the run begins it anew at another.
 """
 
 from __future__ import annotations
@@ -12,19 +11,18 @@ import logging
 import multiprocessing
 import os
 import time
-import uuid
-from collections.abc import Awaitable, Callable
-from concurrent.futures import CancelledError, Future, wait
+from collections.abc import Callable
+from concurrent.futures import CancelledError, Future, InvalidStateError, wait
 from contextlib import suppress
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, Self, cast
 
 from distributed import Client, Security, get_worker
+from distributed.cfexecutor import ClientExecutor
 from distributed.comm import connect
 
-from .executors import ProcessExecutor
-from .performing import Executor, ExecutorError, Made
+from .executors import Executor, ExecutorError, Made, ProcessExecutor
 from .steps import Job, version_here
 
 CONNECTING = 5.0
@@ -62,48 +60,64 @@ class DaskExecutor(Executor):
     """The workers of the Dask scheduler at an address, tcp://HOST:8786, or tls:// with certificates in Dask's settings.
 
     All of them must see the output folder; `note` takes lines for the user about them. Raises ExecutorError on
-    entering, where no scheduler answers, or all its workers are unfit, and later, where it is gone.
+    entering, where no scheduler answers, and later, where it is gone, or all its workers are unfit.
     """
 
     def __init__(self, address: str, folder: Path, note: Callable[[str], object]) -> None:
-        self._address, self._folder, self._note = address, folder, note
-        self._resource = f"rigid-motion-{uuid.uuid4().hex[:8]}"
-        self._fit: dict[str, bool] = {}
-        """The workers that were asked, by their addresses."""
-        self._capacity, self._looked_at = 0, 0.0
+        self._address, self._folder, self._note = address, os.fspath(folder), note
+        self._executors: dict[str, ClientExecutor] = {}
+        """Address of a worker to what gives jobs to it alone."""
+        self._fit: dict[str, int] = {}
+        """Address of a worker that has answered to how many threads it has; 0 where it does not fit."""
+        self._jobs: dict[str, list[Future[Made]]] = {}
+        """Address of a worker to what it is doing: where it is gone, this is seen to be lost."""
+        self._looked_at = 0.0
         self._client: Client
 
     @property
     def capacity(self) -> int:  # type: ignore[override]  # it is only read
         """The threads of all workers that fit. Raises ExecutorError where there are workers, and none of them fits."""
         if time.monotonic() - self._looked_at > LOOK:
-            self._capacity, self._looked_at = self._look(), time.monotonic()
-        return self._capacity
+            self._look()
+            self._looked_at = time.monotonic()
+        return sum(self._fit.get(address, 0) for address in self._executors)
 
     def submit(self, job: Job) -> Future[Made]:
-        return self._client.get_executor(pure=False, resources={self._resource: 1}).submit(do, job)
+        self._jobs = {address: [job for job in jobs if not job.done()] for address, jobs in self._jobs.items()}
+        address = max(self._executors, key=lambda address: self._fit.get(address, 0) - len(self._jobs[address]))
+        future: Future[Made] = Future()
+        self._jobs[address].append(future)
+        self._executors[address].submit(do, job).add_done_callback(partial(_hand_over, future))
+        return future
 
-    def _look(self) -> int:
-        """See which workers there are, ask those that are new, and return how many threads fit."""
-        threads, before = self._threads(), bool(self._fit)
-        for address in self._fit.keys() - threads.keys():
-            if self._fit.pop(address):
-                self._note(f"worker {address} is gone; others go on with its tasks")
-        if strangers := [*threads.keys() - self._fit.keys()]:
-            answers: dict[str, str | BaseException] = {}
+    def _look(self) -> None:
+        """See which workers there are, and ask those that are new."""
+        threads, before = self._threads(), bool(self._executors)
+        for address in self._executors.keys() - threads.keys():
             with suppress(*UNREACHABLE):
-                ask = _asker(version_here(), os.fspath(self._folder), self._resource)
-                answers = self._client.run(ask, workers=strangers, on_error="return")
-            for address, said in answers.items():
-                if isinstance(said, str):  # Otherwise it is seen again at the next look, or gone.
-                    self._fit[address] = not said
-                    if said:
-                        self._note(f"worker {address}: {said}; it is left out")
-        if self._fit and not any(self._fit.values()):
+                self._executors.pop(address).shutdown(wait=False)
+            for future in self._jobs.pop(address):  # Dask does not always say that they are cancelled.
+                with suppress(InvalidStateError):
+                    future.set_exception(CancelledError())
+            if self._fit.pop(address, 0):
+                self._note(f"worker {address} is gone; others go on with its tasks")
+        for address in threads.keys() - self._executors.keys():
+            executor = self._executors[address] = self._client.get_executor(pure=False, workers=[address])
+            self._jobs[address] = []
+            answer = executor.submit(_asker(version_here(), self._folder))
+            answer.add_done_callback(partial(self._hear, address, threads[address]))
+        if self._fit and self._fit.keys() == threads.keys() and not any(self._fit.values()):
             raise ExecutorError(f"{self._address}: none of its workers is fit")
         if not threads and (before or not self._looked_at):
             self._note(f"{self._address} has no worker; waiting for one: `dask worker {self._address}`")
-        return sum(threads[address] for address, fits in self._fit.items() if fits)
+
+    def _hear(self, address: str, threads: int, answer: Future[str]) -> None:
+        """Take the answer of a worker."""
+        if not answer.cancelled():  # Otherwise it is gone.
+            said = str(answer.exception() or answer.result())
+            self._fit[address] = 0 if said else threads
+            if said:
+                self._note(f"worker {address}: {said}; it is left out")
 
     def _threads(self) -> dict[str, int]:
         """Return the workers that the scheduler knows, and how many threads each has."""
@@ -114,29 +128,33 @@ class DaskExecutor(Executor):
         raise ExecutorError(f"{self._address}: the Dask scheduler is gone")
 
     def __enter__(self) -> Self:
-        for name in ("distributed", "distributed.client"):
+        for name in ("distributed", "distributed.client", "tornado.application"):
             # What there is to say of the connection is said here, in one line.
             logging.getLogger(name).setLevel(logging.CRITICAL)
         try:
             # A client that finds nobody goes on trying for long, even when it has said so.
             asyncio.run(_knock(self._address))
             self._client = Client(self._address, timeout=CONNECTING, set_as_default=False, name="rigid-motion")
-        except (ValueError, ImportError, TypeError) as error:  # The last one where tls:// finds no certificates.
-            way_out = "give an address such as tcp://farm:8786, and certificates of tls:// in Dask's configuration"
-            raise ExecutorError(f"{self._address}: {error}; {way_out}") from None
-        except OSError:
-            way_out = "start one with `dask scheduler`, or give the address that it prints"
-            raise ExecutorError(f"{self._address}: no Dask scheduler answers there; {way_out}") from None
-        try:
-            self._look()
-        except ExecutorError:
-            self.__exit__()
-            raise
+        except (OSError, ValueError, ImportError, TypeError) as error:  # The last one where tls:// has no certificates.
+            raise ExecutorError(
+                f"{self._address}: no Dask scheduler answers there ({error}); start one with `dask scheduler`, and "
+                "give the address that it prints, such as tcp://farm:8786; tls:// needs certificates in Dask's settings"
+            ) from None
         return self
 
     def __exit__(self, *_: object) -> None:
         with suppress(*UNREACHABLE):
             self._client.close(timeout=2.0)  # Then nobody wants what is at work, and it is cancelled.
+
+
+def _hand_over(future: Future[Made], theirs: Future[Made]) -> None:
+    """Give a future what came of one of Dask's."""
+    error = CancelledError() if theirs.cancelled() else theirs.exception()
+    with suppress(InvalidStateError):  # Its worker was taken for gone.
+        if error:
+            future.set_exception(error)
+        else:
+            future.set_result(theirs.result())
 
 
 async def _knock(address: str) -> None:
@@ -146,22 +164,19 @@ async def _knock(address: str) -> None:
     comm.abort()
 
 
-def _asker(requested: str, folder: str, resource: str) -> Callable[[Any], Awaitable[str]]:
-    """Return a function that answers why a worker does not fit, or gives it the resource.
+def _asker(requested: str, folder: str) -> Callable[[], str]:
+    """Return a function that answers why a worker does not fit. It is sent whole: one may not have the program."""
 
-    It is sent whole: one may not have the program.
-    """
-
-    async def ask(dask_worker: Any) -> str:
+    def ask() -> str:
         if not os.path.isdir(folder):
             return f"it does not see {folder}; choose one on a disk that all share"
         try:
             from rigid_motion_batch.pipeline.steps import version_here
         except ImportError as error:
             return str(error)
-        if (result := version_here()) != requested:
-            return f"it has {result}, and this run is of {requested}; start it anew with that"
-        await dask_worker.set_resources(**{resource: dask_worker.state.nthreads})
-        return ""
+        result = version_here()
+        return (
+            "" if result == requested else f"it has {result}, and this run is of {requested}; start it anew with that"
+        )
 
     return ask

@@ -1,42 +1,95 @@
-"""Worker processes of `pebble` that do jobs on this machine: whatever kills one costs its task alone.
+"""Executors of jobs: at once in this process, or in worker processes, where whatever kills one costs its job alone.
 
-In a worker tasks run in the main thread, as Blender wants it.
+Of a job comes a folder with files, or a `TaskError`. Nothing here touches a store, so it does not matter where it
+happens or how it ends: here, in a worker, or in a Blender of the user's, a program for each job, which has the standard
+library, NumPy and bpy. Jobs and what comes of them are pickled.
 """
 
 from __future__ import annotations
 
+import errno
 import multiprocessing
 import os
+import pickle
+import shutil
 import signal
+import subprocess
 import sys
-from concurrent.futures import Future
-from contextlib import suppress
+import threading
+import time
+import traceback
+import uuid
+from concurrent.futures import CancelledError, Future
+from contextlib import AbstractContextManager, suppress
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any, cast
 
-from pebble import CONSTS, ProcessPool
+from rigid_motion_batch.places import EXTENSION, PACKAGE
+from rigid_motion_batch.supervising import death, end_with_parent, held_back, join_session, session
 
-from rigid_motion_batch.supervising import end_with_parent, held_back, join_session, session
+from .steps import Job, TaskError, sha256_in, sha256_of
 
-from .performing import Executor, Made, perform
-from .steps import Job
+Made = dict[str, Any]
+"""The `folder` that a job has made, its `files` with size, time of change and digest, the `seconds` that it took, and
+`facts` that its step has returned."""
 
-CONSTS.term_timeout = 0.05
-"""Seconds that a worker has to end by itself before it is killed: Blender at work does not listen."""
+FULL_OR_FORBIDDEN = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM})
+"""Errors at writing that the next task will have as well."""
+
+JOB, ANSWER = "job", "answer"
+"""The files by which a Blender gets its job, and says what came of it."""
+
+PROGRAM = """import sys
+place, *path = sys.argv[sys.argv.index("--") + 1 :]
+sys.path[:0] = path
+from rigid_motion_batch.pipeline.executors import perform_in_blender
+perform_in_blender(place)"""
+
+
+class ExecutorError(Exception):
+    """Error that says why nothing can be done by these means, and the way out, in one line."""
+
+
+class Executor(AbstractContextManager["Executor"]):
+    """Executor of jobs: this class at once, in this process. A context; may be used again after `stop`."""
+
+    capacity = 1
+    """Number of jobs that it takes at a time."""
+
+    def submit(self, job: Job) -> Future[Made]:
+        """Begin a job. Its future raises TaskError where it failed, and others where who did it is gone: see `loss`."""
+        future: Future[Made] = Future()
+        try:
+            future.set_result(perform(job))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+    def stop(self) -> None:
+        """End what is at work, within a second."""
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
 
 
 class ProcessExecutor(Executor):
-    """Does jobs in processes, each with a pool for itself, which are started when there is work for them.
+    """Does so many jobs at a time, in processes that are started when there is work for them.
 
-    Parameters
-    ----------
-    jobs : int
-        How many there are at most.
+    In a process jobs run in the main thread, as Blender wants it. Each has a pool of `pebble` for itself: a larger one
+    may lose the job of a process that is killed as it takes it. Raises ImportError without `pebble`.
     """
 
     def __init__(self, jobs: int) -> None:
+        import pebble
+
+        pebble.CONSTS.term_timeout = 0.05  # Blender at work does not listen: it is killed.
         self.capacity = max(1, jobs)
-        self._pools: list[ProcessPool] = []
-        self._idle: list[ProcessPool] = []
+        spawn = multiprocessing.get_context("spawn")
+        self._new_pool = partial(pebble.ProcessPool, 1, initializer=_begin, initargs=(session(),), context=spawn)
+        self._pools: list[Any] = []
+        self._idle: list[Any] = []
 
     def submit(self, job: Job) -> Future[Made]:
         with held_back({signal.SIGINT}):  # Ctrl-C reaches this process alone, which decides what comes of it.
@@ -46,21 +99,93 @@ class ProcessExecutor(Executor):
         return future
 
     def stop(self) -> None:
-        pools, self._pools, self._idle = self._pools, [], []
-        for pool in pools:
-            pool.stop()  # type: ignore[no-untyped-call]  # Pebble has no types there
-        for pool in pools:
+        for pool in self._pools:
+            pool.stop()
+        for pool in self._pools:
             with suppress(RuntimeError):
                 pool.join()
 
-    def _pool(self) -> ProcessPool:
+    def _pool(self) -> Any:
         while self._idle:
-            pool = self._idle.pop()
-            if pool.active:  # And not killed while it had nothing to do.
+            if (pool := self._idle.pop()).active:  # And not killed while it had nothing to do.
                 return pool
-        spawn = multiprocessing.get_context("spawn")
-        self._pools.append(ProcessPool(1, initializer=_begin, initargs=(session(),), context=spawn))
+        self._pools.append(self._new_pool())
         return self._pools[-1]
+
+
+def processors() -> int:
+    """Return how many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def loss(error: BaseException, job: Job) -> str:
+    """Return how it came that a job has no result, and no error of its own: it may be tried again."""
+    if isinstance(error, CancelledError):
+        return "its worker is gone"
+    code = getattr(error, "exitcode", None) or getattr(error, "returncode", None)
+    how = f"died ({death(code)})" if code else f"failed: {type(error).__name__}: {error}"
+    log = job.place / "log"
+    printed = log.read_text(encoding="utf-8", errors="replace").split("\n") if log.exists() else []
+    last_words = [line.strip()[:200] for line in printed if line.strip()][-1:]
+    return ": ".join([f"its process {how}", *last_words])
+
+
+def perform(job: Job) -> Made:
+    """Do a job. Raises TaskError, and CalledProcessError where a Blender died."""
+    # Another who does it at the same time, and was taken for dead, is not in the way.
+    job.folder = job.place / uuid.uuid4().hex[:8]
+    if job.blender and job.task.step.blender:
+        return _made_by_blender(job)
+    try:
+        return _make(job)
+    except Exception as error:
+        problem = _problem(error, job)
+        with suppress(OSError):  # Blender says little where a disk is full.
+            if not problem.fatal and shutil.disk_usage(job.output).free < 1 << 20:
+                problem.args, problem.fatal = (f"{os.strerror(errno.ENOSPC)} ({problem})",), True
+        raise problem from None
+
+
+def _make(job: Job) -> Made:
+    """Have the files of a job written."""
+    started, task = time.perf_counter(), job.task
+    for path in task.inputs:
+        if os.path.exists(path) and not os.path.isfile(path):
+            raise TaskError(f"{path}: this is no file, but a folder, pipe or device; give a file")
+    job.folder.mkdir(parents=True)
+    facts = task.step.make(job)
+    for path, digest in task.inputs.items():
+        if sha256_in(path) != digest:
+            raise TaskError(f"{path}: this file changed while it was read; run the same command again")
+    files = {}
+    for made in sorted(job.folder.rglob("*")):
+        if made.is_file() and not made.is_symlink():
+            status = made.stat()
+            files[made.relative_to(job.folder).as_posix()] = status.st_size, status.st_mtime_ns, sha256_of(made)
+    for name, place in task.publish.items():
+        if not name.endswith("/") and name not in files:
+            raise TaskError(f"{job.output / place}: this was to be made, and was not")
+    return {"folder": job.folder, "files": files, "seconds": time.perf_counter() - started, "facts": facts or {}}
+
+
+def _problem(error: Exception, job: Job) -> TaskError:
+    """Return an error as one of the task, with its place in the program where nobody foresaw it."""
+    if isinstance(error, TaskError):
+        return error
+    problem = TaskError(f"{type(error).__name__}: {error}")
+    if isinstance(error, OSError):
+        path = str(error.filename or "")
+        # The user knows where files will be, and not the folder of a task at work.
+        known = job.task.publish.get(path.removeprefix(f"{job.folder}{os.sep}").replace(os.sep, "/"))
+        shown = os.fspath(job.output / known) if known else path.replace(str(job.folder), str(job.output))
+        problem = TaskError(": ".join(filter(None, (shown, error.strerror or str(error)))))
+        is_own = path.startswith(str(job.output)) or error.errno == errno.ENOSPC
+        problem.fatal = error.errno in FULL_OR_FORBIDDEN and is_own
+    problem.details = traceback.format_exc()
+    return problem
+
+
+# -- in a process of its own ------------------------------------------------------------------------------------------
 
 
 def _begin(command: str) -> None:
@@ -89,3 +214,41 @@ def _print_to(path: str | Path) -> None:
     for stream in (1, 2):
         os.dup2(opened, stream)
     os.close(opened)
+
+
+# -- in a Blender of the user's ---------------------------------------------------------------------------------------
+
+
+def _made_by_blender(job: Job) -> Made:
+    """Have a job done by a Blender of its own."""
+    job.place.mkdir(parents=True, exist_ok=True)
+    (job.place / JOB).write_bytes(pickle.dumps(replace(job, blender="")))
+    module = sys.modules[type(job.task.step).__module__]  # It may be outside this package.
+    root = Path(cast(str, module.__file__)).resolve().parents[module.__name__.count(".")]
+    command = [job.blender, "--background", "--factory-startup", "--python-exit-code", "1", "--python-expr", PROGRAM]
+    command += ["--", *map(os.fspath, (job.place.absolute(), PACKAGE.parent, EXTENSION.parent, root))]
+    with (
+        (job.place / "log").open("ab") as log,
+        subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,  # Whose end tells it that nobody waits any more.
+            stdout=log,
+            stderr=log,
+            preexec_fn=end_with_parent if sys.platform == "linux" else None,
+        ) as process,
+    ):
+        if code := process.wait():
+            raise subprocess.CalledProcessError(code, command)
+    answer = pickle.loads((job.place / ANSWER).read_bytes())
+    if isinstance(answer, Exception):
+        raise answer
+    return cast(Made, answer)
+
+
+def perform_in_blender(place: str) -> None:
+    """Do the job that lies in a folder, in a Blender that was started for it."""
+    threading.Thread(target=lambda: (sys.stdin.buffer.read(), os._exit(1)), daemon=True).start()
+    done = Executor().submit(pickle.loads(Path(place, JOB).read_bytes()))
+    Path(place, ANSWER).write_bytes(pickle.dumps(done.exception() or done.result()))
+    # Not sys.exit: Blender can wait for long while it is taken down.
+    os._exit(0)

@@ -1,4 +1,4 @@
-"""Running plans: what is missing is given to an executor, in order, kept, and published.
+"""Running plans: what is missing is given to an executor, in order, kept, and published; or only why it would be.
 
 A plan is a function that returns its tasks one by one, each after those that it reads from. So of ten thousand clips
 only those are in memory that are at work. Where a task fails those that need it are skipped, and all others are done.
@@ -7,25 +7,29 @@ What ends a run is Ctrl-C, and a disk that is full or must not be written. Nothi
 
 from __future__ import annotations
 
-import io
+import itertools
+import json
 import shutil
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import suppress
 from dataclasses import dataclass, field
+from typing import Any
 
+from rigid_motion_batch.command_line import few
 from rigid_motion_batch.progress import Progress
 
-from .performing import FULL_OR_FORBIDDEN, Executor, ExecutorError, Made, loss
+from .executors import FULL_OR_FORBIDDEN, Executor, ExecutorError, Made, loss
 from .steps import Job, Task, TaskError
 from .store import OutputError, Store
+from .values import plain
 
 Plan = Callable[[], Iterable[Task]]
 
-RETRIES = 2
-"""Number of times that a task is begun anew whose process died."""
+ATTEMPTS = 3
+"""Number of times that a task is begun whose process dies."""
 
 LOOK = 0.2
 """Seconds between two looks at how far tasks are."""
@@ -36,118 +40,78 @@ STATES = (DONE, UP_TO_DATE, FAILED, SKIPPED, STOPPED)
 """States of a task, for people. It is skipped where a task before it failed."""
 
 
-@dataclass(frozen=True)
-class Share:
-    """A part of a plan, for one of several workers: tasks of a stage, and of their groups every `of`-th."""
-
-    stage: str = ""
-    """Empty for all."""
-
-    number: int = 1
-    of: int = 1
-
-    def tasks(self, plan: Plan) -> Iterator[Task]:
-        """Yield the tasks of a plan that are in the share."""
-        groups: dict[str, int] = {}
-        for task in plan():
-            if self.stage in ("", task.step.stage):
-                group = groups.setdefault(task.group or task.name, len(groups)) if self.of > 1 else 0
-                if group % self.of == self.number - 1:
-                    yield task
+def share_of(plan: Plan, stage: str = "", number: int = 1, of: int = 1) -> Iterator[Task]:
+    """Yield the tasks of a stage, or of all, that are one of several equal shares; a task goes with what it reads."""
+    shares: dict[str, int] = {}
+    turn = itertools.cycle(range(of))
+    for task in plan():
+        if stage in ("", task.step.stage):
+            before = [shares[key] for key in task.after if key in shares]
+            shares[task.key] = before[0] if before else next(turn)
+            if shares[task.key] == number - 1:
+                yield task
 
 
-EVERYTHING = Share()
+def survey(plan: Plan, store: Store) -> tuple[dict[str, tuple[float, int]], int]:
+    """Return the tasks of a plan that are to be done, by name, with their seconds and frames, and how many are done.
 
-
-@dataclass
-class Survey:
-    """Tasks, and what they come to."""
-
-    tasks: int = 0
-    up_to_date: int = 0
-    weight: float = 0.0
-    frames: int = 0
-
-    def add(self, task: Task) -> None:
-        self.tasks += 1
-        self.weight += task.weight
-        self.frames += task.frames
-
-    @classmethod
-    def of(cls, plan: Plan, store: Store, share: Share = EVERYTHING) -> Survey:
-        """Look through a plan for what there is to do.
-
-        Raises
-        ------
-        OutputError
-            Where something would be replaced that must not be, or two tasks publish one file.
-        """
-        survey, strangers = cls(), []
-        places: set[int] = set()
-        for task in share.tasks(plan):
-            for path in task.publish.values():
-                if (place := hash(path.casefold())) in places:
-                    raise OutputError(f"{path}: two results would go here; choose other names")
-                places.add(place)
-            if store.is_done(task):
-                survey.up_to_date += 1
-            else:
-                strangers += store.strangers(task, store.index_of(task.key))
-                survey.add(task)
-        store.require_none(strangers)
-        return survey
+    Raises OutputError where something would be replaced that must not be, or two tasks publish one file.
+    """
+    costs: dict[str, tuple[float, int]] = {}
+    foreign: list[str] = []
+    places, done = set[int](), 0
+    for task in plan():
+        for path in task.publish.values():
+            if (place := hash(path.casefold())) in places:
+                raise OutputError(f"{path}: two results would go here; choose other names")
+            places.add(place)
+        index = store.index_of(task.key)
+        unpublished = store.unpublished(task, index)
+        if index and not unpublished:
+            done += 1
+        else:
+            costs[task.name] = task.seconds, task.frames
+            foreign += [path for _, path in unpublished if not store.is_own(path)]
+    store.refuse(foreign)
+    return costs, done
 
 
 @dataclass(eq=False)
 class Run:
-    """A run in an opened store, by an opened executor: of one plan, or of several of the same work."""
+    """A run in an opened store, by an opened executor: of one plan, or of several of the same work.
+
+    `progress` gets a stage for each plan, and what is said of tasks; `blender` is the program for steps that need it,
+    if it is not to be this one. `counts` says how many tasks are in which of the `STATES`, `failures` what was wrong
+    with a task, in one line, and `noted` that with what Python said of it. Where it was `interrupted` by Ctrl-C,
+    nothing is at work any more; where nothing more could be done, `problem` says why, in one line.
+    """
 
     store: Store
     executor: Executor
-    progress: Progress = field(default_factory=lambda: Progress(io.StringIO()))
-    """Gets a stage for each plan, and what is said of tasks."""
-
-    share: Share = EVERYTHING
-    """What is to be done here; of the rest, what is there is used."""
-
+    progress: Progress
     blender: str = ""
-    """The program for steps that need Blender, if it is not to be this one."""
-
     counts: Counter[str] = field(default_factory=Counter)
     failures: dict[str, str] = field(default_factory=dict)
-    """Task to what was wrong, in one line."""
-
-    details: dict[str, str] = field(default_factory=dict)
-    """Task to what Python said of its failure; empty where the reason is known."""
-
+    noted: dict[str, dict[str, str]] = field(default_factory=dict)
     interrupted: bool = False
-    """True if it was interrupted by Ctrl-C; then nothing is at work any more."""
-
     problem: str = ""
-    """The reason why nothing more could be done, in one line; empty where everything was tried."""
 
     def do(self, plan: Plan, title: str = "") -> None:
         """Do what is missing of a plan, which yields the same tasks each time.
 
-        Raises
-        ------
-        OutputError
-            Before anything is done, where something would be replaced that must not be.
+        Raises OutputError before anything is done, where something would be replaced that must not be.
         """
-        # What an earlier plan did is found up to date by this one.
-        done = self.counts[DONE]
-        self.counts = Counter({DONE: done, UP_TO_DATE: -done})
         with self.progress.stage(title, 1.0) as self._stage:
-            self._survey = Survey.of(plan, self.store, self.share)
-            self._stage.total = self._survey.weight
-            if self._survey.tasks:
+            self._left, up_to_date = survey(plan, self.store)
+            self._stage.total = self._seconds = sum(seconds for seconds, _ in self._left.values())
+            self._all_frames = self._frames = sum(frames for _, frames in self._left.values())
+            # What an earlier plan did is found up to date by this one.
+            self.counts = Counter({DONE: (done := self.counts[DONE]), UP_TO_DATE: up_to_date - done})
+            if self._left:
                 self._do(plan)
-            else:
-                self.counts[UP_TO_DATE] += self._survey.up_to_date
-        if self.share == EVERYTHING:
-            failures = {name: {"message": m, "details": self.details[name]} for name, m in self.failures.items()}
+        if self.store.alone:
             with suppress(OSError):
-                self.store.note("failures.json", failures)
+                self.store.note("failures.json", self.noted)
 
     def _do(self, plan: Plan) -> None:
         self._settled: dict[str, str | None] = {}
@@ -157,31 +121,34 @@ class Run:
         self._waiting: list[Task] = []
         self._at_work: dict[Future[Made], tuple[Task, Job]] = {}
         self._losses: Counter[str] = Counter()
-        """Key of a task to how many died that did it."""
-        self._reached = Survey()
-        """The tasks that have come to their end."""
         try:
-            self._work(self.share.tasks(plan))
-            if self.share == EVERYTHING and not self.failures:
+            self._work(iter(plan()))
+            if self.store.alone and not self.failures:
                 self.store.sweep(key for key in self._settled.values() if key)
         except ExecutorError as error:
             self.problem = str(error)
         except KeyboardInterrupt:
             self.interrupted = True
-        if self.problem or self.interrupted:
+        if self._left:
             self.executor.stop()
-            self.counts[STOPPED] = self._survey.tasks - self._reached.tasks
+            self.counts[STOPPED] = len(self._left)
 
     def _work(self, rest: Iterator[Task]) -> None:
         """Do tasks, each when those before it are settled. Raises ExecutorError where nothing more can be done."""
         more = True
         while more or self._waiting or self._at_work:
             capacity = self.executor.capacity
-            ready = list(filter(self._is_ready, self._waiting))
+            ready = [task for task in self._waiting if self._open.isdisjoint(task.after)]
             while more and len(ready) < capacity:
                 task = next(rest, None)
-                if more := task is not None:
-                    ready += filter(self._is_ready, self._meet(task))
+                if task is None:
+                    more = False
+                elif task.name in self._left:
+                    ready += [task] if self._open.isdisjoint(task.after) else []
+                    self._open.add(task.key)
+                    self._waiting.append(task)
+                else:
+                    self._settled[task.key] = task.key
             for task in ready[: max(0, capacity - len(self._at_work))]:
                 self._waiting.remove(task)
                 self._begin(task)
@@ -192,20 +159,7 @@ class Run:
                 self._end(future, *self._at_work.pop(future))
             for task, job in () if ended else self._at_work.values():
                 job.look()
-                self._show(task, job.doing)
-
-    def _meet(self, task: Task) -> list[Task]:
-        """Take a task from the plan: it is up to date, or waits from now on, and is returned."""
-        if task.key not in self._open and self.store.is_done(task):
-            self._settled[task.key] = task.key
-            self.counts[UP_TO_DATE] += 1
-            return []
-        self._open.add(task.key)
-        self._waiting.append(task)
-        return [task]
-
-    def _is_ready(self, task: Task) -> bool:
-        return not any(key in self._open for key in reversed(task.after))
+                self._show(task, job.reached[1])
 
     def _before(self, task: Task) -> list[str | None]:
         """Return the keys of the results of the tasks before one, also of earlier plans; None where there is none."""
@@ -229,22 +183,20 @@ class Run:
 
     def _end(self, future: Future[Made], task: Task, job: Job) -> None:
         """Take what came of a job."""
-        for note in job.notes():
-            self.progress.note(note)
         try:
             made = future.result()
         except TaskError as error:
             # An error that nobody foresaw does not say by itself what it is about.
-            said = f"{task.shown}: {error}" if error.details else str(error)
+            said = f"{task.name}: {error}" if error.details else str(error)
             self._fail(task, said, error.details, fatal=error.fatal)
         except (CancelledError, Exception) as error:
             self._losses[task.key] += 1
-            if self._losses[task.key] <= RETRIES:
-                self.progress.note(f"{task.shown}: {loss(error, job)}; trying again")
+            said = f"{task.name}: {loss(error, job)}"
+            if self._losses[task.key] < ATTEMPTS:
+                self.progress.note(f"{said}; trying again")
                 self._waiting.insert(0, task)
             else:
-                attempts = f"given up after {self._losses[task.key]} attempts"
-                self._fail(task, f"{task.shown}: {loss(error, job)}; {attempts}")
+                self._fail(task, f"{said}; given up after {ATTEMPTS} attempts")
         else:
             self._settle(task, made)
         shutil.rmtree(job.place, ignore_errors=True)
@@ -268,8 +220,8 @@ class Run:
 
     def _fail(self, task: Task, said: str, details: str = "", *, fatal: bool = False) -> None:
         if not fatal and self.store.discard_damaged(filter(None, self._before(task))):
-            said = f"{task.shown}: what it reads was damaged; run the same command again"
-        self.failures[task.name], self.details[task.name] = said, details
+            said = f"{task.name}: what it reads was damaged; run the same command again"
+        self.failures[task.name], self.noted[task.name] = said, {"message": said, "details": details}
         self.progress.error(said)
         self._close(task, FAILED)
         if fatal:
@@ -280,15 +232,61 @@ class Run:
         self._open.discard(task.key)
         self._settled[task.key] = key
         self.counts[state] += 1
-        self._reached.add(task)
+        seconds, frames = self._left.pop(task.name)
+        self._seconds -= seconds
+        self._frames -= frames
         if key is None:
             self.store.withdraw(task.publish.values())  # What is there under its name was made of something else.
         self._show(task)
 
     def _show(self, task: Task, doing: str = "") -> None:
         """Report how far the whole is, and a task."""
-        parts = [(job.share, one) for one, job in self._at_work.values()]
-        frames = int(self._reached.frames + sum(share * one.frames for share, one in parts))
-        counted = f"frame {frames} of {self._survey.frames}" if self._survey.frames else ""
-        words = ", ".join(filter(None, (": ".join(filter(None, (task.shown, doing))), counted)))
-        self._stage.reach(self._reached.weight + sum(share * one.weight for share, one in parts), words)
+        parts = [(job.reached[0], one) for one, job in self._at_work.values()]
+        frames = self._all_frames - self._frames + sum(share * one.frames for share, one in parts)
+        counted = f"frame {int(frames)} of {self._all_frames}" if self._all_frames else ""
+        words = ", ".join(filter(None, (": ".join(filter(None, (task.name, doing))), counted)))
+        self._stage.reach(self._stage.total - self._seconds + sum(share * one.seconds for share, one in parts), words)
+
+
+# -- why --------------------------------------------------------------------------------------------------------------
+
+
+def explain(plan: Plan, store: Store) -> Iterator[tuple[Task, str]]:
+    """Yield the tasks of a plan that a run would do, and why. Nothing is written."""
+    latest, changed = store.latest(), dict[str, str]()
+    for task in plan():
+        index = store.index_of(task.key)
+        if missing := store.unpublished(task, index) if index else []:
+            yield task, f"{few(path for _, path in missing)} missing, edited or of something else"
+        elif not index:
+            changed[task.key] = task.name
+            earlier = store.index_of(latest.get(task.name, "")) or {}
+            is_damaged = store.folder_of(task.key).exists()
+            yield task, "its result is damaged" if is_damaged else _difference(earlier.get("made_of"), task, changed)
+
+
+def _difference(before: Mapping[str, Any] | None, task: Task, changed: Mapping[str, str]) -> str:
+    """Return in what a task differs from what its last result was made of; `changed` has keys, and names, of tasks."""
+    if before is None:
+        return "never done"
+    reasons, now = [], json.loads(json.dumps(task.made_of, default=plain))
+    for title, part in (("program", "versions"), ("parameters", "parameters"), ("input file", "inputs")):
+        old, new = dict(_leaves(before.get(part))), dict(_leaves(now[part]))
+        names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
+        if part == "parameters":
+            both = {name: f"{name}: {old.get(name)} -> {new.get(name)}" for name in names}
+            names = [said if len(said) < 80 else name for name, said in both.items()]
+        reasons += [f"{title} changed ({few(names)})"] if names else []
+    if before.get("after") != now["after"]:
+        anew = [changed[key] for key in task.after if key in changed]
+        reasons.append(f"an earlier step changed ({few(anew)})" if anew else "earlier steps are others")
+    return "; ".join(reasons) or "its step is another"
+
+
+def _leaves(content: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the values of nested mappings, each under the names that lead to it: "radii.rigid"."""
+    if isinstance(content, Mapping):
+        for key, inner in content.items():
+            yield from _leaves(inner, f"{name}.{key}" if name else key)
+    elif not name.endswith("$"):
+        yield name, content

@@ -27,13 +27,15 @@ from typing import Any, Self
 
 from filelock import FileLock, Timeout
 
+from rigid_motion_batch.command_line import few
 from rigid_motion_batch.files import append_lines, lines_of, write_text
 
-from .performing import Made
-from .steps import OWN, Input, Task, sha256_in, sha256_of
+from .executors import Made
+from .steps import OWN, Task, sha256_in, sha256_of
+from .values import plain
 
 INDEX = ".index.json"
-"""Index of a result: its files with size, time of change and digest; what it was made of, in how long, and facts."""
+"""Index of a result: its files with size, time of change and digest; what it was made of, and in how long."""
 
 KEPT = 7 * 86400.0
 """Seconds that a result is kept that the last plan did not ask for, and what a process was making that was killed."""
@@ -47,35 +49,24 @@ class OutputError(Exception):
 
 
 class Store:
-    """An output folder, as a context.
+    """An output folder, as a context: made where it is missing, and taken away again where nothing came of it.
 
-    Parameters
-    ----------
-    output : Path
-        Made where it is missing, and taken away again where nothing came of it.
-    alone : bool
-        Whether no other run may have the folder meanwhile; not for workers that do a part each.
-    overwrite : bool
-        Whether files that this program has not written may be replaced. Inputs and folders never are.
-
-    Raises
-    ------
-    OutputError, OSError
-        On entering, where another run has the folder, or there can be none.
+    `alone`, no other run may have the folder meanwhile; workers that do a part each are not. With `overwrite`, files
+    may be replaced that this program has not written; inputs and folders never are. Raises OutputError or OSError on
+    entering, where another run has the folder, or there can be none.
     """
 
     def __init__(self, output: Path, *, alone: bool = True, overwrite: bool = False) -> None:
-        self.output, self.overwrite = output.absolute(), overwrite
+        self.output, self.alone, self.overwrite = output.absolute(), alone, overwrite
         self.own = self.output / OWN
         self._results, self._published = self.own / "results", self.own / "published"
-        self._lock = FileLock(self.own / "lock", blocking=False) if alone else None
+        self._lock = FileLock(self.own / "lock", blocking=False)
         self._missing = [folder for folder in (self.output, *self.output.parents) if not folder.exists()]
-        self._digests = _digests_in(self.own / "inputs.json")
+        self._digests = self.noted("inputs.json")
         """Path of an input to what was seen of it when it was hashed, and its digest."""
         self._inputs: dict[tuple[int, int], str] = {}
         """Identities of inputs in the file system, to their paths."""
         self._scratch = self.own / "scratch" / ("run" if alone else uuid.uuid4().hex[:8])
-        self._number = 0
 
     # -- opening and closing ------------------------------------------------------------------------------------------
 
@@ -83,7 +74,7 @@ class Store:
         for folder in (self._results, self._published, self._scratch.parent):
             folder.mkdir(parents=True, exist_ok=True)
         try:
-            if self._lock:
+            if self.alone:
                 self._lock.acquire()
         except Timeout:
             raise OutputError(
@@ -100,63 +91,56 @@ class Store:
         shutil.rmtree(self._scratch, ignore_errors=True)
         with suppress(OSError):
             self.note("inputs.json", self._digests)
-        for folder in (self._results, self._scratch.parent, self._published):
-            _remove_if_empty(folder)
-        if self._lock:
-            if not self._results.exists():
-                for name in ("inputs.json", "failures.json", "lock"):
-                    (self.own / name).unlink(missing_ok=True)
-            self._lock.release()
+        # A list, for each of them goes where it is empty.
+        is_empty = all([*map(_remove_if_empty, (self._results, self._scratch.parent, self._published))])
+        for name in ("inputs.json", "failures.json", "lock") if self.alone and is_empty else ():
+            (self.own / name).unlink(missing_ok=True)
+        self._lock.release()
         for folder in (self.own, *self._missing):
             _remove_if_empty(folder)
 
     def new_scratch(self) -> Path:
         """Return a path for what is being made; nothing is there."""
-        self._number += 1
-        return self._scratch / str(self._number)
+        return self._scratch / uuid.uuid4().hex[:8]
 
-    def note(self, name: str, content: Any) -> None:
+    def note(self, name: str, content: Mapping[str, Any]) -> None:
         """Write a file of the store's own, of JSON; of nothing there is none."""
         if content:
             write_text(self.own / name, json.dumps(content, indent=1))
         else:
             (self.own / name).unlink(missing_ok=True)
 
+    def noted(self, name: str) -> dict[str, Any]:
+        """Return what is in a file of the store's own; empty where it is missing or damaged."""
+        with suppress(*UNREADABLE):
+            return dict(json.loads((self.own / name).read_bytes()))
+        return {}
+
     # -- inputs -------------------------------------------------------------------------------------------------------
 
-    def input(self, path: Path | str) -> Input:
-        """Return a file as it is now.
+    def inputs(self, *paths: Path | str) -> dict[str, str]:
+        """Return files as they are now, with their digests; an empty one for what is no file that can be read.
 
-        Raises
-        ------
-        OutputError
-            Where this program has written it into this folder.
+        Raises OutputError where this program has written one into this folder.
         """
-        shown, place = os.fspath(path), os.path.abspath(path)
-        try:
-            status, link = os.stat(path), os.lstat(path)  # noqa: PTH116 - it may be text, and "" no folder
-        except (OSError, ValueError):
-            return Input(shown, "")
-        self._require_no_output(shown)
-        if not stat.S_ISREG(status.st_mode):
-            return Input(shown, "")
-        self._inputs[status.st_dev, status.st_ino] = self._inputs[link.st_dev, link.st_ino] = place
-        seen = [status.st_size, status.st_mtime_ns, status.st_ctime_ns]
-        *known, digest = self._digests.get(place, ("",))
-        if known != seen:
-            digest = sha256_in(path)
-            self._digests[place] = [*seen, digest]
-        return Input(shown, digest)
+        return {os.fspath(path): self._digest_of(os.fspath(path)) for path in paths}
 
-    def _require_no_output(self, shown: str) -> None:
-        real, output = os.path.realpath(shown), os.path.realpath(self.output)
-        if not real.startswith(output + os.sep):
-            return
-        path = Path(real).relative_to(output).as_posix()
-        if path.partition("/")[0] == OWN:
-            raise OutputError(f"{shown}: this input lies in {self.own}, where the program works; move it elsewhere")
-        if self._digests_of(path):
-            raise OutputError(f"{shown}: this input was written by a run into this folder; choose another --output")
+    def _digest_of(self, path: str) -> str:
+        try:
+            status, link = os.stat(path), os.lstat(path)  # noqa: PTH116 - it may be "", which is no folder
+        except (OSError, ValueError):
+            return ""
+        inside = os.path.realpath(path).removeprefix(os.path.realpath(self.output) + os.sep).replace(os.sep, "/")
+        if inside.startswith(f"{OWN}/") or self._digests_at(inside):
+            raise OutputError(f"{path}: this input was written by a run into this folder; choose another --output")
+        if not stat.S_ISREG(status.st_mode):
+            return ""
+        place, seen = os.path.abspath(path), [status.st_size, status.st_mtime_ns, status.st_ctime_ns]
+        self._inputs |= dict.fromkeys([(status.st_dev, status.st_ino), (link.st_dev, link.st_ino)], place)
+        known = self._digests.get(place)
+        if not (isinstance(known, list) and known[:-1] == seen):
+            self._digests[place] = known = [*seen, sha256_in(path)]
+        return str(known[-1])
 
     # -- results ------------------------------------------------------------------------------------------------------
 
@@ -184,8 +168,8 @@ class Store:
 
     def keep(self, task: Task, key: str, made: Made) -> None:
         """Take what was made as the result of a task. Raises OSError where that cannot be."""
-        folder, index = made["folder"], {name: made[name] for name in ("files", "seconds", "facts")}
-        content = json.dumps({**index, "name": task.name, "made_of": task.made_of})
+        folder, index = made["folder"], {name: made[name] for name in ("files", "seconds")}
+        content = json.dumps({**index, "name": task.name, "made_of": task.made_of}, default=plain)
         (folder / INDEX).write_text(content, encoding="utf-8")
         try:
             folder.rename(self.folder_of(key))
@@ -220,120 +204,87 @@ class Store:
 
     # -- published files ----------------------------------------------------------------------------------------------
 
-    def is_done(self, task: Task) -> bool:
-        """Return whether the result of a task is there, and all files that it publishes are in place."""
-        index = self.index_of(task.key)
-        return index is not None and not self.unpublished(task, index)
-
     def unpublished(self, task: Task, index: Mapping[str, Any] | None) -> list[tuple[str, str]]:
         """Return the files of a result that are not in place, and where they belong."""
-        files = index["files"] if index else {}
-        return [(name, path) for name, path in task.published(files) if not self._is_same(files.get(name), path)]
+        files, result = index["files"] if index else {}, []
+        for name, path in task.publish.items():
+            for file in [file for file in files if file.startswith(name)] if name.endswith("/") else [name]:
+                place = path + file.removeprefix(name)
+                result += [] if self._is_same(files.get(file), place) else [(file, place)]
+        return result
 
-    def strangers(self, task: Task, index: Mapping[str, Any] | None) -> list[str]:
-        """Return paths where a result would replace what this program has not written, or was edited since.
-
-        Raises
-        ------
-        OutputError
-            Where there is an input, or a folder, or a file where a folder must be: nothing of that is ever replaced.
-        """
-        return [path for _, path in self.unpublished(task, index) if not self._is_own(path)]
-
-    def require_none(self, strangers: list[str]) -> None:
-        """Raise OutputError where there are such paths, unless they may be replaced."""
-        if strangers and not self.overwrite:
-            named = ", ".join(os.fspath(self.output / path) for path in strangers[:3])
-            more = f" and {len(strangers) - 3} more" if len(strangers) > 3 else ""
-            were, them = ("was", "it") if len(strangers) == 1 else ("were", "them")
+    def refuse(self, foreign: list[str]) -> None:
+        """Raise OutputError where there are paths that are not the program's own, unless they may be replaced."""
+        if foreign and not self.overwrite:
+            named = few(os.fspath(self.output / path) for path in foreign)
             raise OutputError(
-                f"{named}{more} {were} not written by this program, or edited since; choose another folder with "
-                f"--output, or replace {them} with --overwrite"
+                f"{named} {'was' if len(foreign) == 1 else 'were'} not written by this program, or edited since; "
+                "choose another folder with --output, or replace that with --overwrite"
             )
 
     def publish(self, task: Task, key: str) -> bool:
         """Put files of a result where they belong, and return whether there were any that were not there.
 
-        Raises
-        ------
-        OutputError
-            Where something is there that must not be replaced; what was put in place before that stays.
-        OSError
+        Raises OSError, and OutputError where something is there that must not be replaced; files before that stay.
         """
         index = self.index_of(key) or {}
-        self.require_none(self.strangers(task, index))
         missing = self.unpublished(task, index)
+        self.refuse([path for _, path in missing if not self.is_own(path)])
         for name, path in missing:
             target, beside = self.output / path, self.new_scratch()
-            target.parent.mkdir(parents=True, exist_ok=True)
             if not Path(os.path.realpath(target.parent)).is_relative_to(os.path.realpath(self.output)):
                 raise OutputError(f"{target.parent}: this leads out of the output folder; choose another with --output")
+            target.parent.mkdir(parents=True, exist_ok=True)
             # Killed from here on, what was moved is known to be the program's own.
             append_lines(self._record_of(path), [{"path": path, "sha256": index["files"][name][-1]}])
             try:
                 os.link(self.folder_of(key) / name, beside)
             except OSError:  # This file system has no links.
                 shutil.copy2(self.folder_of(key) / name, beside)
-            try:
-                beside.replace(target)
-            except OSError as error:
-                raise OSError(error.errno, error.strerror, os.fspath(target)) from None
+            beside.replace(target)
         return bool(missing)
 
     def withdraw(self, paths: Iterable[str]) -> None:
         """Delete files of this program that are needed no more, and folders that are empty then."""
         for path in paths:
             with suppress(OSError, OutputError):
-                if self._is_own(path):
+                if self.is_own(path):
                     (self.output / path).unlink()
-                    for folder in (self.output / path).parents:
-                        if folder == self.output or not _remove_if_empty(folder):
-                            break
+                    for folder in (self.output / path).relative_to(self.output).parents:
+                        (self.output / folder).rmdir()
 
     def _is_same(self, known: tuple[int, int, str] | None, path: str) -> bool:
         """Return whether a published file is one of a result, of this size and time of change, or a copy."""
-        try:
+        with suppress(OSError):
             status = os.lstat(f"{self.output}/{path}")
-        except OSError:
-            return False
-        same = known is not None and [status.st_size, status.st_mtime_ns] == [*known[:2]]
-        return same and stat.S_ISREG(status.st_mode)
+            same = known is not None and [status.st_size, status.st_mtime_ns] == [*known[:2]]
+            return same and stat.S_ISREG(status.st_mode)
+        return False
 
-    def _is_own(self, path: str) -> bool:
+    def is_own(self, path: str) -> bool:
         """Return whether a path has nothing, or what this program wrote. Raises OutputError for what always stays."""
-        target = f"{self.output}/{path}"
+        target, another = f"{self.output}/{path}", "choose another folder with --output"
         try:
             status = os.lstat(target)
         except FileNotFoundError:
             return True
         except NotADirectoryError:
-            raise OutputError(_in_the_way(target, "a file where a folder")) from None
+            raise OutputError(f"{target}: there is a file where a folder goes; move it, or {another}") from None
         if stat.S_ISDIR(status.st_mode):
-            raise OutputError(_in_the_way(target, "a folder where a file"))
+            raise OutputError(f"{target}: there is a folder where a file goes; move it, or {another}")
         if source := self._inputs.get((status.st_dev, status.st_ino)):
-            raise OutputError(f"{source}: this input lies where {target} goes; choose another folder with --output")
-        return stat.S_ISREG(status.st_mode) and sha256_of(target) in self._digests_of(path)
+            raise OutputError(f"{source}: this input lies where {target} goes; {another}")
+        return stat.S_ISREG(status.st_mode) and sha256_of(target) in self._digests_at(path)
 
     def _record_of(self, path: str) -> Path:
         """Return the file of the record of what was published into the same folder."""
         folder = path.rpartition("/")[0].casefold()
         return self._published / f"{uuid.uuid5(uuid.NAMESPACE_URL, folder).hex[:16]}.jsonl"
 
-    def _digests_of(self, path: str) -> set[str]:
+    def _digests_at(self, path: str) -> set[str]:
         """Return digests of all that was put at a path, or one that differs in case, which file systems may ignore."""
         lines = lines_of(self._record_of(path))
         return {str(line.get("sha256")) for line in lines if str(line.get("path")).casefold() == path.casefold()}
-
-
-def _in_the_way(target: str, kind: str) -> str:
-    return f"{target}: there is {kind} goes; move it, or choose another folder with --output"
-
-
-def _digests_in(file: Path) -> dict[str, list[Any]]:
-    try:
-        return {path: seen for path, seen in json.loads(file.read_bytes()).items() if isinstance(seen[-1], str)}
-    except UNREADABLE:
-        return {}
 
 
 def _age(path: Path) -> float:

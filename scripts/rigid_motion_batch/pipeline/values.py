@@ -9,7 +9,7 @@ import json
 import sys
 from collections.abc import Mapping, MutableMapping
 from dataclasses import fields, is_dataclass
-from functools import cache
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar, get_origin
 
@@ -18,52 +18,40 @@ T = TypeVar("T")
 CLASS, ARRAY = "$", "array"
 
 
-def to_plain(value: Any, arrays: MutableMapping[str, Any] | None = None) -> Any:
-    """Return a value as plain data for JSON.
+def plain(value: Any, arrays: MutableMapping[str, Any] | None = None) -> Any:
+    """Return a dataclass or a number of NumPy for JSON, as `json.dumps(..., default=plain)` asks for it.
 
-    Parameters
-    ----------
-    value : dataclass, list, tuple, mapping with text for keys, number, text or None
-    arrays : mapping, optional
-        Takes the NumPy arrays, each under a number; without it there may be none.
+    NumPy arrays go into `arrays`, each under a number; without it there may be none.
     """
-    if value is None or isinstance(value, (bool, int, float, str)):
-        return value
     if is_dataclass(value):
         kind: type = type(value)
-        content = {name: to_plain(getattr(value, name), arrays) for name in _names(kind)}
+        content = {field.name: getattr(value, field.name) for field in fields(kind) if field.init}
         return {CLASS: f"{kind.__module__}:{kind.__qualname__}", **content}
-    if isinstance(value, Mapping):
-        return {name: to_plain(inner, arrays) for name, inner in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [to_plain(inner, arrays) for inner in value]
-    if hasattr(value, "dtype"):
-        if value.ndim == 0:
-            return value.item()
-        if arrays is not None:
-            name = str(len(arrays))
-            arrays[name] = value
-            return {ARRAY: name}
-    raise TypeError(f"{type(value).__name__} is no value for JSON")
+    if getattr(value, "ndim", None) == 0:
+        return value.item()
+    if arrays is None or not hasattr(value, "dtype"):
+        raise TypeError(f"{type(value).__name__} is no value for JSON")
+    name = str(len(arrays))
+    arrays[name] = value
+    return {ARRAY: name}
 
 
-def from_plain(plain: Any, arrays: Mapping[str, Any] | None = None) -> Any:
-    """Return the value of `to_plain`, lists as tuples. ValueError for a class not loaded, or no dataclass."""
-    if isinstance(plain, list):
-        return tuple(from_plain(inner, arrays) for inner in plain)
-    if not isinstance(plain, dict):
-        return plain
-    if plain.keys() == {ARRAY}:
-        return (arrays or {})[plain[ARRAY]]
-    content = {name: from_plain(inner, arrays) for name, inner in plain.items() if name != CLASS}
-    return _class_named(plain[CLASS])(**content) if CLASS in plain else content
+def from_json(text: str, arrays: Mapping[str, Any]) -> Any:
+    """Return the value of a text, lists as tuples. ValueError for a class not loaded, or no dataclass."""
+
+    def made(content: dict[str, Any]) -> Any:
+        if content.keys() == {ARRAY}:
+            return arrays[content[ARRAY]]
+        content = {name: _tuples(inner) for name, inner in content.items()}
+        return _class_named(content.pop(CLASS))(**content) if CLASS in content else content
+
+    return _tuples(json.loads(text, object_hook=made))
 
 
 def write(stem: Path, value: Any) -> None:
     """Write a value to STEM.json, and its arrays, if it has any, to STEM.npz."""
     arrays: dict[str, Any] = {}
-    plain = to_plain(value, arrays)
-    stem.with_suffix(".json").write_text(json.dumps(plain), encoding="utf-8")
+    stem.with_suffix(".json").write_text(json.dumps(value, default=partial(plain, arrays=arrays)), encoding="utf-8")
     if arrays:
         import numpy as np
 
@@ -78,15 +66,14 @@ def read(kind: type[T], stem: Path) -> T:
 
         with np.load(stem.with_suffix(".npz"), allow_pickle=False) as stored:
             arrays = dict(stored)
-    value = from_plain(json.loads(stem.with_suffix(".json").read_text(encoding="utf-8")), arrays)
+    value = from_json(stem.with_suffix(".json").read_text(encoding="utf-8"), arrays)
     if not isinstance(value, get_origin(kind) or kind):
         raise ValueError(f"{stem}: a {type(value).__name__} is no {kind.__name__}")
     return value
 
 
-@cache
-def _names(kind: type) -> tuple[str, ...]:
-    return tuple(field.name for field in fields(kind) if field.init)
+def _tuples(value: Any) -> Any:
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value
 
 
 def _class_named(name: str) -> type:

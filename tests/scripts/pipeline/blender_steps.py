@@ -6,41 +6,40 @@ import os
 import signal
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
-from rigid_motion_batch.pipeline.steps import Job, TaskError, step
+from rigid_motion_batch.pipeline.steps import Job, Step, TaskError
 
 
 @dataclass(frozen=True)
-class Scene:
+class Save(Step, blender=True):
+    """Write a .blend file with a scene of this name, and whether it was a Blender with a program of its own."""
+
     name: str
     frames: tuple[int, ...] = ()
     fate: str = ""
 
+    def make(self, job: Job) -> dict[str, int]:
+        import bpy
 
-@step(blender=True)
-def save(job: Job, parameters: Scene) -> dict[str, int]:
-    """Write a .blend file with a scene of this name, and whether it was a Blender with a program of its own."""
-    import bpy
-
-    print("Fra:1 Mem:1M")
-    job.progress(1, 2, "half way")
-    match parameters.fate:
-        case "foreseen":
-            raise TaskError("no such scene; make another")
-        case "unforeseen":
-            raise KeyError(parameters.name)
-        case "full":
-            raise OSError(28, "No space left on device", str(job.folder / "scene.blend"))
-        case "killed":
-            os.kill(os.getpid(), signal.SIGKILL)
-        case "slow":
-            (job.folder / "begun").touch()
-            time.sleep(600)
-    bpy.context.scene.name = parameters.name
-    bpy.context.scene.frame_end = parameters.frames[-1]
-    bpy.ops.wm.save_as_mainfile(filepath=str(job.folder / "scene.blend"))
-    before = "".join((folder / "out.txt").read_text() for folder in job.before)
-    inputs = "".join(path.read_text() for path in job.inputs)
-    (job.folder / "out.txt").write_text(f"{bool(bpy.app.binary_path)} {before}{inputs}")
-    job.note(f"saved {parameters.name}")
-    return {"frames": len(parameters.frames)}
+        print("Fra:1 Mem:1M")
+        job.progress(1, 2, "half way")
+        match self.fate:
+            case "foreseen":
+                raise TaskError("no such scene; make another")
+            case "unforeseen":
+                raise KeyError(self.name)
+            case "full":
+                raise OSError(28, "No space left on device", str(job.folder / "scene.blend"))
+            case "killed":
+                os.kill(os.getpid(), signal.SIGKILL)
+            case "slow":
+                (job.folder / "begun").touch()
+                time.sleep(600)
+        bpy.context.scene.name = self.name
+        bpy.context.scene.frame_end = self.frames[-1]
+        bpy.ops.wm.save_as_mainfile(filepath=str(job.folder / "scene.blend"))
+        before = "".join((folder / "out.txt").read_text() for folder in job.before)
+        inputs = "".join(path.read_text() for path in map(Path, job.task.inputs))
+        (job.folder / "out.txt").write_text(f"{bool(bpy.app.binary_path)} {before}{inputs}")
+        return {"frames": len(self.frames)}

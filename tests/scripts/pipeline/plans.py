@@ -7,32 +7,29 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from rigid_motion_batch.pipeline.executors import ProcessExecutor
-from rigid_motion_batch.pipeline.performing import Executor
-from rigid_motion_batch.pipeline.running import Plan, Run
+from rigid_motion_batch.pipeline.executors import Executor, ProcessExecutor
+from rigid_motion_batch.pipeline.running import Plan, Run, share_of
 from rigid_motion_batch.pipeline.steps import OWN, Step, Task
 from rigid_motion_batch.pipeline.store import Store
 from rigid_motion_batch.progress import Progress, Stage
-from tests.scripts.pipeline import steps
-from tests.scripts.pipeline.steps import FILE, Nothing, Write
+from tests.scripts.pipeline.steps import FILE, Join, Write
 
 EXECUTORS = {"serial": Executor, "processes": lambda: ProcessExecutor(2)}
 
 
-def task(name: str, step: Step = steps.write, parameters: object = None, *after: Task, **fields: object) -> Task:
+def task(name: str, step: Step, *after: Task, **fields: object) -> Task:
     """A task that publishes its file under its name."""
     fields = {"publish": {FILE: f"{name}.txt"}} | fields
-    made = Nothing() if parameters is None else parameters
-    return Task(step, made, name, after=tuple(item.key for item in after), **fields)
+    return Task(step, name, after=tuple(item.key for item in after), **fields)
 
 
 def writing(name: str, text: str = "", log: object = "", **fields: object) -> Task:
-    return task(name, steps.write, Write(text or name, str(log)), **fields)
+    return task(name, Write(text or name, str(log)), **fields)
 
 
 def joining(name: str, *after: Task, log: object = "", **fields: object) -> Task:
     """A task that joins the texts of others."""
-    return task(name, steps.join, Nothing(str(log)), *after, **fields)
+    return task(name, Join(str(log)), *after, **fields)
 
 
 class Listener(Progress):
@@ -71,7 +68,7 @@ class Watched(Store):
 
 def run(plan: Plan, store: Store, executor: Executor, **options: object) -> Run:
     """Do what is missing of a plan."""
-    work = Run(store, executor, **options)
+    work = Run(store, executor, **{"progress": Listener(), **options})
     work.do(plan)
     return work
 
@@ -79,8 +76,9 @@ def run(plan: Plan, store: Store, executor: Executor, **options: object) -> Run:
 def run_in(output: Path, *tasks: Task, executor: Executor | None = None, **options: object) -> Run:
     """Run a plan in a folder."""
     of_store = {name: options.pop(name) for name in ("alone", "overwrite") if name in options}
+    share = options.pop("share", ())
     with Store(output, **of_store) as store, executor or Executor() as opened:
-        return run(lambda: tasks, store, opened, **options)
+        return run(lambda: share_of(lambda: tasks, *share), store, opened, **options)
 
 
 def states(outcome: Run) -> dict[str, int]:

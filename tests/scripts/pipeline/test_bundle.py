@@ -10,8 +10,10 @@ from pathlib import Path
 import pytest
 
 from rigid_motion_batch.cli import compare
+from rigid_motion_batch.cli.job_bundle import below_inputs
 from rigid_motion_batch.pipeline import bundle
-from rigid_motion_batch.pipeline.bundle import below_inputs, write_bundle
+from rigid_motion_batch.pipeline.bundle import write_bundle
+from rigid_motion_batch.progress import FARM
 from tests.scripts.comparing import outputs, write_toss
 
 PARTS = {"read": 2, "measure": 2, "build": 1, "render": 3, "encode": 1, "report": 1}
@@ -27,7 +29,7 @@ def test_a_job_on_a_farm_makes_the_same_as_a_run_on_one_machine(tmp_path: Path) 
     takes = tmp_path / "takes"
     sources = [write_toss(takes / "toss.csv"), write_toss(takes / "other.csv", samples=70)]
     asked = [*map(str, sources), "--rates", "5", "--modes", "lerp_slerp", "--resolution", "64x36", "--fps", "10"]
-    given = write_bundle(tmp_path / "bundle", asked, tmp_path / "out", PARTS, "Two clips")
+    given = write_bundle(tmp_path / "bundle", *below_inputs(asked), tmp_path / "out", PARTS)
     template = tmp_path / "bundle" / "template.json"
     checked = openjd("check", template, cwd=tmp_path)
     assert checked.returncode == 0, checked.stdout
@@ -45,8 +47,10 @@ def test_a_job_on_a_farm_makes_the_same_as_a_run_on_one_machine(tmp_path: Path) 
 
 
 def test_stages_follow_one_another_and_their_parts_are_a_parameter(tmp_path: Path) -> None:
-    write_bundle(tmp_path, ["a.csv"], tmp_path / "out", {"read": 4, "measure": 2000, "report": 1}, "One")
+    write_bundle(tmp_path, ["a.csv"], tmp_path, tmp_path / "out", {"read": 4, "measure": 2000, "report": 1})
     template = json.loads((tmp_path / "template.json").read_text())
+    assert template["name"] == "out"
+    assert template["jobEnvironments"][0]["variables"][FARM] == "openjd"
     steps = template["steps"]
     assert [step["name"] for step in steps] == ["Read", "Measure", "Report"]
     assert [step.get("dependencies") for step in steps] == [None, [{"dependsOn": "Read"}], [{"dependsOn": "Measure"}]]
@@ -81,9 +85,9 @@ def test_files_are_named_from_the_folder_that_has_all_of_them(tmp_path: Path, mo
     ]
 
 
-def test_a_name_that_is_an_expression_of_templates_is_refused(tmp_path: Path) -> None:
+def test_a_name_that_is_an_expression_of_templates_is_refused() -> None:
     with pytest.raises(ValueError, match="for its braces; rename it"):
-        write_bundle(tmp_path, ["{{a}}.csv"], tmp_path / "out", PARTS, "One")
+        below_inputs(["{{a}}.csv"])
 
 
 def test_a_machine_with_another_version_is_told_so(capsys: pytest.CaptureFixture) -> None:

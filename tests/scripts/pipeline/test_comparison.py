@@ -20,8 +20,7 @@ from rigid_motion_batch.analysis.results import compare_clip
 from rigid_motion_batch.pipeline import values
 from rigid_motion_batch.pipeline.comparison import Comparison, ComparisonPlan
 from rigid_motion_batch.pipeline.comparison_steps import result_in
-from rigid_motion_batch.pipeline.executors import ProcessExecutor
-from rigid_motion_batch.pipeline.performing import Executor
+from rigid_motion_batch.pipeline.executors import Executor, ProcessExecutor
 from rigid_motion_batch.pipeline.running import Run
 from rigid_motion_batch.pipeline.steps import OWN, Task
 from rigid_motion_batch.pipeline.store import OutputError, Store
@@ -136,7 +135,7 @@ def test_a_film_and_a_page_of_a_clip(output: Path, toss: Path) -> None:
     assert outcome.failures == {}
     assert {"toss/5/comparison.mp4", "toss/5/comparison.blend", "report.html"} <= {*published(output)}
     assert "toss/5/comparison.mp4" in (output / "report.html").read_text()
-    assert any(doing.startswith("toss at 5 keys/s") for _, doing in listener.reached)
+    assert any(doing.startswith("render toss/5 from 1") for _, doing in listener.reached)
     assert listener.reached[-1][1].endswith(", frame 7 of 7")
     _, again = compared(output, comparison)
     assert again.made == []
@@ -360,15 +359,16 @@ sys.modules["bpy"] = sys.modules["mathutils"] = None
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.pipeline.comparison import Comparison, ComparisonPlan
 from rigid_motion_batch.report.settings import Settings
-from rigid_motion_batch.pipeline.performing import Executor
+from rigid_motion_batch.pipeline.executors import Executor
 from rigid_motion_batch.pipeline.running import Run
 from rigid_motion_batch.pipeline.store import Store
+from rigid_motion_batch.progress import Progress
 
 with Store(Path(sys.argv[2])) as store, Executor() as executor:
     choices, modes = (Tolerance("2cm"),), ("lerp_slerp", "motor_spline")
     about = Settings(0.1, "x", "y")
     plan = ComparisonPlan(Comparison((sys.argv[1],), choices, modes, count_keys=True, about=about), store)
-    run = Run(store, executor)
+    run = Run(store, executor, Progress(quiet=True))
     run.do(plan.reading)
     plan.look_into()
     run.do(plan.tasks)

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from rigid_motion_batch.pipeline import steps as pipeline_steps
-from rigid_motion_batch.pipeline.explain import explain
-from rigid_motion_batch.pipeline.performing import Executor
-from rigid_motion_batch.pipeline.steps import OWN, Step, Task, digest_of
+from rigid_motion_batch import places
+from rigid_motion_batch.pipeline.executors import Executor
+from rigid_motion_batch.pipeline.running import explain
+from rigid_motion_batch.pipeline.steps import OWN, Task, digest_of
 from rigid_motion_batch.pipeline.store import Store
 from tests.scripts.pipeline import steps
 from tests.scripts.pipeline.plans import joining, run, run_in, task, writing
@@ -22,7 +22,7 @@ def explained(output: Path, *tasks: Task) -> dict[str, str]:
 
 
 def two(text: str = "1") -> tuple[Task, Task]:
-    first = writing("a", text, title="The first")
+    first = writing("a", text)
     return first, joining("b", first)
 
 
@@ -37,7 +37,7 @@ def test_what_changed_is_named(output: Path) -> None:
     run_in(output, *two())
     assert explained(output, *two("2")) == {
         "a": "parameters changed (text: 1 -> 2)",
-        "b": "an earlier step changed (The first)",
+        "b": "an earlier step changed (a)",
     }
 
 
@@ -46,7 +46,7 @@ def test_a_changed_file_is_named(output: Path, tmp_path: Path) -> None:
     source.write_text("1")
 
     def copying(store: Store) -> Task:
-        return task("a", steps.copy, inputs=(store.input(source),))
+        return task("a", steps.Copy(), inputs=store.inputs(source))
 
     with Store(output) as store:
         run(lambda: [copying(store)], store, Executor())
@@ -65,7 +65,7 @@ def test_files_that_are_missing_or_edited_are_named(output: Path) -> None:
 
 
 def test_a_damaged_result_is_named(output: Path) -> None:
-    hidden = task("a", steps.write, Write("1"), publish={})
+    hidden = task("a", Write("1"), publish={})
     run_in(output, hidden)
     (path,) = (output / OWN).glob("results/*/out.txt")
     path.unlink()
@@ -75,7 +75,7 @@ def test_a_damaged_result_is_named(output: Path) -> None:
 @pytest.fixture
 def room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A room of the program."""
-    monkeypatch.setattr(pipeline_steps, "place_of_room", lambda name: tmp_path / name)
+    monkeypatch.setattr(places, "place_of", lambda name: tmp_path / name)
     digest_of.cache_clear()
     (tmp_path / "measuring" / "deep").mkdir(parents=True)
     (tmp_path / "drawing").mkdir()
@@ -84,7 +84,11 @@ def room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def in_rooms(*rooms: str) -> Task:
     digest_of.cache_clear()
-    return task("a", Step(steps.write.function, rooms=rooms), Write("1"), publish={})
+
+    class Measure(Write, rooms=rooms):
+        pass
+
+    return task("a", Measure("1"), publish={})
 
 
 def test_a_change_in_a_room_redoes_the_steps_that_use_it_and_no_others(room: Path, output: Path) -> None:
@@ -117,10 +121,10 @@ def test_files_that_come_and_go_change_a_room(room: Path, change: str) -> None:
 
 
 def test_a_room_that_does_not_exist_is_an_error() -> None:
-    with pytest.raises(KeyError):
-        pipeline_steps.place_of_room("kitchen")
+    with pytest.raises(FileNotFoundError):
+        digest_of(places.place_of("kitchen"))
 
 
 def test_rooms_are_folders_and_files_of_the_program() -> None:
-    places = [pipeline_steps.place_of_room(name) for name in ("pipeline", "files.py", "rigid_motion/motion")]
-    assert all(place.exists() for place in places)
+    names = ("pipeline", "files.py", "rigid_motion/motion", "rigid_motion/animation")
+    assert all(places.place_of(name).exists() for name in names)

@@ -26,7 +26,7 @@ from tests.scripts.pipeline.plans import task
 from tests.scripts.pipeline.steps import Write
 
 if __name__ == "__main__":
-    tasks = [task(str(n), steps.write, Write(str(n), seconds=float(sys.argv[2]))) for n in range(20)]
+    tasks = [task(str(n), Write(str(n), seconds=float(sys.argv[2]))) for n in range(20)]
     run_in(Path(sys.argv[1]), *tasks, joining("all", *tasks), executor=ProcessExecutor(2))
 """
 

@@ -11,13 +11,13 @@ from rigid_motion_batch.pipeline.executors import ProcessExecutor
 from rigid_motion_batch.pipeline.store import Store
 from tests.scripts.pipeline import steps
 from tests.scripts.pipeline.plans import Listener, contents, joining, run, run_in, states, task, writing
-from tests.scripts.pipeline.steps import Die, Write
+from tests.scripts.pipeline.steps import Die
 
 needs_signals = pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")
 
 
 def test_tasks_are_done_by_as_many_processes_as_there_are_jobs(output: Path) -> None:
-    tasks = [task(name, steps.process_id, Write(name, seconds=0.4)) for name in "abcd"]
+    tasks = [task(name, steps.ProcessId(name, 0.4)) for name in "abcd"]
     run_in(output, *tasks, executor=ProcessExecutor(2))
     workers = set(contents(output).values())
     assert len(workers) == 2
@@ -26,7 +26,7 @@ def test_tasks_are_done_by_as_many_processes_as_there_are_jobs(output: Path) -> 
 
 @needs_signals
 def test_a_worker_that_dies_is_replaced_and_its_task_done_again(output: Path, tmp_path: Path) -> None:
-    dying = task("b", steps.die, Die(str(tmp_path / "marker"), 2))
+    dying = task("b", Die(str(tmp_path / "marker"), 2))
     listener = Listener()
     tasks = [writing("a"), dying, joining("c", dying)]
     assert states(run_in(output, *tasks, executor=ProcessExecutor(2), progress=listener)) == {"done": 3}
@@ -37,7 +37,7 @@ def test_a_worker_that_dies_is_replaced_and_its_task_done_again(output: Path, tm
 
 @needs_signals
 def test_a_task_that_kills_every_worker_is_given_up_and_the_others_go_on(output: Path, tmp_path: Path) -> None:
-    tasks = [task("b", steps.die, Die(str(tmp_path / "marker"), 99)), writing("a")]
+    tasks = [task("b", Die(str(tmp_path / "marker"), 99)), writing("a")]
     outcome = run_in(output, *tasks, executor=ProcessExecutor(1))
     assert states(outcome) == {"failed": 1, "done": 1}
     assert outcome.failures["b"].startswith("b: its process died (SIGKILL, perhaps for want of memory)")
@@ -47,13 +47,13 @@ def test_a_task_that_kills_every_worker_is_given_up_and_the_others_go_on(output:
 
 @needs_signals
 def test_the_last_line_that_a_dying_worker_printed_is_said(output: Path, tmp_path: Path) -> None:
-    dying = task("b", steps.die, Die(str(tmp_path / "marker"), 99, "reading\nno such bone: Hand\n\n"))
+    dying = task("b", Die(str(tmp_path / "marker"), 99, "reading\nno such bone: Hand\n\n"))
     outcome = run_in(output, dying, executor=ProcessExecutor(1))
     assert "(SIGKILL, perhaps for want of memory): no such bone: Hand; given up after 3" in outcome.failures["b"]
 
 
 def test_what_is_printed_in_a_worker_does_not_get_in_the_way(output: Path, capfd: pytest.CaptureFixture) -> None:
-    run_in(output, task("a", steps.chatter), executor=ProcessExecutor(1))
+    run_in(output, task("a", steps.Chatter()), executor=ProcessExecutor(1))
     assert capfd.readouterr() == ("", "")
 
 

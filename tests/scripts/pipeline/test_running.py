@@ -12,14 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from rigid_motion_batch.pipeline.executors import ProcessExecutor
-from rigid_motion_batch.pipeline.performing import Executor
-from rigid_motion_batch.pipeline.running import Run, Share
+from rigid_motion_batch.pipeline.executors import Executor, ProcessExecutor
+from rigid_motion_batch.pipeline.running import Run, share_of
 from rigid_motion_batch.pipeline.steps import OWN, Step, Task
 from rigid_motion_batch.pipeline.store import Store
 from tests.scripts.pipeline import steps
 from tests.scripts.pipeline.plans import EXECUTORS, Listener, contents, joining, run, run_in, states, task, writing
-from tests.scripts.pipeline.steps import FILE, Count, Fail, Nothing, Write
+from tests.scripts.pipeline.steps import FILE, Count, Fail, Join, Write
 
 
 class Log:
@@ -85,7 +84,7 @@ def test_a_changed_input_redoes_its_task_and_those_that_read_it(output: Path, lo
 
     def redone() -> list[str]:
         with Store(output) as store, Executor() as executor:
-            first = task("a", steps.copy, Nothing(str(log)), inputs=(store.input(source),))
+            first = task("a", steps.Copy(str(log)), inputs=store.inputs(source))
             tasks = first, joining("c", first, log=log), writing("b", "b", log)
             run(lambda: tasks, store, executor)
         return log.new()
@@ -100,7 +99,7 @@ def test_a_changed_input_redoes_its_task_and_those_that_read_it(output: Path, lo
 
 @pytest.mark.parametrize("executor", EXECUTORS)
 def test_a_failure_is_said_and_the_others_go_on(output: Path, executor: str) -> None:
-    bad, good = task("bad", steps.fail, Fail()), writing("a")
+    bad, good = task("bad", Fail()), writing("a")
     needs_bad = joining("c", bad, good)
     tasks = good, bad, joining("b", good), needs_bad, joining("d", needs_bad)
     outcome = run_in(output, *tasks, executor=EXECUTORS[executor]())
@@ -110,10 +109,10 @@ def test_a_failure_is_said_and_the_others_go_on(output: Path, executor: str) -> 
 
 
 def test_an_error_that_nobody_foresaw_names_its_task_and_a_file_says_where(output: Path) -> None:
-    outcome = run_in(output, writing("a"), task("bad", steps.fail, Fail(foreseen=False), title="The bad one"))
-    assert outcome.failures["bad"] == "The bad one: KeyError: 'unforeseen'"
+    outcome = run_in(output, writing("a"), task("the bad one", Fail(foreseen=False)))
+    assert outcome.failures["the bad one"] == "the bad one: KeyError: 'unforeseen'"
     failures = json.loads((output / OWN / "failures.json").read_text())
-    assert "in fail" in failures["bad"]["details"]
+    assert "in make" in failures["the bad one"]["details"]
     run_in(output, writing("a"))
     run_in(output, writing("b"))
     assert not (output / OWN / "failures.json").exists()
@@ -121,12 +120,12 @@ def test_an_error_that_nobody_foresaw_names_its_task_and_a_file_says_where(outpu
 
 def test_an_error_of_the_system_names_the_file_where_it_would_have_been(output: Path) -> None:
     names = {"x/keys.csv": "keys.csv", "x/best_of.keys.csv": "a/best_of.keys.csv"}
-    outcome = run_in(output, task("c", steps.stumble, Write("x/best_of.keys.csv"), publish=names))
+    outcome = run_in(output, task("c", steps.Stumble("x/best_of.keys.csv"), publish=names))
     assert outcome.failures["c"].startswith(f"c: {output}/a/best_of.keys.csv: ")
 
 
 def test_a_task_that_does_not_make_what_it_publishes_has_failed(output: Path) -> None:
-    outcome = run_in(output, task("a", steps.forget))
+    outcome = run_in(output, task("a", steps.Forget()))
     assert outcome.failures["a"] == f"{output / 'a.txt'}: this was to be made, and was not"
 
 
@@ -135,7 +134,7 @@ def test_a_task_that_failed_is_tried_again_the_next_time(output: Path, tmp_path:
 
     def attempt() -> Run:
         with Store(output) as store, Executor() as executor:
-            first = task("a", steps.copy, inputs=(store.input(source),))
+            first = task("a", steps.Copy(), inputs=store.inputs(source))
             return run(lambda: (first, joining("b", first), writing("c")), store, executor)
 
     outcome = attempt()
@@ -149,7 +148,7 @@ def test_an_input_that_vanishes_while_it_is_read_is_said_and_nothing_comes_of_it
     source = tmp_path / "in.csv"
     source.write_text("1")
     with Store(output) as store:
-        outcome = run(lambda: [task("a", steps.vanish, inputs=(store.input(source),))], store, Executor())
+        outcome = run(lambda: [task("a", steps.Vanish(), inputs=store.inputs(source))], store, Executor())
     assert "changed while it was read" in outcome.failures["a"]
     assert contents(output) == {}
 
@@ -166,14 +165,14 @@ def test_an_input_that_is_no_file_is_refused_and_not_waited_for(tmp_path: Path, 
     }[kind]()
     source = f"{path}\0" if kind == "NUL" else path
     with Store(tmp_path / "out") as store:
-        tasks = [task("a", steps.copy, inputs=(store.input(source),)), writing("b")]
+        tasks = [task("a", steps.Copy(), inputs=store.inputs(source)), writing("b")]
         outcome = run(lambda: tasks, store, Executor())
     assert states(outcome) == {"failed": 1, "done": 1}
 
 
 def test_what_was_published_of_something_else_does_not_pass_for_the_result_of_a_failure(output: Path) -> None:
     run_in(output, writing("a", "of yesterday", publish={FILE: "a/b.txt"}))
-    outcome = run_in(output, task("a", steps.fail, Fail(), publish={FILE: "a/b.txt"}))
+    outcome = run_in(output, task("a", Fail(), publish={FILE: "a/b.txt"}))
     assert states(outcome) == {"failed": 1}
     assert os.listdir(output) == [OWN]
 
@@ -207,9 +206,9 @@ def test_a_partial_task_makes_the_best_of_what_there_is(output: Path, tmp_path: 
 
     def attempt() -> dict[str, int]:
         with Store(output) as store, Executor() as executor:
-            tasks = [writing("a", "1"), task("b", steps.copy, inputs=(store.input(source),))]
-            tasks.append(task("report", steps.report, None, *tasks))
-            tasks.append(task("overview", steps.report, None, tasks[-1]))
+            tasks = [writing("a", "1"), task("b", steps.Copy(), inputs=store.inputs(source))]
+            tasks.append(task("report", steps.Report(), *tasks))
+            tasks.append(task("overview", steps.Report(), tasks[-1]))
             return states(run(lambda: tasks, store, executor))
 
     assert attempt() == {"done": 3, "failed": 1}
@@ -221,15 +220,14 @@ def test_a_partial_task_makes_the_best_of_what_there_is(output: Path, tmp_path: 
 
 
 def test_a_partial_task_with_nothing_to_go_by_is_skipped(output: Path) -> None:
-    bad = task("bad", steps.fail, Fail())
-    assert states(run_in(output, bad, task("report", steps.report, None, bad))) == {"failed": 1, "skipped": 1}
+    bad = task("bad", Fail())
+    assert states(run_in(output, bad, task("report", steps.Report(), bad))) == {"failed": 1, "skipped": 1}
 
 
-def film(output: Path, log: object, piece: str = "1", step: Step = steps.join, **options: object) -> Run:
+def film(output: Path, log: object, piece: str = "1", step: Step | None = None, **options: object) -> Run:
     """Run a plan of a film whose pieces are wanted where it is missing only."""
-    pieces = [Task(steps.write, Write(text, str(log)), f"piece {text}") for text in (piece, "2")]
-    parameters = Fail() if step is steps.fail else Nothing(str(log))
-    whole = task("film", step, parameters, *pieces, spends=tuple(item.key for item in pieces))
+    pieces = [Task(Write(text, str(log)), f"piece {text}") for text in (piece, "2")]
+    whole = task("film", step or Join(str(log)), *pieces, spends=tuple(item.key for item in pieces))
     with Store(output, **options) as store, Executor() as executor:
         return run(lambda: [whole] if store.index_of(whole.key) else [*pieces, whole], store, executor)
 
@@ -253,7 +251,7 @@ def test_spent_results_go_when_what_wanted_them_is_done(output: Path, log: Log) 
 
 
 def test_results_stay_for_a_task_that_failed(output: Path, log: Log) -> None:
-    film(output, log, step=steps.fail)
+    film(output, log, step=Fail())
     assert log.new() == ["1", "2"]
     assert kept(output) == 2
     film(output, log)
@@ -267,10 +265,10 @@ def test_results_stay_for_a_task_that_failed(output: Path, log: Log) -> None:
 @pytest.mark.parametrize("parts", [1, 2, 3])
 def test_the_shares_of_a_plan_make_the_whole(output: Path, log: Log, parts: int) -> None:
     first = [writing(f"{n}", f"{n}", log) for n in range(5)]
-    tasks = [*first, joining("pair", *first[:2], log=log), task("all", steps.report, Nothing(str(log)), *first)]
+    tasks = [*first, joining("pair", *first[:2], log=log), task("all", steps.Report(str(log)), *first)]
     for stage in ("write", "join", "report"):
         for number in range(1, parts + 1):
-            outcome = run_in(output, *tasks, alone=False, share=Share(stage, number, parts))
+            outcome = run_in(output, *tasks, alone=False, share=(stage, number, parts))
             assert not outcome.failures
     assert contents(output)["all.txt"] == "01234"
     assert contents(output)["pair.txt"] == "01"
@@ -278,12 +276,19 @@ def test_the_shares_of_a_plan_make_the_whole(output: Path, log: Log, parts: int)
     assert states(run_in(output, *tasks)) == {"up to date": 7}
 
 
+def test_shares_are_even_and_a_task_goes_with_what_it_reads() -> None:
+    firsts = [writing(f"{n}") for n in range(6)]
+    pairs = [item for first in firsts for item in (first, task(f"after {first.name}", Write("x"), first))]
+    shares = [[item.name for item in share_of(lambda: pairs, "write", number, 3)] for number in (1, 2, 3)]
+    assert shares == [[f"{n}", f"after {n}", f"{n + 3}", f"after {n + 3}"] for n in range(3)]
+
+
 def test_shares_at_the_same_time_do_not_get_in_one_anothers_way(output: Path) -> None:
     tasks = [writing(f"{n}") for n in range(60)]
     tasks.append(joining("all", *tasks))
 
     def work(number: int) -> None:
-        run_in(output, *tasks, alone=False, share=Share("write", number, 3))
+        run_in(output, *tasks, alone=False, share=("write", number, 3))
         run_in(output, *tasks, alone=False)
 
     workers = [threading.Thread(target=work, args=(number,)) for number in (1, 2, 3)]
@@ -300,7 +305,7 @@ def test_shares_at_the_same_time_do_not_get_in_one_anothers_way(output: Path) ->
 
 
 def test_a_full_disk_ends_the_run_with_what_is_done_in_place(output: Path) -> None:
-    outcome = run_in(output, writing("a", "1"), task("b", steps.fill_disk), writing("c"))
+    outcome = run_in(output, writing("a", "1"), task("b", steps.FillDisk()), writing("c"))
     assert states(outcome) == {"done": 1, "failed": 1, "not begun or stopped": 1}
     assert outcome.problem == f"b: {output / 'b.txt'}: {os.strerror(28)}"
     assert contents(output) == {"a.txt": "1"}
@@ -332,7 +337,7 @@ def test_an_output_folder_that_cannot_be_made_is_an_error_of_the_system(tmp_path
 
 
 def test_a_run_that_made_nothing_leaves_nothing(output: Path) -> None:
-    run_in(output / "deeper", task("bad", steps.fail, Fail()))
+    run_in(output / "deeper", task("bad", Fail()))
     assert not output.exists()
 
 
@@ -352,8 +357,8 @@ def interrupt_when(condition: object) -> threading.Thread:
 
 @pytest.mark.parametrize("executor", EXECUTORS)
 def test_ctrl_c_leaves_what_is_done_and_nothing_half_written(output: Path, executor: str) -> None:
-    first, slow = writing("a", "1"), task("slow", steps.write, Write("2", seconds=60.0))
-    tasks = [first, slow, joining("b", slow), task("report", steps.report, None, first, slow)]
+    first, slow = writing("a", "1"), task("slow", Write("2", seconds=60.0))
+    tasks = [first, slow, joining("b", slow), task("report", steps.Report(), first, slow)]
     interrupt_when((output / "a.txt").exists)
     started = time.monotonic()
     outcome = run_in(output, *tasks, executor=EXECUTORS[executor]())
@@ -369,17 +374,16 @@ def test_ctrl_c_leaves_what_is_done_and_nothing_half_written(output: Path, execu
 
 def test_progress_is_told_in_weights_and_words(output: Path) -> None:
     listener = Listener()
-    tasks = [writing("a", weight=2.0, title="The first"), task("b", steps.chatter, weight=4.0, title="The second")]
+    tasks = [writing("a", seconds=2.0), task("b", steps.Chatter(), seconds=4.0)]
     outcome = run_in(output, *tasks, executor=ProcessExecutor(2), progress=listener)
     assert listener.total == 6.0
-    assert any(doing == "The second: half way" and done in (2.0, 4.0) for done, doing in listener.reached)
-    assert listener.notes == ["it is nearly there"]
+    assert any(doing == "b: half way" and done in (2.0, 4.0) for done, doing in listener.reached)
     assert states(outcome) == {"done": 2}
 
 
 @pytest.mark.parametrize("executor", EXECUTORS)
 def test_what_is_counted_is_counted_over_all_tasks_and_never_goes_back(output: Path, executor: str) -> None:
-    films = [task(f"{n}", steps.count, Count(n), frames=n) for n in (4, 2, 3)]
+    films = [task(f"{n}", Count(n), frames=n) for n in (4, 2, 3)]
     run_in(output, films[1])
     listener = Listener()
     run_in(output, *films, writing("a"), executor=EXECUTORS[executor](), progress=listener)

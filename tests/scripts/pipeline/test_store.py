@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 
 from rigid_motion_batch.pipeline import steps as pipeline_steps
-from rigid_motion_batch.pipeline.performing import Executor
+from rigid_motion_batch.pipeline.executors import Executor
 from rigid_motion_batch.pipeline.steps import OWN, Task
 from rigid_motion_batch.pipeline.store import OutputError, Store
 from tests.scripts.pipeline import steps
 from tests.scripts.pipeline.plans import contents, joining, run, run_in, states, task, writing
-from tests.scripts.pipeline.steps import FILE, Nothing, Write
+from tests.scripts.pipeline.steps import FILE, Write
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -29,7 +29,7 @@ def whole() -> tuple[Task, Task, Task]:
 def copying(output: Path, source: Path, name: str = "a", **options: object) -> dict[str, int]:
     """Run a task that reads a file."""
     with Store(output, **options) as store, Executor() as executor:
-        return states(run(lambda: [task(name, steps.copy, inputs=(store.input(source),))], store, executor))
+        return states(run(lambda: [task(name, steps.Copy(), inputs=store.inputs(source))], store, executor))
 
 
 # -- whose a file is --------------------------------------------------------------------------------------------------
@@ -108,31 +108,16 @@ def test_what_this_program_wrote_is_no_input_of_the_next_run(output: Path, tmp_p
     (tmp_path / "linked").symlink_to(output / "c.txt")
     with pytest.raises(OutputError, match="this input was written by a run into this folder"):
         copying(output, tmp_path / "linked", "d")
-    with pytest.raises(OutputError, match="where the program works"):
+    with pytest.raises(OutputError, match="this input was written by a run into this folder"):
         copying(output, next((output / OWN).glob("results/*/out.txt")), "d")
     assert copying(tmp_path / "other", output / "c.txt", "d") == {"done": 1}
 
 
-@pytest.mark.parametrize(
-    "path",
-    [
-        "../a",
-        "/a",
-        "a/../../b",
-        "C:/a",
-        "a\\b",
-        "a//b",
-        "",
-        ".",
-        "a\0b",
-        ".rigid-motion/lock",
-        ".Rigid-Motion/x",
-        "a:b",
-    ],
-)
-def test_no_path_leads_out_of_the_folder(path: str) -> None:
-    with pytest.raises(ValueError, match=r"is no path below the output folder|keeps its own files"):
-        writing("a", publish={FILE: path})
+@pytest.mark.parametrize("path", ["../a", "{}/a", "a/../../b"])
+def test_no_path_leads_out_of_the_folder(output: Path, tmp_path: Path, path: str) -> None:
+    outcome = run_in(output, writing("a", publish={FILE: path.format(tmp_path)}))
+    assert "leads out of the output folder" in outcome.failures["a"]
+    assert os.listdir(tmp_path) == ["out"]
 
 
 def test_a_link_that_leads_out_of_the_folder_is_not_followed(output: Path, tmp_path: Path) -> None:
@@ -226,7 +211,7 @@ needs_pipes = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has 
     ],
 )
 def test_a_damaged_result_is_made_again(output: Path, damage: Callable[[Path], None], part: str) -> None:
-    hidden = task("hidden", steps.write, Write("1"), publish={})
+    hidden = task("hidden", Write("1"), publish={})
     run_in(output, hidden)
     (path,) = (output / OWN).glob(part)
     damage(path)
@@ -257,8 +242,8 @@ def rewritten(path: Path, content: str) -> None:
 
 
 def parsing(log: object = "") -> list[Task]:
-    part = task("part", steps.write, Write('{"a": 1}', str(log)), publish={})
-    return [part, task("whole", steps.parse, None, part)]
+    part = task("part", Write('{"a": 1}', str(log)), publish={})
+    return [part, task("whole", steps.Parse(), part)]
 
 
 def test_what_a_failed_task_reads_is_made_again_where_it_is_damaged(output: Path) -> None:
@@ -274,7 +259,7 @@ def test_what_a_failed_task_reads_is_made_again_where_it_is_damaged(output: Path
 
 def test_a_task_that_fails_for_its_own_reasons_is_tried_once(output: Path) -> None:
     part = writing("part", "no JSON")
-    outcome = run_in(output, part, task("whole", steps.parse, None, part))
+    outcome = run_in(output, part, task("whole", steps.Parse(), part))
     assert states(outcome) == {"done": 1, "failed": 1}
     assert "JSONDecodeError" in outcome.failures["whole"]
 
@@ -346,5 +331,4 @@ def test_what_is_kept_of_a_result_says_what_it_was_made_of(output: Path) -> None
         "seconds": 0.0,
         "files": [],
     }
-    assert made_of["step"] == "tests.scripts.pipeline.steps:write"
-    assert states(run_in(output, task("a", steps.write, Nothing()), executor=Executor())) == {"failed": 1}
+    assert states(run_in(output, task("a", steps.Fail()))) == {"failed": 1}

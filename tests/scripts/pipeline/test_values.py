@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -75,15 +76,15 @@ def test_a_class_of_another_kind_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["os:system", "pathlib:Path", "nowhere:Circle", "Circle"])
 def test_what_is_no_class_of_values_is_not_made(name: str) -> None:
     with pytest.raises(ValueError, match="is no class of values"):
-        values.from_plain({"$": name})
+        values.from_json(json.dumps({"$": name}), {})
 
 
 def test_what_is_no_value_is_refused() -> None:
     with pytest.raises(TypeError, match="object is no value"):
-        values.to_plain(object())
+        values.plain(object())
     with pytest.raises(TypeError, match="ndarray is no value"):
-        values.to_plain(np.zeros(2))
+        values.plain(np.zeros(2))
 
 
 def test_numbers_of_numpy_become_those_of_python() -> None:
-    assert values.to_plain([np.float64(0.5), np.int64(3), np.bool_(True)]) == [0.5, 3, True]
+    assert json.dumps([np.float64(0.5), np.int64(3), np.bool_(True)], default=values.plain) == "[0.5, 3, true]"

@@ -38,7 +38,7 @@ def active_binding(transform: Transform, bindings: Iterable[Binding] | None = No
 
 
 def active_bindings(transforms: Sequence[Transform]) -> dict[Transform, Binding]:
-    """Return `active_place` of each that has one, by a single look."""
+    """Return `active_binding` of each that has one, by a single look."""
     desired, result = set(transforms), {}
     for binding in bindings_of(transforms):
         for user in binding.users:
