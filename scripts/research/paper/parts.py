@@ -10,7 +10,6 @@ import argparse
 import json
 import sys
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +23,11 @@ require_blender(SCRIPT)
 
 import bpy
 
+from research.drawing import save
 from research.pages import FIGURES
 from research.studies import files_in, publish, study_parser
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.scenes.film import render_film, render_still
 
 from . import bodies, catching, motions, sending, strips, table, timing, triangle
 from .table import PAPER, TIME_SAVED, UPDATES
@@ -145,16 +144,15 @@ def count_figures(_: argparse.Namespace) -> dict[str, Any]:
     return {"triangle": triangle.figures(), "strips": strips.figures(), "catching": caught}
 
 
-def render(options: argparse.Namespace) -> None:
-    """Render the figures to docs/paper/."""
+def draw(options: argparse.Namespace) -> None:
+    """Draw the figures, and write them to docs/paper/."""
     folder = options.root / "docs" / "paper"
     folder.mkdir(parents=True, exist_ok=True)
-    caught = partial(catching.build, motions.assets()["throw"])
-    pictures = {"triangle": triangle.build, "strips": strips.build, "catching": partial(caught, film=False)}
-    for name, build in pictures.items():
-        render_still(build(), folder / f"{name}.png")
+    for name, figure in {"triangle": triangle.draw, "strips": strips.draw}.items():
+        save(figure(), folder / f"{name}.png")
+    catching.write_picture(motions.assets()["throw"], folder / "catching.png")
     if not options.no_video:
-        render_film(caught(film=True), folder / "catching.mp4", lambda *_: None)
+        catching.write_film(motions.assets()["throw"], folder / "catching.mp4")
 
 
 PARTS: dict[str, Callable[[argparse.Namespace], dict[str, Any] | None]] = {
@@ -163,5 +161,5 @@ PARTS: dict[str, Callable[[argparse.Namespace], dict[str, Any] | None]] = {
     "bodies": measure_bodies,
     "timing": race,
     "figures": count_figures,
-    "pictures": render,
+    "pictures": draw,
 }
