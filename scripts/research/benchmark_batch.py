@@ -32,10 +32,18 @@ from rigid_motion_batch.places import PACKAGE
 SECONDS = 2.0  # of a clip
 RATE = 90.0  # samples a second of the clip whose length grows
 FEW = 20  # clips to compare the memory with
-MAIN = "import sys; from rigid_motion_batch.cli.commands import main; sys.exit(main(sys.argv[1:]))"
+MAIN = """
+import os, resource, sys
+if {}:
+    os.sched_setaffinity(0, {{min(os.sched_getaffinity(0))}})
+from rigid_motion_batch.cli.commands import main
+code = main(sys.argv[1:])
+print(*(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)))
+sys.exit(code)
+"""
 """The program in the process that is started; `-m rigid_motion_batch` does the work in a child of that."""
 
-POLL = 0.05  # seconds between two looks at the memory of the processes
+UNIT = 1 if sys.platform == "darwin" else 1024  # bytes
 
 
 @dataclass(frozen=True)
@@ -45,7 +53,7 @@ class Run:
     seconds: float
 
     program: int
-    """The most memory of the program itself, in bytes; 0 where that cannot be told."""
+    """The most memory of the program itself, in bytes."""
 
     worker: int
     """The most memory of any process that it started."""
@@ -72,39 +80,11 @@ def wandering(samples: int) -> str:
 
 def compare(clips: Sequence[Path], folder: Path, jobs: int, *options: str, alone: bool = False) -> Run:
     """Run `compare` on some clips, on a single processor if it is to be alone, into a new folder in that one."""
-    output = Path(tempfile.mkdtemp(dir=folder))
-    command = [sys.executable, "-c", MAIN, "compare", *clips, "--output", output, "--jobs", str(jobs)]
-    started, program, worker = time.perf_counter(), 0, 0
-    with subprocess.Popen([*command, *options], cwd=PACKAGE.parent, stdout=subprocess.DEVNULL) as process:
-        if alone:
-            os.sched_setaffinity(process.pid, {min(os.sched_getaffinity(0))})
-        while process.poll() is None:
-            program = max(program, peak_memory_of(process.pid))
-            worker = max([worker, *map(peak_memory_of, children_of(process.pid))])
-            time.sleep(POLL)
-        seconds = time.perf_counter() - started
-    if process.returncode:
-        raise subprocess.CalledProcessError(process.returncode, process.args)
-    return Run(seconds, program, worker)
-
-
-def _of_process(pid: int, name: str) -> str:
-    """Return what Linux says of a process; nothing where it is gone, or the system is another."""
-    try:
-        return Path(f"/proc/{pid}/{name}").read_text(encoding="ascii", errors="replace")
-    except OSError:
-        return ""
-
-
-def peak_memory_of(pid: int) -> int:
-    """Return the most memory, in bytes, that a process has had; 0 where that cannot be told."""
-    lines = _of_process(pid, "status").splitlines()
-    return next((int(line.split()[1]) << 10 for line in lines if line.startswith("VmHWM:")), 0)
-
-
-def children_of(pid: int) -> list[int]:
-    """Return the processes that a process has started; none where that cannot be told."""
-    return [int(child) for child in _of_process(pid, f"task/{pid}/children").split()]
+    command = [*clips, "--output", tempfile.mkdtemp(dir=folder), "--jobs", jobs, *options]
+    program = [sys.executable, "-c", MAIN.format(alone), "compare", *map(str, command)]
+    started = time.perf_counter()
+    said = subprocess.run(program, cwd=PACKAGE.parent, stdout=subprocess.PIPE, text=True, check=True).stdout
+    return Run(time.perf_counter() - started, *(UNIT * int(number) for number in said.splitlines()[-1].split()))
 
 
 def workers(clips: Sequence[Path], folder: Path, rounds: int, *options: str) -> list[dict[str, Any]]:
