@@ -18,7 +18,6 @@ import bpy
 import numpy as np
 
 from research import body_reduction
-from research.body_reduction import figures_of
 from research.studies import EXTENSIONS, files_in, publish, report, study_parser
 from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate, repair, shell_error
@@ -92,25 +91,26 @@ def measure(
         decimate(obj, **options)
         return outcome(obj, recording, truth, radius)
 
-    as_few, fewest, most = None, 2, round(reduced.keys)
+    fewest, most = 2, round(reduced.keys)
+    as_few = None
     while fewest < most:
         keys = (fewest + most + 1) // 2
         tried = decimated(mode="RATIO", factor=1.0 - keys / len(recording.frames))
-        if tried.frames <= reduced.frames:
-            fewest, as_few = keys, tried
-        else:
-            most = keys - 1
+        fewest, most, as_few = (keys, most, tried) if tried.frames <= reduced.frames else (fewest, keys - 1, as_few)
 
-    as_good, (low, high) = None, np.log(MARGINS)
+    good, (low, high) = [], np.log(MARGINS)
     for _ in range(TRIALS):
         margin = 0.5 * (low + high)
         tried = decimated(mode="ERROR", remove_error_margin=float(np.exp(margin)))
-        if tried.largest <= reduced.largest:
-            low = margin
-            as_good = tried if as_good is None or tried.keys < as_good.keys else as_good
-        else:
-            high = margin
-    return reduced, as_good, as_few
+        is_good = tried.largest <= reduced.largest
+        low, high = (margin, high) if is_good else (low, margin)
+        good += [tried] if is_good else []
+    return reduced, min(good, key=lambda left: left.keys, default=None), as_few
+
+
+def figures_of(left: Left) -> dict[str, float]:
+    """Return the figures of what is left."""
+    return {"frames": left.frames, "key_count": left.keys, "numbers": left.numbers, "error_mm": 1e3 * left.largest}
 
 
 def row(recording: Recording, reduced: Left, as_good: Left | None, as_few: Left | None) -> dict[str, Any]:

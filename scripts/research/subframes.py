@@ -54,15 +54,6 @@ MOTIONS = (
 )
 
 
-@dataclass(frozen=True)
-class Deviation:
-    """How far a motion is off: shell errors in metres, the rotation in radians."""
-
-    largest: float
-    rms: float
-    rotation: float
-
-
 def key_poses(motion: Motion) -> Poses:
     """Return poses a turn and a step apart, in directions drawn at random."""
     axes, steps = normalise(np.random.default_rng(11).normal(size=(2, SEGMENTS, 3)))
@@ -94,51 +85,40 @@ def between(motion: Motion, fractions: np.ndarray) -> np.ndarray:
     return (np.arange(first, last)[:, None] + fractions).ravel()
 
 
-def deviation(obj: bpy.types.Object, frames: np.ndarray, requested: Poses, radius: float) -> Deviation:
-    """Return how far Blender shows an object from where it should be."""
-    shown = animation.read_poses(obj, frames)
-    shell = shell_error(shown, requested, radius)
-    turned = angle_between(shown.quaternions, requested.quaternions)
-    return Deviation(float(shell.max()), rms(shell), float(turned.max()))
-
-
-def measure(motion: Motion, mode: str, rotation_mode: str, radius: float) -> list[Deviation]:
+def measure(motion: Motion, mode: str, rotation_mode: str, radius: float) -> dict[str, float]:
     """Measure live in-betweens, exact ones, those baked on every quarter of a frame, and on every whole frame."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     obj = keyed_object(motion, rotation_mode)
     animation.set_mode(obj, mode)
-    quarters, finest, eighths = (
-        (frames, in_betweens(source_of(obj), frames).desired, radius)
-        for frames in (between(motion, fractions) for fractions in (QUARTERS, THIRTY_SECONDS, EIGHTHS))
-    )
-    live = deviation(obj, *quarters)
+    moments = [between(motion, fractions) for fractions in (QUARTERS, THIRTY_SECONDS, EIGHTHS)]
+    quarters, finest, eighths = ((frames, in_betweens(source_of(obj), frames).desired) for frames in moments)
+
+    def deviation(name: str, frames: np.ndarray, requested: Poses) -> dict[str, float]:
+        """Return how far Blender shows it from where it should be."""
+        shown = animation.read_poses(obj, frames)
+        shell, turned = shell_error(shown, requested, radius), angle_between(shown.quaternions, requested.quaternions)
+        figures = {"mm": 1e3 * shell.max(), "rms_mm": 1e3 * rms(shell), "degrees": np.degrees(turned.max())}
+        return {f"{name}_{unit}": float(figure) for unit, figure in figures.items()}
+
+    figures = deviation("live", *quarters)
     animation.set_exact(obj)
-    exact = deviation(obj, *finest)
+    figures |= deviation("exact", *finest)
     animation.set_exact(obj, False)
     animation.bake(obj, step=0.25)
-    finely = deviation(obj, *eighths)
+    figures |= deviation("quarter", *eighths)
     animation.unbake(obj)
     animation.bake(obj)
-    return [live, exact, finely, deviation(obj, *quarters)]
+    return figures | deviation("whole", *quarters)
 
 
 def figures_of(motion: Motion, radius: float) -> dict[str, Any]:
     """Return the figures of one motion, for every mode and rotation mode."""
-    rows = []
-    for mode in KEYFRAME_MODES:
-        for rotation_mode in ROTATION_MODES:
-            live, exact, finely, whole = measure(motion, mode, rotation_mode, radius)
-            figures = {
-                "live_mm": 1e3 * live.largest,
-                "live_rms_mm": 1e3 * live.rms,
-                "live_degrees": np.degrees(live.rotation),
-                "quarter_mm": 1e3 * finely.largest,
-                "quarter_degrees": np.degrees(finely.rotation),
-                "whole_mm": 1e3 * whole.largest,
-                "exact_mm": 1e3 * exact.largest,
-            }
-            rows.append({"mode": mode, "rotation": rotation_mode, **figures})
     about = {"name": motion.name, "degrees": motion.turn, "metres": motion.distance, "frames": motion.frames}
+    rows = [
+        {"mode": mode, "rotation": rotation_mode, **measure(motion, mode, rotation_mode, radius)}
+        for mode in KEYFRAME_MODES
+        for rotation_mode in ROTATION_MODES
+    ]
     return {**about, "rows": rows}
 
 
@@ -147,10 +127,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = study_parser("subframes", __doc__)
     parser.add_argument("--radius", type=float, default=0.1, help="of the shell, in metres (%(default)s)")
     options = parser.parse_args(arguments)
-    motions = []
+    report("some minutes")
     with registered():
-        for motion in MOTIONS:
-            report(motion.name)
-            motions.append(figures_of(motion, options.radius))
-    figures = {"radius": options.radius, "motions": motions}
+        figures = {"radius": options.radius, "motions": [figures_of(motion, options.radius) for motion in MOTIONS]}
     return publish("subframes", figures, options, f"--radius {options.radius:g}", Blender=bpy.app.version_string)
