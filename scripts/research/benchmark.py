@@ -22,7 +22,7 @@ from scipy.spatial.transform import RigidTransform, Rotation, RotationSpline, Sl
 
 from research.in_betweens import Case
 from research.studies import publish, report, seconds_in_turns, study_parser
-from rigid_motion.motion import MODES, Poses, interpolate, reduce_keys, shell_error, twists
+from rigid_motion.motion import MODES, Poses, reduce_keys, twists
 from rigid_motion.motion.poses import reshaped
 from rigid_motion.motion.quaternions import align_signs, multiply, normalise
 from rigid_motion.motion.trigonometry import VECTOR_TANGENT
@@ -162,27 +162,11 @@ def recording(count: int) -> tuple[np.ndarray, Poses]:
     return times, Poses(0.05 * way[3:].T + noise, turn.T)
 
 
-def greedy(times: np.ndarray, poses: Poses, tolerance: float) -> np.ndarray:
-    """Put keys in where the error is largest, one in each segment that passes the tolerance, until none does."""
-    keys = np.array((0, len(times) - 1))
-    while True:
-        errors = shell_error(interpolate(times[keys], poses[keys], times, "motor_spline"), poses)
-        over = np.flatnonzero(np.maximum.reduceat(errors, keys[:-1]) > tolerance)
-        if not len(over):
-            return keys
-        ends = np.append(keys, len(times))
-        keys = np.union1d(keys, [keys[i] + int(np.argmax(errors[keys[i] : ends[i + 1]])) for i in over])
-
-
 def reduction(count: int, tolerance: float = 0.005) -> dict[str, float]:
-    """Return what key reduction of so many samples takes, beside greedy insertion: the faster of two runs."""
+    """Return what key reduction of so many samples takes: the faster of two runs."""
     times, poses = recording(count)
-    programs = {"": reduce_keys, "greedy_": greedy}
-    runs = {name: partial(program, times, poses, tolerance=tolerance) for name, program in programs.items()}
-    result: dict[str, float] = {"samples": count}
-    for name, seconds in seconds_in_turns(runs, 2).items():
-        result |= {f"{name}seconds": min(seconds), f"{name}key_count": len(runs[name]())}
-    return result
+    run = partial(reduce_keys, times, poses, tolerance=tolerance)
+    return {"samples": count, "seconds": min(seconds_in_turns({"": run}, 2)[""]), "key_count": len(run())}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -191,17 +175,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--count", type=int, default=100_000, help="in-betweens in a case (%(default)s)")
     parser.add_argument("--rounds", type=int, default=50, help="rounds of all against all (%(default)s)")
     options = parser.parse_args(arguments)
-    result = []
+    figures: dict[str, Any] = {"vector_tangent": bool(VECTOR_TANGENT), "cases": []}
     for case in cases(options.count):
         report(case.title)
         about = {"title": case.title, "in_betweens": case.in_betweens, "key_count": int(np.prod(case.keys.shape))}
         seconds = seconds_in_turns(ways(case), options.rounds, warm=True, most=ENOUGH)
-        result.append({**about, "rates": rates(case, seconds)})
+        figures["cases"].append({**about, "rates": rates(case, seconds)})
     report("key reduction")
-    figures = {
-        "vector_tangent": bool(VECTOR_TANGENT),
-        "cases": result,
-        "reductions": [reduction(count) for count in (900, 1000, options.count // 10, options.count)],
-    }
+    figures["reductions"] = [reduction(count) for count in (900, 1000, options.count // 10, options.count)]
     versions = {"SciPy": scipy.__version__, "pytransform3d": pytransform3d.__version__}
     return publish("benchmark", figures, options, "--rounds", options.rounds, **versions)
