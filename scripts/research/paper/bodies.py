@@ -1,22 +1,21 @@
-"""What the paper asks, of whole bodies: key poses needed, errors, and what there is of a screw in a joint's motion.
+"""What the paper asks, of whole bodies: key poses needed, and errors.
 
-A body is measured three times. As a rig has it: every joint is interpolated in its parent's space. As trackers have it:
-hands, feet and head alone, each a single rigid body in the space of the roots, which is that of the recording. And both
-beside each other at the same keys. Errors are in metres, measured in the space of the roots.
+A body is measured as a rig has it: every joint is interpolated in its parent's space. And as trackers have it: hands,
+feet and head alone, each a single rigid body in the space of the roots, which is that of the recording. Errors are in
+metres, measured in the space of the roots.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rigid_motion.motion import Poses, decimate, interpolate, rms, shell_error
 from rigid_motion.streams.humanoid import humanoid_bones
-from rigid_motion_batch.analysis.bodies import BodyReconstruction, moving, reconstruct_body
+from rigid_motion_batch.analysis.bodies import moving, reconstruct_body
 from rigid_motion_batch.analysis.body_metrics import measure_modes
 from rigid_motion_batch.analysis.body_needed import OfBody
 from rigid_motion_batch.analysis.choices import Uniform
@@ -27,8 +26,8 @@ from rigid_motion_batch.analysis.radii import JOINT
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.recordings.options import ReadingOptions
 
+from .motions import spread
 from .table import RADIUS, SAMPLES_AN_UPDATE, SCREW, means
 
 MODES = (REFERENCE, SCREW, "pga_lerp", "motor_spline")
@@ -42,21 +41,11 @@ LIMBS = {"LeftHand": "hands", "RightHand": "hands", "LeftFoot": "feet", "RightFo
 
 KINDS = (BODY, *dict.fromkeys(LIMBS.values()))
 
-THROUGH, ALONE = "through", "alone"
-"""The ways to interpolate a limb: through the joints that it hangs on, or as a single body."""
-
 NEVER_EXACT = 1e-3
 """Files round the time of a frame: so much, as a share, may be missing to two samples an update."""
 
 SEARCHED = 10.0
 """Seconds of a whole body, from its first sample on, for which key poses are searched: every try reduces keys anew."""
-
-JUMP = 3.0
-"""A first sample is no motion from which the body gets away so many times faster than it ever moves afterwards: files
-of motion capture may begin with a pose to calibrate by."""
-
-WHOLE = ReadingOptions(start=0.0)
-"""A first sample that is no motion is looked for here, in all bodies alike."""
 
 EXTENSIONS = (".bvh", ".fbx", ".glb", ".gltf", ".blend")  # of files that may hold a body
 
@@ -64,46 +53,28 @@ EXTENSIONS = (".bvh", ".fbx", ".glb", ".gltf", ".blend")  # of files that may ho
 # -- what there is to measure ------------------------------------------------------------------------------------------
 
 
-def read_body(path: Path) -> tuple[Clip, int]:
-    """Read and repair the first whole body of a file, without a first sample that is no motion, and how many that were.
+def read_body(path: Path) -> Clip:
+    """Read and repair the first whole body of a file.
 
     Raises
     ------
     TrajectoryError
         Where there is none, or nothing of it moves.
     """
-    whole = [clip for clip in read_clips([str(path)], None, WHOLE)[0] if clip.rest_body is not None]
+    whole = [clip for clip in read_clips([str(path)])[0] if clip.rest_body is not None]
     if not whole:
         raise TrajectoryError(path, "it is no whole body", "leave it out")
-    clip = replace(whole[0], name=path.stem)
-    if not moving(clip).any():
+    if not moving(whole[0]).any():
         raise TrajectoryError(path, "at rest: none of its joints moves", "leave it out")
-    places = clip.rest_body.skeleton.in_root_space(clip.poses).positions
-    speeds = np.linalg.norm(np.diff(places, axis=1), axis=-1).max(axis=0) / np.diff(clip.times)
-    skipped = int(len(speeds) >= 2 and speeds[0] > JUMP * speeds[1:].max())
-    return part_of(clip, skipped, len(clip.times) - 1) if skipped else clip, skipped
+    return replace(whole[0], name=path.stem)
 
 
-@dataclass(frozen=True)
-class Limb:
-    """A joint that a tracker may be on, of a kind of `LIMBS`, and how many joints that move carry it, and are it."""
-
-    kind: str
-    joint: int
-    chain: int
-
-
-def limbs_of(clip: Clip) -> list[Limb]:
-    """Return the joints that move and are hands, feet and head by their names."""
-    moves, parents, result = moving(clip), clip.rest_body.parents, []
-    bones = humanoid_bones(clip.rest_body.joints)
-    for bone, kind in LIMBS.items():
-        joint, chain = bones.get(bone, -1), 0
-        while joint >= 0:
-            chain, joint = chain + int(moves[joint]), int(parents[joint])
-        if chain:
-            result.append(Limb(kind, bones[bone], chain))
-    return result
+def limbs_of(clip: Clip) -> list[tuple[str, int]]:
+    """Return the joints that are hands, feet and head by their names, and move, each with its kind."""
+    bones, skeleton = humanoid_bones(clip.rest_body.joints), clip.rest_body.skeleton
+    places = skeleton.in_root_space(clip.poses)
+    found = [(kind, bones[bone]) for bone, kind in LIMBS.items() if bone in bones]
+    return [(kind, joint) for kind, joint in found if spread(clip.in_metres(places[joint])) > 1e-6]
 
 
 def alone(clip: Clip, joint: int) -> Clip:
@@ -119,7 +90,7 @@ def has_samples_for(clip: Clip, rate: float) -> bool:
     return rate <= clip.samples_a_second * (1.0 + NEVER_EXACT) / SAMPLES_AN_UPDATE
 
 
-def needed_of(clip: Clip, limbs: Iterable[Limb]) -> list[tuple[str, dict[str, dict[str, list[float]]]]]:
+def needed_of(clip: Clip) -> list[tuple[str, dict[str, dict[str, list[float]]]]]:
     """Return the keys that every mode needs, of the whole body and of each limb alone: what it is of, and shares.
 
     The shares are by mode and decimation: of each of `RATES` the keys needed as a share of the reference's; NaN where
@@ -128,7 +99,7 @@ def needed_of(clip: Clip, limbs: Iterable[Limb]) -> list[tuple[str, dict[str, di
     radii = np.full(len(clip.rest_body.joints), JOINT)
     searched = part_of(clip, 0, int(np.searchsorted(clip.times, clip.times[0] + SEARCHED, side="right")) - 1)
     result = [(BODY, keys_needed(OfBody(searched, radii), MODES))]
-    result += [(limb.kind, keys_needed(OfRigidBody(alone(clip, limb.joint), RADIUS), MODES)) for limb in limbs]
+    result += [(kind, keys_needed(OfRigidBody(alone(clip, joint), RADIUS), MODES)) for kind, joint in limbs_of(clip)]
     return [(kind, _shares(clip, keys)) for kind, keys in result]
 
 
@@ -139,76 +110,28 @@ def _shares(clip: Clip, result: KeysNeeded) -> dict[str, dict[str, list[float]]]
     return {mode: dict(zip(DECIMATIONS, row, strict=False)) for group, row in groups for mode in group}
 
 
-def errors_of(clip: Clip, limbs: Sequence[Limb]) -> list[tuple[str, str, str, int, float, float]]:
-    """Return the errors of all modes at `ERROR_RATES`: of the body, and of each limb in both ways at the same keys.
+def errors_of(clip: Clip) -> dict[str, dict[int, tuple[float, float]]]:
+    """Return by mode and rate, of `ERROR_RATES`, the RMS shell error of the body and its RMS velocity error.
 
-    What it is of, the way, the mode, the rate, the RMS shell error, and the RMS velocity error of the body.
+    NaN where the clip has no two samples to a key pose.
     """
-    rows = []
-    for rate, keyed in _with_key_poses(clip):
-        rows += [
-            (BODY, THROUGH, row.mode, rate, row.rms_shell_m, row.rms_velocity_m_s)
-            for row in measure_modes(keyed, JOINT).rows
-        ]
-        keys, truth = decimate(clip.times, rate), keyed.truth(keyed.samples)
-        for mode in MODES:
-            shown = keyed.shown(mode, keyed.times)
-            for limb in limbs:
-                single = alone(clip, limb.joint)
-                filled = clip.in_metres(interpolate(clip.times[keys], single.poses[keys], keyed.times, mode))
-                for way, poses in ((THROUGH, shown[limb.joint]), (ALONE, filled)):
-                    error = rms(shell_error(poses, truth[limb.joint], RADIUS))
-                    rows.append((limb.kind, way, mode, rate, error, np.nan))
-    return rows
-
-
-def apart_of(clip: Clip) -> dict[int, dict[str, float]]:
-    """Return how far a screw gets from `lerp_slerp` at most, in metres, at `ERROR_RATES`.
-
-    "parents" is of all joints but the roots in their parents' spaces; "carried" of the same in the space of the roots,
-    where these are held still: what adds up along a chain; "roots" of the roots; "all" of all joints in that space;
-    "error" is how far `lerp_slerp` is from the recording there.
-    """
-    result, roots, in_root_space = {}, clip.rest_body.parents < 0, clip.rest_body.skeleton.in_root_space
-
-    def distances(first: Poses, second: Poses) -> np.ndarray:
-        return np.linalg.norm(first.positions - second.positions, axis=-1).max(axis=-1) * clip.metres_per_unit
-
-    for rate, keyed in _with_key_poses(clip):
-        straight, screw = (keyed.filled_in(mode, keyed.times) for mode in (REFERENCE, SCREW))
-        held = screw.copy()
-        held[np.flatnonzero(roots)] = straight[roots]
-        shown = in_root_space(straight)
-        local = distances(straight, screw)
-        result[rate] = {
-            "parents": local[~roots].max(initial=0.0),
-            "carried": distances(shown, in_root_space(held))[~roots].max(initial=0.0),
-            "roots": local[roots].max(),
-            "all": distances(shown, in_root_space(screw)).max(),
-            "error": distances(shown, in_root_space(clip.poses[:, keyed.samples])).max(),
-        }
+    result = {mode: dict.fromkeys(ERROR_RATES, (np.nan, np.nan)) for mode in MODES}
+    for rate in ERROR_RATES:
+        made = reconstruct_body(clip, Uniform(str(rate)), MODES, JOINT) if has_samples_for(clip, rate) else None
+        for row in measure_modes(made, JOINT).rows if made else ():
+            result[row.mode][rate] = row.rms_shell_m, row.rms_velocity_m_s
     return result
-
-
-def _with_key_poses(clip: Clip) -> list[tuple[int, BodyReconstruction]]:
-    """Return it with evenly spaced ones at `ERROR_RATES`, where the clip has two samples to each."""
-    rates = [rate for rate in ERROR_RATES if has_samples_for(clip, rate)]
-    bodies = [(rate, reconstruct_body(clip, Uniform(str(rate)), MODES, JOINT)) for rate in rates]
-    return [(rate, body) for rate, body in bodies if body]
 
 
 # -- over all bodies ---------------------------------------------------------------------------------------------------
 
 
-def measure(clips: Sequence[tuple[Clip, int]]) -> dict[str, Any]:
+def measure(clips: Sequence[Clip]) -> dict[str, Any]:
     """Return all of it in numbers, with geometric means over bodies, and over limbs of a kind."""
-    limbs = {clip.name: limbs_of(clip) for clip, _ in clips}
-    needed = [row for clip, _ in clips for row in needed_of(clip, limbs[clip.name])]
-    errors = {clip.name: errors_of(clip, limbs[clip.name]) for clip, _ in clips}
-    kinds = [kind for kind in KINDS if any(of == kind for of, _ in needed)]
-    every = [row for rows in errors.values() for row in rows]
+    needed = [row for clip in clips for row in needed_of(clip)]
+    errors = {clip.name: errors_of(clip) for clip in clips}
     return {
-        "bodies": {clip.name: _about(clip, skipped, limbs[clip.name]) for clip, skipped in clips},
+        "bodies": {clip.name: _about(clip) for clip in clips},
         "rates": [int(rate) for rate in RATES],
         "needed": {
             kind: {
@@ -217,48 +140,32 @@ def measure(clips: Sequence[tuple[Clip, int]]) -> dict[str, Any]:
                 }
                 for mode in MODES
             }
-            for kind in kinds
-        },
-        "chains": {
-            kind: [limb.chain for of_body in limbs.values() for limb in of_body if limb.kind == kind]
-            for kind in kinds[1:]
+            for kind in KINDS
+            if any(of == kind for of, _ in needed)
         },
         "errors": {
-            kind: {
-                way: {mode: {rate: _mean_error(every, kind, way, mode, rate) for rate in ERROR_RATES} for mode in MODES}
-                for way in ((THROUGH,) if kind == BODY else (THROUGH, ALONE))
+            mode: {
+                rate: dict(zip(("shell", "velocity"), geometric_mean(_of_all(errors, mode, rate)), strict=True))
+                for rate in ERROR_RATES
             }
-            for kind in kinds
+            for mode in MODES
         },
         "by_body": {
-            name: {
-                mode: {rate: _mean_error(rows, BODY, THROUGH, mode, rate)["shell"] for rate in ERROR_RATES}
-                for mode in MODES
-            }
-            for name, rows in errors.items()
+            name: {mode: {rate: shell for rate, (shell, _) in rates.items()} for mode, rates in own.items()}
+            for name, own in errors.items()
         },
-        "apart": {clip.name: apart_of(clip) for clip, _ in clips},
     }
 
 
-def _about(clip: Clip, skipped: int, limbs: Iterable[Limb]) -> dict[str, Any]:
-    """Return what is said of a body; "moved" is the farthest that any joint but the roots moves in its parent's space.
+def _of_all(errors: Mapping[str, Mapping[str, Mapping[int, tuple[float, float]]]], mode: str, rate: int) -> np.ndarray:
+    return np.array([own[mode][rate] for own in errors.values()])
 
-    That is from corner to corner of what it fills.
-    """
-    joints = np.flatnonzero(clip.rest_body.parents >= 0)
-    widths = np.ptp(clip.poses.positions[joints], axis=1) * clip.metres_per_unit
+
+def _about(clip: Clip) -> dict[str, Any]:
     return {
         "joints": len(clip.rest_body.joints),
         "seconds": float(clip.times[-1] - clip.times[0]),
         "samples_per_s": clip.samples_a_second,
-        "skipped": skipped,
-        "moved": np.linalg.norm(widths, axis=-1).max(initial=0.0),
-        "limbs": [clip.rest_body.joints[limb.joint] for limb in limbs],
+        "skipped": clip.calibration,
+        "limbs": [clip.rest_body.joints[joint] for _, joint in limbs_of(clip)],
     }
-
-
-def _mean_error(rows: Iterable[tuple], kind: str, way: str, mode: str, rate: int) -> dict[str, float]:
-    """Return geometric means of the RMS shell error, and of the RMS velocity error where there is one."""
-    errors = np.array([row[4:] for row in rows if row[:4] == (kind, way, mode, rate)]).reshape(-1, 2)
-    return dict(zip(("shell", "velocity"), geometric_mean(errors).tolist(), strict=True))

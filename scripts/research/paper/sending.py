@@ -1,28 +1,23 @@
 """What a live stream costs that is sent when needed, beside even streams of the state of the art that are as good.
 
 The even streams are those of the paper, `lerp_slerp` at its rates; the other is the codec of `rigid_motion.streams`,
-over a link that takes no time. It has a tolerance, which is searched for: the one at which the RMS shell error is that
-of the even stream. Bytes are a second's, those of UDP and IPv4 around each datagram among them, and
-what somebody who joins is told once is not. Of each recording the first `SECONDS` are sent. Seconds and metres.
+over loopback to another process (`streaming.measuring`). It has a tolerance, which is searched for: the one at which
+the RMS shell error is that of the even stream. Bytes are a second's, those of UDP and IPv4 around each datagram among
+them, and what somebody who joins is told once is not. Of each recording the first `SECONDS` are sent. Seconds, metres.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from typing import Any
 
 import numpy as np
 
-from rigid_motion.motion import Poses, rms, shell_error
-from rigid_motion.motion.poses import joined
+from rigid_motion.motion import Poses, shell_error
 from rigid_motion.motion.quaternions import normalise
-from rigid_motion.streams import Receiver, Sender
-from rigid_motion.streams.paths import Path
-from rigid_motion.streams.wire import DESCRIPTION, kind_of
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.analysis.needed import part_of
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.streaming.measuring import HEADERS, even_rate
+from rigid_motion_batch.streaming.measuring import HEADERS, measure
 from rigid_motion_batch.streaming.packed import CUBE, PLACE_BITS, STAMP, smallest_three
 from rigid_motion_batch.streaming.sending import body_of, samples_of
 
@@ -45,35 +40,11 @@ PACKINGS = {
 
 
 def sent(clip: Clip, tolerance: float, delay: float) -> tuple[float, float, float]:
-    """Send a clip, show it, and return datagrams and bytes a second, and the RMS shell error of what was shown."""
+    """Send a clip over loopback, and return datagrams and bytes a second, and the RMS shell error of what was shown."""
     times, poses = samples_of(clip)
-    body = body_of(clip, poses, RADIUS)
-    sender, receiver = Sender([body], tolerance, delay, even_rate(times)), Receiver()
-    frames, shown, sizes = deque((times + delay).tolist()), [], []
-
-    def draw(until: float) -> None:
-        while frames and frames[0] < until:
-            shown.extend(receiver.show(frames.popleft()).values())
-
-    def post(datagrams: list[bytes], now: float) -> None:
-        draw(now)
-        for datagram in datagrams:
-            receiver.take(datagram, now)
-            if kind_of(datagram) != DESCRIPTION:
-                sizes.append(len(datagram) + HEADERS)
-            for _, answer in receiver.answers():
-                post(sender.hear(answer, now), now)
-
-    for sample, moment in enumerate(times.tolist()):
-        while (due := sender.next) < moment:
-            post(sender.poll(due), due)
-        post(sender.add(moment, poses[:, sample]), moment)
-    post(sender.finish(), float(times[-1]))
-    draw(np.inf)
-    truth = Path(times, poses).at(np.array([it.moment for it in shown]))[0]
-    error = rms(shell_error(joined([it.poses[body.name] for it in shown]), truth, RADIUS))
-    seconds = float(times[-1] - times[0])
-    return len(sizes) / seconds, sum(sizes) / seconds, error
+    cost, _ = measure(body_of(clip, poses, RADIUS), times, poses, tolerance, delay)
+    size = cost.bytes_a_second_with_headers
+    return (size - cost.bytes_a_second) / HEADERS, size, 1e-3 * cost.rms_mm
 
 
 def costs_of(clip: Clip) -> dict[float, dict[int, tuple[float, float]]]:

@@ -7,8 +7,7 @@ import pytest
 
 from research.paper import parts, sending, table
 from research.paper.table import UPDATES
-from rigid_motion_batch.streaming.measuring import HEADERS, measure
-from rigid_motion_batch.streaming.sending import body_of, samples_of
+from rigid_motion_batch.streaming.measuring import HEADERS
 from tests.scripts.research.paper.clips import circling
 
 CLIP = circling(turns=0.7, rate=90.0, seconds=3.0)
@@ -54,6 +53,7 @@ def test_a_wrong_option_is_named_and_ends_with_code_2(
     assert said in capfd.readouterr().err
 
 
+@pytest.mark.network
 def test_a_stream_costs_less_the_more_it_may_be_off(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sending, "DELAYS", (0.1,))
     monkeypatch.setattr(sending, "TOLERANCES", (1.0, 5.0, 3))
@@ -64,13 +64,3 @@ def test_a_stream_costs_less_the_more_it_may_be_off(monkeypatch: pytest.MonkeyPa
         assert size > HEADERS * datagrams > 0.0
     assert result["even"]["7 doubles"][0] == 30 * (56 + HEADERS + sending.STAMP)
     assert own["saved_bytes"]["7 doubles"][0] == pytest.approx(1.0 - own["bytes"][0] / result["even"]["7 doubles"][0])
-
-
-@pytest.mark.network
-def test_a_stream_is_that_which_another_process_shows() -> None:
-    times, poses = samples_of(CLIP)
-    cost, _ = measure(body_of(CLIP, poses, 0.1), times, poses, 0.005, 0.1)
-    datagrams, size, error = sending.sent(CLIP, 0.005, 0.1)
-    assert datagrams == pytest.approx((cost.bytes_a_second_with_headers - cost.bytes_a_second) / HEADERS)
-    assert size == pytest.approx(cost.bytes_a_second_with_headers)
-    assert error == pytest.approx(1e-3 * cost.rms_mm, rel=0.05)
