@@ -86,7 +86,7 @@ def engines(clip: Clip) -> list[dict[str, Any]]:
         shown = {engine: (by_engine(engine, truth, way, frames), 2.0 * RATE * (7 * 4 + HEADERS)) for engine in ENGINES}
         shown["sent when needed"] = by_codec(truth, way, frames, TOLERANCE, next(iter(DELAYS)))
         for engine, (poses_shown, size) in shown.items():
-            rows.append({"link": label, "by": engine, "bytes": size, **asdict(seen(poses_shown, truth, frames))})
+            rows.append({"link": label, "by": engine, "bytes": size, **seen(poses_shown, truth, frames)})
     return rows
 
 
