@@ -21,14 +21,14 @@ from rigid_motion_batch.analysis.body_needed import OfBody
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.analysis.modes import REFERENCE
-from rigid_motion_batch.analysis.needed import DECIMATIONS, RATES, KeysNeeded, OfRigidBody, keys_needed, part_of
+from rigid_motion_batch.analysis.needed import DECIMATIONS, RATES, OfRigidBody, keys_needed, part_of
 from rigid_motion_batch.analysis.radii import JOINT
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 
 from .motions import spread
-from .table import RADIUS, SAMPLES_AN_UPDATE, SCREW, means
+from .table import RADIUS, SCREW, has_samples_for, means, shares_of
 
 MODES = (REFERENCE, SCREW, "pga_lerp", "motor_spline")
 ERROR_RATES = (5, 10)  # key poses a second at which errors are measured
@@ -40,9 +40,6 @@ LIMBS = {"LeftHand": "hands", "RightHand": "hands", "LeftFoot": "feet", "RightFo
 """Humanoid bones that a tracker may be on, and their kinds."""
 
 KINDS = (BODY, *dict.fromkeys(LIMBS.values()))
-
-NEVER_EXACT = 1e-3
-"""Files round the time of a frame: so much, as a share, may be missing to two samples an update."""
 
 SEARCHED = 10.0
 """Seconds of a whole body, from its first sample on, for which key poses are searched: every try reduces keys anew."""
@@ -85,11 +82,6 @@ def alone(clip: Clip, joint: int) -> Clip:
 # -- what comes of it --------------------------------------------------------------------------------------------------
 
 
-def has_samples_for(clip: Clip, rate: float) -> bool:
-    """Return whether a body has two samples to a key pose."""
-    return rate <= clip.samples_a_second * (1.0 + NEVER_EXACT) / SAMPLES_AN_UPDATE
-
-
 def needed_of(clip: Clip) -> list[tuple[str, dict[str, dict[str, list[float]]]]]:
     """Return the keys that every mode needs, of the whole body and of each limb alone: what it is of, and shares.
 
@@ -100,14 +92,7 @@ def needed_of(clip: Clip) -> list[tuple[str, dict[str, dict[str, list[float]]]]]
     searched = part_of(clip, 0, int(np.searchsorted(clip.times, clip.times[0] + SEARCHED, side="right")) - 1)
     result = [(BODY, keys_needed(OfBody(searched, radii), MODES))]
     result += [(kind, keys_needed(OfRigidBody(alone(clip, joint), RADIUS), MODES)) for kind, joint in limbs_of(clip)]
-    return [(kind, _shares(clip, keys)) for kind, keys in result]
-
-
-def _shares(clip: Clip, result: KeysNeeded) -> dict[str, dict[str, list[float]]]:
-    counted = [has_samples_for(clip, float(rate)) for rate in result.rates]
-    shares = np.where(counted, result.shares, np.nan).tolist()
-    groups = zip(result.groups, shares, strict=True)
-    return {mode: dict(zip(DECIMATIONS, row, strict=False)) for group, row in groups for mode in group}
+    return [(kind, shares_of(clip, keys)) for kind, keys in result]
 
 
 def errors_of(clip: Clip) -> dict[str, dict[int, tuple[float, float]]]:

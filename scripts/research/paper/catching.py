@@ -29,10 +29,9 @@ from rigid_motion_batch.scenes.film import render_film
 from rigid_motion_batch.scenes.scene import set_up_render
 from rigid_motion_batch.scenes.settings import SceneSettings
 
-from .table import PHASES
-
 ENGINES = ("lerp_slerp", "dq_sclerp", "pga_lerp", "motor_spline")
 RATES = (5, 10, 15, 20)  # updates a second
+PHASES = 6  # senders of the same rate that begin one after the other within an interval
 
 GRIP = np.array((0.0, -HAND, 0.0))  # where the wrist is, in the axes of the tool that the hand holds
 _, RELEASE, CATCH, _ = THERE.moments

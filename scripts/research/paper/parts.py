@@ -86,9 +86,7 @@ def tabulate(options: argparse.Namespace) -> dict[str, Any]:
     """Return Table 1, and why a screw wins here and loses there."""
     sets, left_out = clips_of(options)
     clips = [clip for of_set in sets.values() for clip in of_set]
-    needed = {clip.name: table.needed(clip, table.curves_of(clip)) for clip in clips}
-    names = [*table.MODES, *(mode + table.CHOSEN for mode in table.ADAPTIVE)]
-    first = next(iter(table.YARDSTICKS))
+    needed = {clip.name: table.needed(clip) for clip in clips}
     return {
         "paper": {
             "rates": UPDATES,
@@ -100,20 +98,12 @@ def tabulate(options: argparse.Namespace) -> dict[str, Any]:
         "samples": {name: sum(len(clip.times) for clip in of_set) for name, of_set in sets.items()},
         "seconds": {name: sum(float(it.times[-1] - it.times[0]) for it in of_set) for name, of_set in sets.items()},
         "left_out": left_out,
-        "yardsticks": table.YARDSTICKS,
         "needed": {
-            of_set: {
-                yardstick: {
-                    name: table.mean_over(needed[clip.name][yardstick].get(name, {}) for clip in clips)
-                    for name in names
-                }
-                for yardstick in table.YARDSTICKS
-            }
+            of_set: {name: table.mean_over([needed[clip.name][name] for clip in clips]) for name in table.NAMES}
             for of_set, clips in sets.items()
         },
         "by_clip": {
-            clip.name: {mode: table.mean_over([needed[clip.name][first][mode]])["saved"] for mode in table.MODES}
-            for clip in clips
+            name: {mode: table.mean_over([own[mode]])["saved"] for mode in table.MODES} for name, own in needed.items()
         },
         "bows": {clip.name: table.bows_of(clip) for clip in clips},
     }
@@ -134,7 +124,7 @@ def measure_bodies(options: argparse.Namespace) -> dict[str, Any]:
 def race(options: argparse.Namespace) -> dict[str, Any]:
     """Return the running time of a frame, at the rates of Table 1 among others."""
     result = json.loads((options.root / FIGURES / "paper_table.json").read_text(encoding="utf-8"))
-    needed = next(iter(result["needed"].values()))[next(iter(table.YARDSTICKS))]
+    needed = next(iter(result["needed"].values()))
     return timing.races(motions.assets()["reach"], needed, options.rounds)
 
 

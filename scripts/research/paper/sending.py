@@ -12,16 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from rigid_motion.motion import Poses, shell_error
+from rigid_motion.motion import Poses, decimate, shell_error
 from rigid_motion.motion.quaternions import normalise
-from rigid_motion_batch.analysis.metrics import geometric_mean
-from rigid_motion_batch.analysis.needed import part_of
+from rigid_motion_batch.analysis.metrics import NOTHING, geometric_mean
+from rigid_motion_batch.analysis.modes import REFERENCE
+from rigid_motion_batch.analysis.needed import OfRigidBody, part_of
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.streaming.measuring import HEADERS, measure
 from rigid_motion_batch.streaming.packed import CUBE, PLACE_BITS, STAMP, smallest_three
 from rigid_motion_batch.streaming.sending import body_of, samples_of
 
-from .table import RADIUS, UPDATES, even_points, lowest
+from .table import RADIUS, UPDATES, has_samples_for
 
 DELAYS = (0.1, 0.2)  # by which the picture is behind
 SECONDS = 10.0
@@ -50,7 +51,10 @@ def sent(clip: Clip, tolerance: float, delay: float) -> tuple[float, float, floa
 def costs_of(clip: Clip) -> dict[float, dict[int, tuple[float, float]]]:
     """Return by delay and rate of the state of the art the datagrams and the bytes a second that are as good."""
     clip = part_of(clip, 0, int(np.searchsorted(clip.times, clip.times[0] + SECONDS, side="right")) - 1)
-    requested = {rate: row[1] for rate, row in even_points(clip).items()}
+    ways = OfRigidBody(clip, RADIUS)
+    requested = {
+        rate: ways.error(decimate(clip.times, rate), REFERENCE) for rate in UPDATES if has_samples_for(clip, rate)
+    }
     low, high, count = TOLERANCES
     tolerances = np.geomspace(low * min(requested.values()), high * max(requested.values()), count)
     result: dict[float, dict[int, tuple[float, float]]] = {}
@@ -60,6 +64,24 @@ def costs_of(clip: Clip) -> dict[float, dict[int, tuple[float, float]]]:
             rate: (lowest(datagrams, errors, error), lowest(size, errors, error)) for rate, error in requested.items()
         }
     return result
+
+
+def lowest(cost: np.ndarray, errors: np.ndarray, requested: float) -> float:
+    """Return the lowest cost (n,) at which a curve is down to the error wanted; infinite where it never is.
+
+    Between two points, error and cost are taken to be lines on a double logarithmic scale.
+    """
+    order = np.argsort(cost, kind="stable")
+    cost, errors = cost[order], errors[order]
+    good = np.flatnonzero(errors <= requested)
+    if not len(good):
+        return float("inf")
+    first = int(good[0])
+    if first == 0 or errors[first] == requested:
+        return float(cost[first])
+    before, after = np.log(np.maximum(errors[[first - 1, first]], NOTHING))
+    part = (before - np.log(requested)) / (before - after)
+    return float(cost[first - 1] * (cost[first] / cost[first - 1]) ** part)
 
 
 def costs(clips: list[Clip]) -> dict[str, Any]:

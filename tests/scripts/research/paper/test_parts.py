@@ -3,9 +3,10 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from research.paper import parts, sending, table
+from research.paper import parts, sending
 from research.paper.table import UPDATES
 from rigid_motion_batch.streaming.measuring import HEADERS
 from tests.scripts.research.paper.clips import circling
@@ -15,8 +16,6 @@ CLIP = circling(turns=0.7, rate=90.0, seconds=3.0)
 
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(table, "STEP", 2.0)
-    monkeypatch.setattr(table, "TOLERANCES", (0.5, 2.0, 2))
     monkeypatch.setattr(parts.motions, "assets", lambda: {CLIP.name: CLIP})
 
 
@@ -28,7 +27,7 @@ def test_a_part_writes_its_figures(tmp_path: Path) -> None:
     result = json.loads(path.read_text(encoding="utf-8"))
     assert result["made_by"].startswith("`python scripts/research paper --only table")
     assert result["clips"] == {"assets": ["circling"]}
-    assert result["needed"]["assets"]["rms_shell"]["lerp_slerp"]["updates"] == pytest.approx(UPDATES, rel=1e-3)
+    assert result["needed"]["assets"]["lerp_slerp"]["updates"] == pytest.approx(UPDATES, rel=1e-3)
     assert result["by_clip"]["circling"]["motor_spline"][0] > 0.3
     assert set(result["bows"]["circling"]) == {"5", "8", "12", "15", "20", "30"}
 
@@ -64,3 +63,11 @@ def test_a_stream_costs_less_the_more_it_may_be_off(monkeypatch: pytest.MonkeyPa
         assert size > HEADERS * datagrams > 0.0
     assert result["even"]["7 doubles"][0] == 30 * (56 + HEADERS + sending.STAMP)
     assert own["saved_bytes"]["7 doubles"][0] == pytest.approx(1.0 - own["bytes"][0] / result["even"]["7 doubles"][0])
+
+
+def test_the_lowest_cost_is_the_first_that_is_good_enough_also_where_a_higher_one_is_not() -> None:
+    rates, errors = np.array((5.0, 10.0, 20.0, 30.0)), np.array((4.0, 1.0, 3.0, 0.5))
+    assert sending.lowest(rates, errors, 1.0) == 10.0
+    assert sending.lowest(rates, errors, 2.0) == pytest.approx(5.0 * 2.0**0.5)
+    assert sending.lowest(rates, errors, 0.4) == np.inf
+    assert sending.lowest(rates[::-1], errors[::-1], 9.0) == 5.0
