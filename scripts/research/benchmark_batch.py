@@ -16,15 +16,15 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from research.making.tracking import table
 from research.paper.motions import assets
-from research.studies import publish, report, study_parser
+from research.studies import publish, report, seconds_in_turns, study_parser
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion_batch.places import PACKAGE
@@ -46,17 +46,12 @@ sys.exit(code)
 UNIT = 1 if sys.platform == "darwin" else 1024  # bytes
 
 
-@dataclass(frozen=True)
-class Run:
-    """What a run of `compare` took."""
+class Run(NamedTuple):
+    """What a run of `compare` took: seconds, and the most memory of the program and of any process that it started."""
 
     seconds: float
-
     program: int
-    """The most memory of the program itself, in bytes."""
-
     worker: int
-    """The most memory of any process that it started."""
 
 
 def pieces(count: int) -> Iterator[str]:
@@ -89,23 +84,19 @@ def compare(clips: Sequence[Path], folder: Path, jobs: int, *options: str, alone
 
 def workers(clips: Sequence[Path], folder: Path, rounds: int, *options: str) -> list[dict[str, Any]]:
     """Return what one worker takes beside two, and beside one that has a single processor."""
-    runs: dict[tuple[int, bool], list[Run]] = {(1, False): [], (2, False): []}
-    if hasattr(os, "sched_setaffinity"):
-        runs[1, True] = []
-    for _ in range(rounds):
-        for (jobs, alone), results in runs.items():
-            report(f"{len(clips)} clips, {jobs} at work{' on one processor' if alone else ''}")
-            results.append(compare(clips, folder, jobs, *options, alone=alone))
-    best = {way: min(results, key=lambda run: run.seconds) for way, results in runs.items()}
+    ways = [(1, False), (2, False), *([(1, True)] if hasattr(os, "sched_setaffinity") else [])]
+    runs = {way: partial(compare, clips, folder, way[0], *options, alone=way[1]) for way in ways}
+    report(f"{len(clips)} clips")
+    best = {way: min(seconds) for way, seconds in seconds_in_turns(runs, rounds).items()}
     return [
         {
             "workers": jobs,
             "one_processor": alone,
-            "seconds": run.seconds,
-            "clips_a_minute": 60.0 * len(clips) / run.seconds,
-            "speedup": best[1, False].seconds / run.seconds,
+            "seconds": seconds,
+            "clips_a_minute": 60.0 * len(clips) / seconds,
+            "speedup": best[1, False] / seconds,
         }
-        for (jobs, alone), run in best.items()
+        for (jobs, alone), seconds in best.items()
     ]
 
 

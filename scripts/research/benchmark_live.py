@@ -12,10 +12,9 @@ from __future__ import annotations
 import statistics
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import bpy
 import numpy as np
@@ -36,21 +35,12 @@ Targets = Sequence[bpy.types.Object | bpy.types.PoseBone]
 Seconds = Sequence[float]
 
 
-@dataclass(frozen=True)
-class Size:
+class Size(NamedTuple):
     """Objects or bones, the keys of each on all channels, and the frames from the first key to the last."""
 
     objects: int
-    keys: int
+    key_count: int
     frames: int
-
-    def scaled(self, scale: float) -> Size:
-        """Return a part of its objects and frames."""
-        return Size(max(1, round(scale * self.objects)), self.keys, max(2 * self.keys, round(scale * self.frames)))
-
-    @property
-    def figures(self) -> dict[str, int]:
-        return {"objects": self.objects, "key_count": self.keys, "frames": self.frames}
 
 
 SIZES = {
@@ -59,6 +49,12 @@ SIZES = {
     "rig": Size(100, 10, 1000),
 }
 LONG, LONG_FRAMES = 200, (50_000, 100_000)  # the keys of an object that is baked, and its frames
+
+
+def scaled(size: Size, scale: float) -> Size:
+    """Return a part of the objects and frames."""
+    objects, frames = max(1, round(scale * size.objects)), max(2 * size.key_count, round(scale * size.frames))
+    return Size(objects, size.key_count, frames)
 
 
 # -- scenes ------------------------------------------------------------------------------------------------------------
@@ -78,7 +74,7 @@ def keyed(targets: Sequence[Target], size: Size, rotation_mode: str) -> list[Tar
     rotation = "rotation_quaternion" if rotation_mode == "QUATERNION" else "rotation_euler"
     for target in targets:
         target.rotation_mode = rotation_mode
-        for frame in np.linspace(1, size.frames, size.keys).round():
+        for frame in np.linspace(1, size.frames, size.key_count).round():
             for channel in ("location", rotation):
                 setattr(target, channel, random.normal(size=len(getattr(target, channel))))
                 target.keyframe_insert(channel, frame=frame)
@@ -262,41 +258,39 @@ def everyday(size: Size, rotation: str, rounds: int) -> list[dict[str, Any]]:
 def shot(size: Size, rotation: str, rounds: int) -> dict[str, Any]:
     """Measure a mode chosen for all objects, an edit of each, and the file."""
     objects = scene_of(size, rotation)
-    without = file_sizes()
-    (chosen, updated), baking = choose(objects, rounds), NativeBaking(objects).seconds(min(3, rounds))
-    live = file_sizes()
-    edited, native = with_and_without(partial(edit, middle_keys(objects, size.keys // 2)), rounds, 1)
+    files = {"without_mb": file_sizes()}
+    (chosen, updated), baking = choose(objects, rounds), NativeBaking(objects)
+    baked = baking.seconds(min(3, rounds))
+    files["mb"] = file_sizes()
+    edited, native = with_and_without(partial(edit, middle_keys(objects, size.key_count // 2)), rounds, 1)
+    animation.set_enabled(False)
+    baking.bake()
+    files["baked_mb"] = file_sizes()
+    animation.set_enabled(True)
     rows = [
-        row("`set_mode` for all in one call", chosen, "`bake_action_objects`", baking),
-        row("the same, and the view updated", updated, "`bake_action_objects`", baking),
+        row("`set_mode` for all in one call", chosen, "`bake_action_objects`", baked),
+        row("the same, and the view updated", updated, "`bake_action_objects`", baked),
         row("the view updated after an edit of each", edited, "Blender's own update", native),
     ]
-    animation.set_enabled(False)
-    NativeBaking(objects).bake()
-    baked = file_sizes()
-    animation.set_enabled(True)
-    files = {
-        kind: {"mb": live[kind] / 1e6, "without_mb": without[kind] / 1e6, "baked_mb": baked[kind] / 1e6}
-        for kind in live
-    }
-    return {"rotation": rotation, "rows": rows, **files}
+    sizes = {kind: {name: of_kind[kind] for name, of_kind in files.items()} for kind in files["mb"]}
+    return {"rotation": rotation, "rows": rows, **sizes}
 
 
-def file_sizes() -> dict[str, int]:
-    """Return the bytes of the open file, compressed and not."""
+def file_sizes() -> dict[str, float]:
+    """Return the size of the open file in MB, compressed and not."""
     sizes = {}
     with tempfile.TemporaryDirectory() as folder, silenced():
         path = Path(folder, "shot.blend")
         for kind in ("compressed", "uncompressed"):
             bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=kind == "compressed")
-            sizes[kind] = path.stat().st_size
+            sizes[kind] = path.stat().st_size / 1e6
     return sizes
 
 
 def rigs(size: Size, rounds: int) -> list[dict[str, Any]]:
     """Measure edits as in a window, where large rigs are edited in draft; all anew; and playback."""
     bones, few = rig_of(size), max(5, rounds // 8)
-    keys = middle_keys(bones, size.keys // 2)
+    keys = middle_keys(bones, size.key_count // 2)
     set_modes(bones, MODE)
     animation.follower.set_drafts(True)
     try:
@@ -333,15 +327,15 @@ def long_baking(size: Size, rounds: int) -> dict[str, Any]:
 
 def measure(rounds: int, scale: float) -> dict[str, Any]:
     """Return all figures, of scenes with a part of their objects and frames."""
-    few, sizes = max(3, rounds // 8), {name: size.scaled(scale) for name, size in SIZES.items()}
+    few, sizes = max(3, rounds // 8), {name: scaled(size, scale) for name, size in SIZES.items()}
     report("everyday work, shots, a rig, long baking")
     return {
-        **{name: size.figures for name, size in sizes.items()},
+        **{name: size._asdict() for name, size in sizes.items()},
         "everyday": {rotation: everyday(sizes["scene"], rotation, rounds) for rotation in ROTATION_MODES},
         "shots": [shot(sizes["shot"], rotation, few) for rotation in ROTATION_MODES],
         "rigs": rigs(sizes["rig"], rounds),
         "baking_keys": LONG,
-        "baking": [long_baking(Size(1, LONG, frames).scaled(scale), few) for frames in LONG_FRAMES],
+        "baking": [long_baking(scaled(Size(1, LONG, frames), scale), few) for frames in LONG_FRAMES],
     }
 
 

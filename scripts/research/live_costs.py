@@ -10,7 +10,6 @@ joint's ball of 3 cm, in the root's space, at every sample.
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -107,6 +106,5 @@ def main(arguments: list[str] | None = None) -> int:
         "engines": engines(next(clip for clip in clips if clip.name == HAND)),
     }
     report("a room")
-    about = {"users": options.users, "seconds": options.seconds}
-    result["room"] = about | asdict(room.measured(options.users, options.seconds))
+    result["room"] = room.measured(options.users, options.seconds)
     return publish("live_costs", result, options, *options.folders)

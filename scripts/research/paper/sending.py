@@ -14,7 +14,7 @@ import numpy as np
 
 from rigid_motion.motion import Poses, decimate, shell_error
 from rigid_motion.motion.quaternions import normalise
-from rigid_motion_batch.analysis.metrics import NOTHING, geometric_mean
+from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.analysis.modes import REFERENCE
 from rigid_motion_batch.analysis.needed import OfRigidBody, part_of
 from rigid_motion_batch.recordings.clips import Clip
@@ -67,21 +67,12 @@ def costs_of(clip: Clip) -> dict[float, dict[int, tuple[float, float]]]:
 
 
 def lowest(cost: np.ndarray, errors: np.ndarray, requested: float) -> float:
-    """Return the lowest cost (n,) at which a curve is down to the error wanted; infinite where it never is.
+    """Return the cost at which a curve (n,) is off by so much; infinite where it never is so good.
 
     Between two points, error and cost are taken to be lines on a double logarithmic scale.
     """
-    order = np.argsort(cost, kind="stable")
-    cost, errors = cost[order], errors[order]
-    good = np.flatnonzero(errors <= requested)
-    if not len(good):
-        return float("inf")
-    first = int(good[0])
-    if first == 0 or errors[first] == requested:
-        return float(cost[first])
-    before, after = np.log(np.maximum(errors[[first - 1, first]], NOTHING))
-    part = (before - np.log(requested)) / (before - after)
-    return float(cost[first - 1] * (cost[first] / cost[first - 1]) ** part)
+    order = np.argsort(errors)
+    return float(np.exp(np.interp(np.log(requested), np.log(errors[order]), np.log(cost[order]), left=np.inf)))
 
 
 def costs(clips: list[Clip]) -> dict[str, Any]:

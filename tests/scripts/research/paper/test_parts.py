@@ -65,9 +65,9 @@ def test_a_stream_costs_less_the_more_it_may_be_off(monkeypatch: pytest.MonkeyPa
     assert own["saved_bytes"]["7 doubles"][0] == pytest.approx(1.0 - own["bytes"][0] / result["even"]["7 doubles"][0])
 
 
-def test_the_lowest_cost_is_the_first_that_is_good_enough_also_where_a_higher_one_is_not() -> None:
-    rates, errors = np.array((5.0, 10.0, 20.0, 30.0)), np.array((4.0, 1.0, 3.0, 0.5))
-    assert sending.lowest(rates, errors, 1.0) == 10.0
-    assert sending.lowest(rates, errors, 2.0) == pytest.approx(5.0 * 2.0**0.5)
-    assert sending.lowest(rates, errors, 0.4) == np.inf
-    assert sending.lowest(rates[::-1], errors[::-1], 9.0) == 5.0
+def test_a_cost_is_read_off_the_curve() -> None:
+    errors, costs = np.array((0.5, 1.0, 4.0)), np.array((30.0, 20.0, 5.0))
+    assert sending.lowest(costs, errors, 1.0) == pytest.approx(20.0)
+    assert sending.lowest(costs, errors, 2.0) == pytest.approx(10.0)
+    assert sending.lowest(costs, errors, 9.0) == pytest.approx(5.0)
+    assert sending.lowest(costs, errors, 0.4) == np.inf
