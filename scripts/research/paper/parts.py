@@ -110,9 +110,8 @@ def tabulate(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def send(options: argparse.Namespace) -> dict[str, Any]:
-    """Return streams that are sent when needed, and the bytes of a pose."""
-    clips = next(iter(clips_of(options)[0].values()))
-    return sending.costs(clips) | {"packings": sending.packings(motions.assets()["reach"])}
+    """Return streams that are sent when needed, and bytes."""
+    return sending.costs(next(iter(clips_of(options)[0].values())))
 
 
 def measure_bodies(options: argparse.Namespace) -> dict[str, Any]:

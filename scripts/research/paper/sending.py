@@ -12,14 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from rigid_motion.motion import Poses, decimate, shell_error
-from rigid_motion.motion.quaternions import normalise
+from rigid_motion.motion import decimate
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.analysis.modes import REFERENCE
 from rigid_motion_batch.analysis.needed import OfRigidBody, part_of
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.streaming.measuring import HEADERS, measure
-from rigid_motion_batch.streaming.packed import CUBE, PLACE_BITS, STAMP, smallest_three
+from rigid_motion_batch.streaming.packed import PLACE_BITS, STAMP
 from rigid_motion_batch.streaming.sending import body_of, samples_of
 
 from .table import RADIUS, UPDATES, has_samples_for
@@ -91,18 +90,3 @@ def costs(clips: list[Clip]) -> dict[str, Any]:
             "saved_bytes": {name: 1.0 - size / of_even for name, of_even in even.items()},
         }
     return {"seconds": SECONDS, "clips": list(of_clips), "even": even, "needed": needed}
-
-
-def packings(clip: Clip) -> dict[str, dict[str, float]]:
-    """Return the bytes of a pose in each packing, and the largest shell error that it makes on a clip, in metres."""
-    poses = clip.in_metres(clip.poses)
-    step = CUBE / (2**PLACE_BITS - 1)
-    packed = (
-        poses,
-        Poses(poses.positions.astype(np.float32), normalise(poses.quaternions.astype(np.float32))),
-        Poses(np.rint(poses.positions / step) * step, smallest_three(poses.quaternions, TURN_BITS)),
-    )
-    return {
-        name: {"bytes": size, "error": float(shell_error(shown, poses, RADIUS).max())}
-        for (name, size), shown in zip(PACKINGS.items(), packed, strict=True)
-    }

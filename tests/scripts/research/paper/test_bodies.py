@@ -9,10 +9,9 @@ from research.paper import bodies
 from research.studies import files_in
 from rigid_motion.motion import Poses
 from rigid_motion_batch.recordings import TrajectoryError
-from rigid_motion_batch.recordings.clips import Clip
 from tests.motion.bodies import body_errors
 from tests.scripts.bvh_bodies import write_body
-from tests.scripts.clips.bodies import JOINTS, PARENTS, swinging_body
+from tests.scripts.clips.bodies import PARENTS, swinging_body
 
 NAMES = ("Hips", "Spine", "Head", "LeftArm", "LeftHand", "Glove", "RightLeg", "RightFoot")
 
@@ -21,19 +20,6 @@ BODY_CLIP = swinging_body("walk", seconds=2.0, rate=30.0, seed=3, joints=NAMES)
 RADII = np.full(len(NAMES), 0.03)
 
 METRES = Poses(BODY_CLIP.poses.positions * 0.01, BODY_CLIP.poses.quaternions)
-
-
-def named(*joints: str) -> Clip:
-    """The body with these names, and what they leave called by numbers."""
-    return swinging_body(joints=(*joints, *map(str, range(len(JOINTS) - len(joints)))))
-
-
-# -- names -------------------------------------------------------------------------------------------------------------
-
-
-def test_hands_feet_and_heads_are_told_by_their_names() -> None:
-    clip = named("Hips", "mixamorig:RightHand", "hand.L", "Foot_Right", "Head", "LeftHandIndex1", "LeftForeArm")
-    assert bodies.limbs_of(clip) == [("hands", 2), ("hands", 1), ("feet", 3), ("heads", 4)]
 
 
 # -- errors ------------------------------------------------------------------------------------------------------------
@@ -55,8 +41,7 @@ def test_errors_of_the_body_are_those_of_matrices() -> None:
 def test_the_figures_say_everything_of_each_body() -> None:
     short = swinging_body("short", seconds=1.0, rate=30.0, seed=4, joints=NAMES)
     result = bodies.measure([BODY_CLIP, short])
-    assert result["bodies"]["walk"]["limbs"] == ["LeftHand", "RightFoot", "Head"]
-    assert tuple(result["needed"]) == bodies.KINDS
+    assert tuple(result["needed"]) == bodies.MODES
     assert result["errors"]["pga_lerp"][5]["velocity"] > 0.0
     errors = [result["by_body"][name]["lerp_slerp"][10] for name in ("walk", "short")]
     mean = result["errors"]["lerp_slerp"][10]["shell"]
