@@ -48,7 +48,6 @@ SIZES = {
     "shot": Size(300, 20, 2000),  # all get a mode, are edited, and saved
     "rig": Size(100, 10, 1000),
 }
-LONG, LONG_FRAMES = 200, (50_000, 100_000)  # the keys of an object that is baked, and its frames
 
 
 def scaled(size: Size, scale: float) -> Size:
@@ -316,26 +315,15 @@ def rigs(size: Size, rounds: int) -> list[dict[str, Any]]:
     ]
 
 
-def long_baking(size: Size, rounds: int) -> dict[str, Any]:
-    """Measure baking an object over many frames."""
-    (obj,) = scene_of(size, "QUATERNION")
-    set_modes([obj], MODE)
-    runs = {"bake": partial(animation.bake, obj), "back": partial(animation.unbake, obj)}
-    seconds = seconds_in_turns(runs, rounds)["bake"]
-    return row(f"{size.frames} frames", seconds, "`bake_action_objects`", NativeBaking([obj]).seconds(min(3, rounds)))
-
-
 def measure(rounds: int, scale: float) -> dict[str, Any]:
     """Return all figures, of scenes with a part of their objects and frames."""
     few, sizes = max(3, rounds // 8), {name: scaled(size, scale) for name, size in SIZES.items()}
-    report("everyday work, shots, a rig, long baking")
+    report("everyday work, shots, a rig")
     return {
         **{name: size._asdict() for name, size in sizes.items()},
         "everyday": {rotation: everyday(sizes["scene"], rotation, rounds) for rotation in ROTATION_MODES},
         "shots": [shot(sizes["shot"], rotation, few) for rotation in ROTATION_MODES],
         "rigs": rigs(sizes["rig"], rounds),
-        "baking_keys": LONG,
-        "baking": [long_baking(scaled(Size(1, LONG, frames), scale), few) for frames in LONG_FRAMES],
     }
 
 

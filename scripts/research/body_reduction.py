@@ -1,8 +1,7 @@
-"""What key reduction leaves of whole bodies, beside greedy insertion, Blender's Decimate and published figures."""
+"""What key reduction leaves of whole bodies, beside greedy insertion and Blender's Decimate."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from research.studies import report, seconds_in_turns
-from rigid_motion.motion import MODES, Poses, interpolate, shell_error
-from rigid_motion_batch.analysis.bodies import BodyReconstruction, JointKeys, reconstruct_body
+from rigid_motion.motion import shell_error
+from rigid_motion_batch.analysis.bodies import BodyReconstruction, reconstruct_body
 from rigid_motion_batch.analysis.body_decimated import DECIMATE, OWN, SHARED
 from rigid_motion_batch.analysis.body_metrics import measure_modes
 from rigid_motion_batch.analysis.choices import Tolerance
@@ -30,14 +29,6 @@ WAYS = {OWN: False, SHARED: True}
 
 MOST_FRAMES = 1200  # longer recordings are cut off
 LONG = "cmu_01_01"  # the file that is timed uncut
-
-OZZ_BODY, OZZ_KEYS, OZZ_WITHIN, OZZ_RADIUS = "pab_walk", 901, Tolerance("2.25mm"), 0.1
-"""What ozz-animation's optimizer leaves of 8241 keys of this file; the largest error, and its distance in metres."""
-
-VARIES = 1e-4  # metres, or of a quaternion: what changes by less is constant
-NOISE = 0.01  # of the tolerance: what changes by less is made constant first
-
-BATCH = 2**11  # pairs of keys looked at in one go
 
 
 def figures(paths: Sequence[Path]) -> dict[str, Any]:
@@ -57,8 +48,6 @@ def figures(paths: Sequence[Path]) -> dict[str, Any]:
             for at, own in enumerate(next(iter(kept.values()), ()))
             if own["how"] != DECIMATE
         },
-        "ozz_keys": OZZ_KEYS,
-        "ozz": beside_ozz(clips[OZZ_BODY]) if OZZ_BODY in clips else [],
         "timing": [row for name in clips.keys() & {LONG} or clips for row in timing(of_height(clips[name]))],
     }
 
@@ -104,40 +93,8 @@ def greedy(body: Clip, mode: str = MODE, tolerance: float = WITHIN.metres(1.0)) 
     return keys
 
 
-def optimum(body: Clip, mode: str, tolerance: float = WITHIN.metres(1.0)) -> int:
-    """Return the fewest key poses there can be, by an exact dynamic programme that tries every frame as the next key.
-
-    It is for modes by which what is between two keys depends on no others.
-    """
-    fewest = np.full(len(body.times), math.inf)
-    fewest[0] = 1
-    for start in range(len(fewest) - 1):
-        ends = np.arange(start + 1, len(fewest))
-        for share in (0.5, 0.25, 0.75, 0.125, 0.375, 0.625, 0.875):
-            samples = start + ((ends - start) * share).astype(int)
-            ends = ends[errors_between(body, mode, start, ends, samples) <= tolerance]
-        tried, samples = np.repeat(ends, ends - start), np.concatenate([np.arange(start, end) for end in ends])
-        ends = np.setdiff1d(ends, tried[errors_between(body, mode, start, tried, samples) > tolerance])
-        fewest[ends] = np.minimum(fewest[ends], fewest[start] + 1)
-    return int(fewest[-1])
-
-
-def errors_between(body: Clip, mode: str, start: int, ends: np.ndarray, samples: np.ndarray) -> np.ndarray:
-    """Return the largest error of any joint at samples (m,), each between a first key and the second in `ends` (m,)."""
-    result, skeleton = np.empty(len(samples)), body.rest_body.skeleton
-    for first in range(0, len(samples), BATCH):
-        batch = slice(first, first + BATCH)
-        keys = np.stack(np.broadcast_arrays(start, ends[batch]), axis=-1)
-        times = np.broadcast_to(body.times[keys], (len(body.poses), *keys.shape))
-        moments = np.broadcast_to(body.times[samples[batch], None], (*times.shape[:2], 1))
-        between = interpolate(times, body.poses[:, keys], moments, mode)[:, :, 0]
-        shown, truth = (body.in_metres(skeleton.in_root_space(it)) for it in (between, body.poses[:, samples[batch]]))
-        result[batch] = shell_error(shown, truth, RADIUS).max(axis=0)
-    return result
-
-
 def beside_greedy(body: Clip) -> list[dict[str, Any]]:
-    """Return how many key poses there are beside greedy insertion, and beside the fewest there can be."""
+    """Return how many key poses there are beside greedy insertion."""
     report(f"{body.name}, greedy insertion")
     return [
         {
@@ -145,13 +102,12 @@ def beside_greedy(body: Clip) -> list[dict[str, Any]]:
             "mode": mode,
             "greedy": len(greedy(body, mode)),
             "key_count": max(map(len, reduced(body, mode).keys[mode])),
-            "optimum": None if MODES[mode].is_smooth else optimum(body, mode),
         }
         for mode in COMPARED
     ]
 
 
-# -- Blender's Decimate, and ozz-animation -----------------------------------------------------------------------------
+# -- Blender's Decimate, and time -----------------------------------------------------------------------------
 
 
 def beside(body: Clip, way: str) -> list[dict[str, Any]]:
@@ -173,33 +129,6 @@ def beside(body: Clip, way: str) -> list[dict[str, Any]]:
     slides = measured.foot_slide_m, measured.recorded_slide_m
     slide, recorded = (None if metres is None else 1e3 * metres for metres in slides)
     return [own | {"slide_mm": slide, "recorded_slide_mm": recorded}, decimated]
-
-
-def beside_ozz(body: Clip) -> list[dict[str, Any]]:
-    """Return keys as ozz-animation counts them, for each mode; the body is of its own size."""
-    report("ozz-animation")
-    widths = np.ptp(body.poses.positions, axis=1).max(axis=1) * body.metres_per_unit
-    still = widths < NOISE * OZZ_WITHIN.metres(1.0)
-    positions = np.where(still[:, None, None], body.poses.positions[:, :1], body.poses.positions)
-    cleaned = replace(body, poses=Poses(positions, body.poses.quaternions))
-    rows = []
-    for mode in COMPARED:
-        made = reconstruct_body(cleaned, OZZ_WITHIN, [mode], OZZ_RADIUS)
-        truth = body.in_metres(made.skeleton.in_root_space(body.poses))
-        largest = shell_error(made.shown(mode, body.times), truth, OZZ_RADIUS).max()
-        varying, constant = track_keys(cleaned, made.keys[mode])
-        rows.append({"mode": mode, "error_mm": 1e3 * largest, "key_count": varying + constant, "varying": varying})
-    return rows
-
-
-def track_keys(body: Clip, keys: JointKeys) -> tuple[int, int]:
-    """Return how many keys of translations and rotations vary, and one for each that does not but for the identity."""
-    counts, varying, constant = np.array([len(samples) for samples in keys]), 0, 0
-    for values in (body.poses.positions * body.metres_per_unit, body.poses.quaternions):
-        varies = np.ptp(values, axis=1).max(axis=1) > VARIES
-        there = np.abs(values[:, 0, -3:]).max(axis=1) >= 1e-6
-        varying, constant = varying + int(counts[varies].sum()), constant + int((there & ~varies).sum())
-    return varying, constant
 
 
 def timing(body: Clip) -> list[dict[str, Any]]:

@@ -111,15 +111,7 @@ def centroids(halvings: int) -> np.ndarray:
 def write_legend(axes: Axes, entries: list[tuple[str, str]], x: float, y: float, points: float) -> None:
     """Write patches of colour in one line, each with its word."""
     handles = [axes.fill([], [], color=colour, label=label)[0] for colour, label in entries]
-    options = {"handlelength": 1.0, "handletextpad": 0.4, "columnspacing": 1.2, "borderpad": 0.0, "borderaxespad": 0.0}
+    place = {"loc": "lower left", "bbox_to_anchor": (x, y), "bbox_transform": axes.transData, "borderaxespad": 0.0}
     axes.legend(
-        handles=handles,
-        ncols=len(entries),
-        loc="lower left",
-        bbox_to_anchor=(x, y),
-        bbox_transform=axes.transData,
-        fontsize=points,
-        frameon=False,
-        labelcolor=INK,
-        **options,
+        handles=handles, ncols=len(entries), fontsize=points, frameon=False, handlelength=1.0, borderpad=0.0, **place
     )

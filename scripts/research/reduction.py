@@ -27,7 +27,7 @@ from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.scenes.body_scene import registered
-from rigid_motion_batch.scenes.decimated_bodies import FREE, Decimations, Left, decimate
+from rigid_motion_batch.scenes.decimated_bodies import FREE, Decimations, Left
 
 ROTATION_MODES = ("QUATERNION", "XYZ")
 TRIALS = 14  # error margins tried until Decimate is as good as the reduced poses
@@ -78,24 +78,15 @@ def outcome(obj: bpy.types.Object, clip: Clip, radius: float) -> Left:
     return Left(clip.name, frames, count / len(curves), numbers, float(error.max()))
 
 
-def measure(clip: Clip, rotation_mode: str, tolerance: float, radius: float) -> tuple[Left, Left | None, Left | None]:
-    """Reduce to poses, and decimate to be as good, and to have keys on as few frames; None where that cannot be."""
+def measure(clip: Clip, rotation_mode: str, tolerance: float, radius: float) -> dict[str, Any]:
+    """Return what poses leave of a recording, and Decimate with no larger an error; None where it cannot be so good."""
     obj = import_clip(clip, rotation_mode)
     animation.reduce_keys_of(obj, "motor_spline", tolerance, radius)
     reduced = outcome(obj, clip, radius)
-
     obj = import_clip(clip, rotation_mode)
     as_good = Decimations(obj, lambda: outcome(obj, clip, radius), TRIALS).within(reduced.largest)
-
-    fewest, most = 2, round(reduced.keys)
-    as_few = None
-    while fewest < most:
-        keys = (fewest + most + 1) // 2
-        obj = import_clip(clip, rotation_mode)
-        decimate(obj, mode="RATIO", factor=1.0 - keys / len(clip.times))
-        tried = outcome(obj, clip, radius)
-        fewest, most, as_few = (keys, most, tried) if tried.frames <= reduced.frames else (fewest, keys - 1, as_few)
-    return reduced, as_good, as_few
+    about = {"name": clip.name, "frames": len(clip.times)}
+    return {**about, "reduced": figures_of(reduced), "decimate": as_good and figures_of(as_good)}
 
 
 def figures_of(left: Left) -> dict[str, float]:
@@ -103,27 +94,13 @@ def figures_of(left: Left) -> dict[str, float]:
     return {"frames": left.frames, "key_count": left.keys, "numbers": left.numbers, "error_mm": 1e3 * left.largest}
 
 
-def row(clip: Clip, reduced: Left, as_good: Left | None, as_few: Left | None) -> dict[str, Any]:
-    """Return the figures of a recording."""
-    return {
-        "name": clip.name,
-        "frames": len(clip.times),
-        "reduced": figures_of(reduced),
-        "decimate": as_good and figures_of(as_good),
-        "few_mm": as_few and 1e3 * as_few.largest,
-    }
-
-
 def means(rows: list[dict[str, Any]]) -> dict[str, float]:
     """Return what Decimate has in multiples of reduced poses: geometric means over the recordings."""
-    ratios = [
-        {name: row["decimate"][name] / reduced for name, reduced in row["reduced"].items()}
-        for row in rows
-        if row["decimate"]
-    ]
-    few = [row["few_mm"] / row["reduced"]["error_mm"] for row in rows if row["few_mm"]]
-    result = {name: geometric_mean(np.array([ratio[name] for ratio in ratios])) for name in ratios[0]}
-    return {**result, "few_mm": geometric_mean(np.array(few))}
+    pairs = [(row["decimate"], row["reduced"]) for row in rows if row["decimate"]]
+    return {
+        name: geometric_mean(np.array([decimated[name] / reduced[name] for decimated, reduced in pairs]))
+        for name in pairs[0][0]
+    }
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -144,7 +121,7 @@ def main(arguments: list[str] | None = None) -> int:
     report(f"{len(recordings)} recordings")
     with registered():
         rows = {
-            rotation: [row(clip, *measure(clip, rotation, options.tolerance, options.radius)) for clip in recordings]
+            rotation: [measure(clip, rotation, options.tolerance, options.radius) for clip in recordings]
             for rotation in ROTATION_MODES
         }
         result = {

@@ -9,8 +9,7 @@ compared with the pose that the mode has there: millimetres are the largest disp
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
@@ -33,18 +32,13 @@ THIRTY_SECONDS = np.arange(1, 32) / 32.0  # between samples wherever these lie
 EIGHTHS = np.array((0.125, 0.375, 0.625, 0.875))  # half-way between keys that are baked on every quarter of a frame
 
 
-@dataclass(frozen=True)
-class Motion:
-    """What happens between two keys."""
+class Motion(NamedTuple):
+    """What happens between two keys, in degrees, metres and frames."""
 
     name: str
-    turn: float  # degrees
-    distance: float  # metres
+    degrees: float
+    metres: float
     frames: int
-
-    @property
-    def key_frames(self) -> np.ndarray:
-        return 1.0 + self.frames * np.arange(SEGMENTS + 1)
 
 
 MOTIONS = (
@@ -57,11 +51,11 @@ MOTIONS = (
 def key_poses(motion: Motion) -> Poses:
     """Return poses a turn and a step apart, in directions drawn at random."""
     axes, steps = normalise(np.random.default_rng(11).normal(size=(2, SEGMENTS, 3)))
-    half = 0.5 * np.radians(motion.turn)
+    half = 0.5 * np.radians(motion.degrees)
     quaternions = [np.array((0.5, 0.5, -0.5, 0.5))]
     for axis in axes:
         quaternions.append(multiply(np.concatenate(((np.cos(half),), np.sin(half) * axis)), quaternions[-1]))
-    positions = np.concatenate((np.zeros((1, 3)), np.cumsum(motion.distance * steps, axis=0)))
+    positions = np.concatenate((np.zeros((1, 3)), np.cumsum(motion.metres * steps, axis=0)))
     return Poses(positions, align_signs(np.array(quaternions)))
 
 
@@ -75,14 +69,10 @@ def keyed_object(motion: Motion, rotation_mode: str) -> bpy.types.Object:
     if rotation_mode != "QUATERNION":
         channel, rotations = "rotation_euler", extrinsic_eulers_from_quaternions(rotations, rotation_mode)
     for path, values in (("location", poses.positions), (channel, rotations)):
-        animation.write_channel(obj, path, motion.key_frames, values, interpolation="BEZIER")
+        animation.write_channel(
+            obj, path, 1.0 + motion.frames * np.arange(SEGMENTS + 1), values, interpolation="BEZIER"
+        )
     return obj
-
-
-def between(motion: Motion, fractions: np.ndarray) -> np.ndarray:
-    """Return the sub-frames from the first key to the last."""
-    first, last = motion.key_frames[[0, -1]]
-    return (np.arange(first, last)[:, None] + fractions).ravel()
 
 
 def measure(motion: Motion, mode: str, rotation_mode: str, radius: float) -> dict[str, float]:
@@ -90,7 +80,8 @@ def measure(motion: Motion, mode: str, rotation_mode: str, radius: float) -> dic
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     obj = keyed_object(motion, rotation_mode)
     animation.set_mode(obj, mode)
-    moments = [between(motion, fractions) for fractions in (QUARTERS, THIRTY_SECONDS, EIGHTHS)]
+    whole = 1.0 + np.arange(motion.frames * SEGMENTS)[:, None]
+    moments = [(whole + fractions).ravel() for fractions in (QUARTERS, THIRTY_SECONDS, EIGHTHS)]
     quarters, finest, eighths = ((frames, in_betweens(source_of(obj), frames).desired) for frames in moments)
 
     def deviation(name: str, frames: np.ndarray, requested: Poses) -> dict[str, float]:
@@ -113,13 +104,12 @@ def measure(motion: Motion, mode: str, rotation_mode: str, radius: float) -> dic
 
 def figures_of(motion: Motion, radius: float) -> dict[str, Any]:
     """Return the figures of one motion, for every mode and rotation mode."""
-    about = {"name": motion.name, "degrees": motion.turn, "metres": motion.distance, "frames": motion.frames}
     rows = [
         {"mode": mode, "rotation": rotation_mode, **measure(motion, mode, rotation_mode, radius)}
         for mode in KEYFRAME_MODES
         for rotation_mode in ROTATION_MODES
     ]
-    return {**about, "rows": rows}
+    return {**motion._asdict(), "rows": rows}
 
 
 def main(arguments: list[str] | None = None) -> int:

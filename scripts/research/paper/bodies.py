@@ -6,7 +6,7 @@ the space of the roots.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -78,35 +78,28 @@ def errors_of(clip: Clip) -> dict[str, dict[int, tuple[float, float]]]:
     return result
 
 
-# -- over all bodies ---------------------------------------------------------------------------------------------------
-
-
 def measure(clips: Sequence[Clip]) -> dict[str, Any]:
     """Return all of it in numbers, with geometric means over bodies."""
-    needed = [needed_of(clip) for clip in clips]
+    needed, rates = [needed_of(clip) for clip in clips], [int(rate) for rate in RATES]
     errors = {clip.name: errors_of(clip) for clip in clips}
+
+    def mean(mode: str, rate: int) -> dict[str, float]:
+        shell, velocity = geometric_mean(np.array([own[mode][rate] for own in errors.values()]))
+        return {"shell": shell, "velocity": velocity}
+
     return {
         "bodies": {clip.name: _about(clip) for clip in clips},
-        "rates": [int(rate) for rate in RATES],
+        "rates": rates,
         "needed": {
-            mode: {way: means([shares[mode][way] for shares in needed]) for way in DECIMATIONS[:2]} for mode in MODES
-        },
-        "errors": {
-            mode: {
-                rate: dict(zip(("shell", "velocity"), geometric_mean(_of_all(errors, mode, rate)), strict=True))
-                for rate in ERROR_RATES
-            }
+            mode: {way: means([shares[mode][way] for shares in needed], rates) for way in DECIMATIONS[:2]}
             for mode in MODES
         },
+        "errors": {mode: {rate: mean(mode, rate) for rate in ERROR_RATES} for mode in MODES},
         "by_body": {
             name: {mode: {rate: shell for rate, (shell, _) in rates.items()} for mode, rates in own.items()}
             for name, own in errors.items()
         },
     }
-
-
-def _of_all(errors: Mapping[str, Mapping[str, Mapping[int, tuple[float, float]]]], mode: str, rate: int) -> np.ndarray:
-    return np.array([own[mode][rate] for own in errors.values()])
 
 
 def _about(clip: Clip) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from rigid_motion_batch.command_line import complain, program_of
-from rigid_motion_batch.system_libraries import missing_for_rendering, require_blender, way_out
+from rigid_motion_batch.system_libraries import require_blender
 
 SCRIPT = "research paper"
 PROGRAM = program_of(SCRIPT)
@@ -57,9 +57,6 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--no-video", action="store_true", help="make pictures, but no film")
     parser.add_argument("--rounds", type=int, default=timing.ROUNDS, metavar="N", help="of the timing (%(default)s)")
     options = parser.parse_args(arguments)
-    if "pictures" in options.only and (missing := missing_for_rendering()):
-        print(f"{PROGRAM}: {way_out(missing)}", file=sys.stderr)
-        return 2
     try:
         for part in options.only:
             print(f"{PROGRAM}: {part}", file=sys.stderr, flush=True)
@@ -99,11 +96,11 @@ def tabulate(options: argparse.Namespace) -> dict[str, Any]:
         "seconds": {name: sum(float(it.times[-1] - it.times[0]) for it in of_set) for name, of_set in sets.items()},
         "left_out": left_out,
         "needed": {
-            of_set: {name: table.mean_over([needed[clip.name][name] for clip in clips]) for name in table.NAMES}
+            of_set: {name: table.means([needed[clip.name][name] for clip in clips]) for name in table.NAMES}
             for of_set, clips in sets.items()
         },
         "by_clip": {
-            name: {mode: table.mean_over([own[mode]])["saved"] for mode in table.MODES} for name, own in needed.items()
+            name: {mode: table.means([own[mode]])["saved"] for mode in table.MODES} for name, own in needed.items()
         },
         "bows": {clip.name: table.bows_of(clip) for clip in clips},
     }

@@ -79,21 +79,16 @@ def needed(clip: Clip) -> dict[str, list[float]]:
     return {name: row[: len(UPDATES)] for name, row in rows.items()}
 
 
-def mean_over(shares: Sequence[Sequence[float]]) -> dict[str, np.ndarray]:
-    """Return `means` of shares at `UPDATES`, and the "updates" that they are."""
-    result = means(shares)
-    return {"updates": (1.0 - result["saved"]) * UPDATES, **result}
+def means(shares: Sequence[Sequence[float]], rates: Sequence[float] = UPDATES) -> dict[str, np.ndarray]:
+    """Return geometric means over clips of shares of rates (clips, rates), NaN where a clip was not asked.
 
-
-def means(shares: Sequence[Sequence[float]]) -> dict[str, np.ndarray]:
-    """Return geometric means over clips of shares (clips, rates), NaN where a clip was not asked.
-
-    What is "saved" as a share, NaN where it is on no clip; on how many clips the error was "reached", of how many
-    "asked".
+    What is "saved" as a share, and the "updates" that are left, NaN where there is none on any clip; on how many clips
+    the error was "reached", of how many "asked".
     """
     table = np.array(shares)
     reached, asked = np.isfinite(table).sum(axis=0), (~np.isnan(table)).sum(axis=0)
-    return {"saved": 1.0 - geometric_mean(table), "reached": reached, "asked": asked}
+    mean = geometric_mean(table)
+    return {"updates": mean * rates, "saved": 1.0 - mean, "reached": reached, "asked": asked}
 
 
 def bows_of(clip: Clip) -> dict[int, tuple[float, float]]:

@@ -9,7 +9,7 @@ from rigid_motion import animation
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.scripts.research.keeping import written
 
-BRISK = Motion("Brisk", turn=90.0, distance=1.0, frames=24)
+BRISK = Motion("Brisk", degrees=90.0, metres=1.0, frames=24)
 
 
 @pytest.fixture

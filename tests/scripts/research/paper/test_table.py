@@ -29,7 +29,7 @@ def test_a_spline_of_a_circle_needs_far_fewer_updates_than_chords():
 
 def test_means_are_geometric_and_over_the_clips_that_got_there():
     nan = np.nan
-    mean = table.mean_over([[0.25, nan, nan, nan], [1.0, nan, nan, np.inf], [np.inf, nan, nan, nan], [nan] * 4])
+    mean = table.means([[0.25, nan, nan, nan], [1.0, nan, nan, np.inf], [np.inf, nan, nan, nan], [nan] * 4])
     assert mean["updates"][0] == pytest.approx(15.0)
     assert mean["saved"][0] == pytest.approx(0.5)
     assert (mean["reached"].tolist(), mean["asked"].tolist()) == ([2, 0, 0, 0], [3, 0, 0, 1])
