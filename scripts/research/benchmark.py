@@ -54,11 +54,6 @@ def cases(count: int) -> Iterator[Case]:
 # -- ways to compute ---------------------------------------------------------------------------------------------------
 
 
-def in_the_algebra(case: Case, mode: str) -> Poses:
-    """Evaluate this program's reference of the mode, in the algebra it is named after."""
-    return MODES[mode].reference(*case.ends())
-
-
 def pytransform3d_sclerp(case: Case) -> np.ndarray:
     """Evaluate `dual_quaternions_sclerp`, the batch form of pytransform3d."""
     first, u = case.pairs()
@@ -97,7 +92,7 @@ def ways(case: Case) -> dict[Way, Callable[[], object]]:
     for mode in MODES:
         result[mode, PROGRAM] = partial(case.filled_in, mode)
         if not MODES[mode].is_smooth:
-            result[mode, "NumPy, in the algebra"] = partial(in_the_algebra, case, mode)
+            result[mode, "NumPy, in the algebra"] = partial(case.in_the_algebra, mode)
     result["dq_sclerp", "pytransform3d"] = partial(pytransform3d_sclerp, case)
     result["dq_sclerp", "SciPy"] = partial(scipy_screw, case)
     if case.times.ndim == 1 and case.keys.shape[0] == 1:

@@ -12,7 +12,7 @@ import numpy as np
 from research.studies import report, seconds_in_turns
 from rigid_motion.motion import shell_error
 from rigid_motion_batch.analysis.bodies import BodyReconstruction, reconstruct_body
-from rigid_motion_batch.analysis.body_decimated import DECIMATE, OWN, SHARED
+from rigid_motion_batch.analysis.body_decimated import OWN, SHARED
 from rigid_motion_batch.analysis.body_metrics import measure_modes
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.metrics import geometric_mean
@@ -35,18 +35,18 @@ def figures(paths: Sequence[Path]) -> dict[str, Any]:
     """Return all that is measured of the bodies in files."""
     clips = {path.stem: replace(read_clips([str(path)])[0][0], name=path.stem) for path in paths}
     bodies = [of_height(part_of(clip, 0, min(len(clip.times), MOST_FRAMES) - 1)) for clip in clips.values()]
-    kept = {body.name: [row for way in WAYS for row in beside(body, way)] for body in bodies}
+    pairs = {way: [beside(body, way) for body in bodies] for way in WAYS}
     return {
         "bodies": [about(body) | {"extent": HEIGHT / body.metres_per_unit} for body in bodies],
         "greedy": [row for body in bodies for row in beside_greedy(body)],
-        "decimate": [row for rows in kept.values() for row in rows],
+        "decimate": [row for of_way in pairs.values() for pair in of_way for row in pair],
         "decimate_means": {
-            own["how"]: {
-                name: geometric_mean(np.array([rows[at + 1][name] / rows[at][name] for rows in kept.values()]))
+            way: {
+                name: geometric_mean(np.array([decimated[name] / own[name] for own, decimated in of_way]))
                 for name in ("frames", "numbers")
             }
-            for at, own in enumerate(next(iter(kept.values()), ()))
-            if own["how"] != DECIMATE
+            for way, of_way in pairs.items()
+            if of_way
         },
         "timing": [row for name in clips.keys() & {LONG} or clips for row in timing(of_height(clips[name]))],
     }

@@ -18,7 +18,7 @@ from rigid_motion_batch.analysis.modes import REFERENCE
 from rigid_motion_batch.analysis.needed import OfRigidBody, part_of
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.streaming.measuring import HEADERS, measure
-from rigid_motion_batch.streaming.packed import PLACE_BITS, STAMP
+from rigid_motion_batch.streaming.packed import STAMP
 from rigid_motion_batch.streaming.sending import body_of, samples_of
 
 from .table import RADIUS, UPDATES, has_samples_for
@@ -29,13 +29,7 @@ SECONDS = 10.0
 TOLERANCES = 1.0, 5.0, 4
 """From this multiple of the smallest error wanted to this multiple of the largest, so many."""
 
-TURN_BITS = 10  # of each of the smallest three components of a quaternion
-
-PACKINGS = {
-    "7 doubles": 56,
-    "7 singles": 28,
-    f"places of {PLACE_BITS} bits, smallest three of {TURN_BITS}": (3 * PLACE_BITS + 2 + 3 * TURN_BITS) // 8,
-}
+PACKINGS = {"7 doubles": 56, "7 singles": 28}
 """Bytes of a pose."""
 
 

@@ -2,9 +2,8 @@
 
 Two readings of the same work, a hand for each of `USERS` users at `FRAMES_PER_S`:
 
-- `fast`: this program's own forms (`motion.interpolate`), which work a segment out once and then fill its frames;
-- `in_the_algebra`: the modes in the algebra they are named after (`Mode.reference`), every frame encoded, interpolated
-  and extracted anew as in the paper, all of them in one array.
+- `Case.filled_in`: this program's own forms, which work a segment out once and then fill its frames;
+- `Case.in_the_algebra`: every frame encoded, interpolated and extracted anew as in the paper, all of them in one array.
 
 All engines take turns in every round, and each is held against the state of the art of the same round; the interval is
 from a bootstrap over rounds. Seconds. Timings differ from run to run.
@@ -62,9 +61,9 @@ def races(clip: Clip, needed: Mapping[str, Mapping[str, list[float]]], rounds: i
             "paper": dict.fromkeys(exact, float(PAPER[rate])),
         }
         for pace, updates in paces.items():
-            for mode, row in race(clip, fast, updates | {REFERENCE: float(rate)}, rounds).items():
+            for mode, row in race(clip, Case.filled_in, updates | {REFERENCE: float(rate)}, rounds).items():
                 result.setdefault(pace, {}).setdefault(mode, {})[rate] = row
-    result["algebra"] = race(clip, in_the_algebra, dict.fromkeys(exact, float(UPDATES[0])), rounds)
+    result["algebra"] = race(clip, Case.in_the_algebra, dict.fromkeys(exact, float(UPDATES[0])), rounds)
     return result
 
 
@@ -107,13 +106,3 @@ def case_of(clip: Clip, rate: float) -> Case:
     quaternions = np.tile(align_signs(poses.quaternions), (USERS, 1, 1))
     frames = np.arange(times[0], times[-1], 1.0 / FRAMES_PER_S)
     return Case(clip.name, times, Poses(np.tile(poses.positions, (USERS, 1, 1)), quaternions), frames)
-
-
-def fast(case: Case, mode: str) -> Poses:
-    """Generate all frames of all users by the fast form."""
-    return case.filled_in(mode)
-
-
-def in_the_algebra(case: Case, mode: str) -> Poses:
-    """Generate the same frames, each encoded, interpolated and extracted anew, all in one array."""
-    return MODES[mode].reference(*case.ends())

@@ -16,7 +16,7 @@ EXACT = [mode for mode in MODES if not MODES[mode].is_smooth]
 @pytest.mark.parametrize("mode", EXACT)
 def test_all_readings_generate_the_same_frames(mode: str):
     case = timing.case_of(CLIP, 10.0)
-    fast, arrays = (engine(case, mode).positions for engine in (timing.fast, timing.in_the_algebra))
+    fast, arrays = (engine(mode).positions for engine in (case.filled_in, case.in_the_algebra))
     assert case.in_betweens == timing.USERS * 90
     np.testing.assert_allclose(arrays, fast.reshape(-1, 3), atol=1e-12)
 
