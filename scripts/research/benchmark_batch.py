@@ -103,21 +103,19 @@ def workers(clips: Sequence[Path], folder: Path, rounds: int, *options: str) -> 
 def memory(folder: Path, clips: Sequence[Path], minutes: Sequence[int]) -> dict[str, list[dict[str, float]]]:
     """Return what the program takes over the number of clips, and its workers over the length of one."""
     options = ("--no-video", "--rates", "10")
-    programs, long = [], []
-    for count in (FEW, len(clips)):
-        report(f"memory over {count} clips")
-        programs.append({"clips": count, "mb": compare(clips[:count], folder, 2, *options).program / 1e6})
+    report(f"memory over clips, and over {minutes} minutes")
+    taken = {count: compare(clips[:count], folder, 2, *options).program / 1e6 for count in (FEW, len(clips))}
+    long = []
     path, rest = folder / "long.csv", 0
     for length in (0, *minutes):
         samples = int(length * 60 * RATE) or 10
-        report(f"memory over {length} minutes")
         path.write_text(wandering(samples), encoding="utf-8")
         run = compare([path], folder, 1, *options)
         rest = rest or run.worker
         if length:
             figures = {"mb": run.worker / 1e6, "bytes_a_sample": (run.worker - rest) / samples, "seconds": run.seconds}
             long.append({"minutes": length, "samples": samples, **figures})
-    return {"programs": programs, "workers": long}
+    return {"programs": [{"clips": count, "mb": mb} for count, mb in taken.items()], "workers": long}
 
 
 def main(arguments: list[str] | None = None) -> int:

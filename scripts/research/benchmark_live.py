@@ -241,15 +241,15 @@ def everyday(size: Size, rotation: str, rounds: int) -> list[dict[str, Any]]:
         lamp.location.x += 0.01
         bpy.context.view_layer.update()
 
-    works = {
-        "one key edited, and the view updated": edited,
-        "another object moved": with_and_without(move, rounds),
-        "all frames played": play(objects, few),
-    }
-    rows = [row(what, live, "native", native) for what, (live, native) in works.items()]
-    beside = "`bake_action_objects`, all channels, as *Bake Action* does"
+    moved, played = with_and_without(move, rounds), play(objects, few)
+    baking = "`bake_action_objects`, all channels, as *Bake Action* does"
     anew, baked = fill_in(objects, rounds), NativeBaking(objects, every_channel=True).seconds(few)
-    return [*rows, row("all in-betweens anew", anew, beside, baked)]
+    return [
+        row("one key edited, and the view updated", edited[0], "native", edited[1]),
+        row("another object moved", moved[0], "native", moved[1]),
+        row("all frames played", played[0], "native", played[1]),
+        row("all in-betweens anew", anew, baking, baked),
+    ]
 
 
 def shot(size: Size, rotation: str, rounds: int) -> dict[str, Any]:

@@ -29,8 +29,7 @@ FINER, FILLED = 2, 0.6  # pixels of a model for a pixel of the picture, each way
 
 def picture(width: int, height: int, ground: str = "none", dots_per_inch: int = 100) -> Axes:
     """Return what a picture of so many pixels is drawn on, in units of its height, 0 in the middle."""
-    size = (width / dots_per_inch, height / dots_per_inch)
-    figure = Figure(figsize=size, dpi=dots_per_inch, facecolor=ground)
+    figure = Figure((width / dots_per_inch, height / dots_per_inch), dpi=dots_per_inch, facecolor=ground)
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set(xlim=(-0.5 * width / height, 0.5 * width / height), ylim=(-0.5, 0.5))

@@ -26,7 +26,6 @@ from rigid_motion_batch.analysis.metrics import geometric_mean
 from tests.gltf.oracle import File
 
 HEIGHT, RADIUS = 1.7, 0.03  # metres
-SIDES = ("input", "output")
 TOLERANCES = (1e-4, 1e-3, 5e-3)  # metres
 
 TOOLS = {
@@ -52,7 +51,9 @@ def animation_bytes(path: Path) -> int:
     """Return the bytes of all keys of a file: times and values."""
     document = read_document(path, in_memory=True)
     samplers = [sampler for animation in document.json["animations"] for sampler in animation["samplers"]]
-    return sum(stored_size(document, it) for it in {sampler[side] for sampler in samplers for side in SIDES})
+    return sum(
+        stored_size(document, it) for it in {sampler[side] for sampler in samplers for side in ("input", "output")}
+    )
 
 
 def beside(original: Path, smaller: Path, tool: str) -> dict[str, Any]:

@@ -105,6 +105,5 @@ def main(arguments: list[str] | None = None) -> int:
         "single": table([row for row in rows if row["joints"] == 1]),
         "engines": engines(next(clip for clip in clips if clip.name == HAND)),
     }
-    report("a room")
     result["room"] = room.measured(options.users, options.seconds)
     return publish("live_costs", result, options, *options.folders)

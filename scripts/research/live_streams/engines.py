@@ -18,7 +18,7 @@ import heapq
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import accumulate
+from itertools import accumulate, count
 
 import numpy as np
 
@@ -80,9 +80,8 @@ def arriving(arrivals: Arrivals, moments: np.ndarray) -> Iterator[tuple[float, A
 
 def without_overtaken(arrivals: Arrivals) -> Arrivals:
     """Return the arrivals that nothing sent later came before."""
-    newest = accumulate((sent for _, sent, _ in arrivals), max)
-    before = [-np.inf, *newest]
-    return [it for it, latest in zip(arrivals, before, strict=False) if it[1] > latest]
+    newest = [-np.inf, *accumulate((sent for _, sent, _ in arrivals), max)]
+    return [it for it, latest in zip(arrivals, newest, strict=False) if it[1] > latest]
 
 
 def mirror(arrivals: Arrivals, frames: np.ndarray) -> list[Pose]:
@@ -131,9 +130,9 @@ class _Average:
     variance: float = 0.0
 
     def add(self, value: float) -> None:
-        part = 2.0 / (self.count + 1.0)
-        delta = value - (self.value if self.value is not None else value)
-        self.value = value if self.value is None else self.value + part * delta
+        part, before = 2.0 / (self.count + 1.0), value if self.value is None else self.value
+        delta = value - before
+        self.value = before + part * delta
         self.variance = (1.0 - part) * (self.variance + part * delta * delta)
 
 
@@ -204,17 +203,16 @@ def by_codec(truth: Path, way: Way, frames: np.ndarray, tolerance: float, delay:
     rng = np.random.default_rng(7)
     bodies = [Body.rigid("hand", radius=RADIUS), Body.rigid("tool", radius=RADIUS)]
     sender, receiver = Sender(bodies, tolerance, delay), Receiver()
-    pending, count, size = [], 0, 0
+    pending, numbers, size = [], count(), 0
     samples = truth.at(truth.moments)
     current, shown = truth.at(frames[:1])[:, 0], []
 
     def post(datagrams: list[bytes], now: float, back: bool = False) -> None:
-        nonlocal count, size
+        nonlocal size
         for datagram in datagrams:
             size += 0 if back else len(datagram) + HEADERS
-            count += 1
             if np.isfinite(arrival := way.arrival(now, rng)):
-                heapq.heappush(pending, (arrival, count, back, datagram))
+                heapq.heappush(pending, (arrival, next(numbers), back, datagram))
 
     def come(until: float) -> None:
         while pending and pending[0][0] <= until:
@@ -244,7 +242,7 @@ def seen(shown: Poses, truth: Path, frames: np.ndarray) -> dict[str, float]:
     """Compare what was shown at frames (n,) with the truth; slip is the tool's middle from its place in the hand."""
     kept = frames > SETTLED
     shown, frames = shown[:, kept], frames[kept]
-    hand, tool = shown[0], shown[1]
+    hand, tool = shown
     errors = [shell_error(hand, truth.at(frames - lag)[0], RADIUS) for lag in LAGS]
     best = int(np.argmin([rms(error) for error in errors]))
     went, goes = (np.diff(it.positions, axis=0) for it in (hand, truth.at(frames - LAGS[best])[0]))

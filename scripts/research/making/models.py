@@ -20,7 +20,6 @@ from rigid_motion_batch.scenes.materials import surface
 from .motions import TIP
 
 X, Y, Z = np.eye(3)
-CREASE = np.radians(38.0)  # edges of less are smooth
 
 MATERIALS = {"Mode": ("#CED4DA", 0.0, 0.32), "Metal": ("#CBCED2", 0.7, 0.30), "Rubber": ("#35373C", 0.0, 0.60)}
 """Colour, metallic, roughness."""
@@ -174,6 +173,7 @@ NECK = ((12, 15, 6, -6), (26, 14, 5, -3.5), (40, 17, 5, -0.5))
 def controller() -> list[Part]:
     """Return the parts of the hand controller."""
     (middle, axis, ahead), around = RING, np.radians(np.arange(0, 360, 30))
+    band = np.stack((7.2 * np.sin(around), 42 + 2.6 * np.cos(around)), axis=1)
 
     def on_face(x: float, forward: float) -> Place:
         return HEAD[0] + x * X + forward * HEAD[2], *HEAD[1:]
@@ -195,9 +195,7 @@ def controller() -> list[Part]:
         loft("Metal", on_face(14.0, -5.0), BUTTON, points=14),
         loft("Metal", on_face(5.5, -16.0), ((-1, 2.4), (1.4, 2.4), (1.8, 1.8)), points=10),
         loft("Rubber", PULL, TRIGGER, exponent=3.0, count=11),
-        loft(
-            "Mode", RING, np.stack((7.2 * np.sin(around), 42 + 2.6 * np.cos(around)), axis=1), points=48, endless=True
-        ),
+        loft("Mode", RING, band, points=48, endless=True),
         loft("Mode", (middle, ahead, axis), NECK, exponent=4.0),
         *map(light, np.radians(np.arange(-48, 229, 23))),
     ]
@@ -237,7 +235,7 @@ def build_mesh(name: str, parts: list[Part], materials: dict[str, bpy.types.Mate
     outward.to_mesh(mesh)
     outward.free()
     mesh.shade_smooth()
-    mesh.set_sharp_from_angle(angle=CREASE)
+    mesh.set_sharp_from_angle(angle=np.radians(38.0))
     return mesh
 
 

@@ -88,7 +88,15 @@ def measure(clips: Sequence[Clip]) -> dict[str, Any]:
         return {"shell": shell, "velocity": velocity}
 
     return {
-        "bodies": {clip.name: _about(clip) for clip in clips},
+        "bodies": {
+            clip.name: {
+                "joints": len(clip.rest_body.joints),
+                "seconds": float(clip.times[-1] - clip.times[0]),
+                "samples_per_s": clip.samples_a_second,
+                "skipped": clip.calibration,
+            }
+            for clip in clips
+        },
         "rates": rates,
         "needed": {
             mode: {way: means([shares[mode][way] for shares in needed], rates) for way in DECIMATIONS[:2]}
@@ -99,13 +107,4 @@ def measure(clips: Sequence[Clip]) -> dict[str, Any]:
             name: {mode: {rate: shell for rate, (shell, _) in rates.items()} for mode, rates in own.items()}
             for name, own in errors.items()
         },
-    }
-
-
-def _about(clip: Clip) -> dict[str, Any]:
-    return {
-        "joints": len(clip.rest_body.joints),
-        "seconds": float(clip.times[-1] - clip.times[0]),
-        "samples_per_s": clip.samples_a_second,
-        "skipped": clip.calibration,
     }

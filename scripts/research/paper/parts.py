@@ -50,9 +50,7 @@ def main(arguments: list[str]) -> int:
     """Reproduce the paper, and return the exit code."""
     parser = study_parser("paper", __doc__, EPILOG)
     parser.add_argument("--recordings", type=Path, metavar="FOLDER", help="more recordings for the table")
-    parser.add_argument(
-        "--bodies", type=Path, nargs="+", default=[], metavar="PATH", help="whole bodies, or folders of them"
-    )
+    parser.add_argument("--bodies", type=Path, nargs="+", default=[], metavar="PATH", help="whole bodies, or folders")
     parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART", help=", ".join(PARTS))
     parser.add_argument("--no-video", action="store_true", help="make pictures, but no film")
     parser.add_argument("--rounds", type=int, default=timing.ROUNDS, metavar="N", help="of the timing (%(default)s)")
@@ -126,8 +124,8 @@ def race(options: argparse.Namespace) -> dict[str, Any]:
 
 def count_figures(_: argparse.Namespace) -> dict[str, Any]:
     """Return the figures in numbers."""
-    caught = catching.figures(motions.assets()["throw"])
-    return {"triangle": triangle.figures(), "strips": strips.figures(), "catching": caught}
+    thrown = motions.assets()["throw"]
+    return {"triangle": triangle.figures(), "strips": strips.figures(), "catching": catching.figures(thrown)}
 
 
 def draw(options: argparse.Namespace) -> None:

@@ -72,10 +72,9 @@ def costs(clips: list[Clip]) -> dict[str, Any]:
     """Return the geometric means over clips, and the bytes of even streams, for each of the paper's rates."""
     of_clips = {clip.name: costs_of(clip) for clip in clips}
     even = {name: [rate * (size + STAMP + HEADERS) for rate in UPDATES] for name, size in PACKINGS.items()}
-    missing = (np.nan, np.nan)
     needed = {}
     for delay in DELAYS:
-        table = np.array([[costs[delay].get(rate, missing) for rate in UPDATES] for costs in of_clips.values()])
+        table = np.array([[own[delay].get(rate, (np.nan,) * 2) for rate in UPDATES] for own in of_clips.values()])
         datagrams, size = geometric_mean(table).T
         needed[f"{1e3 * delay:.0f}"] = {
             "datagrams": datagrams,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from research.drawing import FAINT, INK, RULE, Model, column, seen
+from research.drawing import FAINT, INK, RULE, Model, column
 from research.making.motions import TIP, about, chain, held_by
 from rigid_motion.motion import MODES, Poses, interpolate
 from rigid_motion.motion.quaternions import angle_between, normalise, rotate
@@ -60,7 +60,7 @@ def draw() -> Axes:
             if off > 1e-4:
                 drill.draw(axes, result["dq_sclerp"][moment], place, METRES, DARK.ghost, whole=True)
             drill.draw(axes, poses[moment], place, METRES, colour_of(mode), whole=False)
-            axes.plot(*seen(np.zeros(3), place, METRES), "+", color="#C1121F", markersize=4, markeredgewidth=0.7)
+            axes.plot(*place, "+", color="#C1121F", markersize=4, markeredgewidth=0.7)
             axes.text(x, foot - 0.027, f"{1e3 * off:.0f} mm", fontsize=6, color=INK, ha="center")
             axes.text(x, foot - 0.053, f"{angle:.1f}°", fontsize=6, color=FAINT, ha="center")
     for x, moment in zip(columns, MOMENTS, strict=True):
