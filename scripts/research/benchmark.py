@@ -21,7 +21,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import RigidTransform, Rotation, RotationSpline, Slerp
 
 from research.in_betweens import Case
-from research.studies import publish, report, seconds_in_turns, study_parser
+from research.studies import interleaved_seconds, publish, report, study_parser
 from rigid_motion.motion import MODES, Poses
 from rigid_motion.motion.poses import reshaped
 from rigid_motion.motion.quaternions import align_signs, normalise
@@ -125,7 +125,7 @@ def main(arguments: list[str] | None = None) -> int:
     for case in cases(options.count):
         report(case.title)
         about = {"title": case.title, "in_betweens": case.in_betweens, "key_count": int(np.prod(case.keys.shape))}
-        seconds = seconds_in_turns(ways(case), options.rounds, warm=True, most=ENOUGH)
+        seconds = interleaved_seconds(ways(case), options.rounds, warm=True, most=ENOUGH)
         figures["cases"].append({**about, "rates": rates(case, seconds)})
     versions = {"SciPy": scipy.__version__, "pytransform3d": pytransform3d.__version__}
     return publish("benchmark", figures, options, "--rounds", options.rounds, **versions)

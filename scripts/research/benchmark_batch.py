@@ -24,7 +24,7 @@ import numpy as np
 
 from research.making.tracking import table
 from research.paper.motions import assets
-from research.studies import publish, report, seconds_in_turns, study_parser
+from research.studies import interleaved_seconds, publish, report, study_parser
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion_batch.places import PACKAGE
@@ -87,7 +87,7 @@ def workers(clips: Sequence[Path], folder: Path, rounds: int, *options: str) -> 
     ways = [(1, False), (2, False), *([(1, True)] if hasattr(os, "sched_setaffinity") else [])]
     runs = {way: partial(compare, clips, folder, way[0], *options, alone=way[1]) for way in ways}
     report(f"{len(clips)} clips")
-    best = {way: min(seconds) for way, seconds in seconds_in_turns(runs, rounds).items()}
+    best = {way: min(seconds) for way, seconds in interleaved_seconds(runs, rounds).items()}
     return [
         {
             "workers": jobs,
@@ -124,7 +124,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--clips", type=int, default=200, help="without video (%(default)s)")
     parser.add_argument("--films", type=int, default=12, help="clips with video (%(default)s)")
     parser.add_argument("--minutes", default="6,60", metavar="N,...", help="lengths of the long clip (%(default)s)")
-    parser.add_argument("--rounds", type=int, default=3, help="of one worker and two in turns (%(default)s)")
+    parser.add_argument("--rounds", type=int, default=3, help="of one worker and two, interleaved (%(default)s)")
     options = parser.parse_args(arguments)
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)

@@ -20,7 +20,7 @@ import bpy
 import numpy as np
 from bpy_extras import anim_utils
 
-from research.studies import publish, report, seconds_in_turns, study_parser
+from research.studies import interleaved_seconds, publish, report, study_parser
 from rigid_motion import animation
 from rigid_motion_batch.scenes.body_scene import registered
 from rigid_motion_batch.silencing import silenced
@@ -137,7 +137,7 @@ class NativeBaking:
     def seconds(self, rounds: int) -> Seconds:
         """Measure it, while nothing is followed."""
         animation.set_enabled(False)
-        seconds = seconds_in_turns({"bake": self.bake, "restore": self.restore}, rounds)["bake"]
+        seconds = interleaved_seconds({"bake": self.bake, "restore": self.restore}, rounds)["bake"]
         animation.set_enabled(True)
         return seconds
 
@@ -171,7 +171,7 @@ def with_and_without(edit: Callable[[], None], rounds: int, edits: int = WARMING
     runs = {}
     for name, switch in switches.items():
         runs |= {name: switch, f"{name}, warm": row_of_edits, f"{name}, measured": row_of_edits}
-    seconds = seconds_in_turns(runs, rounds)
+    seconds = interleaved_seconds(runs, rounds)
     animation.set_enabled(True)
     animation.refresh()
     live, native = ([spent / edits for spent in seconds[f"{name}, measured"]] for name in switches)
@@ -196,7 +196,7 @@ def play(targets: Targets, rounds: int) -> tuple[Seconds, Seconds]:
     runs = {}
     for mode in (MODE, "BLENDER"):
         runs |= {f"to {mode}": partial(set_modes, targets, mode), mode: show_all}
-    seconds = seconds_in_turns(runs, rounds)
+    seconds = interleaved_seconds(runs, rounds)
     set_modes(targets, MODE)
     return seconds[MODE], seconds["BLENDER"]
 
@@ -213,13 +213,13 @@ def fill_in(targets: Targets, rounds: int) -> Seconds:
         if animation.refresh() != len(targets):
             raise RuntimeError("not all were filled in")
 
-    return seconds_in_turns({"forget": forget, "refresh": refresh}, rounds)["refresh"]
+    return interleaved_seconds({"forget": forget, "refresh": refresh}, rounds)["refresh"]
 
 
 def choose(targets: Targets, rounds: int) -> tuple[Seconds, Seconds]:
     """Return the seconds of a mode chosen for all in one call; and with the update of the view. They have it then."""
     back, chosen = partial(set_modes, targets, "BLENDER"), partial(animation.set_mode, targets, MODE)
-    seconds = seconds_in_turns({"back": back, "choose": chosen, "update": bpy.context.view_layer.update}, rounds)
+    seconds = interleaved_seconds({"back": back, "choose": chosen, "update": bpy.context.view_layer.update}, rounds)
     return seconds["choose"], np.add(seconds["choose"], seconds["update"]).tolist()
 
 
@@ -295,7 +295,7 @@ def rigs(size: Size, rounds: int) -> list[dict[str, Any]]:
         each, _ = with_and_without(partial(edit, keys), few, 1)
         _, chosen = choose(bones, few)
         drafts = {"edit": partial(edit, keys[:1]), "finish": animation.follower.follower.finish_drafts}
-        finished = seconds_in_turns(drafts, few)["finish"]
+        finished = interleaved_seconds(drafts, few)["finish"]
     finally:
         animation.follower.set_drafts(False)
     works = {

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from research.studies import report, seconds_in_turns
+from research.studies import interleaved_seconds, report
 from rigid_motion.motion import shell_error
 from rigid_motion_batch.analysis.bodies import BodyReconstruction, reconstruct_body
 from rigid_motion_batch.analysis.body_decimated import OWN, SHARED
@@ -42,7 +42,7 @@ def figures(paths: Sequence[Path]) -> dict[str, Any]:
         "decimate": [row for of_way in pairs.values() for pair in of_way for row in pair],
         "decimate_means": {
             way: {
-                name: geometric_mean(np.array([decimated[name] / own[name] for own, decimated in of_way]))
+                name: geometric_mean(np.array([decimated[name] / reduced[name] for reduced, decimated in of_way]))
                 for name in ("frames", "numbers")
             }
             for way, of_way in pairs.items()
@@ -115,7 +115,7 @@ def beside(body: Clip, way: str) -> list[dict[str, Any]]:
     report(f"{body.name}, {way}")
     made = reduced(body, shared=WAYS[way])
     (measured,) = measure_modes(made, RADIUS).rows
-    own, decimated = (
+    reduced_keys, decimated = (
         {
             "body": body.name,
             "how": left.how,
@@ -128,14 +128,14 @@ def beside(body: Clip, way: str) -> list[dict[str, Any]]:
     )
     slides = measured.foot_slide_m, measured.recorded_slide_m
     slide, recorded = (None if metres is None else 1e3 * metres for metres in slides)
-    return [own | {"slide_mm": slide, "recorded_slide_mm": recorded}, decimated]
+    return [reduced_keys | {"slide_mm": slide, "recorded_slide_mm": recorded}, decimated]
 
 
 def timing(body: Clip) -> list[dict[str, Any]]:
     """Return the seconds of both ways to have keys, and as multiples of greedy insertion's."""
     report(f"{body.name}, time")
     runs = {how: lambda shared=shared: reduced(body, shared=shared) for how, shared in WAYS.items()}
-    seconds = {how: min(spent) for how, spent in seconds_in_turns(runs | {"": lambda: greedy(body)}, 2).items()}
+    seconds = {how: min(spent) for how, spent in interleaved_seconds(runs | {"": lambda: greedy(body)}, 2).items()}
     return [
         about(body) | {"how": how, "seconds": seconds[how], "of_greedy": seconds[how] / seconds[""]} for how in runs
     ]

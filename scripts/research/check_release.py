@@ -30,7 +30,7 @@ CONTRIBUTING.md has the steps of a release. Exit code: 0 all is there, 1 somethi
 MANIFEST, CHANGELOG, MANUAL = "blender_manifest.toml", "CHANGELOG.md", "addon/rigid_motion/ui/manual.py"
 
 STAND_INS = re.compile(r"(^|\.)(example(\.(org|com|net))?|test|invalid|localhost)$|^$")
-"""Names of hosts that are nobody's (RFC 2606), or no names."""
+"""Names of hosts that are reserved (RFC 2606), or no names."""
 
 
 def missing(checkout: Path) -> Iterator[str]:

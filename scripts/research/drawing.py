@@ -83,8 +83,8 @@ class Model:
         sizes = np.ptp(corners[..., :2], axis=1).max(axis=1)
         halvings = np.ceil(np.log2(sizes / (FILLED * pixel))).clip(0.0).astype(int)
         parts = [(centroids(times) @ corners[halvings == times], halvings == times) for times in set(halvings.tolist())]
-        points = np.concatenate([own.reshape(-1, 3) for own, _ in parts])
-        colours = np.concatenate([np.repeat(colours[some], own.shape[1], axis=0) for own, some in parts])
+        points = np.concatenate([pieces.reshape(-1, 3) for pieces, _ in parts])
+        colours = np.concatenate([np.repeat(colours[cut], pieces.shape[1], axis=0) for pieces, cut in parts])
         # The nearest part of a triangle in a pixel is seen.
         order = np.argsort(-points[:, 2])
         cells = np.rint(points[order, :2] / pixel).astype(int)

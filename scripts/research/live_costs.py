@@ -4,8 +4,8 @@
 
 Whole bodies and single hands are sent by the codec of [the wire](wire.md) over UDP on loopback; a receiver in another
 process shows them, and goes by the recording's clock, however busy the machine is. Bytes are those of datagrams with
-the 28 bytes of UDP and IPv4 around each, without what somebody who joins is told once. Errors are the largest of any
-joint's ball of 3 cm, in the root's space, at every sample.
+the 28 bytes of UDP and IPv4 around each, without the description that a receiver gets when it joins. Errors are the
+largest of any joint's ball of 3 cm, in the root's space, at every sample.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ Small models of what each engine does with the poses that arrive, after its sour
   the second by up to three intervals, and towards that by dt / 0.1 s at every frame ("lerp of lerp").
 - Godot (`MultiplayerSynchronizer`): the newest pose at each of 60 physics ticks, between two by physics interpolation.
 
-All get the poses of hand and tool in datagrams of their own, 30 times a second, and drop those that are overtaken. An
+All get the poses of hand and tool in separate datagrams, 30 times a second, and drop those that are overtaken. An
 error is that of a ball of 10 cm, at the constant delay that suits what was shown best. Seconds and metres.
 """
 

@@ -131,7 +131,7 @@ def swing(hammer: bpy.types.Object, hand: Vector, mode: str | None) -> list[Matr
 
 def _draw_hammer(axes: Axes, pose: Matrix, colour: str | None = None) -> None:
     """Draw a hammer as cylinders in their light; in one colour, or that of wood and steel."""
-    for *ends, radius, own in CYLINDERS:
+    for *ends, radius, material in CYLINDERS:
         begin, end = (np.array(pose @ Vector(end))[::2] for end in ends)
         along = (end - begin) / np.linalg.norm(end - begin)
         out = np.array((-along[1], along[0]))
@@ -139,5 +139,5 @@ def _draw_hammer(axes: Axes, pose: Matrix, colour: str | None = None) -> None:
         bright = np.clip(SHADES * (out @ (-0.45, 0.55)) + np.sqrt(1.0 - SHADES**2) * 0.7, 0.0, 1.0)
         edges = radius * SHADES[:, None] * out
         strips = np.stack((begin + edges[:-1], end + edges[:-1], end + edges[1:], begin + edges[1:]), axis=1)
-        shades = (0.4 + 0.65 * 0.5 * (bright[:-1] + bright[1:]))[:, None] * to_rgb(colour or own)
+        shades = (0.4 + 0.65 * 0.5 * (bright[:-1] + bright[1:]))[:, None] * to_rgb(colour or material)
         axes.add_collection(PolyCollection(strips, facecolors=shades.clip(0.0, 1.0), edgecolors="face", linewidths=0.5))

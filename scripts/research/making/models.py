@@ -221,9 +221,9 @@ def build_mesh(name: str, parts: list[Part], materials: dict[str, bpy.types.Mate
     mesh, used = bpy.data.meshes.new(name), list(dict.fromkeys(part.material for part in parts))
     vertices, faces, numbers = [], [], []
     for part in parts:
-        own = part.faces()
-        faces += [[len(vertices) + corner for corner in face] for face in own]
-        numbers += [used.index(part.material)] * len(own)
+        quads = part.faces()
+        faces += [[len(vertices) + corner for corner in face] for face in quads]
+        numbers += [used.index(part.material)] * len(quads)
         vertices += (1e-3 * part.rings).reshape(-1, 3).tolist()
     mesh.from_pydata(vertices, [], faces)
     for material in used:

@@ -84,7 +84,7 @@ def measure(clips: Sequence[Clip]) -> dict[str, Any]:
     errors = {clip.name: errors_of(clip) for clip in clips}
 
     def mean(mode: str, rate: int) -> dict[str, float]:
-        shell, velocity = geometric_mean(np.array([own[mode][rate] for own in errors.values()]))
+        shell, velocity = geometric_mean(np.array([of_clip[mode][rate] for of_clip in errors.values()]))
         return {"shell": shell, "velocity": velocity}
 
     return {
@@ -104,7 +104,7 @@ def measure(clips: Sequence[Clip]) -> dict[str, Any]:
         },
         "errors": {mode: {rate: mean(mode, rate) for rate in ERROR_RATES} for mode in MODES},
         "by_body": {
-            name: {mode: {rate: shell for rate, (shell, _) in rates.items()} for mode, rates in own.items()}
-            for name, own in errors.items()
+            name: {mode: {rate: shell for rate, (shell, _) in rates.items()} for mode, rates in of_clip.items()}
+            for name, of_clip in errors.items()
         },
     }

@@ -1,6 +1,6 @@
 """The figure "catching a tool": a drill thrown by one person and caught by another, as a third one's headset shows it.
 
-The two hands and the tool are streams of their own, at the same rate over the same link, and a mode fills in what
+The two hands and the tool are separate streams, at the same rate over the same link, and a mode fills in what
 arrives. A hand that holds the tool is one rigid body with it, so nothing between them should move. The hand is tracked
 at the wrist, a hand's length from where it holds. All modes are shown at the same moments of the motion; one that looks
 ahead gets there later. Seconds, metres.
@@ -157,7 +157,7 @@ def pictures(clip: Clip) -> tuple[np.ndarray, Callable[[int], Axes]]:
     tool, controller = Model.of("drill"), Model.of("controller")
     truth = _turned(interpolate(times, poses["tool"], moments, "dq_sclerp"))
     shown = {
-        (mode, rate): {body: _turned(own) for body, own in shown_of(times, poses, rate, mode, moments).items()}
+        (mode, rate): {body: _turned(of_body) for body, of_body in shown_of(times, poses, rate, mode, moments).items()}
         for mode in ENGINES
         for rate in RATES
     }
@@ -175,13 +175,13 @@ def pictures(clip: Clip) -> tuple[np.ndarray, Callable[[int], Axes]]:
             axes.axhline(top, 0.016, 0.984, color=RULE, linewidth=0.5)
             axes.text(left, top - 0.025, label_of(mode), fontsize=6.5, color=INK)
             for rate, x in zip(RATES, columns, strict=True):
-                place, own = (x, top - 0.118), shown[mode, rate]
-                for path, width, colour in ((truth, 0.4, FAINT), (own["tool"], 1.0, colour_of(mode))):
+                place, view = (x, top - 0.118), shown[mode, rate]
+                for path, width, colour in ((truth, 0.4, FAINT), (view["tool"], 1.0, colour_of(mode))):
                     axes.plot(*seen(path.positions[trail], place, METRES).T, color=colour, linewidth=width, zorder=-1)
                 tool.draw(axes, truth[frame], place, METRES, DARK.ghost, whole=True)
-                tool.draw(axes, own["tool"][frame], place, METRES, colour_of(mode), whole=False)
+                tool.draw(axes, view["tool"][frame], place, METRES, colour_of(mode), whole=False)
                 for hand, colour in HANDS.items():
-                    controller.draw(axes, own[hand][frame], place, METRES, colour, whole=False)
+                    controller.draw(axes, view[hand][frame], place, METRES, colour, whole=False)
                 axes.text(x + 0.06, top - 0.052, f"{1e3 * result[mode][rate]['gap']:.0f} mm", fontsize=6.5, ha="center")
         entries = [*((colour, f"{hand}'s hand") for hand, colour in HANDS.items()), (DARK.ghost, "what happened")]
         write_legend(axes, entries, left, -0.458, 6.5)

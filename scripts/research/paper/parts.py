@@ -98,7 +98,8 @@ def tabulate(options: argparse.Namespace) -> dict[str, Any]:
             for of_set, clips in sets.items()
         },
         "by_clip": {
-            name: {mode: table.means([own[mode]])["saved"] for mode in table.MODES} for name, own in needed.items()
+            name: {mode: table.means([shares[mode]])["saved"] for mode in table.MODES}
+            for name, shares in needed.items()
         },
         "bows": {clip.name: table.bows_of(clip) for clip in clips},
     }

@@ -2,8 +2,8 @@
 
 The even streams are those of the paper, `lerp_slerp` at its rates; the other is the codec of `rigid_motion.streams`,
 over loopback to another process (`streaming.measuring`). It has a tolerance, which is searched for: the one at which
-the RMS shell error is that of the even stream. Bytes are a second's, those of UDP and IPv4 around each datagram among
-them, and what somebody who joins is told once is not. Of each recording the first `SECONDS` are sent. Seconds, metres.
+the RMS shell error is that of the even stream. Bytes are a second's, with those of UDP and IPv4 around each datagram,
+without the description that a receiver gets when it joins. The first `SECONDS` are sent. Seconds, metres.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ DELAYS = (0.1, 0.2)  # by which the picture is behind
 SECONDS = 10.0
 
 TOLERANCES = 1.0, 5.0, 4
-"""From this multiple of the smallest error wanted to this multiple of the largest, so many."""
+"""From this multiple of the smallest requested error to this multiple of the largest, so many."""
 
 PACKINGS = {"7 doubles": 56, "7 singles": 28}
 """Bytes of a pose."""
@@ -74,7 +74,7 @@ def costs(clips: list[Clip]) -> dict[str, Any]:
     even = {name: [rate * (size + STAMP + HEADERS) for rate in UPDATES] for name, size in PACKINGS.items()}
     needed = {}
     for delay in DELAYS:
-        table = np.array([[own[delay].get(rate, (np.nan,) * 2) for rate in UPDATES] for own in of_clips.values()])
+        table = np.array([[clip[delay].get(rate, (np.nan,) * 2) for rate in UPDATES] for clip in of_clips.values()])
         datagrams, size = geometric_mean(table).T
         needed[f"{1e3 * delay:.0f}"] = {
             "datagrams": datagrams,

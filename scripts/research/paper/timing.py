@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from research.in_betweens import Case
-from research.studies import seconds_in_turns
+from research.studies import interleaved_seconds
 from rigid_motion.motion import MODES, Poses, decimate
 from rigid_motion.motion.quaternions import align_signs
 from rigid_motion_batch.analysis.modes import REFERENCE
@@ -79,8 +79,8 @@ def race(
     np.zeros(HELD).fill(1.0)
     cases = {mode: case_of(clip, rate) for mode, rate in updates.items()}
     runs = {mode: partial(engine, case, mode) for mode, case in cases.items()}
-    wall = {mode: np.array(of_mode) for mode, of_mode in seconds_in_turns(runs, rounds, warm=True).items()}
-    processor = seconds_in_turns(runs, rounds, clock=time.process_time)
+    wall = {mode: np.array(of_mode) for mode, of_mode in interleaved_seconds(runs, rounds, warm=True).items()}
+    processor = interleaved_seconds(runs, rounds, clock=time.process_time)
     a_frame = {mode: of_mode / cases[mode].in_betweens for mode, of_mode in wall.items()}
     return {
         mode: {

@@ -5,7 +5,7 @@ import pytest
 
 from research.paper import timing
 from research.paper.table import PAPER, UPDATES
-from research.studies import seconds_in_turns
+from research.studies import interleaved_seconds
 from rigid_motion.motion import MODES
 from tests.scripts.research.paper.clips import circling
 
@@ -21,10 +21,10 @@ def test_all_readings_generate_the_same_frames(mode: str):
     np.testing.assert_allclose(arrays, fast.reshape(-1, 3), atol=1e-12)
 
 
-def test_everyone_runs_as_often_in_turns():
+def test_interleaved_runs_are_as_many_of_each():
     ran: list[str] = []
     runs = {name: lambda name=name: ran.append(name) for name in "abc"}
-    seconds = seconds_in_turns(runs, 2, warm=True)
+    seconds = interleaved_seconds(runs, 2, warm=True)
     assert "".join(ran) == "aabbcc" * 2
     assert {name: len(spent) for name, spent in seconds.items()} == dict.fromkeys("abc", 2)
 
