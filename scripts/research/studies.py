@@ -51,7 +51,7 @@ def interleaved_seconds(
 ) -> dict[Name, list[float]]:
     """Return the seconds of every round of each, interleaved, so that a machine that slows down slows all.
 
-    A warm run has one before it that pays for memory and caches. One that has used up `most` seconds has no more rounds.
+    A warm run has one before it that pays for memory and caches. One that has used up `most` seconds has no more.
     """
     seconds: dict[Name, list[float]] = {name: [] for name in runs}
     for _ in range(rounds):
