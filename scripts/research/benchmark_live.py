@@ -20,7 +20,7 @@ import bpy
 import numpy as np
 from bpy_extras import anim_utils
 
-from research.studies import interleaved_seconds, publish, report, study_parser
+from research.studies import interleaved_seconds, publish, study_parser
 from rigid_motion import animation
 from rigid_motion_batch.scenes.body_scene import registered
 from rigid_motion_batch.silencing import silenced
@@ -316,7 +316,6 @@ def rigs(size: Size, rounds: int) -> list[dict[str, Any]]:
 def measure(rounds: int, scale: float) -> dict[str, Any]:
     """Return all figures, of scenes with a part of their objects and frames."""
     few, sizes = max(3, rounds // 8), {name: scaled(size, scale) for name, size in SIZES.items()}
-    report("everyday work, shots, a rig")
     return {
         **{name: size._asdict() for name, size in sizes.items()},
         "everyday": {rotation: everyday(sizes["scene"], rotation, rounds) for rotation in ROTATION_MODES},

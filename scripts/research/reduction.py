@@ -18,7 +18,7 @@ import bpy
 import numpy as np
 
 from research import body_reduction
-from research.studies import EXTENSIONS, files_in, publish, report, study_parser
+from research.studies import EXTENSIONS, files_in, publish, study_parser
 from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate, shell_error
 from rigid_motion_batch.analysis.metrics import geometric_mean
@@ -118,7 +118,6 @@ def main(arguments: list[str] | None = None) -> int:
         bodies = files_in(options.bodies, (".bvh", ".fbx"))
     except (TrajectoryError, OSError) as error:
         parser.error(str(error))
-    report(f"{len(recordings)} recordings")
     with registered():
         rows = {
             rotation: [measure(clip, rotation, options.tolerance, options.radius) for clip in recordings]

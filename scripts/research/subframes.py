@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import bpy
 import numpy as np
 
-from research.studies import publish, report, study_parser
+from research.studies import publish, study_parser
 from rigid_motion import animation
 from rigid_motion.animation.compute.differences import in_betweens
 from rigid_motion.animation.queries.keyed import source_of
@@ -117,7 +117,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser = study_parser("subframes", __doc__)
     parser.add_argument("--radius", type=float, default=0.1, help="of the shell, in metres (%(default)s)")
     options = parser.parse_args(arguments)
-    report("some minutes")
     with registered():
         figures = {"radius": options.radius, "motions": [figures_of(motion, options.radius) for motion in MOTIONS]}
     return publish("subframes", figures, options, f"--radius {options.radius:g}", Blender=bpy.app.version_string)

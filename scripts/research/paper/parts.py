@@ -94,12 +94,11 @@ def tabulate(options: argparse.Namespace) -> dict[str, Any]:
         "seconds": {name: sum(float(it.times[-1] - it.times[0]) for it in of_set) for name, of_set in sets.items()},
         "left_out": left_out,
         "needed": {
-            of_set: {name: table.means([needed[clip.name][name] for clip in clips]) for name in table.NAMES}
+            of_set: {name: table.means([needed[clip.name][name] for clip in clips]) for name in table.WAYS}
             for of_set, clips in sets.items()
         },
         "by_clip": {
-            name: {mode: table.means([shares[mode]])["saved"] for mode in table.MODES}
-            for name, shares in needed.items()
+            name: {mode: table.means([row[mode]])["saved"] for mode in table.MODES} for name, row in needed.items()
         },
         "bows": {clip.name: table.bows_of(clip) for clip in clips},
     }

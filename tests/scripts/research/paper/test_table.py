@@ -9,6 +9,12 @@ from tests.scripts.clips.recordings import swinging_clip
 from tests.scripts.research.paper.clips import circling, spinning_straight
 
 
+@pytest.fixture(autouse=True)
+def single(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One sender, which begins with the clip."""
+    monkeypatch.setattr(table, "PHASES", 1)
+
+
 def test_on_a_pivot_a_screw_needs_no_more_updates_than_tell_which_way_it_turns():
     # 1.6 turns: with four segments each is less than half a turn.
     clip = circling("pivot", turns=1.0)
@@ -22,7 +28,7 @@ def test_on_a_circle_without_turning_the_screw_is_the_straight_line():
 
 def test_a_spline_of_a_circle_needs_far_fewer_updates_than_chords():
     own = table.needed(circling(turns=0.5))
-    assert set(own) == set(table.NAMES)
+    assert set(own) == set(table.WAYS)
     for name in ("motor_spline", f"motor_spline{table.CHOSEN}"):
         assert max(own[name]) < 0.6
 
