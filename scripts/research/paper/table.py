@@ -1,7 +1,7 @@
 """The paper's table: how many updates a second each mode needs to be as good as the state of the art is with its own.
 
 As good means an RMS shell error no larger than that of `lerp_slerp` at 30, 20, 15 or 12 updates a second. How many that
-takes is what comparisons find (`analysis.needed`, keys_needed.csv), here of several senders. Errors are in metres.
+takes is what comparisons find (`analysis.needed`, keys_needed.csv), of a single sender. Errors are in metres.
 
 Why a screw wins on one motion and loses on another, `bows_of` tells: between two keys the origin runs straight under
 `lerp_slerp` and on a bow under a screw. With a the way from the straight line to the recorded position, and b to the
@@ -23,7 +23,7 @@ import numpy as np
 from rigid_motion.motion import decimate, interpolate
 from rigid_motion_batch.analysis.metrics import NOTHING, geometric_mean
 from rigid_motion_batch.analysis.modes import REFERENCE
-from rigid_motion_batch.analysis.needed import DECIMATIONS, KeysNeeded, OfRigidBody, keys_needed, part_of
+from rigid_motion_batch.analysis.needed import DECIMATIONS, KeysNeeded, OfRigidBody, keys_needed
 from rigid_motion_batch.recordings.clips import Clip
 
 PAPER = {30: 20, 20: 10, 15: 7, 12: 5}
@@ -33,7 +33,6 @@ UPDATES = tuple(PAPER)  # a second of the state of the art, from the most to the
 TIME_SAVED = 0.165  # what the paper saves of the running time for a generated frame, as a share
 
 RADIUS = 0.1  # of the shell, in metres
-PHASES = 2  # senders that begin within an interval
 
 SCREW = "dq_sclerp"
 
@@ -69,18 +68,10 @@ def shares_of(clip: Clip, result: KeysNeeded) -> dict[str, dict[str, list[float]
     return {mode: dict(zip(DECIMATIONS, row, strict=False)) for group, row in groups for mode in group}
 
 
-def needed(clip: Clip) -> dict[str, np.ndarray]:
-    """Return by name, of `WAYS`, what is needed of the updates of the state of the art at `UPDATES`, as shares.
-
-    Geometric means over `PHASES` senders that begin one after the other, because where one begins is chance.
-    """
-    begins = np.searchsorted(clip.times, clip.times[0] + np.arange(PHASES) / (PHASES * UPDATES[-1])).tolist()
-    senders = [OfRigidBody(part_of(clip, first, len(clip.times) - 1), RADIUS) for first in begins]
-    shares = [shares_of(clip, keys_needed(sender, MODES)) for sender in senders]
-    return {
-        name: np.exp(np.mean(np.log([of_sender[mode][way] for of_sender in shares]), axis=0))[: len(UPDATES)]
-        for name, (mode, way) in WAYS.items()
-    }
+def needed(clip: Clip) -> dict[str, list[float]]:
+    """Return by name, of `WAYS`, what is needed of the updates of the state of the art at `UPDATES`, as shares."""
+    shares = shares_of(clip, keys_needed(OfRigidBody(clip, RADIUS), MODES))
+    return {name: shares[mode][way][: len(UPDATES)] for name, (mode, way) in WAYS.items()}
 
 
 def means(shares: Sequence[Sequence[float]], rates: Sequence[float] = UPDATES) -> dict[str, np.ndarray]:

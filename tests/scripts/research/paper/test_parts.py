@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from research.paper import parts, sending, table
+from research.paper import parts, sending
 from research.paper.table import UPDATES
 from rigid_motion_batch.streaming.measuring import HEADERS
 from tests.scripts.research.paper.clips import circling
@@ -16,7 +16,6 @@ CLIP = circling(turns=0.7, rate=90.0, seconds=3.0)
 
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(table, "PHASES", 1)
     monkeypatch.setattr(parts.motions, "assets", lambda: {CLIP.name: CLIP})
 
 

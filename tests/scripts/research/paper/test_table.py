@@ -9,12 +9,6 @@ from tests.scripts.clips.recordings import swinging_clip
 from tests.scripts.research.paper.clips import circling, spinning_straight
 
 
-@pytest.fixture(autouse=True)
-def single(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One sender, which begins with the clip."""
-    monkeypatch.setattr(table, "PHASES", 1)
-
-
 def test_on_a_pivot_a_screw_needs_no_more_updates_than_tell_which_way_it_turns():
     # 1.6 turns: with four segments each is less than half a turn.
     clip = circling("pivot", turns=1.0)
