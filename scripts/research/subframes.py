@@ -9,6 +9,7 @@ compared with the pose that the mode has there: millimetres are the largest disp
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import bpy
@@ -84,22 +85,22 @@ def measure(motion: Motion, mode: str, rotation_mode: str, radius: float) -> dic
     moments = [(whole + fractions).ravel() for fractions in (QUARTERS, THIRTY_SECONDS, EIGHTHS)]
     quarters, finest, eighths = ((frames, in_betweens(source_of(obj), frames).desired) for frames in moments)
 
-    def deviation(name: str, frames: np.ndarray, requested: Poses) -> dict[str, float]:
+    def deviation(name: str, units: Sequence[str], frames: np.ndarray, requested: Poses) -> dict[str, float]:
         """Return how far Blender shows it from where it should be."""
         shown = animation.read_poses(obj, frames)
         shell, turned = shell_error(shown, requested, radius), angle_between(shown.quaternions, requested.quaternions)
         figures = {"mm": 1e3 * shell.max(), "rms_mm": 1e3 * rms(shell), "degrees": np.degrees(turned.max())}
-        return {f"{name}_{unit}": float(figure) for unit, figure in figures.items()}
+        return {f"{name}_{unit}": float(figures[unit]) for unit in units}
 
-    figures = deviation("live", *quarters)
+    figures = deviation("live", ("mm", "rms_mm", "degrees"), *quarters)
     animation.set_exact(obj)
-    figures |= deviation("exact", *finest)
+    figures |= deviation("exact", ("mm",), *finest)
     animation.set_exact(obj, False)
     animation.bake(obj, step=0.25)
-    figures |= deviation("quarter", *eighths)
+    figures |= deviation("quarter", ("mm", "degrees"), *eighths)
     animation.unbake(obj)
     animation.bake(obj)
-    return figures | deviation("whole", *quarters)
+    return figures | deviation("whole", ("mm",), *quarters)
 
 
 def figures_of(motion: Motion, radius: float) -> dict[str, Any]:
