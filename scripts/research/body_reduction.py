@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from research.studies import interleaved_seconds, report
-from rigid_motion.motion import shell_error
+from rigid_motion.motion import Poses, shell_error
 from rigid_motion_batch.analysis.bodies import BodyReconstruction, reconstruct_body
 from rigid_motion_batch.analysis.body_decimated import OWN, SHARED
 from rigid_motion_batch.analysis.body_metrics import measure_modes
@@ -72,10 +73,16 @@ def reduced(body: Clip, mode: str = MODE, *, shared: bool = True) -> BodyReconst
 # -- key poses ---------------------------------------------------------------------------------------------------------
 
 
+@cache
+def truth_of(body: Clip) -> Poses:
+    """Return where the joints are in the recording, in metres, shape (joints, n)."""
+    return body.in_metres(body.rest_body.skeleton.in_root_space(body.poses))
+
+
 def errors_of(body: Clip, keys: np.ndarray, mode: str) -> np.ndarray:
     """Return the largest error of any joint on every frame, by key poses (k,), in metres, shape (n,)."""
     made = BodyReconstruction(body, WITHIN, {mode: (keys,) * len(body.poses)}, shared=True)
-    return shell_error(made.shown(mode, body.times), made.truth(slice(None)), RADIUS).max(axis=0)
+    return shell_error(made.shown(mode, body.times), truth_of(body), RADIUS).max(axis=0)
 
 
 def greedy(body: Clip, mode: str = MODE, tolerance: float = WITHIN.metres(1.0)) -> np.ndarray:
