@@ -62,7 +62,7 @@ def main(arguments: list[str] | None = None) -> None:
     if bpy.app.version[:2] != MODELS_BLENDER:
         print(f"models.blend is left as it is: older versions cannot open what {bpy.app.version_string} writes")
         return
-    from research.making.library import write_models
+    from research.making.models import write_models
 
     write(output / "models.blend", write_models)
 

@@ -1,6 +1,6 @@
 """Makes the pictures of the extension's page on extensions.blender.org: listing/icon.png and listing/featured.png.
 
-They need Blender's Python module, and about a minute and a half. Look at both before you commit them, also made small.
+They need Blender's Python module and Matplotlib. Look at both before you commit them, also made small.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from pathlib import Path
 ASSETS = Path(__file__).resolve().parent
 sys.path[:0] = [str(ASSETS.parent / folder) for folder in ("addon", "scripts")]
 
-import bpy  # noqa: F401 - bmesh and mathutils come with it
+import bpy  # noqa: F401 - mathutils comes with it
 
-from research.making import featured, icon
+from research.making import listing
 
-PICTURES = {"icon": icon.make, "featured": featured.make}
+PICTURES = {"icon": listing.icon, "featured": listing.featured}
 
 
 def main(arguments: list[str] | None = None) -> None:

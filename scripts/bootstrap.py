@@ -44,7 +44,7 @@ PYTHON = f"{sys.version_info.major}.{sys.version_info.minor}"
 COMMANDS = {
     "compare": ([ROOT / "scripts" / "compare.py"], ()),
     "inspect": (["-m", "rigid_motion_batch", "inspect"], ()),
-    "paper": ([ROOT / "scripts" / "research", "paper"], ()),
+    "paper": ([ROOT / "scripts" / "research", "paper"], ("benchmark",)),
     "test": (["-m", "pytest"], ("test", "farm", "docs", "stream")),
     "benchmark": ([ROOT / "scripts" / "research", "benchmark"], ("benchmark",)),
     "bake": ([ROOT / "scripts" / "bake.py"], ()),

@@ -21,10 +21,10 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import RigidTransform, Rotation, RotationSpline, Slerp
 
 from research.in_betweens import Case
-from research.studies import publish, report, seconds_in_turns, study_parser
-from rigid_motion.motion import MODES, Poses, interpolate, reduce_keys, shell_error, twists
+from research.studies import interleaved_seconds, publish, report, study_parser
+from rigid_motion.motion import MODES, Poses
 from rigid_motion.motion.poses import reshaped
-from rigid_motion.motion.quaternions import align_signs, multiply, normalise
+from rigid_motion.motion.quaternions import align_signs, normalise
 from rigid_motion.motion.trigonometry import VECTOR_TANGENT
 
 PROGRAM = "Rigid Motion"
@@ -52,35 +52,6 @@ def cases(count: int) -> Iterator[Case]:
 
 
 # -- ways to compute ---------------------------------------------------------------------------------------------------
-
-
-def closed_form(case: Case, mode: str) -> Poses:
-    """Evaluate the closed form on both keys of every in-between, as one would write it first."""
-    first, second, u = case.ends()
-    (p0, q0), (p1, q1), u = (first.positions, first.quaternions), (second.positions, second.quaternions), u[:, None]
-    cosine = np.sum(q0 * q1, axis=1, keepdims=True)
-    chord = p1 - p0
-    if mode == "pga_lerp":
-        squared = (1 - u) ** 2 + u**2 + 2 * u * (1 - u) * cosine
-        v = multiply(q1, q0 * (1, -1, -1, -1))[:, 1:]
-        across = u * (1 - u) / squared * np.cross(v, chord)
-        along = (u**2 + u * (1 - u) * cosine) / squared * chord
-        return Poses(p0 + along - across, ((1 - u) * q0 + u * q1) / np.sqrt(squared))
-    angle = np.arccos(np.minimum(cosine, 1.0))
-    sine = np.maximum(np.sin(angle), 1e-12)
-    w0, w1 = np.sin((1 - u) * angle) / sine, np.sin(u * angle) / sine
-    quaternions = w0 * q0 + w1 * q1
-    if mode == "lerp_slerp":
-        return Poses(p0 + u * chord, quaternions)
-    v = multiply(q1, q0 * (1, -1, -1, -1))[:, 1:]
-    across = chord - v * np.sum(v * chord, axis=1, keepdims=True) / sine**2
-    swing = (w1 * np.cos((1 - u) * angle) - u) * across
-    return Poses(p0 + u * chord + swing - w0 * w1 * np.cross(v, chord), quaternions)
-
-
-def in_the_algebra(case: Case, mode: str) -> Poses:
-    """Evaluate this program's reference of the mode, in the algebra it is named after."""
-    return MODES[mode].reference(*case.ends())
 
 
 def pytransform3d_sclerp(case: Case) -> np.ndarray:
@@ -121,9 +92,7 @@ def ways(case: Case) -> dict[Way, Callable[[], object]]:
     for mode in MODES:
         result[mode, PROGRAM] = partial(case.filled_in, mode)
         if not MODES[mode].is_smooth:
-            result[mode, "NumPy, in the algebra"] = partial(in_the_algebra, case, mode)
-    for mode in ("lerp_slerp", "dq_sclerp", "pga_lerp"):
-        result[mode, "NumPy, closed form"] = partial(closed_form, case, mode)
+            result[mode, "NumPy, in the algebra"] = partial(case.in_the_algebra, mode)
     result["dq_sclerp", "pytransform3d"] = partial(pytransform3d_sclerp, case)
     result["dq_sclerp", "SciPy"] = partial(scipy_screw, case)
     if case.times.ndim == 1 and case.keys.shape[0] == 1:
@@ -146,62 +115,17 @@ def rates(case: Case, seconds: dict[Way, list[float]]) -> list[dict[str, Any]]:
     ]
 
 
-# -- key reduction -----------------------------------------------------------------------------------------------------
-
-
-def recording(count: int) -> tuple[np.ndarray, Poses]:
-    """Return a hand at 90 samples a second that reaches, turns and rests, for as long as is asked for."""
-    random = np.random.default_rng(11)
-    times = np.arange(count) / 90.0
-    rates = random.uniform(0.1, 1.5, size=(6, 8, 1))
-    swings = (np.sin(2.0 * np.pi * rates * times + random.uniform(0.0, 6.0, size=(6, 8, 1))) / rates).sum(axis=1)
-    lively = np.clip(3.0 * np.sin(2.0 * np.pi * 0.05 * times), 0.0, 1.0)
-    way = np.cumsum(lively * np.gradient(swings, axis=1), axis=1)
-    turn, _ = twists.exponential(np.concatenate((0.5 * way[:3], np.zeros((3, count)))))
-    noise = 2e-4 * random.normal(size=(count, 3))
-    return times, Poses(0.05 * way[3:].T + noise, turn.T)
-
-
-def greedy(times: np.ndarray, poses: Poses, tolerance: float) -> np.ndarray:
-    """Put keys in where the error is largest, one in each segment that passes the tolerance, until none does."""
-    keys = np.array((0, len(times) - 1))
-    while True:
-        errors = shell_error(interpolate(times[keys], poses[keys], times, "motor_spline"), poses)
-        over = np.flatnonzero(np.maximum.reduceat(errors, keys[:-1]) > tolerance)
-        if not len(over):
-            return keys
-        ends = np.append(keys, len(times))
-        keys = np.union1d(keys, [keys[i] + int(np.argmax(errors[keys[i] : ends[i + 1]])) for i in over])
-
-
-def reduction(count: int, tolerance: float = 0.005) -> dict[str, float]:
-    """Return what key reduction of so many samples takes, beside greedy insertion: the faster of two runs."""
-    times, poses = recording(count)
-    programs = {"": reduce_keys, "greedy_": greedy}
-    runs = {name: partial(program, times, poses, tolerance=tolerance) for name, program in programs.items()}
-    result: dict[str, float] = {"samples": count}
-    for name, seconds in seconds_in_turns(runs, 2).items():
-        result |= {f"{name}seconds": min(seconds), f"{name}key_count": len(runs[name]())}
-    return result
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Run all cases, and write the figures."""
     parser = study_parser("benchmark", __doc__)
     parser.add_argument("--count", type=int, default=100_000, help="in-betweens in a case (%(default)s)")
     parser.add_argument("--rounds", type=int, default=50, help="rounds of all against all (%(default)s)")
     options = parser.parse_args(arguments)
-    result = []
+    figures: dict[str, Any] = {"vector_tangent": bool(VECTOR_TANGENT), "cases": []}
     for case in cases(options.count):
         report(case.title)
         about = {"title": case.title, "in_betweens": case.in_betweens, "key_count": int(np.prod(case.keys.shape))}
-        seconds = seconds_in_turns(ways(case), options.rounds, warm=True, most=ENOUGH)
-        result.append({**about, "rates": rates(case, seconds)})
-    report("key reduction")
-    figures = {
-        "vector_tangent": bool(VECTOR_TANGENT),
-        "cases": result,
-        "reductions": [reduction(count) for count in (900, 1000, options.count // 10, options.count)],
-    }
+        seconds = interleaved_seconds(ways(case), options.rounds, warm=True, most=ENOUGH)
+        figures["cases"].append({**about, "rates": rates(case, seconds)})
     versions = {"SciPy": scipy.__version__, "pytransform3d": pytransform3d.__version__}
     return publish("benchmark", figures, options, "--rounds", options.rounds, **versions)

@@ -16,15 +16,15 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from research.making.tracking import table
 from research.paper.motions import assets
-from research.studies import publish, report, study_parser
+from research.studies import interleaved_seconds, publish, report, study_parser
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion_batch.places import PACKAGE
@@ -32,23 +32,26 @@ from rigid_motion_batch.places import PACKAGE
 SECONDS = 2.0  # of a clip
 RATE = 90.0  # samples a second of the clip whose length grows
 FEW = 20  # clips to compare the memory with
-MAIN = "import sys; from rigid_motion_batch.cli.commands import main; sys.exit(main(sys.argv[1:]))"
+MAIN = """
+import os, resource, sys
+if {}:
+    os.sched_setaffinity(0, {{min(os.sched_getaffinity(0))}})
+from rigid_motion_batch.cli.commands import main
+code = main(sys.argv[1:])
+print(*(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)))
+sys.exit(code)
+"""
 """The program in the process that is started; `-m rigid_motion_batch` does the work in a child of that."""
 
-POLL = 0.05  # seconds between two looks at the memory of the processes
+UNIT = 1 if sys.platform == "darwin" else 1024  # bytes
 
 
-@dataclass(frozen=True)
-class Run:
-    """What a run of `compare` took."""
+class Run(NamedTuple):
+    """What a run of `compare` took: seconds, and the most memory of the program and of any process that it started."""
 
     seconds: float
-
     program: int
-    """The most memory of the program itself, in bytes; 0 where that cannot be told."""
-
     worker: int
-    """The most memory of any process that it started."""
 
 
 def pieces(count: int) -> Iterator[str]:
@@ -72,81 +75,47 @@ def wandering(samples: int) -> str:
 
 def compare(clips: Sequence[Path], folder: Path, jobs: int, *options: str, alone: bool = False) -> Run:
     """Run `compare` on some clips, on a single processor if it is to be alone, into a new folder in that one."""
-    output = Path(tempfile.mkdtemp(dir=folder))
-    command = [sys.executable, "-c", MAIN, "compare", *clips, "--output", output, "--jobs", str(jobs)]
-    started, program, worker = time.perf_counter(), 0, 0
-    with subprocess.Popen([*command, *options], cwd=PACKAGE.parent, stdout=subprocess.DEVNULL) as process:
-        if alone:
-            os.sched_setaffinity(process.pid, {min(os.sched_getaffinity(0))})
-        while process.poll() is None:
-            program = max(program, peak_memory_of(process.pid))
-            worker = max([worker, *map(peak_memory_of, children_of(process.pid))])
-            time.sleep(POLL)
-        seconds = time.perf_counter() - started
-    if process.returncode:
-        raise subprocess.CalledProcessError(process.returncode, process.args)
-    return Run(seconds, program, worker)
-
-
-def _of_process(pid: int, name: str) -> str:
-    """Return what Linux says of a process; nothing where it is gone, or the system is another."""
-    try:
-        return Path(f"/proc/{pid}/{name}").read_text(encoding="ascii", errors="replace")
-    except OSError:
-        return ""
-
-
-def peak_memory_of(pid: int) -> int:
-    """Return the most memory, in bytes, that a process has had; 0 where that cannot be told."""
-    lines = _of_process(pid, "status").splitlines()
-    return next((int(line.split()[1]) << 10 for line in lines if line.startswith("VmHWM:")), 0)
-
-
-def children_of(pid: int) -> list[int]:
-    """Return the processes that a process has started; none where that cannot be told."""
-    return [int(child) for child in _of_process(pid, f"task/{pid}/children").split()]
+    command = [*clips, "--output", tempfile.mkdtemp(dir=folder), "--jobs", jobs, *options]
+    program = [sys.executable, "-c", MAIN.format(alone), "compare", *map(str, command)]
+    started = time.perf_counter()
+    said = subprocess.run(program, cwd=PACKAGE.parent, stdout=subprocess.PIPE, text=True, check=True).stdout
+    return Run(time.perf_counter() - started, *(UNIT * int(number) for number in said.splitlines()[-1].split()))
 
 
 def workers(clips: Sequence[Path], folder: Path, rounds: int, *options: str) -> list[dict[str, Any]]:
     """Return what one worker takes beside two, and beside one that has a single processor."""
-    runs: dict[tuple[int, bool], list[Run]] = {(1, False): [], (2, False): []}
-    if hasattr(os, "sched_setaffinity"):
-        runs[1, True] = []
-    for _ in range(rounds):
-        for (jobs, alone), results in runs.items():
-            report(f"{len(clips)} clips, {jobs} at work{' on one processor' if alone else ''}")
-            results.append(compare(clips, folder, jobs, *options, alone=alone))
-    best = {way: min(results, key=lambda run: run.seconds) for way, results in runs.items()}
+    ways = [(1, False), (2, False), *([(1, True)] if hasattr(os, "sched_setaffinity") else [])]
+    runs = {way: partial(compare, clips, folder, way[0], *options, alone=way[1]) for way in ways}
+    report(f"{len(clips)} clips")
+    best = {way: min(seconds) for way, seconds in interleaved_seconds(runs, rounds).items()}
     return [
         {
             "workers": jobs,
             "one_processor": alone,
-            "seconds": run.seconds,
-            "clips_a_minute": 60.0 * len(clips) / run.seconds,
-            "speedup": best[1, False].seconds / run.seconds,
+            "seconds": seconds,
+            "clips_a_minute": 60.0 * len(clips) / seconds,
+            "speedup": best[1, False] / seconds,
         }
-        for (jobs, alone), run in best.items()
+        for (jobs, alone), seconds in best.items()
     ]
 
 
 def memory(folder: Path, clips: Sequence[Path], minutes: Sequence[int]) -> dict[str, list[dict[str, float]]]:
     """Return what the program takes over the number of clips, and its workers over the length of one."""
     options = ("--no-video", "--rates", "10")
-    programs, long = [], []
-    for count in (FEW, len(clips)):
-        report(f"memory over {count} clips")
-        programs.append({"clips": count, "mb": compare(clips[:count], folder, 2, *options).program / 1e6})
+    report(f"memory over clips, and over {minutes} minutes")
+    taken = {count: compare(clips[:count], folder, 2, *options).program / 1e6 for count in (FEW, len(clips))}
+    long = []
     path, rest = folder / "long.csv", 0
     for length in (0, *minutes):
         samples = int(length * 60 * RATE) or 10
-        report(f"memory over {length} minutes")
         path.write_text(wandering(samples), encoding="utf-8")
         run = compare([path], folder, 1, *options)
         rest = rest or run.worker
         if length:
             figures = {"mb": run.worker / 1e6, "bytes_a_sample": (run.worker - rest) / samples, "seconds": run.seconds}
             long.append({"minutes": length, "samples": samples, **figures})
-    return {"programs": programs, "workers": long}
+    return {"programs": [{"clips": count, "mb": mb} for count, mb in taken.items()], "workers": long}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -155,7 +124,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--clips", type=int, default=200, help="without video (%(default)s)")
     parser.add_argument("--films", type=int, default=12, help="clips with video (%(default)s)")
     parser.add_argument("--minutes", default="6,60", metavar="N,...", help="lengths of the long clip (%(default)s)")
-    parser.add_argument("--rounds", type=int, default=3, help="of one worker and two in turns (%(default)s)")
+    parser.add_argument("--rounds", type=int, default=3, help="of one worker and two, interleaved (%(default)s)")
     options = parser.parse_args(arguments)
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)

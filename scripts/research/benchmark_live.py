@@ -9,86 +9,54 @@ medians and the fastest, in milliseconds.
 
 from __future__ import annotations
 
-import math
 import statistics
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import bpy
 import numpy as np
 from bpy_extras import anim_utils
 
-from research.studies import publish, report, seconds_in_turns, study_parser
+from research.studies import interleaved_seconds, publish, study_parser
 from rigid_motion import animation
 from rigid_motion_batch.scenes.body_scene import registered
 from rigid_motion_batch.silencing import silenced
 
 MODE = "dq_sclerp"  # the mode that is measured: the screw mode
 ROTATION_MODES = ("QUATERNION", "XYZ")
-CHAIN, RING = 10, 20  # bones from root to tip, and vertices of the skin around a bone
+CHAIN = 10  # bones from root to tip
 WARMING = 8  # edits in a row, unmeasured and then measured
 
 Target = TypeVar("Target", bpy.types.Object, bpy.types.PoseBone)
 Targets = Sequence[bpy.types.Object | bpy.types.PoseBone]
-Motion = Callable[[np.random.Generator, int], tuple[np.ndarray, np.ndarray]]
-"""A location, and a rotation as a quaternion or Euler angles by its width."""
+Seconds = Sequence[float]
 
 
-@dataclass(frozen=True)
-class Size:
-    """Objects or bones, the keys of each on all channels, the frames from the first key to the last, and the skin."""
+class Size(NamedTuple):
+    """Objects or bones, the keys of each on all channels, and the frames from the first key to the last."""
 
     objects: int
-    keys: int
+    key_count: int
     frames: int
-    vertices: int = 0
-
-    def scaled(self, scale: float) -> Size:
-        """Return a part of its objects, frames and vertices."""
-        objects, frames, vertices = (round(scale * count) for count in (self.objects, self.frames, self.vertices))
-        return Size(max(1, objects), self.keys, max(2 * self.keys, frames), vertices)
-
-    @property
-    def figures(self) -> dict[str, int]:
-        return {"objects": self.objects, "key_count": self.keys, "frames": self.frames, "vertices": self.vertices}
 
 
 SIZES = {
     "scene": Size(100, 10, 1000),  # one key of it is edited
     "shot": Size(300, 20, 2000),  # all get a mode, are edited, and saved
-    "rig": Size(100, 10, 1000, vertices=20_000),
+    "rig": Size(100, 10, 1000),
 }
-LONG, LONG_FRAMES = 200, (50_000, 100_000)  # the keys of an object that is baked, and its frames
+
+
+def scaled(size: Size, scale: float) -> Size:
+    """Return a part of the objects and frames."""
+    objects, frames = max(1, round(scale * size.objects)), max(2 * size.key_count, round(scale * size.frames))
+    return Size(objects, size.key_count, frames)
 
 
 # -- scenes ------------------------------------------------------------------------------------------------------------
-
-
-def general(random: np.random.Generator, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return a pose that is turned about any axis."""
-    return random.normal(size=3), random.normal(size=width)
-
-
-def planar(random: np.random.Generator, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return a pose in the plane of x and y, turned about z."""
-    x, y, angle = random.normal(size=3)
-    turned = (np.cos(0.5 * angle), 0.0, 0.0, np.sin(0.5 * angle)) if width == 4 else (0.0, 0.0, angle)
-    return np.array((x, y, 0.0)), np.array(turned)
-
-
-MOTIONS: dict[str, Motion] = {"about general axes": general, "in a plane": planar}
-
-
-def new_scene(frames: int) -> np.random.Generator:
-    """Open a new file with so many frames; return what its poses are drawn from."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, frames
-    return np.random.default_rng(5)
 
 
 def new_object(name: str, data: bpy.types.ID | None = None) -> bpy.types.Object:
@@ -98,31 +66,31 @@ def new_object(name: str, data: bpy.types.ID | None = None) -> bpy.types.Object:
     return obj
 
 
-def keyed(target: Target, size: Size, rotation_mode: str, motion: Motion, random: np.random.Generator) -> Target:
-    """Insert keys of poses drawn at random, evenly over the frames."""
+def keyed(targets: Sequence[Target], size: Size, rotation_mode: str) -> list[Target]:
+    """Insert keys of poses drawn at random, evenly over the frames of the scene."""
+    random = np.random.default_rng(5)
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, size.frames
     rotation = "rotation_quaternion" if rotation_mode == "QUATERNION" else "rotation_euler"
-    target.rotation_mode = rotation_mode
-    for frame in np.linspace(1, size.frames, size.keys).round():
-        target.location, turned = motion(random, len(getattr(target, rotation)))
-        setattr(target, rotation, turned)
-        target.keyframe_insert("location", frame=frame)
-        target.keyframe_insert(rotation, frame=frame)
-    return target
-
-
-def scene_of(size: Size, rotation_mode: str, motion: Motion = general) -> list[bpy.types.Object]:
-    """Return animated empties in a new file."""
-    random = new_scene(size.frames)
-    objects = [keyed(new_object(f"Tool {i}"), size, rotation_mode, motion, random) for i in range(size.objects)]
+    for target in targets:
+        target.rotation_mode = rotation_mode
+        for frame in np.linspace(1, size.frames, size.key_count).round():
+            for channel in ("location", rotation):
+                setattr(target, channel, random.normal(size=len(getattr(target, channel))))
+                target.keyframe_insert(channel, frame=frame)
     bpy.context.view_layer.update()
-    return objects
+    return list(targets)
 
 
-def rig_of(size: Size) -> bpy.types.Object:
-    """Return an armature in a new file whose bones all have keys of location and rotation."""
-    random = new_scene(size.frames)
-    rig = new_object("Rig", bpy.data.armatures.new("Rig"))
-    bpy.context.view_layer.objects.active = rig
+def scene_of(size: Size, rotation_mode: str) -> list[bpy.types.Object]:
+    """Return animated empties in a new file."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    return keyed([new_object(f"Tool {number}") for number in range(size.objects)], size, rotation_mode)
+
+
+def rig_of(size: Size) -> list[bpy.types.PoseBone]:
+    """Return the bones of an armature in a new file, all of which have keys of location and rotation."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    rig = bpy.context.view_layer.objects.active = new_object("Rig", bpy.data.armatures.new("Rig"))
     bpy.ops.object.mode_set(mode="EDIT")
     for number in range(size.objects):
         chain, place = divmod(number, CHAIN)
@@ -130,38 +98,7 @@ def rig_of(size: Size) -> bpy.types.Object:
         bone.head, bone.tail = (chain, 0.0, place), (chain, 0.0, place + 1.0)
         bone.parent = rig.data.edit_bones[f"Bone {number - 1}"] if place else None
     bpy.ops.object.mode_set(mode="OBJECT")
-    for bone in rig.pose.bones:
-        keyed(bone, size, "QUATERNION", general, random)
-    bpy.context.view_layer.update()
-    return rig
-
-
-def add_skin(rig: bpy.types.Object, count: int) -> bpy.types.Object:
-    """Add a mesh of about so many vertices that the bones deform, two for each vertex: a tube along each chain."""
-    bones = rig.data.bones
-    rings = max(2, round(count / (RING * math.ceil(len(bones) / CHAIN))))
-    turns = 2.0 * np.pi * np.arange(RING) / RING
-    skin = new_object("Skin", bpy.data.meshes.new("Skin"))
-    groups = [skin.vertex_groups.new(name=bone.name) for bone in bones]
-    points, faces, weights = [], [], []
-    for first in range(0, len(bones), CHAIN):
-        length = min(CHAIN, len(bones) - first)
-        for along in np.linspace(0.0, length, rings):
-            # From the middle of a bone to the middle of the next, the one hands over to the other.
-            behind = min(max(along - 0.5, 0.0), length - 1.0)
-            lower = min(int(behind), max(length - 2, 0))
-            ring = list(range(len(points), len(points) + RING))
-            weights += [(first + lower, ring, 1.0 - behind + lower), (first + lower + 1, ring, behind - lower)]
-            if along:
-                faces += [(a - RING, a, b, b - RING) for a, b in pairwise([*ring, ring[0]])]
-            points += [(first // CHAIN + 0.3 * np.cos(turn), 0.3 * np.sin(turn), along) for turn in turns]
-    skin.data.from_pydata(points, [], faces)
-    for bone, ring, weight in weights:
-        if bone < len(groups):
-            groups[bone].add(ring, weight, "REPLACE")
-    skin.modifiers.new("Armature", "ARMATURE").object = rig
-    bpy.context.view_layer.update()
-    return skin
+    return keyed(list(rig.pose.bones), size, "QUATERNION")
 
 
 def set_modes(targets: Targets, mode: str) -> None:
@@ -171,14 +108,12 @@ def set_modes(targets: Targets, mode: str) -> None:
 
 
 class NativeBaking:
-    """Blender's own baking of objects, or of their bones: what they show, to keys in new Actions. And the way back."""
+    """Blender's own baking of objects or bones: what they show, to keys in new Actions. And the way back."""
 
-    def __init__(
-        self, objects: Sequence[bpy.types.Object], *, every_channel: bool = False, bones: bool = False
-    ) -> None:
-        scene = bpy.context.scene
-        self.objects, self.frames = objects, range(scene.frame_start, scene.frame_end + 1)
-        self.played = [(obj.animation_data.action, obj.animation_data.action_slot) for obj in objects]
+    def __init__(self, targets: Targets, *, every_channel: bool = False) -> None:
+        scene, bones = bpy.context.scene, isinstance(targets[0], bpy.types.PoseBone)
+        self.objects, self.frames = list({it.id_data for it in targets}), range(scene.frame_start, scene.frame_end + 1)
+        self.played = [(obj.animation_data.action, obj.animation_data.action_slot) for obj in self.objects]
         chosen = {"do_pose": bones, "do_object": not bones}
         chosen |= dict.fromkeys(("do_visual_keying", "do_location", "do_rotation"), True)
         chosen |= dict.fromkeys(("do_scale", "do_bbone", "do_custom_props"), every_channel)
@@ -199,10 +134,10 @@ class NativeBaking:
                 bpy.data.actions.remove(baked)
         bpy.context.view_layer.update()
 
-    def seconds(self, rounds: int) -> list[float]:
+    def seconds(self, rounds: int) -> Seconds:
         """Measure it, while nothing is followed."""
         animation.set_enabled(False)
-        seconds = seconds_in_turns({"bake": self.bake, "restore": self.restore}, rounds)["bake"]
+        seconds = interleaved_seconds({"bake": self.bake, "restore": self.restore}, rounds)["bake"]
         animation.set_enabled(True)
         return seconds
 
@@ -210,7 +145,7 @@ class NativeBaking:
 # -- what is measured --------------------------------------------------------------------------------------------------
 
 
-def row(what: str, live: Sequence[float], beside: str, native: Sequence[float]) -> dict[str, Any]:
+def row(what: str, live: Seconds, beside: str, native: Seconds) -> dict[str, Any]:
     """Return the figures of one kind of work, from its seconds and those of what is beside."""
     return {
         "what": what,
@@ -222,7 +157,7 @@ def row(what: str, live: Sequence[float], beside: str, native: Sequence[float]) 
     }
 
 
-def with_and_without(edit: Callable[[], None], rounds: int, edits: int = WARMING) -> tuple[list[float], list[float]]:
+def with_and_without(edit: Callable[[], None], rounds: int, edits: int = WARMING) -> tuple[Seconds, Seconds]:
     """Return the seconds of an edit, as the mean of several in a row, with in-betweens following and not.
 
     What was not followed is caught up with outside of the measured time, and so are the caches that this costs.
@@ -236,7 +171,7 @@ def with_and_without(edit: Callable[[], None], rounds: int, edits: int = WARMING
     runs = {}
     for name, switch in switches.items():
         runs |= {name: switch, f"{name}, warm": row_of_edits, f"{name}, measured": row_of_edits}
-    seconds = seconds_in_turns(runs, rounds)
+    seconds = interleaved_seconds(runs, rounds)
     animation.set_enabled(True)
     animation.refresh()
     live, native = ([spent / edits for spent in seconds[f"{name}, measured"]] for name in switches)
@@ -250,7 +185,7 @@ def edit(keys: Sequence[bpy.types.Keyframe]) -> None:
     bpy.context.view_layer.update()
 
 
-def play(targets: Targets, rounds: int) -> tuple[list[float], list[float]]:
+def play(targets: Targets, rounds: int) -> tuple[Seconds, Seconds]:
     """Return the seconds of all frames one after the other, with modes and without."""
     scene = bpy.context.scene
 
@@ -261,12 +196,12 @@ def play(targets: Targets, rounds: int) -> tuple[list[float], list[float]]:
     runs = {}
     for mode in (MODE, "BLENDER"):
         runs |= {f"to {mode}": partial(set_modes, targets, mode), mode: show_all}
-    seconds = seconds_in_turns(runs, rounds)
+    seconds = interleaved_seconds(runs, rounds)
     set_modes(targets, MODE)
     return seconds[MODE], seconds["BLENDER"]
 
 
-def fill_in(targets: Targets, rounds: int) -> list[float]:
+def fill_in(targets: Targets, rounds: int) -> Seconds:
     """Return the seconds of all in-betweens anew, for all that the extension knows."""
 
     def forget() -> None:
@@ -278,13 +213,13 @@ def fill_in(targets: Targets, rounds: int) -> list[float]:
         if animation.refresh() != len(targets):
             raise RuntimeError("not all were filled in")
 
-    return seconds_in_turns({"forget": forget, "refresh": refresh}, rounds)["refresh"]
+    return interleaved_seconds({"forget": forget, "refresh": refresh}, rounds)["refresh"]
 
 
-def choose(targets: Targets, rounds: int) -> tuple[list[float], list[float]]:
+def choose(targets: Targets, rounds: int) -> tuple[Seconds, Seconds]:
     """Return the seconds of a mode chosen for all in one call; and with the update of the view. They have it then."""
     back, chosen = partial(set_modes, targets, "BLENDER"), partial(animation.set_mode, targets, MODE)
-    seconds = seconds_in_turns({"back": back, "choose": chosen, "update": bpy.context.view_layer.update}, rounds)
+    seconds = interleaved_seconds({"back": back, "choose": chosen, "update": bpy.context.view_layer.update}, rounds)
     return seconds["choose"], np.add(seconds["choose"], seconds["update"]).tolist()
 
 
@@ -306,119 +241,87 @@ def everyday(size: Size, rotation: str, rounds: int) -> list[dict[str, Any]]:
         lamp.location.x += 0.01
         bpy.context.view_layer.update()
 
-    works = {
-        "one key edited, and the view updated": edited,
-        "another object moved": with_and_without(move, rounds),
-        "all frames played": play(objects, few),
-    }
-    rows = [row(what, live, "native", native) for what, (live, native) in works.items()]
-    anew = fill_in(objects, rounds)
-    for every, channels in ((False, "location and rotation"), (True, "all channels, as *Bake Action* does")):
-        baked = NativeBaking(objects, every_channel=every).seconds(few)
-        rows.append(row("all in-betweens anew", anew, f"`bake_action_objects`, {channels}", baked))
-    return rows
+    moved, played = with_and_without(move, rounds), play(objects, few)
+    baking = "`bake_action_objects`, all channels, as *Bake Action* does"
+    anew, baked = fill_in(objects, rounds), NativeBaking(objects, every_channel=True).seconds(few)
+    return [
+        row("one key edited, and the view updated", edited[0], "native", edited[1]),
+        row("another object moved", moved[0], "native", moved[1]),
+        row("all frames played", played[0], "native", played[1]),
+        row("all in-betweens anew", anew, baking, baked),
+    ]
 
 
-def shot(size: Size, rotation: str, motion: str, rounds: int) -> dict[str, Any]:
+def shot(size: Size, rotation: str, rounds: int) -> dict[str, Any]:
     """Measure a mode chosen for all objects, an edit of each, and the file."""
-    objects = scene_of(size, rotation, MOTIONS[motion])
-    without = file_sizes()
-    (chosen, updated), baking = choose(objects, rounds), NativeBaking(objects).seconds(min(3, rounds))
-    live = file_sizes()
-    sampled = sum(len(f.sampled_points) > 0 for obj in objects for f in animation.channelbag_of(obj).fcurves)
-    edited, native = with_and_without(partial(edit, middle_keys(objects, size.keys // 2)), rounds, 1)
+    objects = scene_of(size, rotation)
+    files = {"without_mb": file_sizes()}
+    (chosen, updated), baking = choose(objects, rounds), NativeBaking(objects)
+    baked = baking.seconds(min(3, rounds))
+    files["mb"] = file_sizes()
+    edited, native = with_and_without(partial(edit, middle_keys(objects, size.key_count // 2)), rounds, 1)
+    animation.set_enabled(False)
+    baking.bake()
+    files["baked_mb"] = file_sizes()
+    animation.set_enabled(True)
     rows = [
-        row("`set_mode` for all in one call", chosen, "`bake_action_objects`", baking),
-        row("the same, and the view updated", updated, "`bake_action_objects`", baking),
+        row("`set_mode` for all in one call", chosen, "`bake_action_objects`", baked),
+        row("the same, and the view updated", updated, "`bake_action_objects`", baked),
         row("the view updated after an edit of each", edited, "Blender's own update", native),
     ]
-    animation.set_enabled(False)
-    NativeBaking(objects).bake()
-    baked = file_sizes()
-    animation.set_enabled(True)
-    files = {
-        kind: {"mb": live[kind] / 1e6, "without_mb": without[kind] / 1e6, "baked_mb": baked[kind] / 1e6}
-        for kind in live
-    }
-    return {"rotation": rotation, "motion": motion, "components": sampled / len(objects), "rows": rows, **files}
+    sizes = {kind: {name: of_kind[kind] for name, of_kind in files.items()} for kind in files["mb"]}
+    return {"rotation": rotation, "rows": rows, **sizes}
 
 
-def file_sizes() -> dict[str, int]:
-    """Return the bytes of the open file, compressed and not."""
+def file_sizes() -> dict[str, float]:
+    """Return the size of the open file in MB, compressed and not."""
     sizes = {}
     with tempfile.TemporaryDirectory() as folder, silenced():
         path = Path(folder, "shot.blend")
         for kind in ("compressed", "uncompressed"):
             bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=kind == "compressed")
-            sizes[kind] = path.stat().st_size
+            sizes[kind] = path.stat().st_size / 1e6
     return sizes
 
 
 def rigs(size: Size, rounds: int) -> list[dict[str, Any]]:
-    """Measure edits as in a window, where large rigs are edited in draft; all anew; and playback, bare and with a skin.
-
-    `without`: no bone has a mode; `native`: and the extension is switched off; `paused`: modes are not followed.
-    """
-    rig, few = rig_of(size), max(5, rounds // 8)
-    bones = list(rig.pose.bones)
-    keys = middle_keys(bones, size.keys // 2)
-    edit_one = partial(edit, keys[len(keys) // 2 :][:1])
+    """Measure edits as in a window, where large rigs are edited in draft; all anew; and playback."""
+    bones, few = rig_of(size), max(5, rounds // 8)
+    keys = middle_keys(bones, size.key_count // 2)
+    set_modes(bones, MODE)
     animation.follower.set_drafts(True)
     try:
-        without, native = with_and_without(edit_one, rounds)
-        set_modes(bones, MODE)
-        live, paused = with_and_without(edit_one, rounds)
+        one, paused = with_and_without(partial(edit, keys[len(keys) // 2 :][:1]), rounds)
         each, _ = with_and_without(partial(edit, keys), few, 1)
         _, chosen = choose(bones, few)
         drafts = {"edit": partial(edit, keys[:1]), "finish": animation.follower.follower.finish_drafts}
-        finished = seconds_in_turns(drafts, few)["finish"]
+        finished = interleaved_seconds(drafts, few)["finish"]
     finally:
         animation.follower.set_drafts(False)
-    anew = fill_in(bones, few)
-    baked = NativeBaking([rig], every_channel=True, bones=True).seconds(few)
-    bare, bare_native = play(bones, few)
-    add_skin(rig, size.vertices)
-    skinned, skinned_native = play(list(rig.pose.bones), few)
-    baking = "`bake_action_objects`, as *Bake Action* does"
+    works = {
+        "all in-betweens anew": fill_in(bones, few),
+        "a mode chosen for all bones, and the view updated": chosen,
+        "a key of each bone edited, and the view updated": each,
+        "samples between frames after an edit, for all bones": finished,
+    }
+    baked = NativeBaking(bones, every_channel=True).seconds(few)
+    played, native = play(bones, few)
     return [
-        row("one bone edited, and the view updated", live, "native, no modes", native),
-        row("one bone edited, and the view updated", live, "not followed", paused),
-        row("one bone edited of a rig without modes, and the view updated", without, "native", native),
-        row("all in-betweens anew", anew, baking, baked),
-        row("a mode chosen for all bones, and the view updated", chosen, baking, baked),
-        row("a key of each bone edited, and the view updated", each, baking, baked),
-        row("samples between frames after an edit, for all bones", finished, baking, baked),
-        row("all frames played, bare armature", bare, "native", bare_native),
-        row(f"all frames played, skin of {size.vertices} vertices", skinned, "native", skinned_native),
+        row("one bone edited, and the view updated", one, "not followed", paused),
+        *(row(what, live, "`bake_action_objects`, as *Bake Action* does", baked) for what, live in works.items()),
+        row("all frames played", played, "native", native),
     ]
 
 
-def long_baking(size: Size, rounds: int) -> dict[str, Any]:
-    """Measure baking an object over many frames."""
-    (obj,) = scene_of(size, "QUATERNION")
-    set_modes([obj], MODE)
-    runs = {"bake": partial(animation.bake, obj), "back": partial(animation.unbake, obj)}
-    seconds = seconds_in_turns(runs, rounds)["bake"]
-    return row(f"{size.frames} frames", seconds, "`bake_action_objects`", NativeBaking([obj]).seconds(min(3, rounds)))
-
-
 def measure(rounds: int, scale: float) -> dict[str, Any]:
-    """Return all figures, of scenes with a part of their objects, frames and vertices."""
-    few, sizes = max(3, rounds // 8), {name: size.scaled(scale) for name, size in SIZES.items()}
-    figures: dict[str, Any] = {"everyday": {}, "shots": [], "baking_keys": LONG}
-    figures |= {name: size.figures for name, size in sizes.items()}
-    for rotation in ROTATION_MODES:
-        report(f"everyday work, {rotation}")
-        figures["everyday"][rotation] = everyday(sizes["scene"], rotation, rounds)
-    for motion in MOTIONS:
-        for rotation in ROTATION_MODES:
-            report(f"a shot, {rotation}, {motion}")
-            figures["shots"].append(shot(sizes["shot"], rotation, motion, few))
-    report("a rig")
-    figures["rigs"] = rigs(sizes["rig"], rounds)
-    report("long baking")
-    figures["baking"] = [long_baking(Size(1, LONG, frames).scaled(scale), few) for frames in LONG_FRAMES]
-    return figures
+    """Return all figures, of scenes with a part of their objects and frames."""
+    few, sizes = max(3, rounds // 8), {name: scaled(size, scale) for name, size in SIZES.items()}
+    return {
+        **{name: size._asdict() for name, size in sizes.items()},
+        "everyday": {rotation: everyday(sizes["scene"], rotation, rounds) for rotation in ROTATION_MODES},
+        "shots": [shot(sizes["shot"], rotation, few) for rotation in ROTATION_MODES],
+        "rigs": rigs(sizes["rig"], rounds),
+    }
 
 
 def main(arguments: list[str] | None = None) -> int:

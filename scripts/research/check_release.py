@@ -11,7 +11,7 @@ import re
 import subprocess
 import sys
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -30,12 +30,12 @@ CONTRIBUTING.md has the steps of a release. Exit code: 0 all is there, 1 somethi
 MANIFEST, CHANGELOG, MANUAL = "blender_manifest.toml", "CHANGELOG.md", "addon/rigid_motion/ui/manual.py"
 
 STAND_INS = re.compile(r"(^|\.)(example(\.(org|com|net))?|test|invalid|localhost)$|^$")
-"""Names of hosts that are nobody's (RFC 2606), or no names."""
+"""Names of hosts that are reserved (RFC 2606), or no names."""
 
 
-def addresses(checkout: Path) -> Iterator[str]:
-    """Check that website and maintainer can be reached, and the program opens what the manifest names."""
-    manifest = manifest_of(checkout)
+def missing(checkout: Path) -> Iterator[str]:
+    """Yield what a release needs and has not."""
+    manifest = tomllib.loads((checkout / MANIFEST).read_text(encoding="utf-8"))
     website, mail = manifest.get("website", ""), manifest["maintainer"].rpartition("<")[2].rstrip(">")
     if STAND_INS.search(urlsplit(website).hostname or ""):
         yield f"{MANIFEST}: the website is {website or 'not there'}: set it to the project's, and WEBSITE in {MANUAL}"
@@ -45,43 +45,28 @@ def addresses(checkout: Path) -> Iterator[str]:
     if opened is None or opened[1] != website:
         yield f"{MANUAL}: WEBSITE is {opened[1] if opened else 'not there'}, in {MANIFEST} it is {website}"
 
-
-def version(checkout: Path) -> Iterator[str]:
-    """Check that the version has a dated entry in the changelog, and was not released before."""
-    number = manifest_of(checkout)["version"]
-    changelog = (checkout / CHANGELOG).read_text(encoding="utf-8")
+    number, changelog = manifest["version"], (checkout / CHANGELOG).read_text(encoding="utf-8")
     entry = re.search(rf"^## {re.escape(number)} - (.*)$", changelog, re.MULTILINE)
     if entry is None:
         yield f"{CHANGELOG}: there is no entry of {number}, the version of {MANIFEST}"
     elif not re.fullmatch(r"\d{4}-\d{2}-\d{2}", entry[1]):
         yield f"{CHANGELOG}: {number} is {entry[1]}: give it the day of the release"
-    if f"v{number}" in _git(checkout, "tag", "--list").split():
+
+    def git(*arguments: str) -> str:
+        return subprocess.run(["git", *arguments], cwd=checkout, capture_output=True, text=True, check=True).stdout
+
+    if f"v{number}" in git("tag", "--list").split():
         yield f"the tag v{number} is there already: {MANIFEST} needs the next version"
-
-
-def commits(checkout: Path) -> Iterator[str]:
-    """Check that what is released is committed."""
-    for line in _git(checkout, "status", "--porcelain", "--untracked-files=no").splitlines():
+    for line in git("status", "--porcelain", "--untracked-files=no").splitlines():
         yield f"{line[3:]} is not committed"
-
-
-CHECKS: tuple[Callable[[Path], Iterator[str]], ...] = (addresses, version, commits)
-
-
-def manifest_of(checkout: Path) -> dict:
-    return tomllib.loads((checkout / MANIFEST).read_text(encoding="utf-8"))
-
-
-def _git(checkout: Path, *arguments: str) -> str:
-    return subprocess.run(["git", *arguments], cwd=checkout, capture_output=True, text=True, check=True).stdout
 
 
 def main(arguments: list[str]) -> int:
     """Look at everything, and return the exit code."""
     parser_of(SCRIPT, __doc__, EPILOG).parse_args(arguments)
-    missing = [finding for check in CHECKS for finding in check(ROOT)]
-    for finding in missing:
+    findings = list(missing(ROOT))
+    for finding in findings:
         print(f"{program_of(SCRIPT)}: {finding}", file=sys.stderr)
-    if not missing:
+    if not findings:
         print("All is there for a release.")
-    return 1 if missing else 0
+    return 1 if findings else 0

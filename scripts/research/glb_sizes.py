@@ -4,7 +4,7 @@
 
 `--tools` is the folder with the programs `gltfpack` and `gltf-transform`, as `npm install gltfpack
 @gltf-transform/cli` puts them into `node_modules/.bin`; each that is missing is left out. What the files show is worked
-out here with SciPy, by nothing of the program.
+out by matrices, with nothing of the program.
 """
 
 from __future__ import annotations
@@ -17,15 +17,13 @@ from typing import Any
 
 import bpy
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
 
 from research.studies import publish, report, study_parser
 from rigid_motion.gltf import Options, reduce_file
 from rigid_motion.gltf.accessors import stored_size
 from rigid_motion.gltf.documents import read_document
-from rigid_motion.gltf.nodes import Nodes
-from rigid_motion.gltf.tracks import STEP, read_clips
 from rigid_motion_batch.analysis.metrics import geometric_mean
+from tests.gltf.oracle import File
 
 HEIGHT, RADIUS = 1.7, 0.03  # metres
 TOLERANCES = (1e-4, 1e-3, 5e-3)  # metres
@@ -38,69 +36,38 @@ TOOLS = {
 """Programs beside, with the arguments that make one file another."""
 
 
-class File:
-    """What is played of a file: its nodes, and the tracks of its longest clip."""
-
-    def __init__(self, path: Path) -> None:
-        document = read_document(path, in_memory=True)
-        animations = document.json.get("animations", ())
-        samplers = [sampler for animation in animations for sampler in animation["samplers"]]
-        accessors = {sampler[side] for sampler in samplers for side in ("input", "output")}
-        self.names = [node.get("name", f"node {number}") for number, node in enumerate(document.json["nodes"])]
-        self.nodes = Nodes(document)
-        clip = max(read_clips(document), key=lambda clip: len(clip.tracks))
-        self.tracks = {(track.node, track.path): track for track in clip.tracks}
-        self.animation_bytes = sum(stored_size(document, accessor) for accessor in accessors)
-        self.file_bytes = path.stat().st_size
-
-    def values(self, node: int, path: str, times: np.ndarray) -> np.ndarray:
-        """Return the translation (n, 3), rotation (n, 4) or scale (n, 3) of a node at times (n,)."""
-        track = self.tracks.get((node, path))
-        if track is None or len(track.times) == 1:
-            return np.repeat(
-                self.nodes.rest[path][node][None] if track is None else track.values[:], len(times), axis=0
-            )
-        if track.interpolation == STEP:
-            return track.values[:][np.clip(np.searchsorted(track.times, times, side="right") - 1, 0, None)]
-        if path == "rotation":
-            slerp = Slerp(track.times, Rotation.from_quat(track.values[:], scalar_first=True))
-            return slerp(times.clip(*track.times[[0, -1]])).as_quat(scalar_first=True)
-        return np.stack([np.interp(times, track.times, column) for column in track.values[:].T], axis=1)
-
-    def worlds(self, times: np.ndarray) -> dict[int, np.ndarray]:
-        """Return the matrices of all nodes at times (n,): by node (n, 4, 4)."""
-        result: dict[int, np.ndarray] = {}
-        for node in np.concatenate(self.nodes.skeleton.levels).tolist():
-            matrix = np.tile(np.eye(4), (len(times), 1, 1))
-            turns = Rotation.from_quat(self.values(node, "rotation", times), scalar_first=True).as_matrix()
-            matrix[:, :3, :3] = turns * self.values(node, "scale", times)[:, None]
-            matrix[:, :3, 3] = self.values(node, "translation", times)
-            parent = int(self.nodes.parents[node])
-            result[node] = matrix if parent < 0 else result[parent] @ matrix
-        return result
-
-    def points(self, times: np.ndarray) -> dict[str, np.ndarray]:
-        """Return where each node's head and points beside it are in the world: name to shape (n, 7, 3)."""
-        result = {}
-        for node, matrix in self.worlds(times).items():
-            axes = np.swapaxes(matrix[:, :3, :3], 1, 2)
-            axes = RADIUS * axes / np.linalg.norm(axes, axis=2, keepdims=True)
-            head = matrix[:, None, :3, 3]
-            result[self.names[node]] = np.concatenate((head, head + axes, head - axes), axis=1)
-        return result
+def points(file: File, times: np.ndarray) -> dict[str, np.ndarray]:
+    """Return where each node's head and points beside it are in the world: name to shape (n, 7, 3)."""
+    result = {}
+    for node, worlds in zip(file.json["nodes"], file.worlds(0, times), strict=True):
+        axes = np.swapaxes(worlds[:, :3, :3], 1, 2)
+        axes = RADIUS * axes / np.linalg.norm(axes, axis=2, keepdims=True)
+        head = worlds[:, None, :3, 3]
+        result[node.get("name")] = np.concatenate((head, head + axes, head - axes), axis=1)
+    return result
 
 
-def beside(original: File, smaller: File, tool: str) -> dict[str, Any]:
+def animation_bytes(path: Path) -> int:
+    """Return the bytes of all keys of a file: times and values."""
+    document = read_document(path, in_memory=True)
+    samplers = [sampler for animation in document.json["animations"] for sampler in animation["samplers"]]
+    return sum(
+        stored_size(document, it) for it in {sampler[side] for sampler in samplers for side in ("input", "output")}
+    )
+
+
+def beside(original: Path, smaller: Path, tool: str) -> dict[str, Any]:
     """Return what a tool made of a clip, with its errors at eighths of the gaps between the keys of both files."""
-    times = np.unique(np.concatenate([track.times for file in (original, smaller) for track in file.tracks.values()]))
+    files = File(original), File(smaller)
+    times = np.unique(np.concatenate([file.moments(0) for file in files]))
     eighths = np.unique((times[:-1, None] + np.diff(times)[:, None] * np.arange(8) / 8.0).ravel())
-    truth, shown = original.points(eighths), smaller.points(eighths)
+    truth, shown = (points(file, eighths) for file in files)
     errors = np.array([np.linalg.norm(truth[it] - shown[it], axis=2).max(axis=1) for it in truth if it in shown])
     return {
         "tool": tool,
-        "animation_bytes": smaller.animation_bytes,
-        "share": smaller.animation_bytes / original.animation_bytes,
-        "file_bytes": smaller.file_bytes,
+        "animation_bytes": animation_bytes(smaller),
+        "share": animation_bytes(smaller) / animation_bytes(original),
+        "file_bytes": smaller.stat().st_size,
         "error_mm": 1e3 * errors.max(),
         "within_tenth": (errors <= 1e-4).mean(),
         "within_one": (errors <= 1e-3).mean(),
@@ -132,16 +99,15 @@ def measure(path: Path, tools: Path | None, folder: Path) -> list[dict[str, Any]
     """Return what the exporter and each tool make of a body."""
     exported, output = folder / f"{path.stem}.glb", folder / f"{path.stem}-smaller.glb"
     export(path, exported)
-    original = File(exported)
-    result = [beside(original, original, "exported by Blender")]
+    result = [beside(exported, exported, "exported by Blender")]
     for tolerance in TOLERANCES:
         reduce_file(exported, output, Options(tolerance, RADIUS))
-        result.append(beside(original, File(output), f"`reduce --tolerance {1e3 * tolerance:g}mm`"))
+        result.append(beside(exported, output, f"`reduce --tolerance {1e3 * tolerance:g}mm`"))
     for name, (program, *given) in TOOLS.items():
         if tools and (found := shutil.which(program, path=str(tools))):
             arguments = [argument.format(exported, output) for argument in given]
             subprocess.run([found, *arguments], check=True, capture_output=True)
-            result.append(beside(original, File(output), name))
+            result.append(beside(exported, output, name))
     return result
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigid_motion.motion import Poses, interpolate
+from rigid_motion.motion import MODES, Poses, interpolate
 from rigid_motion.motion.poses import reshaped
 
 
@@ -40,3 +40,7 @@ class Case:
     def filled_in(self, mode: str) -> Poses:
         """Return the in-betweens of a mode, shape (b, m): each segment is worked out once."""
         return interpolate(self.key_times, self.keys, self.times, mode)
+
+    def in_the_algebra(self, mode: str) -> Poses:
+        """Return the same, shape (b m,), by the algebra that the mode is named after: each begins with its keys."""
+        return MODES[mode].reference(*self.ends())

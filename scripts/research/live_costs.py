@@ -4,13 +4,12 @@
 
 Whole bodies and single hands are sent by the codec of [the wire](wire.md) over UDP on loopback; a receiver in another
 process shows them, and goes by the recording's clock, however busy the machine is. Bytes are those of datagrams with
-the 28 bytes of UDP and IPv4 around each, without what somebody who joins is told once. Errors are the largest of any
-joint's ball of 3 cm, in the root's space, at every sample.
+the 28 bytes of UDP and IPv4 around each, without the description that a receiver gets when it joins. Errors are the
+largest of any joint's ball of 3 cm, in the root's space, at every sample.
 """
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -86,7 +85,7 @@ def engines(clip: Clip) -> list[dict[str, Any]]:
         shown = {engine: (by_engine(engine, truth, way, frames), 2.0 * RATE * (7 * 4 + HEADERS)) for engine in ENGINES}
         shown["sent when needed"] = by_codec(truth, way, frames, TOLERANCE, next(iter(DELAYS)))
         for engine, (poses_shown, size) in shown.items():
-            rows.append({"link": label, "by": engine, "bytes": size, **asdict(seen(poses_shown, truth, frames))})
+            rows.append({"link": label, "by": engine, "bytes": size, **seen(poses_shown, truth, frames)})
     return rows
 
 
@@ -106,7 +105,5 @@ def main(arguments: list[str] | None = None) -> int:
         "single": table([row for row in rows if row["joints"] == 1]),
         "engines": engines(next(clip for clip in clips if clip.name == HAND)),
     }
-    report("a room")
-    about = {"users": options.users, "seconds": options.seconds}
-    result["room"] = about | asdict(room.measured(options.users, options.seconds))
+    result["room"] = room.measured(options.users, options.seconds)
     return publish("live_costs", result, options, *options.folders)

@@ -10,7 +10,7 @@ worse, found by trials. All errors are those of what Blender shows, on every fra
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,54 +18,54 @@ import bpy
 import numpy as np
 
 from research import body_reduction
-from research.body_reduction import figures_of
-from research.studies import EXTENSIONS, files_in, publish, report, study_parser
+from research.studies import EXTENSIONS, files_in, publish, study_parser
 from rigid_motion import animation
-from rigid_motion.motion import Poses, interpolate, repair, shell_error
+from rigid_motion.motion import Poses, interpolate, shell_error
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.places import ASSETS
-from rigid_motion_batch.recordings import TrajectoryError, read_trajectories
+from rigid_motion_batch.recordings import TrajectoryError
+from rigid_motion_batch.recordings.clip_reading import read_clips
+from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.scenes.body_scene import registered
-from rigid_motion_batch.scenes.decimated_bodies import FREE, Left, decimate
+from rigid_motion_batch.scenes.decimated_bodies import FREE, Decimations, Left
 
 ROTATION_MODES = ("QUATERNION", "XYZ")
 TRIALS = 14  # error margins tried until Decimate is as good as the reduced poses
-MARGINS = (1e-6, 1.0)  # the smallest and the largest of them, in the units of the channels
 
 
-@dataclass(frozen=True, eq=False)
-class Recording:
-    """A motion with a pose on every frame (n,), from 1 on."""
+def read(path: Path, rate: float) -> Clip:
+    """Read the first body of a file at so many frames a second, straight between samples; of a skeleton the root.
 
-    name: str
-    frames: np.ndarray
-    poses: Poses
-
-
-def read(path: Path, rate: float) -> Recording:
-    """Read the first body of a file at so many frames a second, straight between samples; of a skeleton the root."""
-    trajectory = read_trajectories(str(path)).trajectories[0]
-    times, poses, _ = repair(trajectory.times, trajectory.rigid)
-    if len(times) < 2:
-        raise TrajectoryError(path, f"{len(times)} usable poses are left", "record at least 2")
-    poses = Poses(trajectory.metres_per_unit * poses.positions, poses.quaternions)
-    frames = np.arange(np.floor((times[-1] - times[0]) * rate) + 1.0)
-    return Recording(path.stem, 1.0 + frames, interpolate(times - times[0], poses, frames / rate, "lerp_slerp"))
+    Raises
+    ------
+    TrajectoryError
+        Where it cannot be read, or has fewer than two usable poses.
+    """
+    clip = read_clips([str(path)])[0][0]
+    poses = clip.in_metres(clip.poses if clip.rest_body is None else clip.poses[0])
+    times = np.arange(np.floor((clip.times[-1] - clip.times[0]) * rate) + 1.0) / rate
+    poses = interpolate(clip.times - clip.times[0], Poses(poses.positions, poses.quaternions), times, "lerp_slerp")
+    return replace(clip, name=path.stem, times=times, poses=poses, rest_body=None, metres_per_unit=1.0)
 
 
-def import_recording(recording: Recording, rotation_mode: str) -> bpy.types.Object:
+def frames_of(clip: Clip) -> np.ndarray:
+    """Return the frames of its poses (n,), from 1 on."""
+    return 1.0 + np.arange(len(clip.times))
+
+
+def import_clip(clip: Clip, rotation_mode: str) -> bpy.types.Object:
     """Return an empty with a key on every frame, alone in a new file, selected."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    obj = bpy.data.objects.new(recording.name, None)
+    obj = bpy.data.objects.new(clip.name, None)
     obj.rotation_mode = rotation_mode
     bpy.context.collection.objects.link(obj)
-    animation.bake_poses(obj, recording.frames, recording.poses)
+    animation.bake_poses(obj, frames_of(clip), clip.poses)
     obj.select_set(True)
     bpy.context.view_layer.objects.active = obj
     return obj
 
 
-def outcome(obj: bpy.types.Object, recording: Recording, truth: Poses, radius: float) -> Left:
+def outcome(obj: bpy.types.Object, clip: Clip, radius: float) -> Left:
     """Return what an object has now for keys, in a channel on average, and how far off it is shown."""
     curves = [
         [key.co.x for key in fcurve.keyframe_points]
@@ -74,66 +74,33 @@ def outcome(obj: bpy.types.Object, recording: Recording, truth: Poses, radius: f
     ]
     frames, count = len(set().union(*curves)), sum(map(len, curves))
     numbers = frames * (1 + len(curves)) if animation.is_reduced(obj) else FREE * count
-    error = shell_error(animation.read_poses(obj, recording.frames), truth, radius)
-    return Left(recording.name, frames, count / len(curves), numbers, float(error.max()))
+    error = shell_error(animation.read_poses(obj, frames_of(clip)), clip.poses, radius)
+    return Left(clip.name, frames, count / len(curves), numbers, float(error.max()))
 
 
-def measure(
-    recording: Recording, rotation_mode: str, tolerance: float, radius: float
-) -> tuple[Left, Left | None, Left | None]:
-    """Reduce to poses, and decimate to be as good, and to have keys on as few frames; None where that cannot be."""
-    obj = import_recording(recording, rotation_mode)
-    truth = animation.read_poses(obj, recording.frames)
+def measure(clip: Clip, rotation_mode: str, tolerance: float, radius: float) -> dict[str, Any]:
+    """Return what poses leave of a recording, and Decimate with no larger an error; None where it cannot be so good."""
+    obj = import_clip(clip, rotation_mode)
     animation.reduce_keys_of(obj, "motor_spline", tolerance, radius)
-    reduced = outcome(obj, recording, truth, radius)
-
-    def decimated(**options: object) -> Left:
-        obj = import_recording(recording, rotation_mode)
-        decimate(obj, **options)
-        return outcome(obj, recording, truth, radius)
-
-    as_few, fewest, most = None, 2, round(reduced.keys)
-    while fewest < most:
-        keys = (fewest + most + 1) // 2
-        tried = decimated(mode="RATIO", factor=1.0 - keys / len(recording.frames))
-        if tried.frames <= reduced.frames:
-            fewest, as_few = keys, tried
-        else:
-            most = keys - 1
-
-    as_good, (low, high) = None, np.log(MARGINS)
-    for _ in range(TRIALS):
-        margin = 0.5 * (low + high)
-        tried = decimated(mode="ERROR", remove_error_margin=float(np.exp(margin)))
-        if tried.largest <= reduced.largest:
-            low = margin
-            as_good = tried if as_good is None or tried.keys < as_good.keys else as_good
-        else:
-            high = margin
-    return reduced, as_good, as_few
+    reduced = outcome(obj, clip, radius)
+    obj = import_clip(clip, rotation_mode)
+    as_good = Decimations(obj, lambda: outcome(obj, clip, radius), TRIALS).within(reduced.largest)
+    about = {"name": clip.name, "frames": len(clip.times)}
+    return {**about, "reduced": figures_of(reduced), "decimate": as_good and figures_of(as_good)}
 
 
-def row(recording: Recording, reduced: Left, as_good: Left | None, as_few: Left | None) -> dict[str, Any]:
-    """Return the figures of a recording."""
-    return {
-        "name": recording.name,
-        "frames": len(recording.frames),
-        "reduced": figures_of(reduced),
-        "decimate": as_good and figures_of(as_good),
-        "few_mm": as_few and 1e3 * as_few.largest,
-    }
+def figures_of(left: Left) -> dict[str, float]:
+    """Return the figures of what is left."""
+    return {"frames": left.frames, "key_count": left.keys, "numbers": left.numbers, "error_mm": 1e3 * left.largest}
 
 
 def means(rows: list[dict[str, Any]]) -> dict[str, float]:
     """Return what Decimate has in multiples of reduced poses: geometric means over the recordings."""
-    ratios = [
-        {name: row["decimate"][name] / reduced for name, reduced in row["reduced"].items()}
-        for row in rows
-        if row["decimate"]
-    ]
-    few = [row["few_mm"] / row["reduced"]["error_mm"] for row in rows if row["few_mm"]]
-    result = {name: geometric_mean(np.array([ratio[name] for ratio in ratios])) for name in ratios[0]}
-    return {**result, "few_mm": geometric_mean(np.array(few))}
+    pairs = [(row["decimate"], row["reduced"]) for row in rows if row["decimate"]]
+    return {
+        name: geometric_mean(np.array([decimated[name] / reduced[name] for decimated, reduced in pairs]))
+        for name in pairs[0][0]
+    }
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -151,13 +118,11 @@ def main(arguments: list[str] | None = None) -> int:
         bodies = files_in(options.bodies, (".bvh", ".fbx"))
     except (TrajectoryError, OSError) as error:
         parser.error(str(error))
-    rows: dict[str, list[dict[str, Any]]] = {rotation: [] for rotation in ROTATION_MODES}
     with registered():
-        for rotation, of_rotation in rows.items():
-            for recording in recordings:
-                report(f"{recording.name}, {rotation}")
-                outcomes = measure(recording, rotation, options.tolerance, options.radius)
-                of_rotation.append(row(recording, *outcomes))
+        rows = {
+            rotation: [measure(clip, rotation, options.tolerance, options.radius) for clip in recordings]
+            for rotation in ROTATION_MODES
+        }
         result = {
             "tolerance_mm": 1e3 * options.tolerance,
             "radius": options.radius,

@@ -41,7 +41,7 @@ def report(text: str) -> None:
     print(f"{text} ...", file=sys.stderr, flush=True)
 
 
-def seconds_in_turns(
+def interleaved_seconds(
     runs: Mapping[Name, Callable[[], object]],
     rounds: int,
     *,
@@ -49,9 +49,9 @@ def seconds_in_turns(
     most: float = float("inf"),
     clock: Callable[[], float] = time.perf_counter,
 ) -> dict[Name, list[float]]:
-    """Return the seconds of every round of each, all taking turns, so that a machine that slows down slows all.
+    """Return the seconds of every round of each, interleaved, so that a machine that slows down slows all.
 
-    A warm run has one before it that pays for memory and caches. Whoever has used up `most` seconds has had its rounds.
+    A warm run has one before it that pays for memory and caches. One that has used up `most` seconds has no more.
     """
     seconds: dict[Name, list[float]] = {name: [] for name in runs}
     for _ in range(rounds):

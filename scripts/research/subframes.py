@@ -9,13 +9,13 @@ compared with the pose that the mode has there: millimetres are the largest disp
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
 
-from research.studies import publish, report, study_parser
+from research.studies import publish, study_parser
 from rigid_motion import animation
 from rigid_motion.animation.compute.differences import in_betweens
 from rigid_motion.animation.queries.keyed import source_of
@@ -33,18 +33,13 @@ THIRTY_SECONDS = np.arange(1, 32) / 32.0  # between samples wherever these lie
 EIGHTHS = np.array((0.125, 0.375, 0.625, 0.875))  # half-way between keys that are baked on every quarter of a frame
 
 
-@dataclass(frozen=True)
-class Motion:
-    """What happens between two keys."""
+class Motion(NamedTuple):
+    """What happens between two keys, in degrees, metres and frames."""
 
     name: str
-    turn: float  # degrees
-    distance: float  # metres
+    degrees: float
+    metres: float
     frames: int
-
-    @property
-    def key_frames(self) -> np.ndarray:
-        return 1.0 + self.frames * np.arange(SEGMENTS + 1)
 
 
 MOTIONS = (
@@ -54,23 +49,14 @@ MOTIONS = (
 )
 
 
-@dataclass(frozen=True)
-class Deviation:
-    """How far a motion is off: shell errors in metres, the rotation in radians."""
-
-    largest: float
-    rms: float
-    rotation: float
-
-
 def key_poses(motion: Motion) -> Poses:
     """Return poses a turn and a step apart, in directions drawn at random."""
     axes, steps = normalise(np.random.default_rng(11).normal(size=(2, SEGMENTS, 3)))
-    half = 0.5 * np.radians(motion.turn)
+    half = 0.5 * np.radians(motion.degrees)
     quaternions = [np.array((0.5, 0.5, -0.5, 0.5))]
     for axis in axes:
         quaternions.append(multiply(np.concatenate(((np.cos(half),), np.sin(half) * axis)), quaternions[-1]))
-    positions = np.concatenate((np.zeros((1, 3)), np.cumsum(motion.distance * steps, axis=0)))
+    positions = np.concatenate((np.zeros((1, 3)), np.cumsum(motion.metres * steps, axis=0)))
     return Poses(positions, align_signs(np.array(quaternions)))
 
 
@@ -84,62 +70,47 @@ def keyed_object(motion: Motion, rotation_mode: str) -> bpy.types.Object:
     if rotation_mode != "QUATERNION":
         channel, rotations = "rotation_euler", extrinsic_eulers_from_quaternions(rotations, rotation_mode)
     for path, values in (("location", poses.positions), (channel, rotations)):
-        animation.write_channel(obj, path, motion.key_frames, values, interpolation="BEZIER")
+        animation.write_channel(
+            obj, path, 1.0 + motion.frames * np.arange(SEGMENTS + 1), values, interpolation="BEZIER"
+        )
     return obj
 
 
-def between(motion: Motion, fractions: np.ndarray) -> np.ndarray:
-    """Return the sub-frames from the first key to the last."""
-    first, last = motion.key_frames[[0, -1]]
-    return (np.arange(first, last)[:, None] + fractions).ravel()
-
-
-def deviation(obj: bpy.types.Object, frames: np.ndarray, requested: Poses, radius: float) -> Deviation:
-    """Return how far Blender shows an object from where it should be."""
-    shown = animation.read_poses(obj, frames)
-    shell = shell_error(shown, requested, radius)
-    turned = angle_between(shown.quaternions, requested.quaternions)
-    return Deviation(float(shell.max()), rms(shell), float(turned.max()))
-
-
-def measure(motion: Motion, mode: str, rotation_mode: str, radius: float) -> list[Deviation]:
+def measure(motion: Motion, mode: str, rotation_mode: str, radius: float) -> dict[str, float]:
     """Measure live in-betweens, exact ones, those baked on every quarter of a frame, and on every whole frame."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     obj = keyed_object(motion, rotation_mode)
     animation.set_mode(obj, mode)
-    quarters, finest, eighths = (
-        (frames, in_betweens(source_of(obj), frames).desired, radius)
-        for frames in (between(motion, fractions) for fractions in (QUARTERS, THIRTY_SECONDS, EIGHTHS))
-    )
-    live = deviation(obj, *quarters)
+    whole = 1.0 + np.arange(motion.frames * SEGMENTS)[:, None]
+    moments = [(whole + fractions).ravel() for fractions in (QUARTERS, THIRTY_SECONDS, EIGHTHS)]
+    quarters, finest, eighths = ((frames, in_betweens(source_of(obj), frames).desired) for frames in moments)
+
+    def deviation(name: str, units: Sequence[str], frames: np.ndarray, requested: Poses) -> dict[str, float]:
+        """Return how far Blender shows it from where it should be."""
+        shown = animation.read_poses(obj, frames)
+        shell, turned = shell_error(shown, requested, radius), angle_between(shown.quaternions, requested.quaternions)
+        figures = {"mm": 1e3 * shell.max(), "rms_mm": 1e3 * rms(shell), "degrees": np.degrees(turned.max())}
+        return {f"{name}_{unit}": float(figures[unit]) for unit in units}
+
+    figures = deviation("live", ("mm", "rms_mm", "degrees"), *quarters)
     animation.set_exact(obj)
-    exact = deviation(obj, *finest)
+    figures |= deviation("exact", ("mm",), *finest)
     animation.set_exact(obj, False)
     animation.bake(obj, step=0.25)
-    finely = deviation(obj, *eighths)
+    figures |= deviation("quarter", ("mm", "degrees"), *eighths)
     animation.unbake(obj)
     animation.bake(obj)
-    return [live, exact, finely, deviation(obj, *quarters)]
+    return figures | deviation("whole", ("mm",), *quarters)
 
 
 def figures_of(motion: Motion, radius: float) -> dict[str, Any]:
     """Return the figures of one motion, for every mode and rotation mode."""
-    rows = []
-    for mode in KEYFRAME_MODES:
-        for rotation_mode in ROTATION_MODES:
-            live, exact, finely, whole = measure(motion, mode, rotation_mode, radius)
-            figures = {
-                "live_mm": 1e3 * live.largest,
-                "live_rms_mm": 1e3 * live.rms,
-                "live_degrees": np.degrees(live.rotation),
-                "quarter_mm": 1e3 * finely.largest,
-                "quarter_degrees": np.degrees(finely.rotation),
-                "whole_mm": 1e3 * whole.largest,
-                "exact_mm": 1e3 * exact.largest,
-            }
-            rows.append({"mode": mode, "rotation": rotation_mode, **figures})
-    about = {"name": motion.name, "degrees": motion.turn, "metres": motion.distance, "frames": motion.frames}
-    return {**about, "rows": rows}
+    rows = [
+        {"mode": mode, "rotation": rotation_mode, **measure(motion, mode, rotation_mode, radius)}
+        for mode in KEYFRAME_MODES
+        for rotation_mode in ROTATION_MODES
+    ]
+    return {**motion._asdict(), "rows": rows}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -147,10 +118,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser = study_parser("subframes", __doc__)
     parser.add_argument("--radius", type=float, default=0.1, help="of the shell, in metres (%(default)s)")
     options = parser.parse_args(arguments)
-    motions = []
     with registered():
-        for motion in MOTIONS:
-            report(motion.name)
-            motions.append(figures_of(motion, options.radius))
-    figures = {"radius": options.radius, "motions": motions}
+        figures = {"radius": options.radius, "motions": [figures_of(motion, options.radius) for motion in MOTIONS]}
     return publish("subframes", figures, options, f"--radius {options.radius:g}", Blender=bpy.app.version_string)

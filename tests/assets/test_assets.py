@@ -7,7 +7,6 @@ import pytest
 from numpy.typing import ArrayLike
 
 from assets import make_assets
-from research.making.drill import drill
 from research.making.motions import (
     MOTIONS,
     PITCH,
@@ -89,15 +88,6 @@ def test_the_screw_advances_by_its_pitch_with_every_turn():
     assert np.polyfit(turns, advance, 1)[0] == pytest.approx(PITCH, rel=0.15)
 
 
-# ---- what models are made of -----------------------------------------------------------------------------------------
-
-
-def test_the_bit_of_the_drill_ends_where_the_clips_have_the_tip():
-    foremost = drill().vertices
-    foremost = foremost[foremost[:, 1] > foremost[:, 1].max() - 1e-6]
-    np.testing.assert_allclose(foremost.mean(axis=0), 1e3 * TIP, atol=1e-9)
-
-
 # ---- models ----------------------------------------------------------------------------------------------------------
 
 
@@ -105,7 +95,7 @@ def test_the_bit_of_the_drill_ends_where_the_clips_have_the_tip():
 def models():
     """The objects of the kept file and those made anew: {name: (kept, made)}."""
     bpy = pytest.importorskip("bpy")
-    from research.making.library import MODELS, build_models
+    from research.making.models import MODELS, build_models
 
     kinds = ("objects", "meshes", "materials")
     before = {kind: set(getattr(bpy.data, kind)) for kind in kinds}
@@ -151,6 +141,12 @@ def test_the_script_makes_the_kept_model_again(models, name):
         np.array([corner.vector[:] for corner in m.data.corner_normals]) for m in (kept, made)
     )
     np.testing.assert_allclose(kept_normals, made_normals, atol=1e-3)
+
+
+def test_the_bit_of_the_drill_ends_where_the_clips_have_the_tip(models):
+    vertices = vertices_of(models["Drill"][0])
+    foremost = vertices[vertices[:, 1] > vertices[:, 1].max() - 1e-6]
+    np.testing.assert_allclose(foremost.mean(axis=0), TIP, atol=1e-7)
 
 
 @pytest.mark.parametrize(("name", "length"), [("Drill", 0.22), ("Controller", 0.15)])

@@ -8,7 +8,7 @@ Small models of what each engine does with the poses that arrive, after its sour
   the second by up to three intervals, and towards that by dt / 0.1 s at every frame ("lerp of lerp").
 - Godot (`MultiplayerSynchronizer`): the newest pose at each of 60 physics ticks, between two by physics interpolation.
 
-All get the poses of hand and tool in datagrams of their own, 30 times a second, and drop those that are overtaken. An
+All get the poses of hand and tool in separate datagrams, 30 times a second, and drop those that are overtaken. An
 error is that of a ball of 10 cm, at the constant delay that suits what was shown best. Seconds and metres.
 """
 
@@ -18,6 +18,7 @@ import heapq
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import accumulate, count
 
 import numpy as np
 
@@ -61,20 +62,6 @@ class Way:
         return np.inf if lost else sent + takes
 
 
-@dataclass(frozen=True)
-class Seen:
-    """What came out."""
-
-    delay: float
-    rms_mm: float
-    p98_mm: float
-    largest_mm: float
-    freezes: int
-    jumps_back: int
-    slip_mm: float
-    """The 98th percentile of how far the tool's middle is from its place in the hand."""
-
-
 # -- engines -----------------------------------------------------------------------------------------------------------
 
 
@@ -91,16 +78,10 @@ def arriving(arrivals: Arrivals, moments: np.ndarray) -> Iterator[tuple[float, A
         yield moment, arrivals[begin:end]
 
 
-def newest_of(arrivals: Arrivals, moments: np.ndarray) -> Iterator[tuple[float, Arrivals]]:
-    """Yield the same without what was overtaken."""
-    newest = -np.inf
-    for moment, come in arriving(arrivals, moments):
-        kept = []
-        for arrived in come:
-            if arrived[1] > newest:
-                newest = arrived[1]
-                kept.append(arrived)
-        yield moment, kept
+def without_overtaken(arrivals: Arrivals) -> Arrivals:
+    """Return the arrivals that nothing sent later came before."""
+    newest = [-np.inf, *accumulate((sent for _, sent, _ in arrivals), max)]
+    return [it for it, latest in zip(arrivals, newest, strict=False) if it[1] > latest]
 
 
 def mirror(arrivals: Arrivals, frames: np.ndarray) -> list[Pose]:
@@ -120,7 +101,7 @@ def mirror(arrivals: Arrivals, frames: np.ndarray) -> list[Pose]:
             if last_arrival is not None:
                 taken.add(arrival - last_arrival)
             last_arrival = arrival
-            multiple = (interval + taken.deviation) / interval + 1.0
+            multiple = (interval + float(np.sqrt(taken.variance))) / interval + 1.0
             aim = buffer[-1][0] - interval * multiple
             local = min(max(local, aim - interval * multiple), aim + interval * multiple)
             drift.add(buffer[-1][0] - local)
@@ -140,24 +121,19 @@ def mirror(arrivals: Arrivals, frames: np.ndarray) -> list[Pose]:
     return shown
 
 
+@dataclass
 class _Average:
     """An exponential moving average over so many values, and the deviation from it."""
 
-    def __init__(self, count: float) -> None:
-        self._part = 2.0 / (count + 1.0)
-        self.value, self._variance, self._begun = 0.0, 0.0, False
+    count: float
+    value: float | None = None
+    variance: float = 0.0
 
     def add(self, value: float) -> None:
-        if not self._begun:
-            self.value, self._begun = value, True
-            return
-        delta = value - self.value
-        self.value += self._part * delta
-        self._variance = (1.0 - self._part) * (self._variance + self._part * delta * delta)
-
-    @property
-    def deviation(self) -> float:
-        return float(np.sqrt(self._variance))
+        part, before = 2.0 / (self.count + 1.0), value if self.value is None else self.value
+        delta = value - before
+        self.value = before + part * delta
+        self.variance = (1.0 - part) * (self.variance + part * delta * delta)
 
 
 def netcode(arrivals: Arrivals, frames: np.ndarray) -> list[Pose]:
@@ -166,7 +142,7 @@ def netcode(arrivals: Arrivals, frames: np.ndarray) -> list[Pose]:
     waiting, shown, before = [], [], frames[0]
     current = arrivals[0][2]
     start = end = (0.0, current)
-    for now, come in newest_of(arrivals, frames):
+    for now, come in arriving(without_overtaken(arrivals), frames):
         waiting += [(sent, pose) for _, sent, pose in come]
         render = now - offset
         while waiting and render >= end[0]:
@@ -182,7 +158,7 @@ def netcode(arrivals: Arrivals, frames: np.ndarray) -> list[Pose]:
 def godot(arrivals: Arrivals, frames: np.ndarray) -> list[Pose]:
     """Show the newest at each physics tick, and between the last two ticks."""
     pose, ticks = arrivals[0][2], []
-    for tick, come in newest_of(arrivals, np.arange(frames[0] - 2.0 * TICK, frames[-1] + TICK, TICK)):
+    for tick, come in arriving(without_overtaken(arrivals), np.arange(frames[0] - 2.0 * TICK, frames[-1] + TICK, TICK)):
         pose = come[-1][2] if come else pose
         ticks.append((tick, pose))
     shown = []
@@ -227,17 +203,16 @@ def by_codec(truth: Path, way: Way, frames: np.ndarray, tolerance: float, delay:
     rng = np.random.default_rng(7)
     bodies = [Body.rigid("hand", radius=RADIUS), Body.rigid("tool", radius=RADIUS)]
     sender, receiver = Sender(bodies, tolerance, delay), Receiver()
-    pending, count, size = [], 0, 0
+    pending, numbers, size = [], count(), 0
     samples = truth.at(truth.moments)
     current, shown = truth.at(frames[:1])[:, 0], []
 
     def post(datagrams: list[bytes], now: float, back: bool = False) -> None:
-        nonlocal count, size
+        nonlocal size
         for datagram in datagrams:
             size += 0 if back else len(datagram) + HEADERS
-            count += 1
             if np.isfinite(arrival := way.arrival(now, rng)):
-                heapq.heappush(pending, (arrival, count, back, datagram))
+                heapq.heappush(pending, (arrival, next(numbers), back, datagram))
 
     def come(until: float) -> None:
         while pending and pending[0][0] <= until:
@@ -263,11 +238,11 @@ def by_codec(truth: Path, way: Way, frames: np.ndarray, tolerance: float, delay:
     return joined(shown, axis=1), size / float(truth.moments[-1])
 
 
-def seen(shown: Poses, truth: Path, frames: np.ndarray) -> Seen:
-    """Compare what was shown at frames (n,) with the truth."""
+def seen(shown: Poses, truth: Path, frames: np.ndarray) -> dict[str, float]:
+    """Compare what was shown at frames (n,) with the truth; slip is the tool's middle from its place in the hand."""
     kept = frames > SETTLED
     shown, frames = shown[:, kept], frames[kept]
-    hand, tool = shown[0], shown[1]
+    hand, tool = shown
     errors = [shell_error(hand, truth.at(frames - lag)[0], RADIUS) for lag in LAGS]
     best = int(np.argmin([rms(error) for error in errors]))
     went, goes = (np.diff(it.positions, axis=0) for it in (hand, truth.at(frames - LAGS[best])[0]))
@@ -277,12 +252,13 @@ def seen(shown: Poses, truth: Path, frames: np.ndarray) -> Seen:
     along = np.einsum("ij,ij->i", went, goes) / np.maximum(speed, 1e-9)
     runs = np.diff(np.flatnonzero(np.diff(np.pad(stands, 1).astype(int))))[::2]
     slips = np.linalg.norm(rotate(conjugate(hand.quaternions), tool.positions - hand.positions) - GRIP, axis=-1)
-    return Seen(
-        delay=float(LAGS[best]),
-        rms_mm=1e3 * rms(errors[best]),
-        p98_mm=1e3 * float(np.percentile(errors[best], 98.0)),
-        largest_mm=1e3 * float(errors[best].max()),
-        freezes=int(np.sum(runs >= FROZEN * FPS)),
-        jumps_back=int(np.sum(moving & (along < -BACK))),
-        slip_mm=1e3 * float(np.percentile(slips, 98.0)),
-    )
+    off = 1e3 * errors[best]
+    return {
+        "delay": float(LAGS[best]),
+        "rms_mm": rms(off),
+        "p98_mm": float(np.percentile(off, 98.0)),
+        "largest_mm": float(off.max()),
+        "freezes": int(np.sum(runs >= FROZEN * FPS)),
+        "jumps_back": int(np.sum(moving & (along < -BACK))),
+        "slip_mm": 1e3 * float(np.percentile(slips, 98.0)),
+    }

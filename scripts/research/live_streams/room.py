@@ -7,7 +7,6 @@ import multiprocessing
 import socket
 import struct
 import time
-from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
 import numpy as np
@@ -17,22 +16,11 @@ STAMP = struct.Struct("<d")
 SETTLING = 5.0  # seconds in which all have to hear of one another, and that do not count
 
 
-@dataclass(frozen=True)
-class Room:
-    """What came out. Processor time is of one processor; `rate` are datagrams heard a second by all."""
+def measured(users: int, seconds: float) -> dict[str, float]:
+    """Play a room for so many seconds, and return what came out.
 
-    bytes: float
-    heard: int
-    expected: int
-    rate: float
-    median_ms: float
-    p99_ms: float
-    router: float
-    listeners: float
-
-
-def measured(users: int, seconds: float) -> Room:
-    """Play a room for so many seconds."""
+    Processor time is of one processor; `rate` are datagrams heard a second by all.
+    """
     context = multiprocessing.get_context("spawn")
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
@@ -50,16 +38,18 @@ def measured(users: int, seconds: float) -> Room:
     for process in multiprocessing.active_children():
         process.join()
     latencies = np.concatenate([latencies for _, latencies in listeners])
-    return Room(
-        bytes=float(np.mean([len(datagram) for datagram in datagrams])),
-        heard=len(latencies),
-        expected=round(users * (users - 1) * RATE * seconds),
-        rate=len(latencies) / seconds,
-        median_ms=1e3 * float(np.median(latencies)),
-        p99_ms=1e3 * float(np.percentile(latencies, 99.0)),
-        router=router / seconds,
-        listeners=sum(spent for spent, _ in listeners) / seconds,
-    )
+    return {
+        "users": users,
+        "seconds": seconds,
+        "bytes": float(np.mean([len(datagram) for datagram in datagrams])),
+        "heard": len(latencies),
+        "expected": round(users * (users - 1) * RATE * seconds),
+        "rate": len(latencies) / seconds,
+        "median_ms": 1e3 * float(np.median(latencies)),
+        "p99_ms": 1e3 * float(np.percentile(latencies, 99.0)),
+        "router": router / seconds,
+        "listeners": sum(spent for spent, _ in listeners) / seconds,
+    }
 
 
 def _datagrams() -> list[bytes]:

@@ -190,26 +190,22 @@ class Throw:
     angles: tuple[float, float, float, float] = (0.0, -2.0, 366.0, 360.0)
     """Degrees at these moments. Between them the hands turn back for the swing, and on with what they have caught."""
 
-    def path(self) -> list[Knot]:
-        """Return the centre of mass: a hand that lets go or catches moves as the free body, up to the acceleration."""
+    def knots(self) -> list[Knot]:
+        """Return the centre of mass, and the angle about the axis in radians.
+
+        A hand that lets go or catches moves as the free body, up to the acceleration; in flight the angle has a
+        constant rate.
+        """
         start, release, catch, rest = self.moments
-        held, released, caught, resting = self.centres
-        flight = catch - release
-        velocity = np.subtract(caught, released) / flight - 0.5 * GRAVITY * flight
+        held, released, caught, resting = np.column_stack((self.centres, np.radians(self.angles)))
+        flight, fall = catch - release, np.append(GRAVITY, 0.0)
+        velocity = (caught - released) / flight - 0.5 * fall * flight
         return [
             Knot(start, held),
-            Knot(release, released, velocity, GRAVITY),
-            Knot(catch, caught, velocity + GRAVITY * flight, GRAVITY),
+            Knot(release, released, velocity, fall),
+            Knot(catch, caught, velocity + fall * flight, fall),
             Knot(rest, resting),
         ]
-
-    def turning(self) -> list[Knot]:
-        """Return the angle about the axis, in radians; its rate is constant in flight."""
-        start, release, catch, rest = self.moments
-        angles = np.radians(self.angles)[:, None]
-        rate = (angles[2] - angles[1]) / (catch - release)
-        thrown, caught = Knot(release, angles[1], rate), Knot(catch, angles[2], rate)
-        return [Knot(start, angles[0]), thrown, caught, Knot(rest, angles[3])]
 
     def airborne(self, times: np.ndarray) -> np.ndarray:
         """Return 1 in flight, 0 in a hand, with 40 ms of letting go and of closing in between, shape (n,)."""
@@ -228,8 +224,8 @@ BACK = Throw(
 
 def throw(rng: np.random.Generator, times: np.ndarray) -> Poses:
     """Throw from the right hand to the left and back: wind-up, release, a tumble in free flight, catch, absorption."""
-    places = through(THERE.path() + BACK.path(), times)
-    turns = [about(way.axis, through(way.turning(), times)[:, 0]) for way in (THERE, BACK)]
+    places = through(THERE.knots() + BACK.knots(), times)[:, :3]
+    turns = [about(way.axis, through(way.knots(), times)[:, 3]) for way in (THERE, BACK)]
     poses = held_by(CENTRE_OF_MASS, places, chain(*turns, turn(np.radians(12.0) * X)))
 
     grasp = 1.0 - THERE.airborne(times) - BACK.airborne(times)

@@ -34,7 +34,7 @@ from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.streaming.measuring import even_rate
 
 SETTINGS = ((0.1, 0.0), (0.2, 0.0), (0.1, 0.06), (0.1, 0.15), (0.2, 0.15), (0.1, None))
-"""Delays, and seconds that a datagram takes; None where nobody answers."""
+"""Delays, and seconds that a datagram takes; None where no receiver answers."""
 
 MOST_SECONDS = 15.0  # of a recording, so that long ones do not have all the say
 BODY_RADIUS, SINGLE_RADIUS = 0.03, 0.1  # of the balls of bodies, and of single bodies

@@ -6,7 +6,7 @@ table                        Table 1, and why a screw wins here and loses there
 sending                      streams that are sent when needed, and bytes
 bodies                       the same study on whole bodies
 timing                       the running time of a frame
-triangle, strips, catching   the figures that Blender renders, on the sheets of picture
+triangle, strips, catching   the figures, in numbers and drawn
 
 Source: Kamarianakis, Lydatakis, Papagiannakis, "Never 'Drop the Ball' in the Operating Room: an efficient hand-based VR
 HMD controller interpolation algorithm for collaborative, networked virtual environments", 2021, arXiv 2107.04875.

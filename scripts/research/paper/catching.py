@@ -1,6 +1,6 @@
 """The figure "catching a tool": a drill thrown by one person and caught by another, as a third one's headset shows it.
 
-The two hands and the tool are streams of their own, at the same rate over the same link, and a mode fills in what
+The two hands and the tool are separate streams, at the same rate over the same link, and a mode fills in what
 arrives. A hand that holds the tool is one rigid body with it, so nothing between them should move. The hand is tracked
 at the wrist, a hand's length from where it holds. All modes are shown at the same moments of the motion; one that looks
 ahead gets there later. Seconds, metres.
@@ -8,30 +8,30 @@ ahead gets there later. Seconds, metres.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import bpy
 import numpy as np
+from matplotlib.axes import Axes
 
+from research.drawing import FAINT, INK, RULE, Model, column, save, seen, write_legend
 from research.making.motions import HAND, THERE
-from research.making.rendering import add
-from rigid_motion.animation import bake_poses
 from rigid_motion.motion import MODES, Poses, interpolate, measure, rms
 from rigid_motion.motion.poses import joined
 from rigid_motion.motion.quaternions import multiply, rotate
 from rigid_motion_batch.analysis.modes import label_of
 from rigid_motion_batch.palette import DARK, colour_of
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.scenes import captions, layout, trails
-from rigid_motion_batch.scenes.materials import surface
-from rigid_motion_batch.scenes.nodes import apply_group
-from rigid_motion_batch.scenes.subject import load_subject
-
-from .picture import FAINT, INK, RULE, Sheet
-from .table import PHASES
+from rigid_motion_batch.scenes import layout
+from rigid_motion_batch.scenes.film import render_film
+from rigid_motion_batch.scenes.scene import set_up_render
+from rigid_motion_batch.scenes.settings import SceneSettings
 
 ENGINES = ("lerp_slerp", "dq_sclerp", "pga_lerp", "motor_spline")
 RATES = (5, 10, 15, 20)  # updates a second
+PHASES = 6  # senders of the same rate that begin one after the other within an interval
 
 GRIP = np.array((0.0, -HAND, 0.0))  # where the wrist is, in the axes of the tool that the hand holds
 _, RELEASE, CATCH, _ = THERE.moments
@@ -42,13 +42,13 @@ END = 2.55  # what comes after is another throw
 SHOWN = (0.32, 1.90)  # the moments that are shown, from the first to the last
 FPS, SLOWER = 30, 3.0  # of the film
 FILM_SIZE = (720, 1004)  # pixels: as the picture, but smaller
+METRES = 5.6  # that the picture's height spans
 TRAIL_SECONDS = 0.7  # of the motion
 
 YAW = np.radians(52.0)
 """By which the scene is turned for the eye, so that neither the throw nor the tool is seen end on."""
 
 MIDDLE = np.array((0.0, 0.40, 1.14))  # of the throw
-TITLE = 0.5 - 0.044  # where the first line stands on the sheet
 HANDS = {"thrower": "#3A6EA5", "catcher": "#7A5C99"}  # with the colours of their controllers
 
 Bodies = Mapping[str, Poses]
@@ -139,7 +139,7 @@ def _apart(tool: Poses, hand: Poses) -> np.ndarray:
     return np.linalg.norm(hand.positions - rotate(hand.quaternions, GRIP) - tool.positions, axis=-1)
 
 
-# -- as a scene --------------------------------------------------------------------------------------------------------
+# -- as a picture ------------------------------------------------------------------------------------------------------
 
 
 def frame_moments(caught: float) -> np.ndarray:
@@ -149,83 +149,73 @@ def frame_moments(caught: float) -> np.ndarray:
     return caught + np.arange(-before, after + 1.0) / rate
 
 
-def build(clip: Clip, *, film: bool) -> bpy.types.Scene:
-    """Return the scene of the film, or of the picture at the catch, with its gaps."""
+def pictures(clip: Clip) -> tuple[np.ndarray, Callable[[int], Axes]]:
+    """Return the moments of the film, shape (n,), and what draws one of its frames."""
     times, poses = bodies(clip)
     result = figures(clip)
     moments = frame_moments(_recorded(times)[1])
-    sheet = Sheet(1400, 5.6, frames=len(moments) if film else 1)
-    sheet.scene.render.fps = FPS
-    if film:
-        sheet.scene.render.resolution_x, sheet.scene.render.resolution_y = FILM_SIZE
-    cast = _Cast(sheet, interpolate(times, poses["tool"], moments, "dq_sclerp"))
-    columns = (np.arange(len(RATES)) - 1.5) * 0.243 * sheet.aspect
-    sheet.words("Catching a tool", sheet.left, TITLE, 9.0)
-    for rate, x in zip(RATES, columns, strict=True):
-        sheet.words(f"{rate} updates/s", x, TITLE - 0.036, 7.0, INK, "CENTER")
-    for row, mode in enumerate(ENGINES):
-        top = TITLE - 0.050 - row * 0.2135
-        sheet.card(0.0, top, 2.0 * -sheet.left, 0.0014, RULE)
-        sheet.words(label_of(mode), sheet.left, top - 0.025, 6.5)
+    tool, controller = Model.of("drill"), Model.of("controller")
+    truth = _turned(interpolate(times, poses["tool"], moments, "dq_sclerp"))
+    shown = {
+        (mode, rate): {body: _turned(of_body) for body, of_body in shown_of(times, poses, rate, mode, moments).items()}
+        for mode in ENGINES
+        for rate in RATES
+    }
+
+    def draw(frame: int) -> Axes:
+        axes = column(1400)
+        left, columns = axes.get_xlim()[0] + 0.012, (np.arange(len(RATES)) - 1.5) * 0.174
+        trail = slice(max(frame - round(TRAIL_SECONDS * FPS * SLOWER), 0), frame + 1)
+        axes.text(left, 0.456, "Catching a tool", fontsize=8.5, color=INK)
+        axes.text(-left, 0.456, f"{moments[frame]:.2f} s", fontsize=8.5, color=INK, ha="right")
         for rate, x in zip(RATES, columns, strict=True):
-            cast.perform(mode, rate, shown_of(times, poses, rate, mode, moments), sheet.place(x, top - 0.118))
-            sheet.words(f"{1e3 * result[mode][rate]['gap']:.0f} mm", x + 0.06, top - 0.055, 6.5, INK, "CENTER")
-    _write_legend(sheet, moments)
-    sheet.scene.frame_set(1 + int(np.argmax(moments >= CATCH)))
-    return sheet.scene
+            axes.text(x, 0.418, f"{rate} updates/s", fontsize=6.5, color=INK, ha="center")
+        for row, mode in enumerate(ENGINES):
+            top = 0.406 - row * 0.2135
+            axes.axhline(top, 0.016, 0.984, color=RULE, linewidth=0.5)
+            axes.text(left, top - 0.025, label_of(mode), fontsize=6.5, color=INK)
+            for rate, x in zip(RATES, columns, strict=True):
+                place, view = (x, top - 0.118), shown[mode, rate]
+                for path, width, colour in ((truth, 0.4, FAINT), (view["tool"], 1.0, colour_of(mode))):
+                    axes.plot(*seen(path.positions[trail], place, METRES).T, color=colour, linewidth=width, zorder=-1)
+                tool.draw(axes, truth[frame], place, METRES, DARK.ghost, whole=True)
+                tool.draw(axes, view["tool"][frame], place, METRES, colour_of(mode), whole=False)
+                for hand, colour in HANDS.items():
+                    controller.draw(axes, view[hand][frame], place, METRES, colour, whole=False)
+                axes.text(x + 0.06, top - 0.052, f"{1e3 * result[mode][rate]['gap']:.0f} mm", fontsize=6.5, ha="center")
+        entries = [*((colour, f"{hand}'s hand") for hand, colour in HANDS.items()), (DARK.ghost, "what happened")]
+        write_legend(axes, entries, left, -0.458, 6.5)
+        legend = "coloured: the tool as shown, and its path; mm: from tool to hand at the catch"
+        axes.text(left, -0.486, legend, fontsize=6, color=FAINT)
+        return axes
+
+    return moments, draw
 
 
-class _Cast:
-    """Whoever moves: one tool, its ghost and two hands to a panel, with the paths of the tool."""
-
-    def __init__(self, sheet: Sheet, truth: Poses) -> None:
-        self.sheet, self.truth = sheet, truth
-        self.tool, self.controller = load_subject("drill"), load_subject("controller")
-        self.ghost = surface("What happened", DARK.ghost, alpha=0.45)
-        self.hands = {hand: surface(hand, colour) for hand, colour in HANDS.items()}
-        self.tools = {mode: surface(f"Mode {mode}", colour_of(mode)) for mode in ENGINES}
-        self.trail = trails.trail_group()
-        self.frames = np.arange(1.0, len(truth) + 1.0)
-
-    def perform(self, mode: str, rate: int, shown: Bodies, place: np.ndarray) -> None:
-        """Show one panel, its middle at a place."""
-        name = f"{mode} {rate}"
-        seen = {body: _seen(poses, place) for body, poses in {"truth": self.truth, **shown}.items()}
-        self._move(name, self.tool, seen["tool"], self.tools[mode])
-        self._move(f"{name} truth", self.tool, seen["truth"], self.ghost, whole=True)
-        for hand, paint in self.hands.items():
-            self._move(f"{name} {hand}", self.controller, seen[hand], paint)
-        self._trace(f"{name} path", seen["tool"], 0.010, colour_of(mode))
-        self._trace(f"{name} true path", seen["truth"], 0.004, FAINT)
-
-    def _move(
-        self, name: str, mesh: bpy.types.Mesh, poses: Poses, paint: bpy.types.Material, *, whole: bool = False
-    ) -> None:
-        obj = self.sheet.solid(name, mesh, poses[0], paint, whole=whole)
-        obj.rotation_mode = "QUATERNION"
-        bake_poses(obj, self.frames, poses)
-
-    def _trace(self, name: str, poses: Poses, radius: float, colour: str) -> None:
-        obj = add(name, trails.polyline(name, self.frames, poses.positions))
-        window = TRAIL_SECONDS * FPS * SLOWER
-        apply_group(obj, self.trail, Past=window, Ahead=0.0, Radius=radius, Taper=0.6, Material=self.sheet.ink(colour))
+def write_picture(clip: Clip, path: Path) -> None:
+    """Write the picture of the catch."""
+    moments, draw = pictures(clip)
+    save(draw(int(np.argmax(moments >= CATCH))), path)
 
 
-def _seen(poses: Poses, place: np.ndarray) -> Poses:
+def write_film(clip: Clip, path: Path) -> None:
+    """Write all frames, encoded by Blender."""
+    moments, draw = pictures(clip)
+    with tempfile.TemporaryDirectory() as folder:
+        frames = [Path(folder, f"{frame:04}.png") for frame in range(len(moments))]
+        for number, frame in enumerate(frames):
+            save(draw(number), frame)
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        scene = bpy.context.scene
+        set_up_render(scene, SceneSettings(resolution=FILM_SIZE, fps=FPS), len(moments), "#FFFFFF")
+        strip = scene.sequence_editor_create().strips.new_image("Frames", str(frames[0]), 1, 1, fit_method="FIT")
+        for frame in frames[1:]:
+            strip.elements.append(frame.name)
+        scene.render.use_sequencer = True
+        render_film(scene, path)
+
+
+def _turned(poses: Poses) -> Poses:
     """Return poses turned for the eye, around the middle of the throw."""
     turn = layout.yaw_quaternion(YAW)
-    return Poses(rotate(turn, poses.positions - MIDDLE) + place, multiply(turn, poses.quaternions))
-
-
-def _write_legend(sheet: Sheet, moments: np.ndarray) -> None:
-    """Write what is what, and the time."""
-    low, right, unit = -0.5 + 0.042, -sheet.left, "s"
-    entries = [*((colour, f"{hand}'s hand") for hand, colour in HANDS.items()), (DARK.ghost, "what happened")]
-    sheet.key(entries, sheet.left, low, 6.5)
-    legend = "coloured: the tool as shown, and its path; mm: from tool to hand at the catch"
-    sheet.words(legend, sheet.left, low - 0.028, 6.5, FAINT)
-    sheet.words(unit, right, TITLE, 9.0, FAINT, "RIGHT")
-    frames = np.arange(1.0, len(moments) + 1.0)
-    readout = captions.readout_group("Time in s", 2, sheet.ink(INK))
-    time = captions.readout("Time", readout, sheet.size(9.0), frames[[0, -1]], moments[[0, -1]])
-    sheet.put(time, right - sheet.size(9.0) * (captions.width_of(unit) + 0.3), TITLE)
+    return Poses(rotate(turn, poses.positions - MIDDLE), multiply(turn, poses.quaternions))

@@ -10,12 +10,11 @@ import argparse
 import json
 import sys
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from rigid_motion_batch.command_line import complain, program_of
-from rigid_motion_batch.system_libraries import missing_for_rendering, require_blender, way_out
+from rigid_motion_batch.system_libraries import require_blender
 
 SCRIPT = "research paper"
 PROGRAM = program_of(SCRIPT)
@@ -24,11 +23,11 @@ require_blender(SCRIPT)
 
 import bpy
 
+from research.drawing import save
 from research.pages import FIGURES
 from research.studies import files_in, publish, study_parser
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.scenes.film import render_film, render_still
 
 from . import bodies, catching, motions, sending, strips, table, timing, triangle
 from .table import PAPER, TIME_SAVED, UPDATES
@@ -51,16 +50,11 @@ def main(arguments: list[str]) -> int:
     """Reproduce the paper, and return the exit code."""
     parser = study_parser("paper", __doc__, EPILOG)
     parser.add_argument("--recordings", type=Path, metavar="FOLDER", help="more recordings for the table")
-    parser.add_argument(
-        "--bodies", type=Path, nargs="+", default=[], metavar="PATH", help="whole bodies, or folders of them"
-    )
+    parser.add_argument("--bodies", type=Path, nargs="+", default=[], metavar="PATH", help="whole bodies, or folders")
     parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART", help=", ".join(PARTS))
     parser.add_argument("--no-video", action="store_true", help="make pictures, but no film")
     parser.add_argument("--rounds", type=int, default=timing.ROUNDS, metavar="N", help="of the timing (%(default)s)")
     options = parser.parse_args(arguments)
-    if "pictures" in options.only and (missing := missing_for_rendering()):
-        print(f"{PROGRAM}: {way_out(missing)}", file=sys.stderr)
-        return 2
     try:
         for part in options.only:
             print(f"{PROGRAM}: {part}", file=sys.stderr, flush=True)
@@ -87,9 +81,7 @@ def tabulate(options: argparse.Namespace) -> dict[str, Any]:
     """Return Table 1, and why a screw wins here and loses there."""
     sets, left_out = clips_of(options)
     clips = [clip for of_set in sets.values() for clip in of_set]
-    needed = {clip.name: table.needed(clip, table.curves_of(clip)) for clip in clips}
-    names = [*table.MODES, *(mode + table.CHOSEN for mode in table.ADAPTIVE)]
-    first = next(iter(table.YARDSTICKS))
+    needed = {clip.name: table.needed(clip) for clip in clips}
     return {
         "paper": {
             "rates": UPDATES,
@@ -101,29 +93,20 @@ def tabulate(options: argparse.Namespace) -> dict[str, Any]:
         "samples": {name: sum(len(clip.times) for clip in of_set) for name, of_set in sets.items()},
         "seconds": {name: sum(float(it.times[-1] - it.times[0]) for it in of_set) for name, of_set in sets.items()},
         "left_out": left_out,
-        "yardsticks": table.YARDSTICKS,
         "needed": {
-            of_set: {
-                yardstick: {
-                    name: table.mean_over(needed[clip.name][yardstick].get(name, {}) for clip in clips)
-                    for name in names
-                }
-                for yardstick in table.YARDSTICKS
-            }
+            of_set: {name: table.means([needed[clip.name][name] for clip in clips]) for name in table.WAYS}
             for of_set, clips in sets.items()
         },
         "by_clip": {
-            clip.name: {mode: table.mean_over([needed[clip.name][first][mode]])["saved"] for mode in table.MODES}
-            for clip in clips
+            name: {mode: table.means([row[mode]])["saved"] for mode in table.MODES} for name, row in needed.items()
         },
         "bows": {clip.name: table.bows_of(clip) for clip in clips},
     }
 
 
 def send(options: argparse.Namespace) -> dict[str, Any]:
-    """Return streams that are sent when needed, and the bytes of a pose."""
-    clips = next(iter(clips_of(options)[0].values()))
-    return sending.costs(clips) | {"packings": sending.packings(motions.assets()["reach"])}
+    """Return streams that are sent when needed, and bytes."""
+    return sending.costs(next(iter(clips_of(options)[0].values())))
 
 
 def measure_bodies(options: argparse.Namespace) -> dict[str, Any]:
@@ -135,26 +118,25 @@ def measure_bodies(options: argparse.Namespace) -> dict[str, Any]:
 def race(options: argparse.Namespace) -> dict[str, Any]:
     """Return the running time of a frame, at the rates of Table 1 among others."""
     result = json.loads((options.root / FIGURES / "paper_table.json").read_text(encoding="utf-8"))
-    needed = next(iter(result["needed"].values()))[next(iter(table.YARDSTICKS))]
+    needed = next(iter(result["needed"].values()))
     return timing.races(motions.assets()["reach"], needed, options.rounds)
 
 
 def count_figures(_: argparse.Namespace) -> dict[str, Any]:
     """Return the figures in numbers."""
-    caught = catching.figures(motions.assets()["throw"])
-    return {"triangle": triangle.figures(), "strips": strips.figures(), "catching": caught}
+    thrown = motions.assets()["throw"]
+    return {"triangle": triangle.figures(), "strips": strips.figures(), "catching": catching.figures(thrown)}
 
 
-def render(options: argparse.Namespace) -> None:
-    """Render the figures to docs/paper/."""
+def draw(options: argparse.Namespace) -> None:
+    """Draw the figures, and write them to docs/paper/."""
     folder = options.root / "docs" / "paper"
     folder.mkdir(parents=True, exist_ok=True)
-    caught = partial(catching.build, motions.assets()["throw"])
-    pictures = {"triangle": triangle.build, "strips": strips.build, "catching": partial(caught, film=False)}
-    for name, build in pictures.items():
-        render_still(build(), folder / f"{name}.png")
+    for name, figure in {"triangle": triangle.draw, "strips": strips.draw}.items():
+        save(figure(), folder / f"{name}.png")
+    catching.write_picture(motions.assets()["throw"], folder / "catching.png")
     if not options.no_video:
-        render_film(caught(film=True), folder / "catching.mp4", lambda *_: None)
+        catching.write_film(motions.assets()["throw"], folder / "catching.mp4")
 
 
 PARTS: dict[str, Callable[[argparse.Namespace], dict[str, Any] | None]] = {
@@ -163,5 +145,5 @@ PARTS: dict[str, Callable[[argparse.Namespace], dict[str, Any] | None]] = {
     "bodies": measure_bodies,
     "timing": race,
     "figures": count_figures,
-    "pictures": render,
+    "pictures": draw,
 }

@@ -6,17 +6,14 @@ pose and the last. Metres.
 
 from __future__ import annotations
 
-import bpy
 import numpy as np
+from matplotlib.axes import Axes
 
+from research.drawing import FAINT, INK, RULE, Model, column
 from research.making.motions import TIP, about, chain, held_by
 from rigid_motion.motion import MODES, Poses, interpolate
 from rigid_motion.motion.quaternions import angle_between, normalise, rotate
 from rigid_motion_batch.palette import DARK, colour_of
-from rigid_motion_batch.scenes.materials import surface
-from rigid_motion_batch.scenes.subject import load_subject
-
-from .picture import FAINT, INK, RULE, Sheet
 
 ENGINES = {"lerp_slerp": "State of the art", "dq_sclerp": "Dual quaternions", "pga_lerp": "Multivectors"}
 """Mode id to what the paper calls it."""
@@ -29,6 +26,8 @@ SWING, AXIS = np.radians(110.0), normalise(np.array((0.0, 0.97, 0.24)))
 UPRIGHT = normalise(np.array((1.0, -1.0, 0.0, 0.0)))  # the bit points down, and the grip away from who looks
 SIDEWAYS = normalise(np.array((1.0, 0.0, 0.0, 1.0)))  # the grip to the left
 
+METRES = 1.56  # that the picture's height spans
+
 
 def shown() -> dict[str, Poses]:
     """Return the poses at `MOMENTS` by mode; the tip is at the origin in the first and the last."""
@@ -38,48 +37,34 @@ def shown() -> dict[str, Poses]:
 
 def figures() -> dict[str, float]:
     """Return how far the tip gets from where it rests, at most, by mode."""
-    return {mode: _off(poses).max() for mode, poses in shown().items()}
+    return {mode: np.linalg.norm(tips(poses), axis=1).max() for mode, poses in shown().items()}
 
 
-def _off(poses: Poses) -> np.ndarray:
-    """Return how far the tip has left the point that it rests on, shape (7,)."""
-    return np.linalg.norm(poses.positions + rotate(poses.quaternions, TIP), axis=-1)
+def tips(poses: Poses) -> np.ndarray:
+    """Return how far the tip has left the point that it rests on, shape (7, 3)."""
+    return poses.positions + rotate(poses.quaternions, TIP)
 
 
-def build() -> bpy.types.Scene:
-    """Return the figure as a scene."""
-    sheet = Sheet(1000, 1.56)
-    mesh, ghost = load_subject("drill"), surface("Pivoting about the tip", DARK.ghost, alpha=0.35)
-    columns = np.linspace(-0.378, 0.345, len(MOMENTS)) * sheet.aspect
-    sheet.words("Interpolation algorithms", sheet.left, 0.5 - 0.058, 9.0)
-    result = shown()
+def draw() -> Axes:
+    """Draw the figure."""
+    axes, drill, result = column(1000), Model.of("drill"), shown()
+    left, columns = axes.get_xlim()[0] + 0.016, np.linspace(-0.378, 0.345, len(MOMENTS))
+    axes.text(left, 0.442, "Interpolation algorithms", fontsize=8.5, color=INK)
     for row, (mode, title) in enumerate(ENGINES.items()):
-        foot, poses = 0.5 - 0.300 - row * 0.286, result[mode]
-        paint = surface(f"Mode {mode}", colour_of(mode))
-        sheet.card(0.0, foot + 0.222, 2.0 * -sheet.left, 0.0016, RULE)
-        sheet.words(f"{title}: {MODES[mode].label}", sheet.left, foot + 0.193, 7.0)
+        foot, poses = 0.2 - row * 0.286, result[mode]
+        axes.axhline(foot + 0.222, 0.016, 0.984, color=RULE, linewidth=0.5)
+        axes.text(left, foot + 0.190, f"{title}: {MODES[mode].label}", fontsize=6.5, color=INK)
         turned = np.degrees(angle_between(poses.quaternions[:1], poses.quaternions))
-        for column, (x, off, angle) in enumerate(zip(columns, _off(poses), turned, strict=True)):
-            place = sheet.place(x, foot + 0.028)
-            sheet.solid(f"{mode} {column}", mesh, _moved(poses[column], place), paint, whole=False)
+        for moment, (x, tip, angle) in enumerate(zip(columns, tips(poses), turned, strict=True)):
+            place, off = (x, foot + 0.028), np.linalg.norm(tip)
             if off > 1e-4:
-                rest = _moved(result["dq_sclerp"][column], place)
-                sheet.solid(f"{mode} {column} truth", mesh, rest, ghost, whole=True)
-            _mark(sheet, place)
-            sheet.words(f"{1e3 * off:.0f} mm", x, foot - 0.025, 6.0, INK, "CENTER")
-            sheet.words(f"{angle:.1f}°", x, foot - 0.051, 6.0, FAINT, "CENTER")
+                drill.draw(axes, result["dq_sclerp"][moment], place, METRES, DARK.ghost, whole=True)
+            drill.draw(axes, poses[moment], place, METRES, colour_of(mode), whole=False)
+            axes.plot(*place, "+", color="#C1121F", markersize=4, markeredgewidth=0.7)
+            axes.text(x, foot - 0.027, f"{1e3 * off:.0f} mm", fontsize=6, color=INK, ha="center")
+            axes.text(x, foot - 0.053, f"{angle:.1f}°", fontsize=6, color=FAINT, ha="center")
     for x, moment in zip(columns, MOMENTS, strict=True):
-        sheet.words(f"{moment:.0%}", x, -0.5 + 0.052, 6.0, FAINT, "CENTER")
-    legend = "of the way. Cross: where the tip rests; mm: how far off it is; pale: a turn about it"
-    sheet.words(legend, sheet.left, -0.5 + 0.018, 6.0, FAINT)
-    return sheet.scene
-
-
-def _moved(pose: Poses, place: np.ndarray) -> Poses:
-    return Poses(pose.positions + place, pose.quaternions)
-
-
-def _mark(sheet: Sheet, place: np.ndarray) -> None:
-    """Draw a cross at a place, in front of what stands there."""
-    bars = 0.010 * np.array((((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)), ((0.0, 0.0, -1.0), (0.0, 0.0, 1.0))))
-    sheet.lines("Rest", bars + place + (0.0, -0.3, 0.1), 0.0016, "#C1121F")
+        axes.text(x, -0.453, f"{moment:.0%}", fontsize=6, color=FAINT, ha="center")
+    legend = "of the way. Cross: the tip's place; mm: how far it is off; pale: turned about it"
+    axes.text(left, -0.486, legend, fontsize=6, color=FAINT)
+    return axes

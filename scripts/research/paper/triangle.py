@@ -6,14 +6,14 @@ way leaves the other is counted. Metres; the triangle is about as large as one.
 
 from __future__ import annotations
 
-import bpy
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import to_rgb
 
+from research.drawing import FAINT, INK, column, seen, write_legend
 from rigid_motion.motion import MODES, Poses, interpolate, measure
 from rigid_motion.motion.quaternions import angle_between, normalise, rotate
-from rigid_motion_batch.scenes.materials import surface
-
-from .picture import FAINT, INK, Sheet
 
 IN_BETWEENS = 20
 
@@ -58,27 +58,24 @@ def figures() -> dict[str, float]:
     }
 
 
-def build() -> bpy.types.Scene:
-    """Return the figure as a scene."""
-    sheet = Sheet(620, 3.1)
+def draw() -> Axes:
+    """Draw the figure."""
+    axes = column(620)
+    left = axes.get_xlim()[0] + 0.026
+
+    def corners(poses: Poses) -> np.ndarray:
+        points = poses.positions[:, None] + rotate(poses.quaternions[:, None], TRIANGLE[None])
+        return seen(points, (0.0, 0.02), 3.1)
+
     fine = in_betweens(np.linspace(0.0, 1.0, 200))
+    axes.add_collection(PolyCollection(corners(EXTREMES), facecolors="#B9C0C8", edgecolors=INK, linewidths=1.2))
     for name, poses in in_betweens().items():
-        corners, colour = _corners(poses), COLOURS[name]
-        sheet.faces(f"{name} faces", corners, surface(name, colour, alpha=0.14))
-        sheet.lines(f"{name} edges", corners, 0.013, colour, closed=True)
-        sheet.lines(f"{name} paths", _corners(fine[name]).transpose(1, 0, 2), 0.006, colour)
-    ends = _corners(EXTREMES)
-    sheet.faces("Extremes", ends, surface("Extremes", "#7C8794", alpha=0.75))
-    sheet.lines("Extreme edges", ends, 0.018, INK, closed=True)
-    low = -0.5 + 0.05
-    sheet.words("LERP and SLERP of multivectors", sheet.left, 0.5 - 0.095, 9.0)
+        faces = {"facecolors": (*to_rgb(COLOURS[name]), 0.06), "edgecolors": COLOURS[name], "linewidths": 0.5}
+        axes.add_collection(PolyCollection(corners(poses), **faces))
+        axes.add_collection(LineCollection(corners(fine[name]).swapaxes(0, 1), colors=COLOURS[name], linewidths=0.35))
+    axes.text(left, 0.405, "LERP and SLERP of multivectors", fontsize=8.5, color=INK)
     entries = [(COLOURS[name], f"{name.upper()}: {MODES[mode].label}") for name, mode in ENGINES.items()]
-    sheet.key(entries, sheet.left, low + 0.07)
-    turned = f"{IN_BETWEENS} in-betweens at even steps, {np.degrees(TURN):.0f}° from the first to the last"
-    sheet.words(turned, sheet.left, low, 7.0, FAINT)
-    return sheet.scene
-
-
-def _corners(poses: Poses) -> np.ndarray:
-    """Return where the triangle's corners are, shape (n, 3, 3)."""
-    return poses.positions[:, None] + rotate(poses.quaternions[:, None], TRIANGLE[None])
+    write_legend(axes, entries, left, -0.38, 6.5)
+    text = f"{IN_BETWEENS} in-betweens at even steps, {np.degrees(TURN):.0f}° from the first to the last"
+    axes.text(left, -0.45, text, fontsize=6.5, color=FAINT)
+    return axes

@@ -15,12 +15,7 @@ def test_rates_are_those_of_the_fastest_round():
     assert (program["faster_by"], peer["faster_by"]) == (None, pytest.approx(75.0))
 
 
-def test_the_study_writes_what_the_page_reads(tmp_path, monkeypatch):
-    monkeypatch.setattr(benchmark, "reduction", lambda count: {**REDUCED, "samples": count})
+def test_the_study_writes_what_the_page_reads(tmp_path):
     assert benchmark.main(["--count", "1000", "--rounds", "1", "--root", str(tmp_path)]) == 0
     result = written(tmp_path, "benchmark")
-    assert [row["samples"] for row in result["reductions"]] == [900, 1000, 100, 1000]
     assert result["cases"][0]["in_betweens"] == 1000
-
-
-REDUCED = benchmark.reduction(90)

@@ -2,6 +2,7 @@
 
 import shutil
 import subprocess
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -30,7 +31,7 @@ def ready(tmp_path, monkeypatch) -> Path:
     for name in (MANIFEST, CHANGELOG, MANUAL):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, tmp_path / name)
-    manifest = check_release.manifest_of(ROOT)
+    manifest = tomllib.loads((ROOT / MANIFEST).read_text(encoding="utf-8"))
     change(tmp_path, MANIFEST, manifest["website"], WEBSITE)
     change(tmp_path, MANUAL, manifest["website"], WEBSITE)
     change(tmp_path, MANIFEST, manifest["maintainer"], "Maintainer <maintainer@motion.dev>")
@@ -58,7 +59,7 @@ def test_stand_ins_for_addresses_are_no_release(ready):
     change(ready, MANIFEST, WEBSITE, "https://example.org/rigid-motion")
     change(ready, MANUAL, WEBSITE, "https://example.org/rigid-motion")
     change(ready, MANIFEST, "@motion.dev", "@example.org")
-    website, mail = check_release.addresses(ready)
+    website, mail, *_ = check_release.missing(ready)
     assert "the website is https://example.org/rigid-motion" in website
     assert "maintainer@example.org" in mail
 

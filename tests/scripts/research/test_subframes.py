@@ -4,14 +4,12 @@ import numpy as np
 import pytest
 
 from research import subframes
-from research.subframes import QUARTERS, Motion, between, deviation, keyed_object, measure
+from research.subframes import Motion, measure
 from rigid_motion import animation
-from rigid_motion.animation.compute.differences import in_betweens
-from rigid_motion.animation.queries.keyed import source_of
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.scripts.research.keeping import written
 
-BRISK = Motion("Brisk", turn=90.0, distance=1.0, frames=24)
+BRISK = Motion("Brisk", degrees=90.0, metres=1.0, frames=24)
 
 
 @pytest.fixture
@@ -22,28 +20,24 @@ def live_file(empty_file):
     animation.unregister()
 
 
-def live(motion, mode="dq_sclerp", rotation_mode="QUATERNION", fractions=QUARTERS):
-    obj = keyed_object(motion, rotation_mode)
-    animation.set_mode(obj, mode)
-    frames = between(motion, np.asarray(fractions))
-    return deviation(obj, frames, in_betweens(source_of(obj), frames).desired, radius=0.1)
-
-
 @pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XYZ"])
 @pytest.mark.parametrize("mode", KEYFRAME_MODES)
-def test_a_brisk_motion_is_within_millimetres_between_frames_and_exact_on_them(live_file, mode, rotation_mode):
+def test_a_brisk_motion_is_within_millimetres_between_frames_and_exact_on_them(
+    live_file, monkeypatch, mode, rotation_mode
+):
     """Within 2, and within 2.5 where a smooth mode takes up speed between its keys."""
-    result = live(BRISK, mode, rotation_mode)
-    assert 1e-4 < result.largest < (2.5e-3 if KEYFRAME_MODES[mode].is_smooth else 2e-3)
-    assert result.rotation < np.radians(0.2)
-    assert live(BRISK, mode, rotation_mode, fractions=[0.0]).largest < 1e-5
+    result = measure(BRISK, mode, rotation_mode, 0.1)
+    assert 0.1 < result["live_mm"] < (2.5 if KEYFRAME_MODES[mode].is_smooth else 2.0)
+    assert result["live_degrees"] < 0.2
+    monkeypatch.setattr(subframes, "QUARTERS", np.zeros(1))
+    assert measure(BRISK, mode, rotation_mode, 0.1)["live_mm"] < 1e-2
 
 
 @pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XYZ"])
 def test_baking_every_quarter_of_a_frame_leaves_a_tenth_of_the_error(live_file, rotation_mode):
-    result, _, finely, whole = measure(BRISK, "dq_sclerp", rotation_mode, 0.1)
-    assert finely.largest < 0.1 * result.largest
-    assert whole.largest > 0.5 * result.largest, "baking whole frames does not help"
+    result = measure(BRISK, "dq_sclerp", rotation_mode, 0.1)
+    assert result["quarter_mm"] < 0.1 * result["live_mm"]
+    assert result["whole_mm"] > 0.5 * result["live_mm"], "baking whole frames does not help"
 
 
 def test_the_study_writes_what_the_page_reads(empty_file, tmp_path, monkeypatch):

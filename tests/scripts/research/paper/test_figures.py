@@ -1,29 +1,14 @@
-"""The figures: what they show, in numbers, and that it fits on the sheet."""
+"""The figures: what they show, in numbers, and that it fits into their column."""
 
 import bpy
 import numpy as np
 import pytest
-from mathutils import Vector
 
-from research.paper import picture, strips, triangle
-from research.paper.catching import build
-from rigid_motion_batch.scenes.film import render_still
+from research.drawing import DOTS_PER_INCH, WIDTH, Model, column, save
+from research.paper import catching, strips, triangle
+from rigid_motion.motion import Poses
+from rigid_motion_batch.scenes.layout import AWAY
 from tests.scripts.research.paper.clips import thrown
-
-
-def words_on(scene: bpy.types.Scene) -> dict[str, np.ndarray]:
-    """Text to its left, right, foot and top, in pixels from the lower left corner."""
-    bpy.context.view_layer.update()
-    width, height = scene.render.resolution_x, scene.render.resolution_y
-    frame = bpy.data.objects["Frame"].matrix_world.inverted()
-    result = {}
-    for obj in scene.objects:
-        if obj.type == "FONT":
-            corners = np.array([frame @ obj.matrix_world @ Vector(corner) for corner in obj.bound_box])
-            left, foot = corners[:, :2].min(axis=0) * height + (width / 2.0, height / 2.0)
-            right, top = corners[:, :2].max(axis=0) * height + (width / 2.0, height / 2.0)
-            result[obj.data.body] = np.array((left, right, foot, top))
-    return result
 
 
 def test_the_tip_rests_under_screws_and_leaves_its_place_under_the_state_of_the_art():
@@ -34,33 +19,40 @@ def test_the_tip_rests_under_screws_and_leaves_its_place_under_the_state_of_the_
 
 
 @pytest.mark.parametrize("figure", ["triangle", "strips", "catching"])
-def test_all_words_stand_on_the_sheet_and_are_large_enough_to_read(figure: str):
-    scene = {
-        "triangle": triangle.build,
-        "strips": strips.build,
-        "catching": lambda: build(thrown(), film=False),
-    }[figure]()
-    assert scene.render.resolution_x == picture.WIDTH
-    words = words_on(scene)
+def test_all_words_are_inside_of_the_picture_and_large_enough_to_read(figure: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(catching, "RATES", (5, 20))
+    drawn = {"triangle": triangle.draw, "strips": strips.draw, "catching": lambda: catching.pictures(thrown())[1](90)}
+    axes = drawn[figure]()
+    assert (axes.figure.bbox.width, axes.figure.dpi) == (WIDTH, DOTS_PER_INCH)
+    axes.figure.draw_without_rendering()
+    legend = axes.get_legend()
+    words = [*axes.texts, *(legend.get_texts() if legend else ())]
     assert words
-    for text, (left, right, foot, top) in words.items():
-        assert left >= 0.0, text
-        assert right <= scene.render.resolution_x, text
-        assert foot >= 0.0, text
-        assert top <= scene.render.resolution_y, text
-    sizes = [obj.data.size * scene.render.resolution_y for obj in scene.objects if obj.type == "FONT"]
-    assert min(sizes) >= 6.0 * picture.DOTS_PER_INCH / 72.0 - 1e-3
+    for text in words:
+        box = text.get_window_extent()
+        assert 0.0 <= box.x0 < box.x1 <= axes.bbox.width, text
+        assert 0.0 <= box.y0 < box.y1 <= axes.bbox.height, text
+        assert text.get_fontsize() >= 6.0
 
 
 def test_a_picture_is_as_wide_as_a_column_and_has_both_colours(tmp_path):
     path = tmp_path / "triangle.png"
-    scene = triangle.build()
-    scene.display.render_aa = "OFF"
-    render_still(scene, path)
+    save(triangle.draw(), path)
     image = bpy.data.images.load(str(path))
-    assert tuple(image.size) == (picture.WIDTH, scene.render.resolution_y)
+    assert tuple(image.size) == (WIDTH, 620)
     pixels = np.array(image.pixels[:]).reshape(-1, 4)[:, :3]
     for colour in triangle.COLOURS.values():
         expected = np.array([int(colour[start : start + 2], 16) / 255.0 for start in (1, 3, 5)])
         assert np.count_nonzero(np.abs(pixels - expected).max(axis=1) < 0.06) > 500
-    assert np.all(pixels[:: picture.WIDTH] > 0.97)
+    assert np.all(pixels[::WIDTH] > 0.97)
+
+
+def test_a_model_covers_what_is_behind_it_without_holes():
+    """A triangle hides one behind it that is as large, wherever it is seen."""
+    corners = np.array([[(-0.3, 0.0, -0.3), (0.4, 0.0, -0.2), (0.1, 0.0, 0.4)]])
+    model = Model(np.concatenate((corners + 0.1 * AWAY, corners)), np.eye(3)[:2], np.zeros(2, dtype=bool))
+    axes = column(200)
+    model.draw(axes, Poses(np.zeros(3), np.array((1.0, 0.0, 0.0, 0.0))), (0.0, 0.0), 1.0, "#000000", whole=False)
+    image = np.array(axes.images[0].get_array())
+    seen = image[image[..., 3] > 0.0]
+    assert np.count_nonzero(seen[:, 1]) > 0.95 * len(seen)

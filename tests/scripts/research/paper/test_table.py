@@ -5,66 +5,31 @@ import pytest
 
 from research.paper import table
 from research.paper.table import UPDATES
-from rigid_motion_batch.recordings.clips import Clip
 from tests.scripts.clips.recordings import swinging_clip
 from tests.scripts.research.paper.clips import circling, spinning_straight
 
-FIRST = next(iter(table.YARDSTICKS))
 
-
-@pytest.fixture(autouse=True)
-def few(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(table, "STEP", 1.1)
-    monkeypatch.setattr(table, "TOLERANCES", (0.5, 2.0, 3))
-
-
-def needed(clip: Clip) -> dict[str, dict[str, dict[int, float]]]:
-    return table.needed(clip, table.curves_of(clip))
-
-
-def test_the_lowest_rate_is_the_first_that_is_good_enough_also_where_a_higher_one_is_not():
-    rates, errors = np.array((5.0, 10.0, 20.0, 30.0)), np.array((4.0, 1.0, 3.0, 0.5))
-    assert table.lowest(rates, errors, 1.0) == 10.0
-    assert table.lowest(rates, errors, 2.0) == pytest.approx(5.0 * 2.0**0.5)
-    assert table.lowest(rates, errors, 0.4) == np.inf
-    assert table.lowest(rates[::-1], errors[::-1], 9.0) == 5.0
-
-
-def test_on_a_pivot_a_screw_is_as_good_at_the_lowest_rate_that_is_tried():
-    for own in needed(circling("pivot", turns=1.0)).values():
-        for rate in UPDATES:
-            assert rate * own["dq_sclerp"][rate] == pytest.approx(table.LOWEST, rel=0.02)
+def test_on_a_pivot_a_screw_needs_no_more_updates_than_tell_which_way_it_turns():
+    # 1.6 turns: with four segments each is less than half a turn.
+    clip = circling("pivot", turns=1.0)
+    for rate, share in zip(UPDATES, table.needed(clip)["dq_sclerp"], strict=True):
+        assert share * (rate * clip.times[-1] + 1.0) == pytest.approx(5.0)
 
 
 def test_on_a_circle_without_turning_the_screw_is_the_straight_line():
-    clip = circling(turns=0.0)
-    for own in needed(clip).values():
-        assert own["dq_sclerp"] == pytest.approx(dict.fromkeys(UPDATES, 1.0), rel=0.01)
-    # The mean square of what an arc is off its chord, the 30 cm circle 0.4 times a second round.
-    for rate, row in table.even_points(clip).items():
-        if rate <= 15:
-            sagitta = 0.3 * (1.0 - np.cos(np.pi * 0.4 / rate))
-            assert row[1] == pytest.approx(np.sqrt(8.0 / 15.0) * sagitta, rel=0.02)
+    assert table.needed(circling(turns=0.0))["dq_sclerp"] == pytest.approx([1.0] * 4, rel=0.01)
 
 
 def test_a_spline_of_a_circle_needs_far_fewer_updates_than_chords():
-    own = needed(circling(turns=0.5))[FIRST]
+    own = table.needed(circling(turns=0.5))
+    assert set(own) == set(table.WAYS)
     for name in ("motor_spline", f"motor_spline{table.CHOSEN}"):
-        assert set(own[name]) == set(UPDATES)
-        assert max(own[name].values()) < 0.6
-
-
-def test_senders_begin_one_after_the_other_within_an_interval():
-    clip = circling(rate=240.0)
-    sent = table.senders(clip, 10.0)
-    begins = [clip.times[keys[0]] for keys in sent]
-    assert len(sent) == table.PHASES
-    np.testing.assert_allclose(begins, np.arange(table.PHASES) / (10.0 * table.PHASES))
-    assert all(np.all(np.diff(keys) == 24) for keys in sent)
+        assert max(own[name]) < 0.6
 
 
 def test_means_are_geometric_and_over_the_clips_that_got_there():
-    mean = table.mean_over([{30: 0.25}, {30: 1.0, 12: np.inf}, {30: np.inf}, {}])
+    nan = np.nan
+    mean = table.means([[0.25, nan, nan, nan], [1.0, nan, nan, np.inf], [np.inf, nan, nan, nan], [nan] * 4])
     assert mean["updates"][0] == pytest.approx(15.0)
     assert mean["saved"][0] == pytest.approx(0.5)
     assert (mean["reached"].tolist(), mean["asked"].tolist()) == ([2, 0, 0, 0], [3, 0, 0, 1])

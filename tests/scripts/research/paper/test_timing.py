@@ -5,7 +5,7 @@ import pytest
 
 from research.paper import timing
 from research.paper.table import PAPER, UPDATES
-from research.studies import seconds_in_turns
+from research.studies import interleaved_seconds
 from rigid_motion.motion import MODES
 from tests.scripts.research.paper.clips import circling
 
@@ -16,19 +16,15 @@ EXACT = [mode for mode in MODES if not MODES[mode].is_smooth]
 @pytest.mark.parametrize("mode", EXACT)
 def test_all_readings_generate_the_same_frames(mode: str):
     case = timing.case_of(CLIP, 10.0)
-    (fast, frames), (arrays, others), (single, _) = (
-        engine(case, mode) for engine in (timing.fast, timing.in_the_algebra, timing.one_by_one)
-    )
-    assert frames == others == timing.USERS * 90
-    one_user = fast().positions[0]
-    np.testing.assert_allclose(arrays().positions[:90], one_user, atol=1e-12)
-    np.testing.assert_allclose([pose.positions[0] for pose in single()], one_user[: timing.SINGLES], atol=1e-12)
+    fast, arrays = (engine(mode).positions for engine in (case.filled_in, case.in_the_algebra))
+    assert case.in_betweens == timing.USERS * 90
+    np.testing.assert_allclose(arrays, fast.reshape(-1, 3), atol=1e-12)
 
 
-def test_everyone_runs_as_often_in_turns():
+def test_interleaved_runs_are_as_many_of_each():
     ran: list[str] = []
     runs = {name: lambda name=name: ran.append(name) for name in "abc"}
-    seconds = seconds_in_turns(runs, 2, warm=True)
+    seconds = interleaved_seconds(runs, 2, warm=True)
     assert "".join(ran) == "aabbcc" * 2
     assert {name: len(spent) for name, spent in seconds.items()} == dict.fromkeys("abc", 2)
 
@@ -36,8 +32,8 @@ def test_everyone_runs_as_often_in_turns():
 def test_the_interval_holds_the_ratio_and_narrows_with_more_rounds():
     random = np.random.default_rng(3)
 
-    def interval(rounds: int) -> tuple[float, float, float]:
-        return timing.compared(0.9 * random.lognormal(0.0, 0.05, rounds), np.ones(rounds))
+    def interval(rounds: int) -> tuple[float, ...]:
+        return tuple(timing.compared(0.9 * random.lognormal(0.0, 0.05, rounds)).values())
 
     few, many = interval(10), interval(400)
     assert few[1] <= few[0] <= few[2]
@@ -47,7 +43,6 @@ def test_the_interval_holds_the_ratio_and_narrows_with_more_rounds():
 
 def test_the_races_have_every_mode_at_the_rates_that_were_asked_for(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(timing, "USERS", 2)
-    monkeypatch.setattr(timing, "SINGLES", 4)
     needed = {"lerp_slerp": {"updates": [29.0, 19.0, 14.0, 11.0]}, "pga_lerp": {"updates": [25.0, 16.0, 13.0, 11.5]}}
     result = timing.races(CLIP, needed, 2)
 
@@ -60,5 +55,5 @@ def test_the_races_have_every_mode_at_the_rates_that_were_asked_for(monkeypatch:
         as_good = {"lerp_slerp": rate, "pga_lerp": needed["pga_lerp"]["updates"][place]}
         assert updates("as good", rate) == as_good
         assert result["equal"]["lerp_slerp"][rate]["relative"] == 1.0
-    assert set(result["algebra"]) == set(result["single"]) == set(EXACT)
+    assert set(result["algebra"]) == set(EXACT)
     assert all(item["processor"] > 0.0 for item in result["algebra"].values())

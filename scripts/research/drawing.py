@@ -1,0 +1,116 @@
+"""Pictures by Matplotlib: of the paper, as wide as its column, and of the extension's page."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+
+from rigid_motion.motion import Poses
+from rigid_motion.motion.quaternions import rotate
+from rigid_motion_batch.scenes.layout import project
+from rigid_motion_batch.scenes.subject import load_subject, tinted_slots, vertices_of
+
+WIDTH, DOTS_PER_INCH = 1004, 300  # pixels of a column of 8.5 cm
+INK, FAINT, RULE = "#1B2026", "#58626E", "#C9CFD6"
+
+LIGHT, AMBIENT = np.array((-0.42, 0.60, -0.68)), 0.5
+"""Where it comes from: right, up, and away from who looks."""
+
+FINER, FILLED = 2, 0.6  # pixels of a model for a pixel of the picture, each way, and how far its points are apart
+
+
+def picture(width: int, height: int, ground: str = "none", dots_per_inch: int = 100) -> Axes:
+    """Return what a picture of so many pixels is drawn on, in units of its height, 0 in the middle."""
+    figure = Figure((width / dots_per_inch, height / dots_per_inch), dpi=dots_per_inch, facecolor=ground)
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set(xlim=(-0.5 * width / height, 0.5 * width / height), ylim=(-0.5, 0.5))
+    axes.set_axis_off()
+    return axes
+
+
+def column(height: int) -> Axes:
+    """Return a white picture as wide as a column."""
+    return picture(WIDTH, height, "#FFFFFF", DOTS_PER_INCH)
+
+
+def save(axes: Axes, path: Path) -> None:
+    """Write a picture, without a note of what made it."""
+    axes.figure.savefig(path, dpi="figure", facecolor=axes.figure.get_facecolor(), metadata={"Software": None})
+
+
+def seen(points: np.ndarray, place: ArrayLike, metres: float) -> np.ndarray:
+    """Return where points (..., 3) in metres are seen in a picture whose height spans so many: shape (..., 2)."""
+    return project(points)[..., :2] / metres + place
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """The surface of a model: triangles (t, 3, 3) in metres, their colours (t, 3), and which have that of a mode."""
+
+    triangles: np.ndarray
+    colours: np.ndarray
+    tinted: np.ndarray
+
+    @classmethod
+    def of(cls, subject: str) -> Model:
+        """Return the model of a subject of comparisons, as `load_subject` takes it."""
+        mesh = load_subject(subject)
+        mesh.calc_loop_triangles()
+        slots = np.array([triangle.material_index for triangle in mesh.loop_triangles])
+        colours = np.array([material.diffuse_color[:3] for material in mesh.materials]) ** (1.0 / 2.2)
+        corners = vertices_of(mesh)[[triangle.vertices[:] for triangle in mesh.loop_triangles]]
+        return cls(corners, colours[slots], np.isin(slots, tinted_slots(mesh)))
+
+    def draw(self, axes: Axes, pose: Poses, place: ArrayLike, metres: float, colour: str, *, whole: bool) -> None:
+        """Draw it at a pose, shape (): its tinted parts, or the whole of it, of a colour."""
+        corners = project(rotate(pose.quaternions, self.triangles) + pose.positions) / metres
+        # Right, up, away are left-handed.
+        normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 1] - corners[:, 0])
+        facing = normals[:, 2] < 0.0
+        corners, normals = corners[facing], normals[facing] / np.linalg.norm(normals[facing], axis=1, keepdims=True)
+        bright = AMBIENT + (1.0 - AMBIENT) * np.clip(normals @ LIGHT, 0.0, 1.0)
+        colours = np.where((self.tinted | whole)[:, None], to_rgb(colour), self.colours)[facing] * bright[:, None]
+        pixel = 1.0 / (FINER * axes.bbox.height)
+        sizes = np.ptp(corners[..., :2], axis=1).max(axis=1)
+        halvings = np.ceil(np.log2(sizes / (FILLED * pixel))).clip(0.0).astype(int)
+        parts = [(centroids(times) @ corners[halvings == times], halvings == times) for times in set(halvings.tolist())]
+        points = np.concatenate([pieces.reshape(-1, 3) for pieces, _ in parts])
+        colours = np.concatenate([np.repeat(colours[cut], pieces.shape[1], axis=0) for pieces, cut in parts])
+        # The nearest part of a triangle in a pixel is seen.
+        order = np.argsort(-points[:, 2])
+        cells = np.rint(points[order, :2] / pixel).astype(int)
+        low, high = cells.min(axis=0), cells.max(axis=0) + 1
+        image = np.zeros((*(high - low)[::-1], 4))
+        image[tuple((cells - low).T[::-1])] = np.pad(colours[order], ((0, 0), (0, 1)), constant_values=1.0)
+        left, foot, right, top = pixel * np.concatenate((low, high)) + np.tile(place, 2)
+        axes.imshow(image, extent=(left, right, foot, top), origin="lower", aspect="auto")
+
+
+@cache
+def centroids(halvings: int) -> np.ndarray:
+    """Return the middles of the parts of a triangle whose sides are halved so often, as shares of its corners."""
+    parts = np.eye(3)[None]
+    for _ in range(halvings):
+        middles = 0.5 * (parts + np.roll(parts, -1, axis=1))
+        parts = np.concatenate(
+            [middles, *(np.stack((parts[:, i], middles[:, i], middles[:, i - 1]), 1) for i in range(3))]
+        )
+    return parts.mean(axis=1)
+
+
+def write_legend(axes: Axes, entries: list[tuple[str, str]], x: float, y: float, points: float) -> None:
+    """Write patches of colour in one line, each with its word."""
+    handles = [axes.fill([], [], color=colour, label=label)[0] for colour, label in entries]
+    place = {"loc": "lower left", "bbox_to_anchor": (x, y), "bbox_transform": axes.transData, "borderaxespad": 0.0}
+    axes.legend(
+        handles=handles, ncols=len(entries), fontsize=points, frameon=False, handlelength=1.0, borderpad=0.0, **place
+    )
