@@ -13,8 +13,7 @@ from collections import deque
 import numpy as np
 
 from ..motion import Poses
-from ..motion.quaternions import normalise
-from .paths import SMALLEST, turned, turns_between
+from ..motion.quaternions import SMALLEST, normalise, turned, turns_between
 
 LOOK_BACK = 3.0
 """Seconds of which the longest transit counts."""

@@ -18,13 +18,13 @@ from rigid_motion.motion.poses import joined
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion.streams import Receiver, Sender
 from rigid_motion.streams.paths import Path
-from rigid_motion.streams.wire import DESCRIPTION, kind_of
+from rigid_motion.streams.wire import Description, read
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.analysis.needed import part_of
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.streaming.measuring import HEADERS, even_rate
+from rigid_motion_batch.streaming.measuring import HEADERS
 from rigid_motion_batch.streaming.packed import CUBE, PLACE_BITS, STAMP, smallest_three
-from rigid_motion_batch.streaming.sending import body_of, samples_of
+from rigid_motion_batch.streaming.sending import body_of, even_rate, samples_of
 
 from .table import RADIUS, UPDATES, even_points, lowest
 
@@ -59,7 +59,7 @@ def sent(clip: Clip, tolerance: float, delay: float) -> tuple[float, float, floa
         draw(now)
         for datagram in datagrams:
             receiver.take(datagram, now)
-            if kind_of(datagram) != DESCRIPTION:
+            if not isinstance(read(datagram), Description):
                 sizes.append(len(datagram) + HEADERS)
             for _, answer in receiver.answers():
                 post(sender.hear(answer, now), now)

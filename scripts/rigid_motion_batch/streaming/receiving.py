@@ -13,7 +13,7 @@ from rigid_motion.live.sockets import Address, Outlet
 from rigid_motion.motion import Poses
 from rigid_motion.motion.poses import joined
 from rigid_motion.streams import Body, Receiver, Shown
-from rigid_motion.streams.receiver import MOST_STREAMS, SILENT, Stream
+from rigid_motion.streams.receiver import MOST_STREAMS, SILENT
 
 from .rooms import ANSWERS, MOTION, SKELETON, Came, Room
 from .written import Motion
@@ -28,10 +28,10 @@ LINGER = 0.3
 class Tracks(dict[tuple[str, Body], dict[float, Poses]]):
     """What was shown of all bodies of all users, or their keys: poses (joints,) by rising moments of the sender."""
 
-    def add(self, user: str, bodies: Iterable[Body], moment: float, poses: Mapping[str, Poses]) -> None:
+    def add(self, user: object, bodies: Iterable[Body], moment: float, poses: Mapping[str, Poses]) -> None:
         """Add the poses (joints,) of a user's bodies at a moment."""
         for body in bodies:
-            known = self.setdefault((user, body), {})
+            known = self.setdefault((str(user), body), {})
             if moment > next(reversed(known), -math.inf):
                 known[moment] = poses[body.name]
 
@@ -71,7 +71,7 @@ class Receiving:
         self.shown, self.keys = Tracks(), Tracks()
         self.datagrams, self.bytes = Counter[str](), Counter[str]()
         """Counts for each user."""
-        self.on_frame: list[Callable[[dict[Stream, Shown]], None]] = []
+        self.on_frame: list[Callable[[Iterable[Shown]], None]] = []
         """Called with what each frame shows."""
         self._outlets: dict[str, Outlet] = {}
         self._heard: dict[str, float] = {}
@@ -121,15 +121,15 @@ class Receiving:
     def _show(self, now: float) -> None:
         shown = self.receiver.show(now)
         for act in self.on_frame:
-            act(shown)
+            act(shown.values())
         if self._keeps:
             for stream, what in shown.items():
-                self.shown.add(str(stream.source), self.receiver.bodies(stream), what.moment, what.poses)
+                self.shown.add(stream.source, what.bodies, what.moment, what.poses)
             came = self.receiver.keys()
             for keys in came:
                 for row, moment in enumerate(keys.moments.tolist()):
                     poses = {name: poses[row] for name, poses in keys.poses.items()}
-                    self.keys.add(str(keys.stream.source), self.receiver.bodies(keys.stream), moment, poses)
+                    self.keys.add(keys.stream.source, keys.bodies, moment, poses)
         for user in [user for user, heard in self._heard.items() if now - heard > SILENT]:
             self._leave(user)
         if self.datagrams and not self._heard and self._silent == math.inf:
