@@ -11,9 +11,9 @@ from pythonosc.osc_message_builder import OscMessageBuilder
 
 from rigid_motion.live.retargeting import Retargeting, matched
 from rigid_motion.motion import Poses, Skeleton, shell_error
+from rigid_motion.motion.humanoid import HUMANOID, humanoid_bones
 from rigid_motion.motion.quaternions import multiply, rotate
 from rigid_motion.streams import Body, osc
-from rigid_motion.streams.humanoid import HUMANOID, humanoid_bones
 from rigid_motion.streams.vmc import (
     JOINTS,
     MOST_DEVICES,

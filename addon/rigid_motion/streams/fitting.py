@@ -19,20 +19,16 @@ from .paths import Path, carried
 from .residuals import FINEST, MOST_GROUPS, MOST_KNOTS
 from .wire import TICKS
 
-NEAR = 0.97
-"""Part of the tolerance that rounding may use."""
-
-MARGINS = (0.97, 0.85, 0.7)
-"""Parts of the tolerance that smaller numbers may use, one after another, while the outcome is off by more."""
+NEAR, MARGINS = 0.97, (0.97, 0.85, 0.7)
+"""Parts of the tolerance that rounding may use; and that smaller numbers may, one after another, while the outcome is
+off by more."""
 
 AT_END, TAPER = 0.85, 0.4
 """Part of that at the end of a window, from where the motion has to go on well by itself; from this part of it on."""
 
-NOTHING = 1e-9
-"""Seconds: moments that are not further apart are the same."""
-
-STILL, BEYOND = 0.25, 0.2
-"""Part of the tolerance within which a body does not move; and so many seconds later it is still where it was."""
+STILL, BEYOND, NOTHING = 0.25, 0.2, 1e-9
+"""Part of the tolerance within which a body does not move; so many seconds later it is still where it was; and moments
+that are not further apart than so many are the same."""
 
 FAR_APART, MOST_PARTS = 0.013, 8
 """Seconds between samples beyond which it is looked at what is shown between them, and into how many parts at most."""

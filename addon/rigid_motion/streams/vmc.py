@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 
 from ..motion import Poses
+from ..motion.humanoid import HUMANOID, alignments, beside, humanoid_bones
 from ..motion.poses import joined
 from ..motion.quaternions import conjugate, multiply
 from .bodies import LONGEST_NAME, Body
-from .humanoid import HUMANOID, alignments, beside, humanoid_bones
 from .osc import Message, read, write_bundle, write_message
 from .paths import Path, transposed
 from .playing import SET, Playing
@@ -29,8 +29,8 @@ from .receiver import Stream, Streams
 PORT = 39539
 """That programs which show a performer listen on."""
 
-ROOT = "Root"
-"""The joint that the hips hang on."""
+ROOT, PERFORMER = "Root", "VMC"
+"""The joint that the hips hang on; and the name of a performer's body."""
 
 JOINTS = (ROOT, *HUMANOID)
 PARENTS = {ROOT: "", **{bone: above or ROOT for bone, above in HUMANOID.items()}}
@@ -41,20 +41,12 @@ Joint = tuple[bool, str]
 DEVICES = {f"/VMC/Ext/{kind}/Pos" for kind in ("Tra", "Con", "Hmd")}
 """Trackers, controllers and headsets: rigid bodies in the world, by their serial numbers."""
 
-PERFORMER = "VMC"
-"""The name of a performer's body."""
-
 MOST_SOURCES, MOST_DEVICES, MOST_SAMPLES = 16, 32, 512
 """Programs; devices of each, and samples that wait to be shown or to be recorded."""
 
-SILENT = 2.0
-"""Seconds after which a performer, who is sent on every frame, has gone."""
-
-FURTHEST = 1e5
-"""Metres; what is further away is damage."""
-
-AT_ONCE = 12
-"""Bones of a datagram: it stays below what networks carry in one piece."""
+SILENT, FURTHEST, AT_ONCE = 2.0, 1e5, 12
+"""Seconds after which a performer, who is sent on every frame, has gone; metres beyond which there is only damage; and
+bones of a datagram, which stays below what networks carry in one piece."""
 
 _TO_BLENDER = np.array(((-1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)))
 """Unity's axes as Blender's: a mirror."""

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from rigid_motion.motion import Poses, decimate, interpolate, rms, shell_error
-from rigid_motion.streams.humanoid import humanoid_bones
+from rigid_motion.motion.humanoid import humanoid_bones
 from rigid_motion_batch.analysis.bodies import BodyReconstruction, moving, reconstruct_body
 from rigid_motion_batch.analysis.body_metrics import measure_modes
 from rigid_motion_batch.analysis.body_needed import OfBody

@@ -11,9 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..motion import Poses
-from ..motion.poses import inverse, placed
-from ..motion.quaternions import normalise
+from .poses import Poses, inverse, placed
+from .quaternions import normalise
 
 SIDES = {"": "", "L": "Left", "R": "Right"}
 FINGERS = ("Thumb", "Index", "Middle", "Ring", "Little")
