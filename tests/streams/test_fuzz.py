@@ -5,15 +5,20 @@ RIGID_MOTION_FUZZ=10000000 tries as many datagrams as one has time for.
 
 from __future__ import annotations
 
+import json
 import os
 import time
 import tracemalloc
+import zlib
 
 import numpy as np
 import pytest
 
-from rigid_motion.streams import Receiver, Sender
+from rigid_motion.streams import Body, Receiver, Sender
+from rigid_motion.streams.coding import Coder
+from rigid_motion.streams.messages import Codec
 from rigid_motion.streams.receiver import MOST_ALL_JOINTS, MOST_STREAMS
+from rigid_motion.streams.wire import read, read_description
 
 from .links import body, dance, run
 
@@ -114,6 +119,36 @@ def test_a_sender_far_in_the_past_or_future_is_shown() -> None:
         for datagram in [*sender.add(seconds, own.rest), *sender.add(seconds + 0.1, own.rest), *sender.finish()]:
             receiver.take(datagram, 0.0, seconds)
         assert receiver.show(0.2)
+
+
+WRONG = (None, True, 1.5, -1, 0, 10**400, -(10**30), "", "x", [], [[]], {}, {"a": 1}, float("nan"), float("inf"))
+"""What is put in the place of parts of a description."""
+
+
+def packed(text: str) -> bytes:
+    compressor = zlib.compressobj(wbits=-15)
+    return compressor.compress(text.encode()) + compressor.flush()
+
+
+def test_any_description_is_read_or_none() -> None:
+    rng = np.random.default_rng(7)
+    datagram = Sender([body(3), Body.rigid("tool")]).describe()[0]
+    genuine = json.loads(zlib.decompress(read(datagram).data, wbits=-15))
+
+    def changed(part: object) -> object:
+        if isinstance(part, list) and part and rng.random() < 0.85:
+            place = rng.integers(len(part))
+            return [*part[:place], changed(part[place]), *part[place + 1 :]]
+        return WRONG[rng.integers(len(WRONG))]
+
+    there = 0
+    for _ in range(2000):
+        if described := read_description(packed(json.dumps(changed(genuine)))):
+            there += 1
+            Codec(*described).code(Coder(rng.bytes(30)), lambda back: None)
+    assert 0 < there < 1000
+    for text in ("[" * 100_000, '{"a":' * 20_000, f"[{'9' * 5000},1,1,[]]", "[5000,360,60,[", "1", '"abcd"'):
+        assert read_description(packed(text)) is None
 
 
 @pytest.mark.slow

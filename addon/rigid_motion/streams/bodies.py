@@ -47,8 +47,7 @@ class Body:
     """Which joints change their places in their parents' space, shape (joints,). None for roots alone."""
 
     def __post_init__(self) -> None:
-        parents = np.asarray(self.parents, dtype=np.int64)
-        count = len(self.joints)
+        parents, count = np.asarray(self.parents, dtype=np.int64), len(self.joints)
         sliding = parents < 0 if self.sliding is None else np.asarray(self.sliding, dtype=bool)
         if not (count and parents.shape == sliding.shape == self.rest.shape == (count,)):
             raise ValueError(f"{self.name}: names, parents and rest poses of its {count} joints are not as many")

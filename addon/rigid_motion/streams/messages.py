@@ -8,7 +8,7 @@ parent's space; both are counted in steps.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -38,38 +38,30 @@ NOWHERE = 1e5
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """What both sides know of a message: its window, which the next one builds on."""
+    """What both sides know of a message, which others build on: the path from the start of its window to the end, how
+    large the residuals of each group were, and the ticks of the end.
+    """
 
     path: Path
-    """From the start of the window to its end."""
-
     memory: tuple[int, ...]
-    """Of each group, how large its residuals were."""
-
     end: int
-    """The ticks of the end of the window."""
 
 
 class Said(NamedTuple):
-    """What a message says, in whole numbers."""
+    """What a message says, in whole numbers.
+
+    The message that it builds on is `back` before it, 0 for nothing; its window ends at the tick `end`. Where it is
+    sent later than at the end, `late` is 1 and the ticks by which its window is shorter. Steps are halved `finer`
+    times. Of each knot besides the end, `cells` is how many cells of the grid it is before the end, in the order of
+    their numbers; `groups` are those, of each knot, the end first, and each group three.
+    """
 
     back: int
-    """The message that it builds on is so many before it; 0 where it builds on nothing."""
-
     end: int
-    """The ticks of the end of its window."""
-
     late: int = 0
-    """1, and the ticks by which its window is shorter, where it is sent later than at the end. Up to the delay."""
-
     finer: int = 0
-    """How many times its steps are halved."""
-
-    cells: list[int] = []  # noqa: RUF012 - never written to
-    """Of each knot besides the end, how many cells of the grid it is before the end, in the order of their numbers."""
-
-    groups: Groups = []  # noqa: RUF012
-    """Of each knot, the end first, and each group three numbers."""
+    cells: Sequence[int] = ()
+    groups: Groups | tuple[()] = ()
 
     def window(self, terms: Terms) -> tuple[float, float]:
         """Return the start and the end of the window, in seconds."""

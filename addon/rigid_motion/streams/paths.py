@@ -19,11 +19,6 @@ CARRY = 0.15
 """Seconds: a motion of velocity v goes on by v * CARRY * (1 - exp(-t / CARRY)) beyond the last knot."""
 
 
-def at_rest() -> np.ndarray:
-    """Return no velocity, of all joints."""
-    return np.zeros((1, 3))
-
-
 def carried(after: np.ndarray | float) -> np.ndarray:
     """By how many seconds of its velocity a motion goes on, so many seconds after its last knot."""
     return np.asarray(CARRY * -np.expm1(-np.maximum(after, 0.0) / CARRY))
@@ -36,19 +31,14 @@ def transposed(poses: Poses) -> Poses:
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """Knots of all joints, rising in time, and how the joints move at the last of them."""
+    """Knots of all joints: rising moments (knots,), poses (joints, knots), and how the joints move at the last of them,
+    by velocities of places and angular velocities (joints, 3), a second.
+    """
 
     moments: np.ndarray
-    """Shape (knots,)."""
-
     poses: Poses
-    """Shape (joints, knots)."""
-
-    velocities: np.ndarray = field(default_factory=at_rest)
-    """Of places at the last knot, a second, shape (joints, 3)."""
-
-    spins: np.ndarray = field(default_factory=at_rest)
-    """Angular velocities at the last knot, shape (joints, 3)."""
+    velocities: np.ndarray = field(default_factory=lambda: np.zeros((1, 3)))
+    spins: np.ndarray = field(default_factory=lambda: np.zeros((1, 3)))
 
     def at(self, moments: np.ndarray) -> Poses:
         """Return the poses at moments (n,), shape (joints, n). Before the first knot those of the first."""

@@ -50,30 +50,23 @@ class Stream(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What a stream shows."""
+    """What a stream shows: the moment in seconds by the sender's clock, and of each body by its name poses (joints,),
+    each joint in its parent's space.
+    """
 
     moment: float
-    """Seconds, by the sender's clock."""
-
     bodies: tuple[Body, ...]
-
     poses: dict[str, Poses]
-    """Of each body, shape (joints,), each joint in its parent's space."""
 
 
 @dataclass(frozen=True, eq=False)
 class Keys:
-    """What was sent, to be recorded."""
+    """What was sent, to be recorded: rising moments (k,) in seconds by the sender's clock, and poses (k, joints)."""
 
     stream: Stream
-
     bodies: tuple[Body, ...]
-
     moments: np.ndarray
-    """Seconds by the sender's clock, rising, shape (k,)."""
-
     poses: dict[str, Poses]
-    """Of each body, shape (k, joints)."""
 
 
 class Streams:

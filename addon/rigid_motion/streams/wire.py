@@ -39,16 +39,13 @@ RAW = -15
 
 
 class Terms(NamedTuple):
-    """What sender and receivers agree on."""
+    """What sender and receivers agree on: the tolerance in micrometres; ticks by which what is shown is behind what is
+    sent; and ticks between the moments at which knots may be, counted back from the end of a window.
+    """
 
     tolerance: int
-    """Micrometres."""
-
     delay: int
-    """Ticks by which what is shown is behind what is sent."""
-
     grid: int
-    """Ticks between the moments at which knots may be, counted back from the end of a window."""
 
     @property
     def cells(self) -> int:
@@ -72,13 +69,12 @@ class Motion(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What a receiver says of a stream."""
+    """What a receiver says of a stream: the newest sequence, and in `before` bit i where newest - 1 - i is there."""
 
     identity: bytes
     receiver: bytes
     newest: int
     before: int
-    """Bit i: sequence newest - 1 - i is there."""
     needs: int
 
     def has(self, sequence: int) -> bool:
@@ -141,7 +137,9 @@ def _body(radius: int, names: list[str], parents: object, sliding: object, rest:
     rows = np.array(rest, dtype=np.float64)
     places, turns = rows[:, :3] / LENGTH, rows[:, 3:] / UNIT
     lengths = np.linalg.norm(turns, axis=1)
-    if not ((np.abs(places) < 1e6).all() and (lengths > 0.5).all() and 0 < radius < MOST):
+    are_sound = (np.abs(places) < 1e6).all() and (lengths > 0.5).all() and (lengths < 1e6).all()
+    if not (are_sound and 0 < radius < MOST):
         raise ValueError("such a pose at rest is none")
     poses = Poses(places, turns / lengths[:, None])
-    return Body(names[0], tuple(names[1:]), np.array(parents), poses, radius / LENGTH, np.array(sliding))
+    above, slides = np.array(parents, dtype=np.int64), np.array(sliding, dtype=bool)
+    return Body(names[0], tuple(names[1:]), above, poses, radius / LENGTH, slides)

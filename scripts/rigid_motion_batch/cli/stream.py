@@ -132,7 +132,7 @@ def send_performer(options: argparse.Namespace, stopped: list[int]) -> None:
 def receive(options: argparse.Namespace, stopped: list[int]) -> None:
     """Show what comes. Raises what says why there is nothing."""
     truth = _read([options.truth], options)[0] if options.truth else None
-    keeps = bool(options.output or truth)
+    keeps = "keys" if options.mode else "shown" if options.output or truth else ""
     with (
         _room(options) as room,
         Progress() as progress,
@@ -150,12 +150,12 @@ def receive(options: argparse.Namespace, stopped: list[int]) -> None:
                 stage.total = max(stage.done, 1e-9)
     for user, datagrams in receiving.datagrams.items():
         _say(f"{user}: {datagrams} datagrams, {receiving.bytes[user]} bytes")
-    motions = receiving.shown.motions()
+    motions = receiving.tracks.motions()
     if not (motions if keeps else receiving.datagrams):
         came = "nothing that could be shown came" if receiving.datagrams else f"nobody sent anything in {options.room}"
         raise RoomError(f"{came}, so nothing is written; see --room and --at of the sender")
     if options.mode:
-        motions = [motion.even(options.mode, options.fps) for motion in receiving.keys.motions()]
+        motions = [motion.even(options.mode, options.fps) for motion in motions]
     for motion in motions:
         _say(f"{motion.name}: {len(motion.times)} poses{_error(motion, truth)}")
     if options.output:

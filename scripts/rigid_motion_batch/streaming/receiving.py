@@ -59,16 +59,15 @@ class Receiving:
         Seconds that are waited longer for each datagram.
     to : address, optional
         What gets all datagrams by UDP as well, from a port for each user, and whose answers go back to them.
-    keeps : bool
-        Whether what was shown, and the keys, are to be there in the end.
+    keeps : str, optional
+        What is to be there in the end: what was `shown`, the `keys`, or nothing.
     """
 
     def __init__(
-        self, room: Room, user: str, fps: float, margin: float, to: Address | None = None, keeps: bool = True
+        self, room: Room, user: str, fps: float, margin: float, to: Address | None = None, keeps: str = ""
     ) -> None:
         self._room, self._fps, self._margin, self._to, self._keeps = room, fps, margin, to, keeps
-        self.receiver = Receiver()
-        self.shown, self.keys = Tracks(), Tracks()
+        self.receiver, self.tracks = Receiver(), Tracks()
         self.datagrams, self.bytes = Counter[str](), Counter[str]()
         """Counts for each user."""
         self.on_frame: list[Callable[[Iterable[Shown]], None]] = []
@@ -122,14 +121,13 @@ class Receiving:
         shown = self.receiver.show(now)
         for act in self.on_frame:
             act(shown.values())
-        if self._keeps:
+        if self._keeps == "shown":
             for stream, what in shown.items():
-                self.shown.add(stream.source, what.bodies, what.moment, what.poses)
-            came = self.receiver.keys()
-            for keys in came:
-                for row, moment in enumerate(keys.moments.tolist()):
-                    poses = {name: poses[row] for name, poses in keys.poses.items()}
-                    self.keys.add(keys.stream.source, keys.bodies, moment, poses)
+                self.tracks.add(stream.source, what.bodies, what.moment, what.poses)
+        for keys in self.receiver.keys() if self._keeps == "keys" else ():
+            for row, moment in enumerate(keys.moments.tolist()):
+                poses = {name: poses[row] for name, poses in keys.poses.items()}
+                self.tracks.add(keys.stream.source, keys.bodies, moment, poses)
         for user in [user for user, heard in self._heard.items() if now - heard > SILENT]:
             self._leave(user)
         if self.datagrams and not self._heard and self._silent == math.inf:

@@ -19,17 +19,12 @@ from rigid_motion_batch.recordings.rest_bodies import RestBody
 
 
 class Motion(NamedTuple):
-    """What was shown of a body."""
+    """What was shown of a body: moments (n,), and poses (joints, n), each joint in its parent's space."""
 
     name: str
-
     body: Body
-
     times: np.ndarray
-    """Shape (n,)."""
-
     poses: Poses
-    """In metres and Blender's axes, each joint in its parent's space. Shape (joints, n)."""
 
     def even(self, mode: str, fps: float) -> Motion:
         """Return so many poses a second instead, with the in-betweens of a mode."""
