@@ -19,10 +19,10 @@ import numpy as np
 from research.live_streams import room
 from research.live_streams.engines import ENGINES, FPS, RATE, Way, by_codec, by_engine, seen, truth_of
 from research.studies import files_in, publish, report, study_parser
-from rigid_motion_batch.cli.stream_measure import packed
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.streaming.measuring import HEADERS, measure
+from rigid_motion_batch.streaming.packed import packed
 from rigid_motion_batch.streaming.sending import body_of, samples_of
 
 RADIUS, TOLERANCE = 0.03, 0.005

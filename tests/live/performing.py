@@ -11,8 +11,8 @@ import numpy as np
 
 from rigid_motion.live import receiving
 from rigid_motion.motion import Poses, Skeleton
+from rigid_motion.motion.quaternions import turned
 from rigid_motion.streams import Body
-from rigid_motion.streams.paths import turned
 from rigid_motion.streams.vmc import Performer, write
 
 JOINTS = ("Hips", "Spine", "Neck", "Head", "LeftUpperArm", "LeftLowerArm", "LeftHand", "LeftUpperLeg", "LeftLowerLeg")

@@ -53,7 +53,7 @@ def test_a_rig_is_a_performer(listener, prefix, turned_by):
             receiver.take(datagram, turn / 60)
         (shown,) = receiver.show(turn / 60).values()
         (keys,) = receiver.keys()
-        (body,) = receiver.bodies(keys.stream)
+        (body,) = keys.bodies
         assert body.joints == (ROOT, *(name for name in body.joints[1:] if name in JOINTS))
         result = dict(zip(body.joints, Skeleton(body.parents).in_root_space(shown.poses["VMC"]).positions, strict=True))
         for name, head in zip(JOINTS, heads, strict=True):

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from rigid_motion.motion import Poses, shell_error
+from rigid_motion.motion.quaternions import turned
 from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.bodies import Forest
-from rigid_motion.streams.paths import Path, turned
+from rigid_motion.streams.coding import Coder
+from rigid_motion.streams.paths import Path
+from rigid_motion.streams.residuals import BASES
+from rigid_motion.streams.wire import Motion, read
 
 AHEAD = 1000.0
 """By how many seconds the receiver's clock is ahead."""
@@ -37,6 +41,12 @@ def dance(own: Body, seconds: float = 6.0, rate: float = 60.0, speed: float = 1.
     positions = np.repeat(own.rest.positions[:, None], len(times), axis=1)
     positions[0] += 0.4 * np.sin(speed * times[:, None] * (1.0, 1.3, 0.4))
     return times, Poses(positions, np.array(turned(still, angles)))
+
+
+def backs_of(datagrams: Iterable[bytes]) -> list[int]:
+    """What the messages among datagrams build on: 0 nothing, 1 the one before, 2 an earlier one."""
+    messages = [it for it in map(read, datagrams) if isinstance(it, Motion)]
+    return [Coder(message.data).symbol(BASES) for message in messages]
 
 
 @dataclass

@@ -14,21 +14,22 @@ from pathlib import Path
 import numpy as np
 
 from rigid_motion.streams import Body, Receiver, Sender
-from rigid_motion.streams.coding import Encoder
+from rigid_motion.streams.coding import Coder
 from rigid_motion.streams.messages import Said, State
 from rigid_motion.streams.tables import TABLES
+from rigid_motion.streams.wire import VERSION
 
 from .links import body, dance
 
 VECTORS = Path(__file__).parent / "vectors.json"
-IDENTITY = bytes((1, 2, 3))
+IDENTITY, RECEIVER = bytes((1, 2, 3)), bytes((7, 8, 9))
 
 
 def coding() -> list[dict]:
     """Symbols, the numbers of their tables, or how many a flat one could have been; and their bytes."""
     rng, cases = np.random.default_rng(1), []
     for length in (0, 1, 5, 40):
-        encoder, steps = Encoder(), []
+        encoder, steps = Coder(), []
         for _ in range(length):
             if rng.random() < 0.3:
                 count = int(rng.integers(1, 1 << 12))
@@ -47,21 +48,20 @@ def stream() -> dict:
     own, tool = body(6), Body.rigid("tool", radius=0.1)
     times, poses = dance(own, 1.2, 30.0)
     sender, receiver, messages = Sender([own, tool], rate=30.0), Receiver(), []
-    sender.identity, receiver.own = IDENTITY, bytes((7, 8, 9))
+    sender.identity, receiver.own = IDENTITY, RECEIVER
     write = sender.codec.write
 
-    def noted(said: Said, kind: int, state: State, is_late: bool) -> tuple:
-        payload, memory = write(said, kind, state, is_late)
-        messages.append({"late": said.late, "finer": said.finer, "cells": said.cells, "groups": said.groups})
-        messages[-1] |= {"kind": kind, "memory": list(memory), "payload": payload.hex()}
-        return payload, memory
+    def noted(said: Said, base: State) -> tuple[bytes, State]:
+        data, state = write(said, base)
+        messages.append(said._asdict() | {"kind": said.kind(base), "memory": state.memory, "data": data.hex()})
+        return data, state
 
     sender.codec.write = noted
     datagrams, answers = [], []
     for row, time in enumerate(times.tolist()):
         sample = {own.name: poses[:, row], tool.name: poses[-1:, row]}
         # Samples that are needed do not come, and a datagram is late.
-        overdue = row > 12 and math.isfinite(sender.next) and not any(message["late"] for message in messages)
+        overdue = row > 12 and math.isfinite(sender.next) and not any(message["late"] > 1 for message in messages)
         time = sender.next if overdue else time
         for datagram in sender.poll(time) if overdue else sender.add(time, sample):
             receiver.take(datagram, time)
@@ -81,4 +81,4 @@ def stream() -> dict:
 
 
 if __name__ == "__main__":
-    VECTORS.write_text(json.dumps({"version": 2, "coding": coding(), "stream": stream()}), encoding="utf-8")
+    VECTORS.write_text(json.dumps({"version": VERSION, "coding": coding(), "stream": stream()}), encoding="utf-8")

@@ -7,8 +7,8 @@ import itertools
 import numpy as np
 import pytest
 
-from rigid_motion.streams.coding import TOTAL, Decoder, Encoder
-from rigid_motion.streams.residuals import COUNT, FINENESS, KNOT_COUNTS, WIDTHS, bucket, symbols_of
+from rigid_motion.streams.coding import TOTAL, Coder
+from rigid_motion.streams.residuals import BASES, COUNT, FINENESS, KNOT_COUNTS, LATES, ODD, WIDTHS, bucket, symbols_of
 from rigid_motion.streams.tables import TABLES
 
 
@@ -21,7 +21,7 @@ def table(rng: np.random.Generator, symbols: int) -> tuple[int, ...]:
 def test_what_is_written_is_read(seed: int) -> None:
     rng = np.random.default_rng(seed)
     tables = [table(rng, int(rng.integers(2, 20))) for _ in range(5)]
-    written, encoder = [], Encoder(tables)
+    written, encoder = [], Coder(tables=tables)
     for _ in range(int(rng.integers(0, 400))):
         if rng.random() < 0.2:
             count = int(rng.integers(1, 1 << 20))
@@ -32,7 +32,7 @@ def test_what_is_written_is_read(seed: int) -> None:
             # The rarest and the most frequent symbols are where carries come from.
             symbol = int(rng.choice([0, last, rng.integers(last + 1)]))
             written.append((None, number, encoder.symbol(number, symbol)))
-    decoder = Decoder(encoder.finish(), tables)
+    decoder = Coder(encoder.finish(), tables)
     read = [decoder.flat(count) if count else decoder.symbol(number) for count, number, _ in written]
     assert read == [symbol for *_, symbol in written]
 
@@ -40,7 +40,7 @@ def test_what_is_written_is_read(seed: int) -> None:
 def test_symbols_cost_what_their_frequencies_say() -> None:
     rng, own = np.random.default_rng(1), (0, 3500, 4000, TOTAL)
     symbols = rng.choice(3, 4000, p=np.diff(own) / TOTAL)
-    encoder = Encoder([own])
+    encoder = Coder(tables=[own])
     for symbol in symbols.tolist():
         encoder.symbol(0, symbol)
     ideal = -np.log2(np.diff(own) / TOTAL)[symbols].sum() / 8.0
@@ -48,13 +48,13 @@ def test_symbols_cost_what_their_frequencies_say() -> None:
 
 
 def test_nothing_said_is_no_bytes() -> None:
-    assert Encoder().finish() == b""
+    assert Coder().finish() == b""
 
 
 @pytest.mark.parametrize("seed", range(50))
 def test_any_bytes_are_some_symbols(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    decoder = Decoder(rng.bytes(int(rng.integers(0, 60))), [table(rng, 7)])
+    decoder = Coder(rng.bytes(int(rng.integers(0, 60))), [table(rng, 7)])
     assert all(0 <= decoder.symbol(0) < 7 and 0 <= decoder.flat(1000) < 1000 for _ in range(300))
 
 
@@ -64,7 +64,7 @@ def test_the_tables_are_whole() -> None:
         assert len(own) == symbols_of(number) + 1
         assert (own[0], own[-1]) == (0, TOTAL)
         assert all(low < high for low, high in itertools.pairwise(own))
-    assert [symbols_of(table) for table in (KNOT_COUNTS, WIDTHS, FINENESS)] == [16, 21, 4]
+    assert [symbols_of(table) for table in (KNOT_COUNTS, WIDTHS, FINENESS, BASES, ODD, LATES)] == [16, 21, 4, 3, 2, 3]
 
 
 def test_buckets() -> None:

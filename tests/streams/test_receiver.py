@@ -7,7 +7,6 @@ import pytest
 
 from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.receiver import MOST_JOINT_KNOTS
-from rigid_motion.streams.wire import LATE, MOTION, NEXT, kind_of
 from tests.thoroughness import tried
 
 from .links import body, dance, run
@@ -279,9 +278,3 @@ def test_keys_that_nobody_records_are_forgotten() -> None:
             receiver.take(datagram, time, "sender")
     (keys,) = receiver.keys()
     assert 500 < len(keys.moments) <= MOST_JOINT_KNOTS
-
-
-def test_motions_are_of_three_kinds() -> None:
-    own = body()
-    outcome = run(own, *dance(own, 1.0))
-    assert {kind_of(datagram) for _, datagram in outcome.datagrams[2:]} <= {MOTION, LATE, NEXT}

@@ -9,17 +9,11 @@ import numpy as np
 import pytest
 
 from rigid_motion.streams import Receiver
-from rigid_motion.streams.coding import Decoder, Encoder
-from rigid_motion.streams.messages import Codec, Said, State
-from rigid_motion.streams.wire import (
-    DESCRIPTION,
-    LATE,
-    kind_of,
-    read_answer,
-    read_description,
-    read_motion,
-    read_piece,
-)
+from rigid_motion.streams.coding import Coder
+from rigid_motion.streams.messages import Codec, Said
+from rigid_motion.streams.wire import Answer, Description, Motion, read, read_description, write
+
+from .make_vectors import IDENTITY, RECEIVER
 
 VECTORS = json.loads((Path(__file__).parent / "vectors.json").read_text(encoding="utf-8"))
 STREAM = VECTORS["stream"]
@@ -28,7 +22,7 @@ DATAGRAMS = [bytes.fromhex(row["bytes"]) for row in STREAM["datagrams"]]
 
 @pytest.mark.parametrize("case", VECTORS["coding"])
 def test_symbols(case: dict) -> None:
-    encoder, decoder = Encoder(), Decoder(bytes.fromhex(case["bytes"]))
+    encoder, decoder = Coder(), Coder(bytes.fromhex(case["bytes"]))
     for step in case["steps"]:
         if "flat" in step:
             encoder.flat(step["flat"], step["symbol"])
@@ -40,22 +34,23 @@ def test_symbols(case: dict) -> None:
 
 
 def test_messages() -> None:
-    pieces = [read_piece(datagram) for datagram in DATAGRAMS if kind_of(datagram) == DESCRIPTION]
-    forest, terms = read_description(b"".join(piece.data for piece in pieces[: pieces[0].pieces]))
+    read_ones = [read(datagram) for datagram in DATAGRAMS]
+    assert [write(own) for own in read_ones] == DATAGRAMS
+    descriptions = [own for own in read_ones if isinstance(own, Description)]
+    forest, terms = read_description(descriptions[0].data)
     assert [body.name for body in forest.bodies] == ["performer", "tool"]
-    codec = Codec(forest, terms)
-    motions = [read_motion(datagram) for datagram in DATAGRAMS if kind_of(datagram) != DESCRIPTION]
-    states, payloads = {}, {row["payload"]: row for row in STREAM["messages"]}
-    for motion in motions:
-        expected = payloads[motion.payload.hex()]
-        state = states.get(motion.sequence - motion.back) if motion.back else codec.rest
-        kind = state.kind(motion.ticks, motion.back)
-        said, memory = codec.read(motion.payload, kind, state, motion.late)
-        assert kind == expected["kind"]
-        assert said == Said(expected["finer"], expected["cells"], expected["groups"], expected["late"])
-        assert list(memory) == expected["memory"]
-        assert codec.write(said, kind, state, motion.late)[0] == motion.payload
-        states[motion.sequence] = State(codec.path(said, state, kind, motion.ticks), memory, motion.ticks)
+    codec, states = Codec(forest, terms), {}
+    messages = {row["data"]: row for row in STREAM["messages"]}
+    for motion in (own for own in read_ones if isinstance(own, Motion)):
+        expected = messages[motion.data.hex()]
+        said, state = codec.code(Coder(motion.data), lambda back: states[motion.sequence - back])  # noqa: B023
+        base = states[motion.sequence - said.back] if said.back else codec.rest
+        assert said == Said(*(expected[name] for name in Said._fields))
+        assert (said.kind(base), list(state.memory)) == (expected["kind"], expected["memory"])
+        assert codec.write(said, base)[0] == motion.data
+        states[motion.sequence] = state
+    assert {said["kind"] for said in STREAM["messages"]} >= {0, 3}
+    assert any(said["late"] > 1 for said in STREAM["messages"])
 
 
 def test_what_is_shown() -> None:
@@ -71,10 +66,6 @@ def test_what_is_shown() -> None:
 
 def test_answers() -> None:
     for row in STREAM["answers"]:
-        receiver, entries = read_answer(bytes.fromhex(row["bytes"]))
-        assert receiver == bytes((7, 8, 9))
-        assert [entry.identity for entry in entries] == [bytes((1, 2, 3))]
-
-
-def test_late_ones_are_there() -> None:
-    assert any(kind_of(datagram) == LATE for datagram in DATAGRAMS)
+        answer = read(bytes.fromhex(row["bytes"]))
+        assert isinstance(answer, Answer)
+        assert (answer.identity, answer.receiver) == (IDENTITY, RECEIVER)

@@ -11,9 +11,9 @@ from pythonosc.osc_message_builder import OscMessageBuilder
 
 from rigid_motion.live.retargeting import Retargeting, matched
 from rigid_motion.motion import Poses, Skeleton, shell_error
+from rigid_motion.motion.humanoid import HUMANOID, humanoid_bones
 from rigid_motion.motion.quaternions import multiply, rotate
 from rigid_motion.streams import Body, osc
-from rigid_motion.streams.humanoid import HUMANOID, humanoid_bones
 from rigid_motion.streams.vmc import (
     JOINTS,
     MOST_DEVICES,
@@ -115,8 +115,8 @@ def test_what_another_program_sends_in_single_messages_is_shown():
             message("/VMC/Ext/T", 100.0 + 0.1 * second),
         ]
         heard(datagrams, 0.1 * second, receiver)
-    ((stream, shown),) = receiver.show(0.15).items()
-    assert receiver.bodies(stream)[0].joints == (ROOT, "Hips")
+    (shown,) = receiver.show(0.15).values()
+    assert shown.bodies[0].joints == (ROOT, "Hips")
     assert shown.moment == pytest.approx(100.15)
     assert shown.poses["VMC"].positions[1] == pytest.approx([0.0, -0.15, 1.0], abs=1e-5)
 
@@ -153,9 +153,9 @@ def test_bytes_written_after_the_documentation_are_shown(available, root, pack):
         "a bundle for each": [bundled(each) for each in messages],
     }[pack]
     receiver = heard(datagrams, 1.0, VmcReceiver(delay=0.0))
-    ((stream, shown),) = receiver.show(1.0).items()
+    (shown,) = receiver.show(1.0).values()
     assert shown.moment == pytest.approx(10.0)
-    assert receiver.bodies(stream)[0].joints == (ROOT, "Hips")
+    assert shown.bodies[0].joints == (ROOT, "Hips")
     for joint in range(2):
         assert shown.poses["VMC"].positions[joint] == pytest.approx([-1.0, -3.0, 2.0])
         assert shown.poses["VMC"].quaternions[joint] == pytest.approx(about(2, -90), abs=1e-7)
@@ -177,7 +177,7 @@ def test_what_is_written_is_what_is_shown():
         heard(write(row / 60, frame(row)), 5.0 + row / 60, receiver)
     (keys,) = receiver.keys()
     assert keys.moments == pytest.approx(np.arange(20) / 60, abs=1e-6)
-    body = receiver.bodies(keys.stream)[0]
+    body = keys.bodies[0]
     for joint, name in enumerate(body.joints[1:], 1):
         frames = [frame(row)[name] for row in range(20)]
         sent = Poses([one.positions for one in frames], [one.quaternions for one in frames])
@@ -196,8 +196,8 @@ HEADSET = b"/VMC/Ext/Hmd/Pos\0\0\0\0,sfffffff\0\0\0LHR-3\0\0\0" + POSE_7
 def test_devices_are_rigid_bodies_beside_the_performer(messages):
     """After the documentation: a serial number and a pose in the world."""
     receiver = heard([*messages, TIME], 1.0, VmcReceiver(delay=0.0))
-    ((stream, shown),) = receiver.show(1.0).items()
-    bodies = receiver.bodies(stream)
+    (shown,) = receiver.show(1.0).values()
+    bodies = shown.bodies
     assert [body.name for body in bodies] == ["VMC"] * (HIPS in messages) + ["LHR-1", "LHR-2", "LHR-3"]
     for body in bodies[-3:]:
         assert body.joints == (body.name,)
@@ -207,10 +207,11 @@ def test_devices_are_rigid_bodies_beside_the_performer(messages):
 
 def test_a_tracker_that_joins_leaves_the_other_bodies_as_they_are():
     receiver = heard([ROOT_7, HIPS, TRACKER, TIME], 1.0, VmcReceiver(delay=0.0))
-    (stream,) = receiver.show(1.0)
-    before = receiver.bodies(stream)
+    (shown,) = receiver.show(1.0).values()
+    before = shown.bodies
     heard([ROOT_7, HIPS, TRACKER, CONTROLLER, TIME.replace(b"\x41\x20", b"\x41\x28")], 1.5, receiver)
-    after = receiver.bodies(stream)
+    (shown,) = receiver.show(1.5).values()
+    after = shown.bodies
     assert after[:2] == before
     assert [body.name for body in after] == ["VMC", "LHR-1", "LHR-2"]
 
@@ -247,7 +248,7 @@ def test_a_skeleton_of_another_size_rest_and_naming_does_the_same():
     receiver = heard(write(0.0, sent))
     receiver.show(0.0)
     (keys,) = receiver.keys()
-    body = receiver.bodies(keys.stream)[0]
+    body = keys.bodies[0]
     pairs = matched(body.joints, joints)
     assert pairs == {name: f"mixamorig:{name}" for name in body.joints if name in NAMES}
     rows = np.array([(body.joints.index(one), joints.index(other)) for one, other in pairs.items()])
@@ -288,8 +289,8 @@ def test_any_datagram_does_no_harm():
         if row % 100 == 0:
             shown = receiver.show(row / 600)
             assert len(shown) <= MOST_SOURCES
-            for stream, what in shown.items():
+            for what in shown.values():
                 assert np.isfinite(what.poses["VMC"].positions).all()
                 assert np.linalg.norm(what.poses["VMC"].quaternions, axis=1) == pytest.approx(1.0)
-                assert len(receiver.bodies(stream)[0].joints) == len(what.poses["VMC"])
+                assert len(what.bodies[0].joints) == len(what.poses["VMC"])
             receiver.keys()

@@ -16,9 +16,9 @@ from mathutils import Quaternion
 
 from ..motion import Poses, Skeleton
 from ..motion.eulers import ORDERS
+from ..motion.humanoid import beside, humanoid_bones
 from ..motion.quaternions import conjugate, from_matrices, multiply, rotate
 from ..streams import Body
-from ..streams.humanoid import beside, humanoid_bones
 from .retargeting import Retargeting
 
 MARK = "rigid_motion_live"

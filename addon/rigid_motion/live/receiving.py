@@ -121,7 +121,7 @@ class Listening:
             (stream, body.name): (receiver, body, what)
             for receiver in (self._codec, self._vmc)
             for stream, what in receiver.show(now).items()
-            for body in receiver.bodies(stream)
+            for body in what.bodies
         }
         for which, (receiver, body, what) in shown.items():
             heard = self._heard_of(which, body, shown, receiver is self._vmc)

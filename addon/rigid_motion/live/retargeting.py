@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..motion import Poses
+from ..motion.humanoid import SPINE, alignments, humanoid_bones, plain_name
 from ..motion.quaternions import conjugate, multiply, rotate
-from ..streams.humanoid import SPINE, alignments, humanoid_bones, plain_name
 
 
 def matched(sources: Sequence[str], targets: Sequence[str]) -> dict[str, str]:

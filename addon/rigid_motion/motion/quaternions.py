@@ -6,6 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+SMALLEST = 1e-12
+"""Stands for the sine of no turn."""
+
 
 def components(vectors: np.ndarray) -> np.ndarray:
     """Vectors (..., k) as their components (k, ...). A view."""
@@ -120,3 +123,19 @@ def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Return the angle in radians, 0 to pi, of the rotation that takes a to b. Accurate for tiny angles too."""
     difference = multiply(conjugate(a), b)
     return 2.0 * np.arctan2(np.linalg.norm(difference[..., 1:], axis=-1), np.abs(difference[..., 0]))
+
+
+def turned(quaternions: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Return unit quaternions (..., 4) turned by rotation vectors (..., 3), radians in their own axes."""
+    half = 0.5 * np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
+    share = 0.5 * np.sinc(half / np.pi)
+    return multiply(quaternions, np.concatenate((np.cos(half)[..., None], share[..., None] * vectors), axis=-1))
+
+
+def turns_between(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return shortest rotation vectors (..., 3) from unit quaternions (..., 4) to others, in the axes of the first."""
+    turns = multiply(conjugate(first), second)
+    w = turns[..., 0]
+    sine = np.sqrt(np.einsum("...i,...i->...", turns[..., 1:], turns[..., 1:]))
+    angle = 2.0 * np.arctan2(sine, np.abs(w))
+    return turns[..., 1:] * (np.where(w < 0.0, -1.0, 1.0) * angle / np.maximum(sine, SMALLEST))[..., None]

@@ -22,31 +22,12 @@ A receiver takes any bytes, from anybody, without ever raising an exception:
     for stream, shown in receiver.show(now).items():
         shown.moment                              # of the sender's time
         shown.poses["performer"]                  # Poses (joints,), each joint in its parent's space
-        receiver.bodies(stream)                   # each Body: name, joints, parents, rest
+        shown.bodies                              # each Body: name, joints, parents, rest
     for keys in receiver.keys():                  # since the last call: what was sent, to be recorded
         keys.stream, keys.moments, keys.poses     # (k,) seconds; of each body Poses (k, joints)
 
 Between keys, places go straight and turns about one axis: `lerp_slerp`, and `dq_sclerp` hardly differs. Metres,
-seconds, Blender's axes, quaternions w, x, y, z. docs/wire.md has every byte. Each module uses only those above it:
-
-bodies     what is streamed, as one forest of joints
-wire       datagrams
-coding     whole numbers to bytes and back, by frequencies
-residuals  which table each number of a message is coded by
-paths      what is shown at any moment
-messages   what a message says, in whole numbers, metres and radians, and as bytes
-fitting    what a message has to say
-sender     when it has to be said
-playing    the jitter buffer: which moment is shown when
-receiver   from datagrams to what is shown
-
-and of what the world speaks:
-
-osc        messages and bundles of Open Sound Control
-humanoid   which bone is which, and how they are held at rest
-vmc        the Virtual Motion Capture protocol
-
-Tables alone: tables, which `python scripts/research stream_tables` counted for the coder, and bones.
+seconds, Blender's axes, quaternions w, x, y, z. docs/wire.md has every byte.
 """
 
 from .bodies import Body

@@ -19,13 +19,8 @@ from ..motion.poses import joined
 RADIUS = 0.03
 """Of the ball at every joint, in metres, unless it is given."""
 
-MOST_JOINTS = 1024
-"""Of all bodies of a sender."""
-
-MOST_BODIES = 255
-
-LONGEST_NAME = 255
-"""Bytes of a name in UTF-8."""
+MOST_BODIES, MOST_JOINTS, LONGEST_NAME = 255, 1024, 255
+"""Of a sender; and bytes of a name in UTF-8."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +47,7 @@ class Body:
     """Which joints change their places in their parents' space, shape (joints,). None for roots alone."""
 
     def __post_init__(self) -> None:
-        parents = np.asarray(self.parents, dtype=np.int64)
-        count = len(self.joints)
+        parents, count = np.asarray(self.parents, dtype=np.int64), len(self.joints)
         sliding = parents < 0 if self.sliding is None else np.asarray(self.sliding, dtype=bool)
         if not (count and parents.shape == sliding.shape == self.rest.shape == (count,)):
             raise ValueError(f"{self.name}: names, parents and rest poses of its {count} joints are not as many")
@@ -115,6 +109,20 @@ class Forest:
         return shell_error(self.skeleton.in_root_space(shown), truth, self.radii[:, None])
 
     @cached_property
+    def groups(self) -> list[tuple[int, int, int]]:
+        """What is said of a pose, in its order: the joint, 1 for its place and 0 for its turn, and the group above.
+
+        That is the one of the same kind of the joint's parent or, where it has none, the parent's turn; -1 for roots.
+        """
+        result: list[tuple[int, int, int]] = []
+        numbers: dict[tuple[int, int], int] = {}
+        for joint, (parent, slides) in enumerate(zip(self.parents.tolist(), self.sliding.tolist(), strict=True)):
+            for slide in range(1 + slides):
+                numbers[joint, slide] = len(result)
+                result.append((joint, slide, numbers.get((parent, slide), numbers.get((parent, 0), -1))))
+        return result
+
+    @cached_property
     def below(self) -> list[np.ndarray]:
         """Each joint and all that hang on it."""
         return [self.skeleton.below(joint) for joint in range(len(self))]
@@ -123,8 +131,8 @@ class Forest:
     def reaches(self) -> np.ndarray:
         """How far from each joint anything is that hangs on it, with the balls around it, shape (joints,)."""
         reaches = self.radii.copy()
-        for joint in range(len(self) - 1, -1, -1):
+        arms = np.linalg.norm(self.rest.positions, axis=1)
+        for joint in range(len(self) - 1, 0, -1):
             if (parent := self.parents[joint]) >= 0:
-                arm = float(np.linalg.norm(self.rest.positions[joint]))
-                reaches[parent] = max(reaches[parent], arm + reaches[joint])
+                reaches[parent] = max(reaches[parent], arms[joint] + reaches[joint])
         return reaches

@@ -19,20 +19,16 @@ from .paths import Path, carried
 from .residuals import FINEST, MOST_GROUPS, MOST_KNOTS
 from .wire import TICKS
 
-NEAR = 0.97
-"""Part of the tolerance that rounding may use."""
-
-MARGINS = (0.97, 0.85, 0.7)
-"""Parts of the tolerance that smaller numbers may use, one after another, while the outcome is off by more."""
+NEAR, MARGINS = 0.97, (0.97, 0.85, 0.7)
+"""Parts of the tolerance that rounding may use; and that smaller numbers may, one after another, while the outcome is
+off by more."""
 
 AT_END, TAPER = 0.85, 0.4
 """Part of that at the end of a window, from where the motion has to go on well by itself; from this part of it on."""
 
-NOTHING = 1e-9
-"""Seconds: moments that are not further apart are the same."""
-
-STILL, BEYOND = 0.25, 0.2
-"""Part of the tolerance within which a body does not move; and so many seconds later it is still where it was."""
+STILL, BEYOND, NOTHING = 0.25, 0.2, 1e-9
+"""Part of the tolerance within which a body does not move; so many seconds later it is still where it was; and moments
+that are not further apart than so many are the same."""
 
 FAR_APART, MOST_PARTS = 0.013, 8
 """Seconds between samples beyond which it is looked at what is shown between them, and into how many parts at most."""
@@ -57,50 +53,44 @@ class Fitting:
     codec : Codec
     shown : Path, optional
         What is shown so far.
-    state : State
+    base : State
         What the message builds on.
-    kind : int
-        How it does, a kind of `residuals`.
+    head : Said
+        Its window, and how it builds on that.
     samples : Path
-    end, late : int
-        Ticks of the end of the window, and by how many it is shorter than the delay.
     """
 
-    def __init__(
-        self, codec: Codec, shown: Path | None, state: State, kind: int, samples: Path, end: int, late: int
-    ) -> None:
-        self._codec, self._forest, self._walk = codec, codec.forest, codec.walk
-        self._shown, self._state, self._kind, self._samples = shown, state, kind, samples
-        self._ticks, self._late = end, late
-        self._start, self._end = (end + late - codec.terms.delay) / TICKS, end / TICKS
+    def __init__(self, codec: Codec, shown: Path | None, base: State, head: Said, samples: Path) -> None:
+        self._codec, self._forest, self._shown, self._samples = codec, codec.forest, shown, samples
+        self._base, self._head = base, head
+        self._start, self._end = head.window(codec.terms)
 
     def said(self) -> tuple[Said, bool]:
         """Return the message, and whether all of the window is within the tolerance."""
-        tolerance, terms = self._codec.tolerance, self._codec.terms
+        tolerance, (_, delay, grid), ticks = self._codec.tolerance, self._codec.terms, self._head.end
         moments = self._samples.moments
         inside = moments[(moments > self._start) & (moments < self._end)]
         looked = np.concatenate(([self._start], inside, [self._end]))
         ends = self._forest.skeleton.in_root_space(self._samples.at(looked[[0, -1]]))
         is_still = shell_error(ends[:, 0], ends[:, 1], self._forest.radii).max() < STILL * tolerance
-        exact = (self._ticks - inside * TICKS) / terms.grid
+        exact = (ticks - inside * TICKS) / grid
         # A jump between two cells takes both of them, everything else the nearest.
         for cells in (np.rint(exact), np.concatenate((np.floor(exact), np.ceil(exact)))):
             cells = np.unique(cells.astype(int))
-            cells = cells[(cells > 0) & (cells * terms.grid < terms.delay - self._late)]
-            self._grid = (self._ticks - cells[::-1] * terms.grid) / TICKS
+            cells = cells[(cells > 0) & (cells * grid < delay - max(self._head.late - 1, 0))]
+            self._grid = (ticks - cells[::-1] * grid) / TICKS
             between = self._grid[np.abs(self._grid[:, None] - looked).min(axis=1) > NOTHING]
             self._moments = closely(np.unique(np.concatenate((looked, between))))[1:]
             if is_still:
                 # It is to come to rest, and not to be put right again and again.
                 self._moments = np.append(self._moments, self._end + BEYOND)
             self._truth = self._forest.skeleton.in_root_space(self._samples.at(self._moments))
-            fitted = self._fitted()
-            if fitted.error <= tolerance:
+            window, _, error = self._fitted()
+            if error <= tolerance:
                 break
-        window = fitted.window
-        inner = [round((self._ticks - moment * TICKS) / terms.grid) for moment in window.inner]
-        said = Said(window.finer, inner, np.array(window.numbers).tolist(), self._late)
-        return said, fitted.error <= tolerance
+        inner = [round((ticks - moment * TICKS) / grid) for moment in window.inner]
+        groups = np.array(window.numbers).tolist()
+        return self._head._replace(finer=window.finer, cells=inner, groups=groups), error <= tolerance
 
     def _fitted(self) -> Fitted:
         """Return the message with knots on the grid, of what is shown at the moments (n,) that are looked at."""
@@ -112,82 +102,65 @@ class Fitting:
         left = np.maximum(self._end - self._moments, 0.0) / (self._end - self._start)
         most = tolerance * np.minimum(AT_END + (1.0 - AT_END) * left / TAPER, 1.0)
         for margin in MARGINS:
-            smaller = self._smaller(result, margin * most)
+            smaller = self._smaller(result, (margin * most) ** 2)
             if smaller.error <= max(tolerance, result.error):
                 return smaller
         return result
 
     def _near(self, knots: list[float], finer: int) -> Fitted:
         """Return the numbers nearest to the truth, with knots and, where that is not enough, with more of them."""
-        tolerance, most_knots = self._codec.tolerance, min(MOST_KNOTS, max(MOST_GROUPS // len(self._walk), 1))
-        window = self._window(finer)
+        tolerance, most_knots = self._codec.tolerance, min(MOST_KNOTS, max(MOST_GROUPS // len(self._forest.groups), 1))
+        window = Window(self._codec, self._base, self._head, finer)
         for moment in (None, *knots):
-            window.fit(self._samples, moment)
+            window.say(None, moment, self._samples)
         while True:
-            path, errors = self._look(window)
-            error, worst = float(errors.max()), self._moments[np.argmax(errors)]
-            free = self._grid[~np.isin(self._grid, window.moments)]
-            if error <= NEAR * tolerance or not len(free) or len(knots) + 1 == most_knots:
-                return Fitted(window, path, error)
+            result, errors = self._look(window)
+            worst, free = self._moments[np.argmax(errors)], self._grid[~np.isin(self._grid, window.moments)]
+            if result.error <= NEAR * tolerance or not len(free) or len(knots) + 1 == most_knots:
+                return result
             nearest = float(free[np.argmin(np.abs(free - worst))])
-            good = finer < FINEST or error <= tolerance
-            if good and np.abs(np.array(window.moments[1:]) - worst).min() < abs(nearest - worst):
-                return Fitted(window, path, error)
+            good = finer < FINEST or result.error <= tolerance
+            if good and np.abs(window.moments[1:] - worst).min() < abs(nearest - worst):
+                return result
             knots.append(nearest)
-            window.fit(self._samples, nearest)
+            window.say(None, nearest, self._samples)
 
-    def _window(self, finer: int) -> Window:
-        return Window(self._codec, self._state, self._kind, self._start, self._end, finer)
-
-    def _look(self, window: Window) -> tuple[Path, np.ndarray]:
+    def _look(self, window: Window) -> tuple[Fitted, np.ndarray]:
         """Return what is shown with a window, and the largest error of each moment within it."""
         path = window.path() if self._shown is None else self._shown.followed(window.path())
         inside = self._moments <= self._end
-        return path, self._forest.errors(path.at(self._moments[inside]), self._truth[:, inside]).max(axis=0)
+        errors = self._forest.errors(path.at(self._moments[inside]), self._truth[:, inside]).max(axis=0)
+        return Fitted(window, path, float(errors.max())), errors
 
     def _smaller(self, result: Fitted, most: np.ndarray) -> Fitted:
-        """Return a message with smaller numbers, with which no joint is off by more than `most` (n,)."""
+        """Return a message with smaller numbers, with which the square of no joint's error is more than `most` (n,)."""
+        window, radii = result.window, self._forest.radii[:, None]
         there = self._forest.skeleton.in_root_space(result.path.at(self._moments))
-        places, d = (_apart(part) for part in (there.positions, there.positions - self._truth.positions))
         turn = multiply(there.quaternions, conjugate(self._truth.quaternions))
-        v = _apart(2.0 * turn[..., 1:] * np.where(turn[..., :1] < 0.0, -1.0, 1.0)) * self._forest.radii[:, None]
-        axes, window = matrices(there.quaternions), result.window
+        turn = 2.0 * turn[..., 1:] * np.where(turn[..., :1] < 0.0, -1.0, 1.0) * radii[..., None]
+        # How far balls are off, and by how much their shells are turned.
+        errors = np.stack([_apart(there.positions - self._truth.positions), _apart(turn)])
+        places, axes = _apart(there.positions), matrices(there.quaternions)
         numbers, last = np.array(window.numbers), max([self._start, *window.inner])
         for own, support in zip(numbers[::-1], window.supports[::-1], strict=True):
-            hat = _hat(support, self._moments, self._end, last)
-            seen = np.flatnonzero(hat)
-            if not len(seen):
-                own[:] = 0
-                continue
-            near = [part[..., seen] for part in (d, v, places, axes)]
-            for group in range(len(self._walk) - 1, -1, -1):
-                if own[group].any():
-                    does = self._does(group, near[2], near[3], window.factor * hat[seen])
-                    _reduce(own[group], self._forest.below[self._walk.joints[group]], near, does, most[seen] ** 2)
-            d[..., seen], v[..., seen] = near[:2]
-        smaller = self._window(window.finer)
+            hat = window.factor * _hat(support, self._moments, self._end, last)
+            for values, (joint, slide, _) in zip(own[::-1], self._forest.groups[::-1], strict=True):
+                if not values.any():
+                    continue
+                hung, parent = self._forest.below[joint], self._forest.parents[joint]
+                if slide:
+                    along = np.eye(3)[..., None] if parent < 0 else axes[:, :, parent]
+                    does = np.zeros((2, 3, 3, 1, len(hat)))
+                    does[0] = (along * (self._codec.slide_step * hat))[:, :, None]
+                else:
+                    about = (axes[:, :, joint] * (self._codec.turn_steps[joint] * hat))[:, :, None]
+                    arms = (places[:, hung] - places[:, [joint]])[:, None]
+                    does = np.stack([cross(about, arms), about * radii[hung]])
+                _reduce(values, errors, hung, does, most)
+        smaller = Window(self._codec, self._base, self._head, window.finer)
         for moment, own in zip((None, *window.inner), numbers, strict=True):
             smaller.say(own, moment)
-        path, errors = self._look(smaller)
-        return Fitted(smaller, path, float(errors.max()))
-
-    def _does(self, group: int, places: np.ndarray, axes: np.ndarray, hat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return what one step of each number of a group does to what hangs on its joint.
-
-        Returns
-        -------
-        moved, turned : array, shape (3 components, 3 numbers, hung, n)
-            By how much places move, and the balls' shells turn.
-        """
-        joint = self._walk.joints[group]
-        hung, parent = self._forest.below[joint], self._forest.parents[joint]
-        if self._walk.slides[group]:
-            along = np.eye(3)[:, :, None] if parent < 0 else axes[:, :, parent]
-            moved = np.broadcast_to((along * (self._codec.slide_step * hat))[:, :, None], (3, 3, len(hung), len(hat)))
-            return moved, np.zeros_like(moved)
-        about = (axes[:, :, joint] * (self._codec.turn_steps[joint] * hat))[:, :, None]
-        arms = (places[:, hung] - places[:, [joint]])[:, None]
-        return cross(about, arms), about * self._forest.radii[hung][:, None]
+        return self._look(smaller)[0]
 
 
 def closely(moments: np.ndarray) -> np.ndarray:
@@ -199,26 +172,19 @@ def closely(moments: np.ndarray) -> np.ndarray:
     return np.append(moments[:1], before + share * np.repeat(np.diff(moments), parts))
 
 
-def _reduce(
-    values: np.ndarray,
-    hung: np.ndarray,
-    near: list[np.ndarray],
-    does: tuple[np.ndarray, np.ndarray],
-    most: np.ndarray,
-) -> None:
-    """Put the smallest numbers that will do in the place of three, and what they do into the errors."""
+def _reduce(values: np.ndarray, errors: np.ndarray, hung: np.ndarray, does: np.ndarray, most: np.ndarray) -> None:
+    """Put the smallest numbers that will do in the place of three, and what they do into the errors.
+
+    A step of each number moves places and turns shells: `does`, shape (2, 3 components, 3 numbers, hung, n).
+    """
     fewer = smaller_than(values)
-    changes = (fewer - values).astype(np.float64)
-    d, v = (
-        part[:, None, hung] + np.einsum("ca,wahn->wchn", changes, own) for part, own in zip(near[:2], does, strict=True)
-    )
+    before = errors[:, :, hung]
+    after = before[:, :, None] + np.einsum("ca,ewahn->ewchn", (fewer - values).astype(np.float64), does)
     # Where it is off by more already, it may not become worse.
-    most = np.maximum(most, _squared_errors(near[0][:, hung], near[1][:, hung]))
-    good = (_squared_errors(d, v) <= most).all(axis=(1, 2))
+    good = (_squared(after) <= np.maximum(most, _squared(before))).all(axis=(1, 2))
     if good.any():
         first = int(np.argmax(good))
-        values[:] = fewer[first]
-        near[0][:, hung], near[1][:, hung] = d[:, first], v[:, first]
+        values[:], errors[:, :, hung] = fewer[first], after[:, :, first]
 
 
 def smaller_than(values: np.ndarray) -> np.ndarray:
@@ -228,8 +194,9 @@ def smaller_than(values: np.ndarray) -> np.ndarray:
     return result[(result != values).any(axis=1)]
 
 
-def _squared_errors(d: np.ndarray, v: np.ndarray) -> np.ndarray:
+def _squared(errors: np.ndarray) -> np.ndarray:
     """Of balls that are off by d (3, ...), and whose shells are turned by v: see `motion.shell_error`."""
+    d, v = errors
     across = cross(d, v)
     return (d * d).sum(axis=0) + (v * v).sum(axis=0) + 2.0 * np.sqrt((across * across).sum(axis=0))
 

@@ -9,7 +9,7 @@ import struct
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from itertools import islice
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 BUNDLE = b"#bundle\0"
 
@@ -19,10 +19,9 @@ IMMEDIATELY = struct.pack(">Q", 1)
 DEEPEST, MOST_MESSAGES = 4, 2048
 """Bundles in one another, and messages of a datagram."""
 
-NUMBERS = {kind: struct.Struct(f">{own}") for kind, own in zip("ifhdt", "ifqdQ", strict=True)}
-"""Types of OSC, as `struct` has them."""
-
+FORMATS = {"i": ">i", "f": ">f", "h": ">q", "d": ">d", "t": ">Q"}
 CONSTANTS = {"T": True, "F": False, "N": None}
+"""Types of OSC beside texts and blobs, as `struct` has them; and those that are all said by their type."""
 
 
 class Message(NamedTuple):
@@ -67,46 +66,38 @@ def _padded(text: str) -> bytes:
 
 def _messages(data: bytes, depth: int) -> Iterator[Message]:
     if not data.startswith(BUNDLE):
-        yield _message(data)
+        address, at = _argument("s", data, 0)
+        tags, at = _argument("s", data, at)
+        if address[:1] != "/" or tags[:1] != ",":
+            raise ValueError("a message has an address and types")
+        arguments = []
+        for tag in tags[1:]:
+            argument, at = _argument(tag, data, at)
+            arguments.append(argument)
+        yield Message(address, tuple(arguments))
         return
     at = len(BUNDLE) + len(IMMEDIATELY)
     while at < len(data):
-        part, at = _block(data, at)
+        part, at = _argument("b", data, at)
         if not depth:
             raise ValueError("too many bundles in one another")
         yield from _messages(part, depth - 1)
 
 
-def _message(data: bytes) -> Message:
-    address, at = _string(data, 0)
-    tags, at = _string(data, at)
-    if address[:1] != "/" or tags[:1] != ",":
-        raise ValueError("a message has an address and types")
-    arguments: list[object] = []
-    for tag in tags[1:]:
-        if tag in NUMBERS:
-            arguments += NUMBERS[tag].unpack_from(data, at)
-            at += NUMBERS[tag].size
-        elif tag in CONSTANTS:
-            arguments.append(CONSTANTS[tag])
-        elif tag in "sb":
-            argument, at = _string(data, at) if tag == "s" else _block(data, at)
-            arguments.append(argument)
-        else:
-            raise ValueError("there is no such type")
-    return Message(address, tuple(arguments))
-
-
-def _string(data: bytes, at: int) -> tuple[str, int]:
-    """Return a text, and where what follows begins."""
-    end = data.index(b"\0", at)
-    return data[at:end].decode(), end + 4 - end % 4
-
-
-def _block(data: bytes, at: int) -> tuple[bytes, int]:
-    """Return bytes with their number in front, and where what follows begins."""
-    (size,) = struct.unpack_from(">I", data, at)
-    end = at + 4 + size
-    if end > len(data):
-        raise ValueError("it is cut off")
-    return data[at + 4 : end], end + -size % 4
+def _argument(tag: str, data: bytes, at: int) -> tuple[Any, int]:
+    """Return what is at a place, of some type, and where what follows begins."""
+    if tag == "s":
+        end = data.index(b"\0", at)
+        return data[at:end].decode(), end + 4 - end % 4
+    if tag == "b":
+        (size,) = struct.unpack_from(">I", data, at)
+        end = at + 4 + size
+        if end > len(data):
+            raise ValueError("it is cut off")
+        return data[at + 4 : end], end + -size % 4
+    if tag in CONSTANTS:
+        return CONSTANTS[tag], at
+    if tag not in FORMATS:
+        raise ValueError("there is no such type")
+    (number,) = struct.unpack_from(FORMATS[tag], data, at)
+    return number, at + struct.calcsize(FORMATS[tag])

@@ -13,40 +13,15 @@ import numpy as np
 
 from ..motion import Poses
 from ..motion.poses import joined
-from ..motion.quaternions import conjugate, multiply
+from ..motion.quaternions import turned, turns_between
 
 CARRY = 0.15
 """Seconds: a motion of velocity v goes on by v * CARRY * (1 - exp(-t / CARRY)) beyond the last knot."""
-
-SMALLEST = 1e-12
-"""Stands for the angle of no turn."""
-
-
-def at_rest() -> np.ndarray:
-    """Return no velocity, of all joints."""
-    return np.zeros((1, 3))
 
 
 def carried(after: np.ndarray | float) -> np.ndarray:
     """By how many seconds of its velocity a motion goes on, so many seconds after its last knot."""
     return np.asarray(CARRY * -np.expm1(-np.maximum(after, 0.0) / CARRY))
-
-
-def turned(quaternions: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Return unit quaternions (..., 4) turned by rotation vectors (..., 3) in their own axes."""
-    half = 0.5 * np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
-    share = 0.5 * np.sinc(half / np.pi)
-    turns = np.concatenate((np.cos(half)[..., None], share[..., None] * vectors), axis=-1)
-    return multiply(quaternions, turns)
-
-
-def turns_between(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Return shortest rotation vectors (..., 3) from unit quaternions (..., 4) to others, in the axes of the first."""
-    turns = multiply(conjugate(first), second)
-    w = turns[..., 0]
-    sine = np.sqrt(np.einsum("...i,...i->...", turns[..., 1:], turns[..., 1:]))
-    angle = 2.0 * np.arctan2(sine, np.abs(w))
-    return turns[..., 1:] * (np.where(w < 0.0, -1.0, 1.0) * angle / np.maximum(sine, SMALLEST))[..., None]
 
 
 def transposed(poses: Poses) -> Poses:
@@ -56,19 +31,14 @@ def transposed(poses: Poses) -> Poses:
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """Knots of all joints, rising in time, and how the joints move at the last of them."""
+    """Knots of all joints: rising moments (knots,), poses (joints, knots), and how the joints move at the last of them,
+    by velocities of places and angular velocities (joints, 3), a second.
+    """
 
     moments: np.ndarray
-    """Shape (knots,)."""
-
     poses: Poses
-    """Shape (joints, knots)."""
-
-    velocities: np.ndarray = field(default_factory=at_rest)
-    """Of places at the last knot, a second, shape (joints, 3)."""
-
-    spins: np.ndarray = field(default_factory=at_rest)
-    """Angular velocities at the last knot, shape (joints, 3)."""
+    velocities: np.ndarray = field(default_factory=lambda: np.zeros((1, 3)))
+    spins: np.ndarray = field(default_factory=lambda: np.zeros((1, 3)))
 
     def at(self, moments: np.ndarray) -> Poses:
         """Return the poses at moments (n,), shape (joints, n). Before the first knot those of the first."""

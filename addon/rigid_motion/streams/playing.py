@@ -13,40 +13,29 @@ from collections import deque
 import numpy as np
 
 from ..motion import Poses
-from ..motion.quaternions import normalise
-from .paths import SMALLEST, turned, turns_between
+from ..motion.quaternions import SMALLEST, normalise, turned, turns_between
 
-LOOK_BACK = 3.0
-"""Seconds of which the longest transit counts."""
+LOOK_BACK, MOST_TRANSITS = 3.0, 512
+"""Seconds of which the longest transit counts, and of how many datagrams at most."""
 
-MOST_TRANSITS = 512
-
-FEW, SHORT, SOONER = 4, 0.3, 0.05
-"""Datagrams at so many times in a row, over so many seconds, that all came so much sooner than the longest..."""
-
-QUICK = 0.1
-"""... and sooner than all but this part of those before: the network is quicker now, and does not only vary."""
+FEW, SHORT, SOONER, QUICK = 4, 0.3, 0.05, 0.1
+"""Datagrams at so many times in a row, over so many seconds, that all came so much sooner than the longest, and sooner
+than all but this part of those before: the network is quicker now, and does not only vary."""
 
 SET = 1.0
 """A transit that differs by more than this many seconds is that of another clock; a display may not leap further."""
 
-SETTLING = 0.15
-"""Seconds in which a third of a difference to the moment that should be shown is left."""
+SETTLING, HURRY = 0.15, 0.6
+"""Seconds in which a third of a difference to the moment that should be shown is left; and by which part faster than
+time the moment goes on at most."""
 
-HURRY = 0.6
-"""By which part faster than time the moment goes on at most."""
+FADE, FORWARD = 0.04, 0.8
+"""Seconds: as critically damped springs of this time constant, differences to what should be shown fade. And the part
+of the motion that a difference may take away: what was shown too far ahead waits, and never goes back."""
 
-FADE = 0.04
-"""Seconds: as critically damped springs of this time constant, differences to what should be shown fade."""
-
-FORWARD = 0.8
-"""Part of the motion that a difference may take away: what was shown too far ahead waits, and never goes back."""
-
-RESTS = 0.05
-"""Metres or radians a second: a motion that is slower is at rest, and differences along it fade as all others."""
-
-NOTHING = 1e-5
-"""Metres or radians: differences that are smaller are over."""
+RESTS, NOTHING = 0.05, 1e-5
+"""Metres or radians a second: a motion that is slower is at rest, and differences along it fade as all others. And
+metres or radians: differences that are smaller are over."""
 
 
 class Playing:

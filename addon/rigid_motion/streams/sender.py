@@ -22,19 +22,17 @@ from ..motion.quaternions import normalise
 from . import wire
 from .bodies import Body, Forest
 from .fitting import Fitting, closely
-from .messages import Codec, State
+from .messages import MOST_BACK, Codec, Said, State
 from .paths import Path
-from .wire import ANSWER, TICKS, Entry, Terms
+from .wire import NEEDS_DESCRIPTION, NEEDS_REFRESH, TICKS, Answer, Description, Motion, Terms
 
 KEEPALIVE, REFRESH = 0.5, 1.0
 """Seconds of silence after which something is said in any case; and, where nobody answers, between messages that build
 on nothing."""
 
-AGAIN = 0.03
-"""Seconds after which a refresh is sent a second time, so that one loss does not lose both."""
-
-PATIENCE = 0.15
-"""Seconds that a refresh has to arrive, before another is sent to somebody who asks for one."""
+AGAIN, PATIENCE = 0.03, 0.15
+"""Seconds after which a refresh is sent a second time, so that one loss does not lose both; and that it has to arrive,
+before another is sent to somebody who asks for one."""
 
 SILENT, MOST_RECEIVERS = 2.0, 256
 """Seconds after which somebody who does not answer any more is not waited for; and for so many at most."""
@@ -42,32 +40,21 @@ SILENT, MOST_RECEIVERS = 2.0, 256
 GRID = 3
 """Ticks of the grid of knots for samples at any moments."""
 
-ROUNDING = 1e-3
-"""Ticks by which a sample may be before the one that it is at."""
+ROUNDING, SOON, OVERDUE = 1e-3, 1e-4, 2e-4
+"""Ticks by which a sample may be before the one that it is at; seconds by which clocks are not more even than that; and
+that are waited for a sample, instead of sending without it."""
 
 LAST = 0xFFFF
 """The largest sequence number: behind it the sender begins again, with another identity."""
 
-STEP = 1.0
-"""Seconds between two samples that are no pause, but a clock that was set."""
+STEP, AT_ONCE = 1.0, 32
+"""Seconds between two samples that are no pause, but a clock that was set; and samples that are let go together."""
 
-AT_ONCE = 32
-"""Samples that are let go together."""
+ALMOST, CALMER = 0.99, 0.9
+"""Part of an interval that it surely takes; what is left of the longest with every sample that came sooner."""
 
-ALMOST, SOON = 0.99, 1e-4
-"""Part of an interval, and seconds: clocks are not more even than that."""
-
-OVERDUE = 2e-4
-"""Seconds that are waited for a sample, instead of sending without it."""
-
-CALMER = 0.9
-"""What is left of the longest interval between samples with every sample that came sooner."""
-
-MOST_BACK, FURTHEST_BACK = 33, 255
-"""Messages that an answer speaks of; and the base of one may be so many before it."""
-
-OLDEST = 2.0
-"""Seconds: what is older is not worth building on, and everything is said anew."""
+ANSWERED, OLDEST = 33, 2.0
+"""Messages that an answer speaks of; and seconds: what is older is not worth building on, and all is said anew."""
 
 LOSSY, CALM = 2, 5.0
 """Messages of the last 32: where so many are missing, each is sent twice until none is for some seconds."""
@@ -107,12 +94,17 @@ class Sender:
                 raise ValueError(f"a {name} of {value} is not a positive number")
         even = TICKS / rate if rate else GRID
         grid = round(even) if abs(even - round(even)) < 0.01 and even >= 1.0 else GRID
-        self._terms, self._keepalive = Terms(math.floor(tolerance * 1e6), round(delay * TICKS), grid), keepalive
-        self._delay = self._terms.delay / TICKS
-        self._given = Forest(bodies)
+        terms, self._keepalive = Terms(math.floor(tolerance * 1e6), round(delay * TICKS), grid), keepalive
+        self._delay = terms.delay / TICKS
+        self._packed = wire.describe(Forest(bodies), terms)
+        # The bodies as receivers read them, in so many digits.
+        read = wire.read_description(self._packed)
+        if read is None or len(self._packed) > wire.LONGEST - 4:
+            raise ValueError("the delay, the tolerance or the bodies are too large to be described")
+        self._forest, self.codec = read[0], Codec(*read)
         self._slip = 0.0
         """What is added to the times of samples, so that a clock that was set makes no difference."""
-        none = np.empty((len(self._given), 0, 4))
+        none = np.empty((len(self._forest), 0, 4))
         self._samples = Path(np.empty(0), Poses(none[..., :3], none))
         self._next = math.inf
         self._interval = 0.0
@@ -120,15 +112,8 @@ class Sender:
         self._begin()
 
     def _begin(self) -> None:
-        """Begin with a new identity, and with the bodies as receivers read them, in single precision."""
+        """Begin with a new identity."""
         self.identity = secrets.token_bytes(3)
-        pieces = [wire.read_piece(datagram) for datagram in wire.describe(self.identity, 0, self._given, self._terms)]
-        data = [piece.data for piece in pieces if piece]
-        read = wire.read_description(b"".join(data)) if len(data) == len(pieces) else None
-        if read is None:
-            raise ValueError("the delay, the tolerance or the bodies are too large to be described")
-        self._forest = read[0]
-        self.codec = Codec(*read)
         self._states: dict[int, State] = {}
         """Of messages that others may build on, by their sequence numbers."""
         self._sequence = 0
@@ -138,7 +123,7 @@ class Sender:
         """Until this moment it is known to be within the tolerance."""
         self._good: float | None = None
         """The moment behind which it is not."""
-        self._receivers: dict[bytes, tuple[Entry, float]] = {}
+        self._receivers: dict[bytes, tuple[Answer, float]] = {}
         """What those who answer have, and when they said so."""
         self._refreshed = self._sent = -math.inf
         self._again: tuple[float, int, bytes] | None = None
@@ -164,10 +149,10 @@ class Sender:
         ValueError
             Where poses are not as many as joints, or not finite.
         """
-        poses = poses if isinstance(poses, Poses) else self._given.joined(poses)
+        poses = poses if isinstance(poses, Poses) else self._forest.joined(poses)
         finite = np.isfinite(poses.positions).all() and np.isfinite(poses.quaternions).all()
-        if poses.shape != (len(self._given),) or not (finite and math.isfinite(time)):
-            raise ValueError(f"a sample needs {len(self._given)} finite poses and a time")
+        if poses.shape != (len(self._forest),) or not (finite and math.isfinite(time)):
+            raise ValueError(f"a sample needs {len(self._forest)} finite poses and a time")
         now = self._remember(time, poses)
         if self._sequence > LAST:
             self._begin()
@@ -193,8 +178,7 @@ class Sender:
 
     def describe(self) -> list[bytes]:
         """Names, parents and rest poses, for those who join."""
-        newest = self._samples.moments[-1] if len(self._samples.moments) else 0.0
-        return wire.describe(self.identity, max(math.floor(newest * TICKS), 0), self._forest, self._terms)
+        return [wire.write(Description(self.identity, self._packed))]
 
     def join(self) -> list[bytes]:
         """Return what somebody who joins needs: the description. The next message then builds on nothing."""
@@ -203,22 +187,20 @@ class Sender:
 
     def hear(self, datagram: bytes, now: float) -> list[bytes]:
         """Take an answer, at a time by the clock of the samples, and return what is to be sent for it."""
-        read = wire.read_answer(datagram) if wire.kind_of(datagram) == ANSWER else None
-        if read is None:
+        answer = wire.read(datagram)
+        if not isinstance(answer, Answer) or answer.identity != self.identity:
             return []
-        receiver, entries = read
-        entry = next((entry for entry in entries if entry.identity == self.identity), None)
-        if entry is None or (receiver not in self._receivers and len(self._receivers) == MOST_RECEIVERS):
+        if answer.receiver not in self._receivers and len(self._receivers) == MOST_RECEIVERS:
             return []
         heard, times = now + self._slip, self._samples.moments
         if len(times) and abs(heard - times[-1]) > STEP:
             heard = float(times[-1])
-        self._receivers[receiver] = entry, heard
-        missing = entry.before.bit_length() - entry.before.bit_count()
+        self._receivers[answer.receiver] = answer, heard
+        missing = answer.before.bit_length() - answer.before.bit_count()
         self._missed = heard if missing >= LOSSY or (self._lossy and missing) else self._missed
         self._lossy = heard - self._missed < CALM
-        self._desired |= bool(entry.needs & wire.NEEDS_REFRESH) and heard - self._refreshed > PATIENCE
-        return self.describe() if entry.needs & wire.NEEDS_DESCRIPTION else []
+        self._desired |= bool(answer.needs & NEEDS_REFRESH) and heard - self._refreshed > PATIENCE
+        return self.describe() if answer.needs & NEEDS_DESCRIPTION else []
 
     def _remember(self, time: float, poses: Poses) -> float:
         """Keep a sample, and return its time by a clock that only goes on."""
@@ -279,41 +261,38 @@ class Sender:
 
     def _have(self, sequence: int) -> bool:
         """Whether all who answer have a message."""
-        return all(entry.has(sequence) for entry, _ in self._receivers.values())
+        return all(answer.has(sequence) for answer, _ in self._receivers.values())
 
     def _usable(self, now: float) -> int | None:
         """Return the message to build on, or None."""
+        number = self._base
         if self._answered(now):
-            for number in sorted(self._states, reverse=True):
-                if number >= self._sequence - MOST_BACK and self._have(number):
-                    return number if now - self._states[number].end / TICKS < OLDEST else None
-        is_near = self._base is not None and self._sequence - self._base <= FURTHEST_BACK
-        return self._base if is_near else None
+            known = sorted(self._states, reverse=True)
+            number = next((it for it in known if it >= self._sequence - ANSWERED and self._have(it)), self._base)
+        if number is None or self._sequence - number > MOST_BACK:
+            return None
+        return number if now - self._states[number].end / TICKS < OLDEST else None
 
     def _message(self, now: float, refresh: bool = False) -> bytes:
         """Say the window until the last sample."""
         end = math.floor(self._samples.moments[-1] * TICKS + ROUNDING)
-        base = None if refresh else self._usable(now)
-        state = self.codec.rest if base is None else self._states[base]
+        number = None if refresh else self._usable(now)
+        base = self.codec.rest if number is None else self._states[number]
         is_late = now - self._samples.moments[-1] > SOON
-        late = min(math.floor(now * TICKS) - end, self._terms.delay - 1) if is_late else 0
-        back = 0 if base is None else self._sequence - base
-        kind = state.kind(end, back)
-        said, is_within = Fitting(self.codec, self._path, state, kind, self._samples, end, late).said()
-        payload, memory = self.codec.write(said, kind, state, is_late)
-        path = self.codec.path(said, state, kind, end)
-        assert path is not None  # which receivers read, too
-        self._states[self._sequence] = State(path, memory, end)
-        kept = {*range(self._sequence - MOST_BACK, self._sequence + 1), self._base}
+        late = 1 + min(math.floor(now * TICKS) - end, self.codec.terms.delay - 1) if is_late else 0
+        head = Said(0 if number is None else self._sequence - number, end, late)
+        said, is_within = Fitting(self.codec, self._path, base, head, self._samples).said()
+        data, state = self.codec.write(said, base)
+        self._states[self._sequence] = state
+        kept = {*range(self._sequence - ANSWERED, self._sequence + 1), self._base}
         self._states = {number: old for number, old in self._states.items() if number in kept}
-        start = float(path.moments[0])
-        self._path = path if self._path is None else self._path.followed(path).since(start - 0.05)
+        start = float(state.path.moments[0])
+        self._path = state.path if self._path is None else self._path.followed(state.path).since(start - 0.05)
         self._shown, self._good = end / TICKS if is_within else start, None
         self._sent = now
-        if base is None:
+        if number is None:
             self._refreshed, self._desired = now, False
-            again, _ = self.codec.write(said, kind, state, True)
-            datagram = wire.motion(self.identity, self._sequence, end, back, again, late=True)
-            self._again = (now + AGAIN, self._sequence, datagram)
+            again, _ = self.codec.write(said._replace(late=max(late, 1)), base)
+            self._again = (now + AGAIN, self._sequence, wire.write(Motion(self.identity, self._sequence, again)))
         self._sequence += 1
-        return wire.motion(self.identity, self._sequence - 1, end, back, payload, is_late)
+        return wire.write(Motion(self.identity, self._sequence - 1, data))

@@ -10,49 +10,43 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping, Sequence, Set
 from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from ..motion import Poses
+from ..motion.humanoid import HUMANOID, alignments, beside, humanoid_bones
 from ..motion.poses import joined
 from ..motion.quaternions import conjugate, multiply
 from .bodies import LONGEST_NAME, Body
-from .humanoid import HUMANOID, alignments, beside, humanoid_bones
 from .osc import Message, read, write_bundle, write_message
 from .paths import Path, transposed
 from .playing import SET, Playing
-from .receiver import Shown, Stream, Streams
+from .receiver import Stream, Streams
 
 PORT = 39539
 """That programs which show a performer listen on."""
 
-ROOT = "Root"
-"""The joint that the hips hang on."""
+ROOT, PERFORMER = "Root", "VMC"
+"""The joint that the hips hang on; and the name of a performer's body."""
 
 JOINTS = (ROOT, *HUMANOID)
-NUMBERS = {name: number for number, name in enumerate(JOINTS) if number}
 PARENTS = {ROOT: "", **{bone: above or ROOT for bone, above in HUMANOID.items()}}
+
+Joint = tuple[bool, str]
+"""Whether it is a device, and the name of the bone or its serial number."""
 
 DEVICES = {f"/VMC/Ext/{kind}/Pos" for kind in ("Tra", "Con", "Hmd")}
 """Trackers, controllers and headsets: rigid bodies in the world, by their serial numbers."""
 
-PERFORMER = "VMC"
-"""The name of a performer's body."""
-
 MOST_SOURCES, MOST_DEVICES, MOST_SAMPLES = 16, 32, 512
 """Programs; devices of each, and samples that wait to be shown or to be recorded."""
 
-SILENT = 2.0
-"""Seconds after which a performer, who is sent on every frame, has gone."""
-
-FURTHEST = 1e5
-"""Metres; what is further away is damage."""
-
-AT_ONCE = 12
-"""Bones of a datagram: it stays below what networks carry in one piece."""
+SILENT, FURTHEST, AT_ONCE = 2.0, 1e5, 12
+"""Seconds after which a performer, who is sent on every frame, has gone; metres beyond which there is only damage; and
+bones of a datagram, which stays below what networks carry in one piece."""
 
 _TO_BLENDER = np.array(((-1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)))
 """Unity's axes as Blender's: a mirror."""
@@ -60,15 +54,15 @@ _TO_BLENDER = np.array(((-1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)))
 
 def from_unity(poses: Poses) -> Poses:
     """Poses in Unity's axes as poses in Blender's."""
-    return _mirrored(poses, _TO_BLENDER)
+    return _changed(poses, _TO_BLENDER)
 
 
 def to_unity(poses: Poses) -> Poses:
     """Poses in Blender's axes as poses in Unity's."""
-    return _mirrored(poses, _TO_BLENDER.T)
+    return _changed(poses, _TO_BLENDER.T)
 
 
-def _mirrored(poses: Poses, change: np.ndarray) -> Poses:
+def _changed(poses: Poses, change: np.ndarray) -> Poses:
     turned = -poses.quaternions[..., 1:] @ change.T
     return Poses(poses.positions @ change.T, np.concatenate((poses.quaternions[..., :1], turned), axis=-1))
 
@@ -122,7 +116,7 @@ class Performer:
         return {ROOT: Poses(np.zeros(3), [1.0, 0.0, 0.0, 0.0]), **dict(zip(self.bones, local, strict=True))}
 
 
-def _parents(names: list[str]) -> list[int]:
+def _parents(names: Sequence[str]) -> list[int]:
     """Return which of some joints each of them hangs on, -1 for none."""
     result = []
     for name in names:
@@ -143,13 +137,11 @@ class VmcReceiver(Streams):
         """Take a datagram that came at a time, by the clock of `show`, from somewhere."""
         stream = Stream(source, b"VMC")
         for message in read(datagram):
-            if not message.address.startswith("/VMC/Ext/"):
-                continue
-            if stream not in self._streams:
-                if len(self._streams) >= MOST_SOURCES:
-                    return
-                self._streams[stream] = _Source(self.delay)
-            self._streams[stream].hear(message, arrival)
+            if message.address.startswith("/VMC/Ext/"):
+                if stream not in self._streams and len(self._streams) < MOST_SOURCES:
+                    self._streams[stream] = _Source(self.delay)
+                if stream in self._streams:
+                    self._streams[stream].hear(message, arrival)
 
 
 class _Source:
@@ -159,16 +151,12 @@ class _Source:
         self.heard = -np.inf
         self.bodies: tuple[Body, ...] = ()
         self._playing = Playing(delay)
-        count = len(JOINTS) + MOST_DEVICES
-        self._unity = Poses(np.zeros((count, 3)), np.tile((1.0, 0.0, 0.0, 0.0), (count, 1)))
-        """The newest poses, in Unity's axes: of `JOINTS`, and of each device."""
+        self._newest: dict[Joint, list[float]] = {(False, ROOT): [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]}
+        """Place and turn of all that was ever said, in Unity's axes."""
         self._rows: dict[str, list[int]] = {}
-        """The joints of each body."""
-        self._devices: dict[str, int] = {}
-        self._known = {0}
-        """Joints that were ever said."""
-        self._said: set[int] = set()
-        """Those of this frame, and when it began."""
+        """Which of these each body is."""
+        self._frame: dict[Joint, list[float]] = {}
+        """What was said of this frame, and when it began."""
         self._begun = 0.0
         self._samples: deque[tuple[float, Poses]] = deque(maxlen=MOST_SAMPLES)
         self._unkept: deque[tuple[float, Poses]] = deque(maxlen=MOST_SAMPLES)
@@ -177,25 +165,19 @@ class _Source:
     def hear(self, message: Message, arrival: float) -> None:
         """Take one message."""
         address, (name, *numbers) = message.address, message.arguments or (None,)
-        if address == "/VMC/Ext/Bone/Pos" and name in NUMBERS:
-            self._place(NUMBERS[name], numbers, arrival)
-        elif address == "/VMC/Ext/Root/Pos":
-            self._place(0, numbers, arrival)
-        elif address in DEVICES and (joint := self._device(name)):
-            self._place(joint, numbers, arrival)
+        if address == "/VMC/Ext/Root/Pos":
+            self._place((False, ROOT), numbers, arrival)
+        elif address == "/VMC/Ext/Bone/Pos" and name in HUMANOID:
+            self._place((False, str(name)), numbers, arrival)
+        elif address in DEVICES and isinstance(name, str) and name != PERFORMER:
+            known = {serial for is_device, serial in (*self._newest, *self._frame) if is_device}
+            if 0 < len(name.encode()) <= LONGEST_NAME and (name in known or len(known) < MOST_DEVICES):
+                self._place((True, name), numbers, arrival)
         elif address == "/VMC/Ext/T" and not numbers and isinstance(name, float | int) and math.isfinite(name):
             self._has_time = True
             self._sample(float(name), arrival)
 
-    def _device(self, serial: object) -> int | None:
-        """Return the joint of a device; None for what is no name, and for too many."""
-        if isinstance(serial, str) and serial not in self._devices:
-            is_name = serial != PERFORMER and 0 < len(serial.encode()) <= LONGEST_NAME
-            if is_name and len(self._devices) < MOST_DEVICES:
-                self._devices[serial] = len(JOINTS) + len(self._devices)
-        return self._devices.get(serial) if isinstance(serial, str) else None
-
-    def _place(self, joint: int, numbers: list[Any], arrival: float) -> None:
+    def _place(self, joint: Joint, numbers: list[Any], arrival: float) -> None:
         try:
             x, y, z, w = numbers[3:7]
             length = math.sqrt(x * x + y * y + z * z + w * w)
@@ -204,25 +186,25 @@ class _Source:
             is_sound = False
         if not is_sound:
             return
-        if joint in self._said and not self._has_time:
+        if joint in self._frame and not self._has_time:
             self._sample(self._begun, self._begun)
-        if not self._said:
+        if not self._frame:
             self._begun = arrival
-        self._said.add(joint)
-        self._unity.positions[joint] = numbers[:3]
-        self._unity.quaternions[joint] = w / length, x / length, y / length, z / length
+        self._frame[joint] = [*numbers[:3], w / length, x / length, y / length, z / length]
 
     def _sample(self, moment: float, arrival: float) -> None:
         """Take the frame that is complete."""
-        if not self._said - {0}:
+        if not self._frame.keys() - {(False, ROOT)}:
             return
-        poses = from_unity(self._unity)
-        if new := self._said - self._known:
-            self._known |= new
+        new = self._frame.keys() - self._newest.keys()
+        self._newest |= self._frame
+        self._frame = {}
+        rows = np.array(list(self._newest.values()))
+        poses = from_unity(Poses(rows[:, :3], rows[:, 3:]))
+        if new:
             self._describe(new, poses)
-        self._said = set()
         last = self._samples[-1][0] if self._samples else -np.inf
-        if abs(moment - last) > SET:
+        if new or abs(moment - last) > SET:
             self._samples.clear()
         elif moment <= last:
             return
@@ -231,20 +213,21 @@ class _Source:
         self._playing.heard(moment, arrival)
         self.heard = arrival
 
-    def _describe(self, new: set[int], poses: Poses) -> None:
-        """Have bodies for joints that were never said before; the others stay the same."""
+    def _describe(self, new: Set[Joint], poses: Poses) -> None:
+        """Have bodies for what was never said before; the others stay the same."""
+        self._unkept.clear()
+        numbers = {joint: row for row, joint in enumerate(self._newest)}
         bodies = {body.name: body for body in self.bodies}
-        if min(new) < len(JOINTS):
-            rows = self._rows[PERFORMER] = sorted(joint for joint in self._known if joint < len(JOINTS))
-            names = [JOINTS[joint] for joint in rows]
+        if not all(is_device for is_device, _ in new):
+            names = tuple(name for name in JOINTS if (False, name) in numbers)
+            rows = self._rows[PERFORMER] = [numbers[False, name] for name in names]
             rest = Poses(poses.positions[rows], np.tile((1.0, 0.0, 0.0, 0.0), (len(names), 1)))
             sliding = np.array([name in (ROOT, "Hips") for name in names])
-            performer = Body(PERFORMER, tuple(names), np.array(_parents(names)), rest, sliding=sliding)
-            bodies.pop(PERFORMER, None)
-            bodies = {PERFORMER: performer, **bodies}
-        for serial, joint in self._devices.items():
-            if joint in new:
-                bodies[serial], self._rows[serial] = Body.rigid(serial, poses[joint : joint + 1]), [joint]
+            performer = Body(PERFORMER, names, np.array(_parents(names)), rest, sliding=sliding)
+            bodies = {PERFORMER: performer} | {name: body for name, body in bodies.items() if name != PERFORMER}
+        for joint, row in numbers.items():
+            if joint in new and joint[0]:
+                bodies[joint[1]], self._rows[joint[1]] = Body.rigid(joint[1], poses[row : row + 1]), [row]
         self.bodies = tuple(bodies.values())
 
     def _of_bodies(self, samples: Iterable[tuple[float, Poses]]) -> tuple[np.ndarray, dict[str, Poses]]:
@@ -253,14 +236,14 @@ class _Source:
         every = joined([own[:, None] for own in poses], axis=1)
         return np.array(moments), {body.name: every[self._rows[body.name]] for body in self.bodies}
 
-    def show(self, now: float) -> Shown | None:
+    def show(self, now: float) -> tuple[float, dict[str, Poses]] | None:
         moment = self._playing.moment(now)
         if moment is None or not self._samples:
             return None
         while len(self._samples) > 2 and self._samples[1][0] <= moment:
             self._samples.popleft()
         moments, bodies = self._of_bodies(islice(self._samples, 2))
-        return Shown(moment, {name: Path(moments, poses).pose(moment) for name, poses in bodies.items()})
+        return moment, {name: Path(moments, poses).pose(moment) for name, poses in bodies.items()}
 
     def keys(self) -> tuple[np.ndarray, dict[str, Poses]]:
         if not self._unkept:

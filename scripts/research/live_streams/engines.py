@@ -24,9 +24,9 @@ import numpy as np
 
 from rigid_motion.motion import Poses, rms, shell_error
 from rigid_motion.motion.poses import joined
-from rigid_motion.motion.quaternions import align_signs, conjugate, normalise, rotate
+from rigid_motion.motion.quaternions import align_signs, conjugate, normalise, rotate, turned, turns_between
 from rigid_motion.streams import Body, Receiver, Sender
-from rigid_motion.streams.paths import Path, turned, turns_between
+from rigid_motion.streams.paths import Path
 from rigid_motion_batch.streaming.measuring import HEADERS
 
 RATE, FPS, TICK = 30.0, 72.0, 1.0 / 60.0

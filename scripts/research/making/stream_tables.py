@@ -31,7 +31,7 @@ from rigid_motion.streams.residuals import (
 )
 from rigid_motion_batch.cli.stream_measure import body_of, samples_of
 from rigid_motion_batch.recordings.clip_reading import read_clips
-from rigid_motion_batch.streaming.measuring import even_rate
+from rigid_motion_batch.streaming.sending import even_rate
 
 SETTINGS = ((0.1, 0.0), (0.2, 0.0), (0.1, 0.06), (0.1, 0.15), (0.2, 0.15), (0.1, None))
 """Delays, and seconds that a datagram takes; None where no receiver answers."""
@@ -50,11 +50,11 @@ class Counting:
     def __init__(self) -> None:
         self.counts = [np.zeros(symbols_of(table)) for table in range(COUNT)]
 
-    def symbol(self, table: int, value: int) -> int:
+    def symbol(self, table: int, value: int = 0) -> int:
         self.counts[table][value] += 1
         return value
 
-    def flat(self, _count: int, value: int) -> int:
+    def flat(self, _count: int, value: int = 0) -> int:
         return value
 
 
@@ -73,9 +73,9 @@ def count(coder: Counting, body: Body, times: np.ndarray, poses: Poses, delay: f
     sender, receiver = Sender([body], 0.005, delay, even_rate(times)), Receiver()
     write = sender.codec.write
 
-    def counted(said: Said, kind: int, state: State, is_late: bool) -> tuple:
-        sender.codec.through(coder, said, kind, state, is_late)
-        return write(said, kind, state, is_late)
+    def counted(said: Said, base: State) -> tuple[bytes, State]:
+        sender.codec.code(coder, lambda _: base, said)
+        return write(said, base)
 
     sender.codec.write = counted
     on_the_way: list[tuple[float, bytes]] = []

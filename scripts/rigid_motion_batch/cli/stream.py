@@ -67,24 +67,25 @@ def send(options: argparse.Namespace, stopped: list[int]) -> None:
         send_performer(options, stopped)
         return
     clips = _read(options.recordings, options)
-    if options.to_vmc:
-        with Progress() as progress, progress.stage("Playing", float(clips[0].times[-1] - clips[0].times[0])) as stage:
-            _say(f"datagrams: {vmc.play(clips[0], options.to_vmc, stopped, stage.reach)}")
-        return
     bodies, moments, poses = together(clips, options.rate)
+    if options.to_vmc:
+        with Progress() as progress, progress.stage("Playing", float(moments[-1] - moments[0])) as stage:
+            _say(f"datagrams: {vmc.play(bodies[0], moments, poses, options.to_vmc, stopped, stage.reach)}")
+        return
     delay = options.delay or (1.0 / options.rate if options.rate else DELAY)
     sender = sender_of(bodies, moments, options.tolerance.tolerance(clips[0]), delay, options.rate)
     with _room(options) as room, Progress() as progress:
-        sending = Sending(room, options.user, sender)
         _say(f"{options.user} sends {', '.join(body.name for body in bodies)} to {options.room}")
         with progress.stage("Sending", float(moments[-1] - moments[0])) as stage:
-            seconds = play(
-                sending,
+            sending, seconds = play(
+                room,
+                options.user,
+                sender,
                 moments,
                 poses,
                 delay,
                 stopped,
-                lambda done: stage.reach(done, f"{sending.datagrams} datagrams"),
+                lambda done, sending: stage.reach(done, f"{sending.datagrams} datagrams"),
             )
             if stopped:
                 stage.total = max(stage.done, 1e-9)
@@ -106,19 +107,21 @@ def send_performer(options: argparse.Namespace, stopped: list[int]) -> None:
     with _room(options) as room, vmc.Performers(options.from_vmc) as performers:
         _say(f"{options.user} listens to port {performers.number} and sends to {options.room}")
         while not stopped:
-            for bodies, moments, poses in performers.samples():
+            for keys in performers.samples():
+                ahead = float(keys.moments[-1]) - time.monotonic()
                 if sending is None:
-                    sending = Sending(room, options.user, Sender(bodies, tolerance, delay))
-                elif bodies is not sent:  # Bones or trackers came that were not there before.
-                    sending.sender = Sender(bodies, tolerance, delay)
+                    sending = Sending(room, options.user, Sender(keys.bodies, tolerance, delay), ahead)
+                elif keys.bodies is not sent:  # Bones or trackers came that were not there before.
+                    sending.sender = Sender(keys.bodies, tolerance, delay)
                     sending.say(sending.sender.join())
-                sent = bodies
-                for sample, moment in enumerate(moments.tolist()):
-                    sending.say(sending.sender.add(moment, poses[:, sample]))
-                ahead = float(moments[-1]) - time.monotonic()
-            for came in room.come(FRAME):
-                if sending:
-                    sending.take(came, time.monotonic() + ahead)
+                sent, sending.ahead = keys.bodies, ahead
+                for sample, moment in enumerate(keys.moments.tolist()):
+                    poses = {name: poses[sample] for name, poses in keys.poses.items()}
+                    sending.say(sending.sender.add(moment, poses))
+            if sending:
+                sending.answer(FRAME)
+            else:
+                time.sleep(FRAME)
         if sending is None:
             raise RoomError(f"nothing came by VMC at port {performers.number}; give the other program this port")
         room.leave(options.user, MOTION)
@@ -128,14 +131,14 @@ def send_performer(options: argparse.Namespace, stopped: list[int]) -> None:
 def receive(options: argparse.Namespace, stopped: list[int]) -> None:
     """Show what comes. Raises what says why there is nothing."""
     truth = _read([options.truth], options)[0] if options.truth else None
-    keeps = bool(options.output or truth)
+    keeps = "keys" if options.mode else "shown" if options.output or truth else ""
     with (
         _room(options) as room,
         Progress() as progress,
         closing(Receiving(room, options.user, options.fps, options.margin, options.to_blender, keeps)) as receiving,
     ):
         if options.to_vmc:
-            receiving.on_frame.append(vmc.ToVmc(receiving.receiver, options.to_vmc))
+            receiving.on_frame.append(vmc.ToVmc(options.to_vmc).show)
         _say(f"{options.user} listens in {options.room}")
         until = time.monotonic() + (options.seconds or float("inf"))
         with _stage(progress, "Receiving", options.seconds) as stage:
@@ -146,12 +149,12 @@ def receive(options: argparse.Namespace, stopped: list[int]) -> None:
                 stage.total = max(stage.done, 1e-9)
     for user, datagrams in receiving.datagrams.items():
         _say(f"{user}: {datagrams} datagrams, {receiving.bytes[user]} bytes")
-    motions = receiving.shown.motions()
+    motions = receiving.tracks.motions()
     if not (motions if keeps else receiving.datagrams):
         came = "nothing that could be shown came" if receiving.datagrams else f"nobody sent anything in {options.room}"
         raise RoomError(f"{came}, so nothing is written; see --room and --at of the sender")
     if options.mode:
-        motions = [motion.even(options.mode, options.fps) for motion in receiving.keys.motions()]
+        motions = [motion.even(options.mode, options.fps) for motion in motions]
     for motion in motions:
         _say(f"{motion.name}: {len(motion.times)} poses{_error(motion, truth)}")
     if options.output:

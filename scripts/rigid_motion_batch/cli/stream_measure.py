@@ -14,11 +14,9 @@ from typing import cast
 
 import numpy as np
 
-from rigid_motion.motion import Poses, rms
-from rigid_motion.motion.quaternions import align_signs
+from rigid_motion.motion import Poses
 from rigid_motion.streams import Body
 from rigid_motion.streams.bodies import RADIUS
-from rigid_motion.streams.paths import Path as Samples
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.metrics import write_poses
 from rigid_motion_batch.axes import from_blender
@@ -29,7 +27,7 @@ from rigid_motion_batch.recordings.bvh_writing import write_bvh
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.streaming.measuring import Cost, Link, measure
-from rigid_motion_batch.streaming.packed import WAYS
+from rigid_motion_batch.streaming.packed import packed
 from rigid_motion_batch.streaming.sending import body_of, samples_of
 
 EPILOG = """
@@ -88,21 +86,6 @@ def run(options: argparse.Namespace) -> None:
         print(line)
     if options.output:
         print(path_line(options.output))
-
-
-def packed(body: Body, times: np.ndarray, poses: Poses) -> dict[str, dict[str, float]]:
-    """Return what even streams of packed joints cost, and how far off they are."""
-    result, samples = {}, Samples(times, Poses(poses.positions, align_signs(poses.quaternions)))
-    for way in WAYS:
-        worst = way.errors(body, samples).max(axis=0)
-        alone, with_headers = way.bytes_a_second(body)
-        result[way.label] = {
-            "bytes_a_second": alone,
-            "bytes_a_second_with_headers": with_headers,
-            "rms_mm": 1000.0 * rms(worst),
-            "largest_mm": 1000.0 * float(worst.max()),
-        }
-    return result
 
 
 def write(path: Path, clip: Clip, body: Body, times: np.ndarray, shown: Poses) -> None:

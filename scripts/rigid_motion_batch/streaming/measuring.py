@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import heapq
 import multiprocessing
+from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
+from struct import Struct
 from typing import Any
 
 import numpy as np
@@ -22,18 +24,22 @@ from rigid_motion.motion.quaternions import normalise
 from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.bodies import Forest
 from rigid_motion.streams.paths import Path
-from rigid_motion.streams.wire import DESCRIPTION, kind_of
+from rigid_motion.streams.wire import Description, read
+
+from .sending import even_rate
 
 LOOPBACK = "127.0.0.1"
 
 HEADERS = 28
 """Bytes of UDP and IPv4 in front of every datagram."""
 
-PATIENCE = 30.0
-"""Seconds in which the other process has to be there."""
+PATIENCE, AFTER = 30.0, 0.5
+"""Seconds in which the other process has to be there; and for which it goes on behind the last sample and the delay."""
 
-AFTER = 0.5
-"""Seconds for which the receiver goes on behind the last sample, beside the delay."""
+MISSING = f"the receiver's process did not answer within {PATIENCE:g} s"
+
+ARRIVAL = Struct("<d")
+"""In front of every datagram: by the clock of the recording."""
 
 
 @dataclass(frozen=True)
@@ -92,11 +98,18 @@ def measure(
     process.start()
     there.close()
     try:
-        with Outlet(LOOPBACK, _answer(here)) as outlet:
-            run = _Run(Sender([body], tolerance, delay, even_rate(times)), outlet, here, link, seed)
+        with Outlet(LOOPBACK, _given(here)) as outlet:
+
+            def carry(datagram: bytes, arrival: float) -> bytes:
+                outlet.say(ARRIVAL.pack(arrival) + datagram)
+                for answer, _ in outlet.received(PATIENCE):
+                    return answer
+                raise RuntimeError(MISSING)
+
+            run = _Run(Sender([body], tolerance, delay, even_rate(times)), carry, link, seed)
             run.play(times, poses, delay + link.latency + AFTER)
-        here.send(None)
-        moments, drawn, lags, answered = _answer(here)
+            outlet.say(b"")
+            moments, drawn, lags, answered = _given(here)
     finally:
         here.close()
         process.join(AFTER)
@@ -108,7 +121,7 @@ def measure(
     compared = times >= moments[0] - 1e-6
     off = errors(body, shown[:, compared], poses[:, compared]).max(axis=0)
     seconds = float(times[-1] - times[0])
-    joining = [datagram for datagram in run.sent if kind_of(datagram) == DESCRIPTION]
+    joining = [datagram for datagram in run.sent if isinstance(read(datagram), Description)]
     joining_bytes = sum(map(len, joining))
     a_second = (sum(map(len, run.sent)) - joining_bytes) / seconds
     cost = Cost(
@@ -134,26 +147,20 @@ def errors(body: Body, shown: Poses, truth: Poses) -> np.ndarray:
     return forest.errors(shown, forest.skeleton.in_root_space(truth))
 
 
-def even_rate(times: np.ndarray) -> float | None:
-    """Return samples a second, where they are even."""
-    rate = 1.0 / float(np.median(np.diff(times)))
-    return float(round(rate)) if abs(rate - round(rate)) < 0.01 else None
-
-
-def _answer(pipe: Connection) -> Any:
+def _given(pipe: Connection) -> Any:
     try:
-        if not pipe.poll(PATIENCE):
-            raise RuntimeError(f"the receiver's process did not answer within {PATIENCE:g} s")
-        return pipe.recv()
+        if pipe.poll(PATIENCE):
+            return pipe.recv()
     except EOFError:
         raise RuntimeError("the receiver's process ended") from None
+    raise RuntimeError(MISSING)
 
 
 class _Run:
-    """A sender, and the way to the receiver's process and back: datagrams over UDP, and by a pipe what time it is."""
+    """A sender, and a link to what carries datagrams on and returns the answer, in the time of the recording."""
 
-    def __init__(self, sender: Sender, outlet: Outlet, pipe: Connection, link: Link, seed: int) -> None:
-        self._sender, self._outlet, self._pipe, self._link = sender, outlet, pipe, link
+    def __init__(self, sender: Sender, carry: Callable[[bytes, float], bytes], link: Link, seed: int) -> None:
+        self._sender, self._carry, self._link = sender, carry, link
         self._random = np.random.default_rng(seed)
         self._on_the_way: list[tuple[float, int, bytes, bool]] = []
         self._count = self.lost = 0
@@ -189,11 +196,8 @@ class _Run:
             arrival, _, datagram, back = heapq.heappop(self._on_the_way)
             if back:
                 self._post(self._sender.hear(datagram, arrival), arrival)
-                continue
-            self._outlet.say(datagram)
-            self._pipe.send(arrival)
-            replies = self._outlet.received(PATIENCE) if _answer(self._pipe) else []
-            self._post([answer for answer, _ in replies], arrival, back=True)
+            elif answer := self._carry(datagram, arrival):
+                self._post([answer], arrival, back=True)
 
 
 def _receive(pipe: Connection, times: np.ndarray, answers: bool) -> None:
@@ -213,15 +217,14 @@ def _receive(pipe: Connection, times: np.ndarray, answers: bool) -> None:
 
     with Port() as port:
         pipe.send(port.number)
-        while (arrival := pipe.recv()) is not None:
+        while (came := port.received(PATIENCE)[0])[0]:
+            data, source = came
+            (arrival,) = ARRIVAL.unpack_from(data)
             draw(arrival)
-            for datagram, source in port.received(PATIENCE):
-                receiver.take(datagram, arrival, source)
+            receiver.take(data[ARRIVAL.size :], arrival, source)
             now, replies = max(now, arrival), receiver.answers() if answers else []
-            for _, answer in replies:
-                port.send(answer, source)
-                answered += HEADERS + len(answer)
-            pipe.send(bool(replies))
+            answered += sum(HEADERS + len(answer) for _, answer in replies)
+            port.send(b"".join(answer for _, answer in replies), source)
         draw(np.inf)
     drawn = [frame for frame in frames if frame]
     shown = joined([poses[:, None] for *_, poses in drawn], axis=1) if drawn else None

@@ -6,16 +6,22 @@ displacement of any point of the joints' balls, at every sample.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from rigid_motion.motion import Poses
-from rigid_motion.motion.quaternions import normalise
+from rigid_motion.motion import Poses, rms
+from rigid_motion.motion.quaternions import align_signs, normalise
 from rigid_motion.streams import Body
 from rigid_motion.streams.paths import Path
 
 from .measuring import HEADERS, errors
+
+WAYS: dict[str, tuple[float, int | None]] = {
+    "float32 at 30 Hz": (30.0, None),
+    "smallest three (32 bits) at 20 Hz": (20.0, 10),
+    "29 bits at 30 Hz": (30.0, 9),
+    "29 bits at 12 Hz": (12.0, 9),
+}
+"""How often all joints are sent, and the bits of each component of a quaternion; None for floats."""
 
 STAMP = 5
 """Bytes of a datagram that say whose it is, and when: as few as will do."""
@@ -24,42 +30,31 @@ PLACE_BITS, CUBE = 16, 8.0
 """The bits of each coordinate of a place that is packed, over a cube of so many metres."""
 
 
-@dataclass(frozen=True)
-class Packed:
-    """A way of sending all joints, so often, and the bits of each component of a quaternion; None for floats."""
-
-    label: str
-    rate: float
-    bits: int | None
-
-    def bytes_a_second(self, body: Body) -> tuple[float, float]:
-        """Return bytes without headers and with them."""
-        turn, place = (128, 96) if self.bits is None else (2 + 3 * self.bits, 3 * PLACE_BITS)
-        size = -(-(len(body.joints) * turn + np.count_nonzero(body.sliding) * place) // 8)
-        return self.rate * size, self.rate * (size + STAMP + HEADERS)
-
-    def errors(self, body: Body, samples: Path) -> np.ndarray:
-        """Return how far off joints are shown at every sample, shape (joints, n)."""
-        moments = np.arange(samples.moments[0], samples.moments[-1] + 1.0 / self.rate, 1.0 / self.rate)
-        sent = samples.at(np.minimum(moments, samples.moments[-1]))
+def packed(body: Body, times: np.ndarray, poses: Poses) -> dict[str, dict[str, float]]:
+    """Return what each way costs of samples (n,) of poses (joints, n), and how far off they are."""
+    result, sliding = {}, np.asarray(body.sliding)
+    samples = Path(times, Poses(poses.positions, align_signs(poses.quaternions)))
+    for label, (rate, bits) in WAYS.items():
+        moments = np.arange(times[0], times[-1] + 1.0 / rate, 1.0 / rate)
+        sent = samples.at(np.minimum(moments, times[-1]))
         positions, quaternions = sent.positions, normalise(sent.quaternions)
-        if self.bits is None:
+        if bits is None:
+            turn, place = 128, 96
             positions, quaternions = (part.astype(np.float32).astype(np.float64) for part in (positions, quaternions))
         else:
-            step = CUBE / (2**PLACE_BITS - 1)
-            sliding = np.asarray(body.sliding)[:, None, None]
-            positions = np.where(sliding, np.rint(positions / step) * step, positions)
-            quaternions = smallest_three(quaternions, self.bits)
-        shown = Path(moments, Poses(positions, normalise(quaternions))).at(samples.moments)
-        return errors(body, shown, samples.at(samples.moments))
-
-
-WAYS = (
-    Packed("float32 at 30 Hz", 30.0, None),
-    Packed("smallest three (32 bits) at 20 Hz", 20.0, 10),
-    Packed("29 bits at 30 Hz", 30.0, 9),
-    Packed("29 bits at 12 Hz", 12.0, 9),
-)
+            turn, place, step = 2 + 3 * bits, 3 * PLACE_BITS, CUBE / (2**PLACE_BITS - 1)
+            positions = np.where(sliding[:, None, None], np.rint(positions / step) * step, positions)
+            quaternions = smallest_three(quaternions, bits)
+        shown = Path(moments, Poses(positions, normalise(quaternions))).at(times)
+        worst = errors(body, shown, samples.at(times)).max(axis=0)
+        size = -(-(len(body.joints) * turn + np.count_nonzero(sliding) * place) // 8)
+        result[label] = {
+            "bytes_a_second": rate * size,
+            "bytes_a_second_with_headers": rate * (size + STAMP + HEADERS),
+            "rms_mm": 1000.0 * rms(worst),
+            "largest_mm": 1000.0 * float(worst.max()),
+        }
+    return result
 
 
 def smallest_three(quaternions: np.ndarray, bits: int) -> np.ndarray:

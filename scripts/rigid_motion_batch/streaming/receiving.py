@@ -13,7 +13,7 @@ from rigid_motion.live.sockets import Address, Outlet
 from rigid_motion.motion import Poses
 from rigid_motion.motion.poses import joined
 from rigid_motion.streams import Body, Receiver, Shown
-from rigid_motion.streams.receiver import MOST_STREAMS, SILENT, Stream
+from rigid_motion.streams.receiver import MOST_STREAMS, SILENT
 
 from .rooms import ANSWERS, MOTION, SKELETON, Came, Room
 from .written import Motion
@@ -28,10 +28,10 @@ LINGER = 0.3
 class Tracks(dict[tuple[str, Body], dict[float, Poses]]):
     """What was shown of all bodies of all users, or their keys: poses (joints,) by rising moments of the sender."""
 
-    def add(self, user: str, bodies: Iterable[Body], moment: float, poses: Mapping[str, Poses]) -> None:
+    def add(self, user: object, bodies: Iterable[Body], moment: float, poses: Mapping[str, Poses]) -> None:
         """Add the poses (joints,) of a user's bodies at a moment."""
         for body in bodies:
-            known = self.setdefault((user, body), {})
+            known = self.setdefault((str(user), body), {})
             if moment > next(reversed(known), -math.inf):
                 known[moment] = poses[body.name]
 
@@ -59,19 +59,18 @@ class Receiving:
         Seconds that are waited longer for each datagram.
     to : address, optional
         What gets all datagrams by UDP as well, from a port for each user, and whose answers go back to them.
-    keeps : bool
-        Whether what was shown, and the keys, are to be there in the end.
+    keeps : str, optional
+        What is to be there in the end: what was `shown`, the `keys`, or nothing.
     """
 
     def __init__(
-        self, room: Room, user: str, fps: float, margin: float, to: Address | None = None, keeps: bool = True
+        self, room: Room, user: str, fps: float, margin: float, to: Address | None = None, keeps: str = ""
     ) -> None:
         self._room, self._fps, self._margin, self._to, self._keeps = room, fps, margin, to, keeps
-        self.receiver = Receiver()
-        self.shown, self.keys = Tracks(), Tracks()
+        self.receiver, self.tracks = Receiver(), Tracks()
         self.datagrams, self.bytes = Counter[str](), Counter[str]()
         """Counts for each user."""
-        self.on_frame: list[Callable[[dict[Stream, Shown]], None]] = []
+        self.on_frame: list[Callable[[Iterable[Shown]], None]] = []
         """Called with what each frame shows."""
         self._outlets: dict[str, Outlet] = {}
         self._heard: dict[str, float] = {}
@@ -121,15 +120,14 @@ class Receiving:
     def _show(self, now: float) -> None:
         shown = self.receiver.show(now)
         for act in self.on_frame:
-            act(shown)
-        if self._keeps:
+            act(shown.values())
+        if self._keeps == "shown":
             for stream, what in shown.items():
-                self.shown.add(str(stream.source), self.receiver.bodies(stream), what.moment, what.poses)
-            came = self.receiver.keys()
-            for keys in came:
-                for row, moment in enumerate(keys.moments.tolist()):
-                    poses = {name: poses[row] for name, poses in keys.poses.items()}
-                    self.keys.add(str(keys.stream.source), self.receiver.bodies(keys.stream), moment, poses)
+                self.tracks.add(stream.source, what.bodies, what.moment, what.poses)
+        for keys in self.receiver.keys() if self._keeps == "keys" else ():
+            for row, moment in enumerate(keys.moments.tolist()):
+                poses = {name: poses[row] for name, poses in keys.poses.items()}
+                self.tracks.add(keys.stream.source, keys.bodies, moment, poses)
         for user in [user for user, heard in self._heard.items() if now - heard > SILENT]:
             self._leave(user)
         if self.datagrams and not self._heard and self._silent == math.inf:

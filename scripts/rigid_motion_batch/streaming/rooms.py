@@ -21,18 +21,17 @@ from rigid_motion_batch.places import CHECKOUT
 if TYPE_CHECKING:
     import zenoh
 
-PORT = 7447
-"""Zenoh's own."""
-
-HERE, EVERYWHERE = "127.0.0.1", "0.0.0.0"
+HERE, EVERYWHERE, PORT = "127.0.0.1", "0.0.0.0", 7447
+"""The port is Zenoh's own."""
 
 MOTION, SKELETON, ANSWERS, LISTENING = "motion", "skeleton", "answers", "listening"
 
 USER = re.compile(r"[\w.-]+")
 ROOM = re.compile(r"[\w.-]+(/[\w.-]+)*")
 
-WAIT_MS = 4000
-"""For which a router that cannot be reached is tried."""
+WAIT_MS, MOST_WAITING = 4000, 4096
+"""Milliseconds for which a router that cannot be reached is tried; and datagrams that wait to be looked at: others are
+dropped, as a network does."""
 
 LIMITS = {
     "connect/retry": {"period_init_ms": 100, "period_max_ms": 200, "period_increase_factor": 1.5},
@@ -41,9 +40,6 @@ LIMITS = {
     "transport/link/tx/queue/size/data": 16,
 }
 """Of Zenoh: the pauses between attempts to connect, and bytes of what is taken from others at once."""
-
-MOST_WAITING = 4096
-"""Datagrams that wait to be looked at; others are dropped, as a network does."""
 
 
 class RoomError(ValueError):

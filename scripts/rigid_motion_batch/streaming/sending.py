@@ -1,4 +1,4 @@
-"""Sending recordings into a room: all bodies by one sender, in real time."""
+"""Sending recordings and performers: all bodies by one sender, in real time."""
 
 from __future__ import annotations
 
@@ -15,27 +15,21 @@ from rigid_motion.streams import Body, Sender
 from rigid_motion.streams.bodies import RADIUS
 from rigid_motion.streams.paths import Path
 from rigid_motion.streams.sender import KEEPALIVE
-from rigid_motion.streams.wire import DESCRIPTION, kind_of
+from rigid_motion.streams.wire import Description, read
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.clips import Clip
 
-from .measuring import even_rate
-from .rooms import ANSWERS, LISTENING, MOTION, SKELETON, Came, Room
+from .rooms import ANSWERS, LISTENING, MOTION, SKELETON, Room
 
 SLIDES = 1e-4
 """Metres by which a joint has to change its place in its parent's space to be sent with it."""
 
-LOOK = 0.02
-"""Seconds after which a loop looks up, whatever comes or does not."""
+LOOK, AGAIN, AFTER = 0.02, 0.03, 0.3
+"""Seconds after which a loop looks up, whatever comes or does not; after which the description is sent again, for many
+may ask for it at once; and for which a sender stays behind the end, beside the delay: what was lost is asked for."""
 
 ALMOST = 0.9
 """Part of the interval of an even stream after which a key is due."""
-
-AGAIN = 0.03
-"""Seconds after which the description is sent again; many may ask for it at once."""
-
-AFTER = 0.3
-"""Seconds for which a sender stays behind the end, beside the delay: what was lost is asked for."""
 
 
 def samples_of(clip: Clip) -> tuple[np.ndarray, Poses]:
@@ -44,8 +38,7 @@ def samples_of(clip: Clip) -> tuple[np.ndarray, Poses]:
     Of a file whose keys are not at its frames those are what it shows at its frames.
     """
     poses = to_blender(clip.in_metres(clip.poses), clip.axes)
-    positions, quaternions = (part if part.ndim == 3 else part[None] for part in (poses.positions, poses.quaternions))
-    times, poses = clip.times, Poses(positions, quaternions)
+    times, poses = clip.times, poses if len(poses.shape) == 2 else poses[None]
     if clip.rate and len(times) != round((times[-1] - times[0]) * clip.rate) + 1:
         even = np.arange(times[0], times[-1] + 0.01 / clip.rate, 1.0 / clip.rate)
         return even, Path(times, poses).at(even)
@@ -76,81 +69,89 @@ def together(clips: Sequence[Clip], rate: float | None = None) -> tuple[list[Bod
         rate = rate or max(clip.samples_a_second for clip in clips)
         seconds = max(times[-1] - times[0] for times, _ in samples)
         moments = first[0] + np.arange(int(seconds * rate + 1e-6) + 1) / rate
-    shown = [
-        Path(times, poses).at(np.clip(moments - first[0] + times[0], times[0], times[-1])) for times, poses in samples
-    ]
+    shown = [Path(times, poses).at(np.minimum(moments - first[0] + times[0], times[-1])) for times, poses in samples]
     return bodies, moments, joined(shown)
+
+
+def even_rate(times: np.ndarray) -> float | None:
+    """Return samples a second, where they are even."""
+    rate = 1.0 / float(np.median(np.diff(times))) if len(times) > 1 else 0.5
+    return float(round(rate)) if abs(rate - round(rate)) < 0.01 else None
 
 
 def sender_of(bodies: list[Body], moments: np.ndarray, tolerance: float, delay: float, rate: float | None) -> Sender:
     """Return a sender that says what is needed or, with a rate, a key at each of its ticks."""
-    even = even_rate(moments) if len(moments) > 1 else None
-    return Sender(bodies, tolerance, delay, rate or even, ALMOST / rate if rate else KEEPALIVE)
+    return Sender(bodies, tolerance, delay, rate or even_rate(moments), ALMOST / rate if rate else KEEPALIVE)
 
 
 class Sending:
     """A sender in a room, under the name of a user."""
 
-    def __init__(self, room: Room, user: str, sender: Sender) -> None:
-        self.room, self.user, self.sender = room, user, sender
+    def __init__(self, room: Room, user: str, sender: Sender, ahead: float) -> None:
+        self.room, self.user, self.sender, self.ahead = room, user, sender, ahead
+        """`ahead` by so many seconds is the clock of the motion."""
         self.datagrams = self.bytes = self.joined = 0
         self._described = -math.inf
         room.listen(user, ANSWERS)
         room.watch_presence()
 
+    @property
+    def now(self) -> float:
+        """The time of the motion."""
+        return time.monotonic() + self.ahead
+
     def say(self, datagrams: Iterable[bytes]) -> None:
         """Send datagrams, and count them."""
         for datagram in datagrams:
-            self.room.send(self.user, SKELETON if kind_of(datagram) == DESCRIPTION else MOTION, datagram)
+            stream = SKELETON if isinstance(read(datagram), Description) else MOTION
+            self.room.send(self.user, stream, datagram)
             self.datagrams += 1
             self.bytes += len(datagram)
 
-    def take(self, came: Came, now: float) -> None:
-        """Deal with an answer, or with a receiver that joins, at a time of the motion."""
-        said = []
-        if came.stream == LISTENING and came.datagram is not None:
-            self.joined += 1
-            said = self.sender.join()
-        elif came.stream == ANSWERS and came.datagram:
-            said = self.sender.hear(came.datagram, now)
-        if said and now - self._described > AGAIN:
-            self._described = now
-            self.say(said)
+    def answer(self, seconds: float) -> None:
+        """Deal with answers, and with receivers that join, for which it waits so long."""
+        for came in self.room.come(seconds):
+            said = []
+            if came.stream == LISTENING and came.datagram is not None:
+                self.joined += 1
+                said = self.sender.join()
+            elif came.stream == ANSWERS and came.datagram:
+                said = self.sender.hear(came.datagram, self.now)
+            if said and self.now - self._described > AGAIN:
+                self._described = self.now
+                self.say(said)
 
-    def until(self, moment: float, clock: Callable[[], float], stopped: Sequence[int]) -> None:
+    def until(self, moment: float, stopped: Sequence[int]) -> None:
         """Wait for a moment of the motion, and meanwhile answer and say what is due without a sample."""
-        while not stopped and (now := clock()) < moment:
-            for came in self.room.come(min(moment - now, max(self.sender.next - now, 0.0), LOOK)):
-                self.take(came, clock())
-            if self.sender.next <= (now := clock()) < moment:
+        while not stopped and (now := self.now) < moment:
+            self.answer(min(moment - now, max(self.sender.next - now, 0.0), LOOK))
+            if self.sender.next <= (now := self.now) < moment:
                 self.say(self.sender.poll(now))
 
 
 def play(
-    sending: Sending,
+    room: Room,
+    user: str,
+    sender: Sender,
     moments: np.ndarray,
     poses: Poses,
     delay: float,
     stopped: Sequence[int],
-    reach: Callable[[float], None] = lambda _: None,
-) -> float:
+    reach: Callable[[float, Sending], None] = lambda *_: None,
+) -> tuple[Sending, float]:
     """Send samples (n,) of poses (joints, n) when they are due, and return the seconds that were sent."""
-    began = time.monotonic() - float(moments[0])
-
-    def clock() -> float:
-        return time.monotonic() - began
-
+    first, last = float(moments[0]), float(moments[-1])
+    sending = Sending(room, user, sender, first - time.monotonic())
     for sample, moment in enumerate(moments.tolist()):
-        sending.until(moment, clock, stopped)
+        sending.until(moment, stopped)
         if stopped:
             break
-        for came in sending.room.come(0.0):
-            sending.take(came, moment)
-        sending.say(sending.sender.add(moment, poses[:, sample]))
-        reach(moment - float(moments[0]))
-    seconds = clock() - float(moments[0])
+        sending.answer(0.0)
+        sending.say(sender.add(moment, poses[:, sample]))
+        reach(moment - first, sending)
+    seconds = sending.now - first
     if not stopped:
-        sending.say(sending.sender.finish())
-        sending.until(float(moments[-1]) + delay + AFTER, clock, stopped)
-    sending.room.leave(sending.user, MOTION)
-    return seconds
+        sending.say(sender.finish())
+        sending.until(last + delay + AFTER, stopped)
+    room.leave(user, MOTION)
+    return sending, seconds

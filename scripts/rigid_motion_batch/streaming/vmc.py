@@ -1,67 +1,86 @@
-"""VMC for commands: recordings and streams as performers of other programs, and performers as streams.
-
-play(clip, ("127.0.0.1", 39539), stopped)         `send RECORDING --to-vmc HOST:PORT`
-with Performers(port) as performers:              `send --from-vmc PORT`: what comes, for a sender of a room
-    for bodies, moments, poses in performers.samples(): ...
-show = ToVmc(receiver, address)                   `receive --to-vmc HOST:PORT`: called with what each frame shows
-"""
+"""VMC for commands: recordings and streams as performers of other programs, and performers as streams."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
 from rigid_motion.live.sockets import Address, Outlet, Port
 from rigid_motion.motion import Poses, Skeleton
-from rigid_motion.motion.poses import joined
-from rigid_motion.streams import Body, Receiver, Shown
-from rigid_motion.streams.paths import transposed
+from rigid_motion.streams import Body, Keys, Shown
 from rigid_motion.streams.receiver import Stream
 from rigid_motion.streams.vmc import SILENT, Performer, VmcReceiver, write, write_trackers
-from rigid_motion_batch.axes import to_blender
-from rigid_motion_batch.recordings.clips import Clip
 
 RATE = 90.0
 """Frames a second at most: programs draw no faster."""
 
 
+class ToVmc(Outlet):
+    """Another program, which is shown bodies: the first skeleton of a person as its performer, for VMC has one to a
+    port, and all rigid bodies as trackers. Raises OSError where there is no such address.
+    """
+
+    def __init__(self, to: Address) -> None:
+        super().__init__(*to)
+        self.datagrams = 0
+        self._began = time.monotonic()
+        self._performer: tuple[Body | None, Performer | None] = None, None
+
+    def show(self, shown: Iterable[Shown], moment: float | None = None) -> None:
+        """Show what streams show; the moment is that of the clock, unless it is given."""
+        moment = time.monotonic() - self._began if moment is None else moment
+        trackers, datagrams = {}, list[bytes]()
+        for what in shown:
+            for body in what.bodies:
+                poses = what.poses[body.name]
+                if len(body.joints) == 1:
+                    trackers[body.name] = poses[0]
+                elif not datagrams and (performer := self.performer_of(body)):
+                    datagrams = write(moment, performer(Skeleton(body.parents).in_root_space(poses[:, None])[:, 0]))
+        for datagram in datagrams + write_trackers(trackers):
+            self.say(datagram)
+            self.datagrams += 1
+
+    def performer_of(self, body: Body) -> Performer | None:
+        """Return what a skeleton is to VMC; None where it is no person."""
+        if self._performer[0] is not body:
+            rest = Skeleton(body.parents).in_root_space(body.rest[:, None])[:, 0]
+            performer = Performer(body.joints, rest)
+            self._performer = body, performer if "Hips" in performer.bones else None
+        return self._performer[1]
+
+
 def play(
-    clip: Clip,
+    body: Body,
+    moments: np.ndarray,
+    poses: Poses,
     to: Address,
     stopped: Sequence[int] = (),
     reach: Callable[[float], None] = lambda _: None,
 ) -> int:
-    """Play a recording in real time, and return how many datagrams were sent.
+    """Play samples (n,) of a body's poses (joints, n) in real time, and return how many datagrams were sent.
 
     `stopped` ends it as soon as something is in it; `reach` is given the seconds that were played.
     Raises OSError where `to` is no address, and ValueError where no bone of a body is a person's.
     """
-    poses, performer = to_blender(clip.in_metres(clip.poses), clip.axes), None
-    if clip.rest_body is not None:
-        performer = Performer(clip.rest_body.joints, to_blender(clip.in_metres(clip.rest_body.rest), clip.axes))
-        if "Hips" not in performer.bones:
-            raise ValueError(f"{clip.name}: none of its joints is named as the hips of a person, which VMC begins with")
-        poses = Skeleton(clip.whole_body.parents).in_root_space(poses)
-    moments, count = clip.times - clip.times[0], 0
-    with Outlet(*to) as outlet:
+    with ToVmc(to) as outlet:
+        if len(body.joints) > 1 and not outlet.performer_of(body):
+            raise ValueError(f"{body.name}: none of its joints is named as the hips of a person, which VMC begins with")
         began, last = time.monotonic(), -np.inf
-        for row, moment in enumerate(moments.tolist()):
+        for row, moment in enumerate((moments - moments[0]).tolist()):
             if moment - last < 0.99 / RATE and row < len(moments) - 1:
                 continue
             while not stopped and (wait := began + moment - time.monotonic()) > 0.0:
                 time.sleep(min(wait, 0.1))
             if stopped:
                 break
-            now = poses[..., row]
-            for datagram in write_trackers({clip.name: now}) if performer is None else write(moment, performer(now)):
-                outlet.say(datagram)
-                count += 1
+            outlet.show([Shown(moment, (body,), {body.name: poses[:, row]})], moment)
             last = moment
             reach(moment)
-    return count
+        return outlet.datagrams
 
 
 class Performers(Port):
@@ -76,11 +95,8 @@ class Performers(Port):
         self._stream: Stream | None = None
         self._heard = -math.inf
 
-    def samples(self) -> list[tuple[tuple[Body, ...], np.ndarray, Poses]]:
-        """Return what came since the last call: bodies, moments (n,) of their clock, and poses (joints, n) of all.
-
-        They are others as soon as bones or devices come that were not there before.
-        """
+    def samples(self) -> list[Keys]:
+        """Return what came since the last call. Bodies are others as soon as bones or devices come that are new."""
         now, result = time.monotonic(), []
         for datagram, source in self.received():
             self._receiver.take(datagram, now, source)
@@ -91,39 +107,5 @@ class Performers(Port):
                 self._stream = keys.stream
             if keys.stream == self._stream:
                 self._heard = now
-                bodies = self._receiver.bodies(keys.stream)
-                poses = joined([keys.poses[body.name] for body in bodies], axis=1)
-                result.append((bodies, keys.moments, transposed(poses)))
+                result.append(keys)
         return result
-
-
-class ToVmc(Outlet):
-    """What a receiver shows, frame by frame, to another program: the first skeleton as its performer, for VMC has one
-    to a port, and all rigid bodies as trackers.
-    """
-
-    def __init__(self, receiver: Receiver, to: Address) -> None:
-        super().__init__(*to)
-        self._receiver, self._began = receiver, time.monotonic()
-        self._performer: tuple[Body, Performer] | None = None
-
-    def __call__(self, shown: Mapping[Stream, Shown]) -> None:
-        trackers, datagrams = {}, list[bytes]()
-        for stream, what in shown.items():
-            for body in self._receiver.bodies(stream):
-                if len(body.joints) == 1:
-                    trackers[body.name] = what.poses[body.name][0]
-                else:
-                    datagrams = datagrams or self._performed(body, what.poses[body.name])
-        for datagram in datagrams + write_trackers(trackers):
-            self.say(datagram)
-
-    def _performed(self, body: Body, poses: Poses) -> list[bytes]:
-        """Return the datagrams of a skeleton; none of one that is no person."""
-        skeleton = Skeleton(body.parents)
-        if self._performer is None or self._performer[0] is not body:
-            self._performer = body, Performer(body.joints, skeleton.in_root_space(body.rest[:, None])[:, 0])
-        performer = self._performer[1]
-        if "Hips" not in performer.bones:
-            return []
-        return write(time.monotonic() - self._began, performer(skeleton.in_root_space(poses[:, None])[:, 0]))

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TextIO, cast
+from typing import NamedTuple, TextIO, cast
 
 import numpy as np
 
@@ -19,24 +18,18 @@ from rigid_motion_batch.recordings.clip_reading import folder_names
 from rigid_motion_batch.recordings.rest_bodies import RestBody
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """What was shown of a body."""
+class Motion(NamedTuple):
+    """What was shown of a body: moments (n,), and poses (joints, n), each joint in its parent's space."""
 
     name: str
-
     body: Body
-
     times: np.ndarray
-    """Shape (n,)."""
-
     poses: Poses
-    """In metres and Blender's axes, each joint in its parent's space. Shape (joints, n)."""
 
     def even(self, mode: str, fps: float) -> Motion:
         """Return so many poses a second instead, with the in-betweens of a mode."""
         times = self.times[0] + np.arange(int((self.times[-1] - self.times[0]) * fps + 1e-6) + 1) / fps
-        return replace(self, times=times, poses=interpolate(self.times, self.poses, times, mode))
+        return self._replace(times=times, poses=interpolate(self.times, self.poses, times, mode))
 
 
 def write_motions(path: Path, motions: Sequence[Motion], fps: float) -> list[Path]:
@@ -68,9 +61,8 @@ def _write_table(file: TextIO, motions: Sequence[Motion]) -> None:
     file.write("device,t,x,y,z,qw,qx,qy,qz\n")
     for motion in motions:
         poses = Skeleton(motion.body.parents).in_root_space(motion.poses)
-        for joint, name in enumerate(motion.body.joints):
+        for name, own in zip(motion.body.joints, poses, strict=True):
             device = motion.name if len(motion.body.joints) == 1 else f"{motion.name}.{name}"
             device = device.replace(",", "_").replace('"', "_")
-            own = poses[joint]
             for _, lines in lines_of_poses([motion.times, *own.positions.T, *own.quaternions.T]):
                 file.write("".join(f"{device},{line}\n" for line in lines))

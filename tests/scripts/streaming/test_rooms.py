@@ -203,7 +203,7 @@ def test_a_router_that_is_killed_and_started_again_is_found_again(tmp_path, endl
     ):
         receiving = Receiving(room, "bob", 60.0, 0.0)
         moments = []
-        receiving.on_frame.append(lambda shown: moments.extend(one.moment for one in shown.values()))
+        receiving.on_frame.append(lambda shown: moments.extend(one.moment for one in shown))
         receiving.hear(time.monotonic() + 2.0, ())
         assert moments
         router.kill()
@@ -302,13 +302,13 @@ def test_blender_gets_the_datagrams_as_they_are_and_its_answers_get_to_the_sende
             # As one that was started now: it knows nothing, and asks.
             receiver = Receiver()
             began = time.monotonic()
-            while not receiver.show(time.monotonic()) and time.monotonic() < began + PATIENCE:
+            while not (shown := receiver.show(time.monotonic())) and time.monotonic() < began + PATIENCE:
                 datagram, source = panel.recvfrom(2048)
                 receiver.take(datagram, time.monotonic(), source)
                 for to, answer in receiver.answers():
                     panel.sendto(answer, to)
-            (stream,) = receiver.streams
-    assert [own.name for own in receiver.bodies(stream)] == ["endless"]
+    (what,) = shown.values()
+    assert [own.name for own in what.bodies] == ["endless"]
 
 
 # Without a room

@@ -12,9 +12,11 @@ import pytest
 
 from rigid_motion.motion import Poses, Skeleton
 from rigid_motion.streams import Body, Receiver, Sender
+from rigid_motion.streams.paths import transposed
 from rigid_motion.streams.vmc import VmcReceiver, write_trackers
 from rigid_motion_batch.cli import stream
 from rigid_motion_batch.places import CHECKOUT
+from rigid_motion_batch.streaming.sending import together
 from rigid_motion_batch.streaming.vmc import Performers, ToVmc, play
 from tests.live.performing import BODY, JOINTS, TIMES_OF_A_SECOND, dance, frames_of_vmc, in_world
 from tests.scripts.streaming.test_rooms import HERE, PATIENCE, free_port, running
@@ -104,7 +106,7 @@ def test_the_command_plays_a_body_in_real_time(walk, listener):
         receiver.take(datagram, 0.01 * row)
     (keys,) = receiver.keys()
     assert keys.moments == pytest.approx(np.arange(20) / 30, abs=1e-3)
-    (body,) = receiver.bodies(keys.stream)
+    (body,) = keys.bodies
     assert body.joints == ("Root", "Hips", "LeftUpperLeg", "LeftLowerLeg", "LeftFoot")
     # Blender has the y axis of a BVH up; centimetres are found out by the size of the body.
     assert keys.poses["VMC"].positions[5, 1] == pytest.approx([0.05, 0.0, 1.65], abs=1e-5)
@@ -125,9 +127,9 @@ def test_a_body_without_hips_is_refused(walk, listener, capsys):
 
 def test_playing_ends_when_it_is_stopped(walk, listener):
     options = stream.parse(["send", str(walk), "--to-vmc", "127.0.0.1:1"])
-    (clip,) = stream._read(options.recordings, options)
+    (body,), moments, poses = together(stream._read(options.recordings, options))
     began = time.monotonic()
-    assert play(clip, listener.getsockname(), [15]) == 0
+    assert play(body, moments, poses, listener.getsockname(), [15]) == 0
     assert time.monotonic() - began < 0.3
 
 
@@ -137,14 +139,15 @@ def test_performers_are_bodies_with_samples():
             for datagram in datagrams:
                 other.sendto(datagram, ("127.0.0.1", performers.number))
         time.sleep(0.01)
-        (((body,), moments, poses),) = performers.samples()
+        (keys,) = performers.samples()
         assert performers.samples() == []
-    assert moments == pytest.approx(TIMES_OF_A_SECOND, abs=1e-6)
-    shown = dict(zip(body.joints, Skeleton(body.parents).in_root_space(poses).positions, strict=True))
+    (body,), poses = keys.bodies, keys.poses["VMC"]
+    assert keys.moments == pytest.approx(TIMES_OF_A_SECOND, abs=1e-6)
+    shown = dict(zip(body.joints, Skeleton(body.parents).in_root_space(transposed(poses)).positions, strict=True))
     for name, places in zip(JOINTS, in_world(dance(TIMES_OF_A_SECOND)).positions, strict=True):
         assert shown[name] == pytest.approx(places, abs=1e-5)
     # What a sender of a room takes.
-    assert Sender([body]).add(float(moments[0]), poses[:, 0])
+    assert Sender([body]).add(float(keys.moments[0]), poses[0])
 
 
 def test_trackers_beside_a_performer_are_bodies_with_samples():
@@ -154,24 +157,23 @@ def test_trackers_beside_a_performer_are_bodies_with_samples():
             for datagram in [*write_trackers(ball), *datagrams]:
                 other.sendto(datagram, ("127.0.0.1", performers.number))
         time.sleep(0.01)
-        ((bodies, moments, poses),) = performers.samples()
-    assert [body.name for body in bodies] == ["VMC", "ball"]
-    assert poses.positions[-1, :, 0] == pytest.approx(moments, abs=1e-6)
-    assert Sender(bodies).add(float(moments[0]), poses[:, 0])
+        (keys,) = performers.samples()
+    assert [body.name for body in keys.bodies] == ["VMC", "ball"]
+    assert keys.poses["ball"].positions[:, 0, 0] == pytest.approx(keys.moments, abs=1e-6)
+    assert Sender(keys.bodies).add(float(keys.moments[0]), {name: poses[0] for name, poses in keys.poses.items()})
 
 
 def test_what_a_receiver_shows_goes_to_another_program(listener):
     ball = Body.rigid("ball")
     sender, receiver, poses = Sender([ball, BODY], rate=60.0), Receiver(), dance(TIMES_OF_A_SECOND)
-    to_vmc = ToVmc(receiver, listener.getsockname())
+    to_vmc = ToVmc(listener.getsockname())
     for datagram in sender.describe():
         receiver.take(datagram, 0.0)
     for row, moment in enumerate(TIMES_OF_A_SECOND.tolist()):
         there = {"ball": Poses([[moment, 0.0, 0.0]], [[1.0, 0.0, 0.0, 0.0]]), "dancer": poses[:, row]}
         for datagram in sender.add(moment, there):
             receiver.take(datagram, moment)
-        shown = receiver.show(moment)
-        to_vmc(shown)
+        to_vmc.show(receiver.show(moment).values())
     to_vmc.close()
     datagrams = received(listener)
     assert any(b"/VMC/Ext/Tra/Pos" in datagram for datagram in datagrams)

@@ -1,7 +1,7 @@
 """Humanoid bones: which joint of a skeleton is which, and how skeletons differ in where their bones point at rest.
 
-The names are those of `bones`. Arms hang down at rest in one skeleton, and are held out in another. Metres, Blender's
-axes.
+The names are those of Unity's `HumanBodyBones`, which VRM and VMC share. Arms hang down at rest in one skeleton, and
+are held out in another. Metres, Blender's axes.
 """
 
 from __future__ import annotations
@@ -11,11 +11,38 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..motion import Poses
-from ..motion.quaternions import conjugate, multiply, normalise, rotate
-from .bones import BONES
+from .poses import Poses, inverse, placed
+from .quaternions import normalise
 
 SIDES = {"": "", "L": "Left", "R": "Right"}
+FINGERS = ("Thumb", "Index", "Middle", "Ring", "Little")
+PARTS = {"Proximal": "*Hand", "Intermediate": "Proximal", "Distal": "Intermediate"}
+
+BONES = (
+    ("Hips", "", "torso hips hip pelvis"),
+    ("Spine", "Hips", ""),
+    ("Chest", "Spine", ""),
+    ("UpperChest", "Chest", ""),
+    ("Neck", "UpperChest", "neck neck1 neck01"),
+    ("Head", "Neck", "head"),
+    ("Jaw", "Head", "jaw jawmaster"),
+    ("*Eye", "Head", "eye mastereye"),
+    ("*Shoulder", "UpperChest", "shoulder collar clavicle collarbone"),
+    ("*UpperArm", "*Shoulder", "upperarm uparm arm"),
+    ("*LowerArm", "*UpperArm", "lowerarm forearm loarm"),
+    ("*Hand", "*LowerArm", "hand wrist"),
+    ("*UpperLeg", "Hips", "upperleg upleg thigh"),
+    ("*LowerLeg", "*UpperLeg", "lowerleg lowleg leg shin calf"),
+    ("*Foot", "*LowerLeg", "foot ankle"),
+    ("*Toes", "*Foot", "toes toe toebase ball"),
+    *(
+        (f"*{finger}{part}", above if above == "*Hand" else f"*{finger}{above}", "")
+        for finger in FINGERS
+        for part, above in PARTS.items()
+    ),
+)
+"""What each bone hangs on, and what else it is called. Parents come first; * stands for a side, Left or Right. Other
+names are in lower case, without side, sign or namespace, the better ones first."""
 
 HUMANOID = {
     bone.replace("*", side): above.replace("*", side)
@@ -72,7 +99,7 @@ def humanoid_bones(joints: Sequence[str]) -> dict[str, int]:
         if not side and _TRUNK.fullmatch(name) and name != "torso" and (has_fk or not is_rigify):
             trunk.append(number)
         if finger := _FINGER.fullmatch(name):
-            part = ("Proximal", "Intermediate", "Distal")[int(finger[2]) - 1] if finger[2] else finger[3].capitalize()
+            part = list(PARTS)[int(finger[2]) - 1] if finger[2] else finger[3].capitalize()
             bone, rank = finger[1].replace("pinky", "little").capitalize() + part, 0
         elif name in _KNOWN:
             bone, rank = _KNOWN[name]
@@ -124,7 +151,6 @@ def alignments(bones: dict[str, int], first: np.ndarray, second: np.ndarray | No
 
 def beside(poses: Poses, follows: np.ndarray) -> Poses:
     """Return poses (bones,) seen from those that each follows, by number; as they are where that is none, -1."""
-    hanging = (follows >= 0)[:, None]
-    back = np.where(hanging, conjugate(poses.quaternions[follows]), (1.0, 0.0, 0.0, 0.0))
-    arms = poses.positions - np.where(hanging, poses.positions[follows], 0.0)
-    return Poses(rotate(back, arms), multiply(back, poses.quaternions))
+    result, hanging = poses.copy(), follows >= 0
+    result[hanging] = placed(inverse(poses[follows[hanging]]), poses[hanging])
+    return result
