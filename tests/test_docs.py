@@ -17,11 +17,11 @@ TIMES = np.array((1.0, 20.0, 1.0, 0.5)), np.array((20.0, 1.0, 1.0, 0.7))
 
 
 def test_the_rule_in_bold_is_that_of_the_program():
-    np.testing.assert_array_equal(measure_recordings.RULES[OWN_RULE](*TIMES), curves._shares(*TIMES))
+    np.testing.assert_array_equal(measure_recordings.RULES[OWN_RULE](*TIMES), curves.twist_shares(*TIMES))
 
 
 def test_other_rules_are_others():
-    own = curves._shares(*TIMES)
+    own = curves.twist_shares(*TIMES)
     for name, rule in measure_recordings.RULES.items():
         if name != OWN_RULE:
             assert np.abs(rule(*TIMES) - own).max() > 0.01, name

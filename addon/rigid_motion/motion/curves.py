@@ -81,7 +81,7 @@ def motor_lerp(segments: Segments) -> Curves:
 def motor_spline(segments: Segments, tangents: np.ndarray | None = None, spins: np.ndarray | None = None) -> Curves:
     """Return a screw from key to key, bent so that its twist goes on through every key.
 
-    A key has a mean of the twists of the segments next to it, see `_shares`, the outermost ones have that of their
+    A key has a mean of the twists of the segments next to it, see `twist_shares`, the outermost ones have that of their
     segment, and none has any where the body rests before or after. `tangents` is how many times as long the twist at
     either end of each segment is, shape (2, ..., S), for keys that are passed at speeds of their own. `spins` are the
     angular velocities (3, 2, ..., n - 1) that are added to the curve at both ends of the segments in their own time:
@@ -91,7 +91,7 @@ def motor_spline(segments: Segments, tangents: np.ndarray | None = None, spins: 
     def at_keys(
         leaving: np.ndarray, arriving: np.ndarray, before: np.ndarray, after: np.ndarray, rests: np.ndarray
     ) -> np.ndarray:
-        share = _shares(before, after)
+        share = twist_shares(before, after)
         inner = share * arriving[..., :-1] + (1.0 - share) * leaving[..., 1:]
         if rests.any():
             inner[:, rests[..., :-1] | rests[..., 1:]] = 0.0
@@ -129,7 +129,7 @@ SHORT = 1.0 / 16.0
 """The part of its neighbour's time up to which a segment passes no twist on."""
 
 
-def _shares(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+def twist_shares(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """Return what the twist before a key counts for that of the key; the twist after it counts for the rest.
 
     The parabola through the key and its neighbours would have

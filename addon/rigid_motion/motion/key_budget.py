@@ -1,10 +1,11 @@
 """The search for so many keys that are as near to a recording as can be.
 
-Keys are taken out until so many are left. For the largest error they are laid out anew and moved together, a few times,
-or, where there are few samples for each, some are taken out and put in elsewhere. Then the best is put together of all
-that this has led to. Where a segment depends on its two keys alone and there are few samples for each key, nearly all
-of them are candidates, and the first layout is the best there is but for a few hundredths. For the mean square some
-more keys are put in, moved, and as many taken out.
+Keys are taken out until so many are left. For the largest error they are laid out anew and moved together. Where more
+keys than its two have a say in a segment, a search for a tolerance a little below the error that is left follows, as
+bisecting the tolerance would. Then the best is put together of all that this has led to, and such a search is tried
+once or twice more from there. Where a segment depends on its two keys alone and there are few samples for each key,
+nearly all of them are candidates, and the first layout is the best there is but for a few hundredths. For the mean
+square some more keys are put in, moved, and as many taken out.
 """
 
 from __future__ import annotations
@@ -40,20 +41,20 @@ Where there are fewer, what is done for each key takes longer than looking at sa
 at samples takes so long that another try is worth more.
 """
 
-ENOUGH = 10.0, 15.0
-"""Times the poses that the first keys have taken, after which no try begins: in the middle and above."""
-
 TOGETHER = {0: ((5, 6), (5, 12), (5, 24)), 1: ((2, 6), (3, 12), (2, 24), (2, 48)), 2: ((2, 6), (2, 12))}
 """How keys are moved together, by the reach of the mode: places for each, and how near to one another."""
 
 STEPS = slice(1, 2), slice(2), slice(None), slice(2)
 """Which of these are done, by the lengths."""
 
-AGAIN = slice(1)
-"""The same once some keys have been put in elsewhere, or taken out."""
+FIRST_STEP = slice(1)
+"""The first alone: for splines where there are fewest samples for each key, and after the search for a tolerance."""
 
-KEPT = 0.9
-"""Of the keys: what is left of them when some are taken out, for others to be put in elsewhere."""
+TIGHTER, LOOSER = 1.05, 1.6
+"""The largest error over the tolerance that better keys are then searched for, and the looser one on the way there."""
+
+CLOSING, CLOSINGS = 1.03, 2
+"""The same at last, without a looser one, and how often at most."""
 
 FEW = 8
 """Keys that are put in at once where each makes the error less; else half of those that are left."""
@@ -99,35 +100,61 @@ class BudgetSearch(Search):
         """Return the keys with the smallest largest error of all that tries lead to from some."""
         if self._takes_all:
             candidates = self._lively(CALM * keys.peak.max())
-        enough = math.inf if self._is_short else ENOUGH[self._length - 2] * self.costs.looked
-        best = samples = (self.moved(keys, math.inf) if self._length == 2 else keys).indices
-        result = [best]
-        for number in range(min(tries, 1 if self.reach == 0 else 2 if self._is_short else 3)):
-            if self.costs.peak(best) == 0.0 or self.costs.looked > enough:
+        if self.reach and not self._is_short:
+            keys = self._settled(keys)
+        elif self._length == 2:
+            keys = self.moved(keys, math.inf)
+        steps = FIRST_STEP if self.reach and self._length == 0 else STEPS[self._length]
+        samples, result = keys.indices, [keys.indices]
+        for _ in range(min(tries, 2 if self.reach and not self._is_short else 1)):
+            if self.costs.peak(samples) == 0.0:
                 break
-            steps, is_complete = STEPS[self._length], False
-            if number and self._is_short:
-                # Those that matter least go where the motion is off most.
-                fewest = max(2, int(KEPT * self.budget))
-                samples, steps = self.thinned(self.measured(best), math.inf, fewest).indices, AGAIN
-            else:
-                samples, is_complete = spread_keys(self.costs, candidates, samples, self.budget)
+            samples, is_complete = spread_keys(self.costs, candidates, samples, self.budget)
             moved = self._moved_together(samples, steps)
-            result += moved
-            samples, best = moved[-1], min(best, *moved, key=self.costs.peak)
+            # Where there is time for many, what differs little only takes time from putting them together.
+            result += [min(moved, key=self.costs.peak)] if self.reach and not self._is_short else moved
+            samples = moved[-1]
             if self._takes_all and is_complete:
-                return best
+                return min(result, key=self.costs.peak)
             candidates = candidates[::SPARSER]
+        best = min(result, key=self.costs.peak)
         # Without neighbours there is little left to gain, and in long recordings it takes long.
         is_long = len(self.recording.times) > SHORT and not self.reach
-        if is_long or not self.is_linkable or self.costs.peak(best) == 0.0:
+        if is_long or self.costs.peak(best) == 0.0:
             return best
-        if not self.reach:
-            # All are near to one another: the two best have what the others have.
+        if self.reach:
+            result += self._of_tolerance(best)
+            best = min(result, key=self.costs.peak)
+        if self.is_linkable:
+            # Without neighbours all are near to one another: the two best have what the others have.
             by_peak = {self.costs.peak(keys): keys for keys in result}
-            result = [by_peak[peak] for peak in sorted(by_peak)[:2]]
-        joined = self.filled(self.measured(joined_keys(self.costs, result, self.budget))).indices
-        return min(best, joined, key=self.costs.peak)
+            result = [by_peak[peak] for peak in sorted(by_peak)[: None if self.reach else 2]]
+            joined = self.filled(self.measured(joined_keys(self.costs, result, self.budget))).indices
+            best = min(best, joined, key=self.costs.peak)
+        return self._closed(best) if self.reach else best
+
+    def _of_tolerance(self, best: np.ndarray) -> list[np.ndarray]:
+        """Return what a search for a tolerance makes of the best keys, brought to the budget."""
+        tolerance = self.costs.peak(best) / TIGHTER
+        keys = self.loosened(self.measured(best), tolerance, LOOSER)
+        if len(keys.indices) > self.budget:
+            keys = self.thinned(keys, math.inf, self.budget)
+        result = [self.filled(keys).indices]
+        if self._length == 1:  # With fewer samples for each key it takes too long, with more it finds little.
+            result += self._moved_together(min(best, *result, key=self.costs.peak), FIRST_STEP)
+        return result
+
+    def _closed(self, best: np.ndarray) -> np.ndarray:
+        """Return the best keys, or better ones that put in a few at the worst places and do without others."""
+        for _ in range(CLOSINGS):
+            tolerance = self.costs.peak(best) / CLOSING
+            if tolerance == 0.0:
+                break
+            keys = self.refined(self.densified(self.measured(best), tolerance), tolerance)
+            if len(keys.indices) > self.budget:
+                break
+            best = min(best, self.filled(keys).indices, key=self.costs.peak)
+        return best
 
     def filled(self, keys: Keys, most: int | None = None) -> Keys:
         """Keys with more of them where the motion is off most, as many as the budget, or this, has left."""

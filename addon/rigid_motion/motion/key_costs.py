@@ -7,10 +7,12 @@ the keys that have a say in it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
+from .key_memory import Memory
+from .key_splines import SplineErrors
 from .measures import shell_error
 from .modes import MODES
 from .piecewise import blocks
@@ -31,9 +33,6 @@ REMEMBERED = 2**18
 
 REMEMBERED_EACH = 16
 """Segments for each sample of a shorter recording."""
-
-FACTOR = np.uint64(0x9E3779B97F4A7C15)
-"""Spreads segments over the places that they are remembered in: 2^64 over the golden ratio."""
 
 Found = tuple[np.ndarray, np.ndarray]
 """The costs and the peaks of segments."""
@@ -76,6 +75,12 @@ class Recording:
         self.poses_each = float(math.prod(poses.shape[:-1]))
         """How many poses are looked at for the error of a sample, on average."""
 
+    @property
+    def is_plain_spline(self) -> bool:
+        """Whether `SplineErrors` has its errors: under `motor_spline`, of one pose for each sample, without scales."""
+        is_plain = type(self) is Recording and not self.off_at_keys
+        return is_plain and self.mode == "motor_spline" and self.poses.scales is None and len(self.poses.shape) == 1
+
     def errors(self, samples: np.ndarray, shown: Poses) -> np.ndarray:
         """How far what is shown (..., m) is off at some samples (m,), in tolerances, shape (m,)."""
         return self.in_tolerances(shell_error(shown, self.truth[samples], _at(self.radius, samples)), samples)
@@ -106,7 +111,8 @@ class Costs:
         self.looked = 0.0
         """How many poses have been looked at so far."""
         self._first = 0 if recording.off_at_keys else 1
-        self._memory = _Memory(min(REMEMBERED, REMEMBERED_EACH * len(recording.times)))
+        self._spline = SplineErrors(recording) if recording.is_plain_spline else None
+        self._memory = Memory(min(REMEMBERED, REMEMBERED_EACH * len(recording.times)), 2)
 
     def of(self, segments: np.ndarray) -> Found:
         """Costs and peaks (...) of segments (..., keys), zero where no sample counts."""
@@ -176,6 +182,9 @@ class Costs:
     def _errors(self, rows: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return samples (n,) and their errors (n,) in segments (s, keys) with so many of them in each, (s,)."""
         recording, before = self.recording, self.reach
+        if self._spline is not None:
+            samples, errors = self._spline.errors(rows, counts)
+            return samples, np.minimum(errors, WORST)
         begins = rows[:, before] + self._first - np.cumsum(counts) + counts
         samples = np.repeat(begins, counts) + np.arange(counts.sum())
         key_times, keys = _with_ends(recording, rows, self.reach)
@@ -188,42 +197,6 @@ class Costs:
         counts, progress = (np.concatenate([numbers] * math.prod(together)) for numbers in (counts, progress))
         shown = within(counts, progress, slice(None))
         return samples, np.minimum(recording.errors(samples, reshaped(shown, *together, -1)), WORST)
-
-
-class _Memory:
-    """Costs and peaks of segments, each in a place that its samples make; another one for that place replaces it."""
-
-    def __init__(self, most: int) -> None:
-        bits = max(1, (most - 1).bit_length())
-        self._shift = np.uint64(64 - bits)
-        self._numbers, self._found = np.zeros(2**bits, dtype=np.uint64), np.empty((2**bits, 2))
-        self._last = np.empty(2**bits, dtype=np.int64)
-
-    def find(self, rows: np.ndarray, samples: int, work_out: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """Return what there is for segments (s, keys), shape (s, 2), worked out where it is not remembered.
-
-        `samples` is how many there are: a segment is the number that has its samples for digits. Where that has more
-        than 64 bits, another one with the same last bits is none that anybody will ever see.
-        """
-        numbers = np.zeros(len(rows), dtype=np.uint64)
-        for column in range(rows.shape[1]):
-            numbers *= np.uint64(samples + 1)
-            numbers += (rows[:, column] + 1).astype(np.uint64)
-        places = ((numbers * FACTOR) >> self._shift).astype(np.int64)
-        result = self._found.take(places, axis=0)
-        new = np.flatnonzero(self._numbers.take(places) != numbers)
-        if len(new):
-            numbers, places, order = numbers[new], places[new], np.arange(len(new))
-            # Of those for one place the last stays: others are worked out only where they are not the same.
-            self._last[places] = order
-            last = self._last[places]
-            differs = numbers != numbers[last]
-            stays = last == order
-            needed = stays | differs
-            of_needed = work_out(rows[new[needed]])
-            result[new] = of_needed[(np.cumsum(needed) - 1)[np.where(differs, order, last)]]
-            self._numbers[places[stays]], self._found[places[stays]] = numbers[stays], of_needed[stays[needed]]
-        return result
 
 
 def _at(numbers: np.ndarray, samples: np.ndarray) -> np.ndarray:

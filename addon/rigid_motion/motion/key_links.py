@@ -36,7 +36,7 @@ EFFORT = 100
 BESIDE = {0: 2, 1: 0}
 """The same for keys of a budget, whatever the effort."""
 
-NEAR = {0: (1.0, 1.2), 1: (1.2, 1.4)}
+NEAR = {0: (1.0, 1.2), 1: (1.0, 1.2)}
 """How many times the least error so far a segment may be off by for these, and for a longer one to be looked at."""
 
 JOINED = 300

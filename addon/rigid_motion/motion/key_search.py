@@ -116,9 +116,7 @@ class Search:
             return self._traded(best, tries).indices
         result = [best.indices]
         for looser in LOOSER[:tries]:
-            # Keys that are too few find better places, also when some are put back between them.
-            fewer = self.moved(self.thinned(self.measured(best.indices), looser), looser)
-            keys = self.refined(self.densified(fewer, 1.0))
+            keys = self.loosened(best, 1.0, looser)
             best = self._better(best, keys)
             result.append(keys.indices)
         if self.is_linkable and tries:
@@ -217,6 +215,12 @@ class Search:
                 break  # It is off by no more than rounding.
             keys = self.measured(more)
         return keys
+
+    def loosened(self, keys: Keys, tolerance: float, looser: float) -> Keys:
+        """Keys that keep to a tolerance, put back between some that are too few, which find better places."""
+        looser *= tolerance
+        fewer = self.moved(self.thinned(self.measured(keys.indices), looser), looser)
+        return self.refined(self.densified(fewer, tolerance), tolerance)
 
     def _better(self, best: Keys, other: Keys) -> Keys:
         """Of each track the keys that are fewer."""

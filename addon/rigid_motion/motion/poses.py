@@ -237,6 +237,11 @@ class PackedPoses:
             rows.append(poses.scales[None])
         self._rows = np.concatenate(rows)
 
+    @property
+    def rows(self) -> np.ndarray:
+        """Positions, quaternions and, where there are some, scales, shape (7 or 8, ..., n)."""
+        return self._rows
+
     @classmethod
     def _view(cls, rows: np.ndarray) -> PackedPoses:
         view = cls.__new__(cls)

@@ -54,8 +54,8 @@ def reduce_keys(
         How many more searches there are, up to three: what they have found is put together. Each begins with fewer keys
         than the tolerance allows, and puts some back where the motion is off, which takes about half as long as the
         first search; under `rms` it keeps to another tolerance, and takes as long. With a budget, 0 is the first
-        search alone, and tries lay the keys out anew, as long as that takes not much longer than it; one try does
-        where a segment depends on its two keys alone.
+        search alone; one try lays the keys out anew, and a second one does so again for splines with ten samples or
+        more for each key.
 
     Returns
     -------

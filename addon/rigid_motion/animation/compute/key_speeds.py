@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...motion import Poses, twists
-from ...motion.curves import _shares as twist_shares
+from ...motion.curves import twist_shares
 
 STEP = 1.0 / 8.0
 """The part of a segment that slopes are measured over: exact for cubics in time, and finite for vertical handles."""
