@@ -38,7 +38,10 @@ if {}:
     os.sched_setaffinity(0, {{min(os.sched_getaffinity(0))}})
 from rigid_motion_batch.cli.commands import main
 code = main(sys.argv[1:])
-print(*(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)))
+taken, children = (resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+if sys.platform == "linux":  # Where that counts the process that started this one, too.
+    taken = open("/proc/self/status").read().partition("VmHWM:")[2].split()[0]
+print(taken, children)
 sys.exit(code)
 """
 """The program in the process that is started; `-m rigid_motion_batch` does the work in a child of that."""

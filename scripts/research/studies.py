@@ -23,9 +23,7 @@ def study_parser(name: str, description: str, epilog: str = "") -> Parser:
     """Return the parser of a study, with the option where to write."""
     parser = parser_of(f"research {name}", description, epilog)
     parser.set_defaults(study=name)
-    parser.add_argument(
-        "--root", type=Path, default=ROOT, metavar="FOLDER", help="write FOLDER/docs/figures (this checkout)"
-    )
+    parser.add_argument("--root", type=Path, default=ROOT, metavar="FOLDER", help="of docs/figures (this checkout)")
     return parser
 
 
@@ -79,7 +77,6 @@ def files_in(paths: Iterable[Path], extensions: Collection[str] = EXTENSIONS) ->
             raise TrajectoryError(str(path), "no such file or folder", "check the path")
         files = [file for file in sorted(path.rglob("*")) if file.is_file() and file.suffix.lower() in extensions]
         if path.is_dir() and not files:
-            known = ", ".join(sorted(extensions))
-            raise TrajectoryError(str(path), "no recording in this folder", f"known are {known}")
+            raise TrajectoryError(str(path), "no recording in this folder", f"known: {', '.join(sorted(extensions))}")
         result |= dict.fromkeys(files if path.is_dir() else [path])
     return list(result)

@@ -157,7 +157,7 @@ def test_a_body_that_ends_a_worker_is_told_and_the_others_go_on(deadly, tmp_path
     lines = [line for line in lines_about(capfd.readouterr().err, deadly) if "its process died (SIGSEGV)" in line]
     *again, last = lines
     assert all(line.endswith("; trying again") for line in again)
-    assert last.startswith(f"compare.py: {deadly}: its process died (SIGSEGV)")
+    assert last.startswith(f"compare.py: read {deadly}: its process died (SIGSEGV)")
     assert last.endswith("; given up after 3 attempts")
     assert {row["clip"] for row in rows_of(output / "metrics.csv")} == {"walk", "stroll"}
     assert {row["clip"] for row in rows_of(output / "metrics_joints.csv")} == {"walk", "stroll"}
