@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 from mathutils import Quaternion
 
-from ..motion import Poses, Skeleton
+from ..motion import Poses
 from ..motion.eulers import ORDERS
 from ..motion.humanoid import beside, humanoid_bones
 from ..motion.quaternions import conjugate, from_matrices, multiply, rotate
@@ -120,7 +120,6 @@ class RigDriver(Driver):
         bones = obj.pose.bones
         joints = [joint for joint in body.joints if pairs.get(joint, "") in bones]
         self.bones = [pairs[joint] for joint in joints]
-        self._skeleton = Skeleton(body.parents)
         placed, self._follows = _space(obj, self.bones)
         self._offsets = beside(placed, self._follows)
         """The pose of each bone with no values, seen from the bone that it follows, or in the armature."""
@@ -128,11 +127,10 @@ class RigDriver(Driver):
         self._turn, self._scale = np.array(turn), max(sum(map(abs, scale)) / 3.0, 1e-9)
         numbers = np.array([body.joints.index(joint) for joint in joints], dtype=np.int64)
         in_world = Poses(self._scale * rotate(self._turn, placed.positions), multiply(self._turn, placed.quaternions))
-        rest = self._skeleton.in_root_space(body.rest[:, None])[:, 0]
         named = humanoid_bones(body.joints)
         rows = {joint: row for row, joint in enumerate(numbers.tolist())}
         self._retarget = Retargeting(
-            rest,
+            body.in_root_space(body.rest),
             in_world,
             np.stack((numbers, np.arange(len(numbers))), axis=1),
             np.array([self._above(joint, rows) for joint in numbers.tolist()], dtype=np.int64),
@@ -148,7 +146,7 @@ class RigDriver(Driver):
         return rows.get(joint, -1)
 
     def values(self, poses: Poses) -> Values:
-        target = self._retarget(self._skeleton.in_root_space(poses))
+        target = self._retarget(self.body.skeleton.in_root_space(poses))
         back = conjugate(self._turn)
         turns = multiply(back, target.quaternions)
         places = rotate(back, target.positions) / self._scale
@@ -203,7 +201,7 @@ def _new_armature(label: str, body: Body) -> bpy.types.Object | None:
     """
     if bpy.context.mode != "OBJECT":
         return None
-    rest = Skeleton(body.parents).in_root_space(body.rest[:, None])[:, 0]
+    rest = body.in_root_space(body.rest)
     obj = _linked(bpy.data.objects.new(label, bpy.data.armatures.new(label)), label)
     active = bpy.context.view_layer.objects.active
     selected = bpy.context.selected_objects

@@ -63,6 +63,15 @@ class Body:
         object.__setattr__(self, "parents", parents)
         object.__setattr__(self, "sliding", sliding)
 
+    @cached_property
+    def skeleton(self) -> Skeleton:
+        """Which joint hangs on which."""
+        return Skeleton(self.parents)
+
+    def in_root_space(self, poses: Poses) -> Poses:
+        """Return poses (joints,) of the joints, each in its parent's space, as they are in that of the roots."""
+        return self.skeleton.in_root_space(poses[:, None])[:, 0]
+
     @classmethod
     def rigid(cls, name: str, pose: Poses | None = None, radius: float = RADIUS) -> Body:
         """Return a single rigid body, at rest at `pose` (1,), or in the middle of everything."""

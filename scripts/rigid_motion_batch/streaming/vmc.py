@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from rigid_motion.live.sockets import Address, Outlet, Port
-from rigid_motion.motion import Poses, Skeleton
+from rigid_motion.motion import Poses
 from rigid_motion.streams import Body, Keys, Shown
 from rigid_motion.streams.receiver import Stream
 from rigid_motion.streams.vmc import SILENT, Performer, VmcReceiver, write, write_trackers
@@ -39,7 +39,7 @@ class ToVmc(Outlet):
                 if len(body.joints) == 1:
                     trackers[body.name] = poses[0]
                 elif not datagrams and (performer := self.performer_of(body)):
-                    datagrams = write(moment, performer(Skeleton(body.parents).in_root_space(poses[:, None])[:, 0]))
+                    datagrams = write(moment, performer(body.in_root_space(poses)))
         for datagram in datagrams + write_trackers(trackers):
             self.say(datagram)
             self.datagrams += 1
@@ -47,8 +47,7 @@ class ToVmc(Outlet):
     def performer_of(self, body: Body) -> Performer | None:
         """Return what a skeleton is to VMC; None where it is no person."""
         if self._performer[0] is not body:
-            rest = Skeleton(body.parents).in_root_space(body.rest[:, None])[:, 0]
-            performer = Performer(body.joints, rest)
+            performer = Performer(body.joints, body.in_root_space(body.rest))
             self._performer = body, performer if "Hips" in performer.bones else None
         return self._performer[1]
 

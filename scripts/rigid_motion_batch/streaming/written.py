@@ -8,7 +8,7 @@ from typing import NamedTuple, TextIO, cast
 
 import numpy as np
 
-from rigid_motion.motion import Poses, Skeleton, interpolate
+from rigid_motion.motion import Poses, interpolate
 from rigid_motion.streams import Body
 from rigid_motion_batch.analysis.metrics import lines_of_poses, write_poses
 from rigid_motion_batch.axes import from_blender
@@ -60,7 +60,7 @@ def write_motions(path: Path, motions: Sequence[Motion], fps: float) -> list[Pat
 def _write_table(file: TextIO, motions: Sequence[Motion]) -> None:
     file.write("device,t,x,y,z,qw,qx,qy,qz\n")
     for motion in motions:
-        poses = Skeleton(motion.body.parents).in_root_space(motion.poses)
+        poses = motion.body.skeleton.in_root_space(motion.poses)
         for name, own in zip(motion.body.joints, poses, strict=True):
             device = motion.name if len(motion.body.joints) == 1 else f"{motion.name}.{name}"
             device = device.replace(",", "_").replace('"', "_")
