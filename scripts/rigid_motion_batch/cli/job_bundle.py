@@ -51,7 +51,7 @@ def main(arguments: list[str]) -> int:
     parts = {stage: 1 if stage == "report" else own.parts for stage in stages}
     try:
         rest, inputs = below_inputs(without(rest, "-o", "--output"))
-        values = write_bundle(own.bundle.absolute(), rest, inputs, output.absolute(), parts)
+        values = write_bundle(own.bundle.absolute(), rest, inputs, output, parts)
     except ValueError as error:
         complain(PROGRAM, error)
         return 2

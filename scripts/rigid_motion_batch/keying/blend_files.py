@@ -13,7 +13,7 @@ import bpy
 from rigid_motion_batch.files import written_beside
 from rigid_motion_batch.silencing import silenced
 
-from .output_files import FileProblem, Unreadable, changed_at
+from .output_files import FileProblem, Unreadable, changed_at, not_written
 from .records import Record
 from .sessions import stop_if_asked
 
@@ -159,10 +159,9 @@ def write_file(output: Path, record: Record | None, opened: int | None = None) -
         said = " ".join(str(error).split()).removeprefix("Error: ")
         # What it says of a file is of the name that it writes under, and without any it is of no use.
         reason = said.rpartition(": ")[2].replace(beside.name, output.name) if ": " in said else CUT_OFF
-        raise FileProblem(f"{output} could not be written ({reason}): write elsewhere with --output") from None
+        raise not_written(output, reason) from None
     except OSError as error:
-        place, reason = error.filename or output, error.strerror or str(error)
-        raise FileProblem(f"{place} could not be written ({reason}): write elsewhere with --output") from None
+        raise not_written(error.filename or output, error.strerror or error) from None
 
 
 def refuse_cut_off(path: Path) -> None:

@@ -17,6 +17,11 @@ class Unreadable(FileProblem):
     """Why a file cannot be opened, and the way out."""
 
 
+def not_written(path: str | Path, reason: object) -> FileProblem:
+    """Return why a file was begun, and is not there."""
+    return FileProblem(f"{path} could not be written ({reason}): write elsewhere with --output")
+
+
 def changed_at(path: Path) -> int | None:
     """Return when a file was changed last, in nanoseconds; None where there is none."""
     try:

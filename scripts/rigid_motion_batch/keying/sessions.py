@@ -28,7 +28,6 @@ from rigid_motion_batch.progress import Progress, Stage
 from rigid_motion_batch.supervising import blender_program, report, stop_signals, written_of
 
 from .planning import Job
-from .records import Record
 from .work import Doing, Outcome, Work
 
 EXTENSION = "rigid_motion"
@@ -204,7 +203,7 @@ class _Session:
             return
         task = _task(self._work, job)
         key = task.key if task.inputs else ""
-        if key and (result := _record_of(self._work, job).done(key)):
+        if key and (result := self._work.record_of(job).done(key)):
             written, facts = result
             self._note(f"{job.source}: already {self._work.done}: {', '.join(map(str, written))}")
             self._outcomes[place] = outcome = Outcome(job.source, is_old=True, matched=set(facts.get("matched", ())))
@@ -233,7 +232,7 @@ class _Session:
         else:
             if key and outcome.is_whole and not self._work.dry_run:
                 facts = {"matched": sorted(outcome.matched)}
-                _record_of(self._work, job).keep(key, outcome.written, outcome.beside, outcome.read, facts)
+                self._work.record_of(job).keep(key, outcome.written, outcome.beside, outcome.read, facts)
         self._outcomes[place] = outcome
 
 
@@ -251,10 +250,6 @@ def _task(work: Work, job: Job) -> steps.Task:
 
 def _keep_note(place: Path, text: str) -> None:
     append_lines(place / NOTES, [{"note": text}])
-
-
-def _record_of(work: Work, job: Job) -> Record:
-    return Record(job.folder, job.source, overwrite=work.overwrite)
 
 
 def _inputs(job: Job) -> dict[str, str]:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from rigid_motion_batch.supervising import report
 
-from .output_files import FileProblem, Unreadable, refuse_read_only
+from .output_files import FileProblem, Unreadable, not_written, refuse_read_only
 from .planning import Job
 from .records import Record
 
@@ -39,6 +39,10 @@ class Work(ABC):
     dry_run: bool
     processes: int = field(default=1, kw_only=True)
     """For one input, where it has parts."""
+
+    def record_of(self, job: Job) -> Record:
+        """Return what is known of what was made of an input."""
+        return Record(job.folder, job.source, overwrite=self.overwrite)
 
     @abstractmethod
     def needs_blender(self, job: Job) -> bool: ...
@@ -103,7 +107,7 @@ class Doing:
     def __init__(self, work: Work, job: Job, note: Note) -> None:
         self.work, self.job, self.note = work, job, note
         self.title = job.source
-        self.record = Record(job.folder, job.source, overwrite=work.overwrite)
+        self.record = work.record_of(job)
         self.would = "would be " if work.dry_run else ""
         self.outcome = Outcome(job.source)
 
@@ -142,8 +146,7 @@ class Doing:
             with self.record.writing(path) as beside:
                 yield beside
         except OSError as error:
-            reason = error.strerror or error
-            raise FileProblem(f"{path} could not be written ({reason}): write elsewhere with --output") from None
+            raise not_written(path, error.strerror or error) from None
 
     def tell_written(self, path: Path) -> None:
         self.say(f"{self.would}written to {path}")
