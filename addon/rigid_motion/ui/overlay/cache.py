@@ -19,7 +19,7 @@ from bpy.app.handlers import persistent
 from ...animation.actions.slots import Binding
 from ...animation.compute.sources import Source
 from ...animation.handlers import append_handlers, remove_handlers
-from ...animation.queries.keyed import active_bindings, frames_in, sources_of
+from ...animation.queries.keyed import active_bindings, frames_in
 from ...animation.transforms import Transform, transform_of
 from .ghosts import ghosts_of
 from .kinds import PATH_KINDS
@@ -78,12 +78,10 @@ def paths_of(
         if entry is None or entry.stale or entry.settings != (*settings, b"" if entry.above else _bytes(turn)):
             stale[target] = turn
     if stale:
-        bindings = active_bindings(list(stale))
-        sources = dict(zip(bindings, sources_of(list(bindings.values())), strict=True))
         carried = Carried()
-        for target, turn in stale.items():
+        for target, (binding, source) in carried.read(stale).items():
             before = _entries.get(_identity(target))
-            entry = _read(target, bindings.get(target), sources.get(target), settings, turn, before, carried)
+            entry = _read(target, binding, source, settings, stale[target], before, carried)
             _entries[_identity(target)] = entry
     for target in targets:
         _entries.move_to_end(_identity(target))

@@ -29,7 +29,7 @@ WHOLE_OBJECTS = ("OBJECT", "ARMATURE")
 
 
 class Carried:
-    """What several targets hang on: read once, and worked out once for all that are looked at on the same frames."""
+    """Several targets and what they hang on: read once, and worked out once for all looked at on the same frames."""
 
     def __init__(self) -> None:
         self._followers: dict[bpy.types.Object, NotPromised] = {}
@@ -39,7 +39,7 @@ class Carried:
         self._posed: dict[tuple[Transform, bytes], AffineMaps] = {}
 
     def read(self, transforms: Iterable[Transform]) -> dict[Transform, tuple[Binding | None, Source | None]]:
-        """Return the place that each moves by, and what is keyed there; None where there is none."""
+        """Return the binding that each moves by, and what is keyed there; None where there is none."""
         transforms = list(transforms)
         if missing := [transform for transform in transforms if transform not in self._read]:
             bindings = active_bindings(missing)
