@@ -16,7 +16,7 @@ from .curves import twist_shares
 from .key_memory import Memory
 from .measures import largest_displacement
 from .quaternions import cross
-from .segments import SMALLEST_ANGLE, STILL
+from .segments import STILL, in_one_place
 
 if TYPE_CHECKING:
     from .key_costs import Recording
@@ -87,8 +87,7 @@ class SplineErrors:
         begin, end = self._rows.take(first, axis=1), self._rows.take(second, axis=1)
         result = np.zeros((7, len(first)))
         result[:6] = twists.logarithm(*_seen_from(begin, end))
-        size = np.abs(0.5 * (begin[:3] + end[:3])).max(axis=0) + SMALLEST_ANGLE
-        rests = np.abs(end[:3] - begin[:3]).max(axis=0) < STILL * size
+        rests = in_one_place(begin[:3], end[:3])
         if rests.any():
             result[6] = rests & (np.einsum("kp,kp->p", result[:3], result[:3]) < (4.0 * STILL) ** 2)
         return result

@@ -129,9 +129,7 @@ class Segments:
     @property
     def are_still(self) -> np.ndarray:
         """Whether nothing moves between two keys, but for rounding, of all segments of each object, (..., n - 1)."""
-        begin, end = self.positions
-        size = np.abs(0.5 * (begin + end)).max(axis=0) + SMALLEST_ANGLE
-        still = np.abs(end - begin).max(axis=0) < STILL * size
+        still = in_one_place(*self.positions)
         if not still.any():
             return still
         turn, growth = self.screws[:3], self.screws[6]
@@ -424,6 +422,12 @@ def _ends(vectors: np.ndarray) -> Ends:
 def _flat(rows: np.ndarray) -> np.ndarray:
     """Components (k, ...) one after the other, (k, S)."""
     return np.ascontiguousarray(rows).reshape(len(rows), -1)
+
+
+def in_one_place(begin: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Return whether positions (3, ...) are others' but for rounding."""
+    size = np.abs(0.5 * (begin + end)).max(axis=0) + SMALLEST_ANGLE
+    return np.asarray(np.abs(end - begin).max(axis=0) < STILL * size)
 
 
 def _length(components: np.ndarray) -> np.ndarray:
