@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from rigid_motion.motion import MODES, Poses, reduce_keys
+from rigid_motion.motion import MODES, Poses, reduce_keys, twists
+from rigid_motion.motion.key_splines import SplineErrors
+from rigid_motion.motion.quaternions import align_signs
 from tests.motion.test_reduction import RADIUS, shell_errors, wandering
 
 MEMORYLESS = [name for name, mode in MODES.items() if not mode.is_smooth]
@@ -43,3 +45,25 @@ def test_more_searches_leave_fewer_keys_of_the_same_mean_square_error(mode):
         assert len(few) <= len(many)
         fewer += len(few) < len(many)
     assert fewer >= 2
+
+
+def test_long_segments_of_a_smooth_motion_do_not_make_the_search_many_times_as_long(monkeypatch):
+    looked_at = []
+    errors = SplineErrors.errors
+
+    def counted(self, rows, counts):
+        looked_at.append(counts.sum())
+        return errors(self, rows, counts)
+
+    monkeypatch.setattr(SplineErrors, "errors", counted)
+    random, times = np.random.default_rng(110), np.arange(1500) / 60.0
+    rates, sizes = 2.0 * np.pi * random.uniform(0.1, 3.0, (6, 8, 1)), random.normal(size=(6, 8, 1))
+    waves = (sizes / rates * np.sin(rates * times + random.uniform(0.0, 2.0 * np.pi, (6, 8, 1)))).sum(axis=1)
+    turns, _ = twists.exponential(np.concatenate((3.0 * waves[:3], np.zeros((3, len(times))))))
+    poses = Poses(waves[3:].T, align_signs(turns.T))
+    efforts = []
+    for tries in (0, 1):
+        looked_at.clear()
+        reduce_keys(times, poses, "motor_spline", 0.9, RADIUS, tries=tries)
+        efforts.append(sum(looked_at))
+    assert efforts[1] <= 6 * efforts[0]

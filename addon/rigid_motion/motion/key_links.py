@@ -33,6 +33,9 @@ WIDTHS = {0: (3, 1), 1: (1, 0)}
 EFFORT = 100
 """Times that every sample may be looked at, on average."""
 
+PAIRED = 200
+"""The same for pairs of candidates, where a segment depends on more keys than its two: more finds no fewer keys."""
+
 BESIDE = {0: 2, 1: 0}
 """The same for keys of a budget, whatever the effort."""
 
@@ -179,6 +182,8 @@ def _links(
     made no longer; with neighbours as far away as they are long.
     """
     pairs = _pairs(costs, candidates, result, good, alive)
+    if pairs is None:
+        return None
     if costs.reach == 0:
         return candidates[pairs]
     before, after = _neighbours(pairs, len(candidates))
@@ -190,9 +195,12 @@ def _links(
     return np.where(numbers >= 0, candidates[np.maximum(numbers, 0)], -1)
 
 
-def _pairs(costs: Costs, candidates: np.ndarray, result: list[np.ndarray], good: float, alive: float) -> np.ndarray:
-    """Candidates that a segment may join, (p, 2), by the first and then the second."""
+def _pairs(
+    costs: Costs, candidates: np.ndarray, result: list[np.ndarray], good: float, alive: float
+) -> np.ndarray | None:
+    """Return the candidates that a segment may join, (p, 2), by the first and then the second; None for many."""
     last, reach = len(candidates) - 1, costs.reach
+    left = PAIRED * len(costs.recording.times) * costs.recording.poses_each if reach else math.inf
     pairs = [np.searchsorted(candidates, np.stack((keys[:-1], keys[1:]), axis=1)) for keys in result]
     first, gap = np.arange(last), 1
     while len(first):
@@ -203,6 +211,9 @@ def _pairs(costs: Costs, candidates: np.ndarray, result: list[np.ndarray], good:
         windows = candidates[np.clip(numbers, 0, last)]
         windows[first == 0, :, :reach] = -1
         windows[second >= last, 2 + reach :] = -1
+        left -= costs.effort(windows)
+        if left < 0.0:
+            return None
         cost, peak = costs.of(windows)
         worth = cost if costs.power == 2 else peak
         worth[second > last] = math.inf
