@@ -47,7 +47,7 @@ def reduce_keys(
     budget : int, optional
         The most keys, at least 2, instead of a tolerance: the error is then as small as a few tries find, mostly no
         larger than what bisecting the tolerance reaches, and seldom more than a twentieth above it. With `rms` it may
-        be up to a third above it.
+        be up to a third above it. A body that does not move has two.
     rms : bool
         Go by the root mean square of the shell error instead of the largest.
     tries : int
