@@ -11,8 +11,9 @@ import logging
 import multiprocessing
 import os
 import time
+from collections import Counter
 from collections.abc import Callable
-from concurrent.futures import CancelledError, Future, InvalidStateError, wait
+from concurrent.futures import CancelledError, Future, wait
 from contextlib import suppress
 from functools import cache, partial
 from pathlib import Path
@@ -65,12 +66,10 @@ class DaskExecutor(Executor):
 
     def __init__(self, address: str, folder: Path, note: Callable[[str], object]) -> None:
         self._address, self._folder, self._note = address, os.fspath(folder), note
-        self._executors: dict[str, ClientExecutor] = {}
-        """Address of a worker to what gives jobs to it alone."""
-        self._fit: dict[str, int] = {}
-        """Address of a worker that has answered to how many threads it has; 0 where it does not fit."""
-        self._jobs: dict[str, list[Future[Made]]] = {}
-        """Address of a worker to what it is doing: where it is gone, this is seen to be lost."""
+        self._fit: dict[str, int | None] = {}
+        """Address of a worker to how many threads it has; 0 where it does not fit, None before it has answered."""
+        self._jobs: dict[Future[Made], str] = {}
+        """Jobs at work, and the addresses of their workers."""
         self._looked_at = 0.0
         self._client: Client
 
@@ -80,33 +79,32 @@ class DaskExecutor(Executor):
         if time.monotonic() - self._looked_at > LOOK:
             self._look()
             self._looked_at = time.monotonic()
-        return sum(self._fit.get(address, 0) for address in self._executors)
+        return sum(filter(None, self._fit.values()))
 
     def submit(self, job: Job) -> Future[Made]:
-        self._jobs = {address: [job for job in jobs if not job.done()] for address, jobs in self._jobs.items()}
-        address = max(self._executors, key=lambda address: self._fit.get(address, 0) - len(self._jobs[address]))
-        future: Future[Made] = Future()
-        self._jobs[address].append(future)
-        self._executors[address].submit(do, job).add_done_callback(partial(_hand_over, future))
+        self._jobs = {future: address for future, address in self._jobs.items() if not future.done()}
+        busy = Counter(self._jobs.values())
+        address = max(self._fit, key=lambda address: (self._fit[address] or 0) - busy[address])
+        self._jobs[future := self._executor(address).submit(do, job)] = address
         return future
+
+    def _executor(self, address: str) -> ClientExecutor:
+        """Return what gives jobs to one worker alone."""
+        return self._client.get_executor(pure=False, workers=[address])
 
     def _look(self) -> None:
         """See which workers there are, and ask those that are new."""
-        threads, before = self._threads(), bool(self._executors)
-        for address in self._executors.keys() - threads.keys():
-            with suppress(*UNREACHABLE):
-                self._executors.pop(address).shutdown(wait=False)
-            for future in self._jobs.pop(address):  # Dask does not always say that they are cancelled.
-                with suppress(InvalidStateError):
-                    future.set_exception(CancelledError())
-            if self._fit.pop(address, 0):
+        threads, before = self._threads(), bool(self._fit)
+        for address in self._fit.keys() - threads.keys():
+            if self._fit.pop(address):
                 self._note(f"worker {address} is gone; others go on with its tasks")
-        for address in threads.keys() - self._executors.keys():
-            executor = self._executors[address] = self._client.get_executor(pure=False, workers=[address])
-            self._jobs[address] = []
-            answer = executor.submit(_asker(version_here(), self._folder))
+            for future in [future for future, place in self._jobs.items() if place == address]:
+                future.cancel()  # Dask itself does not always do so.
+        for address in threads.keys() - self._fit.keys():
+            self._fit[address] = None
+            answer = self._executor(address).submit(_asker(version_here(), self._folder))
             answer.add_done_callback(partial(self._hear, address, threads[address]))
-        if self._fit and self._fit.keys() == threads.keys() and not any(self._fit.values()):
+        if {*self._fit.values()} == {0}:
             raise ExecutorError(f"{self._address}: none of its workers is fit")
         if not threads and (before or not self._looked_at):
             self._note(f"{self._address} has no worker; waiting for one: `dask worker {self._address}`")
@@ -147,16 +145,6 @@ class DaskExecutor(Executor):
             self._client.close(timeout=2.0)  # Then nobody wants what is at work, and it is cancelled.
 
 
-def _hand_over(future: Future[Made], theirs: Future[Made]) -> None:
-    """Give a future what came of one of Dask's."""
-    error = CancelledError() if theirs.cancelled() else theirs.exception()
-    with suppress(InvalidStateError):  # Its worker was taken for gone.
-        if error:
-            future.set_exception(error)
-        else:
-            future.set_result(theirs.result())
-
-
 async def _knock(address: str) -> None:
     """Raise OSError where nothing answers that speaks Dask's protocol."""
     async with asyncio.timeout(CONNECTING + 1.0):  # Someone else's server may keep it waiting.
@@ -175,8 +163,7 @@ def _asker(requested: str, folder: str) -> Callable[[], str]:
         except ImportError as error:
             return str(error)
         result = version_here()
-        return (
-            "" if result == requested else f"it has {result}, and this run is of {requested}; start it anew with that"
-        )
+        unfit = f"it has {result}, and this run is of {requested}; start it anew with that"
+        return "" if result == requested else unfit
 
     return ask

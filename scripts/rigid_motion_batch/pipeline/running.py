@@ -154,7 +154,8 @@ class Run:
                 self._begin(task)
             if not capacity:
                 time.sleep(LOOK)
-            ended, _ = wait(self._at_work, LOOK, FIRST_COMPLETED)
+            wait(self._at_work, LOOK, FIRST_COMPLETED)
+            ended = [future for future in self._at_work if future.done()]  # Also those that an executor cancels.
             for future in ended:
                 self._end(future, *self._at_work.pop(future))
             for task, job in () if ended else self._at_work.values():
