@@ -353,7 +353,7 @@ class _Comparing:
     def _too_large(self, choice: Tolerance) -> str:
         problem = ""
         for study in self.plan.studies:
-            clip = study.clip.read(self.store.folder_of(study.reader))
+            clip = study.clip.read(self.store.results / study.reader)
             try:
                 choice.require_within(clip, self.plan.comparison.radii.rigid)
                 return ""
@@ -376,7 +376,7 @@ class _Comparing:
         for name, tasks in groupby(self._measuring(), key=lambda task: cast(steps.Measure, task.step).clip.name):
             choices = []
             for task in tasks:
-                folder = self.store.folder_of(task.key)
+                folder = self.store.results / task.key
                 with suppress(OSError, ValueError, KeyError):  # What could not be made.
                     if isinstance(task.step, steps.CountKeys):
                         needed.append(values.read(KeysNeeded, folder / "needed"))

@@ -15,7 +15,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import cast
@@ -54,7 +54,6 @@ NOTES = "notes"
 """The file of what is said of an input while it is done."""
 
 
-@dataclass(frozen=True)
 class Keyed(steps.Step, rooms=ROOMS):
     """Do one input, wherever that is."""
 

@@ -198,7 +198,7 @@ class ComparisonPlan:
     def _look_into(self) -> list[str]:
         comparison = self.comparison
         readers = [task.key for task in self._readers]
-        folders = {key: self.store.folder_of(key) for key in dict.fromkeys(readers) if self.store.index_of(key)}
+        folders = {key: self.store.results / key for key in dict.fromkeys(readers) if self.store.index_of(key)}
         read = {
             key: values.read(tuple[str, tuple[ClipFacts, ...]], folder / "facts") for key, folder in folders.items()
         }

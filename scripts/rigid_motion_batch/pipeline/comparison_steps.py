@@ -51,7 +51,6 @@ def _told(what: str) -> Iterator[None]:
 # -- recordings -------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
 class Read(Step, rooms=RECORDINGS, stage="read"):
     """Read a source, and repair its clips."""
 
@@ -111,7 +110,6 @@ class ClipOf:
 # -- numbers ----------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
 class Measure(Step, rooms=ANALYSIS, stage="measure"):
     """Choose keys of a clip, let the modes fill them in, and measure what was lost. Before: the recording."""
 
@@ -139,7 +137,6 @@ class Measure(Step, rooms=ANALYSIS, stage="measure"):
         values.write(job.folder / "numbers", result.numbers)
 
 
-@dataclass(frozen=True)
 class CountKeys(Step, rooms=ANALYSIS, stage="measure"):
     """Find how many keys every mode needs on a clip. Before: the recording."""
 
@@ -178,7 +175,6 @@ class Decimate(Measure, rooms=SCENES, blender=True):
         values.write(job.folder / "decimated", tuple(rows))
 
 
-@dataclass(frozen=True)
 class Model(Step, rooms=MODEL, stage="report"):
     """Write all motions side by side, for any viewer. Before: the recording, and what was measured."""
 
@@ -200,7 +196,6 @@ class Model(Step, rooms=MODEL, stage="report"):
         (job.folder / GLB).write_bytes(content)
 
 
-@dataclass(frozen=True)
 class Tabulate(Step, rooms=("analysis", "files.py"), stage="report", partial=True):
     """Write the table of all clips. Before: its parts."""
 
@@ -222,7 +217,6 @@ def result_in(folder: Path) -> ChoiceResult:
 # -- films ------------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
 class Build(Step, rooms=SCENES, stage="build", blender=True):
     """Build the scene of a film, and save it. Before: the recording, and what was measured."""
 
@@ -250,7 +244,6 @@ class Build(Step, rooms=SCENES, stage="build", blender=True):
             save_blend(job.folder / BLEND)
 
 
-@dataclass(frozen=True)
 class Render(Step, rooms=SCENES, stage="render", blender=True):
     """Render some frames of a film. Before: its scene."""
 
@@ -282,7 +275,6 @@ class Encode(Render, stage="encode"):
 # -- pages ------------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
 class Subject(Step, rooms=SCENES, stage="report", blender=True):
     """Read the object that rigid bodies move, simple enough for a page."""
 
@@ -311,7 +303,6 @@ class Part:
     """The name of the choice of keys."""
 
 
-@dataclass(frozen=True)
 class Page(Step, rooms=REPORT, stage="report", partial=True):
     """Write a page of some clips. Before: what `parts` says."""
 

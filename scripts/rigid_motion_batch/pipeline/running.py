@@ -101,19 +101,6 @@ class Run:
 
         Raises OutputError before anything is done, where something would be replaced that must not be.
         """
-        with self.progress.stage(title, 1.0) as self._stage:
-            self._left, up_to_date = survey(plan, self.store)
-            self._stage.total = self._seconds = sum(seconds for seconds, _ in self._left.values())
-            self._all_frames = self._frames = sum(frames for _, frames in self._left.values())
-            # What an earlier plan did is found up to date by this one.
-            self.counts = Counter({DONE: (done := self.counts[DONE]), UP_TO_DATE: up_to_date - done})
-            if self._left:
-                self._do(plan)
-        if self.store.alone:
-            with suppress(OSError):
-                self.store.note("failures.json", self.noted)
-
-    def _do(self, plan: Plan) -> None:
         self._settled: dict[str, str | None] = {}
         """Key of a task to that of its result; None where it has none."""
         self._open: set[str] = set()
@@ -121,17 +108,25 @@ class Run:
         self._waiting: list[Task] = []
         self._at_work: dict[Future[Made], tuple[Task, Job]] = {}
         self._losses: Counter[str] = Counter()
-        try:
-            self._work(iter(plan()))
-            if self.store.alone and not self.failures:
-                self.store.sweep(key for key in self._settled.values() if key)
-        except ExecutorError as error:
-            self.problem = str(error)
-        except KeyboardInterrupt:
-            self.interrupted = True
-        if self._left:
-            self.executor.stop()
-            self.counts[STOPPED] = len(self._left)
+        with self.progress.stage(title, 1.0) as self._stage:
+            self._left, up_to_date = survey(plan, self.store)
+            self._stage.total = self._seconds = sum(seconds for seconds, _ in self._left.values())
+            self._all_frames = self._frames = sum(frames for _, frames in self._left.values())
+            # What an earlier plan did is found up to date by this one.
+            self.counts = Counter({DONE: (done := self.counts[DONE]), UP_TO_DATE: up_to_date - done})
+            try:
+                if self._left:
+                    self._work(iter(plan()))
+            except ExecutorError as error:
+                self.problem = str(error)
+            except KeyboardInterrupt:
+                self.interrupted = True
+            if self._left:
+                self.executor.stop()
+                self.counts[STOPPED] = len(self._left)
+        if self.store.alone:
+            with suppress(OSError):
+                self.store.note("failures.json", self.noted)
 
     def _work(self, rest: Iterator[Task]) -> None:
         """Do tasks, each when those before it are settled. Raises ExecutorError where nothing more can be done."""
@@ -161,6 +156,8 @@ class Run:
             for task, job in () if ended else self._at_work.values():
                 job.look()
                 self._show(task, job.reached[1])
+        if self.store.alone and not self.failures:
+            self.store.sweep(key for key in self._settled.values() if key)
 
     def _before(self, task: Task) -> list[str | None]:
         """Return the keys of the results of the tasks before one, also of earlier plans; None where there is none."""
@@ -177,7 +174,7 @@ class Run:
         elif None in before and not (task.step.partial and any(before)):
             self._close(task, SKIPPED)
         else:
-            folders = [self.store.folder_of(key) if key else None for key in before]
+            folders = [self.store.results / key if key else None for key in before]
             job = Job(task, self.store.new_scratch(), self.store.output, folders, self.blender)
             self._show(task)
             self._at_work[self.executor.submit(job)] = task, job
@@ -262,7 +259,7 @@ def explain(plan: Plan, store: Store) -> Iterator[tuple[Task, str]]:
         elif not index:
             changed[task.key] = task.name
             earlier = store.index_of(latest.get(task.name, "")) or {}
-            is_damaged = store.folder_of(task.key).exists()
+            is_damaged = (store.results / task.key).exists()
             yield task, "its result is damaged" if is_damaged else _difference(earlier.get("made_of"), task, changed)
 
 
