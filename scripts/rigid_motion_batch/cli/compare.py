@@ -28,15 +28,7 @@ from rigid_motion_batch.cli.compare_options import ALL, SCRIPT, own_recordings, 
 from rigid_motion_batch.command_line import as_typed, complain, path_line, program_of
 from rigid_motion_batch.pipeline import comparison_steps as steps
 from rigid_motion_batch.pipeline import values
-from rigid_motion_batch.pipeline.comparison import (
-    DECIMATED,
-    IN_BLENDER,
-    JOINT_METRICS,
-    KEYS_NEEDED,
-    METRICS,
-    Comparison,
-    ComparisonPlan,
-)
+from rigid_motion_batch.pipeline.comparison import IN_BLENDER, TABLES, Comparison, ComparisonPlan
 from rigid_motion_batch.pipeline.executors import Executor, ExecutorError, ProcessExecutor, processors
 from rigid_motion_batch.pipeline.running import FAILED, STATES, Plan, Run, explain, share_of, survey
 from rigid_motion_batch.pipeline.steps import OWN, Task
@@ -302,7 +294,7 @@ class _Comparing:
         digests = _digests(self.options.inputs, self.store)
         self.store.note(RECORD, dict(zip(_places([*digests], self.store.output), digests.values(), strict=True)))
         # What an earlier run found is no finding of this.
-        self.store.withdraw({METRICS, JOINT_METRICS, DECIMATED, KEYS_NEEDED} - self.plan.tables)
+        self.store.withdraw(TABLES.keys() - self.plan.tables)
         stage, tasks = self.plan.comparison.stage, self.plan.tasks
         if stage and any(frames for _, frames in survey(tasks, self.store)[0].values()):
             # The numbers take seconds, and films minutes: nobody has to wait for the one to see the other.

@@ -89,7 +89,8 @@ class Task:
     @property
     def made_of(self) -> dict[str, Any]:
         """What its result depends on, for people; `explain` compares it."""
-        parts = {"versions": versions_of(type(self.step)), "parameters": self.step}
+        kind: Any = type(self.step)
+        parts = {"versions": versions_of(kind), "parameters": self.step}
         return {**parts, "inputs": dict(self.inputs), "after": list(self.after)}
 
     @cached_property
