@@ -121,8 +121,7 @@ class DaskExecutor(Executor):
         """Return the workers that the scheduler knows, and how many threads each has."""
         with suppress(*UNREACHABLE):
             if self._client.status == "running":
-                result = self._client.sync(self._client.scheduler.identity, n_workers=-1, callback_timeout=BUSY)
-                return {address: worker["nthreads"] for address, worker in result["workers"].items()}
+                return dict(self._client.sync(self._client.scheduler.ncores, callback_timeout=BUSY))
         raise ExecutorError(f"{self._address}: the Dask scheduler is gone")
 
     def __enter__(self) -> Self:

@@ -55,16 +55,12 @@ def share_of(plan: Plan, stage: str = "", number: int = 1, of: int = 1) -> Itera
 def survey(plan: Plan, store: Store) -> tuple[dict[str, tuple[float, int]], int]:
     """Return the tasks of a plan that are to be done, by name, with their seconds and frames, and how many are done.
 
-    Raises OutputError where something would be replaced that must not be, or two tasks publish one file.
+    Raises OutputError where something would be replaced that must not be.
     """
     costs: dict[str, tuple[float, int]] = {}
     foreign: list[str] = []
-    places, done = set[int](), 0
+    done = 0
     for task in plan():
-        for path in task.publish.values():
-            if (place := hash(path.casefold())) in places:
-                raise OutputError(f"{path}: two results would go here; choose other names")
-            places.add(place)
         index = store.index_of(task.key)
         unpublished = store.unpublished(task, index)
         if index and not unpublished:

@@ -140,11 +140,6 @@ def test_a_link_where_a_file_goes_is_a_strangers_and_its_target_stays(output: Pa
     assert not (output / "a.txt").is_symlink()
 
 
-def test_two_results_for_one_file_are_refused_also_where_only_case_differs(output: Path) -> None:
-    with pytest.raises(OutputError, match="two results would go here"):
-        run_in(output, writing("a", publish={FILE: "clip/Keys.csv"}), writing("b", publish={FILE: "Clip/keys.csv"}))
-
-
 def test_without_links_files_are_copied(output: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def none(*_: object) -> None:
         raise OSError(1, "no links here")
