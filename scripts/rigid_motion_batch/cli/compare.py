@@ -31,7 +31,7 @@ from rigid_motion_batch.pipeline import values
 from rigid_motion_batch.pipeline.comparison import IN_BLENDER, TABLES, Comparison, ComparisonPlan
 from rigid_motion_batch.pipeline.executors import Executor, ExecutorError, ProcessExecutor, processors
 from rigid_motion_batch.pipeline.running import FAILED, STATES, Plan, Run, explain, share_of, survey
-from rigid_motion_batch.pipeline.steps import OWN, Task
+from rigid_motion_batch.pipeline.steps import OWN, VERSION, Task, version_here
 from rigid_motion_batch.pipeline.store import OutputError, Store
 from rigid_motion_batch.places import CHECKOUT, manifest, output_folder
 from rigid_motion_batch.progress import FARM, Progress
@@ -68,6 +68,8 @@ def main(arguments: list[str]) -> int:
     """Run a comparison, and return the exit code."""
     options = parse(arguments)
     try:
+        if (requested := os.environ.get(VERSION)) and requested != (result := version_here()):
+            raise Refused(f"this machine has {result}, and the bundle is of {requested}")
         blender = _blender(options)
         said = [argument for argument in arguments if argument not in SAYING]
         comparison = comparison_of(options, as_typed(PROGRAM, said, options.inputs), blender)

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from rigid_motion_batch.analysis.bodies import BodyReconstruction
     from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult
 
+STAGES = ("read", "measure", "build", "render", "encode", "report")
+"""Stages of a comparison; each begins when all before it have ended."""
+
 RECORDINGS = ("rigid_motion/motion", "recordings", "axes.py", "command_line.py", "files.py", "rows.py")
 ANALYSIS = (*RECORDINGS, "analysis")
 SCENES = (*ANALYSIS, "rigid_motion/animation", "scenes", "palette.py", "silencing.py")

@@ -27,6 +27,9 @@ from .values import plain
 OWN = ".rigid-motion"
 """The folder in an output folder where the pipeline keeps its own files."""
 
+VERSION = "RIGID_MOTION_VERSION"
+"""A variable of the environment: the version that this program is to have, of those at work at one plan."""
+
 INTERVAL = 0.2
 """Seconds between two messages about how far a task is."""
 
