@@ -33,8 +33,8 @@ from rigid_motion_batch.scenes.timeline import Timeline
 from . import comparison_steps as steps
 from . import values
 from .comparison_steps import ClipOf, Page, Part
-from .steps import Task
-from .store import OutputError, Store
+from .steps import RunError, Task
+from .store import Store
 
 METRICS, JOINT_METRICS, DECIMATED, KEYS_NEEDED = "metrics.csv", "metrics_joints.csv", "decimated.csv", "keys_needed.csv"
 
@@ -190,14 +190,14 @@ class ComparisonPlan:
 
         Raises
         ------
-        OutputError
+        RunError
             Where what was read is damaged.
         """
         try:
             return self._look_into()
         except Exception:
             if self.store.discard_damaged(task.key for task in self.reading()):
-                raise OutputError("what was read is damaged; the same command reads it again") from None
+                raise RunError("what was read is damaged; the same command reads it again") from None
             raise
 
     def _look_into(self) -> list[str]:

@@ -23,8 +23,8 @@ from distributed import Client, Security, get_worker
 from distributed.cfexecutor import ClientExecutor
 from distributed.comm import connect
 
-from .executors import Executor, ExecutorError, Made, ProcessExecutor
-from .steps import Job, version_here
+from .executors import Executor, Made, ProcessExecutor
+from .steps import Job, RunError, version_here
 
 CONNECTING = 5.0
 """Seconds that a scheduler has to answer."""
@@ -60,7 +60,7 @@ def _processes(jobs: int) -> ProcessExecutor:
 class DaskExecutor(Executor):
     """The workers of the Dask scheduler at an address, tcp://HOST:8786, or tls:// with certificates in Dask's settings.
 
-    All of them must see the output folder; `note` takes lines for the user about them. Raises ExecutorError on
+    All of them must see the output folder; `note` takes lines for the user about them. Raises RunError on
     entering, where no scheduler answers, and later, where it is gone, or all its workers are unfit.
     """
 
@@ -75,7 +75,7 @@ class DaskExecutor(Executor):
 
     @property
     def capacity(self) -> int:  # type: ignore[override]  # it is only read
-        """The threads of all workers that fit. Raises ExecutorError where there are workers, and none of them fits."""
+        """The threads of all workers that fit. Raises RunError where there are workers, and none of them fits."""
         if time.monotonic() - self._looked_at > LOOK:
             self._look()
             self._looked_at = time.monotonic()
@@ -105,7 +105,7 @@ class DaskExecutor(Executor):
             answer = self._executor(address).submit(_asker(version_here(), self._folder))
             answer.add_done_callback(partial(self._hear, address, threads[address]))
         if {*self._fit.values()} == {0}:
-            raise ExecutorError(f"{self._address}: none of its workers is fit")
+            raise RunError(f"{self._address}: none of its workers is fit")
         if not threads and (before or not self._looked_at):
             self._note(f"{self._address} has no worker; waiting for one: `dask worker {self._address}`")
 
@@ -122,7 +122,7 @@ class DaskExecutor(Executor):
         with suppress(*UNREACHABLE):
             if self._client.status == "running":
                 return dict(self._client.sync(self._client.scheduler.ncores, callback_timeout=BUSY))
-        raise ExecutorError(f"{self._address}: the Dask scheduler is gone")
+        raise RunError(f"{self._address}: the Dask scheduler is gone")
 
     def __enter__(self) -> Self:
         for name in ("distributed", "distributed.client", "tornado.application"):
@@ -133,7 +133,7 @@ class DaskExecutor(Executor):
             asyncio.run(_knock(self._address))
             self._client = Client(self._address, timeout=CONNECTING, set_as_default=False, name="rigid-motion")
         except (OSError, ValueError, ImportError, TypeError) as error:  # The last one where tls:// has no certificates.
-            raise ExecutorError(
+            raise RunError(
                 f"{self._address}: no Dask scheduler answers there ({error}); start one with `dask scheduler`, and "
                 "give the address that it prints, such as tcp://farm:8786; tls:// needs certificates in Dask's settings"
             ) from None

@@ -48,10 +48,6 @@ from rigid_motion_batch.pipeline.executors import perform_in_blender
 perform_in_blender(place)"""
 
 
-class ExecutorError(Exception):
-    """Error that says why nothing can be done by these means, and the way out, in one line."""
-
-
 class Executor(AbstractContextManager["Executor"]):
     """Executor of jobs: this class at once, in this process. A context; may be used again after `stop`."""
 

@@ -21,9 +21,9 @@ from typing import Any
 from rigid_motion_batch.command_line import few
 from rigid_motion_batch.progress import Progress
 
-from .executors import FULL_OR_FORBIDDEN, Executor, ExecutorError, Made, loss
-from .steps import Job, Task, TaskError
-from .store import OutputError, Store
+from .executors import FULL_OR_FORBIDDEN, Executor, Made, loss
+from .steps import Job, RunError, Task, TaskError
+from .store import Store
 from .values import plain
 
 Plan = Callable[[], Iterable[Task]]
@@ -55,7 +55,7 @@ def share_of(plan: Plan, stage: str = "", number: int = 1, of: int = 1) -> Itera
 def survey(plan: Plan, store: Store) -> tuple[dict[str, tuple[float, int]], int]:
     """Return the tasks of a plan that are to be done, by name, with their seconds and frames, and how many are done.
 
-    Raises OutputError where something would be replaced that must not be.
+    Raises RunError where something would be replaced that must not be.
     """
     costs: dict[str, tuple[float, int]] = {}
     foreign: list[str] = []
@@ -95,7 +95,7 @@ class Run:
     def do(self, plan: Plan, title: str = "") -> None:
         """Do what is missing of a plan, which yields the same tasks each time.
 
-        Raises OutputError before anything is done, where something would be replaced that must not be.
+        Raises RunError before anything is done, where something would be replaced that must not be.
         """
         self._settled: dict[str, str | None] = {}
         """Key of a task to that of its result; None where it has none."""
@@ -113,7 +113,7 @@ class Run:
             try:
                 if self._left:
                     self._work(iter(plan()))
-            except ExecutorError as error:
+            except RunError as error:
                 self.problem = str(error)
             except KeyboardInterrupt:
                 self.interrupted = True
@@ -125,7 +125,7 @@ class Run:
                 self.store.note("failures.json", self.noted)
 
     def _work(self, rest: Iterator[Task]) -> None:
-        """Do tasks, each when those before it are settled. Raises ExecutorError where nothing more can be done."""
+        """Do tasks, each when those before it are settled. Raises RunError where nothing more can be done."""
         more = True
         while more or self._waiting or self._at_work:
             capacity = self.executor.capacity
@@ -202,7 +202,7 @@ class Run:
             if made:
                 self.store.keep(task, key, made)
             is_new = self.store.publish(task, key) or made
-        except OutputError as error:
+        except RunError as error:
             self._fail(task, str(error))
         except OSError as error:
             said = f"{error.filename2 or error.filename}: {error.strerror or error}"
@@ -219,7 +219,7 @@ class Run:
         self.progress.error(said)
         self._close(task, FAILED)
         if fatal:
-            raise ExecutorError(said)
+            raise RunError(said)
 
     def _close(self, task: Task, state: str, key: str | None = None) -> None:
         """Take it that a task has come to its end, with a result of this key: those after it may begin."""

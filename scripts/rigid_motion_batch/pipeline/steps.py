@@ -34,6 +34,10 @@ INTERVAL = 0.2
 """Seconds between two messages about how far a task is."""
 
 
+class RunError(Exception):
+    """Error that says why a run cannot begin or go on, and the way out, in one line."""
+
+
 class TaskError(Exception):
     """Error that says why a task cannot be done, and what to do about it, in one line.
 

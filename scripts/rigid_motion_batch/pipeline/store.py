@@ -32,7 +32,7 @@ from rigid_motion_batch.command_line import few
 from rigid_motion_batch.files import append_lines, lines_of, write_text
 
 from .executors import Made
-from .steps import OWN, Task, sha256_in, sha256_of
+from .steps import OWN, RunError, Task, sha256_in, sha256_of
 from .values import plain
 
 INDEX = ".index.json"
@@ -45,15 +45,11 @@ UNREADABLE = (OSError, ValueError, LookupError, TypeError, AttributeError, Recur
 """Errors of a file of the store that is missing or damaged."""
 
 
-class OutputError(Exception):
-    """Error that says what must not be replaced or read, or who is at work there, and the way out, in one line."""
-
-
 class Store:
     """An output folder, as a context: made where it is missing, and taken away again where nothing came of it.
 
     `alone`, no other run may have the folder meanwhile; workers that do a part each are not. With `overwrite`, files
-    may be replaced that this program has not written; inputs and folders never are. Raises OutputError or OSError on
+    may be replaced that this program has not written; inputs and folders never are. Raises RunError or OSError on
     entering, where another run has the folder, or there can be none.
     """
 
@@ -79,7 +75,7 @@ class Store:
             if self.alone:
                 self._lock.acquire()
         except Timeout:
-            raise OutputError(
+            raise RunError(
                 f"{self.output}: another run is at work in this folder; wait for it, or choose another with --output"
             ) from None
         for session in (self._scratch, *_old(self._scratches)):
@@ -121,7 +117,7 @@ class Store:
     def inputs(self, *paths: Path | str) -> dict[str, str]:
         """Return files as they are now, with their digests; an empty one for what is no file that can be read.
 
-        Raises OutputError where this program has written one into this folder.
+        Raises RunError where this program has written one into this folder.
         """
         return {os.fspath(path): self._digest_of(os.fspath(path)) for path in paths}
 
@@ -132,7 +128,7 @@ class Store:
             return ""
         inside = os.path.realpath(path).removeprefix(os.path.realpath(self.output) + os.sep).replace(os.sep, "/")
         if inside.startswith(f"{OWN}/") or self._digests_at(inside):
-            raise OutputError(f"{path}: this input was written by a run into this folder; choose another --output")
+            raise RunError(f"{path}: this input was written by a run into this folder; choose another --output")
         if not stat.S_ISREG(status.st_mode):
             return ""
         place, seen = os.path.abspath(path), [status.st_size, status.st_mtime_ns, status.st_ctime_ns]
@@ -210,10 +206,10 @@ class Store:
         return result
 
     def refuse(self, foreign: list[str]) -> None:
-        """Raise OutputError where there are paths that are not the program's own, unless they may be replaced."""
+        """Raise RunError where there are paths that are not the program's own, unless they may be replaced."""
         if foreign and not self.overwrite:
             named = few(os.fspath(self.output / path) for path in foreign)
-            raise OutputError(
+            raise RunError(
                 f"{named} {'was' if len(foreign) == 1 else 'were'} not written by this program, or edited since; "
                 "choose another folder with --output, or replace that with --overwrite"
             )
@@ -221,7 +217,7 @@ class Store:
     def publish(self, task: Task, key: str) -> bool:
         """Put files of a result where they belong, and return whether there were any that were not there.
 
-        Raises OSError, and OutputError where something is there that must not be replaced; files before that stay.
+        Raises OSError, and RunError where something is there that must not be replaced; files before that stay.
         """
         index = self.index_of(key) or {}
         missing = self.unpublished(task, index)
@@ -229,7 +225,7 @@ class Store:
         for name, path in missing:
             target, beside = self.output / path, self.new_scratch()
             if not Path(os.path.realpath(target.parent)).is_relative_to(os.path.realpath(self.output)):
-                raise OutputError(f"{target.parent}: this leads out of the output folder; choose another with --output")
+                raise RunError(f"{target.parent}: this leads out of the output folder; choose another with --output")
             target.parent.mkdir(parents=True, exist_ok=True)
             # Killed from here on, what was moved is known to be the program's own.
             append_lines(self._record_of(path), [{"path": path, "sha256": index["files"][name][-1]}])
@@ -243,24 +239,24 @@ class Store:
     def withdraw(self, paths: Iterable[str]) -> None:
         """Delete files of this program that are needed no more, and folders that are empty then."""
         for path in paths:
-            with suppress(OSError, OutputError):
+            with suppress(OSError, RunError):
                 if self.is_own(path):
                     (self.output / path).unlink()
                     os.removedirs((self.output / path).parent)
 
     def is_own(self, path: str) -> bool:
-        """Return whether a path has nothing, or what this program wrote. Raises OutputError for what always stays."""
+        """Return whether a path has nothing, or what this program wrote. Raises RunError for what always stays."""
         target, another = f"{self.output}/{path}", "choose another folder with --output"
         try:
             status = os.lstat(target)
         except FileNotFoundError:
             return True
         except NotADirectoryError:
-            raise OutputError(f"{target}: there is a file where a folder goes; move it, or {another}") from None
+            raise RunError(f"{target}: there is a file where a folder goes; move it, or {another}") from None
         if stat.S_ISDIR(status.st_mode):
-            raise OutputError(f"{target}: there is a folder where a file goes; move it, or {another}")
+            raise RunError(f"{target}: there is a folder where a file goes; move it, or {another}")
         if source := self._inputs.get((status.st_dev, status.st_ino)):
-            raise OutputError(f"{source}: this input lies where {target} goes; {another}")
+            raise RunError(f"{source}: this input lies where {target} goes; {another}")
         return stat.S_ISREG(status.st_mode) and sha256_of(target) in self._digests_at(path)
 
     def _record_of(self, path: str) -> Path:
