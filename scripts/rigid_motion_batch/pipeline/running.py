@@ -22,7 +22,7 @@ from rigid_motion_batch.command_line import few
 from rigid_motion_batch.progress import Progress
 
 from .executors import FULL_OR_FORBIDDEN, Executor, Made, loss
-from .steps import Job, RunError, Task, TaskError
+from .steps import INTERVAL, Job, RunError, Task, TaskError
 from .store import Store
 from .values import plain
 
@@ -30,9 +30,6 @@ Plan = Callable[[], Iterable[Task]]
 
 ATTEMPTS = 3
 """Number of times that a task is begun whose process dies."""
-
-LOOK = 0.2
-"""Seconds between two looks at how far tasks are."""
 
 DONE, UP_TO_DATE, FAILED, SKIPPED = "done", "up to date", "failed", "skipped"
 STOPPED = "not begun or stopped"
@@ -144,8 +141,8 @@ class Run:
                 self._waiting.remove(task)
                 self._begin(task)
             if not capacity:
-                time.sleep(LOOK)
-            wait(self._at_work, LOOK, FIRST_COMPLETED)
+                time.sleep(INTERVAL)
+            wait(self._at_work, INTERVAL, FIRST_COMPLETED)
             ended = [future for future in self._at_work if future.done()]  # Also those that an executor cancels.
             for future in ended:
                 self._end(future, *self._at_work.pop(future))

@@ -31,7 +31,7 @@ VERSION = "RIGID_MOTION_VERSION"
 """A variable of the environment: the version that this program is to have, of those at work at one plan."""
 
 INTERVAL = 0.2
-"""Seconds between two messages about how far a task is."""
+"""Seconds between two messages about how far a task is, and between two looks at them."""
 
 
 class RunError(Exception):
