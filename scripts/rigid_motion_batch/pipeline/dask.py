@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import Any, Self, cast
 
 from distributed import Client, Security, get_worker
-from distributed.cfexecutor import ClientExecutor
 from distributed.comm import connect
 
 from .executors import Executor, Made, ProcessExecutor
@@ -85,12 +84,9 @@ class DaskExecutor(Executor):
         self._jobs = {future: address for future, address in self._jobs.items() if not future.done()}
         busy = Counter(self._jobs.values())
         address = max(self._fit, key=lambda address: (self._fit[address] or 0) - busy[address])
-        self._jobs[future := self._executor(address).submit(do, job)] = address
+        future: Future[Made] = self._client.get_executor(pure=False, workers=[address]).submit(do, job)
+        self._jobs[future] = address
         return future
-
-    def _executor(self, address: str) -> ClientExecutor:
-        """Return what gives jobs to one worker alone."""
-        return self._client.get_executor(pure=False, workers=[address])
 
     def _look(self) -> None:
         """See which workers there are, and ask those that are new."""
@@ -102,7 +98,8 @@ class DaskExecutor(Executor):
                 future.cancel()  # Dask itself does not always do so.
         for address in threads.keys() - self._fit.keys():
             self._fit[address] = None
-            answer = self._executor(address).submit(_asker(version_here(), self._folder))
+            executor = self._client.get_executor(pure=False, workers=[address])
+            answer = executor.submit(_asker(version_here(), self._folder))
             answer.add_done_callback(partial(self._hear, address, threads[address]))
         if {*self._fit.values()} == {0}:
             raise RunError(f"{self._address}: none of its workers is fit")
@@ -111,7 +108,7 @@ class DaskExecutor(Executor):
 
     def _hear(self, address: str, threads: int, answer: Future[str]) -> None:
         """Take the answer of a worker."""
-        if not answer.cancelled():  # Otherwise it is gone.
+        if address in self._fit and not answer.cancelled():  # Otherwise it is gone.
             said = str(answer.exception() or answer.result())
             self._fit[address] = 0 if said else threads
             if said:

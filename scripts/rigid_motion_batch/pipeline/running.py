@@ -150,7 +150,7 @@ class Run:
                 job.look()
                 self._show(task, job.reached[1])
         if self.store.alone and not self.failures:
-            self.store.sweep(key for key in self._settled.values() if key)
+            self.store.sweep({*self._settled.values()})
 
     def _before(self, task: Task) -> list[str | None]:
         """Return the keys of the results of the tasks before one, also of earlier plans; None where there is none."""

@@ -21,7 +21,7 @@ import shutil
 import stat
 import time
 import uuid
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
@@ -180,9 +180,8 @@ class Store:
             self.discard(key)
         return bool(damaged)
 
-    def sweep(self, requested: Iterable[str]) -> None:
+    def sweep(self, requested: Container[str | None]) -> None:
         """Delete results that are not among these, and older than a week."""
-        requested = frozenset(requested)
         for folder in _old(self.results):
             if folder.name not in requested:
                 self.discard(folder.name)
