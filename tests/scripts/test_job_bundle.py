@@ -1,4 +1,4 @@
-"""job_bundle.py: a comparison as a job of a render farm; tests/scripts/pipeline/test_bundle.py runs such a job."""
+"""job_bundle.py: a comparison as a job of a render farm; test_bundle.py runs such a job on a farm."""
 
 import json
 import shlex

@@ -28,19 +28,11 @@ from rigid_motion_batch.cli.compare_options import ALL, SCRIPT, own_recordings, 
 from rigid_motion_batch.command_line import as_typed, complain, path_line, program_of
 from rigid_motion_batch.pipeline import comparison_steps as steps
 from rigid_motion_batch.pipeline import values
-from rigid_motion_batch.pipeline.comparison import (
-    DECIMATED,
-    IN_BLENDER,
-    JOINT_METRICS,
-    KEYS_NEEDED,
-    METRICS,
-    Comparison,
-    ComparisonPlan,
-)
-from rigid_motion_batch.pipeline.executors import Executor, ExecutorError, ProcessExecutor, processors
+from rigid_motion_batch.pipeline.comparison import IN_BLENDER, TABLES, Comparison, ComparisonPlan
+from rigid_motion_batch.pipeline.executors import Executor, ProcessExecutor, processors
 from rigid_motion_batch.pipeline.running import FAILED, STATES, Plan, Run, explain, share_of, survey
-from rigid_motion_batch.pipeline.steps import OWN, Task
-from rigid_motion_batch.pipeline.store import OutputError, Store
+from rigid_motion_batch.pipeline.steps import OWN, VERSION, RunError, Task, version_here
+from rigid_motion_batch.pipeline.store import Store
 from rigid_motion_batch.places import CHECKOUT, manifest, output_folder
 from rigid_motion_batch.progress import FARM, Progress
 from rigid_motion_batch.recordings import TrajectoryError
@@ -68,14 +60,12 @@ RECORD = "comparison.json"
 as they count from there."""
 
 
-class Refused(Exception):
-    """Why nothing is done, and the way out."""
-
-
 def main(arguments: list[str]) -> int:
     """Run a comparison, and return the exit code."""
     options = parse(arguments)
     try:
+        if (requested := os.environ.get(VERSION)) and requested != (result := version_here()):
+            raise RunError(f"this machine has {result}, and the bundle is of {requested}")
         blender = _blender(options)
         said = [argument for argument in arguments if argument not in SAYING]
         comparison = comparison_of(options, as_typed(PROGRAM, said, options.inputs), blender)
@@ -91,7 +81,7 @@ def main(arguments: list[str]) -> int:
                 _executor(options, store, progress) as executor,
             ):
                 return _Comparing(options, plan, executor, progress).run()
-    except (SubjectError, ExecutorError, OutputError, Refused) as error:
+    except (SubjectError, RunError) as error:
         print(*(f"{PROGRAM}: {error}".splitlines()), sep="\n", file=sys.stderr)
     except OSError as error:
         complain(PROGRAM, error, options.output or "")
@@ -170,11 +160,11 @@ def _places(sources: list[str], folder: Path) -> list[str]:
 
 
 def _require_same_comparison(output: Path, sources: list[str]) -> None:
-    """Raise OutputError where a folder holds the comparison of other recordings."""
+    """Raise RunError where a folder holds the comparison of other recordings."""
     held = _held(output)
     if held and not _is_same(output, sources) and not {*held.values()} & {*_digests(sources, Store(output)).values()}:
         names = ", ".join(sorted(Path(item).name for item in held)[:3]) + (" and more" if len(held) > 3 else "")
-        raise OutputError(
+        raise RunError(
             f"{_short(output)} holds another comparison, of {names}; choose another folder, such as --output "
             f"{_short(free_folder(sources))}, or replace it with --overwrite"
         )
@@ -203,18 +193,18 @@ def _blender(options: argparse.Namespace) -> str:
 
     Raises
     ------
-    Refused, SubjectError
+    RunError, SubjectError
         Where one is needed that there is not, with the way out.
     """
     read = next((item for item in [*options.inputs, options.against or ""] if _suffix(item) in IN_BLENDER), None)
     if not (options.blender or blender_program() or find_spec("bpy")):
         if options.stage or read:
-            raise Refused(without_blender(f"{read} is read by" if read else "Videos are made by", films=not read))
+            raise RunError(without_blender(f"{read} is read by" if read else "Videos are made by", films=not read))
         return ""
     # Another program has libraries of its own.
     on_screen = options.stage and options.engine != "cycles" and not (options.explain or options.blender)
     if on_screen and (missing := missing_for_rendering()):
-        raise Refused(f"{way_out(missing)}\nOr go without videos: --no-video")
+        raise RunError(f"{way_out(missing)}\nOr go without videos: --no-video")
     if options.blender:
         return version_of(options.blender)
     if options.stage and options.subject not in MODELS:
@@ -231,7 +221,7 @@ def _blender(options: argparse.Namespace) -> str:
 
 
 def version_of(blender: str) -> str:
-    """Return the version of a Blender program, "5.2.3". Raises Refused if it cannot be run or is no Blender."""
+    """Return the version of a Blender program, "5.2.3". Raises RunError if it cannot be run or is no Blender."""
     reason = "this does not say that it is Blender"
     try:
         ended = subprocess.run([blender, "--version"], capture_output=True, timeout=STARTING, check=False)
@@ -239,7 +229,7 @@ def version_of(blender: str) -> str:
             return said[1].decode()
     except (OSError, ValueError, subprocess.TimeoutExpired) as error:
         reason = getattr(error, "strerror", None) or str(error)
-    raise Refused(f"{blender}: {reason}; give the path of a Blender program")
+    raise RunError(f"{blender}: {reason}; give the path of a Blender program")
 
 
 def _suffix(source: str) -> str:
@@ -249,14 +239,14 @@ def _suffix(source: str) -> str:
 
 
 def _executor(options: argparse.Namespace, store: Store, progress: Progress) -> Executor:
-    """Return the executor of the tasks. Raises ExecutorError where that cannot be."""
+    """Return the executor of the tasks. Raises RunError where that cannot be."""
     if options.scheduler is None:
         return Executor() if options.jobs == 0 else ProcessExecutor(options.jobs or processors())
     try:
         from rigid_motion_batch.pipeline.dask import DaskExecutor
     except ImportError as error:
         way = "python scripts/bootstrap.py dask" if CHECKOUT else "pip install 'rigid-motion[farm]'"
-        raise ExecutorError(f"--scheduler: {error}; `{way}` installs it") from None
+        raise RunError(f"--scheduler: {error}; `{way}` installs it") from None
     return DaskExecutor(options.scheduler, store.output, progress.error)
 
 
@@ -302,7 +292,7 @@ class _Comparing:
         digests = _digests(self.options.inputs, self.store)
         self.store.note(RECORD, dict(zip(_places([*digests], self.store.output), digests.values(), strict=True)))
         # What an earlier run found is no finding of this.
-        self.store.withdraw({METRICS, JOINT_METRICS, DECIMATED, KEYS_NEEDED} - self.plan.tables)
+        self.store.withdraw(TABLES.keys() - self.plan.tables)
         stage, tasks = self.plan.comparison.stage, self.plan.tasks
         if stage and any(frames for _, frames in survey(tasks, self.store)[0].values()):
             # The numbers take seconds, and films minutes: nobody has to wait for the one to see the other.
@@ -345,15 +335,15 @@ class _Comparing:
                 complain(PROGRAM, f"{task.name}: {self.work.failures[task.name]}")
 
     def _require_tolerances(self) -> None:
-        """Raise Refused where a tolerance is larger than the motion of every clip."""
+        """Raise RunError where a tolerance is larger than the motion of every clip."""
         for choice in self.plan.comparison.choices:
             if isinstance(choice, Tolerance) and (problem := self._too_large(choice)):
-                raise Refused(problem)
+                raise RunError(problem)
 
     def _too_large(self, choice: Tolerance) -> str:
         problem = ""
         for study in self.plan.studies:
-            clip = study.clip.read(self.store.folder_of(study.reader))
+            clip = study.clip.read(self.store.results / study.reader)
             try:
                 choice.require_within(clip, self.plan.comparison.radii.rigid)
                 return ""
@@ -376,7 +366,7 @@ class _Comparing:
         for name, tasks in groupby(self._measuring(), key=lambda task: cast(steps.Measure, task.step).clip.name):
             choices = []
             for task in tasks:
-                folder = self.store.folder_of(task.key)
+                folder = self.store.results / task.key
                 with suppress(OSError, ValueError, KeyError):  # What could not be made.
                     if isinstance(task.step, steps.CountKeys):
                         needed.append(values.read(KeysNeeded, folder / "needed"))

@@ -7,17 +7,21 @@ run again. It takes the options of compare.py.
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import shlex
-from collections.abc import Sequence
+import sys
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 
 from rigid_motion_batch.cli.compare_options import parse as parse_comparison
 from rigid_motion_batch.cli.compare_options import without
 from rigid_motion_batch.command_line import complain, parser_of, program_of, whole
-from rigid_motion_batch.pipeline.bundle import INPUTS, MOST_PARTS, STAGES, write_bundle
-from rigid_motion_batch.places import output_folder
+from rigid_motion_batch.files import write_text
+from rigid_motion_batch.pipeline.comparison_steps import STAGES
+from rigid_motion_batch.pipeline.steps import VERSION, version_here
+from rigid_motion_batch.places import PACKAGE, output_folder
 
 SCRIPT = "job_bundle.py"
 PROGRAM = program_of(SCRIPT)
@@ -25,8 +29,14 @@ PROGRAM = program_of(SCRIPT)
 PARTS = 16
 """Tasks that a stage is split into, unless requested otherwise."""
 
+MOST_PARTS = 1024
+"""Values of a parameter, in Open Job Description."""
+
 FILMING = ("build", "render", "encode")
 """The stages at the end of which there are films."""
+
+INPUTS = "{{Param.Inputs}}"
+"""The job's folder of inputs, in arguments."""
 
 EPILOG = """
 It writes a folder with template.json (jobtemplate-2023-09) and parameter_values.json. The last line printed is a
@@ -61,6 +71,35 @@ def main(arguments: list[str]) -> int:
     given = (f"-p {shlex.quote(f'{name}={value}')}" for name, value in values.items())
     print("openjd run", shlex.quote(os.fspath(own.bundle.absolute() / "template.json")), *given)
     return 0
+
+
+def write_bundle(
+    folder: Path, arguments: Sequence[str], inputs: Path, output: Path, parts: Mapping[str, int]
+) -> dict[str, str]:
+    """Write the files of a bundle, and return the parameters of the job for a farm on which all is where it is here.
+
+    `arguments` are those of the comparison but for `--output`, with files as in `INPUTS`; `parts` has for each stage
+    how many tasks it is split into. There is no list of tasks: each plans the comparison anew, and does its share.
+    """
+    template = json.loads(Path(__file__).with_name("job_template.json").read_text(encoding="utf-8"))
+    template["name"] = output.name
+    template["jobEnvironments"][0]["variables"][VERSION] = version_here()
+    for before, stage in pairwise(["", *(stage for stage in STAGES if stage in parts)]):
+        count = min(max(parts[stage], 1), MOST_PARTS)
+        share = "--output", "{{Param.Output}}", "--only", stage, "--part", f"{{{{Task.Param.Part}}}}/{count}"
+        command = ["-m", "rigid_motion_batch", "compare", *arguments, *share]
+        step = {
+            "name": stage.capitalize(),
+            "parameterSpace": {"taskParameterDefinitions": [{"name": "Part", "type": "INT", "range": f"1-{count}"}]},
+            "script": {"actions": {"onRun": {"command": "{{Param.Python}}", "args": command}}},
+        }
+        template["steps"].append(step | ({"dependencies": [{"dependsOn": before.capitalize()}]} if before else {}))
+    places = {"Program": PACKAGE.parent, "Python": sys.executable, "Inputs": inputs, "Output": output.absolute()}
+    values = {parameter: str(place) for parameter, place in places.items()}
+    given = {"parameterValues": [{"name": parameter, "value": value} for parameter, value in values.items()]}
+    for file, content in (("parameter_values.json", given), ("template.json", template)):
+        write_text(folder / file, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
+    return values
 
 
 def below_inputs(arguments: Sequence[str]) -> tuple[list[str], Path]:

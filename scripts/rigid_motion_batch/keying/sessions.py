@@ -15,7 +15,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import cast
@@ -23,7 +23,7 @@ from typing import cast
 from rigid_motion_batch.command_line import complain, few, path_line, printable
 from rigid_motion_batch.files import append_lines, lines_of
 from rigid_motion_batch.pipeline import steps
-from rigid_motion_batch.pipeline.executors import Executor, ExecutorError, Made, ProcessExecutor, loss, processors
+from rigid_motion_batch.pipeline.executors import Executor, Made, ProcessExecutor, loss, processors
 from rigid_motion_batch.progress import Progress, Stage
 from rigid_motion_batch.supervising import blender_program, report, stop_signals, written_of
 
@@ -54,7 +54,6 @@ NOTES = "notes"
 """The file of what is said of an input while it is done."""
 
 
-@dataclass(frozen=True)
 class Keyed(steps.Step, rooms=ROOMS):
     """Do one input, wherever that is."""
 
@@ -103,7 +102,7 @@ def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = 
     stopped, unmatched = None, set()
     try:
         executor = _executor(workers, len(jobs))
-    except ExecutorError as error:
+    except steps.RunError as error:
         complain(program, error)
         return 2
     if workers is None and len(jobs) == 1 and not blender_program():
@@ -259,7 +258,7 @@ def _inputs(job: Job) -> dict[str, str]:
 
 
 def _executor(workers: int | None, count: int) -> Executor:
-    """Return the executor of so many inputs. Raises ExecutorError where there cannot be that many processes."""
+    """Return the executor of so many inputs. Raises RunError where there cannot be that many processes."""
     if workers == 0 or (workers is None and count == 1):
         return Executor()
     try:
@@ -269,7 +268,7 @@ def _executor(workers: int | None, count: int) -> Executor:
     except ImportError as error:
         if workers is None:
             return Executor()
-        raise ExecutorError(f"--jobs {workers}: {error}; leave it out, and inputs are done one by one") from None
+        raise steps.RunError(f"--jobs {workers}: {error}; leave it out, and inputs are done one by one") from None
 
 
 def _summary(outcomes: Sequence[Outcome], count: int, work: Work, *, interrupted: bool) -> str:

@@ -33,8 +33,8 @@ from rigid_motion_batch.scenes.timeline import Timeline
 from . import comparison_steps as steps
 from . import values
 from .comparison_steps import ClipOf, Page, Part
-from .steps import Task
-from .store import OutputError, Store
+from .steps import RunError, Task
+from .store import Store
 
 METRICS, JOINT_METRICS, DECIMATED, KEYS_NEEDED = "metrics.csv", "metrics_joints.csv", "decimated.csv", "keys_needed.csv"
 
@@ -60,8 +60,13 @@ RATE_MARGIN = 0.01
 MOST_MODELLED = 100_000
 """Samples times joints of a body that is written as GLB: a minute for a choice of keys."""
 
-TABLE_OF = {"measure": METRICS, "decimate": DECIMATED, "count_keys": KEYS_NEEDED}
-"""Part of a page to the table that it is a part of, too."""
+TABLES = {
+    METRICS: ("measure", steps.ROWS),
+    JOINT_METRICS: ("measure", steps.JOINT_ROWS),
+    DECIMATED: ("decimate", steps.ROWS),
+    KEYS_NEEDED: ("count_keys", steps.ROWS),
+}
+"""Tables of all clips: what each is put together of, as `Part` names it, and the name of its rows there."""
 
 IN_BLENDER = (".blend", ".fbx", ".glb", ".gltf")
 """Recordings that Blender reads."""
@@ -185,46 +190,40 @@ class ComparisonPlan:
 
         Raises
         ------
-        OutputError
+        RunError
             Where what was read is damaged.
         """
         try:
             return self._look_into()
         except Exception:
             if self.store.discard_damaged(task.key for task in self.reading()):
-                raise OutputError("what was read is damaged; the same command reads it again") from None
+                raise RunError("what was read is damaged; the same command reads it again") from None
             raise
 
     def _look_into(self) -> list[str]:
         comparison = self.comparison
-        readers = [task.key for task in self._readers]
-        folders = {key: self.store.folder_of(key) for key in dict.fromkeys(readers) if self.store.index_of(key)}
+        keys = [task.key for task in self._readers if self.store.index_of(task.key)]
         read = {
-            key: values.read(tuple[str, tuple[ClipFacts, ...]], folder / "facts") for key, folder in folders.items()
+            key: values.read(tuple[str, tuple[ClipFacts, ...]], self.store.results / key / "facts") for key in {*keys}
         }
-        notes = [read[key][0] for key in readers if key in read and read[key][0]]
-        bodies = [(key, body, one) for key in readers if key in read for body, one in enumerate(read[key][1])]
-        names = clip_names([(one.name, one.body) for _, _, one in bodies])
-        if unknown := comparison.radii.unknown(joint for _, _, one in bodies for joint in one.joint_names):
+        notes = [note for note, _ in (read[key] for key in keys) if note]
+        bodies = [(key, body, facts) for key in keys for body, facts in enumerate(read[key][1])]
+        names = clip_names([(facts.name, facts.body) for _, _, facts in bodies])
+        if unknown := comparison.radii.unknown(joint for _, _, facts in bodies for joint in facts.joint_names):
             notes.append(printable(f"no body has a joint {listed(unknown)}, for which --radius has a radius"))
         self.studies, of_clips = [], []
-        for name, (key, body, one) in zip(names, bodies, strict=True):
-            times = np.load(folders[key] / f"{body}.times.npy")
-            notes += [f"{name}: {note}" for note in one.repairs]
-            ends = {choice: choice.ends(times) for choice in comparison.choices}
-            of_clips += [
-                f"{name}: too short for two keys at {choice.rate} a second; left out"
-                for choice, matches in ends.items()
-                if matches is None
-            ]
+        for name, (key, body, facts) in zip(names, bodies, strict=True):
+            notes += [f"{name}: {note}" for note in facts.repairs]
+            times = np.load(self.store.results / key / f"{body}.times.npy")
+            enough = {}
+            for choice in comparison.choices:
+                if matches := choice.ends(times):
+                    enough[choice] = float(times[matches[0]]), float(times[matches[1]])
+                else:
+                    of_clips.append(f"{name}: too short for two keys at {choice.rate} a second; left out")
             of_clips += [f"{name}: {note}" for note in rates_above(times, comparison.choices)]
-            enough = {
-                choice: (float(times[matches[0]]), float(times[matches[1]]))
-                for choice, matches in ends.items()
-                if matches
-            }
             if enough:
-                self.studies.append(Study(ClipOf(name, body), key, one, enough, bool(comparison.blender)))
+                self.studies.append(Study(ClipOf(name, body), key, facts, enough, bool(comparison.blender)))
                 of_clips += self._left_out(self.studies[-1])
         if self._shows_object and not comparison.blender:
             notes.append(f"the report shows a drill, for there is no Blender here that reads {comparison.subject}")
@@ -270,34 +269,33 @@ class ComparisonPlan:
         yield from (task for task in self.reading() if task.key in read)
         keys: dict[Part, str] = {}
         """Keys of the tasks whose results pages show."""
-        tables: dict[str, list[str]] = {}
-        """Table to the keys of the tasks that make its parts."""
         for study in self.studies:
             keys[Part("read", study.clip)] = study.reader
             for part, task in self._numbers(study):
                 yield task
                 keys[part] = task.key
-                tables.setdefault(TABLE_OF[part.what], []).append(task.key)
-                if part.what == "measure" and study.facts.joints:
-                    tables.setdefault(JOINT_METRICS, []).append(task.key)
             for choice in self.modelled(study):
                 yield (task := self._model(study, choice, keys[Part("measure", study.clip, choice.name)]))
                 keys[Part("model", study.clip, choice.name)] = task.key
-        for table, after in tables.items():
-            step = steps.Tabulate(steps.JOINT_ROWS if table == JOINT_METRICS else steps.ROWS)
-            yield Task(step, table, tuple(after), publish={"table.csv": table}, seconds=0.002 * len(after))
+        for table in self.tables:
+            what, rows = TABLES[table]
+            clips = {study.clip for study in self.studies if study.facts.joints or table != JOINT_METRICS}
+            after = tuple(key for part, key in keys.items() if part.what == what and part.clip in clips)
+            step = steps.Tabulate(rows)
+            yield Task(step, table, after, publish={"table.csv": table}, seconds=0.002 * len(after))
         filmed: dict[Part, str] = {}
         for study in self.studies:
             for choice in self.filmed(study):
-                filmed[Part("encode", study.clip, choice.name)] = ""
+                film = Part("encode", study.clip, choice.name)
+                filmed[film] = ""
                 for task in self._film(study, choice, keys[Part("measure", study.clip, choice.name)]) if films else ():
                     yield task
-                    filmed[Part("encode", study.clip, choice.name)] = task.key
+                    filmed[film] = task.key
         if self.comparison.about:
             yield from self._pages(keys, filmed, films)
 
     @property
-    def tables(self) -> set[str]:
+    def tables(self) -> list[str]:
         """The tables that there will be; of others those of earlier runs are to be withdrawn."""
         there = {
             METRICS: True,
@@ -305,7 +303,7 @@ class ComparisonPlan:
             JOINT_METRICS: any(study.facts.joints for study in self.studies),
             DECIMATED: any(study.decimated for study in self.studies),
         }
-        return {table for table, requested in there.items() if requested}
+        return [table for table in TABLES if there[table]]
 
     def filmed(self, study: Study) -> list[Choice]:
         """Return the choices that there are films of."""

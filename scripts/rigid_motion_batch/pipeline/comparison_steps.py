@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from rigid_motion_batch.analysis.bodies import BodyReconstruction
     from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult
 
+STAGES = ("read", "measure", "build", "render", "encode", "report")
+"""Stages of a comparison; each begins when all before it have ended."""
+
 RECORDINGS = ("rigid_motion/motion", "recordings", "axes.py", "command_line.py", "files.py", "rows.py")
 ANALYSIS = (*RECORDINGS, "analysis")
 SCENES = (*ANALYSIS, "rigid_motion/animation", "scenes", "palette.py", "silencing.py")
@@ -51,7 +54,6 @@ def _told(what: str) -> Iterator[None]:
 # -- recordings -------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
 class Read(Step, rooms=RECORDINGS, stage="read"):
     """Read a source, and repair its clips."""
 
@@ -111,7 +113,6 @@ class ClipOf:
 # -- numbers ----------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
 class Measure(Step, rooms=ANALYSIS, stage="measure"):
     """Choose keys of a clip, let the modes fill them in, and measure what was lost. Before: the recording."""
 
@@ -139,7 +140,6 @@ class Measure(Step, rooms=ANALYSIS, stage="measure"):
         values.write(job.folder / "numbers", result.numbers)
 
 
-@dataclass(frozen=True)
 class CountKeys(Step, rooms=ANALYSIS, stage="measure"):
     """Find how many keys every mode needs on a clip. Before: the recording."""
 
@@ -178,7 +178,6 @@ class Decimate(Measure, rooms=SCENES, blender=True):
         values.write(job.folder / "decimated", tuple(rows))
 
 
-@dataclass(frozen=True)
 class Model(Step, rooms=MODEL, stage="report"):
     """Write all motions side by side, for any viewer. Before: the recording, and what was measured."""
 
@@ -200,7 +199,6 @@ class Model(Step, rooms=MODEL, stage="report"):
         (job.folder / GLB).write_bytes(content)
 
 
-@dataclass(frozen=True)
 class Tabulate(Step, rooms=("analysis", "files.py"), stage="report", partial=True):
     """Write the table of all clips. Before: its parts."""
 
@@ -222,7 +220,6 @@ def result_in(folder: Path) -> ChoiceResult:
 # -- films ------------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
 class Build(Step, rooms=SCENES, stage="build", blender=True):
     """Build the scene of a film, and save it. Before: the recording, and what was measured."""
 
@@ -250,7 +247,6 @@ class Build(Step, rooms=SCENES, stage="build", blender=True):
             save_blend(job.folder / BLEND)
 
 
-@dataclass(frozen=True)
 class Render(Step, rooms=SCENES, stage="render", blender=True):
     """Render some frames of a film. Before: its scene."""
 
@@ -282,7 +278,6 @@ class Encode(Render, stage="encode"):
 # -- pages ------------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
 class Subject(Step, rooms=SCENES, stage="report", blender=True):
     """Read the object that rigid bodies move, simple enough for a page."""
 
@@ -311,7 +306,6 @@ class Part:
     """The name of the choice of keys."""
 
 
-@dataclass(frozen=True)
 class Page(Step, rooms=REPORT, stage="report", partial=True):
     """Write a page of some clips. Before: what `parts` says."""
 

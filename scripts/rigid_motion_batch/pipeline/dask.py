@@ -11,19 +11,19 @@ import logging
 import multiprocessing
 import os
 import time
+from collections import Counter
 from collections.abc import Callable
-from concurrent.futures import CancelledError, Future, InvalidStateError, wait
+from concurrent.futures import CancelledError, Future, wait
 from contextlib import suppress
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, Self, cast
 
 from distributed import Client, Security, get_worker
-from distributed.cfexecutor import ClientExecutor
 from distributed.comm import connect
 
-from .executors import Executor, ExecutorError, Made, ProcessExecutor
-from .steps import Job, version_here
+from .executors import Executor, Made, ProcessExecutor
+from .steps import Job, RunError, version_here
 
 CONNECTING = 5.0
 """Seconds that a scheduler has to answer."""
@@ -59,61 +59,56 @@ def _processes(jobs: int) -> ProcessExecutor:
 class DaskExecutor(Executor):
     """The workers of the Dask scheduler at an address, tcp://HOST:8786, or tls:// with certificates in Dask's settings.
 
-    All of them must see the output folder; `note` takes lines for the user about them. Raises ExecutorError on
+    All of them must see the output folder; `note` takes lines for the user about them. Raises RunError on
     entering, where no scheduler answers, and later, where it is gone, or all its workers are unfit.
     """
 
     def __init__(self, address: str, folder: Path, note: Callable[[str], object]) -> None:
         self._address, self._folder, self._note = address, os.fspath(folder), note
-        self._executors: dict[str, ClientExecutor] = {}
-        """Address of a worker to what gives jobs to it alone."""
-        self._fit: dict[str, int] = {}
-        """Address of a worker that has answered to how many threads it has; 0 where it does not fit."""
-        self._jobs: dict[str, list[Future[Made]]] = {}
-        """Address of a worker to what it is doing: where it is gone, this is seen to be lost."""
+        self._fit: dict[str, int | None] = {}
+        """Address of a worker to how many threads it has; 0 where it does not fit, None before it has answered."""
+        self._jobs: dict[Future[Made], str] = {}
+        """Jobs at work, and the addresses of their workers."""
         self._looked_at = 0.0
         self._client: Client
 
     @property
     def capacity(self) -> int:  # type: ignore[override]  # it is only read
-        """The threads of all workers that fit. Raises ExecutorError where there are workers, and none of them fits."""
+        """The threads of all workers that fit. Raises RunError where there are workers, and none of them fits."""
         if time.monotonic() - self._looked_at > LOOK:
             self._look()
             self._looked_at = time.monotonic()
-        return sum(self._fit.get(address, 0) for address in self._executors)
+        return sum(filter(None, self._fit.values()))
 
     def submit(self, job: Job) -> Future[Made]:
-        self._jobs = {address: [job for job in jobs if not job.done()] for address, jobs in self._jobs.items()}
-        address = max(self._executors, key=lambda address: self._fit.get(address, 0) - len(self._jobs[address]))
-        future: Future[Made] = Future()
-        self._jobs[address].append(future)
-        self._executors[address].submit(do, job).add_done_callback(partial(_hand_over, future))
+        self._jobs = {future: address for future, address in self._jobs.items() if not future.done()}
+        busy = Counter(self._jobs.values())
+        address = max(self._fit, key=lambda address: (self._fit[address] or 0) - busy[address])
+        future: Future[Made] = self._client.get_executor(pure=False, workers=[address]).submit(do, job)
+        self._jobs[future] = address
         return future
 
     def _look(self) -> None:
         """See which workers there are, and ask those that are new."""
-        threads, before = self._threads(), bool(self._executors)
-        for address in self._executors.keys() - threads.keys():
-            with suppress(*UNREACHABLE):
-                self._executors.pop(address).shutdown(wait=False)
-            for future in self._jobs.pop(address):  # Dask does not always say that they are cancelled.
-                with suppress(InvalidStateError):
-                    future.set_exception(CancelledError())
-            if self._fit.pop(address, 0):
+        threads, before = self._threads(), bool(self._fit)
+        for address in self._fit.keys() - threads.keys():
+            if self._fit.pop(address):
                 self._note(f"worker {address} is gone; others go on with its tasks")
-        for address in threads.keys() - self._executors.keys():
-            executor = self._executors[address] = self._client.get_executor(pure=False, workers=[address])
-            self._jobs[address] = []
+            for future in [future for future, place in self._jobs.items() if place == address]:
+                future.cancel()  # Dask itself does not always do so.
+        for address in threads.keys() - self._fit.keys():
+            self._fit[address] = None
+            executor = self._client.get_executor(pure=False, workers=[address])
             answer = executor.submit(_asker(version_here(), self._folder))
             answer.add_done_callback(partial(self._hear, address, threads[address]))
-        if self._fit and self._fit.keys() == threads.keys() and not any(self._fit.values()):
-            raise ExecutorError(f"{self._address}: none of its workers is fit")
+        if {*self._fit.values()} == {0}:
+            raise RunError(f"{self._address}: none of its workers is fit")
         if not threads and (before or not self._looked_at):
             self._note(f"{self._address} has no worker; waiting for one: `dask worker {self._address}`")
 
     def _hear(self, address: str, threads: int, answer: Future[str]) -> None:
         """Take the answer of a worker."""
-        if not answer.cancelled():  # Otherwise it is gone.
+        if address in self._fit and not answer.cancelled():  # Otherwise it is gone.
             said = str(answer.exception() or answer.result())
             self._fit[address] = 0 if said else threads
             if said:
@@ -123,9 +118,8 @@ class DaskExecutor(Executor):
         """Return the workers that the scheduler knows, and how many threads each has."""
         with suppress(*UNREACHABLE):
             if self._client.status == "running":
-                result = self._client.sync(self._client.scheduler.identity, n_workers=-1, callback_timeout=BUSY)
-                return {address: worker["nthreads"] for address, worker in result["workers"].items()}
-        raise ExecutorError(f"{self._address}: the Dask scheduler is gone")
+                return dict(self._client.sync(self._client.scheduler.ncores, callback_timeout=BUSY))
+        raise RunError(f"{self._address}: the Dask scheduler is gone")
 
     def __enter__(self) -> Self:
         for name in ("distributed", "distributed.client", "tornado.application"):
@@ -136,7 +130,7 @@ class DaskExecutor(Executor):
             asyncio.run(_knock(self._address))
             self._client = Client(self._address, timeout=CONNECTING, set_as_default=False, name="rigid-motion")
         except (OSError, ValueError, ImportError, TypeError) as error:  # The last one where tls:// has no certificates.
-            raise ExecutorError(
+            raise RunError(
                 f"{self._address}: no Dask scheduler answers there ({error}); start one with `dask scheduler`, and "
                 "give the address that it prints, such as tcp://farm:8786; tls:// needs certificates in Dask's settings"
             ) from None
@@ -145,16 +139,6 @@ class DaskExecutor(Executor):
     def __exit__(self, *_: object) -> None:
         with suppress(*UNREACHABLE):
             self._client.close(timeout=2.0)  # Then nobody wants what is at work, and it is cancelled.
-
-
-def _hand_over(future: Future[Made], theirs: Future[Made]) -> None:
-    """Give a future what came of one of Dask's."""
-    error = CancelledError() if theirs.cancelled() else theirs.exception()
-    with suppress(InvalidStateError):  # Its worker was taken for gone.
-        if error:
-            future.set_exception(error)
-        else:
-            future.set_result(theirs.result())
 
 
 async def _knock(address: str) -> None:
@@ -175,8 +159,7 @@ def _asker(requested: str, folder: str) -> Callable[[], str]:
         except ImportError as error:
             return str(error)
         result = version_here()
-        return (
-            "" if result == requested else f"it has {result}, and this run is of {requested}; start it anew with that"
-        )
+        unfit = f"it has {result}, and this run is of {requested}; start it anew with that"
+        return "" if result == requested else unfit
 
     return ask

@@ -48,10 +48,6 @@ from rigid_motion_batch.pipeline.executors import perform_in_blender
 perform_in_blender(place)"""
 
 
-class ExecutorError(Exception):
-    """Error that says why nothing can be done by these means, and the way out, in one line."""
-
-
 class Executor(AbstractContextManager["Executor"]):
     """Executor of jobs: this class at once, in this process. A context; may be used again after `stop`."""
 
@@ -88,15 +84,15 @@ class ProcessExecutor(Executor):
         self.capacity = max(1, jobs)
         spawn = multiprocessing.get_context("spawn")
         self._new_pool = partial(pebble.ProcessPool, 1, initializer=_begin, initargs=(session(),), context=spawn)
-        self._pools: list[Any] = []
-        self._idle: list[Any] = []
+        self._pools: dict[Any, Future[Made]] = {}
+        """The last job of each pool."""
 
     def submit(self, job: Job) -> Future[Made]:
         with held_back({signal.SIGINT}):  # Ctrl-C reaches this process alone, which decides what comes of it.
-            pool = self._pool()
-            future = pool.schedule(_perform, (job,))
-        future.add_done_callback(lambda _: self._idle.append(pool))
-        return future
+            idle = (pool for pool, last in self._pools.items() if last.done() and pool.active)
+            pool = next(idle, None) or self._new_pool()
+            self._pools[pool] = pool.schedule(_perform, (job,))
+        return self._pools[pool]
 
     def stop(self) -> None:
         for pool in self._pools:
@@ -104,13 +100,6 @@ class ProcessExecutor(Executor):
         for pool in self._pools:
             with suppress(RuntimeError):
                 pool.join()
-
-    def _pool(self) -> Any:
-        while self._idle:
-            if (pool := self._idle.pop()).active:  # And not killed while it had nothing to do.
-                return pool
-        self._pools.append(self._new_pool())
-        return self._pools[-1]
 
 
 def processors() -> int:
@@ -227,18 +216,10 @@ def _made_by_blender(job: Job) -> Made:
     root = Path(cast(str, module.__file__)).resolve().parents[module.__name__.count(".")]
     command = [job.blender, "--background", "--factory-startup", "--python-exit-code", "1", "--python-expr", PROGRAM]
     command += ["--", *map(os.fspath, (job.place.absolute(), PACKAGE.parent, EXTENSION.parent, root))]
-    with (
-        (job.place / "log").open("ab") as log,
-        subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,  # Whose end tells it that nobody waits any more.
-            stdout=log,
-            stderr=log,
-            preexec_fn=end_with_parent if sys.platform == "linux" else None,
-        ) as process,
-    ):
-        if code := process.wait():
-            raise subprocess.CalledProcessError(code, command)
+    with (job.place / "log").open("ab") as log:
+        parent = subprocess.PIPE  # Whose end tells it that nobody waits any more.
+        before = end_with_parent if sys.platform == "linux" else None
+        subprocess.check_call(command, stdin=parent, stdout=log, stderr=log, preexec_fn=before)
     answer = pickle.loads((job.place / ANSWER).read_bytes())
     if isinstance(answer, Exception):
         raise answer

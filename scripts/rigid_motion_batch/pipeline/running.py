@@ -21,18 +21,15 @@ from typing import Any
 from rigid_motion_batch.command_line import few
 from rigid_motion_batch.progress import Progress
 
-from .executors import FULL_OR_FORBIDDEN, Executor, ExecutorError, Made, loss
-from .steps import Job, Task, TaskError
-from .store import OutputError, Store
+from .executors import FULL_OR_FORBIDDEN, Executor, Made, loss
+from .steps import INTERVAL, Job, RunError, Task, TaskError
+from .store import Store
 from .values import plain
 
 Plan = Callable[[], Iterable[Task]]
 
 ATTEMPTS = 3
 """Number of times that a task is begun whose process dies."""
-
-LOOK = 0.2
-"""Seconds between two looks at how far tasks are."""
 
 DONE, UP_TO_DATE, FAILED, SKIPPED = "done", "up to date", "failed", "skipped"
 STOPPED = "not begun or stopped"
@@ -55,16 +52,12 @@ def share_of(plan: Plan, stage: str = "", number: int = 1, of: int = 1) -> Itera
 def survey(plan: Plan, store: Store) -> tuple[dict[str, tuple[float, int]], int]:
     """Return the tasks of a plan that are to be done, by name, with their seconds and frames, and how many are done.
 
-    Raises OutputError where something would be replaced that must not be, or two tasks publish one file.
+    Raises RunError where something would be replaced that must not be.
     """
     costs: dict[str, tuple[float, int]] = {}
     foreign: list[str] = []
-    places, done = set[int](), 0
+    done = 0
     for task in plan():
-        for path in task.publish.values():
-            if (place := hash(path.casefold())) in places:
-                raise OutputError(f"{path}: two results would go here; choose other names")
-            places.add(place)
         index = store.index_of(task.key)
         unpublished = store.unpublished(task, index)
         if index and not unpublished:
@@ -99,21 +92,8 @@ class Run:
     def do(self, plan: Plan, title: str = "") -> None:
         """Do what is missing of a plan, which yields the same tasks each time.
 
-        Raises OutputError before anything is done, where something would be replaced that must not be.
+        Raises RunError before anything is done, where something would be replaced that must not be.
         """
-        with self.progress.stage(title, 1.0) as self._stage:
-            self._left, up_to_date = survey(plan, self.store)
-            self._stage.total = self._seconds = sum(seconds for seconds, _ in self._left.values())
-            self._all_frames = self._frames = sum(frames for _, frames in self._left.values())
-            # What an earlier plan did is found up to date by this one.
-            self.counts = Counter({DONE: (done := self.counts[DONE]), UP_TO_DATE: up_to_date - done})
-            if self._left:
-                self._do(plan)
-        if self.store.alone:
-            with suppress(OSError):
-                self.store.note("failures.json", self.noted)
-
-    def _do(self, plan: Plan) -> None:
         self._settled: dict[str, str | None] = {}
         """Key of a task to that of its result; None where it has none."""
         self._open: set[str] = set()
@@ -121,20 +101,28 @@ class Run:
         self._waiting: list[Task] = []
         self._at_work: dict[Future[Made], tuple[Task, Job]] = {}
         self._losses: Counter[str] = Counter()
-        try:
-            self._work(iter(plan()))
-            if self.store.alone and not self.failures:
-                self.store.sweep(key for key in self._settled.values() if key)
-        except ExecutorError as error:
-            self.problem = str(error)
-        except KeyboardInterrupt:
-            self.interrupted = True
-        if self._left:
-            self.executor.stop()
-            self.counts[STOPPED] = len(self._left)
+        with self.progress.stage(title, 1.0) as self._stage:
+            self._left, up_to_date = survey(plan, self.store)
+            self._stage.total = self._seconds = sum(seconds for seconds, _ in self._left.values())
+            self._all_frames = self._frames = sum(frames for _, frames in self._left.values())
+            # What an earlier plan did is found up to date by this one.
+            self.counts = Counter({DONE: (done := self.counts[DONE]), UP_TO_DATE: up_to_date - done})
+            try:
+                if self._left:
+                    self._work(iter(plan()))
+            except RunError as error:
+                self.problem = str(error)
+            except KeyboardInterrupt:
+                self.interrupted = True
+            if self._left:
+                self.executor.stop()
+                self.counts[STOPPED] = len(self._left)
+        if self.store.alone:
+            with suppress(OSError):
+                self.store.note("failures.json", self.noted)
 
     def _work(self, rest: Iterator[Task]) -> None:
-        """Do tasks, each when those before it are settled. Raises ExecutorError where nothing more can be done."""
+        """Do tasks, each when those before it are settled. Raises RunError where nothing more can be done."""
         more = True
         while more or self._waiting or self._at_work:
             capacity = self.executor.capacity
@@ -153,13 +141,16 @@ class Run:
                 self._waiting.remove(task)
                 self._begin(task)
             if not capacity:
-                time.sleep(LOOK)
-            ended, _ = wait(self._at_work, LOOK, FIRST_COMPLETED)
+                time.sleep(INTERVAL)
+            wait(self._at_work, INTERVAL, FIRST_COMPLETED)
+            ended = [future for future in self._at_work if future.done()]  # Also those that an executor cancels.
             for future in ended:
                 self._end(future, *self._at_work.pop(future))
             for task, job in () if ended else self._at_work.values():
                 job.look()
                 self._show(task, job.reached[1])
+        if self.store.alone and not self.failures:
+            self.store.sweep({*self._settled.values()})
 
     def _before(self, task: Task) -> list[str | None]:
         """Return the keys of the results of the tasks before one, also of earlier plans; None where there is none."""
@@ -176,7 +167,7 @@ class Run:
         elif None in before and not (task.step.partial and any(before)):
             self._close(task, SKIPPED)
         else:
-            folders = [self.store.folder_of(key) if key else None for key in before]
+            folders = [self.store.results / key if key else None for key in before]
             job = Job(task, self.store.new_scratch(), self.store.output, folders, self.blender)
             self._show(task)
             self._at_work[self.executor.submit(job)] = task, job
@@ -208,7 +199,7 @@ class Run:
             if made:
                 self.store.keep(task, key, made)
             is_new = self.store.publish(task, key) or made
-        except OutputError as error:
+        except RunError as error:
             self._fail(task, str(error))
         except OSError as error:
             said = f"{error.filename2 or error.filename}: {error.strerror or error}"
@@ -225,7 +216,7 @@ class Run:
         self.progress.error(said)
         self._close(task, FAILED)
         if fatal:
-            raise ExecutorError(said)
+            raise RunError(said)
 
     def _close(self, task: Task, state: str, key: str | None = None) -> None:
         """Take it that a task has come to its end, with a result of this key: those after it may begin."""
@@ -261,7 +252,7 @@ def explain(plan: Plan, store: Store) -> Iterator[tuple[Task, str]]:
         elif not index:
             changed[task.key] = task.name
             earlier = store.index_of(latest.get(task.name, "")) or {}
-            is_damaged = store.folder_of(task.key).exists()
+            is_damaged = (store.results / task.key).exists()
             yield task, "its result is damaged" if is_damaged else _difference(earlier.get("made_of"), task, changed)
 
 

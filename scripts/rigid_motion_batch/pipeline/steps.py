@@ -18,7 +18,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, dataclass_transform
 
 from rigid_motion_batch import places
 
@@ -27,8 +27,15 @@ from .values import plain
 OWN = ".rigid-motion"
 """The folder in an output folder where the pipeline keeps its own files."""
 
+VERSION = "RIGID_MOTION_VERSION"
+"""A variable of the environment: the version that this program is to have, of those at work at one plan."""
+
 INTERVAL = 0.2
-"""Seconds between two messages about how far a task is."""
+"""Seconds between two messages about how far a task is, and between two looks at them."""
+
+
+class RunError(Exception):
+    """Error that says why a run cannot begin or go on, and the way out, in one line."""
 
 
 class TaskError(Exception):
@@ -42,9 +49,9 @@ class TaskError(Exception):
     fatal = False
 
 
-@dataclass(frozen=True)
+@dataclass_transform(frozen_default=True)
 class Step:
-    """What can be done: frozen dataclasses of values, with what is said of each: `class Read(Step, stage="read")`.
+    """What can be done: each is a frozen dataclass of values, and `class Read(Step, stage="read")` says what it is.
 
     A step may use some `rooms`, files and folders of the program as `places.place_of` names them. It belongs to a
     `stage` of the work, for `--only`. A `partial` one goes on with what there is where some of the tasks before it
@@ -59,6 +66,7 @@ class Step:
     def __init_subclass__(cls, **said: Any) -> None:
         for name, value in said.items():
             setattr(cls, name, value)
+        dataclass(frozen=True)(cls)
 
     def make(self, job: Job) -> Mapping[str, Any] | None:
         """Write the files of the result into the job's folder, and return facts for JSON, if there are any."""

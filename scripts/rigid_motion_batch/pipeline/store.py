@@ -15,12 +15,13 @@ number may write at the same time.
 from __future__ import annotations
 
 import json
+import math
 import os
 import shutil
 import stat
 import time
 import uuid
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
@@ -31,7 +32,7 @@ from rigid_motion_batch.command_line import few
 from rigid_motion_batch.files import append_lines, lines_of, write_text
 
 from .executors import Made
-from .steps import OWN, Task, sha256_in, sha256_of
+from .steps import OWN, RunError, Task, sha256_in, sha256_of
 from .values import plain
 
 INDEX = ".index.json"
@@ -44,46 +45,41 @@ UNREADABLE = (OSError, ValueError, LookupError, TypeError, AttributeError, Recur
 """Errors of a file of the store that is missing or damaged."""
 
 
-class OutputError(Exception):
-    """Error that says what must not be replaced or read, or who is at work there, and the way out, in one line."""
-
-
 class Store:
     """An output folder, as a context: made where it is missing, and taken away again where nothing came of it.
 
     `alone`, no other run may have the folder meanwhile; workers that do a part each are not. With `overwrite`, files
-    may be replaced that this program has not written; inputs and folders never are. Raises OutputError or OSError on
+    may be replaced that this program has not written; inputs and folders never are. Raises RunError or OSError on
     entering, where another run has the folder, or there can be none.
     """
 
     def __init__(self, output: Path, *, alone: bool = True, overwrite: bool = False) -> None:
         self.output, self.alone, self.overwrite = output.absolute(), alone, overwrite
         self.own = self.output / OWN
-        self._results, self._published = self.own / "results", self.own / "published"
+        self._folders = [self.own / name for name in ("results", "published", "scratch")]
+        self.results, self._published, self._scratches = self._folders
         self._lock = FileLock(self.own / "lock", blocking=False)
         self._missing = [folder for folder in (self.output, *self.output.parents) if not folder.exists()]
         self._digests = self.noted("inputs.json")
         """Path of an input to what was seen of it when it was hashed, and its digest."""
         self._inputs: dict[tuple[int, int], str] = {}
         """Identities of inputs in the file system, to their paths."""
-        self._scratch = self.own / "scratch" / ("run" if alone else uuid.uuid4().hex[:8])
+        self._scratch = self._scratches / ("run" if alone else uuid.uuid4().hex[:8])
 
     # -- opening and closing ------------------------------------------------------------------------------------------
 
     def __enter__(self) -> Self:
-        for folder in (self._results, self._published, self._scratch.parent):
+        for folder in self._folders:
             folder.mkdir(parents=True, exist_ok=True)
         try:
             if self.alone:
                 self._lock.acquire()
         except Timeout:
-            raise OutputError(
+            raise RunError(
                 f"{self.output}: another run is at work in this folder; wait for it, or choose another with --output"
             ) from None
-        for session in self._scratch.parent.iterdir():
-            with suppress(FileNotFoundError):  # Another process has ended.
-                if session == self._scratch or _age(session) > KEPT:
-                    shutil.rmtree(session, ignore_errors=True)
+        for session in (self._scratch, *_old(self._scratches)):
+            shutil.rmtree(session, ignore_errors=True)
         self._scratch.mkdir()
         return self
 
@@ -91,13 +87,13 @@ class Store:
         shutil.rmtree(self._scratch, ignore_errors=True)
         with suppress(OSError):
             self.note("inputs.json", self._digests)
-        # A list, for each of them goes where it is empty.
-        is_empty = all([*map(_remove_if_empty, (self._results, self._scratch.parent, self._published))])
-        for name in ("inputs.json", "failures.json", "lock") if self.alone and is_empty else ():
-            (self.own / name).unlink(missing_ok=True)
+        if self.alone and not any(self.own.glob("*/*")):
+            for name in ("inputs.json", "failures.json", "lock"):
+                (self.own / name).unlink(missing_ok=True)
         self._lock.release()
-        for folder in (self.own, *self._missing):
-            _remove_if_empty(folder)
+        for folder in (*self._folders, self.own, *self._missing):
+            with suppress(OSError):  # There is something in it.
+                folder.rmdir()
 
     def new_scratch(self) -> Path:
         """Return a path for what is being made; nothing is there."""
@@ -121,7 +117,7 @@ class Store:
     def inputs(self, *paths: Path | str) -> dict[str, str]:
         """Return files as they are now, with their digests; an empty one for what is no file that can be read.
 
-        Raises OutputError where this program has written one into this folder.
+        Raises RunError where this program has written one into this folder.
         """
         return {os.fspath(path): self._digest_of(os.fspath(path)) for path in paths}
 
@@ -132,7 +128,7 @@ class Store:
             return ""
         inside = os.path.realpath(path).removeprefix(os.path.realpath(self.output) + os.sep).replace(os.sep, "/")
         if inside.startswith(f"{OWN}/") or self._digests_at(inside):
-            raise OutputError(f"{path}: this input was written by a run into this folder; choose another --output")
+            raise RunError(f"{path}: this input was written by a run into this folder; choose another --output")
         if not stat.S_ISREG(status.st_mode):
             return ""
         place, seen = os.path.abspath(path), [status.st_size, status.st_mtime_ns, status.st_ctime_ns]
@@ -144,23 +140,17 @@ class Store:
 
     # -- results ------------------------------------------------------------------------------------------------------
 
-    def folder_of(self, key: str) -> Path:
-        """Return the folder where the result of a key is, if it is there."""
-        return self._results / key
-
     def index_of(self, key: str, *, thoroughly: bool = False) -> Mapping[str, Any] | None:
         """Return the index of the result of a key; None where it is not there, or damaged.
 
         With `thoroughly` the content of all files is looked at, otherwise of those that changed since they were made.
         """
-        folder = f"{self._results}/{key}"
         try:
-            index = json.loads(Path(folder, INDEX).read_bytes())
+            index = json.loads((self.results / key / INDEX).read_bytes())
             for name, (size, mtime, digest) in index["files"].items():
-                status = os.lstat(f"{folder}/{name}")
-                if not stat.S_ISREG(status.st_mode) or status.st_size != size:
-                    return None
-                if (status.st_mtime_ns != mtime or thoroughly) and sha256_of(f"{folder}/{name}") != digest:
+                path = f"{self.results}/{key}/{name}"
+                seen = _seen(path)
+                if seen[0] != size or ((seen[1] != mtime or thoroughly) and sha256_of(path) != digest):
                     return None
         except UNREADABLE:
             return None
@@ -172,34 +162,33 @@ class Store:
         content = json.dumps({**index, "name": task.name, "made_of": task.made_of}, default=plain)
         (folder / INDEX).write_text(content, encoding="utf-8")
         try:
-            folder.rename(self.folder_of(key))
+            folder.rename(self.results / key)
         except OSError:
             if not self.index_of(key):  # Otherwise another worker was quicker.
                 self.discard(key)
-                self._results.mkdir(exist_ok=True)  # A worker that made nothing may have taken it away.
-                folder.rename(self.folder_of(key))
+                self.results.mkdir(exist_ok=True)  # A worker that made nothing may have taken it away.
+                folder.rename(self.results / key)
 
     def discard(self, key: str) -> None:
         """Delete a result."""
-        shutil.rmtree(self.folder_of(key), ignore_errors=True)
+        shutil.rmtree(self.results / key, ignore_errors=True)
 
     def discard_damaged(self, keys: Iterable[str]) -> bool:
         """Delete those of these results that are damaged, and return whether there are any."""
-        damaged = [key for key in keys if self.folder_of(key).exists() and not self.index_of(key, thoroughly=True)]
+        damaged = [key for key in keys if (self.results / key).exists() and not self.index_of(key, thoroughly=True)]
         for key in damaged:
             self.discard(key)
         return bool(damaged)
 
-    def sweep(self, requested: Iterable[str]) -> None:
+    def sweep(self, requested: Container[str | None]) -> None:
         """Delete results that are not among these, and older than a week."""
-        requested = frozenset(requested)
-        for folder in self._results.iterdir():
-            if folder.name not in requested and _age(folder) > KEPT:
+        for folder in _old(self.results):
+            if folder.name not in requested:
                 self.discard(folder.name)
 
     def latest(self) -> dict[str, str]:
         """Return the key of the last result of each task, by the task's name, of all that are kept."""
-        keys = [folder.name for folder in sorted(self._results.glob("*"), key=_age, reverse=True)]
+        keys = [folder.name for folder in sorted(self.results.glob("*"), key=_changed_at)]
         return {index["name"]: key for key in keys if (index := self.index_of(key))}
 
     # -- published files ----------------------------------------------------------------------------------------------
@@ -210,14 +199,16 @@ class Store:
         for name, path in task.publish.items():
             for file in [file for file in files if file.startswith(name)] if name.endswith("/") else [name]:
                 place = path + file.removeprefix(name)
-                result += [] if self._is_same(files.get(file), place) else [(file, place)]
+                # A link or a copy has the size and the time of change of what it is of.
+                if file not in files or _seen(f"{self.output}/{place}") != files[file][:2]:
+                    result.append((file, place))
         return result
 
     def refuse(self, foreign: list[str]) -> None:
-        """Raise OutputError where there are paths that are not the program's own, unless they may be replaced."""
+        """Raise RunError where there are paths that are not the program's own, unless they may be replaced."""
         if foreign and not self.overwrite:
             named = few(os.fspath(self.output / path) for path in foreign)
-            raise OutputError(
+            raise RunError(
                 f"{named} {'was' if len(foreign) == 1 else 'were'} not written by this program, or edited since; "
                 "choose another folder with --output, or replace that with --overwrite"
             )
@@ -225,7 +216,7 @@ class Store:
     def publish(self, task: Task, key: str) -> bool:
         """Put files of a result where they belong, and return whether there were any that were not there.
 
-        Raises OSError, and OutputError where something is there that must not be replaced; files before that stay.
+        Raises OSError, and RunError where something is there that must not be replaced; files before that stay.
         """
         index = self.index_of(key) or {}
         missing = self.unpublished(task, index)
@@ -233,47 +224,38 @@ class Store:
         for name, path in missing:
             target, beside = self.output / path, self.new_scratch()
             if not Path(os.path.realpath(target.parent)).is_relative_to(os.path.realpath(self.output)):
-                raise OutputError(f"{target.parent}: this leads out of the output folder; choose another with --output")
+                raise RunError(f"{target.parent}: this leads out of the output folder; choose another with --output")
             target.parent.mkdir(parents=True, exist_ok=True)
             # Killed from here on, what was moved is known to be the program's own.
             append_lines(self._record_of(path), [{"path": path, "sha256": index["files"][name][-1]}])
             try:
-                os.link(self.folder_of(key) / name, beside)
+                os.link(self.results / key / name, beside)
             except OSError:  # This file system has no links.
-                shutil.copy2(self.folder_of(key) / name, beside)
+                shutil.copy2(self.results / key / name, beside)
             beside.replace(target)
         return bool(missing)
 
     def withdraw(self, paths: Iterable[str]) -> None:
         """Delete files of this program that are needed no more, and folders that are empty then."""
         for path in paths:
-            with suppress(OSError, OutputError):
+            with suppress(OSError, RunError):
                 if self.is_own(path):
                     (self.output / path).unlink()
-                    for folder in (self.output / path).relative_to(self.output).parents:
-                        (self.output / folder).rmdir()
-
-    def _is_same(self, known: tuple[int, int, str] | None, path: str) -> bool:
-        """Return whether a published file is one of a result, of this size and time of change, or a copy."""
-        with suppress(OSError):
-            status = os.lstat(f"{self.output}/{path}")
-            same = known is not None and [status.st_size, status.st_mtime_ns] == [*known[:2]]
-            return same and stat.S_ISREG(status.st_mode)
-        return False
+                    os.removedirs((self.output / path).parent)
 
     def is_own(self, path: str) -> bool:
-        """Return whether a path has nothing, or what this program wrote. Raises OutputError for what always stays."""
+        """Return whether a path has nothing, or what this program wrote. Raises RunError for what always stays."""
         target, another = f"{self.output}/{path}", "choose another folder with --output"
         try:
             status = os.lstat(target)
         except FileNotFoundError:
             return True
         except NotADirectoryError:
-            raise OutputError(f"{target}: there is a file where a folder goes; move it, or {another}") from None
+            raise RunError(f"{target}: there is a file where a folder goes; move it, or {another}") from None
         if stat.S_ISDIR(status.st_mode):
-            raise OutputError(f"{target}: there is a folder where a file goes; move it, or {another}")
+            raise RunError(f"{target}: there is a folder where a file goes; move it, or {another}")
         if source := self._inputs.get((status.st_dev, status.st_ino)):
-            raise OutputError(f"{source}: this input lies where {target} goes; {another}")
+            raise RunError(f"{source}: this input lies where {target} goes; {another}")
         return stat.S_ISREG(status.st_mode) and sha256_of(target) in self._digests_at(path)
 
     def _record_of(self, path: str) -> Path:
@@ -287,13 +269,20 @@ class Store:
         return {str(line.get("sha256")) for line in lines if str(line.get("path")).casefold() == path.casefold()}
 
 
-def _age(path: Path) -> float:
-    """Return the seconds since a path was made or changed."""
-    return time.time() - path.lstat().st_mtime
-
-
-def _remove_if_empty(folder: Path) -> bool:
+def _seen(path: str) -> list[int]:
+    """Return size and time of change of a file; nothing that any has where it is none, or is not there."""
     with suppress(OSError):
-        folder.rmdir()
-        return True
-    return False
+        status = os.lstat(path)
+        return [status.st_size, status.st_mtime_ns] if stat.S_ISREG(status.st_mode) else [-1]
+    return [-1]
+
+
+def _old(folder: Path) -> list[Path]:
+    """Return what was made in a folder before so long a time that it is kept no more."""
+    return [path for path in folder.iterdir() if time.time() - _changed_at(path) > KEPT]
+
+
+def _changed_at(path: Path) -> float:
+    with suppress(FileNotFoundError):  # Another process has ended.
+        return path.lstat().st_mtime
+    return math.inf

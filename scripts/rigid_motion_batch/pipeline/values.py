@@ -13,6 +13,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar, get_origin
 
+import numpy as np
+
 T = TypeVar("T")
 
 CLASS, ARRAY = "$", "array"
@@ -36,44 +38,39 @@ def plain(value: Any, arrays: MutableMapping[str, Any] | None = None) -> Any:
     return {ARRAY: name}
 
 
-def from_json(text: str, arrays: Mapping[str, Any]) -> Any:
-    """Return the value of a text, lists as tuples. ValueError for a class not loaded, or no dataclass."""
-
-    def made(content: dict[str, Any]) -> Any:
-        if content.keys() == {ARRAY}:
-            return arrays[content[ARRAY]]
-        content = {name: _tuples(inner) for name, inner in content.items()}
-        return _class_named(content.pop(CLASS))(**content) if CLASS in content else content
-
-    return _tuples(json.loads(text, object_hook=made))
-
-
 def write(stem: Path, value: Any) -> None:
     """Write a value to STEM.json, and its arrays, if it has any, to STEM.npz."""
     arrays: dict[str, Any] = {}
     stem.with_suffix(".json").write_text(json.dumps(value, default=partial(plain, arrays=arrays)), encoding="utf-8")
     if arrays:
-        import numpy as np
-
         np.savez(stem.with_suffix(".npz"), **arrays)
 
 
 def read(kind: type[T], stem: Path) -> T:
-    """Read a value of this type that was written. Raises OSError, ValueError or KeyError where it is damaged."""
+    """Read a value of this type that was written, lists as tuples.
+
+    Raises OSError, ValueError or KeyError where it is damaged, or of a class that is not loaded, or no dataclass.
+    """
     arrays: dict[str, Any] = {}
     if stem.with_suffix(".npz").exists():
-        import numpy as np
-
         with np.load(stem.with_suffix(".npz"), allow_pickle=False) as stored:
             arrays = dict(stored)
-    value = from_json(stem.with_suffix(".json").read_text(encoding="utf-8"), arrays)
+    value = _value(json.loads(stem.with_suffix(".json").read_bytes()), arrays)
     if not isinstance(value, get_origin(kind) or kind):
         raise ValueError(f"{stem}: a {type(value).__name__} is no {kind.__name__}")
     return value
 
 
-def _tuples(value: Any) -> Any:
-    return tuple(map(_tuples, value)) if isinstance(value, list) else value
+def _value(content: Any, arrays: Mapping[str, Any]) -> Any:
+    """Return the value of what was read from JSON."""
+    if isinstance(content, list):
+        return tuple(_value(item, arrays) for item in content)
+    if not isinstance(content, dict):
+        return content
+    if content.keys() == {ARRAY}:
+        return arrays[content[ARRAY]]
+    content = {name: _value(inner, arrays) for name, inner in content.items()}
+    return _class_named(content.pop(CLASS))(**content) if CLASS in content else content
 
 
 def _class_named(name: str) -> type:

@@ -5,13 +5,11 @@ from __future__ import annotations
 import os
 import signal
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 from rigid_motion_batch.pipeline.steps import Job, Step, TaskError
 
 
-@dataclass(frozen=True)
 class Save(Step, blender=True):
     """Write a .blend file with a scene of this name, and whether it was a Blender with a program of its own."""
 

@@ -7,7 +7,6 @@ import json
 import os
 import signal
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 from rigid_motion_batch.pipeline.steps import Job, Step, TaskError
@@ -16,7 +15,6 @@ FILE = "out.txt"
 """The one file that every result has."""
 
 
-@dataclass(frozen=True)
 class Write(Step, stage="write"):
     """Write a text, and note in a log that it was done."""
 
@@ -37,7 +35,6 @@ class Write(Step, stage="write"):
         return {"characters": len(self.text)}
 
 
-@dataclass(frozen=True)
 class Join(Step, stage="join"):
     """Write what is in the results before it that are there."""
 
@@ -52,7 +49,6 @@ class Report(Join, stage="report", partial=True):
     """The same, also where some are missing."""
 
 
-@dataclass(frozen=True)
 class Copy(Step):
     """Write what is in a file from outside."""
 
@@ -75,7 +71,6 @@ class Vanish(Copy):
         Path(*job.task.inputs).unlink()
 
 
-@dataclass(frozen=True)
 class Fail(Step):
     """Write half, and fail."""
 
@@ -88,7 +83,6 @@ class Fail(Step):
         raise KeyError("unforeseen")
 
 
-@dataclass(frozen=True)
 class Stumble(Step):
     """Fail at writing a file."""
 
@@ -106,7 +100,6 @@ class Forget(Step):
         pass
 
 
-@dataclass(frozen=True)
 class Die(Step):
     """Write half and die of SIGKILL, so many times; then write all."""
 
@@ -124,7 +117,6 @@ class Die(Step):
         (job.folder / FILE).write_text("whole")
 
 
-@dataclass(frozen=True)
 class ProcessId(Step):
     """Write who did it, after a while."""
 
@@ -161,7 +153,6 @@ class Parse(Step):
         (job.folder / FILE).write_text(",".join(map(str, json.loads((job.before[0] / FILE).read_text()).values())))
 
 
-@dataclass(frozen=True)
 class Count(Step):
     """Say how far it is, one by one."""
 

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from rigid_motion_batch.cli.compare import Refused, version_of
+from rigid_motion_batch.cli.compare import version_of
 from rigid_motion_batch.pipeline.executors import Executor, ProcessExecutor
 from rigid_motion_batch.pipeline.running import Run
-from rigid_motion_batch.pipeline.steps import OWN, Task
+from rigid_motion_batch.pipeline.steps import OWN, RunError, Task
 from rigid_motion_batch.pipeline.store import Store
 from tests.scripts.pipeline.blender_steps import Save
 from tests.scripts.pipeline.plans import Listener, contents, run, states, task, writing
@@ -104,7 +104,7 @@ def test_a_blender_says_which_it_is(blender: str) -> None:
 
 @pytest.mark.parametrize("path", ["/nowhere/blender", "/bin/true", "/tmp"])
 def test_what_is_no_blender_is_said_to_be_none(path: str) -> None:
-    with pytest.raises(Refused, match=f"{path}: .*; give the path of a Blender program"):
+    with pytest.raises(RunError, match=f"{path}: .*; give the path of a Blender program"):
         version_of(path)
 
 

@@ -22,8 +22,8 @@ from rigid_motion_batch.pipeline.comparison import Comparison, ComparisonPlan
 from rigid_motion_batch.pipeline.comparison_steps import result_in
 from rigid_motion_batch.pipeline.executors import Executor, ProcessExecutor
 from rigid_motion_batch.pipeline.running import Run
-from rigid_motion_batch.pipeline.steps import OWN, Task
-from rigid_motion_batch.pipeline.store import OutputError, Store
+from rigid_motion_batch.pipeline.steps import OWN, RunError, Task
+from rigid_motion_batch.pipeline.store import Store
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.report.settings import Settings
@@ -250,7 +250,7 @@ def test_a_damaged_part_is_made_again(output: Path, toss: Path, part: str, damag
     if damage is garbage:  # Which is seen by those who read it alone.
         try:
             said = " ".join(compared(output, other)[0].failures.values())
-        except OutputError as error:
+        except RunError as error:
             said = str(error)
         assert "damaged" in said
     outcome, _ = compared(output, other)

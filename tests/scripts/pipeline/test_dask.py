@@ -18,8 +18,7 @@ from distributed import Client
 from rigid_motion_batch.cli import compare
 from rigid_motion_batch.pipeline import dask
 from rigid_motion_batch.pipeline.dask import DaskExecutor
-from rigid_motion_batch.pipeline.executors import ExecutorError
-from rigid_motion_batch.pipeline.steps import OWN
+from rigid_motion_batch.pipeline.steps import OWN, RunError
 from tests.scripts.comparing import outputs, write_toss
 
 pytestmark = pytest.mark.skipif(
@@ -211,14 +210,14 @@ def test_workers_of_another_version_are_left_out(
 ) -> None:
     monkeypatch.setattr(dask, "version_here", lambda: "program 2")
     connecting = Connecting(tmp_path, cluster.address)
-    with pytest.raises(ExecutorError, match="none of its workers is fit"), connecting.executor:
+    with pytest.raises(RunError, match="none of its workers is fit"), connecting.executor:
         connecting.wait_for_workers(2)
     assert connecting.notes[-1].endswith(", and this run is of program 2; start it anew with that; it is left out")
 
 
 def test_workers_that_do_not_see_the_folder_are_left_out(cluster: Cluster, tmp_path: Path) -> None:
     connecting = Connecting(tmp_path / "none", cluster.address)
-    with pytest.raises(ExecutorError, match="none of its workers is fit"), connecting.executor:
+    with pytest.raises(RunError, match="none of its workers is fit"), connecting.executor:
         connecting.wait_for_workers(2)
     assert f"it does not see {tmp_path / 'none'}" in connecting.notes[-1]
 
@@ -248,7 +247,7 @@ def test_a_worker_without_this_program_is_left_out_and_lives(cluster: Cluster, t
 )
 def test_a_wrong_address_is_said_to_be_one_within_seconds(tmp_path: Path, address: str, complaint: str) -> None:
     started = time.monotonic()
-    with pytest.raises(ExecutorError, match=complaint):
+    with pytest.raises(RunError, match=complaint):
         Connecting(tmp_path, address).executor.__enter__()
     assert time.monotonic() - started < 10.0
 

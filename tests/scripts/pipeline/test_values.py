@@ -74,9 +74,10 @@ def test_a_class_of_another_kind_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["os:system", "pathlib:Path", "nowhere:Circle", "Circle"])
-def test_what_is_no_class_of_values_is_not_made(name: str) -> None:
+def test_what_is_no_class_of_values_is_not_made(tmp_path: Path, name: str) -> None:
+    (tmp_path / "value.json").write_text(json.dumps({"$": name}))
     with pytest.raises(ValueError, match="is no class of values"):
-        values.from_json(json.dumps({"$": name}), {})
+        values.read(Shape, tmp_path / "value")
 
 
 def test_what_is_no_value_is_refused() -> None:

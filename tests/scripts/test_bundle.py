@@ -10,9 +10,8 @@ from pathlib import Path
 import pytest
 
 from rigid_motion_batch.cli import compare
-from rigid_motion_batch.cli.job_bundle import below_inputs
-from rigid_motion_batch.pipeline import bundle
-from rigid_motion_batch.pipeline.bundle import write_bundle
+from rigid_motion_batch.cli.job_bundle import below_inputs, write_bundle
+from rigid_motion_batch.pipeline.steps import VERSION, version_here
 from rigid_motion_batch.progress import FARM
 from tests.scripts.comparing import outputs, write_toss
 
@@ -90,8 +89,14 @@ def test_a_name_that_is_an_expression_of_templates_is_refused() -> None:
         below_inputs(["{{a}}.csv"])
 
 
-def test_a_machine_with_another_version_is_told_so(capsys: pytest.CaptureFixture) -> None:
-    bundle.check(bundle.version_here())
-    with pytest.raises(SystemExit):
-        bundle.check("program 0")
-    assert "and the bundle is of program 0" in capsys.readouterr().out
+def test_a_machine_with_another_version_is_told_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    share = [str(write_toss(tmp_path / "toss.csv")), "--only", "read", "--no-video", "--output", str(tmp_path / "out")]
+    write_bundle(tmp_path, share, tmp_path, tmp_path / "out", {"read": 1})
+    variables = json.loads((tmp_path / "template.json").read_text())["jobEnvironments"][0]["variables"]
+    monkeypatch.setenv(VERSION, variables[VERSION])
+    assert compare.main(share) == 0
+    monkeypatch.setenv(VERSION, "program 0")
+    assert compare.main(share) == 2
+    assert f"this machine has {version_here()}, and the bundle is of program 0" in capsys.readouterr().err
