@@ -1,17 +1,18 @@
 """A whole body as a rig with a key on every sample, and what Blender's Decimate leaves of these keys.
 
-F-curves are read as Blender evaluates them, at the samples, and errors are those of `study.bodies`: in metres, in the
-root's space, through the hierarchy, of balls around the joints.
+F-curves are read as Blender evaluates them, at the samples, and errors are those of `analysis.bodies`: in metres, in
+the root's space, through the hierarchy, of balls around the joints.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import bpy
 import numpy as np
 
+from rigid_motion import animation
 from rigid_motion.animation.actions.channels import replace_keys
 from rigid_motion.motion import Poses, shell_error
 from rigid_motion.motion.quaternions import normalise
@@ -19,21 +20,15 @@ from rigid_motion_batch.analysis.bodies import BodyReconstruction
 from rigid_motion_batch.analysis.body_decimated import DECIMATE, KeysOfBody, ours
 from rigid_motion_batch.analysis.metrics import Metrics
 from rigid_motion_batch.axes import to_blender
-from rigid_motion_batch.scenes.decimated_bodies import (
-    FREE,
-    Decimations,
-    Left,
-    fcurves_of,
-    key_frames_of,
-    left_of_fcurves,
-    values_of,
-    varying,
-)
 
 from .armature import Rest, Rig
+from .decimated_bodies import FREE, Decimations, Left
 
 EVEN = 0.1
 """Frames that evenly spaced samples may be off a whole one: times are often rounded to milliseconds."""
+
+VARIES = 1e-4
+"""A channel that never changes by more is one that does not vary: importers calculate in single precision."""
 
 APART = 1e-3
 """Frames between two keys, at least: Blender has them in single precision."""
@@ -71,7 +66,7 @@ class DecimatedBody:
         channels = self.rig.channels_of(joints)
         for bone in range(len(self.rig.bones)):
             self.rig.key(bone, self.frames, channels[bone])
-        self._counted = varying(values_of(self.rig.obj, self.frames))
+        self._counted = {curve for curve, own in self._values().items() if np.ptp(own) > VARIES}
         self.decimations = [Decimations(self.rig.obj, self.left)] if self._counted else []
         if self._counted:
             smooth(self.rig.obj)
@@ -84,8 +79,9 @@ class DecimatedBody:
 
     def left(self) -> Left:
         """Return the keys that the rig has now, and their largest error."""
-        keys = key_frames_of(self.rig.obj, self._counted)
-        return left_of_fcurves(DECIMATE, keys, float(self.errors().max()), FREE)
+        curves = [fcurve for curve, fcurve in fcurves_of(self.rig.obj).items() if curve in self._counted]
+        keys = [key.co.x for fcurve in curves for key in fcurve.keyframe_points]
+        return Left(len(set(keys)), len(keys), FREE * len(keys), float(self.errors().max()))
 
     def within(self, largest: float) -> Left | None:
         """Return the fewest keys whose error is nowhere larger than this, in metres.
@@ -97,20 +93,26 @@ class DecimatedBody:
             result.append(everything)
         return min(result, key=lambda left: left.keys, default=None)
 
+    def _values(self) -> dict[tuple[str, int], np.ndarray]:
+        """Return what F-curves show at the samples, by Blender's own evaluation, each of shape (n,)."""
+        frames = self.frames.tolist()
+        return {
+            curve: np.array([fcurve.evaluate(frame) for frame in frames])
+            for curve, fcurve in fcurves_of(self.rig.obj).items()
+        }
+
     def _channels(self) -> Poses:
-        """Return the channels of all bones at the samples, shape (joints, n)."""
-        values = values_of(self.rig.obj, self.frames)
-        bones = [self.rig.obj.pose.bones[name] for name in self.rig.bones]
+        """Return the channels of all bones at the samples, shape (joints, n): what is not keyed stays as it is."""
+        values, bones = self._values(), [self.rig.obj.pose.bones[name] for name in self.rig.bones]
 
         def channels(name: str) -> np.ndarray:
-            return np.stack([self._filled(values, bone.path_from_id(name), getattr(bone, name)) for bone in bones])
+            result = np.array([getattr(bone, name) for bone in bones])[:, None].repeat(len(self.frames), axis=1)
+            for own, path in zip(result, (bone.path_from_id(name) for bone in bones), strict=True):
+                for index in range(own.shape[1]):
+                    own[:, index] = values.get((path, index), own[:, index])
+            return result
 
         return Poses(channels("location"), normalise(channels("rotation_quaternion")))
-
-    def _filled(self, values: Mapping[tuple[str, int], np.ndarray], path: str, still: Sequence[float]) -> np.ndarray:
-        """Return a property at the samples, shape (n, components): what is not keyed stays as it is."""
-        columns = [values.get((path, index), np.full(len(self.frames), value)) for index, value in enumerate(still)]
-        return np.stack(columns, axis=-1)
 
 
 def beside_decimate(
@@ -149,6 +151,11 @@ def beside_decimate(
                 )
             )
     return rows
+
+
+def fcurves_of(obj: bpy.types.Object) -> dict[tuple[str, int], bpy.types.FCurve]:
+    """Return the F-curves of an object and its bones, by data path and index."""
+    return {(fcurve.data_path, fcurve.array_index): fcurve for fcurve in animation.channelbag_of(obj).fcurves}
 
 
 def smooth(obj: bpy.types.Object) -> None:

@@ -130,7 +130,7 @@ def test_decimate_is_held_to_our_largest_error_and_all_is_counted(monkeypatch, s
         assert own.numbers == channels + (len(keys[0]) if shared else sum(map(len, keys)))
         assert own.max_shell_m == metrics.max_shell_m
         assert 0.0 < theirs.max_shell_m <= own.max_shell_m
-        result = Left(DECIMATE, theirs.frames_with_keys, theirs.keys, theirs.numbers, theirs.max_shell_m)
+        result = Left(theirs.frames_with_keys, theirs.keys, theirs.numbers, theirs.max_shell_m)
         assert result in tried
         assert result.keys == min(item.keys for item in tried if item.largest <= own.max_shell_m)
         assert result.keys < max(item.keys for item in tried)
