@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from rigid_motion.motion import Poses
-from rigid_motion.motion.poses import inverse, placed
 from rigid_motion_batch.axes import from_blender, to_blender
 
 from . import clip_reading
@@ -15,6 +14,7 @@ from .clips import Clip, OtherMotion
 from .options import ReadingOptions
 from .reading import format_of, split_source
 from .recordings import TrajectoryError, listed
+from .rest_bodies import in_parents
 
 ROUNDED = 6e-4
 """Seconds that a motion may begin later or end sooner: times are often rounded to milliseconds."""
@@ -78,7 +78,4 @@ def _as_in(clip: Clip, other: Clip, source: str) -> Poses:
         has = f"{clip.source} has {'it' if len(missing) == 1 else 'them'}"
         raise TrajectoryError(source, f"it has no joint {listed(missing, 5)}", has)
     world = theirs.skeleton.in_root_space(poses)[[places[name] for name in own.joints]]
-    parents = own.parents
-    hanging = parents >= 0
-    world[hanging] = placed(inverse(world[parents[hanging]]), world[hanging])
-    return world
+    return in_parents(world, own.parents)
