@@ -11,9 +11,9 @@ from pathlib import Path
 
 from rigid_motion_batch.rows import write_rows
 
-from .bodies import BodyReconstruction
 from .body_metrics import numbers_of
 from .metrics import Metrics
+from .reconstructions import Reconstruction
 
 DECIMATE, OWN, SHARED = "Decimate", "keys of each joint", "key poses"
 """How keys were chosen."""
@@ -48,7 +48,7 @@ class KeysOfBody:
     """The largest shell error that was allowed; None where a rate decides."""
 
 
-def ours(made: BodyReconstruction, row: Metrics) -> KeysOfBody:
+def ours(made: Reconstruction, row: Metrics) -> KeysOfBody:
     """Return what was measured of a mode."""
     assert row.key_frames is not None
     assert row.keys is not None

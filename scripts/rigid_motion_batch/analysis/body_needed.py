@@ -14,14 +14,13 @@ from typing import cast
 
 import numpy as np
 
-from rigid_motion.motion import reduce_skeleton_keys
+from rigid_motion.motion import reduce_skeleton_keys, rms
 from rigid_motion_batch.recordings.clips import Clip
 
-from .bodies import BodyReconstruction, rms_of_body, same_body_motions
 from .choices import Uniform
 from .needed import DECIMATIONS, OfRigidBody, Ways, evenly_spaced, fewest, part_of
 from .radii import Radii
-from .reconstructions import Groups
+from .reconstructions import Groups, Reconstruction, same_motions
 
 NEAR = 0.02
 """The search ends where one knows the number of key poses to so much of it: every step reduces keys anew."""
@@ -40,14 +39,14 @@ class OfBody:
     decimations = DECIMATIONS[:2]
 
     def groups(self, modes: tuple[str, ...]) -> Groups:
-        return same_body_motions(self.clip, modes)
+        return same_motions(self.clip, modes)
 
     def between(self, first: int, last: int) -> OfBody:
         return replace(self, clip=part_of(self.clip, first, last))
 
     def error(self, keys: np.ndarray, mode: str) -> float:
-        made = BodyReconstruction(self.clip, Uniform("1"), {mode: (keys,) * len(self.radii)}, shared=True)
-        return rms_of_body(made, mode, self.radii)
+        made = Reconstruction(self.clip, Uniform("1"), {mode: (keys,) * len(self.radii)}, self.radii, shared=True)
+        return rms(made.shell(mode))
 
     def by_motion(self, mode: str, target: float, evenly: int) -> list[tuple[np.ndarray, float]]:
         """Key poses: as many as evenly spaced ones at most, if those of the motion are any better."""

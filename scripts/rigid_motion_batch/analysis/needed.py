@@ -218,7 +218,7 @@ class OfRigidBody:
         return DECIMATIONS if self.fit else DECIMATIONS[:2]
 
     def groups(self, modes: tuple[str, ...]) -> Groups:
-        return same_motions(self.clip, modes, self.radius)
+        return same_motions(self.clip, modes)
 
     def between(self, first: int, last: int) -> OfRigidBody:
         return replace(self, clip=part_of(self.clip, first, last))

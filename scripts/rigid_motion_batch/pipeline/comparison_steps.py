@@ -24,7 +24,6 @@ from . import values
 from .steps import Job, Step, TaskError
 
 if TYPE_CHECKING:
-    from rigid_motion_batch.analysis.bodies import BodyReconstruction
     from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult
 
 RECORDINGS = ("rigid_motion/motion", "recordings", "axes.py", "command_line.py", "files.py", "rows.py")
@@ -130,7 +129,7 @@ class Measure(Step, rooms=ANALYSIS, stage="measure"):
         made = results.made_of(clip, self.choice, self.modes, radii, shared=self.shared)
         if made is None:
             raise TaskError(f"{clip.name}: too short for two keys {self.choice.phrase}")
-        result = results.measured(made, radii)
+        result = results.measured(made)
         results.write_tables(job.folder, made, self.form)
         metrics.write_metrics(job.folder / ROWS, result.rows)
         if result.joints:
@@ -170,10 +169,10 @@ class Decimate(Measure, rooms=SCENES, blender=True):
         from rigid_motion_batch.scenes.decimating import beside_decimate
 
         clip, result = self.clip.read(job.results[0]), result_in(job.results[1])
-        made = cast("BodyReconstruction", made_again(clip, result, self.radii, shared=self.shared))
+        made = made_again(clip, result, self.radii, shared=self.shared)
         known = [row for row in result.rows if row.keys]
         with _told(f"{clip.name} {result.choice.phrase}: not compared with Blender's Decimate"):
-            rows = beside_decimate(made, self.radii.of(clip.whole_body.joints), known)
+            rows = beside_decimate(made, known)
         write_keys_of_bodies(job.folder / ROWS, rows)
         values.write(job.folder / "decimated", tuple(rows))
 
@@ -234,7 +233,6 @@ class Build(Step, rooms=SCENES, stage="build", blender=True):
     """The version of Blender."""
 
     def make(self, job: Job) -> None:
-        from rigid_motion_batch.analysis.reconstructions import Reconstruction
         from rigid_motion_batch.analysis.results import made_again
         from rigid_motion_batch.scenes.body_scene import build_body_scene
         from rigid_motion_batch.scenes.film import save_blend
@@ -243,10 +241,10 @@ class Build(Step, rooms=SCENES, stage="build", blender=True):
         clip, result, radii = self.clip.read(job.results[0]), result_in(job.results[1]), self.radii
         with _told(f"{clip.name} {result.choice.phrase}: no video"):
             made = made_again(clip, result, radii, shared=self.shared)
-            if isinstance(made, Reconstruction):
+            if clip.rest_body is None:
                 build_scene(made, self.settings)
             else:
-                build_body_scene(made, self.settings, radii.of(clip.whole_body.joints))
+                build_body_scene(made, self.settings)
             save_blend(job.folder / BLEND)
 
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate, shell_error
-from rigid_motion_batch.analysis.bodies import BLOCK, BodyReconstruction, identical_body_modes
 from rigid_motion_batch.analysis.body_metrics import key_samples
+from rigid_motion_batch.analysis.reconstructions import Reconstruction, identical_modes
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.palette import error_hex, full_colour
 from rigid_motion_batch.recordings.rest_bodies import short_names
@@ -47,21 +47,19 @@ GROUND = 0.05
 """The part of the ground that is seen below the feet, in units of the figure."""
 
 
-def build_body_scene(made: BodyReconstruction, settings: SceneSettings, radii: np.ndarray) -> bpy.types.Scene:
+def build_body_scene(made: Reconstruction, settings: SceneSettings) -> bpy.types.Scene:
     """Make the scene of a comparison of whole bodies, in a file that is emptied for it.
 
     Parameters
     ----------
-    made : BodyReconstruction
+    made : Reconstruction
     settings : SceneSettings
         But for the subject and the deviation: a body shows itself, as it is.
-    radii : array, shape (joints,)
-        Of the balls by which errors are measured, in metres.
     """
     timeline = begin(made, settings)
-    lanes_of = identical_body_modes(made) if settings.distinct else tuple((mode,) for mode in made.keys)
+    lanes_of = identical_modes(made) if settings.distinct else tuple((mode,) for mode in made.keys)
     rest = Rest.of(made.clip.rest_body, made.clip.metres_per_unit, made.clip.axes)
-    motion, centre = shown_motion(made, [group[0] for group in lanes_of], timeline, rest, radii)
+    motion, centre = shown_motion(made, [group[0] for group in lanes_of], timeline, rest)
 
     recording, *others = (Jointed(motion.places(some)) for some in (motion.recording, *motion.modes.values()))
     framing = Framing.of(recording, SMOOTHING * settings.fps)
@@ -78,7 +76,7 @@ def build_body_scene(made: BodyReconstruction, settings: SceneSettings, radii: n
         framing=framing,
         framing_steps=1,
         errors={mode: 1e3 * errors.max(axis=0) for mode, errors in motion.errors.items()},
-        sampled={mode: 1e3 * _sampled_errors(made, mode, radii) for mode in motion.modes},
+        sampled={mode: 1e3 * made.shell(mode).max(axis=0) for mode in motion.modes},
         sample_frames=timeline.frames_of(made.times),
         joints=tuple(short_names(made.clip.rest_body.joints)),
         worst={mode: errors.argmax(axis=0) for mode, errors in motion.errors.items()},
@@ -95,7 +93,7 @@ def build_body_scene(made: BodyReconstruction, settings: SceneSettings, radii: n
 
 
 def shown_motion(
-    made: BodyReconstruction, modes: Sequence[str], timeline: Timeline, rest: Rest, radii: np.ndarray
+    made: Reconstruction, modes: Sequence[str], timeline: Timeline, rest: Rest
 ) -> tuple[BodyMotion, np.ndarray]:
     """Return what moves on the stage, and what became its origin: the middle of the recording,
     on the ground, shape (3,).
@@ -128,7 +126,9 @@ def shown_motion(
         ]
         for mode in modes
     }
-    errors = {mode: shell_error(skeleton.in_root_space(poses), truth, radii[:, None]) for mode, poses in shown.items()}
+    errors = {
+        mode: shell_error(skeleton.in_root_space(poses), truth, made.radii[:, None]) for mode, poses in shown.items()
+    }
     moment = {mode: [own for own, _ in some] for mode, some in keys.items()}
     most = max(len(own) for some in moment.values() for own in some)
     fade = float(np.clip(FADE_SHARE * timeline.frames_per_key(most), 1.0, FADE))
@@ -143,15 +143,7 @@ def shown_motion(
     ), centre
 
 
-def _sampled_errors(made: BodyReconstruction, mode: str, radii: np.ndarray) -> np.ndarray:
-    """Return the largest error of any joint at each sample, in metres, shape (n,)."""
-    samples = np.arange(made.samples.start, made.samples.stop)
-    blocks = np.array_split(samples, len(samples) // BLOCK + 1)
-    errors = [shell_error(made.shown(mode, made.clip.times[some]), made.truth(some), radii[:, None]) for some in blocks]
-    return np.concatenate([error.max(axis=0) for error in errors])
-
-
-def _notes(made: BodyReconstruction, modes: Iterable[str]) -> dict[str, str]:
+def _notes(made: Reconstruction, modes: Iterable[str]) -> dict[str, str]:
     """Return mode id to its own number of keys, where the modes have different ones."""
     kind = "key poses" if made.shared else "keys"
     counts = {
@@ -162,7 +154,7 @@ def _notes(made: BodyReconstruction, modes: Iterable[str]) -> dict[str, str]:
     return {} if len(set(counts.values())) == 1 else {mode: f"{count} {kind}" for mode, count in counts.items()}
 
 
-def _legend(made: BodyReconstruction, settings: SceneSettings) -> str:
+def _legend(made: Reconstruction, settings: SceneSettings) -> str:
     """Return how to read the picture, but for the colours."""
     parts = [
         "grey: recording",

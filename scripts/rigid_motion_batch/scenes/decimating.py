@@ -1,6 +1,6 @@
 """A whole body as a rig with a key on every sample, and what Blender's Decimate leaves of these keys.
 
-F-curves are read as Blender evaluates them, at the samples, and errors are those of `analysis.bodies`: in metres, in
+F-curves are read as Blender evaluates them, at the samples, and errors are those of `analysis.errors`: in metres, in
 the root's space, through the hierarchy, of balls around the joints.
 """
 
@@ -16,9 +16,9 @@ from rigid_motion import animation
 from rigid_motion.animation.actions.channels import replace_keys
 from rigid_motion.motion import Poses, shell_error
 from rigid_motion.motion.quaternions import normalise
-from rigid_motion_batch.analysis.bodies import BodyReconstruction
 from rigid_motion_batch.analysis.body_decimated import DECIMATE, KeysOfBody, ours
 from rigid_motion_batch.analysis.metrics import Metrics
+from rigid_motion_batch.analysis.reconstructions import Reconstruction
 from rigid_motion_batch.axes import to_blender
 
 from .armature import Rest, Rig
@@ -39,10 +39,8 @@ class DecimatedBody:
 
     Parameters
     ----------
-    made : BodyReconstruction
+    made : Reconstruction
         All its modes begin and end with the same samples; Decimate gets these and all between.
-    radius : float or array, shape (joints,)
-        Of the balls at the joints, in metres.
 
     Raises
     ------
@@ -50,11 +48,11 @@ class DecimatedBody:
         Where Blender cannot have the keys.
     """
 
-    def __init__(self, made: BodyReconstruction, radius: float | np.ndarray) -> None:
+    def __init__(self, made: Reconstruction) -> None:
         bpy.ops.wm.read_factory_settings(use_empty=True)
         clip = made.clip
         self.frames = frames_of(made.times)
-        self._skeleton, self._radius = made.skeleton, np.broadcast_to(radius, (len(made.skeleton),))[:, None]
+        self._skeleton, self._radius = made.skeleton, made.radii[:, None]
         joints = to_blender(clip.in_metres(clip.poses[:, made.samples]), clip.axes)
         roots = clip.rest_body.parents < 0
         places = joints.positions[roots]
@@ -115,16 +113,12 @@ class DecimatedBody:
         return Poses(channels("location"), normalise(channels("rotation_quaternion")))
 
 
-def beside_decimate(
-    made: BodyReconstruction, radius: float | np.ndarray, measured: Sequence[Metrics]
-) -> list[KeysOfBody]:
+def beside_decimate(made: Reconstruction, measured: Sequence[Metrics]) -> list[KeysOfBody]:
     """Return the keys of each mode, and behind each what Decimate needs for the largest error that these have.
 
     Parameters
     ----------
-    made : BodyReconstruction
-    radius : float or array, shape (joints,)
-        Of the balls at the joints, in metres.
+    made : Reconstruction
     measured : sequence of Metrics
         Of the modes. One whose error Blender cannot keep to, in single precision, has no row of Decimate.
 
@@ -133,7 +127,7 @@ def beside_decimate(
     RuntimeError
         Where Blender cannot have the keys, or cannot decimate.
     """
-    body = DecimatedBody(made, radius)
+    body = DecimatedBody(made)
     rows = []
     for row in measured:
         own = ours(made, row)

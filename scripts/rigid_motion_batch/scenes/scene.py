@@ -14,7 +14,6 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from rigid_motion_batch.analysis.bodies import BodyReconstruction
 from rigid_motion_batch.analysis.reconstructions import Groups, Reconstruction, identical_modes
 from rigid_motion_batch.palette import DARK, linear
 
@@ -45,7 +44,7 @@ def build_scene(reconstruction: Reconstruction, settings: SceneSettings) -> bpy.
     """
     timeline = begin(reconstruction, settings)
     motion = ShownMotion.of(reconstruction, timeline)
-    lanes_of = identical_modes([reconstruction]) if settings.distinct else tuple((mode,) for mode in motion.modes)
+    lanes_of = identical_modes(reconstruction) if settings.distinct else tuple((mode,) for mode in motion.modes)
 
     mesh = load_subject(settings.subject)
     smoothing = SMOOTHING * settings.fps * timeline.steps
@@ -60,7 +59,7 @@ def build_scene(reconstruction: Reconstruction, settings: SceneSettings) -> bpy.
     deviation = settings.deviation or magnification(farthest, size)
     deviated = {mode: magnified(poses, motion.recording, deviation, middle) for mode, poses in motion.modes.items()}
     extent = framing.extent(Solid(motion.recording, outline), [Solid(poses, outline) for poses in deviated.values()])
-    sampled = {mode: 1e3 * errors.shell for mode, errors in reconstruction.errors.items()}
+    sampled = {mode: 1e3 * reconstruction.shell(mode)[0] for mode in reconstruction.keys}
     times = timeline.times_of(timeline.frames)
     cast = Cast.arranged(
         settings,
@@ -83,7 +82,7 @@ def build_scene(reconstruction: Reconstruction, settings: SceneSettings) -> bpy.
     return scene
 
 
-def begin(made: Reconstruction | BodyReconstruction, settings: SceneSettings) -> Timeline:
+def begin(made: Reconstruction, settings: SceneSettings) -> Timeline:
     """Empty the file, name its scene after what is compared, and return the timeline."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.scene.name = f"{made.clip.name} {made.choice.name}"
@@ -124,7 +123,7 @@ def assemble_scene(
 
 def _notes(reconstruction: Reconstruction) -> dict[str, str]:
     """Return mode id to its own number of keys, where the modes have different ones."""
-    counts = {mode: len(keys) for mode, keys in reconstruction.keys.items() if len(keys)}
+    counts = {mode: len(keys) for mode, (keys,) in reconstruction.keys.items() if len(keys)}
     if len(set(counts.values())) == 1:
         return {}
     duration = float(np.ptp(reconstruction.times[[0, -1]]))

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigid_motion.motion import Poses, interpolate
-from rigid_motion_batch.analysis.bodies import BodyReconstruction
 from rigid_motion_batch.analysis.reconstructions import Reconstruction
 from rigid_motion_batch.axes import to_blender
 
@@ -38,7 +37,7 @@ class Timeline:
     """Fine frames for a frame."""
 
     @classmethod
-    def of(cls, made: Reconstruction | BodyReconstruction, fps: int, slow_motion: float) -> Timeline:
+    def of(cls, made: Reconstruction, fps: int, slow_motion: float) -> Timeline:
         """Return all frames from the first key to the last, `slow_motion` times slower than life."""
         return cls.between(float(made.times[0]), float(made.times[-1]), fps, slow_motion)
 
@@ -102,7 +101,7 @@ class ShownMotion:
     @classmethod
     def of(cls, reconstruction: Reconstruction, timeline: Timeline) -> ShownMotion:
         """Return every mode's own in-betweens, not those of the recording's sample times joined by lines."""
-        clip, kept = reconstruction.clip, reconstruction.keys
+        clip, kept = reconstruction.clip, {mode: keys for mode, (keys,) in reconstruction.keys.items()}
         key_times = {mode: clip.times[keys] for mode, keys in kept.items()}
         keys = {mode: clip.poses[of_mode] for mode, of_mode in kept.items()}
         times = timeline.times_of(timeline.fine_frames)

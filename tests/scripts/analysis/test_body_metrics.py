@@ -8,16 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigid_motion_batch.analysis.bodies import Ground, measure_body, reconstruct_body
 from rigid_motion_batch.analysis.body_metrics import (
-    MeasuredBody,
+    Measured,
     join_tables,
     measure_modes,
     write_joint_metrics,
     write_key_tables,
 )
 from rigid_motion_batch.analysis.choices import Choice, Tolerance, Uniform
+from rigid_motion_batch.analysis.errors import Ground, errors_of
 from rigid_motion_batch.analysis.metrics import body_table_names
+from rigid_motion_batch.analysis.reconstructions import reconstruct
 from rigid_motion_batch.rows import unescaped
 from tests.scripts.clips.bodies import JOINTS, swinging_body
 
@@ -47,9 +48,9 @@ CHOICES = [Uniform("5"), Tolerance("2cm")]
 
 def measured(
     choice: Choice = CHOICES[0], modes: tuple[str, ...] = MODES, joints: tuple[str, ...] = JOINTS, **settings: bool
-) -> MeasuredBody:
+) -> Measured:
     clip = swinging_body(joints=joints)
-    return measure_modes(reconstruct_body(clip, choice, modes, RADII, **settings), RADII)
+    return measure_modes(reconstruct(clip, choice, modes, RADII, **settings))
 
 
 def cells_of(path: Path) -> list[list[str]]:
@@ -75,7 +76,7 @@ def test_the_rows_are_statistics_of_all_joints_and_of_each(choice: Choice) -> No
     assert [row.mode for row in result.rows] == list(MODES)
     assert [(row.mode, row.joint) for row in result.joints] == [(mode, joint) for mode in MODES for joint in JOINTS]
     for row in result.rows:
-        errors = measure_body(made, row.mode, RADII, Ground.of(made))
+        errors = errors_of(made, row.mode, Ground.of(made))
         own = [joint for joint in result.joints if joint.mode == row.mode]
         assert row.rms_shell_m == pytest.approx(np.sqrt(np.mean([joint.rms_shell_m**2 for joint in own])))
         assert row.max_shell_m == max(joint.max_shell_m for joint in own) == errors.shell.max()
