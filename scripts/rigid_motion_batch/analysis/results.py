@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 
 from rigid_motion.motion import Poses
-from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.clips import Clip, ClipFacts
 
 from .body_decimated import KeysOfBody
@@ -186,10 +185,7 @@ def measured(made: Reconstruction) -> ChoiceResult:
     rows = {row.mode: row for row in result.rows}
     motions = []
     for group, errors in zip(result.groups, result.errors.values(), strict=True):
-        if clip.rest_body:
-            poses = _places(errors.places)
-        else:
-            poses = to_blender(clip.in_metres(made.filled_in(group[0], made.times)), clip.axes)
+        poses = _places(errors.places) if clip.rest_body else clip.in_blender(made.filled_in(group[0], made.times))
         motions.append(
             Motion(
                 group,
@@ -216,9 +212,9 @@ def clip_result(clip: Clip, choices: Sequence[ChoiceResult], needed: KeysNeeded 
     """Gather what was found of a clip."""
     rest_body = clip.rest_body
     if rest_body is None:
-        truth = to_blender(clip.in_metres(clip.poses), clip.axes)
+        truth = clip.in_blender(clip.poses)
     else:
-        truth = _places(to_blender(clip.in_metres(rest_body.skeleton.in_root_space(clip.poses)), clip.axes).positions)
+        truth = _places(clip.in_blender(rest_body.skeleton.in_root_space(clip.poses)).positions)
     return ClipResult(
         ClipFacts.of(clip),
         clip.times,

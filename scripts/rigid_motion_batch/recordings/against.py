@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from rigid_motion.motion import Poses
-from rigid_motion_batch.axes import from_blender, to_blender
+from rigid_motion_batch.axes import from_blender
 
 from . import clip_reading
 from .clips import Clip, OtherMotion
@@ -66,7 +66,7 @@ def _span(times: np.ndarray) -> str:
 def _as_in(clip: Clip, other: Clip, source: str) -> Poses:
     """Return the poses of another clip in the axes, the unit and, of a whole body, the joints of a clip."""
     own, theirs = clip.rest_body, other.rest_body
-    poses = from_blender(to_blender(other.in_metres(other.poses), other.axes), clip.axes)
+    poses = from_blender(other.in_blender(other.poses), clip.axes)
     poses = Poses(poses.positions / clip.metres_per_unit, poses.quaternions, poses.scales)
     if own is None and theirs is None:
         return poses

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigid_motion.motion import Poses, interpolate
+from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.rest_bodies import RestBody
 
 
@@ -106,6 +107,10 @@ class Clip:
         if self.metres_per_unit == 1.0:
             return poses
         return Poses(poses.positions * self.metres_per_unit, poses.quaternions, poses.scales)
+
+    def in_blender(self, poses: Poses) -> Poses:
+        """Return poses of this clip in metres and Blender's axes."""
+        return to_blender(self.in_metres(poses), self.axes)
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,6 @@ from rigid_motion.motion.quaternions import normalise
 from rigid_motion_batch.analysis.body_decimated import DECIMATE, KeysOfBody, ours
 from rigid_motion_batch.analysis.metrics import Metrics
 from rigid_motion_batch.analysis.reconstructions import Reconstruction
-from rigid_motion_batch.axes import to_blender
 
 from .armature import Rest, Rig
 from .decimated_bodies import FREE, Decimations, Left
@@ -53,13 +52,13 @@ class DecimatedBody:
         clip = made.clip
         self.frames = frames_of(made.times)
         self._skeleton, self._radius = made.skeleton, made.radii[:, None]
-        joints = to_blender(clip.in_metres(clip.poses[:, made.samples]), clip.axes)
+        joints = clip.in_blender(clip.poses[:, made.samples])
         roots = clip.rest_body.parents < 0
         places = joints.positions[roots]
         # Single precision is best around the origin.
         joints.positions[roots] -= (places.min(axis=(0, 1)) + places.max(axis=(0, 1))) / 2.0
         self._truth = self._skeleton.in_root_space(joints)
-        rest = Rest.of(clip.rest_body, clip.metres_per_unit, clip.axes)
+        rest = Rest.of(clip)
         self.rig = Rig("Body", rest, clip.rest_body.joints, bpy.context.scene.collection)
         channels = self.rig.channels_of(joints)
         for bone in range(len(self.rig.bones)):

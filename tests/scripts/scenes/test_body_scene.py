@@ -63,7 +63,7 @@ def assert_played(made: Reconstruction, scene: bpy.types.Scene, modes: tuple[str
     times = timeline.times_of(timeline.frames)
     centre = np.array(scene["recording_centre_m"])
     clip = made.clip
-    rest = Rest.of(clip.rest_body, clip.metres_per_unit, clip.axes)
+    rest = Rest.of(clip)
     expected = {mode: to_blender(made.shown(mode, times), clip.axes) for mode in modes}
     turns = {mode: turns_of(bpy.data.objects[mode], rest) for mode in modes}
     columns = [np.interp(times, clip.times, column) for column in clip.poses.positions[0].T]
