@@ -139,33 +139,8 @@ class ClipResult:
     """The keys that are needed, where that was looked for."""
 
 
-def compare_clip(
-    clip: Clip, choice: Choice, modes: Sequence[str], radii: Radii, *, shared: bool
-) -> ChoiceResult | None:
-    """Keep keys of a clip, let the modes fill them in, and measure what was lost.
-
-    Parameters
-    ----------
-    clip : Clip
-    choice : Choice
-    modes : sequence of str
-        Of `rigid_motion.motion.MODES`, and `best_of`, which is left out of whole bodies.
-    radii : Radii
-        Of the shells.
-    shared : bool
-        Whether the joints of a body have their keys at the same samples, where the motion chooses them.
-
-    Returns
-    -------
-    ChoiceResult or None
-        None where the clip is too short for two keys.
-    """
-    made = made_of(clip, choice, modes, radii, shared=shared)
-    return None if made is None else measured(made)
-
-
 def made_of(clip: Clip, choice: Choice, modes: Sequence[str], radii: Radii, *, shared: bool) -> Reconstruction | None:
-    """Return what modes make of a clip: the first half of `compare_clip`."""
+    """Return what modes make of a clip, with radii of the shells; as `reconstruct`."""
     return reconstruct(clip, choice, modes, _radii_of(clip, radii), shared=shared)
 
 
@@ -180,7 +155,7 @@ def _radii_of(clip: Clip, radii: Radii) -> np.ndarray:
 
 
 def measured(made: Reconstruction) -> ChoiceResult:
-    """Measure what was made: the second half of `compare_clip`."""
+    """Measure what was made."""
     clip, result = made.clip, measure_modes(made)
     rows = {row.mode: row for row in result.rows}
     motions = []

@@ -1,10 +1,14 @@
 """Recordings of a swinging tool for the tests: small, smooth, and different for every seed."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from rigid_motion.motion import KEYFRAME_MODES, Poses, decimate
-from rigid_motion_batch.analysis.choices import Uniform
+from rigid_motion_batch.analysis.choices import Choice, Uniform
+from rigid_motion_batch.analysis.radii import Radii
 from rigid_motion_batch.analysis.reconstructions import Reconstruction
+from rigid_motion_batch.analysis.results import ChoiceResult, made_of, measured
 from rigid_motion_batch.recordings.clips import Clip
 
 
@@ -26,3 +30,9 @@ def reconstruct(clip: Clip, rate: str = "10", modes: tuple[str, ...] = tuple(KEY
     return Reconstruction(
         clip, Uniform(rate), dict.fromkeys(modes, (decimate(clip.times, float(rate)),)), np.array([0.1])
     )
+
+
+def compare_clip(clip: Clip, choice: Choice, modes: Sequence[str], radii: Radii) -> ChoiceResult | None:
+    """What a comparison finds of a clip, as one step; None where it is too short for two keys."""
+    made = made_of(clip, choice, modes, radii, shared=False)
+    return None if made is None else measured(made)
