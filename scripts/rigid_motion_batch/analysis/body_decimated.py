@@ -5,11 +5,7 @@ For every mode one of ours, and one of Decimate that is held to the largest erro
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
-
-from rigid_motion_batch.rows import write_rows
 
 from .body_metrics import numbers_of
 from .metrics import Metrics
@@ -64,8 +60,3 @@ def ours(made: Reconstruction, row: Metrics) -> KeysOfBody:
         decimation=row.decimation,
         tolerance_m=row.tolerance_m,
     )
-
-
-def write_keys_of_bodies(path: Path, rows: Iterable[KeysOfBody]) -> None:
-    """Write a header and the rows."""
-    write_rows(path, KeysOfBody, rows)

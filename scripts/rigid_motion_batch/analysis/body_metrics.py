@@ -15,7 +15,7 @@ import numpy as np
 
 from rigid_motion.motion import Errors
 from rigid_motion_batch.files import replacing
-from rigid_motion_batch.rows import line_of, write_rows
+from rigid_motion_batch.rows import line_of
 
 from .errors import Ground, MotionErrors, errors_of
 from .metrics import BYTES_PER_KEY, BYTES_PER_MODE, Metrics, lines_of_poses, of_errors
@@ -145,11 +145,6 @@ def numbers_of(made: Reconstruction, mode: str) -> int:
     if made.shared:
         return int(len(key_samples(made.keys[mode])) + (counts * channels)[moving(clip)].sum())
     return int((counts * (1 + channels))[moving(clip)].sum())
-
-
-def write_joint_metrics(path: Path, rows: Iterable[JointMetrics]) -> None:
-    """Write a header and a row for every mode and joint."""
-    write_rows(path, JointMetrics, rows)
 
 
 def join_tables(path: Path, parts: Iterable[Path]) -> None:

@@ -17,7 +17,6 @@ from rigid_motion.motion import Errors, Poses
 from rigid_motion.motion.measures import rms
 from rigid_motion_batch.files import replacing
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.rows import write_rows
 
 from .choices import Choice
 from .errors import MotionErrors
@@ -117,11 +116,6 @@ def geometric_mean(values: np.ndarray) -> np.ndarray:
     count = known.sum(axis=0)
     total = np.log(np.where(known, values, 1.0)).sum(axis=0)
     return np.exp(np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0))
-
-
-def write_metrics(path: Path, rows: Iterable[Metrics]) -> None:
-    """Write `metrics.csv`: a header and a row for every clip, choice of keys and mode."""
-    write_rows(path, Metrics, rows)
 
 
 def write_poses(path: Path, times: np.ndarray, poses: Poses, modes: Sequence[str] = ()) -> None:

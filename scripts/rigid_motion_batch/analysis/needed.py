@@ -11,14 +11,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
 from rigid_motion.motion import decimate, fit_keys, interpolate, reduce_keys, rms, shell_error
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.rows import write_rows
 
 from .choices import Uniform
 from .metrics import NOTHING, geometric_mean
@@ -327,12 +325,8 @@ def _place(clip: KeysNeeded, mode: str) -> int:
 # -- keys_needed.csv --------------------------------------------------------------------------------------------------
 
 
-def write_keys_needed(path: Path, clips: Iterable[KeysNeeded]) -> None:
-    """Write a row for every clip, mode, decimation and rate, but where the reference has no error to be as good as."""
-    write_rows(path, NeededRow, (row for clip in clips for row in _rows(clip)))
-
-
-def _rows(clip: KeysNeeded) -> Iterator[NeededRow]:
+def rows_of(clip: KeysNeeded) -> Iterator[NeededRow]:
+    """Yield a row for every mode, decimation and rate, but where the reference has no error to be as good as."""
     for group, decimation, rate in np.argwhere(~np.isnan(clip.keys)).tolist():
         at = group, decimation, rate
         result: list[Any] = [None] * 4

@@ -108,7 +108,7 @@ def comparison_of(options: argparse.Namespace, command: str, blender: str) -> Co
     return Comparison(
         sources=tuple(options.inputs),
         choices=tuple(options.choices),
-        modes=options.modes.names,
+        modes=options.modes,
         against=options.against or "",
         axes=options.axes,
         reading=options.reading,

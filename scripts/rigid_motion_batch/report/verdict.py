@@ -133,7 +133,7 @@ def verdict(numbers: Numbers, needed: Sequence[KeysNeeded] = ()) -> Verdict:
     """
     contests = list(_contests(numbers))
     sentences = [_keys_needed(numbers, needed) if needed else None]
-    sentences += [tell(contest) for contest in contests for tell in (_fewer_keys, _within, _lower_error)]
+    sentences += [tell(contest) for contest in contests for tell in (_fewer_keys, _beside_rival)]
     said = [sentence for sentence in sentences if sentence]
     if not said:
         return Verdict((Part(SAMPLE_IS_KEY),))
@@ -238,44 +238,27 @@ def _fewer_keys(contest: _Contest) -> Text | None:
     )
 
 
-def _within(contest: _Contest) -> Text | None:
-    """How many keys a mode needs within a tolerance."""
+def _beside_rival(contest: _Contest) -> Text:
+    """How much closer the best mode is with as many keys, or how many fewer it needs within a tolerance."""
+    result = _best(contest)
+    if not result:
+        return _no_winner(contest)
+    best, rival, ratios = result
+    at = int(np.nanargmin(ratios))
+    names, less = (contest.name(best), contest.name(rival)), percent(1.0 - ratios[at])
     if contest.kind is not Tolerance:
-        return None
-    result = _best(contest)
-    if not result:
-        return _no_winner(contest)
-    best, rival, ratios = result
-    at = int(np.nanargmin(ratios))
-    phrase = contest.phrase(at)
-    return _say(
-        "{}, {} needs {} keys a second where {} needs {}: {} fewer.",
-        Part(phrase[0].upper() + phrase[1:]),
-        contest.name(best),
-        _number(f"{contest.means[at, best]:.3g}"),
-        contest.name(rival),
-        _number(f"{contest.means[at, rival]:.3g}"),
-        Part(percent(1.0 - ratios[at])),
-    )
-
-
-def _lower_error(contest: _Contest) -> Text | None:
-    """How much closer the best mode is with as many keys."""
-    if contest.kind is Tolerance:
-        return None
-    result = _best(contest)
-    if not result:
-        return _no_winner(contest)
-    best, rival, ratios = result
-    at = int(np.nanargmin(ratios))
-    return _say(
-        f"{{}} has {{}} less error than {{}} with the same {{}} keys a second"
-        f"{' on average' if contest.kind is Budget else ''}.",
-        contest.name(best),
-        _number(percent(1.0 - ratios[at])),
-        contest.name(rival),
-        _number(contest.numbers.choices[contest.places[at]].amount),
-    )
+        keys = contest.numbers.choices[contest.places[at]].amount
+        return _say(
+            f"{{}} has {{}} less error than {{}} with the same {{}} keys a second"
+            f"{' on average' if contest.kind is Budget else ''}.",
+            names[0],
+            _number(less),
+            names[1],
+            _number(keys),
+        )
+    phrase, (own, others) = contest.phrase(at), (_number(f"{mean:.3g}") for mean in contest.means[at, [best, rival]])
+    said = f"{phrase[0].upper()}{phrase[1:]}, {{}} needs {{}} keys a second where {{}} needs {{}}: {less} fewer."
+    return _say(said, names[0], own, names[1], others)
 
 
 def _no_winner(contest: _Contest) -> Text:
