@@ -6,10 +6,8 @@ report measures nothing.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -21,30 +19,9 @@ from .body_decimated import KeysOfBody
 from .body_metrics import JointMetrics, key_samples, measure_modes, write_key_tables
 from .choices import Choice
 from .metrics import Metrics, write_reconstruction
-from .modes import BEST_OF
 from .needed import KeysNeeded
 from .radii import Radii
 from .reconstructions import Keys, Reconstruction, reconstruct
-
-
-@dataclass(frozen=True)
-class SegmentModes:
-    """Which modes were best in how many segments, under `best_of`."""
-
-    counts: Mapping[str, int]
-    changes: int
-    """At how many keys the mode changes."""
-
-    best_single: str
-    """The best mode for all segments alike."""
-
-    @classmethod
-    def of(cls, made: Reconstruction) -> SegmentModes | None:
-        """Return None where the run does without `best_of`."""
-        if BEST_OF not in made.keys:
-            return None
-        changes = sum(mode != following for mode, following in pairwise(made.segment_modes))
-        return cls(dict(Counter(made.segment_modes)), changes, made.best_mode)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,8 +72,6 @@ class ChoiceResult:
 
     keys: Mapping[str, Keys]
     """The keys of every mode."""
-
-    segment_modes: SegmentModes | None = None
 
     mode_of_segments: tuple[str, ...] = ()
     """The mode of each segment under `best_of`; none where the run does without."""
@@ -171,8 +146,7 @@ def measured(made: Reconstruction) -> ChoiceResult:
                 errors.shell if clip.rest_body else None,
             )
         )
-    segments = SegmentModes.of(made), made.segment_modes
-    return ChoiceResult(made.choice, made.samples.start, tuple(motions), made.keys, *segments, result.joints)
+    return ChoiceResult(made.choice, made.samples.start, tuple(motions), made.keys, made.segment_modes, result.joints)
 
 
 def write_tables(folder: Path, made: Reconstruction, form: str) -> None:
