@@ -17,10 +17,11 @@ from rigid_motion.motion import Errors
 from rigid_motion_batch.files import replacing
 from rigid_motion_batch.rows import line_of
 
+from .choices import Keys
 from .errors import Ground, MotionErrors, errors_of
 from .metrics import BYTES_PER_KEY, BYTES_PER_MODE, Metrics, lines_of_poses, of_errors
 from .modes import BEST_OF
-from .reconstructions import Groups, Keys, Reconstruction, identical_modes, moving
+from .reconstructions import Groups, Reconstruction, identical_modes, moving
 
 
 @dataclass(frozen=True)

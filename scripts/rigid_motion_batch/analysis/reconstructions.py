@@ -16,14 +16,11 @@ import numpy as np
 from rigid_motion.motion import Poses, Skeleton, best_modes, interpolate, interpolate_by_segments, rms, shell_error
 from rigid_motion_batch.recordings.clips import Clip
 
-from .choices import Choice, Uniform
+from .choices import Choice, Keys, Uniform
 from .modes import BEST_OF, single_modes
 
 Groups = tuple[tuple[str, ...], ...]
 """Modes, those together that are one motion."""
-
-Keys = tuple[np.ndarray, ...]
-"""The samples that are keys of each joint, rising; a joint that stays as it is has a single one."""
 
 BLOCK = 4096
 """Samples of all joints that are worked on at once."""
@@ -169,11 +166,8 @@ def reconstruct(
     radii = np.broadcast_to(np.asarray(radius, dtype=float), still.shape)
     keys: dict[str, Keys] = {}
     for group in [single] if uniform else same_motions(clip, single):
-        if clip.rest_body:
-            of_joints = choice.body_keys(clip, group[0], radii, shared=shared)
-            result = tuple(own[:1] if rests else own for own, rests in zip(of_joints, still, strict=True))
-        else:
-            result = (choice.keys(clip, group[0], float(radii[0])),)
+        chosen = choice.keys(clip, group[0], radii, shared=shared)
+        result = tuple(own[:1] if rests else own for own, rests in zip(chosen, still, strict=True))
         keys |= dict.fromkeys(group, result)
     made = Reconstruction(clip, choice, {mode: keys[mode] for mode in single}, radii, shared or uniform)
     if BEST_OF in modes and clip.rest_body is None:

@@ -17,11 +17,11 @@ from rigid_motion_batch.recordings.clips import Clip, ClipFacts
 
 from .body_decimated import KeysOfBody
 from .body_metrics import JointMetrics, key_samples, measure_modes, write_key_tables
-from .choices import Choice
+from .choices import Choice, Keys
 from .metrics import Metrics, write_reconstruction
 from .needed import KeysNeeded
 from .radii import Radii
-from .reconstructions import Keys, Reconstruction, reconstruct
+from .reconstructions import Reconstruction, reconstruct
 
 
 @dataclass(frozen=True, eq=False)

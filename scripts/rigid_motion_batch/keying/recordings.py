@@ -95,7 +95,7 @@ class _Clip:
         frames = self._new_file() if scene else None
         count = self.how.count
         if count is None:
-            keys = tolerance.keys(clip, mode, self.radius)
+            (keys,) = tolerance.keys(clip, mode, self.radius)
         else:
             budget = min(count, len(clip.times))
             keys = reduce_keys(clip.times, clip.poses, mode, radius=self.radius / clip.metres_per_unit, budget=budget)

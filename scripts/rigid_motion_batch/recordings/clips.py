@@ -97,6 +97,11 @@ class Clip:
         return self.rate or 1.0 / float(np.median(np.diff(self.times)))
 
     @property
+    def joints(self) -> int:
+        """The number of joints of a figure, or the single one of a rigid body."""
+        return len(self.rest_body.joints) if self.rest_body else 1
+
+    @property
     def whole_body(self) -> RestBody:
         """The figure of a clip that has one."""
         assert self.rest_body is not None
