@@ -120,9 +120,9 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         parser.error(f"--last {options.last:g} is before --first {options.first:g}")
     try:
         refuse_odd_places(options)
-        keys = {"step": options.step or 1.0, "first": options.first, "last": options.last}
+        given = {"step": options.step or 1.0, "first": options.first, "last": options.last}
         hold = "CONSTANT" if options.hold else "LINEAR"
-        options.work = Unbake.of(options) if options.unbake else Bake.of(options, **keys, interpolation=hold)
+        options.work = Unbake.of(options) if options.unbake else Bake.of(options, **given, interpolation=hold)
         options.todo = _planned(options)
     except ValueError as error:
         parser.error(str(error))

@@ -225,8 +225,8 @@ class _Gaps:
         seen = self.look((first[:, None] + (last - first)[:, None] * looks).ravel())
         # What is damaged, or has no direction, is no reason for more samples.
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-            local = (in_parents(some, self.skeleton.parents) for some in (begin, end))
-            straight = self.skeleton.in_root_space(_between(*local, looks))
+            begin, end = (in_parents(some, self.skeleton.parents) for some in (begin, end))
+            straight = self.skeleton.in_root_space(_between(begin, end, looks))
             angle = angle_between(seen.quaternions, straight.quaternions)
             error = np.linalg.norm(seen.positions - straight.positions, axis=-1)
             error += 2.0 * self.radius * np.sin(angle / 2.0)

@@ -77,7 +77,7 @@ def build_body_scene(made: Reconstruction, settings: SceneSettings) -> bpy.types
         framing=framing,
         framing_steps=1,
         errors={mode: 1e3 * errors.max(axis=0) for mode, errors in motion.errors.items()},
-        joints=tuple(short_names(made.clip.rest_body.joints)),
+        joints=tuple(short_names(made.clip.whole_body.joints)),
         worst={mode: errors.argmax(axis=0) for mode, errors in motion.errors.items()},
     )
     full = full_colour(motion.errors.values())
@@ -109,9 +109,9 @@ def shown_motion(
     def around(poses: Poses, joint: int | None = None) -> Poses:
         """Return the poses with the roots, or the joint if it is one, moved by the centre."""
         if joint is not None:
-            return Poses(poses.positions - centre, poses.quaternions) if clip.rest_body.parents[joint] < 0 else poses
+            return Poses(poses.positions - centre, poses.quaternions) if clip.whole_body.parents[joint] < 0 else poses
         positions = poses.positions.copy()
-        positions[clip.rest_body.parents < 0] -= centre
+        positions[clip.whole_body.parents < 0] -= centre
         return Poses(positions, poses.quaternions)
 
     shown = {mode: clip.in_blender(made.filled_in(mode, times)) for mode in modes}
@@ -129,7 +129,7 @@ def shown_motion(
     most = max(len(own) for some in moment.values() for own in some)
     fade = float(np.clip(FADE_SHARE * timeline.frames_per_key(most), 1.0, FADE))
     return BodyMotion(
-        rest_body=clip.rest_body,
+        rest_body=clip.whole_body,
         rest=rest,
         recording=around(recording),
         modes={mode: around(poses) for mode, poses in shown.items()},

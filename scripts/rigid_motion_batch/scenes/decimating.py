@@ -53,13 +53,13 @@ class DecimatedBody:
         self.frames = frames_of(made.times)
         self._skeleton, self._radius = made.skeleton, made.radii[:, None]
         joints = clip.in_blender(clip.poses[:, made.samples])
-        roots = clip.rest_body.parents < 0
+        roots = clip.whole_body.parents < 0
         places = joints.positions[roots]
         # Single precision is best around the origin.
         joints.positions[roots] -= (places.min(axis=(0, 1)) + places.max(axis=(0, 1))) / 2.0
         self._truth = self._skeleton.in_root_space(joints)
         rest = Rest.of(clip)
-        self.rig = Rig("Body", rest, clip.rest_body.joints, bpy.context.scene.collection)
+        self.rig = Rig("Body", rest, clip.whole_body.joints, bpy.context.scene.collection)
         channels = self.rig.channels_of(joints)
         for bone in range(len(self.rig.bones)):
             self.rig.key(bone, self.frames, channels[bone])

@@ -89,13 +89,21 @@ class Cast:
         theme, (width, height) = THEMES[settings.theme], settings.resolution
         named = any(names_of(modes, notes) for modes in lanes_of)
         plan = layout.arrange(len(lanes_of), extent.size, width / height, named=named)
-        inks = {"ink": ink("Ink", theme.ink), "faint": ink("Faint", theme.faint)}
         sampled = {mode: 1e3 * made.shell(mode).max(axis=0) for modes in lanes_of for mode in modes[:1]}
         times = timeline.times_of(timeline.frames)
         own.setdefault("errors", {mode: np.interp(times, made.times, errors) for mode, errors in sampled.items()})
-        frames = timeline.frames_of(made.times)
-        shown = {"timeline": timeline, "layout": plan, "extent": extent, "notes": notes, "theme": theme}
-        return cls(**shown, **inks, sampled=sampled, sample_frames=frames, **own)
+        return cls(
+            timeline=timeline,
+            layout=plan,
+            extent=extent,
+            sampled=sampled,
+            sample_frames=timeline.frames_of(made.times),
+            notes=notes,
+            theme=theme,
+            ink=ink("Ink", theme.ink),
+            faint=ink("Faint", theme.faint),
+            **own,
+        )
 
     @property
     def largest_error(self) -> float:
