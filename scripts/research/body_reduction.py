@@ -12,12 +12,12 @@ import numpy as np
 
 from research.studies import interleaved_seconds, report
 from rigid_motion.motion import Poses, shell_error
-from rigid_motion_batch.analysis.bodies import BodyReconstruction, reconstruct_body
 from rigid_motion_batch.analysis.body_decimated import OWN, SHARED
 from rigid_motion_batch.analysis.body_metrics import measure_modes
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.analysis.needed import part_of
+from rigid_motion_batch.analysis.reconstructions import Reconstruction, reconstruct
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.scenes.decimating import beside_decimate
@@ -65,9 +65,9 @@ def of_height(clip: Clip) -> Clip:
     return replace(clip, metres_per_unit=HEIGHT / float(np.ptp(places, axis=(0, 1)).max()))
 
 
-def reduced(body: Clip, mode: str = MODE, *, shared: bool = True) -> BodyReconstruction:
+def reduced(body: Clip, mode: str = MODE, *, shared: bool = True) -> Reconstruction:
     """Return the fewest keys within the tolerance."""
-    return reconstruct_body(body, WITHIN, [mode], RADIUS, shared=shared)
+    return reconstruct(body, WITHIN, [mode], RADIUS, shared=shared)
 
 
 # -- key poses ---------------------------------------------------------------------------------------------------------
@@ -81,7 +81,8 @@ def truth_of(body: Clip) -> Poses:
 
 def errors_of(body: Clip, keys: np.ndarray, mode: str) -> np.ndarray:
     """Return the largest error of any joint on every frame, by key poses (k,), in metres, shape (n,)."""
-    made = BodyReconstruction(body, WITHIN, {mode: (keys,) * len(body.poses)}, shared=True)
+    radii = np.full(len(body.poses), RADIUS)
+    made = Reconstruction(body, WITHIN, {mode: (keys,) * len(body.poses)}, radii, shared=True)
     return shell_error(made.shown(mode, body.times), truth_of(body), RADIUS).max(axis=0)
 
 
@@ -121,7 +122,7 @@ def beside(body: Clip, way: str) -> list[dict[str, Any]]:
     """Return what is left by keys of each joint or by key poses, and by Decimate within the error that these have."""
     report(f"{body.name}, {way}")
     made = reduced(body, shared=WAYS[way])
-    (measured,) = measure_modes(made, RADIUS).rows
+    (measured,) = measure_modes(made).rows
     reduced_keys, decimated = (
         {
             "body": body.name,
@@ -131,7 +132,7 @@ def beside(body: Clip, way: str) -> list[dict[str, Any]]:
             "numbers": left.numbers,
             "error_mm": 1e3 * left.max_shell_m,
         }
-        for left in beside_decimate(made, RADIUS, [measured])
+        for left in beside_decimate(made, [measured])
     )
     slides = measured.foot_slide_m, measured.recorded_slide_m
     slide, recorded = (None if metres is None else 1e3 * metres for metres in slides)

@@ -75,7 +75,7 @@ def outcome(obj: bpy.types.Object, clip: Clip, radius: float) -> Left:
     frames, count = len(set().union(*curves)), sum(map(len, curves))
     numbers = frames * (1 + len(curves)) if animation.is_reduced(obj) else FREE * count
     error = shell_error(animation.read_poses(obj, frames_of(clip)), clip.poses, radius)
-    return Left(clip.name, frames, count / len(curves), numbers, float(error.max()))
+    return Left(frames, count / len(curves), numbers, float(error.max()))
 
 
 def measure(clip: Clip, rotation_mode: str, tolerance: float, radius: float) -> dict[str, Any]:

@@ -163,7 +163,7 @@ def test_all_numbers_are_in_the_report_before_the_first_frame_is_rendered(short_
 )
 def test_modes_that_are_one_motion_share_a_lane_unless_they_are_asked_for(asked, names, distinct):
     options = compare.parse(["take.csv", *asked])
-    assert (options.modes.names, options.stage.distinct) == (names, distinct)
+    assert (options.modes, options.stage.distinct) == (names, distinct)
 
 
 def test_clips_of_one_name_get_folders_of_their_own(short_clip, tmp_path):

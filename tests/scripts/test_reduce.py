@@ -271,7 +271,7 @@ def test_what_another_run_has_written_meanwhile_stays(tmp_path, capsys, monkeypa
     if kind == "table":
         write_csv(tmp_path / "hand.csv")
         source, result = tmp_path / "hand.csv", tmp_path / "hand-keys.csv"
-        place, step = recordings, "fill_in"
+        place, step = recordings, "Reconstruction"
     else:
         source = object_file(tmp_path / "shot.blend") if kind == "blend" else hand_made(tmp_path)
         result = reduced_name(source) if kind == "blend" else tmp_path / "body-keys.blend"

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from rigid_motion_batch.analysis.bodies import moving, reconstruct_body
 from rigid_motion_batch.analysis.body_metrics import measure_modes
 from rigid_motion_batch.analysis.body_needed import OfBody
 from rigid_motion_batch.analysis.choices import Uniform
@@ -21,6 +20,7 @@ from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.analysis.modes import REFERENCE
 from rigid_motion_batch.analysis.needed import DECIMATIONS, RATES, keys_needed, part_of
 from rigid_motion_batch.analysis.radii import JOINT
+from rigid_motion_batch.analysis.reconstructions import moving, reconstruct
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
@@ -72,8 +72,8 @@ def errors_of(clip: Clip) -> dict[str, dict[int, tuple[float, float]]]:
     """
     result = {mode: dict.fromkeys(ERROR_RATES, (np.nan, np.nan)) for mode in MODES}
     for rate in ERROR_RATES:
-        made = reconstruct_body(clip, Uniform(str(rate)), MODES, JOINT) if has_samples_for(clip, rate) else None
-        for row in measure_modes(made, JOINT).rows if made else ():
+        made = reconstruct(clip, Uniform(str(rate)), MODES, JOINT) if has_samples_for(clip, rate) else None
+        for row in measure_modes(made).rows if made else ():
             result[row.mode][rate] = row.rms_shell_m, row.rms_velocity_m_s
     return result
 

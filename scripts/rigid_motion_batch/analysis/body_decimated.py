@@ -5,15 +5,11 @@ For every mode one of ours, and one of Decimate that is held to the largest erro
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 
-from rigid_motion_batch.rows import write_rows
-
-from .bodies import BodyReconstruction
 from .body_metrics import numbers_of
 from .metrics import Metrics
+from .reconstructions import Reconstruction
 
 DECIMATE, OWN, SHARED = "Decimate", "keys of each joint", "key poses"
 """How keys were chosen."""
@@ -48,7 +44,7 @@ class KeysOfBody:
     """The largest shell error that was allowed; None where a rate decides."""
 
 
-def ours(made: BodyReconstruction, row: Metrics) -> KeysOfBody:
+def ours(made: Reconstruction, row: Metrics) -> KeysOfBody:
     """Return what was measured of a mode."""
     assert row.key_frames is not None
     assert row.keys is not None
@@ -64,8 +60,3 @@ def ours(made: BodyReconstruction, row: Metrics) -> KeysOfBody:
         decimation=row.decimation,
         tolerance_m=row.tolerance_m,
     )
-
-
-def write_keys_of_bodies(path: Path, rows: Iterable[KeysOfBody]) -> None:
-    """Write a header and the rows."""
-    write_rows(path, KeysOfBody, rows)

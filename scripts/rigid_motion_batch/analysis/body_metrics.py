@@ -1,6 +1,6 @@
-"""What a comparison found of a whole body, in numbers: over all joints, and joint by joint.
+"""What a comparison found of a clip, in numbers: over all joints, and of a whole body joint by joint.
 
-Errors are in metres, in the root's space. `metrics.csv` has the body, `metrics_joints.csv` its joints. What is as long
+Errors are in metres, in the root's space. `metrics.csv` has the whole, `metrics_joints.csv` the joints. What is as long
 as the recording is kept for one mode of those that are one motion.
 """
 
@@ -15,14 +15,13 @@ import numpy as np
 
 from rigid_motion.motion import Errors
 from rigid_motion_batch.files import replacing
-from rigid_motion_batch.rows import line_of, write_rows
+from rigid_motion_batch.rows import line_of
 
-from .bodies import BodyErrors, BodyReconstruction, Ground, JointKeys, identical_body_modes, measure_body, moving
-from .metrics import BYTES_PER_KEY, Metrics, lines_of_poses, of_errors
-from .reconstructions import Groups
-
-Radii = float | np.ndarray
-"""Of the balls at the joints, in metres: one for all, or shape (joints,)."""
+from .choices import Keys
+from .errors import Ground, MotionErrors, errors_of
+from .metrics import BYTES_PER_KEY, BYTES_PER_MODE, Metrics, lines_of_poses, of_errors
+from .modes import BEST_OF
+from .reconstructions import Groups, Reconstruction, identical_modes, moving
 
 
 @dataclass(frozen=True)
@@ -55,63 +54,71 @@ class JointMetrics:
 
 
 @dataclass(frozen=True, eq=False)
-class MeasuredBody:
-    """A whole body under one choice of keys, measured."""
+class Measured:
+    """A clip under one choice of keys, measured."""
 
-    made: BodyReconstruction
+    made: Reconstruction
 
     rows: tuple[Metrics, ...]
     """One for each mode."""
 
     joints: tuple[JointMetrics, ...]
-    """One for each mode and joint."""
+    """One for each mode and joint of a whole body."""
 
     groups: Groups
     """The modes, those together that are one motion."""
 
-    errors: Mapping[str, BodyErrors]
+    errors: Mapping[str, MotionErrors]
     """Of the first of each group."""
 
 
-def measure_modes(made: BodyReconstruction, radius: Radii) -> MeasuredBody:
-    """All modes of a reconstruction; of those that are one motion the errors of the first are kept."""
-    ground, groups = Ground.of(made), identical_body_modes(made)
-    rows: dict[str, Metrics] = {}
-    joints: dict[str, tuple[JointMetrics, ...]] = {}
-    kept: dict[str, BodyErrors] = {}
+def measure_modes(made: Reconstruction) -> Measured:
+    """Return the metrics of all modes; of those that are one motion the errors of the first are kept.
+
+    Notes
+    -----
+    `bytes_per_s` is (keys - 1) / duration times 56 bytes, or 57 under `best_of`, whose keys say the mode. A recording
+    that is thinned to 10 keys a second keeps fewer where it has gaps or is slow itself, and it is what would be sent
+    that counts. The first key is not counted, since a stretch of the motion costs the key at its end: keys exactly a
+    tenth of a second apart are 560 bytes a second for any length of the clip.
+    """
+    ground, groups = Ground.of(made), identical_modes(made)
+    rows: list[Metrics] = []
+    joints: list[JointMetrics] = []
+    kept: dict[str, MotionErrors] = {}
     for mode in made.keys:
-        errors = measure_body(made, mode, radius, ground)
-        rows[mode] = _row_of(made, mode, errors, ground)
-        joints[mode] = tuple(_rows_of_joints(made, mode, errors))
+        errors = errors_of(made, mode, ground)
+        rows.append(_row_of(made, mode, errors, ground))
+        joints += _rows_of_joints(made, mode, errors) if made.clip.rest_body else ()
         if mode in (group[0] for group in groups):
             kept[mode] = errors
-    every = tuple(row for mode in made.keys for row in joints[mode])
-    return MeasuredBody(made, tuple(rows.values()), every, groups, kept)
+    return Measured(made, tuple(rows), tuple(joints), groups, kept)
 
 
-def _row_of(made: BodyReconstruction, mode: str, errors: BodyErrors, ground: Ground) -> Metrics:
+def _row_of(made: Reconstruction, mode: str, errors: MotionErrors, ground: Ground) -> Metrics:
     clip, keys = made.clip, made.keys[mode]
     duration = float(made.times[-1] - made.times[0])
     # A joint that stays as it is has its key once, and sends nothing.
     count = sum(map(len, keys))
     sent = count - len(keys)
     moving_joints = sum(len(own) > 1 for own in keys)
+    whole = bool(clip.rest_body)
     return Metrics(
         mode=mode,
         keys=count or None,
         duration_s=duration,
-        bytes_per_s=sent / duration * BYTES_PER_KEY if count else None,
+        bytes_per_s=sent / duration * (BYTES_PER_KEY + BYTES_PER_MODE * (mode == BEST_OF)) if count else None,
         keys_per_s=sent / max(moving_joints, 1) / duration if count else None,
-        joints=len(keys),
-        key_frames=len(key_samples(keys)) or None,
-        worst_joint=clip.whole_body.joints[errors.worst[0]],
+        joints=len(keys) if whole else None,
+        key_frames=len(key_samples(keys)) or None if whole else None,
+        worst_joint=clip.whole_body.joints[errors.worst[0]] if whole else None,
         foot_slide_m=errors.slide if len(ground.joints) else None,
         recorded_slide_m=ground.slide if len(ground.joints) else None,
         **of_errors(clip, made.choice, errors),
     )
 
 
-def _rows_of_joints(made: BodyReconstruction, mode: str, errors: BodyErrors) -> Iterator[JointMetrics]:
+def _rows_of_joints(made: Reconstruction, mode: str, errors: MotionErrors) -> Iterator[JointMetrics]:
     clip, times = made.clip, made.times
     of_joints = map(Errors, errors.shell, errors.position, errors.rotation, errors.velocity)
     for name, keys, own in zip(clip.whole_body.joints, made.keys[mode], of_joints, strict=True):
@@ -124,13 +131,13 @@ def _rows_of_joints(made: BodyReconstruction, mode: str, errors: BodyErrors) -> 
         )
 
 
-def key_samples(keys: JointKeys) -> np.ndarray:
+def key_samples(keys: Keys) -> np.ndarray:
     """Return the samples that are a key of any joint that moves."""
     moving_ones = [own for own in keys if len(own) > 1]
     return np.unique(np.concatenate(moving_ones)) if moving_ones else keys[0]
 
 
-def numbers_of(made: BodyReconstruction, mode: str) -> int:
+def numbers_of(made: Reconstruction, mode: str) -> int:
     """How many numbers the keys take: for each its time, and the place and the turn where these vary."""
     clip = made.clip
     places = np.ptp(clip.poses.positions, axis=1).max(axis=1) * clip.metres_per_unit > 1e-4
@@ -139,11 +146,6 @@ def numbers_of(made: BodyReconstruction, mode: str) -> int:
     if made.shared:
         return int(len(key_samples(made.keys[mode])) + (counts * channels)[moving(clip)].sum())
     return int((counts * (1 + channels))[moving(clip)].sum())
-
-
-def write_joint_metrics(path: Path, rows: Iterable[JointMetrics]) -> None:
-    """Write a header and a row for every mode and joint."""
-    write_rows(path, JointMetrics, rows)
 
 
 def join_tables(path: Path, parts: Iterable[Path]) -> None:
@@ -157,7 +159,7 @@ def join_tables(path: Path, parts: Iterable[Path]) -> None:
                 shutil.copyfileobj(source, stream)
 
 
-def write_key_tables(folder: Path, made: BodyReconstruction) -> None:
+def write_key_tables(folder: Path, made: Reconstruction) -> None:
     """Write the keys: of evenly spaced ones those of all modes, of others a `MODE.keys.csv` for each.
 
     A row is a joint's pose in its parent's space, in the unit of the recording: `joint,t,x,y,z,qw,qx,qy,qz`.

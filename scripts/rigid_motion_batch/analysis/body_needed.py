@@ -7,7 +7,7 @@ better; how many is searched for.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from operator import itemgetter
 from typing import cast
@@ -17,37 +17,25 @@ import numpy as np
 from rigid_motion.motion import reduce_skeleton_keys
 from rigid_motion_batch.recordings.clips import Clip
 
-from .bodies import BodyReconstruction, rms_of_body, same_body_motions
-from .choices import Uniform
-from .needed import DECIMATIONS, OfRigidBody, Ways, evenly_spaced, fewest, part_of
+from .needed import DECIMATIONS, OfRigidBody, Ways, evenly_spaced, fewest
 from .radii import Radii
-from .reconstructions import Groups
 
 NEAR = 0.02
 """The search ends where one knows the number of key poses to so much of it: every step reduces keys anew."""
 
 
 @dataclass(frozen=True)
-class OfBody:
+class OfBody(Ways):
     """Key poses of a whole body: the same samples for all joints."""
-
-    clip: Clip
-    """Of a whole body."""
 
     radii: np.ndarray
     """Of the balls at the joints, in metres, shape (joints,)."""
 
     decimations = DECIMATIONS[:2]
 
-    def groups(self, modes: tuple[str, ...]) -> Groups:
-        return same_body_motions(self.clip, modes)
-
-    def between(self, first: int, last: int) -> OfBody:
-        return replace(self, clip=part_of(self.clip, first, last))
-
-    def error(self, keys: np.ndarray, mode: str) -> float:
-        made = BodyReconstruction(self.clip, Uniform("1"), {mode: (keys,) * len(self.radii)}, shared=True)
-        return rms_of_body(made, mode, self.radii)
+    @property
+    def shells(self) -> np.ndarray:
+        return self.radii
 
     def by_motion(self, mode: str, target: float, evenly: int) -> list[tuple[np.ndarray, float]]:
         """Key poses: as many as evenly spaced ones at most, if those of the motion are any better."""

@@ -25,6 +25,9 @@ MILLIMETRES = {"mm": 1, "cm": 10, "m": 1000}
 Radius = float | np.ndarray
 """Of the ball at every joint, in metres: one for all, or shape (joints,)."""
 
+Keys = tuple[np.ndarray, ...]
+"""The samples that are keys of each joint, rising; a joint that stays as it is has a single one."""
+
 METRES = {unit: length * 1e-3 for unit, length in MILLIMETRES.items()}
 """Units of tolerances and radii, and their lengths."""
 
@@ -53,17 +56,10 @@ class Choice(ABC):
             raise ValueError(f"{self.written!r} is no rate; give numbers such as 5,7.5,10")
 
     @abstractmethod
-    def keys(self, clip: Clip, mode: str, radius: float) -> np.ndarray:
-        """Return the samples of the clip that are kept under a mode, rising, shape (k,).
+    def keys(self, clip: Clip, mode: str, radius: Radius, *, shared: bool = False) -> Keys:
+        """Return the samples of each joint that are kept under a mode, the same for all where they are `shared`.
 
-        The radius of the shell is in metres. Fewer than two keys where the clip is too short.
-        """
-
-    @abstractmethod
-    def body_keys(self, clip: Clip, mode: str, radius: Radius, *, shared: bool) -> tuple[np.ndarray, ...]:
-        """Return samples that are kept of each joint of a clip with a figure, the same for all where they are `shared`.
-
-        The radius is that of the balls at the joints in metres, one or shape (joints,).
+        The radius of the shell, or of the balls at the joints, is in metres. The clip has to have two `ends`.
         """
 
     @property
@@ -118,11 +114,8 @@ class Uniform(Choice):
 
     decimation = "uniform"
 
-    def keys(self, clip: Clip, mode: str, radius: float) -> np.ndarray:
-        return decimate(clip.times, float(self.written))
-
-    def body_keys(self, clip: Clip, mode: str, radius: Radius, *, shared: bool) -> tuple[np.ndarray, ...]:
-        return (decimate(clip.times, float(self.written)),) * clip.poses.shape[0]
+    def keys(self, clip: Clip, mode: str, radius: Radius, *, shared: bool = False) -> Keys:
+        return (decimate(clip.times, float(self.written)),) * clip.joints
 
     def ends(self, times: np.ndarray) -> tuple[int, int] | None:
         keys = decimate(times, float(self.written))
@@ -135,15 +128,9 @@ class Budget(Choice):
     decimation = "adaptive"
     unit = "keys/s on average"
 
-    def keys(self, clip: Clip, mode: str, radius: float) -> np.ndarray:
-        count = self._count(clip.times)
-        if count < 2:
-            return np.array([0])
-        return _reduced(clip, mode, radius, budget=min(count, len(clip.times)), rms=True)
-
-    def body_keys(self, clip: Clip, mode: str, radius: Radius, *, shared: bool) -> tuple[np.ndarray, ...]:
+    def keys(self, clip: Clip, mode: str, radius: Radius, *, shared: bool = False) -> Keys:
         poses = min(self._count(clip.times), len(clip.times))
-        return _reduced_body(clip, mode, radius, shared, budget=poses * (1 if shared else clip.poses.shape[0]))
+        return _reduced(clip, mode, radius, shared, budget=poses * (1 if shared else clip.joints))
 
     def ends(self, times: np.ndarray) -> tuple[int, int] | None:
         return (0, len(times) - 1) if self._count(times) > 1 else None
@@ -167,11 +154,8 @@ class Tolerance(Choice):
     def __post_init__(self) -> None:
         self._parts()
 
-    def keys(self, clip: Clip, mode: str, radius: float) -> np.ndarray:
-        return _reduced(clip, mode, radius, tolerance=self.tolerance(clip) / clip.metres_per_unit)
-
-    def body_keys(self, clip: Clip, mode: str, radius: Radius, *, shared: bool) -> tuple[np.ndarray, ...]:
-        return _reduced_body(clip, mode, radius, shared, tolerance=self.tolerance(clip) / clip.metres_per_unit)
+    def keys(self, clip: Clip, mode: str, radius: Radius, *, shared: bool = False) -> Keys:
+        return _reduced(clip, mode, radius, shared, tolerance=self.tolerance(clip) / clip.metres_per_unit)
 
     def ends(self, times: np.ndarray) -> tuple[int, int]:
         return 0, len(times) - 1
@@ -258,21 +242,14 @@ class Tolerance(Choice):
         return result[1], result[2] or ""
 
 
-def _reduced(clip: Clip, mode: str, radius: float, **requested: Any) -> np.ndarray:
-    return reduce_keys(clip.times, clip.poses, mode, radius=radius / clip.metres_per_unit, **requested)
-
-
-def _reduced_body(clip: Clip, mode: str, radius: Radius, shared: bool, **requested: Any) -> tuple[np.ndarray, ...]:
-    keys = reduce_skeleton_keys(
-        clip.times,
-        clip.poses,
-        clip.whole_body.parents,
-        mode,
-        radius=radius / clip.metres_per_unit,
-        shared=shared,
-        **requested,
-    )
-    return cast(tuple[np.ndarray, ...], keys)
+def _reduced(clip: Clip, mode: str, radius: Radius, shared: bool, **requested: Any) -> Keys:
+    """Return the fewest keys within a tolerance, or so many with the least error: the RMS error of a rigid body."""
+    times, poses, radius = clip.times, clip.poses, radius / clip.metres_per_unit
+    if clip.rest_body is None:
+        rms = "budget" in requested
+        return (reduce_keys(times, poses, mode, radius=float(np.max(radius)), rms=rms, **requested),)
+    parents = clip.rest_body.parents
+    return cast(Keys, reduce_skeleton_keys(times, poses, parents, mode, radius=radius, shared=shared, **requested))
 
 
 def fewest_keys(choices: Iterable[Choice]) -> list[Choice]:

@@ -17,10 +17,9 @@ from rigid_motion.motion import Errors, Poses
 from rigid_motion.motion.measures import rms
 from rigid_motion_batch.files import replacing
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.rows import write_rows
 
-from .bodies import BodyErrors
 from .choices import Choice
+from .errors import MotionErrors
 from .modes import BEST_OF, single_modes
 from .reconstructions import Reconstruction
 
@@ -60,7 +59,7 @@ class Metrics:
     """From the first key to the last."""
 
     bytes_per_s: float | None
-    """Of the keys that were really kept, not of the rate that was asked for: see `measure_reconstruction`."""
+    """Of the keys that were really kept, not of the rate that was asked for: see `measure_modes`."""
 
     rms_shell_m: float
     p95_shell_m: float
@@ -94,44 +93,7 @@ class Metrics:
     """The same in the recording itself."""
 
 
-def measure_reconstruction(reconstruction: Reconstruction) -> list[Metrics]:
-    """Return the metrics of every mode, in the order of the modes.
-
-    Notes
-    -----
-    `bytes_per_s` is (keys - 1) / duration times 56 bytes, or 57 under `best_of`, whose keys say the mode. A recording
-    that is thinned to 10 keys a second keeps fewer where it has gaps or is slow itself, and it is what would be sent
-    that counts. The first key is not counted, since a stretch of the motion costs the key at its end: keys exactly a
-    tenth of a second apart are 560 bytes a second for any length of the clip.
-
-    Raises
-    ------
-    ValueError
-        Where there are fewer than two keys, which have no time between them.
-    """
-    clip, choice, times = reconstruction.clip, reconstruction.choice, reconstruction.times
-    if len(times) < 2:
-        raise ValueError(
-            f"{clip.name} {choice.phrase}: 1 key has no in-betweens to measure; "
-            "give a longer recording or a higher rate"
-        )
-    duration = float(times[-1] - times[0])
-    rows = []
-    for mode, errors in reconstruction.errors.items():
-        keys = len(reconstruction.keys[mode]) or None
-        row = Metrics(
-            mode=mode,
-            keys=keys,
-            duration_s=duration,
-            bytes_per_s=keys and (keys - 1) / duration * (BYTES_PER_KEY + BYTES_PER_MODE * (mode == BEST_OF)),
-            keys_per_s=keys and (keys - 1) / duration,
-            **of_errors(clip, choice, errors),
-        )
-        rows.append(row)
-    return rows
-
-
-def of_errors(clip: Clip, choice: Choice, errors: Errors | BodyErrors) -> dict[str, Any]:
+def of_errors(clip: Clip, choice: Choice, errors: Errors | MotionErrors) -> dict[str, Any]:
     """Return the fields of a row that any motion has, of errors in metres and radians."""
     return {
         "clip": clip.name,
@@ -154,11 +116,6 @@ def geometric_mean(values: np.ndarray) -> np.ndarray:
     count = known.sum(axis=0)
     total = np.log(np.where(known, values, 1.0)).sum(axis=0)
     return np.exp(np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0))
-
-
-def write_metrics(path: Path, rows: Iterable[Metrics]) -> None:
-    """Write `metrics.csv`: a header and a row for every clip, choice of keys and mode."""
-    write_rows(path, Metrics, rows)
 
 
 def write_poses(path: Path, times: np.ndarray, poses: Poses, modes: Sequence[str] = ()) -> None:
@@ -230,15 +187,15 @@ def write_reconstruction(folder: Path, reconstruction: Reconstruction, form: str
     Keys that were chosen evenly are those of all modes, in `keys.csv`; others are in a `MODE.keys.csv` for each. Those
     of `best_of` are in a table of their own in any case, with the mode of each segment.
     """
-    clip = reconstruction.clip
-    for mode, poses in reconstruction.poses.items():
-        write_poses(folder / f"{mode}.{form}", reconstruction.times, poses)
-    known = {mode: keys for mode, keys in reconstruction.keys.items() if len(keys)}
+    clip, times = reconstruction.clip, reconstruction.times
+    for mode in reconstruction.keys:
+        write_poses(folder / f"{mode}.{form}", times, reconstruction.filled_in(mode, times))
+    known = {mode: keys for mode, (keys,) in reconstruction.keys.items() if len(keys)}
     tables = {f"{mode}.keys.{form}": keys for mode, keys in known.items() if mode != BEST_OF}
     if reconstruction.choice.decimation == "uniform":
         tables = {f"keys.{form}": next(iter(tables.values()))}
     for name, keys in tables.items():
         write_poses(folder / name, clip.times[keys], clip.poses[keys])
     if BEST_OF in reconstruction.keys:
-        keys, modes = reconstruction.keys[BEST_OF], reconstruction.segment_modes
+        (keys,), modes = reconstruction.keys[BEST_OF], reconstruction.segment_modes
         write_poses(folder / f"{BEST_OF}.keys.csv", clip.times[keys], clip.poses[keys], modes)

@@ -8,20 +8,20 @@ the points of the curve of error over keys a second. Errors are in metres.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Self
 
 import numpy as np
 
-from rigid_motion.motion import Poses, decimate, fit_keys, interpolate, reduce_keys, rms, shell_error
+from rigid_motion.motion import decimate, fit_keys, interpolate, reduce_keys, rms, shell_error
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.rows import write_rows
 
+from .choices import Uniform
 from .metrics import NOTHING, geometric_mean
 from .modes import REFERENCE
-from .reconstructions import Groups, same_motions
+from .reconstructions import Reconstruction, same_motions
 
 RATES = ("30", "20", "15", "12", "8", "5")
 """Keys a second of the reference that others are to be as good as."""
@@ -101,27 +101,34 @@ class KeysNeeded:
         return (self.keys - 1.0) / self.durations
 
 
-class Ways(Protocol):
+@dataclass(frozen=True)
+class Ways(ABC):
     """The ways to have fewer keys of a clip, and how good they are. All errors are RMS shell errors in metres."""
 
-    @property
-    def clip(self) -> Clip: ...
+    clip: Clip
 
     @property
+    @abstractmethod
     def decimations(self) -> tuple[str, ...]:
         """Those of `DECIMATIONS` that are tried."""
 
-    def groups(self, modes: tuple[str, ...]) -> Groups:
-        """Return the modes, those together that are one motion on the clip."""
+    @property
+    @abstractmethod
+    def shells(self) -> np.ndarray:
+        """The radii of the balls at the joints, or of the shell of a rigid body, in metres, shape (joints,)."""
 
-    def between(self, first: int, last: int) -> Ways:
-        """Return the same for the part of the clip from one sample to another."""
-
-    def error(self, keys: np.ndarray, mode: str) -> float:
-        """Of a mode that has these samples for keys."""
-
+    @abstractmethod
     def by_motion(self, mode: str, target: float, evenly: int) -> list[tuple[np.ndarray, float]]:
         """Return keys, and their error, in each of the ways but for evenly spaced ones, of which it takes so many."""
+
+    def between(self, first: int, last: int) -> Self:
+        """Return the same for the part of the clip from one sample to another."""
+        return replace(self, clip=part_of(self.clip, first, last))
+
+    def error(self, keys: np.ndarray, mode: str) -> float:
+        """Return that of a mode that has these samples for keys of all joints."""
+        made = Reconstruction(self.clip, Uniform("1"), {mode: (keys,) * len(self.shells)}, self.shells, shared=True)
+        return rms(made.shell(mode))
 
 
 def keys_needed(ways: Ways, modes: Iterable[str], *, advance: Callable[[], object] = lambda: None) -> KeysNeeded:
@@ -140,7 +147,7 @@ def keys_needed(ways: Ways, modes: Iterable[str], *, advance: Callable[[], objec
     The adaptive keys begin and end where the reference's do. Evenly spaced ones are searched for by bisection, as if
     the error fell with every key: the result is as good as the reference, one key fewer is not.
     """
-    clip, groups = ways.clip, ways.groups(tuple(modes))
+    clip, groups = ways.clip, same_motions(ways.clip, tuple(modes))
     shape = len(groups), len(ways.decimations), len(RATES)
     keys, reached = np.full(shape, np.nan), np.full(shape, np.nan)
     durations, reference_keys, targets = np.full((3, len(RATES)), np.nan)
@@ -202,10 +209,8 @@ def part_of(clip: Clip, first: int, last: int) -> Clip:
 
 
 @dataclass(frozen=True)
-class OfRigidBody:
+class OfRigidBody(Ways):
     """Keys of a single rigid body: where the motion needs them, and moved to where they fit best."""
-
-    clip: Clip
 
     radius: float
     """Of the shell, in metres."""
@@ -217,17 +222,9 @@ class OfRigidBody:
     def decimations(self) -> tuple[str, ...]:
         return DECIMATIONS if self.fit else DECIMATIONS[:2]
 
-    def groups(self, modes: tuple[str, ...]) -> Groups:
-        return same_motions(self.clip, modes, self.radius)
-
-    def between(self, first: int, last: int) -> OfRigidBody:
-        return replace(self, clip=part_of(self.clip, first, last))
-
-    def error(self, keys: np.ndarray, mode: str, poses: Poses | None = None) -> float:
-        """Where the keys have other poses than their own, these."""
-        clip = self.clip
-        filled = interpolate(clip.times[keys], clip.poses[keys] if poses is None else poses, clip.times, mode)
-        return rms(shell_error(clip.in_metres(filled), clip.in_metres(clip.poses), self.radius))
+    @property
+    def shells(self) -> np.ndarray:
+        return np.array([self.radius])
 
     def by_motion(self, mode: str, target: float, evenly: int) -> list[tuple[np.ndarray, float]]:
         adaptive = self._reduced(mode, target)
@@ -250,7 +247,8 @@ class OfRigidBody:
             if number:
                 keys = self._reduced(mode, aim)
             fitted = fit_keys(clip.times, clip.poses, keys, mode, self.radius / clip.metres_per_unit)
-            error = self.error(keys, mode, fitted)
+            filled = interpolate(clip.times[keys], fitted, clip.times, mode)
+            error = rms(shell_error(clip.in_metres(filled), clip.in_metres(clip.poses), self.radius))
             if error <= target and len(keys) <= len(best):
                 best, reached = keys, error
             if error <= NOTHING:
@@ -327,12 +325,8 @@ def _place(clip: KeysNeeded, mode: str) -> int:
 # -- keys_needed.csv --------------------------------------------------------------------------------------------------
 
 
-def write_keys_needed(path: Path, clips: Iterable[KeysNeeded]) -> None:
-    """Write a row for every clip, mode, decimation and rate, but where the reference has no error to be as good as."""
-    write_rows(path, NeededRow, (row for clip in clips for row in _rows(clip)))
-
-
-def _rows(clip: KeysNeeded) -> Iterator[NeededRow]:
+def rows_of(clip: KeysNeeded) -> Iterator[NeededRow]:
+    """Yield a row for every mode, decimation and rate, but where the reference has no error to be as good as."""
     for group, decimation, rate in np.argwhere(~np.isnan(clip.keys)).tolist():
         at = group, decimation, rate
         result: list[Any] = [None] * 4

@@ -1,32 +1,35 @@
-"""Reconstructions: what each mode makes of the few keys that are kept of a clip, and how far off that is.
+"""Reconstructions: what each mode makes of the few keys that are kept of a clip.
 
-Times and poses are the clip's, errors are in metres (`clips`).
+A single rigid body has the keys of one joint, which hangs on nothing. Of a whole body every joint is interpolated in
+its parent's space, as a rig has its keys, and shown where that puts it: in the root's space, through the hierarchy.
+Times and poses are the clip's, what is shown and errors are in metres.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from rigid_motion.motion import (
-    Errors,
-    Poses,
-    best_modes,
-    interpolate,
-    interpolate_by_segments,
-    measure,
-    rms,
-    shell_error,
-)
-from rigid_motion_batch.recordings.clips import Clip, OtherMotion
+from rigid_motion.motion import Poses, Skeleton, best_modes, interpolate, interpolate_by_segments, rms, shell_error
+from rigid_motion_batch.recordings.clips import Clip
 
-from .choices import Choice, Uniform
+from .choices import Choice, Keys, Uniform
 from .modes import BEST_OF, single_modes
 
 Groups = tuple[tuple[str, ...], ...]
 """Modes, those together that are one motion."""
+
+BLOCK = 4096
+"""Samples of all joints that are worked on at once."""
+
+STILL = 1e-6
+"""A joint none of whose numbers changes by more, in its parent's space, needs one key."""
+
+COMPARED = 512
+"""Samples, evenly spread, that tell whether two modes are one motion."""
 
 PROBE = 4
 """Of so many samples one is a key where it is looked which modes are one motion."""
@@ -40,7 +43,7 @@ NO_KEYS = np.array([], dtype=int)
 
 @dataclass(frozen=True, eq=False)
 class Reconstruction:
-    """A clip under one choice of keys: the keys that each mode kept, and what it filled in between them.
+    """A clip under one choice of keys: the keys that each mode kept, and what it fills in between them.
 
     All modes begin and end with the same samples.
     """
@@ -50,49 +53,90 @@ class Reconstruction:
     choice: Choice
     """How the keys were chosen."""
 
-    keys: dict[str, np.ndarray]
-    """Mode id to the samples that were kept, rising indices into the clip, shape (k,); none of somebody else's motion,
-    which comes last."""
+    keys: dict[str, Keys]
+    """Mode id to the keys of the joints; none of somebody else's motion, which comes last."""
 
-    poses: dict[str, Poses]
-    """Mode id to the poses at `times`."""
+    radii: np.ndarray
+    """Of the balls around the joints, or of the shell of a rigid body, in metres, shape (joints,)."""
 
-    errors: dict[str, Errors]
-    """Mode id to the errors against the clip at `times`."""
+    shared: bool = False
+    """Whether the keys are key poses: the same samples for all joints that move."""
 
     segment_modes: tuple[str, ...] = ()
-    """The mode of each segment under `best_of`, k - 1 of them; none where the run does without."""
+    """The mode of each segment under `best_of`; none where the run does without."""
 
-    @property
+    @cached_property
     def samples(self) -> slice:
         """The samples of the clip between the first and the last key, both included."""
-        keys = next(iter(self.keys.values()))
-        return slice(int(keys[0]), int(keys[-1]) + 1)
+        keys = [own for own in next(iter(self.keys.values())) if len(own) > 1]
+        first, last = (keys[0][0], keys[0][-1]) if keys else (0, len(self.clip.times) - 1)
+        return slice(int(first), int(last) + 1)
 
     @property
     def times(self) -> np.ndarray:
         """The times of `samples`."""
         return self.clip.times[self.samples]
 
+    @cached_property
+    def skeleton(self) -> Skeleton:
+        return self.clip.rest_body.skeleton if self.clip.rest_body else Skeleton([-1])
+
     @property
     def best_mode(self) -> str:
         """The best single mode: with the fewest keys, and of those with the least RMS shell error."""
-        counts = {mode: len(self.keys[mode]) for mode in single_modes(self.keys) if len(self.keys[mode])}
-        return min(counts, key=lambda mode: (counts[mode], rms(self.errors[mode].shell)))
+        counts = {mode: count for mode in single_modes(self.keys) if (count := sum(map(len, self.keys[mode])))}
+        fewest = [mode for mode, count in counts.items() if count == min(counts.values())]
+        return min(fewest, key=lambda mode: rms(self.shell(mode)))
 
     def filled_in(self, mode: str, times: np.ndarray) -> Poses:
-        """Return what a mode makes of its keys at any times."""
-        if not len(self.keys[mode]):
-            assert self.clip.against is not None  # it alone has no keys
-            return self.clip.against.at(times)
-        key_times, keys = self.clip.times[self.keys[mode]], self.clip.poses[self.keys[mode]]
-        if mode == BEST_OF:
-            return interpolate_by_segments(key_times, keys, times, self.segment_modes)
-        return interpolate(key_times, keys, times, mode)
+        """Return what a mode makes of its keys at any times (m,), as the poses of the clip are.
+
+        In the unit of the recording: shape (m,), or of joints in their parents' space (joints, m).
+        """
+        clip, keys = self.clip, self.keys[mode]
+        if not len(keys[0]):
+            assert clip.against is not None  # it alone has no keys
+            return clip.against.at(times)
+        if clip.rest_body is None:
+            key_times, poses = clip.times[keys[0]], clip.poses[keys[0]]
+            if mode == BEST_OF:
+                return interpolate_by_segments(key_times, poses, times, self.segment_modes)
+            return interpolate(key_times, poses, times, mode)
+        alike: dict[bytes, tuple[list[int], np.ndarray]] = {}
+        for joint, own in enumerate(keys):
+            alike.setdefault(own.tobytes(), ([], own))[0].append(joint)
+        filled = Poses(np.empty((len(keys), len(times), 3)), np.empty((len(keys), len(times), 4)))
+        for joints, own in alike.values():
+            filled[joints] = interpolate(clip.times[own], clip.poses[joints][:, own], times, mode)
+        return filled
+
+    def shown(self, mode: str, times: np.ndarray) -> Poses:
+        """Return where that puts the joints, in metres, shape (joints, m)."""
+        return self._in_root_space(self.filled_in(mode, times))
+
+    def truth(self, samples: slice | np.ndarray) -> Poses:
+        """Return where the joints were in the recording, in metres, shape (joints, m)."""
+        return self._in_root_space(self.clip.poses[..., samples])
+
+    def _in_root_space(self, poses: Poses) -> Poses:
+        return self.clip.in_metres(self.skeleton.in_root_space(poses) if self.clip.rest_body else poses[None])
+
+    def shell(self, mode: str) -> np.ndarray:
+        """Return the shell errors of a mode at `samples`, in metres, shape (joints, n)."""
+        times, radii = self.clip.times, self.radii[:, None]
+        parts = [shell_error(self.shown(mode, times[part]), self.truth(part), radii) for part in self.blocks()]
+        return np.concatenate(parts, axis=1)
+
+    def blocks(self, overlap: int = 0) -> Iterator[slice]:
+        """Yield `samples` a block at a time, each with so many of those before it."""
+        for first in range(self.samples.start, self.samples.stop, BLOCK):
+            yield slice(max(self.samples.start, first - overlap), min(first + BLOCK, self.samples.stop))
 
 
-def reconstruct(clip: Clip, choice: Choice, modes: Sequence[str], radius: float) -> Reconstruction | None:
-    """Choose keys of the clip for every mode, and fill in between them.
+def reconstruct(
+    clip: Clip, choice: Choice, modes: Sequence[str], radius: float | np.ndarray, *, shared: bool = False
+) -> Reconstruction | None:
+    """Choose keys of the clip, of all of its joints, for every mode.
 
     Parameters
     ----------
@@ -100,9 +144,11 @@ def reconstruct(clip: Clip, choice: Choice, modes: Sequence[str], radius: float)
         What the user compares with it comes after the modes.
     choice : Choice
     modes : sequence of str
-        Of `rigid_motion.motion.MODES`, and `BEST_OF` of them.
-    radius : float
-        Of the shell, in metres.
+        Of `rigid_motion.motion.MODES`, and of a rigid body `BEST_OF` of them.
+    radius : float or array, shape (joints,)
+        Of the shell, or of the balls at the joints, in metres.
+    shared : bool
+        Whether keys that the motion chooses are key poses; evenly spaced ones always are.
 
     Returns
     -------
@@ -114,66 +160,52 @@ def reconstruct(clip: Clip, choice: Choice, modes: Sequence[str], radius: float)
     Modes that are one motion get one choice of keys, made for the first of them: choosing by the motion takes time,
     and rounding must not make them look different.
     """
-    with_best, modes = BEST_OF in modes, single_modes(modes)
-    groups = [modes] if choice.decimation == "uniform" else same_motions(clip, modes, radius)
-    keys: dict[str, np.ndarray] = {}
-    for group in groups:
-        keys |= dict.fromkeys(group, choice.keys(clip, group[0], radius))
-    if min(map(len, keys.values())) < 2:
+    if choice.ends(clip.times) is None:
         return None
-    made = fill_in(clip, choice, {mode: keys[mode] for mode in modes}, radius)
-    made = with_best_of(made, radius) if with_best else made
-    return with_other(made, clip.against, radius) if clip.against else made
+    single, uniform, still = single_modes(modes), choice.decimation == "uniform", ~moving(clip)
+    radii = np.broadcast_to(np.asarray(radius, dtype=float), still.shape)
+    keys: dict[str, Keys] = {}
+    for group in [single] if uniform else same_motions(clip, single):
+        chosen = choice.keys(clip, group[0], radii, shared=shared)
+        result = tuple(own[:1] if rests else own for own, rests in zip(chosen, still, strict=True))
+        keys |= dict.fromkeys(group, result)
+    made = Reconstruction(clip, choice, {mode: keys[mode] for mode in single}, radii, shared or uniform)
+    if BEST_OF in modes and clip.rest_body is None:
+        made = with_best_of(made)
+    other = {clip.against.name: (NO_KEYS,) * len(still)} if clip.against else {}
+    return replace(made, keys=made.keys | other)
 
 
-def with_best_of(made: Reconstruction, radius: float) -> Reconstruction:
-    """Return the same with `BEST_OF` its modes, which has the keys of the best single one."""
+def with_best_of(made: Reconstruction) -> Reconstruction:
+    """Return the same of a rigid body with `BEST_OF` its modes, which has the keys of the best single one."""
     clip, kept = made.clip, made.keys[made.best_mode]
-    tolerance = made.choice.tolerance(clip)
-    unit = clip.metres_per_unit
-    chosen = best_modes(
-        clip.times, clip.poses, kept, made.keys, radius / unit, None if tolerance is None else tolerance / unit
-    )
-    best = fill_in(clip, made.choice, {BEST_OF: kept}, radius, chosen)
-    return replace(best, keys=made.keys | best.keys, poses=made.poses | best.poses, errors=made.errors | best.errors)
+    tolerance, unit = made.choice.tolerance(clip), clip.metres_per_unit
+    within = None if tolerance is None else tolerance / unit
+    chosen = best_modes(clip.times, clip.poses, kept[0], made.keys, float(made.radii[0]) / unit, within)
+    return replace(made, keys=made.keys | {BEST_OF: kept}, segment_modes=chosen)
 
 
-def with_other(made: Reconstruction, other: OtherMotion, radius: float) -> Reconstruction:
-    """Return the same with somebody else's motion behind its modes, at the samples that these are compared at."""
-    clip, poses = made.clip, other.at(made.times)
-    truth = clip.in_metres(clip.poses[made.samples])
-    errors = measure(made.times, clip.in_metres(poses), truth, radius)
-    return replace(
-        made,
-        keys=made.keys | {other.name: NO_KEYS},
-        poses=made.poses | {other.name: poses},
-        errors=made.errors | {other.name: errors},
-    )
+def moving(clip: Clip) -> np.ndarray:
+    """Return which joints do not stay as they are in their parents' space, shape (joints,); a rigid body counts."""
+    if clip.rest_body is None:
+        return np.array([True])
+    poses = clip.poses
+    ranges = np.ptp(poses.positions, axis=1).max(axis=1) * clip.metres_per_unit, np.ptp(poses.quaternions, axis=1)
+    return (ranges[0] > STILL) | (ranges[1].max(axis=1) > STILL)
 
 
-def fill_in(
-    clip: Clip, choice: Choice, keys: dict[str, np.ndarray], radius: float, segment_modes: tuple[str, ...] = ()
-) -> Reconstruction:
-    """Return what each mode makes of its keys, at least two, which begin and end with the same samples.
-
-    `BEST_OF` among them has the modes of its segments from `segment_modes`.
-    """
-    made = Reconstruction(clip, choice, keys, {}, {}, segment_modes)
-    times, truth = made.times, clip.in_metres(clip.poses[made.samples])
-    poses = {mode: made.filled_in(mode, times) for mode in keys}
-    errors = {mode: measure(times, clip.in_metres(filled), truth, radius) for mode, filled in poses.items()}
-    return replace(made, poses=poses, errors=errors)
+# -- modes that are one motion ----------------------------------------------------------------------------------------
 
 
-def same_motions(clip: Clip, modes: tuple[str, ...], radius: float) -> tuple[tuple[str, ...], ...]:
-    """Return the modes in groups that are one motion on this clip, seen with about every `PROBE`th sample as a key.
+def same_motions(clip: Clip, modes: Sequence[str]) -> Groups:
+    """Return the modes in groups that are one motion of this clip, seen with about every `PROBE`th sample as a key.
 
     Each is on its own where there are too few samples to see it.
     """
-    probe = reconstruct(replace(clip, against=None), probing(clip), modes, radius)
-    if probe is None or len(probe.keys[modes[0]]) < FEWEST_PROBED:
+    probe = reconstruct(replace(clip, against=None), probing(clip), modes, 0.0)
+    if probe is None or 1 < max(map(len, probe.keys[modes[0]])) < FEWEST_PROBED:
         return tuple((mode,) for mode in modes)
-    return identical_modes([probe])
+    return identical_modes(probe)
 
 
 def probing(clip: Clip) -> Uniform:
@@ -182,13 +214,16 @@ def probing(clip: Clip) -> Uniform:
     return Uniform(f"{max(rate, 1e-6):.6f}")
 
 
-def identical_modes(reconstructions: Sequence[Reconstruction]) -> Groups:
-    """Return the modes in groups that gave the same poses in all of these reconstructions.
+def identical_modes(made: Reconstruction) -> Groups:
+    """Return the modes in groups that put every joint at the same place.
 
     The same means: apart by less than a millionth of their error, by the shell measure, or than what rounding does.
     Some modes are one curve by theory (ScLERP and the SLERP of motors); this looks whether they were.
     """
-    return joint_groups([_groups(reconstruction) for reconstruction in reconstructions])
+    samples = np.unique(np.linspace(made.samples.start, made.samples.stop - 1, COMPARED).astype(int))
+    truth = made.truth(samples)
+    shown = {mode: made.shown(mode, made.clip.times[samples]) for mode in made.keys}
+    return alike(shown, {mode: float(shell_error(poses, truth).max()) for mode, poses in shown.items()})
 
 
 def joint_groups(groupings: Iterable[Groups]) -> Groups:
@@ -202,12 +237,6 @@ def joint_groups(groupings: Iterable[Groups]) -> Groups:
     for mode, where in places.items():
         joint.setdefault(tuple(where), []).append(mode)
     return tuple(map(tuple, joint.values()))
-
-
-def _groups(reconstruction: Reconstruction) -> Groups:
-    poses = {mode: reconstruction.clip.in_metres(own) for mode, own in reconstruction.poses.items()}
-    largest = {mode: float(errors.shell.max()) for mode, errors in reconstruction.errors.items()}
-    return alike(poses, largest)
 
 
 def alike(poses: Mapping[str, Poses], largest: Mapping[str, float]) -> Groups:

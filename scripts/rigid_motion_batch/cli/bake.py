@@ -120,7 +120,9 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         parser.error(f"--last {options.last:g} is before --first {options.first:g}")
     try:
         refuse_odd_places(options)
-        options.work = Bake.of(options)
+        given = {"step": options.step or 1.0, "first": options.first, "last": options.last}
+        hold = "CONSTANT" if options.hold else "LINEAR"
+        options.work = Unbake.of(options) if options.unbake else Bake.of(options, **given, interpolation=hold)
         options.todo = _planned(options)
     except ValueError as error:
         parser.error(str(error))
@@ -135,27 +137,31 @@ def main(arguments: list[str]) -> int:
 
 @dataclass(frozen=True)
 class Bake(Work):
-    """Baking keys, or taking that back."""
+    """Baking keys."""
 
-    unbake: bool
+    doing, done = "Baking", "baked"
     step: float
     first: float | None
     last: float | None
     interpolation: str
 
-    @classmethod
-    def of(cls, options: argparse.Namespace) -> Bake:
-        """Return what the options say."""
-        doing, done = ("Un-baking", "un-baked") if options.unbake else ("Baking", "baked")
-        interpolation = "CONSTANT" if options.hold else "LINEAR"
-        where = options.objects, options.overwrite, options.dry_run
-        return cls(doing, done, *where, options.unbake, options.step or 1.0, options.first, options.last, interpolation)
+    def needs_blender(self, job: Job) -> bool:
+        return True
+
+    def do(self, doing: Doing) -> None:
+        do_blend(doing, baking(self.step, self.first, self.last, self.interpolation))
+
+
+class Unbake(Work):
+    """Taking that back."""
+
+    doing, done = "Un-baking", "un-baked"
 
     def needs_blender(self, job: Job) -> bool:
         return True
 
     def do(self, doing: Doing) -> None:
-        do_blend(doing, unbaking() if self.unbake else baking(self.step, self.first, self.last, self.interpolation))
+        do_blend(doing, unbaking())
 
 
 def _planned(options: argparse.Namespace) -> list[Job]:

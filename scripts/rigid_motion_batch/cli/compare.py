@@ -98,7 +98,7 @@ def comparison_of(options: argparse.Namespace, command: str, blender: str) -> Co
     return Comparison(
         sources=tuple(options.inputs),
         choices=tuple(options.choices),
-        modes=options.modes.names,
+        modes=options.modes,
         against=options.against or "",
         axes=options.axes,
         reading=options.reading,
@@ -414,7 +414,7 @@ class _Comparing:
             "report": os.fspath(page) if page else None,
             "exit_code": code,
             "verdict": str(said) if said else None,
-            "facts": [as_text(fact) for fact in said.facts] if said else [],
+            "wins": as_text(said.wins) if said else "",
             "table": [asdict(line) for line in terminal.lines_of(numbers)] if numbers else [],
             "clips": list(numbers.clips) if numbers else [],
             "notes": self.notes,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 from rigid_motion.motion import KEYFRAME_MODES, MODES
 from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform, distinct
@@ -271,7 +271,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     )
     options = parser.parse_args(arguments)
     try:
-        options.distinct = options.modes.distinct
+        options.modes, options.distinct = options.modes
         stage = SceneSettings(**{field.name: getattr(options, field.name) for field in fields(SceneSettings)})
         options.stage = None if options.no_video else stage
         if options.part != (1, 1) and not options.only:
@@ -333,16 +333,8 @@ def _amounts(kind: type[Choice]) -> Callable[[str], list[Choice]]:
     return parse_amounts
 
 
-@dataclass(frozen=True)
-class Modes:
-    """The modes of a run."""
-
-    names: tuple[str, ...]
-    distinct: bool
-    """True if those that are one motion share a lane."""
-
-
-def _modes(text: str) -> Modes:
+def _modes(text: str) -> tuple[tuple[str, ...], bool]:
+    """Return the modes of a run, and whether those that are one motion share a lane."""
     written = [part.strip() for part in text.split(",") if part.strip()]
     named = list(dict.fromkeys(m for part in written for m in (KEYFRAME_MODES if part in (ALL, DISTINCT) else (part,))))
     modes = single_modes(named)
@@ -353,12 +345,12 @@ def _modes(text: str) -> Modes:
         raise ValueError(f"there is no mode {name!r}{near}")
     share = DISTINCT in written
     if BEST_OF not in named:
-        return Modes(tuple(modes), share)
+        return tuple(modes), share
     if len(modes) < 2:
         raise ValueError(
             f"{BEST_OF} chooses among the other modes that are named: name two or more, or {ALL},{BEST_OF}"
         )
-    return Modes((*modes, BEST_OF), share)
+    return (*modes, BEST_OF), share
 
 
 def _part(text: str) -> tuple[int, int]:

@@ -9,7 +9,7 @@ result is a new file; the input stays as it is.
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 from rigid_motion_batch.command_line import not_empty, parser_of, program_of, whole
@@ -149,6 +149,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     keys.add_argument(
         "--keys",
         "--key-poses",
+        dest="count",
         type=whole("number of keys", 2, MOST),
         metavar="N",
         help="instead of a tolerance: N keys of each object, or N key poses of each rig, where the error is smallest",
@@ -187,27 +188,9 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     options = parser.parse_args(arguments)
     try:
         refuse_odd_places(options)
-        options.work = Reduce(
-            doing="Reducing",
-            done="reduced",
-            objects=options.objects,
-            overwrite=options.overwrite,
-            dry_run=options.dry_run,
-            how=Reductions(
-                mode=options.mode or MODE,
-                tolerance=options.tolerance,
-                radius=options.radius,
-                shared=options.shared,
-                discard=options.discard,
-                count=options.keys,
-                vertices=options.vertices,
-                axes=options.axes,
-                reading=reading_options(options),
-                blend=options.blend,
-                fps=options.fps,
-                glb=options.glb,
-            ),
-        )
+        options.reading = reading_options(options)
+        how = {field.name: getattr(options, field.name) for field in fields(Reductions)}
+        options.work = Reduce.of(options, how=Reductions(**how | {"mode": options.mode or MODE}))
         options.todo = _planned(options)
         _refuse_odd(options)
     except ValueError as error:
@@ -227,6 +210,7 @@ def main(arguments: list[str]) -> int:
 class Reduce(Work):
     """Keeping few keys."""
 
+    doing, done = "Reducing", "reduced"
     how: Reductions
 
     def needs_blender(self, job: Job) -> bool:
@@ -287,7 +271,7 @@ def _refuse_odd(options: argparse.Namespace) -> None:
     jobs = [job for job in options.todo if not job.problem]
     recorded = [job for job in jobs if job.is_recording]
     gltf = [job for job in jobs if not job.is_recording and _is_gltf(job.file)]
-    if options.keys is not None and options.tolerance is not None:
+    if options.count is not None and options.tolerance is not None:
         raise ValueError("--keys and --tolerance exclude one another: each decides how many keys there are")
     if options.in_place and recorded:
         raise ValueError(f"--in-place is for .blend files, and {recorded[0].source} is a recording: leave one out")
@@ -317,7 +301,7 @@ def _refuse_beside_glb(options: argparse.Namespace, jobs: list[Job]) -> None:
     for job in jobs:
         if job.file.suffix.lower() == ".gltf" and not job.is_found:
             raise ValueError(f"{job.source} is reduced to a .gltf file: do it without --glb")
-        if job.file.suffix.lower() == ".fbx" and (options.axes or reading_options(options).given):
+        if job.file.suffix.lower() == ".fbx" and (options.axes or options.reading.given):
             raise ValueError(
                 f"with --glb Blender imports {job.source} whole: leave out --axes and what says how to read it"
             )

@@ -38,7 +38,7 @@ def baking(step: float, first: float | None, last: float | None, interpolation: 
         )
         return _result(targets, modes, problems | _by_target(refusals, fit), f", frames {begin:g} to {end:g}")
 
-    return Action("Baking", "baked", with_rigid_segments, bake)
+    return Action(with_rigid_segments, bake)
 
 
 def unbaking() -> Action:
@@ -49,7 +49,7 @@ def unbaking() -> Action:
         animation.unbake(targets, refused=refusals)
         return _result(targets, modes_of(targets), _by_target(refusals, targets))
 
-    return Action("Un-baking", "un-baked", lambda targets: list(filter(animation.is_baked, targets)), unbake)
+    return Action(lambda targets: list(filter(animation.is_baked, targets)), unbake)
 
 
 def _result(

@@ -47,11 +47,11 @@ def _do_file(doing: Doing, action: Action) -> None:
         doing.say(library)
     if missing.hides_objects and doing.work.objects is None:
         outcome.incomplete = True
-        doing.say(f"incomplete, for there may be objects to be {action.done} in what is missing")
+        doing.say(f"incomplete, for there may be objects to be {doing.work.done} in what is missing")
     _do_objects(doing, action, missing.reasons)
     if not outcome.done:
         why = "nothing could be" if outcome.refused else "nothing to be"
-        doing.say(f"{why} {action.done}; left alone")
+        doing.say(f"{why} {doing.work.done}; left alone")
         return
     if (before := cast(Any, bpy.data.version)[:2]) < HERE:
         doing.say(f"was saved by Blender {named(before)}; what is written is of Blender {named(HERE)}")
@@ -98,6 +98,6 @@ def _do_targets(doing: Doing, action: Action, targets: Sequence[Transform]) -> N
         doing.outcome.bones += bones
         doing.outcome.objects += len(result.done) - bones
         between = " " if len(result.done) > 1 else ": "
-        doing.say(f"{title_of(result.done)}{between}{doing.would}{action.done}{result.summary}")
+        doing.say(f"{title_of(result.done)}{between}{doing.would}{doing.work.done}{result.summary}")
     if result.left:
         doing.say(result.describe_kept())

@@ -13,7 +13,6 @@ import numpy as np
 
 from rigid_motion import animation
 from rigid_motion.animation.transforms import transform_of
-from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.keying.output_files import FileProblem
 from rigid_motion_batch.keying.reducing import reduced
 from rigid_motion_batch.keying.reductions import RATES, Reductions
@@ -87,7 +86,7 @@ def new_file(clip: Clip, tolerance: float, fps: int | None) -> np.ndarray:
 def key_densely(clip: Clip, frames: np.ndarray, name: str) -> None:
     """Put axes or a rig into the open file that move as a recording did, with a key for every sample, frames (n,)."""
     if clip.rest_body is None:
-        poses = to_blender(clip.in_metres(clip.poses), clip.axes)
+        poses = clip.in_blender(clip.poses)
         animation.bake_poses(_axes(name), frames, poses, key_type="KEYFRAME")
     else:
         _rig(clip, frames, name)
@@ -96,7 +95,7 @@ def key_densely(clip: Clip, frames: np.ndarray, name: str) -> None:
 def key_object(clip: Clip, keys: np.ndarray, frames: np.ndarray, mode: str, name: str) -> bpy.types.Object:
     """Put axes into the open file that move as a rigid body did, with keys at these samples (k,) of all frames (n,)."""
     obj = _axes(name)
-    poses = to_blender(clip.in_metres(clip.poses[keys]), clip.axes)
+    poses = clip.in_blender(clip.poses[keys])
     animation.bake_poses(obj, frames[keys], poses, key_type="KEYFRAME")
     animation.set_mode(obj, mode)
     return obj
@@ -129,9 +128,9 @@ def _axes(name: str) -> bpy.types.Object:
 def _rig(clip: Clip, frames: np.ndarray, name: str) -> Rig:
     """Return a rig in the open file with a key for every sample of a whole body, on frames (n,)."""
     scene, rest_body = cast(bpy.types.Scene, bpy.context.scene), clip.whole_body
-    rest = Rest.of(rest_body, clip.metres_per_unit, clip.axes)
+    rest = Rest.of(clip)
     rig = Rig(name, rest, rest_body.joints, scene.collection)
-    channels = rig.channels_of(to_blender(clip.in_metres(clip.poses), clip.axes))
+    channels = rig.channels_of(clip.in_blender(clip.poses))
     for bone in range(len(rig.bones)):
         rig.key(bone, frames, channels[bone])
     return rig

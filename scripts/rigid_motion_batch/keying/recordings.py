@@ -15,7 +15,7 @@ import numpy as np
 from rigid_motion.motion import reduce_keys
 from rigid_motion_batch.analysis.metrics import write_poses
 from rigid_motion_batch.analysis.radii import RIGID
-from rigid_motion_batch.analysis.reconstructions import fill_in
+from rigid_motion_batch.analysis.reconstructions import Reconstruction
 from rigid_motion_batch.keying.blend_files import write_file
 from rigid_motion_batch.keying.exporting import export_glb
 from rigid_motion_batch.keying.gltf_files import reduce_gltf
@@ -95,11 +95,12 @@ class _Clip:
         frames = self._new_file() if scene else None
         count = self.how.count
         if count is None:
-            keys = tolerance.keys(clip, mode, self.radius)
+            (keys,) = tolerance.keys(clip, mode, self.radius)
         else:
             budget = min(count, len(clip.times))
             keys = reduce_keys(clip.times, clip.poses, mode, radius=self.radius / clip.metres_per_unit, budget=budget)
-        largest = float(fill_in(clip, tolerance, {mode: keys}, self.radius).errors[mode].shell.max())
+        made = Reconstruction(clip, tolerance, {mode: (keys,)}, np.array([self.radius]))
+        largest = float(made.shell(mode).max())
         stop_if_asked()
         if frames is not None:
             key_object(clip, keys, frames, mode, self.name)

@@ -38,7 +38,7 @@ def reducing(how: Reductions, asked: Sequence[str] | None = None) -> Action:
     def reduce(targets: Sequence[Transform]) -> Result:
         return reduced(targets, how)
 
-    return Action("Reducing", "reduced", concerned, reduce, whole_rigs=True)
+    return Action(concerned, reduce, whole_rigs=True)
 
 
 def reduced(targets: Sequence[Transform], how: Reductions) -> Result:

@@ -48,12 +48,6 @@ class Result:
 class Action:
     """What is done to targets, such as baking."""
 
-    doing: str
-    """The work, as a heading: "Baking"."""
-
-    done: str
-    """The word for what becomes of targets: "baked"."""
-
     concerned: Callable[[Sequence[Transform]], list[Transform]]
     """Returns those of several that there is something to do to, possible or not."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import os
 import traceback
 from abc import ABC, abstractmethod
@@ -9,6 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, ClassVar, Self
 
 from rigid_motion_batch.supervising import report
 
@@ -24,10 +26,10 @@ Note = Callable[[str], None]
 class Work(ABC):
     """What is done to inputs, and how: plain data, which goes to worker processes and into the keys of results."""
 
-    doing: str
+    doing: ClassVar[str]
     """As a heading: "Baking"."""
 
-    done: str
+    done: ClassVar[str]
     """The word for what becomes of objects: "baked"."""
 
     objects: Sequence[str] | None
@@ -39,6 +41,11 @@ class Work(ABC):
     dry_run: bool
     processes: int = field(default=1, kw_only=True)
     """For one input, where it has parts."""
+
+    @classmethod
+    def of(cls, options: argparse.Namespace, **own: Any) -> Self:
+        """Return what the options say, and the fields that a kind of work has of its own."""
+        return cls(options.objects, options.overwrite, options.dry_run, **own)
 
     def record_of(self, job: Job) -> Record:
         """Return what is known of what was made of an input."""

@@ -24,7 +24,6 @@ from . import values
 from .steps import Job, Step, TaskError
 
 if TYPE_CHECKING:
-    from rigid_motion_batch.analysis.bodies import BodyReconstruction
     from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult
 
 STAGES = ("read", "measure", "build", "render", "encode", "report")
@@ -126,16 +125,17 @@ class Measure(Step, rooms=ANALYSIS, stage="measure"):
 
     def make(self, job: Job) -> None:
         from rigid_motion_batch.analysis import body_metrics, metrics, results
+        from rigid_motion_batch.rows import write_rows
 
         clip, radii = self.clip.read(job.results[0]), self.radii
         made = results.made_of(clip, self.choice, self.modes, radii, shared=self.shared)
         if made is None:
             raise TaskError(f"{clip.name}: too short for two keys {self.choice.phrase}")
-        result = results.measured(made, radii)
+        result = results.measured(made)
         results.write_tables(job.folder, made, self.form)
-        metrics.write_metrics(job.folder / ROWS, result.rows)
+        write_rows(job.folder / ROWS, metrics.Metrics, result.rows)
         if result.joints:
-            body_metrics.write_joint_metrics(job.folder / JOINT_ROWS, result.joints)
+            write_rows(job.folder / JOINT_ROWS, body_metrics.JointMetrics, result.joints)
         values.write(job.folder / "result", result)
         values.write(job.folder / "numbers", result.numbers)
 
@@ -152,12 +152,13 @@ class CountKeys(Step, rooms=ANALYSIS, stage="measure"):
         from rigid_motion_batch.analysis import needed
         from rigid_motion_batch.analysis.body_needed import ways_of
         from rigid_motion_batch.analysis.modes import single_modes
+        from rigid_motion_batch.rows import write_rows
 
         done = iter(range(1, len(needed.RATES) + 1))
         ways = ways_of(self.clip.read(job.results[0]), self.radii, fit=self.fit)
         modes = single_modes(self.modes)
         result = needed.keys_needed(ways, modes, advance=lambda: job.progress(next(done), len(needed.RATES)))
-        needed.write_keys_needed(job.folder / ROWS, [result])
+        write_rows(job.folder / ROWS, needed.NeededRow, needed.rows_of(result))
         values.write(job.folder / "needed", result)
 
 
@@ -165,16 +166,17 @@ class Decimate(Measure, rooms=SCENES, blender=True):
     """See what Blender's Decimate needs to be as good as the keys of a whole body. Before: recording, measurement."""
 
     def make(self, job: Job) -> None:
-        from rigid_motion_batch.analysis.body_decimated import write_keys_of_bodies
+        from rigid_motion_batch.analysis.body_decimated import KeysOfBody
         from rigid_motion_batch.analysis.results import made_again
+        from rigid_motion_batch.rows import write_rows
         from rigid_motion_batch.scenes.decimating import beside_decimate
 
         clip, result = self.clip.read(job.results[0]), result_in(job.results[1])
-        made = cast("BodyReconstruction", made_again(clip, result, self.radii, shared=self.shared))
+        made = made_again(clip, result, self.radii, shared=self.shared)
         known = [row for row in result.rows if row.keys]
         with _told(f"{clip.name} {result.choice.phrase}: not compared with Blender's Decimate"):
-            rows = beside_decimate(made, self.radii.of(clip.whole_body.joints), known)
-        write_keys_of_bodies(job.folder / ROWS, rows)
+            rows = beside_decimate(made, known)
+        write_rows(job.folder / ROWS, KeysOfBody, rows)
         values.write(job.folder / "decimated", tuple(rows))
 
 
@@ -231,7 +233,6 @@ class Build(Step, rooms=SCENES, stage="build", blender=True):
     """The version of Blender."""
 
     def make(self, job: Job) -> None:
-        from rigid_motion_batch.analysis.reconstructions import Reconstruction
         from rigid_motion_batch.analysis.results import made_again
         from rigid_motion_batch.scenes.body_scene import build_body_scene
         from rigid_motion_batch.scenes.film import save_blend
@@ -240,10 +241,10 @@ class Build(Step, rooms=SCENES, stage="build", blender=True):
         clip, result, radii = self.clip.read(job.results[0]), result_in(job.results[1]), self.radii
         with _told(f"{clip.name} {result.choice.phrase}: no video"):
             made = made_again(clip, result, radii, shared=self.shared)
-            if isinstance(made, Reconstruction):
+            if clip.rest_body is None:
                 build_scene(made, self.settings)
             else:
-                build_body_scene(made, self.settings, radii.of(clip.whole_body.joints))
+                build_body_scene(made, self.settings)
             save_blend(job.folder / BLEND)
 
 

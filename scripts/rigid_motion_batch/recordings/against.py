@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from rigid_motion.motion import Poses
-from rigid_motion.motion.poses import inverse, placed
-from rigid_motion_batch.axes import from_blender, to_blender
+from rigid_motion_batch.axes import from_blender
 
 from . import clip_reading
 from .clips import Clip, OtherMotion
 from .options import ReadingOptions
 from .reading import format_of, split_source
 from .recordings import TrajectoryError, listed
+from .rest_bodies import in_parents
 
 ROUNDED = 6e-4
 """Seconds that a motion may begin later or end sooner: times are often rounded to milliseconds."""
@@ -66,7 +66,7 @@ def _span(times: np.ndarray) -> str:
 def _as_in(clip: Clip, other: Clip, source: str) -> Poses:
     """Return the poses of another clip in the axes, the unit and, of a whole body, the joints of a clip."""
     own, theirs = clip.rest_body, other.rest_body
-    poses = from_blender(to_blender(other.in_metres(other.poses), other.axes), clip.axes)
+    poses = from_blender(other.in_blender(other.poses), clip.axes)
     poses = Poses(poses.positions / clip.metres_per_unit, poses.quaternions, poses.scales)
     if own is None and theirs is None:
         return poses
@@ -78,7 +78,4 @@ def _as_in(clip: Clip, other: Clip, source: str) -> Poses:
         has = f"{clip.source} has {'it' if len(missing) == 1 else 'them'}"
         raise TrajectoryError(source, f"it has no joint {listed(missing, 5)}", has)
     world = theirs.skeleton.in_root_space(poses)[[places[name] for name in own.joints]]
-    parents = own.parents
-    hanging = parents >= 0
-    world[hanging] = placed(inverse(world[parents[hanging]]), world[hanging])
-    return world
+    return in_parents(world, own.parents)

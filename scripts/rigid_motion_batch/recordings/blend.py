@@ -21,9 +21,8 @@ from rigid_motion.motion import Poses
 
 from .key_moments import BONE_CHANNEL, curves_that_move, fcurves_of, moments_of
 from .options import AS_THE_FILE_SAYS, ReadingOptions
-from .probe_scene import probe
 from .recordings import ALL, Selection, Trajectory, TrajectoryError, listed, shown
-from .rigs import LAST_FRAME, armature_of, whole_body
+from .rigs import LAST_FRAME, armature_of, in_blender, probe, whole_body
 from .sampling import LEAD, OF_OBJECTS, Moments, merged, sampled
 
 if TYPE_CHECKING:
@@ -74,37 +73,27 @@ def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE
 
     Any other object, and any bone, can be had by its name.
     """
-    try:
-        import bpy  # noqa: F401
-    except ImportError:
-        raise TrajectoryError(path, "this needs Blender", "run it in Blender, or pip install bpy") from None
-    try:
-        with _without_scripts(), _opened(path) as (objects, scenes):
-            if not scenes:
-                raise TrajectoryError(path, "no scene in this file", "save the file from Blender itself")
-            bodies = {name: Body(obj) for name, obj in objects.items()}
-            animated = [name for name, body in bodies.items() if body.frames_of_keys() is not None]
-            still = [name for name in objects if name not in animated]
-            selection.match([*objects, *_bones_of(objects)])
-            requested = selection.requested or ""
-            if requested not in bodies and (body := _bone_called(path, requested, objects)):
-                selection.of(animated, unlisted=[requested])
-                return [_sample(path, body, scenes, options.scale)]
-            with_keys = {name: _bones_with_keys(obj) for name, obj in objects.items()}
-            few = [f"{name}/{bone}" for name, bones in with_keys.items() for bone in bones[:FEW]]
-            more = sum(map(len, with_keys.values())) - len(few)
-            if selection.requested == ALL:
-                taken = selection.of(animated, unlisted=[*few, *still], more=more)
-                return [_sample(path, bodies[name], scenes, options.scale) for name in taken]
-            moving = [name for name in objects if name in animated or with_keys[name]]
-            still = [name for name in still if name not in moving]
-            (name,) = selection.of(moving, unlisted=[*few, *still], more=more)
-            if with_keys[name] or _bones_are_moved(objects[name]):
-                return [_sample_whole(path, objects[name], scenes, options.scale)]
-            return [_sample(path, bodies[name], scenes, options.scale)]
-    except (UnicodeDecodeError, SystemError):
-        # Blender takes names as they are, and Python fails where it is handed one: with a SystemError on some ways.
-        raise TrajectoryError(path, "a name in this file is no text", "save it again from Blender") from None
+    with in_blender(path, "save it again from Blender"), _without_scripts(), _opened(path) as (objects, scenes):
+        if not scenes:
+            raise TrajectoryError(path, "no scene in this file", "save the file from Blender itself")
+        bodies = {name: Body(obj) for name, obj in objects.items()}
+        animated = [name for name, body in bodies.items() if body.frames_of_keys() is not None]
+        selection.match([*objects, *_bones_of(objects)])
+        requested = selection.requested or ""
+        if requested not in bodies and (body := _bone_called(path, requested, objects)):
+            selection.of(animated, unlisted=[requested])
+            return [_sample(path, body, scenes, options.scale)]
+        with_keys = {name: _bones_with_keys(obj) for name, obj in objects.items()}
+        # Of all objects those that are animated, and of one any whose bones are as well.
+        every = selection.requested == ALL
+        moving = [name for name in objects if name in animated or (with_keys[name] and not every)]
+        few = [f"{name}/{bone}" for name, bones in with_keys.items() for bone in bones[:FEW]]
+        more = sum(map(len, with_keys.values())) - len(few)
+        still = [name for name in objects if name not in moving]
+        taken = selection.of(moving, unlisted=[*few, *still], more=more)
+        if not every and (with_keys[taken[0]] or _bones_are_moved(objects[taken[0]])):
+            return [_sample_whole(path, objects[taken[0]], scenes, options.scale)]
+        return [_sample(path, bodies[name], scenes, options.scale) for name in taken]
 
 
 def _bones_of(objects: dict[str, bpy.types.Object]) -> Iterator[str]:

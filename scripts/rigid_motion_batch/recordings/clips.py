@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigid_motion.motion import Poses, interpolate
+from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.rest_bodies import RestBody
 
 
@@ -96,6 +97,11 @@ class Clip:
         return self.rate or 1.0 / float(np.median(np.diff(self.times)))
 
     @property
+    def joints(self) -> int:
+        """The number of joints of a figure, or the single one of a rigid body."""
+        return len(self.rest_body.joints) if self.rest_body else 1
+
+    @property
     def whole_body(self) -> RestBody:
         """The figure of a clip that has one."""
         assert self.rest_body is not None
@@ -106,6 +112,10 @@ class Clip:
         if self.metres_per_unit == 1.0:
             return poses
         return Poses(poses.positions * self.metres_per_unit, poses.quaternions, poses.scales)
+
+    def in_blender(self, poses: Poses) -> Poses:
+        """Return poses of this clip in metres and Blender's axes."""
+        return to_blender(self.in_metres(poses), self.axes)
 
 
 @dataclass(frozen=True)

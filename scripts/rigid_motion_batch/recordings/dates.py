@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from functools import lru_cache
 
@@ -30,6 +29,8 @@ MOMENT = re.compile(
 LIKE_A_DATE = re.compile(r"\d[:/]\d|\d[-.]\d\d?[-.]\d|\d{8}T\d", re.ASCII)
 """Pattern of dates as other standards and countries have them."""
 
+CLOCK_TIME = "a clock time"
+
 MIDNIGHT = datetime(1970, 1, 1, tzinfo=UTC)
 
 LEAP_SECOND = 60
@@ -49,19 +50,7 @@ LONGEST_SHOWN = 40
 """Characters of a time in an error: as long as any is."""
 
 
-@dataclass(frozen=True)
-class Kind:
-    """Kind of times: dates or clock times, and whether with an offset from UTC."""
-
-    dated: bool
-    offset: bool
-
-    def __str__(self) -> str:
-        kind = "date" if self.dated else "clock time"
-        return f"a {kind} {'with' if self.offset else 'without'} an offset from UTC"
-
-
-def kind_of_times(table: Table) -> Kind | None:
+def kind_of_times(table: Table) -> str | None:
     """Return what the times in column t of a table are, by the first that there is; None for numbers.
 
     Raises
@@ -78,14 +67,14 @@ def kind_of_times(table: Table) -> Kind | None:
     return None
 
 
-def seconds_of_dates(table: Table, kind: Kind) -> np.ndarray:
+def seconds_of_dates(table: Table, kind: str) -> np.ndarray:
     """Return the times in column t of a table.
 
     Parameters
     ----------
     table : Table
         With rows that are long enough.
-    kind : Kind
+    kind : str
         Of all its times.
 
     Returns
@@ -102,7 +91,7 @@ def seconds_of_dates(table: Table, kind: Kind) -> np.ndarray:
     moments = np.fromiter(_moments(table, kind), np.dtype((np.int64, 2)))
     known = moments[:, 1] != MISSING
     seconds, nanoseconds = moments[known].T
-    if not kind.dated:
+    if kind.startswith(CLOCK_TIME):
         seconds = _through_midnights(seconds)
     times = np.full(len(moments), np.nan)
     if len(seconds):
@@ -112,7 +101,7 @@ def seconds_of_dates(table: Table, kind: Kind) -> np.ndarray:
     return times
 
 
-def _moments(table: Table, kind: Kind) -> Iterator[tuple[int, int]]:
+def _moments(table: Table, kind: str) -> Iterator[tuple[int, int]]:
     """Yield the seconds of every row since some midnight in UTC, and the nanoseconds besides."""
     way_out = "correct or delete the line"
     for number, cell in table.cells("t"):
@@ -128,10 +117,8 @@ def _moments(table: Table, kind: Kind) -> Iterator[tuple[int, int]]:
             if int(second or 0) > LEAP_SECOND:
                 raise ValueError(second)
         except ValueError:
-            name = "date" if kind.dated else "clock time"
-            raise TrajectoryError(
-                table.path, f"t is {shown(cell, LONGEST_SHOWN)}, not a {name}", way_out, number
-            ) from None
+            problem = f"t is {shown(cell, LONGEST_SHOWN)}, not {kind.partition(' with')[0]}"
+            raise TrajectoryError(table.path, problem, way_out, number) from None
         if _kind(match) != kind:
             problem = f"t is {shown(cell, LONGEST_SHOWN)}, not {kind} as before"
             raise TrajectoryError(table.path, problem, way_out, number)
@@ -155,8 +142,9 @@ def _through_midnights(seconds: np.ndarray) -> np.ndarray:
     return seconds + DAY * np.concatenate(([0], days))[: len(seconds)]
 
 
-def _kind(match: re.Match[str]) -> Kind:
-    return Kind(match[1] is not None, match[6] is not None)
+def _kind(match: re.Match[str]) -> str:
+    """Return what a time is, as errors call it."""
+    return f"{'a date' if match[1] else CLOCK_TIME} {'with' if match[6] else 'without'} an offset from UTC"
 
 
 def _is_missing(cell: str) -> bool:

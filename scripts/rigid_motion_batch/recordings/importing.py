@@ -23,7 +23,7 @@ from rigid_motion_batch.silencing import silenced
 
 from .key_moments import BONE_CHANNEL, curves_that_move, fcurves_of, keys_of, moments_of, with_parents
 from .recordings import ALL, NoMotion, Selection, Trajectory, TrajectoryError, listed
-from .rigs import LAST_FRAME, armature_of, joints_of, refuse_too_many, single_joints, whole_body
+from .rigs import LAST_FRAME, armature_of, in_blender, joints_of, refuse_too_many, single_joints, whole_body
 from .sampling import LEAD, SAME, Moments, away, merged
 from .tables import LARGEST_FILE
 
@@ -103,18 +103,9 @@ def read_imported(
     TrajectoryError
         Where there is no Blender, the file cannot be imported, or has no armature that moves.
     """
-    try:
-        import bpy  # noqa: F401
-    except ImportError:
-        raise TrajectoryError(path, "this needs Blender", "run it in Blender, or pip install bpy") from None
-    try:
-        with _imported(path, importer, addon, fps) as (scene, names):
-            rigs = {name: obj for obj, name in names.items() if obj.type == "ARMATURE" and obj.pose}
-            return _read(path, selection, rigs, scene, rate_of, scale, made)
-    except (UnicodeDecodeError, SystemError):
-        raise TrajectoryError(path, "a name in this file is no text", "export it again") from None
-    except MemoryError:
-        raise TrajectoryError(path, "this file needs more memory than there is", "split the recording") from None
+    with in_blender(path, "export it again"), _imported(path, importer, addon, fps) as (scene, names):
+        rigs = {name: obj for obj, name in names.items() if obj.type == "ARMATURE" and obj.pose}
+        return _read(path, selection, rigs, scene, rate_of, scale, made)
 
 
 def _read(

@@ -178,14 +178,9 @@ def inspect(source: str, axes: str | None = None, options: ReadingOptions = AS_T
     ups = {content.up for content in contents if content.up}
     taken = _axes(recording, axes, next(iter(ups)) if len(ups) == 1 else "")
     size = path.stat().st_size
-    return Inspection(
-        source, result.label, size, bodies, taken, tuple(contents), tuple(unreadable), _note_of(recording)
-    )
-
-
-def _note_of(recording: Recording) -> str:
-    """Return what is said of the bodies; not that of the others, which are listed."""
-    return "; ".join(trajectory.remark for trajectory in recording.trajectories if trajectory.remark)
+    # Of the bodies, and not of the others, which are listed.
+    note = "; ".join(trajectory.remark for trajectory in recording.trajectories if trajectory.remark)
+    return Inspection(source, result.label, size, bodies, taken, tuple(contents), tuple(unreadable), note)
 
 
 def _contents(clip: Clip, trajectory: Trajectory, unit: Unit) -> Contents:

@@ -10,6 +10,7 @@ is `Trajectory.metres_per_unit`. Euler angles need their order from the user.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import takewhile
 from pathlib import Path
@@ -68,43 +69,46 @@ def read_below(
     path: Path, selection: Selection, options: ReadingOptions, header: HeaderLine, layout: Layout, way_out: str
 ) -> list[Trajectory]:
     """Read the requested bodies of the rows below a header; `way_out` is what to do with devices that are mixed."""
-    try:
-        return _read(path, selection, options, header, layout, way_out)
-    except ColumnProblem as problem:
-        raise problem.at(path, header.number) from None
-
-
-def _read(
-    path: Path, selection: Selection, options: ReadingOptions, header: HeaderLine, layout: Layout, way_out: str
-) -> list[Trajectory]:
-    bodies = _bodies(path, header, layout, "device" in dict(options.columns))
-    taken = set(selection.of([body.name for body in bodies]))
-    requested = [body for body in bodies if body.name in taken]
-    columns = {"t": layout.time} | {body.label(one): index for body in requested for one, index in body.columns.items()}
-    table = header.table(path, columns)
-    kind = kind_of_times(table)
-    if kind and (options.time_unit or options.frame_rate):
-        given = f"--time-unit {options.time_unit}" if options.time_unit else f"--frame-rate {options.frame_rate:g}"
-        problem = f"{given} is for times that are numbers, and these have {kind}"
-        raise TrajectoryError(path, problem, "leave it out", header.number)
-    parsed = [name for name in columns if name != "t" or kind is None]
-    numbers = dict(zip(parsed, table.parse(parsed).T, strict=True))
-    if kind:
-        times = seconds_of_dates(table, kind)
-    elif options.frame_rate:
-        times = numbers["t"] / options.frame_rate
-    else:
-        require_time_unit(layout)
+    with _told(path, header.number):
+        bodies = _bodies(path, header, layout, "device" in dict(options.columns))
+        taken = set(selection.of([body.name for body in bodies]))
+        requested = [body for body in bodies if body.name in taken]
+        columns = {"t": layout.time}
         for body in requested:
-            require_seconds(table, numbers["t"][body.rows], layout.time_unit)
-        times = seconds_of(table, numbers["t"], layout.time_unit)
-    trajectories = []
-    for body in requested:
-        held = {column: numbers[body.label(column)][body.rows] for column in body.columns}
-        trajectory = replace(_trajectory(body, times[body.rows], held, layout, options), dated=kind is not None)
-        require_one_body(trajectory, path, way_out, header.number)
-        trajectories.append(trajectory)
-    return trajectories
+            columns |= {body.label(one): index for one, index in body.columns.items()}
+        table = header.table(path, columns)
+        kind = kind_of_times(table)
+        if kind and (options.time_unit or options.frame_rate):
+            given = f"--time-unit {options.time_unit}" if options.time_unit else f"--frame-rate {options.frame_rate:g}"
+            problem = f"{given} is for times that are numbers, and these have {kind}"
+            raise TrajectoryError(path, problem, "leave it out", header.number)
+        parsed = [name for name in columns if name != "t" or kind is None]
+        numbers = dict(zip(parsed, table.parse(parsed).T, strict=True))
+        if kind:
+            times = seconds_of_dates(table, kind)
+        elif options.frame_rate:
+            times = numbers["t"] / options.frame_rate
+        else:
+            require_time_unit(layout)
+            for body in requested:
+                require_seconds(table, numbers["t"][body.rows], layout.time_unit)
+            times = seconds_of(table, numbers["t"], layout.time_unit)
+        trajectories = []
+        for body in requested:
+            held = {column: numbers[body.label(column)][body.rows] for column in body.columns}
+            trajectory = replace(_trajectory(body, times[body.rows], held, layout, options), dated=kind is not None)
+            require_one_body(trajectory, path, way_out, header.number)
+            trajectories.append(trajectory)
+        return trajectories
+
+
+@contextmanager
+def _told(path: Path, line: int) -> Iterator[None]:
+    """Raise a problem of columns as one of a line of a file."""
+    try:
+        yield
+    except ColumnProblem as problem:
+        raise problem.at(path, line) from None
 
 
 def _find_header(path: Path, options: ReadingOptions) -> tuple[HeaderLine, Layout]:

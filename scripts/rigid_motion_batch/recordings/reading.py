@@ -133,9 +133,11 @@ def _read(result: Format, path: Path, selection: Selection, options: ReadingOpti
         trajectories = [replace(trajectory, metres_per_unit=options.scale) for trajectory in trajectories]
     else:
         trajectories = [_sized(path, trajectory, unit_given=result.in_metres) for trajectory in trajectories]
-    if result.measured:
-        trajectories = [_doubted(trajectory, "time_unit" in result.honours) for trajectory in trajectories]
-    return trajectories
+    if not result.measured:
+        return trajectories
+    takes_unit = "time_unit" in result.honours
+    found = [doubts(trajectory, time_unit=takes_unit and not trajectory.dated) for trajectory in trajectories]
+    return [replace(item, warnings=(*item.warnings, *more)) for item, more in zip(trajectories, found, strict=True)]
 
 
 def _sized(path: Path, trajectory: Trajectory, *, unit_given: bool) -> Trajectory:
@@ -171,12 +173,6 @@ def _first_whole(skeleton: Skeleton, poses: Poses) -> np.ndarray | None:
         if len(whole):
             return places[:, whole[0]]
     return None
-
-
-def _doubted(trajectory: Trajectory, time_unit: bool) -> Trajectory:
-    return replace(
-        trajectory, warnings=(*trajectory.warnings, *doubts(trajectory, time_unit=time_unit and not trajectory.dated))
-    )
 
 
 def files_of(source: str) -> list[str]:

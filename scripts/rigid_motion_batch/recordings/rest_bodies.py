@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigid_motion.motion import Poses, Skeleton
+from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.repair import LARGEST
 
 UNITS = (
@@ -82,6 +83,14 @@ class RestBody:
     @property
     def skeleton(self) -> Skeleton:
         return Skeleton(self.parents)
+
+
+def in_parents(world: Poses, parents: np.ndarray) -> Poses:
+    """Return poses in the world (joints, n), each in the space of its parent, if it has one of parents (joints,)."""
+    local = Poses(world.positions.copy(), world.quaternions.copy(), world.scales)
+    for joint in np.flatnonzero(parents >= 0).tolist():  # One by one: all of a long recording is large.
+        local[joint] = placed(inverse(world[parents[joint]]), world[joint])
+    return local
 
 
 def repaired(rest_body: RestBody) -> tuple[RestBody, tuple[str, ...]]:

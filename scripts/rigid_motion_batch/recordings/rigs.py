@@ -15,13 +15,11 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from rigid_motion.motion import Poses
-from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.quaternions import align_signs, conjugate, from_matrices, rotate
-from rigid_motion_batch.recordings.rest_bodies import RestBody, size_of, unit_of
 
 from .bvh import MOST_POSES
-from .probe_scene import probe
 from .recordings import Trajectory, TrajectoryError, shown
+from .rest_bodies import RestBody, in_parents, size_of, unit_of
 from .sampling import OF_JOINTS, Moments, sampled
 from .skins import carried_by, skin_of
 
@@ -36,6 +34,43 @@ BLOCK = 256
 
 SHORTEST_AXIS = 1e-12
 """Length below which an axis has no direction: bones are hidden by scaling them to nothing."""
+
+
+@contextmanager
+def in_blender(path: Path, again: str) -> Iterator[None]:
+    """Raise TrajectoryError where this is no Blender, or fails at a file in a way that no importer foresees.
+
+    `again` is what to do about names that are no text, which Blender takes as they are, and Python fails at: with a
+    SystemError on some ways.
+    """
+    try:
+        import bpy  # noqa: F401
+    except ImportError:
+        raise TrajectoryError(path, "this needs Blender", "run it in Blender, or pip install bpy") from None
+    try:
+        yield
+    except (UnicodeDecodeError, SystemError):
+        raise TrajectoryError(path, "a name in this file is no text", again) from None
+    except MemoryError:
+        raise TrajectoryError(path, "this file needs more memory than there is", "split the recording") from None
+
+
+@contextmanager
+def probe() -> Iterator[bpy.types.Object]:
+    """Yield an object that is shown in the current scene, which is new; whatever its constraints follow is evaluated.
+
+    Blender evaluates what is hidden only for the sake of what is shown. Both are gone afterwards.
+    """
+    import bpy
+
+    stage, obj = bpy.data.scenes.new("Reading"), bpy.data.objects.new("Probe", None)
+    try:
+        stage.collection.objects.link(obj)
+        with bpy.context.temp_override(scene=stage, view_layer=stage.view_layers[0]):
+            yield obj
+    finally:
+        bpy.data.objects.remove(obj)
+        bpy.data.scenes.remove(stage)
 
 
 @dataclass(frozen=True)
@@ -116,7 +151,8 @@ def whole_body(
     # What a damaged file has beyond all measure is for the repair to say.
     with np.errstate(invalid="ignore", over="ignore"):
         rest_body = _rest_body(rig, joints, look.first, meshes, made_up=made_up)
-        poses = _in_parents(_filled(seen.poses), joints.parents)
+        local = in_parents(_filled(seen.poses), joints.parents)
+        poses = Poses(local.positions, align_signs(local.quaternions))
     body = Trajectory(name, moments.times(seen.frames), poses, metres_per_unit, joints.remark, rest_body=rest_body)
     return seen.described(body, moments, metres)
 
@@ -262,16 +298,6 @@ def _rows(path: Path, seen: bpy.types.Object, bones: Sequence[str]) -> np.ndarra
         problem = f"the pose of {shown(seen.name)} lacks the bone {shown(missing[0])}"
         raise TrajectoryError(path, problem, "save the file again from Blender")
     return np.array([places[bone] for bone in bones])
-
-
-def _in_parents(world: Poses, parents: np.ndarray) -> Poses:
-    """Return poses in the world (joints, n), each in its parent's space and without flips of signs."""
-    # Joint by joint: what is whole is large.
-    local = Poses(np.empty_like(world.positions), np.empty_like(world.quaternions))
-    for joint, parent in enumerate(parents.tolist()):
-        own = world[joint] if parent < 0 else placed(inverse(world[parent]), world[joint])
-        local.positions[joint], local.quaternions[joint] = own.positions, align_signs(own.quaternions)
-    return local
 
 
 def _rest_body(

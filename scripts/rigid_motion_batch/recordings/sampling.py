@@ -13,13 +13,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigid_motion.motion import Poses, Skeleton
+from rigid_motion.motion.algebras.vector_quaternion import lerp_slerp
 from rigid_motion.motion.decimation import nearest
-from rigid_motion.motion.poses import inverse, placed
-from rigid_motion.motion.quaternions import angle_between
+from rigid_motion.motion.poses import reshaped
+from rigid_motion.motion.quaternions import align_signs, angle_between
 
 from .bvh import MOST_POSES
 from .clips import ClipWarning
 from .recordings import Trajectory
+from .rest_bodies import in_parents
 
 WITHIN = 1e-3
 """Metres that what lies between two samples may be off."""
@@ -50,9 +52,6 @@ LEAD = 2.0 * CLOSEST
 
 SAME = 2e-3
 """Steps by which gaps may differ that are the same: F-curves keep frames in single precision."""
-
-LEAST = 1e-6
-"""Radians: a smaller turn is divided like a line."""
 
 FLIP = np.radians(60.0)
 """Turn between two frames, and back, beyond which angles have jumped by a whole turn."""
@@ -226,7 +225,8 @@ class _Gaps:
         seen = self.look((first[:, None] + (last - first)[:, None] * looks).ravel())
         # What is damaged, or has no direction, is no reason for more samples.
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-            straight = self.skeleton.in_root_space(_between(self._in_parents(begin), self._in_parents(end), looks))
+            begin, end = (in_parents(some, self.skeleton.parents) for some in (begin, end))
+            straight = self.skeleton.in_root_space(_between(begin, end, looks))
             angle = angle_between(seen.quaternions, straight.quaternions)
             error = np.linalg.norm(seen.positions - straight.positions, axis=-1)
             error += 2.0 * self.radius * np.sin(angle / 2.0)
@@ -235,31 +235,12 @@ class _Gaps:
         error, angle = (np.where(np.isfinite(some), some, 0.0).max(axis=0) for some in (error, angle))
         return error.reshape(-1, len(looks)).max(axis=1), angle.reshape(-1, len(looks)).max(axis=1)
 
-    def _in_parents(self, world: Poses) -> Poses:
-        parents = self.skeleton.parents
-        hanging = np.flatnonzero(parents >= 0)
-        if not len(hanging):
-            return world
-        local = Poses(world.positions.copy(), world.quaternions.copy(), world.scales)
-        own = placed(inverse(world[parents[hanging]]), world[hanging])
-        local.positions[hanging], local.quaternions[hanging] = own.positions, own.quaternions
-        return local
-
 
 def _between(a: Poses, b: Poses, looks: np.ndarray) -> Poses:
     """Return poses (joints, n k) on lines and even turns from some (joints, n) to others, at the looks (k,)."""
-    share = looks[:, None]
-    positions = a.positions[..., None, :] + share * (b.positions - a.positions)[..., None, :]
-    dots = np.sum(a.quaternions * b.quaternions, axis=-1, keepdims=True)[..., None, :]
-    half = np.arccos(np.minimum(np.abs(dots), 1.0))
-    parts = [np.where(half > LEAST, np.sin(part * half) / np.sin(half), part) for part in (1.0 - share, share)]
-    signs = np.where(dots < 0.0, -1.0, 1.0)
-    turns = parts[0] * a.quaternions[..., None, :] + parts[1] * signs * b.quaternions[..., None, :]
-    scales = None
-    if a.scales is not None or b.scales is not None:
-        first, last = _scales(a)[..., None], _scales(b)[..., None]
-        scales = (first + looks * (last - first)).reshape(len(positions), -1)
-    return Poses(positions.reshape(len(positions), -1, 3), turns.reshape(len(turns), -1, 4), scales)
+    turned = align_signs(np.stack((a.quaternions, b.quaternions), axis=-2))[..., 1, :]
+    straight = lerp_slerp(a[..., None], Poses(b.positions, turned, b.scales)[..., None], looks)
+    return reshaped(straight, len(a), -1)
 
 
 def _scales(poses: Poses) -> np.ndarray:

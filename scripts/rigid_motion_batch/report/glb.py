@@ -20,7 +20,7 @@ from rigid_motion.gltf.writing import GrowingView, in_one_buffer
 from rigid_motion.motion import Poses, interpolate
 from rigid_motion.motion.quaternions import align_signs
 from rigid_motion_batch.analysis.modes import label_of
-from rigid_motion_batch.analysis.results import Made
+from rigid_motion_batch.analysis.reconstructions import Reconstruction
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.palette import DARK, colour_of, linear
 from rigid_motion_batch.recordings.clips import Clip
@@ -59,7 +59,7 @@ class Lane:
     """Shape (joints, n), each in its parent's space; a rigid body is one joint."""
 
 
-def comparison_glb(made: Made, groups: Iterable[tuple[str, ...]]) -> bytes:
+def comparison_glb(made: Reconstruction, groups: Iterable[tuple[str, ...]]) -> bytes:
     """Return what is in a GLB file of the recording and of these modes, those in one lane that are one motion.
 
     Raises

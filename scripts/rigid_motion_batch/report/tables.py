@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -189,17 +191,17 @@ def decimated_rows(result: ChoiceResult) -> list[tuple[tuple[str, ...] | None, l
 
 def segments_of(result: ChoiceResult, numbers: Numbers) -> str:
     """Which modes were best in how many segments, in a sentence; empty without `best_of`."""
-    found = result.segment_modes
-    if found is None:
+    segments = result.mode_of_segments
+    if not segments:
         return ""
-    errors = {row.mode: row.rms_shell_m for motion in result.motions for row in motion.metrics}
-    counts = sorted(found.counts.items(), key=lambda item: -item[1])
-    modes = listed(f"{numbers.label(mode)} in {count}" for mode, count in counts)
-    said = f"Of {sum(found.counts.values())} segments {modes}; the mode changes at {found.changes} keys."
-    if BEST_OF in errors and errors.get(found.best_single, 0.0) > 0.0:
-        less = 1.0 - errors[BEST_OF] / errors[found.best_single]
-        said += (
-            f" RMS shell error beside {numbers.label(found.best_single)}, the best single mode: {percent(abs(less))} "
-        )
+    rows = {row.mode: row for motion in result.motions for row in motion.metrics}
+    modes = listed(f"{numbers.label(mode)} in {count}" for mode, count in Counter(segments).most_common())
+    changes = sum(mode != following for mode, following in pairwise(segments))
+    said = f"Of {len(segments)} segments {modes}; the mode changes at {changes} keys."
+    known = [row for row in rows.values() if row.keys and row.mode != BEST_OF]
+    best = min(known, key=lambda row: (row.keys or 0, row.rms_shell_m))
+    if best.rms_shell_m > 0.0:
+        less = 1.0 - rows[BEST_OF].rms_shell_m / best.rms_shell_m
+        said += f" RMS shell error beside {numbers.label(best.mode)}, the best single mode: {percent(abs(less))} "
         said += "lower." if less > 0 else "higher."
     return said

@@ -1,4 +1,4 @@
-"""The verdict: one sentence with a number that answers "which mode", and up to three facts beside it.
+"""The verdict: one sentence with a number that answers "which mode", and in how many cases that mode was the best.
 
 Everything is computed from the numbers of the run, and true for any outcome of it. Errors are RMS shell errors;
 several clips are averaged by the geometric mean, so that a large motion counts as much as a small one. Modes that are
@@ -16,10 +16,10 @@ import numpy as np
 from rigid_motion.motion import MODES
 from rigid_motion_batch.analysis.choices import Budget, Tolerance
 from rigid_motion_batch.analysis.metrics import NOTHING, geometric_mean
-from rigid_motion_batch.analysis.modes import BEST_OF, REFERENCE
+from rigid_motion_batch.analysis.modes import REFERENCE
 from rigid_motion_batch.analysis.needed import DECIMATIONS, KeysNeeded, overall
 
-from .numbers import ERROR, KINDS, MINUS, Numbers, digits, listed, percent
+from .numbers import KINDS, Numbers, digits, percent
 
 TIE = 0.005
 """Ratios closer to 1 than this are no difference: they would be shown as 0 %."""
@@ -66,7 +66,8 @@ class Verdict:
     """What a run comes to."""
 
     sentence: Text
-    facts: tuple[Text, ...] = ()
+    wins: Text = ()
+    """In how many cases the best mode was, and where it was beaten by the most; empty of a single case."""
 
     def __str__(self) -> str:
         return as_text(self.sentence)
@@ -122,7 +123,7 @@ class _Contest:
 
 
 def verdict(numbers: Numbers, needed: Sequence[KeysNeeded] = ()) -> Verdict:
-    """Return what a run says, in one sentence and up to three facts.
+    """Return what a run says, in one sentence, and how often the best mode wins.
 
     Parameters
     ----------
@@ -132,20 +133,11 @@ def verdict(numbers: Numbers, needed: Sequence[KeysNeeded] = ()) -> Verdict:
     """
     contests = list(_contests(numbers))
     sentences = [_keys_needed(numbers, needed) if needed else None]
-    sentences += [tell(contest) for contest in contests for tell in (_fewer_keys, _within, _lower_error)]
+    sentences += [tell(contest) for contest in contests for tell in (_fewer_keys, _beside_rival)]
     said = [sentence for sentence in sentences if sentence]
     if not said:
         return Verdict((Part(SAMPLE_IS_KEY),))
-    facts: list[Text] = []
-    if contests:
-        first = contests[0]
-        gain = _gain(first)
-        if gain and gain != said[0] and said[0] != _lower_error(first):
-            facts.append(gain)
-        others = [_gain(contest) for contest in contests[1:]]
-        facts = [fact for fact in (_other(numbers, first),) if fact] + facts
-        facts += [fact for fact in (_wins(first), *others, _best_of(numbers, first), _others(first)) if fact]
-    return Verdict(said[0], tuple(facts[:3]))
+    return Verdict(said[0], _wins(contests[0]) if contests else ())
 
 
 def _contests(numbers: Numbers) -> Iterable[_Contest]:
@@ -246,44 +238,27 @@ def _fewer_keys(contest: _Contest) -> Text | None:
     )
 
 
-def _within(contest: _Contest) -> Text | None:
-    """How many keys a mode needs within a tolerance."""
+def _beside_rival(contest: _Contest) -> Text:
+    """How much closer the best mode is with as many keys, or how many fewer it needs within a tolerance."""
+    result = _best(contest)
+    if not result:
+        return _no_winner(contest)
+    best, rival, ratios = result
+    at = int(np.nanargmin(ratios))
+    names, less = (contest.name(best), contest.name(rival)), percent(1.0 - ratios[at])
     if contest.kind is not Tolerance:
-        return None
-    result = _best(contest)
-    if not result:
-        return _no_winner(contest)
-    best, rival, ratios = result
-    at = int(np.nanargmin(ratios))
-    phrase = contest.phrase(at)
-    return _say(
-        "{}, {} needs {} keys a second where {} needs {}: {} fewer.",
-        Part(phrase[0].upper() + phrase[1:]),
-        contest.name(best),
-        _number(f"{contest.means[at, best]:.3g}"),
-        contest.name(rival),
-        _number(f"{contest.means[at, rival]:.3g}"),
-        Part(percent(1.0 - ratios[at])),
-    )
-
-
-def _lower_error(contest: _Contest) -> Text | None:
-    """How much closer the best mode is with as many keys."""
-    if contest.kind is Tolerance:
-        return None
-    result = _best(contest)
-    if not result:
-        return _no_winner(contest)
-    best, rival, ratios = result
-    at = int(np.nanargmin(ratios))
-    return _say(
-        f"{{}} has {{}} less error than {{}} with the same {{}} keys a second"
-        f"{' on average' if contest.kind is Budget else ''}.",
-        contest.name(best),
-        _number(percent(1.0 - ratios[at])),
-        contest.name(rival),
-        _number(contest.numbers.choices[contest.places[at]].amount),
-    )
+        keys = contest.numbers.choices[contest.places[at]].amount
+        return _say(
+            f"{{}} has {{}} less error than {{}} with the same {{}} keys a second"
+            f"{' on average' if contest.kind is Budget else ''}.",
+            names[0],
+            _number(less),
+            names[1],
+            _number(keys),
+        )
+    phrase, (own, others) = contest.phrase(at), (_number(f"{mean:.3g}") for mean in contest.means[at, [best, rival]])
+    said = f"{phrase[0].upper()}{phrase[1:]}, {{}} needs {{}} keys a second where {{}} needs {{}}: {less} fewer."
+    return _say(said, names[0], own, names[1], others)
 
 
 def _no_winner(contest: _Contest) -> Text:
@@ -326,26 +301,11 @@ def _no_winner(contest: _Contest) -> Text:
     )
 
 
-# -- facts ------------------------------------------------------------------------------------------------------------
-
-
-def _gain(contest: _Contest) -> Text | None:
-    """Return the largest gain with as many keys, beside a sentence that says something else."""
-    result = _best(contest)
-    if not result:
-        return None
-    best, rival, ratios = result
-    at = int(np.nanargmin(ratios))
-    less = f"{percent(1.0 - ratios[at])} {'fewer keys' if contest.kind is Tolerance else 'lower error'}"
-    said = f"{{}} from {{}} than from {{}} {contest.phrase(at)}"
-    return _say(said, _number(less), contest.name(best), contest.name(rival))
-
-
-def _wins(contest: _Contest) -> Text | None:
-    """In how many cases the best mode was, and where it was beaten by the most."""
+def _wins(contest: _Contest) -> Text:
+    """Return in how many cases the best mode was, and where it was beaten by the most."""
     result = _best(contest)
     if not result or contest.distinguishable.sum() < 2:
-        return None
+        return ()
     best = result[0]
     values = np.where(contest.distinguishable[..., None], contest.values, np.nan)
     least = np.where(contest.distinguishable, np.nanmin(np.where(np.isnan(values), np.inf, values), axis=2), np.nan)
@@ -364,61 +324,3 @@ def _wins(contest: _Contest) -> Text | None:
         Part(f"{name} {at.phrase}", "link", f"{name},{at.name}"),
         contest.name(int(np.nanargmin(values[clip, choice]))),
     )
-
-
-def _best_of(numbers: Numbers, contest: _Contest) -> Text | None:
-    """Return the best mode of each segment beside the best single one of each clip."""
-    if BEST_OF not in numbers.modes or contest.kind is Tolerance:
-        return None
-    own = numbers.values[ERROR][:, contest.places][..., numbers.modes.index(BEST_OF)]
-    single = contest.values.min(axis=2)
-    possible = contest.distinguishable & (single > NOTHING * 1e3) & np.isfinite(own)
-    if not possible.any():
-        return None
-    ratio = float(np.exp(np.log(np.maximum(own[possible], 1e-9) / single[possible]).mean()))
-    said = f"{percent(1.0 - ratio)} lower error" if ratio < 1.0 - TIE else "No lower error"
-    return _say("{} from the best mode of each segment than from the best single one", _number(said))
-
-
-def _other(numbers: Numbers, contest: _Contest) -> Text | None:
-    """Somebody else's motion beside the best mode, under the middle choice of keys."""
-    other = next((mode for mode in numbers.modes if mode not in MODES and mode != BEST_OF), None)
-    if other is None or contest.kind is Tolerance:
-        return None
-    at = (len(contest.places) - 1) // 2
-    own = numbers.mean()[ERROR, contest.places[at], numbers.modes.index(other)]
-    best = int(np.argmin(contest.means[at]))
-    return _say(
-        f"{{}} is {{}}, and {{}} {digits(contest.means[at, best])}\u00a0mm {contest.phrase(at)}",
-        _number(f"{digits(own)}\u00a0mm off (RMS)"),
-        Part(numbers.label(other), "mode", other),
-        contest.name(best),
-    )
-
-
-def _others(contest: _Contest) -> Text | None:
-    """Return what did not pay: the modes that are neither the best nor the reference, beside the reference."""
-    result = _best(contest)
-    if not result or contest.reference is None:
-        return None
-    rest = [place for place in range(len(contest.groups)) if place not in (result[0], contest.reference)]
-    if not rest:
-        return None
-    ratios = (contest.means[:, rest] / contest.means[:, [contest.reference]]) - 1.0
-    low, high = float(np.nanmin(ratios)), float(np.nanmax(ratios))
-    what = "keys" if contest.kind is Tolerance else "error"
-    names, reference = listed(contest.name(place).text for place in rest), contest.name(contest.reference)
-    if abs(low) < TIE and abs(high) < TIE:
-        return _say(f"{{}} from {names} as from {{}}", _number(f"The same {what}"), reference)
-    if low >= 0.0 or high <= 0.0:
-        small, large = sorted((abs(low), abs(high)))
-        way = ("higher" if high > 0.0 else "lower") if what == "error" else ("more" if high > 0.0 else "fewer")
-        span = percent(large) if round(100 * small) == round(100 * large) else f"{100 * small:.0f} to {percent(large)}"
-        said = f"{span} {way} {what}"
-    else:
-        said = f"{_signed(low)} to {_signed(high)} {what}"
-    return _say(f"{{}} from {names} beside {{}}", _number(said), reference)
-
-
-def _signed(share: float) -> str:
-    return f"{'+' if share > 0 else MINUS}{percent(abs(share))}"

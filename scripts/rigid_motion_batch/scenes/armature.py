@@ -17,8 +17,7 @@ from rigid_motion import animation
 from rigid_motion.motion import KEYFRAME_MODES, Poses
 from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.quaternions import align_signs, conjugate, multiply, rotate
-from rigid_motion_batch.axes import to_blender
-from rigid_motion_batch.recordings.rest_bodies import RestBody
+from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.rigs import rigid
 
 LEAST_BONE = 0.02
@@ -47,12 +46,12 @@ class Rest:
     """The origin of that space in the figure's world: below it, on the ground. Shape (3,)."""
 
     @classmethod
-    def of(cls, rest_body: RestBody, metres_per_unit: float, axes: str) -> Rest:
-        """Return the figure in metres; it may be in any unit and axes, and at rest anywhere."""
-        metres = Poses(rest_body.rest.positions * metres_per_unit, rest_body.rest.quaternions)
-        joints = to_blender(metres, axes)
+    def of(cls, clip: Clip) -> Rest:
+        """Return the figure of a clip, which may be in any unit and axes, and at rest anywhere."""
+        rest_body = clip.whole_body
+        joints = clip.in_blender(rest_body.rest)
         turned = np.tile(STILL, (len(rest_body.tails), 1))
-        arms = to_blender(Poses(rest_body.tails * metres_per_unit, turned), axes).positions
+        arms = clip.in_blender(Poses(rest_body.tails, turned)).positions
         lengths = np.linalg.norm(arms, axis=1)
         least = LEAST_BONE * max(float(np.ptp(joints.positions, axis=0).max(initial=0.0)), float(lengths.max()), 1e-3)
         short = lengths < least

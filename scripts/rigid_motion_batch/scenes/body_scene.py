@@ -9,15 +9,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 
 import bpy
 import numpy as np
 
 from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate, shell_error
-from rigid_motion_batch.analysis.bodies import BLOCK, BodyReconstruction, identical_body_modes
 from rigid_motion_batch.analysis.body_metrics import key_samples
-from rigid_motion_batch.axes import to_blender
+from rigid_motion_batch.analysis.reconstructions import Reconstruction, identical_modes
 from rigid_motion_batch.palette import error_hex, full_colour
 from rigid_motion_batch.recordings.rest_bodies import short_names
 
@@ -28,7 +28,7 @@ from .framing import SMOOTHING, Framing, Jointed
 from .lanes import Cast
 from .materials import ink
 from .physique import Physique, body_size
-from .scene import LEGEND, Header, assemble_scene, begin
+from .scene import LEGEND, assemble_scene, begin
 from .settings import SceneSettings
 from .timeline import Timeline
 
@@ -47,21 +47,19 @@ GROUND = 0.05
 """The part of the ground that is seen below the feet, in units of the figure."""
 
 
-def build_body_scene(made: BodyReconstruction, settings: SceneSettings, radii: np.ndarray) -> bpy.types.Scene:
+def build_body_scene(made: Reconstruction, settings: SceneSettings) -> bpy.types.Scene:
     """Make the scene of a comparison of whole bodies, in a file that is emptied for it.
 
     Parameters
     ----------
-    made : BodyReconstruction
+    made : Reconstruction
     settings : SceneSettings
         But for the subject and the deviation: a body shows itself, as it is.
-    radii : array, shape (joints,)
-        Of the balls by which errors are measured, in metres.
     """
     timeline = begin(made, settings)
-    lanes_of = identical_body_modes(made) if settings.distinct else tuple((mode,) for mode in made.keys)
-    rest = Rest.of(made.clip.rest_body, made.clip.metres_per_unit, made.clip.axes)
-    motion, centre = shown_motion(made, [group[0] for group in lanes_of], timeline, rest, radii)
+    lanes_of = identical_modes(made) if settings.distinct else tuple((mode,) for mode in made.keys)
+    rest = Rest.of(made.clip)
+    motion, centre = shown_motion(made, [group[0] for group in lanes_of], timeline, rest)
 
     recording, *others = (Jointed(motion.places(some)) for some in (motion.recording, *motion.modes.values()))
     framing = Framing.of(recording, SMOOTHING * settings.fps)
@@ -70,6 +68,7 @@ def build_body_scene(made: BodyReconstruction, settings: SceneSettings, radii: n
         extent, low=extent.low - size * np.array((MARGIN, MARGIN + GROUND, MARGIN)), high=extent.high + MARGIN * size
     )
     cast = Cast.arranged(
+        made,
         settings,
         lanes_of,
         extent,
@@ -78,24 +77,22 @@ def build_body_scene(made: BodyReconstruction, settings: SceneSettings, radii: n
         framing=framing,
         framing_steps=1,
         errors={mode: 1e3 * errors.max(axis=0) for mode, errors in motion.errors.items()},
-        sampled={mode: 1e3 * _sampled_errors(made, mode, radii) for mode in motion.modes},
-        sample_frames=timeline.frames_of(made.times),
-        joints=tuple(short_names(made.clip.rest_body.joints)),
+        joints=tuple(short_names(made.clip.whole_body.joints)),
         worst={mode: errors.argmax(axis=0) for mode, errors in motion.errors.items()},
     )
     full = full_colour(motion.errors.values())
-    shape = Physique.of(made.clip.rest_body, rest, made.clip.metres_per_unit, made.clip.axes)
+    shape = Physique.of(made.clip, rest)
     bar = _Bar.of(1e3 * full, cast.largest_error)
-    header = Header(made.clip.name, made.choice.title, _legend(made, settings), bar.width + 2.0 * BAR_GAP)
+    legend = ("grey: recording", "ring: the worst joint", f"dots: {'key poses' if made.shared else 'keys'}")
     with registered():
-        actors = Bodies(cast, motion, shape, full)
-        scene = assemble_scene(settings, cast, lanes_of, actors, header, centre)
+        enter, reserved = Bodies(cast, motion, shape, full).enter, bar.width + 2.0 * BAR_GAP
+        scene = assemble_scene(made, settings, cast, lanes_of, enter, legend, centre, reserved)
     bar.put(cast)
     return scene
 
 
 def shown_motion(
-    made: BodyReconstruction, modes: Sequence[str], timeline: Timeline, rest: Rest, radii: np.ndarray
+    made: Reconstruction, modes: Sequence[str], timeline: Timeline, rest: Rest
 ) -> tuple[BodyMotion, np.ndarray]:
     """Return what moves on the stage, and what became its origin: the middle of the recording,
     on the ground, shape (3,).
@@ -103,10 +100,7 @@ def shown_motion(
     clip = made.clip
     times = timeline.times_of(timeline.frames)
 
-    def in_blender(poses: Poses) -> Poses:
-        return to_blender(clip.in_metres(poses), clip.axes)
-
-    recording = in_blender(interpolate(clip.times, clip.poses, times, "dq_sclerp"))
+    recording = clip.in_blender(interpolate(clip.times, clip.poses, times, "dq_sclerp"))
     skeleton = made.skeleton
     truth = skeleton.in_root_space(recording)
     low, high = truth.positions.min(axis=(0, 1)), truth.positions.max(axis=(0, 1))
@@ -115,25 +109,27 @@ def shown_motion(
     def around(poses: Poses, joint: int | None = None) -> Poses:
         """Return the poses with the roots, or the joint if it is one, moved by the centre."""
         if joint is not None:
-            return Poses(poses.positions - centre, poses.quaternions) if clip.rest_body.parents[joint] < 0 else poses
+            return Poses(poses.positions - centre, poses.quaternions) if clip.whole_body.parents[joint] < 0 else poses
         positions = poses.positions.copy()
-        positions[clip.rest_body.parents < 0] -= centre
+        positions[clip.whole_body.parents < 0] -= centre
         return Poses(positions, poses.quaternions)
 
-    shown = {mode: in_blender(made.filled_in(mode, times)) for mode in modes}
+    shown = {mode: clip.in_blender(made.filled_in(mode, times)) for mode in modes}
     keys = {
         mode: [
-            (timeline.frames_of(clip.times[own]), around(in_blender(clip.poses[joint][own]), joint))
+            (timeline.frames_of(clip.times[own]), around(clip.in_blender(clip.poses[joint][own]), joint))
             for joint, own in enumerate(made.keys[mode])
         ]
         for mode in modes
     }
-    errors = {mode: shell_error(skeleton.in_root_space(poses), truth, radii[:, None]) for mode, poses in shown.items()}
+    errors = {
+        mode: shell_error(skeleton.in_root_space(poses), truth, made.radii[:, None]) for mode, poses in shown.items()
+    }
     moment = {mode: [own for own, _ in some] for mode, some in keys.items()}
     most = max(len(own) for some in moment.values() for own in some)
     fade = float(np.clip(FADE_SHARE * timeline.frames_per_key(most), 1.0, FADE))
     return BodyMotion(
-        rest_body=clip.rest_body,
+        rest_body=clip.whole_body,
         rest=rest,
         recording=around(recording),
         modes={mode: around(poses) for mode, poses in shown.items()},
@@ -143,15 +139,7 @@ def shown_motion(
     ), centre
 
 
-def _sampled_errors(made: BodyReconstruction, mode: str, radii: np.ndarray) -> np.ndarray:
-    """Return the largest error of any joint at each sample, in metres, shape (n,)."""
-    samples = np.arange(made.samples.start, made.samples.stop)
-    blocks = np.array_split(samples, len(samples) // BLOCK + 1)
-    errors = [shell_error(made.shown(mode, made.clip.times[some]), made.truth(some), radii[:, None]) for some in blocks]
-    return np.concatenate([error.max(axis=0) for error in errors])
-
-
-def _notes(made: BodyReconstruction, modes: Iterable[str]) -> dict[str, str]:
+def _notes(made: Reconstruction, modes: Iterable[str]) -> dict[str, str]:
     """Return mode id to its own number of keys, where the modes have different ones."""
     kind = "key poses" if made.shared else "keys"
     counts = {
@@ -160,18 +148,6 @@ def _notes(made: BodyReconstruction, modes: Iterable[str]) -> dict[str, str]:
         if len((keys := made.keys[mode])[0])
     }
     return {} if len(set(counts.values())) == 1 else {mode: f"{count} {kind}" for mode, count in counts.items()}
-
-
-def _legend(made: BodyReconstruction, settings: SceneSettings) -> str:
-    """Return how to read the picture, but for the colours."""
-    parts = [
-        "grey: recording",
-        "ring: the worst joint",
-        f"dots: {'key poses' if made.shared else 'keys'}",
-    ]
-    if settings.slow_motion != 1.0:
-        parts.append(f"{settings.slow_motion:g} times slower than life")
-    return "   \u00b7   ".join(parts)
 
 
 @dataclass(frozen=True)
@@ -196,9 +172,7 @@ class _Bar:
         collection, frame = bpy.data.collections["Captions"], bpy.data.objects["Frame"]
         foot, right = -0.5 + layout.MARGIN + 0.004, -cast.layout.cells[0].left
 
-        def put(obj: bpy.types.Object, x: float, y: float) -> None:
-            captions.put(obj, frame, collection, x, y)
-
+        put = partial(captions.put, frame, collection)
         put(captions.words("Largest shade", self.most, LEGEND, cast.faint, "RIGHT"), right, foot)
         left = right - captions.width_of(self.most) * LEGEND - BAR_GAP - BAR
         for step in range(SHADES):

@@ -68,9 +68,9 @@ def wrapped(parts: Sequence[str], width: float) -> str:
 
 
 def put(
-    obj: bpy.types.Object,
     frame: bpy.types.Object,
     collection: bpy.types.Collection,
+    obj: bpy.types.Object,
     x: float,
     y: float,
     lift: int = 2,

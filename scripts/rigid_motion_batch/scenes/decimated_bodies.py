@@ -15,11 +15,8 @@ import numpy as np
 
 from rigid_motion import animation
 
-FREE, STRAIGHT = 6, 2
-"""The numbers of a key with free handles, and of one between straight lines."""
-
-VARIES = 1e-4
-"""A channel that never changes by more is one that does not vary: importers calculate in single precision."""
+FREE = 6
+"""The numbers of a key with free handles."""
 
 MARGINS = (1e-5, 10.0)
 """The smallest and the largest error margin of Decimate, in the units of the channels."""
@@ -33,18 +30,11 @@ NEAR = 0.98
 CLOSE = 1.01
 """Two margins whose ratio is less leave the same keys, or nearly."""
 
-EDGE = 0.1
-"""The part of the margins in question that is left out with each trial at least."""
-
-Curve = tuple[str, int]
-"""A data path and an index."""
-
 
 @dataclass(frozen=True)
 class Left:
     """What is left of the keys of the channels that vary, and the largest error in metres."""
 
-    how: str
     frames: int
     """With a key of any joint."""
 
@@ -79,37 +69,6 @@ def decimate(obj: bpy.types.Object, **options: object) -> None:
         bpy.ops.graph.decimate(**options)
 
 
-def fcurves_of(obj: bpy.types.Object) -> dict[Curve, bpy.types.FCurve]:
-    """Return the F-curves of an object and its bones."""
-    return {(fcurve.data_path, fcurve.array_index): fcurve for fcurve in animation.channelbag_of(obj).fcurves}
-
-
-def values_of(obj: bpy.types.Object, frames: np.ndarray) -> dict[Curve, np.ndarray]:
-    """Return what they show on frames (n,), by Blender's own evaluation of F-curves, each of shape (n,)."""
-    listed = frames.tolist()
-    return {curve: np.array([fcurve.evaluate(frame) for frame in listed]) for curve, fcurve in fcurves_of(obj).items()}
-
-
-def varying(values: dict[Curve, np.ndarray]) -> set[Curve]:
-    """Return the F-curves that change, and count."""
-    return {curve for curve, own in values.items() if np.ptp(own) > VARIES}
-
-
-def key_frames_of(obj: bpy.types.Object, counted: set[Curve]) -> dict[Curve, list[float]]:
-    """Return the frames of the keys of the F-curves that count."""
-    return {
-        curve: [key.co.x for key in fcurve.keyframe_points]
-        for curve, fcurve in fcurves_of(obj).items()
-        if curve in counted
-    }
-
-
-def left_of_fcurves(how: str, keys: dict[Curve, list[float]], largest: float, numbers_of_key: int) -> Left:
-    """Return what is left where F-curves have keys on these frames."""
-    count = sum(map(len, keys.values()))
-    return Left(how, len(set().union(*keys.values())), count, numbers_of_key * count, largest)
-
-
 class Decimations:
     """Decimate of an armature with keys on every sample, with one error margin for all F-curves.
 
@@ -130,22 +89,18 @@ class Decimations:
         """The logarithm of a margin, and what it left."""
 
     def within(self, largest: float) -> Left | None:
-        """Return the fewest keys found whose error is at most this, in metres;
-        None where not even the smallest margin does.
+        """Return the fewest keys found whose error is at most this, in metres; None where no margin tried does.
 
-        Margins are searched for between one that is too large and one that is not: from two errors, as if they were
-        a power of the margin, and by halving in turn.
+        Margins are halved between the smallest that is too large and the largest below it that is not.
         """
-        for count in range(self.trials):
+        for _ in range(self.trials):
             low, high = self._between(largest)
-            if high - low < np.log(CLOSE) or any(NEAR * largest <= left.largest <= largest for left in self._tried()):
+            near = any(NEAR * largest <= left.largest <= largest for left in self.tried.values())
+            if near or high - low < np.log(CLOSE):
                 break
-            self._try(self._next(low, high, largest, halving=count % 3 == 2))
-        good = [left for left in self._tried() if left.largest <= largest]
+            self._try((low + high) / 2.0)
+        good = [left for left in self.tried.values() if left.largest <= largest]
         return min(good, key=lambda left: left.keys, default=None)
-
-    def _tried(self) -> list[Left]:
-        return list(self.tried.values())
 
     def _between(self, largest: float) -> tuple[float, float]:
         """Return the logarithms of the smallest margin that is too large, and of the largest below that is not."""
@@ -153,24 +108,6 @@ class Decimations:
         high = min((margin for margin, left in self.tried.items() if left.largest > largest), default=high)
         within = [margin for margin, left in self.tried.items() if left.largest <= largest and margin < high]
         return max(within, default=low), high
-
-    def _next(self, low: float, high: float, largest: float, *, halving: bool) -> float:
-        """Return the logarithm of the margin to try."""
-        ends = [self.tried.get(low), self.tried.get(high)]
-        if not any(ends):
-            return float(np.clip(np.log(max(largest, 1e-12)), low, high))
-        below, above = (np.log(max(end.largest, 1e-12)) if end else None for end in ends)
-        requested = np.log(0.5 * (NEAR + 1.0) * max(largest, 1e-12))
-        if halving or (below is not None and above is not None and above - below < 1e-9):
-            return 0.5 * (low + high)
-        if below is None:
-            guess = high + requested - above
-        elif above is None:
-            guess = low + requested - below
-        else:
-            guess = low + (high - low) * (requested - below) / (above - below)
-        edge = EDGE * (high - low)
-        return float(np.clip(guess, low + edge * bool(ends[0]), high - edge * bool(ends[1])))
 
     def _try(self, margin: float) -> None:
         animated, copy = self.obj.animation_data, self.recorded.copy()

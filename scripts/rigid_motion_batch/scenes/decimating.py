@@ -1,39 +1,33 @@
 """A whole body as a rig with a key on every sample, and what Blender's Decimate leaves of these keys.
 
-F-curves are read as Blender evaluates them, at the samples, and errors are those of `study.bodies`: in metres, in the
-root's space, through the hierarchy, of balls around the joints.
+F-curves are read as Blender evaluates them, at the samples, and errors are those of `analysis.errors`: in metres, in
+the root's space, through the hierarchy, of balls around the joints.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import bpy
 import numpy as np
 
+from rigid_motion import animation
 from rigid_motion.animation.actions.channels import replace_keys
 from rigid_motion.motion import Poses, shell_error
 from rigid_motion.motion.quaternions import normalise
-from rigid_motion_batch.analysis.bodies import BodyReconstruction
 from rigid_motion_batch.analysis.body_decimated import DECIMATE, KeysOfBody, ours
 from rigid_motion_batch.analysis.metrics import Metrics
-from rigid_motion_batch.axes import to_blender
-from rigid_motion_batch.scenes.decimated_bodies import (
-    FREE,
-    Decimations,
-    Left,
-    fcurves_of,
-    key_frames_of,
-    left_of_fcurves,
-    values_of,
-    varying,
-)
+from rigid_motion_batch.analysis.reconstructions import Reconstruction
 
 from .armature import Rest, Rig
+from .decimated_bodies import FREE, Decimations, Left
 
 EVEN = 0.1
 """Frames that evenly spaced samples may be off a whole one: times are often rounded to milliseconds."""
+
+VARIES = 1e-4
+"""A channel that never changes by more is one that does not vary: importers calculate in single precision."""
 
 APART = 1e-3
 """Frames between two keys, at least: Blender has them in single precision."""
@@ -44,10 +38,8 @@ class DecimatedBody:
 
     Parameters
     ----------
-    made : BodyReconstruction
+    made : Reconstruction
         All its modes begin and end with the same samples; Decimate gets these and all between.
-    radius : float or array, shape (joints,)
-        Of the balls at the joints, in metres.
 
     Raises
     ------
@@ -55,23 +47,23 @@ class DecimatedBody:
         Where Blender cannot have the keys.
     """
 
-    def __init__(self, made: BodyReconstruction, radius: float | np.ndarray) -> None:
+    def __init__(self, made: Reconstruction) -> None:
         bpy.ops.wm.read_factory_settings(use_empty=True)
         clip = made.clip
         self.frames = frames_of(made.times)
-        self._skeleton, self._radius = made.skeleton, np.broadcast_to(radius, (len(made.skeleton),))[:, None]
-        joints = to_blender(clip.in_metres(clip.poses[:, made.samples]), clip.axes)
-        roots = clip.rest_body.parents < 0
+        self._skeleton, self._radius = made.skeleton, made.radii[:, None]
+        joints = clip.in_blender(clip.poses[:, made.samples])
+        roots = clip.whole_body.parents < 0
         places = joints.positions[roots]
         # Single precision is best around the origin.
         joints.positions[roots] -= (places.min(axis=(0, 1)) + places.max(axis=(0, 1))) / 2.0
         self._truth = self._skeleton.in_root_space(joints)
-        rest = Rest.of(clip.rest_body, clip.metres_per_unit, clip.axes)
-        self.rig = Rig("Body", rest, clip.rest_body.joints, bpy.context.scene.collection)
+        rest = Rest.of(clip)
+        self.rig = Rig("Body", rest, clip.whole_body.joints, bpy.context.scene.collection)
         channels = self.rig.channels_of(joints)
         for bone in range(len(self.rig.bones)):
             self.rig.key(bone, self.frames, channels[bone])
-        self._counted = varying(values_of(self.rig.obj, self.frames))
+        self._counted = {curve for curve, own in self._values().items() if np.ptp(own) > VARIES}
         self.decimations = [Decimations(self.rig.obj, self.left)] if self._counted else []
         if self._counted:
             smooth(self.rig.obj)
@@ -84,8 +76,9 @@ class DecimatedBody:
 
     def left(self) -> Left:
         """Return the keys that the rig has now, and their largest error."""
-        keys = key_frames_of(self.rig.obj, self._counted)
-        return left_of_fcurves(DECIMATE, keys, float(self.errors().max()), FREE)
+        curves = [fcurve for curve, fcurve in fcurves_of(self.rig.obj).items() if curve in self._counted]
+        keys = [key.co.x for fcurve in curves for key in fcurve.keyframe_points]
+        return Left(len(set(keys)), len(keys), FREE * len(keys), float(self.errors().max()))
 
     def within(self, largest: float) -> Left | None:
         """Return the fewest keys whose error is nowhere larger than this, in metres.
@@ -97,32 +90,34 @@ class DecimatedBody:
             result.append(everything)
         return min(result, key=lambda left: left.keys, default=None)
 
+    def _values(self) -> dict[tuple[str, int], np.ndarray]:
+        """Return what F-curves show at the samples, by Blender's own evaluation, each of shape (n,)."""
+        frames = self.frames.tolist()
+        return {
+            curve: np.array([fcurve.evaluate(frame) for frame in frames])
+            for curve, fcurve in fcurves_of(self.rig.obj).items()
+        }
+
     def _channels(self) -> Poses:
-        """Return the channels of all bones at the samples, shape (joints, n)."""
-        values = values_of(self.rig.obj, self.frames)
-        bones = [self.rig.obj.pose.bones[name] for name in self.rig.bones]
+        """Return the channels of all bones at the samples, shape (joints, n): what is not keyed stays as it is."""
+        values, bones = self._values(), [self.rig.obj.pose.bones[name] for name in self.rig.bones]
 
         def channels(name: str) -> np.ndarray:
-            return np.stack([self._filled(values, bone.path_from_id(name), getattr(bone, name)) for bone in bones])
+            result = np.array([getattr(bone, name) for bone in bones])[:, None].repeat(len(self.frames), axis=1)
+            for own, path in zip(result, (bone.path_from_id(name) for bone in bones), strict=True):
+                for index in range(own.shape[1]):
+                    own[:, index] = values.get((path, index), own[:, index])
+            return result
 
         return Poses(channels("location"), normalise(channels("rotation_quaternion")))
 
-    def _filled(self, values: Mapping[tuple[str, int], np.ndarray], path: str, still: Sequence[float]) -> np.ndarray:
-        """Return a property at the samples, shape (n, components): what is not keyed stays as it is."""
-        columns = [values.get((path, index), np.full(len(self.frames), value)) for index, value in enumerate(still)]
-        return np.stack(columns, axis=-1)
 
-
-def beside_decimate(
-    made: BodyReconstruction, radius: float | np.ndarray, measured: Sequence[Metrics]
-) -> list[KeysOfBody]:
+def beside_decimate(made: Reconstruction, measured: Sequence[Metrics]) -> list[KeysOfBody]:
     """Return the keys of each mode, and behind each what Decimate needs for the largest error that these have.
 
     Parameters
     ----------
-    made : BodyReconstruction
-    radius : float or array, shape (joints,)
-        Of the balls at the joints, in metres.
+    made : Reconstruction
     measured : sequence of Metrics
         Of the modes. One whose error Blender cannot keep to, in single precision, has no row of Decimate.
 
@@ -131,7 +126,7 @@ def beside_decimate(
     RuntimeError
         Where Blender cannot have the keys, or cannot decimate.
     """
-    body = DecimatedBody(made, radius)
+    body = DecimatedBody(made)
     rows = []
     for row in measured:
         own = ours(made, row)
@@ -149,6 +144,11 @@ def beside_decimate(
                 )
             )
     return rows
+
+
+def fcurves_of(obj: bpy.types.Object) -> dict[tuple[str, int], bpy.types.FCurve]:
+    """Return the F-curves of an object and its bones, by data path and index."""
+    return {(fcurve.data_path, fcurve.array_index): fcurve for fcurve in animation.channelbag_of(obj).fcurves}
 
 
 def smooth(obj: bpy.types.Object) -> None:

@@ -6,9 +6,9 @@ is a child of the frame (`layout`).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import bpy
 import numpy as np
@@ -16,7 +16,7 @@ import numpy as np
 from rigid_motion.animation import write_channel
 from rigid_motion.motion.quaternions import rotate
 from rigid_motion_batch.analysis.modes import label_of
-from rigid_motion_batch.analysis.reconstructions import Groups
+from rigid_motion_batch.analysis.reconstructions import Groups, Reconstruction
 from rigid_motion_batch.palette import THEMES, Theme, colour_on
 
 from . import captions, layout, trails
@@ -73,14 +73,37 @@ class Cast:
 
     @classmethod
     def arranged(
-        cls, settings: SceneSettings, lanes_of: Groups, extent: Extent, notes: Mapping[str, str], **own: Any
+        cls,
+        made: Reconstruction,
+        settings: SceneSettings,
+        lanes_of: Groups,
+        extent: Extent,
+        notes: Mapping[str, str],
+        timeline: Timeline,
+        **own: Any,
     ) -> Cast:
-        """Return the cast with lanes arranged for what is seen of the motion; `own` are the fields that are left."""
+        """Return the cast with lanes arranged for what is seen of the motion; `own` are the fields that are left.
+
+        Errors at frames, unless they are given, are between those of the samples.
+        """
         theme, (width, height) = THEMES[settings.theme], settings.resolution
         named = any(names_of(modes, notes) for modes in lanes_of)
         plan = layout.arrange(len(lanes_of), extent.size, width / height, named=named)
-        inks = {"ink": ink("Ink", theme.ink), "faint": ink("Faint", theme.faint)}
-        return cls(layout=plan, extent=extent, notes=notes, theme=theme, **inks, **own)
+        sampled = {mode: 1e3 * made.shell(mode).max(axis=0) for modes in lanes_of for mode in modes[:1]}
+        times = timeline.times_of(timeline.frames)
+        own.setdefault("errors", {mode: np.interp(times, made.times, errors) for mode, errors in sampled.items()})
+        return cls(
+            timeline=timeline,
+            layout=plan,
+            extent=extent,
+            sampled=sampled,
+            sample_frames=timeline.frames_of(made.times),
+            notes=notes,
+            theme=theme,
+            ink=ink("Ink", theme.ink),
+            faint=ink("Faint", theme.faint),
+            **own,
+        )
 
     @property
     def largest_error(self) -> float:
@@ -118,18 +141,11 @@ class Lane:
         return child
 
 
-class Actors(Protocol):
-    """What moves."""
-
-    def enter(self, lane: Lane) -> None:
-        """Add what moves under the mode of a lane, and the recording."""
-
-
 class Lanes:
     """Builds the lanes, one call each, out of materials, groups and meshes that they share."""
 
-    def __init__(self, cast: Cast, frame: bpy.types.Object, actors: Actors) -> None:
-        self.cast, self.frame, self.actors = cast, frame, actors
+    def __init__(self, cast: Cast, frame: bpy.types.Object, enter: Callable[[Lane], None]) -> None:
+        self.cast, self.frame, self.enter = cast, frame, enter
         self.card, self.track = ink("Card", cast.theme.card), ink("Track", cast.theme.track)
         self.graph_group = trails.graph_group()
         self.readout = captions.readout_group("Error in mm", captions.decimals_for(cast.largest_error), cast.ink)
@@ -145,7 +161,7 @@ class Lanes:
         self.collection.objects.link(empty)
         empty.empty_display_size = 0.05 * self.cast.layout.metres
         self._place(empty, cell)
-        self.actors.enter(Lane(mode, empty, self.collection, cell))
+        self.enter(Lane(mode, empty, self.collection, cell))
         self._add_caption(modes, cell)
 
     def _place(self, lane: bpy.types.Object, cell: layout.Cell) -> None:
@@ -210,7 +226,7 @@ class Lanes:
         self._put(bpy.data.objects.new(base.name, base), left + width / 2.0, foot - 0.00125)
 
     def _put(self, obj: bpy.types.Object, x: float, y: float, lift: int = 2) -> None:
-        captions.put(obj, self.frame, self.collection, x, y, lift)
+        captions.put(self.frame, self.collection, obj, x, y, lift)
 
 
 def names_of(modes: tuple[str, ...], notes: Mapping[str, str]) -> list[str]:

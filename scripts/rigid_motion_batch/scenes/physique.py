@@ -13,8 +13,8 @@ import bpy
 import numpy as np
 
 from rigid_motion.motion import Poses
-from rigid_motion_batch.axes import to_blender
-from rigid_motion_batch.recordings.rest_bodies import RestBody, carrying
+from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.recordings.rest_bodies import carrying
 
 from .armature import Rest, Rig
 
@@ -65,13 +65,13 @@ class Physique:
         return foremost[[face[0] for face in self.faces]]
 
     @classmethod
-    def of(cls, rest_body: RestBody, rest: Rest, metres_per_unit: float, axes: str) -> Physique:
+    def of(cls, clip: Clip, rest: Rest) -> Physique:
         """Return the skin, or else solids."""
-        if rest_body.skin is None:
+        skin = clip.whole_body.skin
+        if skin is None:
             return cls._of_solids(rest)
-        skin = rest_body.skin
         unturned = np.tile((1.0, 0.0, 0.0, 0.0), (len(skin.vertices), 1))
-        vertices = to_blender(Poses(skin.vertices * metres_per_unit, unturned), axes).positions - rest.origin
+        vertices = clip.in_blender(Poses(skin.vertices, unturned)).positions - rest.origin
         faces = [*map(tuple, skin.triangles.tolist())]
         return cls(vertices, faces, skin.joints, skin.weights, smooth=True)
 

@@ -8,20 +8,20 @@ without scripts. The scene's custom properties tell where the recording's origin
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 
-from rigid_motion_batch.analysis.bodies import BodyReconstruction
 from rigid_motion_batch.analysis.reconstructions import Groups, Reconstruction, identical_modes
 from rigid_motion_batch.palette import DARK, linear
 
 from . import captions, layout
 from .deviations import largest_deviation, magnification, magnified
 from .framing import SMOOTHING, Framing, Solid
-from .lanes import Actors, Cast, Lanes
+from .lanes import Cast, Lane, Lanes
 from .settings import MODELS, SceneSettings
 from .solids import Solids
 from .subject import load_subject, vertices_of
@@ -45,7 +45,7 @@ def build_scene(reconstruction: Reconstruction, settings: SceneSettings) -> bpy.
     """
     timeline = begin(reconstruction, settings)
     motion = ShownMotion.of(reconstruction, timeline)
-    lanes_of = identical_modes([reconstruction]) if settings.distinct else tuple((mode,) for mode in motion.modes)
+    lanes_of = identical_modes(reconstruction) if settings.distinct else tuple((mode,) for mode in motion.modes)
 
     mesh = load_subject(settings.subject)
     smoothing = SMOOTHING * settings.fps * timeline.steps
@@ -60,9 +60,8 @@ def build_scene(reconstruction: Reconstruction, settings: SceneSettings) -> bpy.
     deviation = settings.deviation or magnification(farthest, size)
     deviated = {mode: magnified(poses, motion.recording, deviation, middle) for mode, poses in motion.modes.items()}
     extent = framing.extent(Solid(motion.recording, outline), [Solid(poses, outline) for poses in deviated.values()])
-    sampled = {mode: 1e3 * errors.shell for mode, errors in reconstruction.errors.items()}
-    times = timeline.times_of(timeline.frames)
     cast = Cast.arranged(
+        reconstruction,
         settings,
         lanes_of,
         extent,
@@ -70,51 +69,59 @@ def build_scene(reconstruction: Reconstruction, settings: SceneSettings) -> bpy.
         timeline=timeline,
         framing=framing,
         framing_steps=timeline.steps,
-        errors={mode: np.interp(times, reconstruction.times, errors) for mode, errors in sampled.items()},
-        sampled=sampled,
-        sample_frames=timeline.frames_of(reconstruction.times),
     )
     solids = Solids(cast, motion, deviated, mesh, layout.telling_point(motion.recording, outline))
-    header = Header(reconstruction.clip.name, reconstruction.choice.title, _legend(cast, settings, deviation, enlarged))
-    scene = assemble_scene(settings, cast, lanes_of, solids, header, motion.centre)
+    legend = _legend(cast, deviation, enlarged)
+    scene = assemble_scene(reconstruction, settings, cast, lanes_of, solids.enter, legend, motion.centre)
     # Our own models are closed: what faces away costs time and is never seen.
     scene.display.shading.show_backface_culling = settings.subject in MODELS
     scene["deviation_shown_times"] = deviation
     return scene
 
 
-def begin(made: Reconstruction | BodyReconstruction, settings: SceneSettings) -> Timeline:
+def begin(made: Reconstruction, settings: SceneSettings) -> Timeline:
     """Empty the file, name its scene after what is compared, and return the timeline."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.scene.name = f"{made.clip.name} {made.choice.name}"
     return Timeline.of(made, settings.fps, settings.slow_motion)
 
 
-@dataclass(frozen=True)
-class Header:
-    """What is written above and below the lanes."""
-
-    clip: str
-    choice: str
-
-    legend: str
-    """Text on how to read the picture."""
-
-    reserved: float = 0.0
-    """The space to be left free to the right of that, in units of the frame's height."""
-
-
 def assemble_scene(
-    settings: SceneSettings, cast: Cast, lanes_of: Groups, actors: Actors, header: Header, centre: np.ndarray
+    made: Reconstruction,
+    settings: SceneSettings,
+    cast: Cast,
+    lanes_of: Groups,
+    enter: Callable[[Lane], None],
+    legend: Sequence[str],
+    centre: np.ndarray,
+    reserved: float = 0.0,
 ) -> bpy.types.Scene:
-    """Make the lanes, what is written around them, camera and lights; `centre` (3,) of the recording is the origin."""
+    """Make the lanes, what is written around them, camera and lights.
+
+    Parameters
+    ----------
+    made : Reconstruction
+    settings : SceneSettings
+    cast : Cast
+    lanes_of : tuple of tuple of str
+        The modes of each lane.
+    enter : callable
+        Adds what moves to a lane.
+    legend : sequence of str
+        How to read the picture.
+    centre : array, shape (3,)
+        The place of the recording that is the origin.
+    reserved : float
+        The space to be left free to the right of the legend, in units of the frame's height.
+    """
     scene = bpy.context.scene
     plan = cast.layout
     frame = make_frame(plan.metres)
-    lanes = Lanes(cast, frame, actors)
+    lanes = Lanes(cast, frame, enter)
     for modes, cell in zip(lanes_of, plan.cells, strict=True):
         lanes.build(modes, cell)
-    _make_header(header, cast, frame)
+    slow = [f"{settings.slow_motion:g} times slower than life"] if settings.slow_motion != 1.0 else []
+    _make_header(made, "   \u00b7   ".join([*legend, *slow]), cast, frame, reserved)
     make_camera(scene, plan.metres, 2.0 * cast.extent.depth)
     make_lights(scene)
     set_up_render(scene, settings, cast.timeline.count, cast.theme.background)
@@ -124,23 +131,19 @@ def assemble_scene(
 
 def _notes(reconstruction: Reconstruction) -> dict[str, str]:
     """Return mode id to its own number of keys, where the modes have different ones."""
-    counts = {mode: len(keys) for mode, keys in reconstruction.keys.items() if len(keys)}
+    counts = {mode: len(keys) for mode, (keys,) in reconstruction.keys.items() if len(keys)}
     if len(set(counts.values())) == 1:
         return {}
     duration = float(np.ptp(reconstruction.times[[0, -1]]))
     return {mode: f"{(count - 1) / duration:.1f} keys/s" for mode, count in counts.items()}
 
 
-def _legend(cast: Cast, settings: SceneSettings, deviation: float, enlarged: float) -> str:
+def _legend(cast: Cast, deviation: float, enlarged: float) -> list[str]:
     """Return how to read the picture."""
     full = f"{cast.largest_error:.{captions.decimals_for(cast.largest_error)}f}"
     drawn = f", deviation drawn {deviation:g} times as large" if deviation > 1.0 else ""
     parts = ["grey: recording", f"colour: mode{drawn}", "dots: keys", f"mm: shell error (graphs up to {full})"]
-    if settings.slow_motion != 1.0:
-        parts.append(f"{settings.slow_motion:g} times slower than life")
-    if enlarged > 1.0:
-        parts.append(f"object shown {enlarged:.3g} times its size")
-    return "   \u00b7   ".join(parts)
+    return [*parts, *([f"object shown {enlarged:.3g} times its size"] if enlarged > 1.0 else [])]
 
 
 def make_frame(metres: float) -> bpy.types.Object:
@@ -152,7 +155,7 @@ def make_frame(metres: float) -> bpy.types.Object:
     return frame
 
 
-def _make_header(header: Header, cast: Cast, frame: bpy.types.Object) -> None:
+def _make_header(made: Reconstruction, legend: str, cast: Cast, frame: bpy.types.Object, reserved: float) -> None:
     """Make what is written above and below the lanes: clip, rate and time, and how to read the picture."""
     collection = bpy.data.collections.new("Captions")
     bpy.context.scene.collection.children.link(collection)
@@ -160,13 +163,11 @@ def _make_header(header: Header, cast: Cast, frame: bpy.types.Object) -> None:
     left, line = cast.layout.cells[0].left, 0.5 - layout.MARGIN - 0.042
     right = -left
 
-    def put(obj: bpy.types.Object, x: float, y: float) -> None:
-        captions.put(obj, frame, collection, x, y)
-
-    name_width = captions.width_of(header.clip)
+    put = partial(captions.put, frame, collection)
+    name_width = captions.width_of(made.clip.name)
     size = min(0.046, 0.5 * (right - left) / name_width)
-    put(captions.words("Clip", header.clip, size, cast.ink), left, line)
-    rate = captions.words("Choice of keys", header.choice, 0.034, cast.faint)
+    put(captions.words("Clip", made.clip.name, size, cast.ink), left, line)
+    rate = captions.words("Choice of keys", made.choice.title, 0.034, cast.faint)
     put(rate, left + name_width * size + 0.03, line)
     timeline = cast.timeline
     ends = timeline.frames[[0, -1]]
@@ -174,8 +175,8 @@ def _make_header(header: Header, cast: Cast, frame: bpy.types.Object) -> None:
     put(captions.readout("Time", decimals, 0.046, ends, timeline.times_of(ends) - timeline.start), right - 0.03, line)
     put(captions.words("Seconds", "s", 0.034, cast.faint, "RIGHT"), right, line)
 
-    size = min(LEGEND, (right - left - header.reserved) / captions.width_of(header.legend))
-    put(captions.words("Legend", header.legend, size, cast.faint), left, -0.5 + layout.MARGIN + 0.004)
+    size = min(LEGEND, (right - left - reserved) / captions.width_of(legend))
+    put(captions.words("Legend", legend, size, cast.faint), left, -0.5 + layout.MARGIN + 0.004)
 
 
 def make_camera(scene: bpy.types.Scene, metres: float, depth: float) -> None:

@@ -13,9 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigid_motion.motion import Poses, interpolate
-from rigid_motion_batch.analysis.bodies import BodyReconstruction
 from rigid_motion_batch.analysis.reconstructions import Reconstruction
-from rigid_motion_batch.axes import to_blender
 
 PATH_RATE = 60.0
 """At least so many points of a path are drawn for a second of the film."""
@@ -38,7 +36,7 @@ class Timeline:
     """Fine frames for a frame."""
 
     @classmethod
-    def of(cls, made: Reconstruction | BodyReconstruction, fps: int, slow_motion: float) -> Timeline:
+    def of(cls, made: Reconstruction, fps: int, slow_motion: float) -> Timeline:
         """Return all frames from the first key to the last, `slow_motion` times slower than life."""
         return cls.between(float(made.times[0]), float(made.times[-1]), fps, slow_motion)
 
@@ -102,21 +100,16 @@ class ShownMotion:
     @classmethod
     def of(cls, reconstruction: Reconstruction, timeline: Timeline) -> ShownMotion:
         """Return every mode's own in-betweens, not those of the recording's sample times joined by lines."""
-        clip, kept = reconstruction.clip, reconstruction.keys
-        key_times = {mode: clip.times[keys] for mode, keys in kept.items()}
-        keys = {mode: clip.poses[of_mode] for mode, of_mode in kept.items()}
+        clip, kept = reconstruction.clip, {mode: keys for mode, (keys,) in reconstruction.keys.items()}
         times = timeline.times_of(timeline.fine_frames)
 
-        def shown(poses: Poses) -> Poses:
-            return to_blender(clip.in_metres(poses), clip.axes)
-
-        recording = shown(interpolate(clip.times, clip.poses, times, "dq_sclerp"))
+        recording = clip.in_blender(interpolate(clip.times, clip.poses, times, "dq_sclerp"))
         centre = (recording.positions.min(axis=0) + recording.positions.max(axis=0)) / 2.0
         return cls(
             recording=_around(centre, recording),
-            modes={mode: _around(centre, shown(reconstruction.filled_in(mode, times))) for mode in kept},
-            keys={mode: _around(centre, shown(poses)) for mode, poses in keys.items()},
-            key_frames={mode: timeline.frames_of(moments) for mode, moments in key_times.items()},
+            modes={mode: _around(centre, clip.in_blender(reconstruction.filled_in(mode, times))) for mode in kept},
+            keys={mode: _around(centre, clip.in_blender(clip.poses[own])) for mode, own in kept.items()},
+            key_frames={mode: timeline.frames_of(clip.times[own]) for mode, own in kept.items()},
             centre=centre,
         )
 

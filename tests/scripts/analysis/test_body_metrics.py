@@ -8,17 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigid_motion_batch.analysis.bodies import Ground, measure_body, reconstruct_body
 from rigid_motion_batch.analysis.body_metrics import (
-    MeasuredBody,
+    JointMetrics,
+    Measured,
     join_tables,
     measure_modes,
-    write_joint_metrics,
     write_key_tables,
 )
 from rigid_motion_batch.analysis.choices import Choice, Tolerance, Uniform
+from rigid_motion_batch.analysis.errors import Ground, errors_of
 from rigid_motion_batch.analysis.metrics import body_table_names
-from rigid_motion_batch.rows import unescaped
+from rigid_motion_batch.analysis.reconstructions import reconstruct
+from rigid_motion_batch.rows import unescaped, write_rows
 from tests.scripts.clips.bodies import JOINTS, swinging_body
 
 HEADER = (
@@ -47,9 +48,9 @@ CHOICES = [Uniform("5"), Tolerance("2cm")]
 
 def measured(
     choice: Choice = CHOICES[0], modes: tuple[str, ...] = MODES, joints: tuple[str, ...] = JOINTS, **settings: bool
-) -> MeasuredBody:
+) -> Measured:
     clip = swinging_body(joints=joints)
-    return measure_modes(reconstruct_body(clip, choice, modes, RADII, **settings), RADII)
+    return measure_modes(reconstruct(clip, choice, modes, RADII, **settings))
 
 
 def cells_of(path: Path) -> list[list[str]]:
@@ -75,7 +76,7 @@ def test_the_rows_are_statistics_of_all_joints_and_of_each(choice: Choice) -> No
     assert [row.mode for row in result.rows] == list(MODES)
     assert [(row.mode, row.joint) for row in result.joints] == [(mode, joint) for mode in MODES for joint in JOINTS]
     for row in result.rows:
-        errors = measure_body(made, row.mode, RADII, Ground.of(made))
+        errors = errors_of(made, row.mode, Ground.of(made))
         own = [joint for joint in result.joints if joint.mode == row.mode]
         assert row.rms_shell_m == pytest.approx(np.sqrt(np.mean([joint.rms_shell_m**2 for joint in own])))
         assert row.max_shell_m == max(joint.max_shell_m for joint in own) == errors.shell.max()
@@ -109,7 +110,7 @@ def test_a_joint_that_stays_as_it_is_sends_nothing() -> None:
 
 def test_the_columns_are_those_promised_and_read_back_exactly(tmp_path: Path) -> None:
     result = measured(CHOICES[1], joints=HOSTILE)
-    write_joint_metrics(tmp_path / "joints.csv", result.joints)
+    write_rows(tmp_path / "joints.csv", JointMetrics, result.joints)
     assert (tmp_path / "joints.csv").read_text().splitlines()[0] == HEADER
     header, *rows = cells_of(tmp_path / "joints.csv")
     assert {len(row) for row in rows} == {len(header)}
@@ -123,9 +124,9 @@ def test_tables_are_joined_under_one_header_whatever_joints_are_called(tmp_path:
     result = measured(joints=HOSTILE)
     parts = [tmp_path / f"{number}.csv" for number in range(3)]
     for part, rows in zip(parts, (result.joints, (), result.joints[:3]), strict=True):
-        write_joint_metrics(part, rows)
+        write_rows(part, JointMetrics, rows)
     join_tables(tmp_path / "all.csv", parts)
-    write_joint_metrics(tmp_path / "expected.csv", [*result.joints, *result.joints[:3]])
+    write_rows(tmp_path / "expected.csv", JointMetrics, [*result.joints, *result.joints[:3]])
     assert (tmp_path / "all.csv").read_bytes() == (tmp_path / "expected.csv").read_bytes()
 
 

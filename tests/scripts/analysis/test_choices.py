@@ -25,7 +25,7 @@ def shell_errors(clip: Clip, keys: np.ndarray, mode: str, radius: float = 0.1) -
 @pytest.mark.parametrize("written", ["2mm", "0.5cm", "0.03m", "0.01"])
 def test_adaptive_keys_keep_to_the_tolerance(written: str, mode: str) -> None:
     clip = swinging_clip(seconds=1.5)
-    keys = Tolerance(written).keys(clip, mode, 0.1)
+    (keys,) = Tolerance(written).keys(clip, mode, 0.1)
     metres = {"2mm": 0.002, "0.5cm": 0.005, "0.03m": 0.03, "0.01": 0.01}[written]
     assert shell_errors(clip, keys, mode).max() <= metres * (1.0 + 1e-9)
     assert (keys[0], keys[-1]) == (0, len(clip.times) - 1)
@@ -36,10 +36,10 @@ def test_a_tolerance_with_a_unit_is_the_same_length_in_recordings_of_any_unit() 
     clip = swinging_clip()
     poses = Poses(clip.poses.positions * 1e3, clip.poses.quaternions)
     in_millimetres = replace(clip, poses=poses, metres_per_unit=1e-3)
-    keys = Tolerance("5mm").keys(in_millimetres, "motor_spline", 0.1)
-    assert np.array_equal(keys, Tolerance("0.5cm").keys(clip, "motor_spline", 0.1))
-    assert np.array_equal(keys, Tolerance("5").keys(in_millimetres, "motor_spline", 0.1))
-    assert np.array_equal(keys, Tolerance("0.005").keys(clip, "motor_spline", 0.1))
+    (keys,) = Tolerance("5mm").keys(in_millimetres, "motor_spline", 0.1)
+    assert np.array_equal(keys, *Tolerance("0.5cm").keys(clip, "motor_spline", 0.1))
+    assert np.array_equal(keys, *Tolerance("5").keys(in_millimetres, "motor_spline", 0.1))
+    assert np.array_equal(keys, *Tolerance("0.005").keys(clip, "motor_spline", 0.1))
     assert shell_errors(in_millimetres, keys, "motor_spline").max() <= 0.005 * (1.0 + 1e-9)
     assert Tolerance("5").tolerance(in_millimetres) == pytest.approx(0.005)
 
@@ -47,8 +47,8 @@ def test_a_tolerance_with_a_unit_is_the_same_length_in_recordings_of_any_unit() 
 @pytest.mark.parametrize(("seconds", "rate", "count"), [(3.0, "10", 31), (1.0, "7.5", 8), (3.0, "500", 271)])
 def test_a_budget_is_as_many_keys_as_a_sender_at_that_rate_has_and_better_ones(seconds, rate, count):
     clip = swinging_clip(seconds=seconds)
-    keys = Budget(rate).keys(clip, "lerp_slerp", 0.1)
-    evenly = Uniform(rate).keys(clip, "lerp_slerp", 0.1)
+    (keys,) = Budget(rate).keys(clip, "lerp_slerp", 0.1)
+    (evenly,) = Uniform(rate).keys(clip, "lerp_slerp", 0.1)
     assert len(keys) == len(evenly) == count
     adaptive, uniform = (
         np.mean(shell_errors(clip, some, "lerp_slerp")[: evenly[-1] + 1] ** 2) for some in (keys, evenly)
@@ -79,17 +79,17 @@ def test_the_best_of_each_segment_has_the_keys_of_the_best_mode_and_keeps_to_wha
     clip = replace(swinging_clip(seed=19), metres_per_unit=0.1)
     modes = ("lerp_slerp", "dq_sclerp", "motor_spline")
     made = reconstruct(clip, choice, (*modes, BEST_OF), 0.1)
-    errors = {mode: np.sqrt(np.mean(own.shell**2)) for mode, own in made.errors.items()}
-    best = min(modes, key=lambda mode: (len(made.keys[mode]), errors[mode]))
-    assert tuple(made.keys) == tuple(made.poses) == tuple(made.errors) == (*modes, BEST_OF)
-    assert np.array_equal(made.keys[BEST_OF], made.keys[best])
-    assert len(made.segment_modes) == len(made.keys[best]) - 1
+    errors = {mode: np.sqrt(np.mean(made.shell(mode) ** 2)) for mode in made.keys}
+    best = min(modes, key=lambda mode: (len(made.keys[mode][0]), errors[mode]))
+    assert tuple(made.keys) == (*modes, BEST_OF)
+    assert np.array_equal(made.keys[BEST_OF][0], made.keys[best][0])
+    assert len(made.segment_modes) == len(made.keys[best][0]) - 1
     assert errors[BEST_OF] <= errors[best] * (1.0 + 1e-6)
     if choice.decimation == "uniform":
         assert len(set(made.segment_modes)) > 1
         assert errors[BEST_OF] < errors[best]
     elif isinstance(choice, Tolerance):
-        assert made.errors[BEST_OF].shell.max() <= choice.tolerance(clip) * (1.0 + 1e-9)
+        assert made.shell(BEST_OF).max() <= choice.tolerance(clip) * (1.0 + 1e-9)
 
 
 def test_no_tolerance_is_too_large_for_a_clip_that_stands_still() -> None:

@@ -6,10 +6,11 @@ import pytest
 from rigid_motion.motion import shell_error
 from rigid_motion_batch.analysis.choices import Tolerance, Uniform
 from rigid_motion_batch.analysis.radii import Radii
-from rigid_motion_batch.analysis.results import clip_result, compare_clip
+from rigid_motion_batch.analysis.results import clip_result
 from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings.clip_reading import read_source
 from tests.scripts.clips.bodies import swinging_body
+from tests.scripts.clips.recordings import compare_clip
 
 MODES = ("lerp_slerp", "dq_sclerp", "pga_slerp", "motor_spline")
 
@@ -17,7 +18,7 @@ MODES = ("lerp_slerp", "dq_sclerp", "pga_slerp", "motor_spline")
 @pytest.mark.parametrize("choice", [Uniform("7"), Tolerance("5mm")])
 def test_errors_of_a_rigid_body_are_those_between_what_is_shown(choice) -> None:
     (clip,), _ = read_source(str(ASSETS / "reach.csv"), "unity")
-    result = compare_clip(clip, choice, MODES, Radii(), shared=False)
+    result = compare_clip(clip, choice, MODES, Radii())
     whole = clip_result(clip, [result])
     assert sorted(row.mode for row in result.rows) == sorted(MODES)
     for motion in result.motions:
@@ -32,7 +33,7 @@ def test_errors_of_a_rigid_body_are_those_between_what_is_shown(choice) -> None:
 
 def test_of_a_body_the_joint_that_is_farthest_off_counts() -> None:
     clip = swinging_body()
-    result = compare_clip(clip, Uniform("4"), MODES, Radii(), shared=False)
+    result = compare_clip(clip, Uniform("4"), MODES, Radii())
     whole = clip_result(clip, [result])
     for motion in result.motions:
         samples = slice(result.first, result.first + motion.errors.shape[1])

@@ -1,14 +1,13 @@
 import csv
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rigid_motion.motion import KEYFRAME_MODES, Poses
+from rigid_motion.motion import Poses
+from rigid_motion_batch.analysis.body_metrics import measure_modes
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.metrics import (
-    measure_reconstruction,
     table_names,
     write_poses,
     write_reconstruction,
@@ -25,14 +24,8 @@ def read(path: Path) -> list[dict[str, str]]:
 
 
 def test_bytes_are_counted_for_the_keys_that_were_there_and_not_for_the_rate_that_was_asked_for() -> None:
-    row = measure_reconstruction(reconstruct(swinging_clip(rate=30.0), "120"))[0]
+    row = measure_modes(reconstruct(swinging_clip(rate=30.0), "120")).rows[0]
     assert row.bytes_per_s == pytest.approx(30 * 56)
-
-
-def test_a_single_key_is_refused_with_the_clip_and_the_rate() -> None:
-    single = replace(reconstruct(swinging_clip(), "10"), keys=dict.fromkeys(KEYFRAME_MODES, np.array([0])))
-    with pytest.raises(ValueError, match="swing at 10 keys/s: 1 key has no in-betweens"):
-        measure_reconstruction(single)
 
 
 def test_poses_read_back_exactly(tmp_path: Path) -> None:
@@ -50,14 +43,14 @@ def test_poses_read_back_exactly(tmp_path: Path) -> None:
 
 def test_a_mode_for_every_segment_costs_a_byte_a_key_and_is_a_column_of_the_keys(tmp_path: Path) -> None:
     made = choose(swinging_clip(), Uniform("10"), ("lerp_slerp", "motor_spline", BEST_OF), 0.1)
-    *single, best = measure_reconstruction(made)
+    *single, best = measure_modes(made).rows
     assert best.mode == BEST_OF
     assert [best.bytes_per_s] == pytest.approx([57 / 56 * row.bytes_per_s for row in single[:1]])
     write_reconstruction(tmp_path, made)
     keys, all_keys = read(tmp_path / "best_of.keys.csv"), read(tmp_path / "keys.csv")
     assert [row.pop("mode") for row in keys] == [*made.segment_modes, ""]
     assert keys == all_keys
-    filled = {mode: read(tmp_path / f"{mode}.csv") for mode in made.poses}
+    filled = {mode: read(tmp_path / f"{mode}.csv") for mode in made.keys}
     ends = [float(row["t"]) for row in keys]
     for first, last, mode in zip(ends[:-1], ends[1:], made.segment_modes, strict=True):
         for own, row in zip(filled[mode], filled[BEST_OF], strict=True):
@@ -72,5 +65,5 @@ def test_in_the_format_of_tum_poses_are_read_back_as_they_were(tmp_path: Path) -
     for mode in made.keys:
         (read,) = read_trajectories(f"{tmp_path / mode}.tum").trajectories
         assert np.array_equal(read.times, made.times)
-        assert np.array_equal(read.poses.positions, made.poses[mode].positions)
-        assert np.array_equal(read.poses.quaternions, made.poses[mode].quaternions)
+        assert np.array_equal(read.poses.positions, made.filled_in(mode, made.times).positions)
+        assert np.array_equal(read.poses.quaternions, made.filled_in(mode, made.times).quaternions)

@@ -9,13 +9,15 @@ from rigid_motion.motion import KEYFRAME_MODES, Poses, decimate, reduce_keys
 from rigid_motion_batch.analysis.needed import (
     RATES,
     KeysNeeded,
+    NeededRow,
     OfRigidBody,
     evenly_spaced,
     keys_needed,
     overall,
-    write_keys_needed,
+    rows_of,
 )
 from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.rows import write_rows
 from tests.scripts.analysis.test_choices import shell_errors
 from tests.scripts.clips.recordings import swinging_clip
 
@@ -154,7 +156,7 @@ def test_the_table_as_a_file_has_a_row_for_every_mode_and_reads_back_exactly(
     tmp_path: Path, result: KeysNeeded
 ) -> None:
     never = clip_of("b", [[100, 50], [np.inf, np.nan]])
-    write_keys_needed(tmp_path / "keys_needed.csv", [result, never])
+    write_rows(tmp_path / "keys_needed.csv", NeededRow, (row for clip in (result, never) for row in rows_of(clip)))
     with (tmp_path / "keys_needed.csv").open(newline="") as stream:
         rows = list(csv.DictReader(stream))
     assert len(rows) == len(KEYFRAME_MODES) * 2 * len(RATES) + 6

@@ -1,10 +1,14 @@
 """Recordings of a swinging tool for the tests: small, smooth, and different for every seed."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from rigid_motion.motion import KEYFRAME_MODES, Poses, decimate, interpolate, measure
-from rigid_motion_batch.analysis.choices import Uniform
+from rigid_motion.motion import KEYFRAME_MODES, Poses, decimate
+from rigid_motion_batch.analysis.choices import Choice, Uniform
+from rigid_motion_batch.analysis.radii import Radii
 from rigid_motion_batch.analysis.reconstructions import Reconstruction
+from rigid_motion_batch.analysis.results import ChoiceResult, made_of, measured
 from rigid_motion_batch.recordings.clips import Clip
 
 
@@ -22,10 +26,13 @@ def swinging_clip(
 
 
 def reconstruct(clip: Clip, rate: str = "10", modes: tuple[str, ...] = tuple(KEYFRAME_MODES)) -> Reconstruction:
-    """The clip thinned to `rate`, filled in again by the real modes and measured."""
-    keys = decimate(clip.times, float(rate))
-    samples = slice(int(keys[0]), int(keys[-1]) + 1)
-    times, truth = clip.times[samples], clip.poses[samples]
-    poses = {mode: interpolate(clip.times[keys], clip.poses[keys], times, mode) for mode in modes}
-    errors = {mode: measure(times, poses[mode], truth) for mode in modes}
-    return Reconstruction(clip, Uniform(rate), dict.fromkeys(modes, keys), poses, errors)
+    """The clip thinned to `rate`, to be filled in again by the real modes."""
+    return Reconstruction(
+        clip, Uniform(rate), dict.fromkeys(modes, (decimate(clip.times, float(rate)),)), np.array([0.1])
+    )
+
+
+def compare_clip(clip: Clip, choice: Choice, modes: Sequence[str], radii: Radii) -> ChoiceResult | None:
+    """What a comparison finds of a clip, as one step; None where it is too short for two keys."""
+    made = made_of(clip, choice, modes, radii, shared=False)
+    return None if made is None else measured(made)

@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 
 from rigid_motion_batch.analysis.choices import Choice, Tolerance, Uniform
-from rigid_motion_batch.analysis.results import compare_clip
 from rigid_motion_batch.pipeline import values
 from rigid_motion_batch.pipeline.comparison import Comparison, ComparisonPlan
 from rigid_motion_batch.pipeline.comparison_steps import result_in
@@ -29,6 +28,7 @@ from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.report.settings import Settings
 from rigid_motion_batch.scenes.settings import SceneSettings
 from tests.scripts.bvh_bodies import write_body
+from tests.scripts.clips.recordings import compare_clip
 from tests.scripts.comparing import write_toss
 from tests.scripts.pipeline.plans import Listener, Watched, run, states
 from tests.thoroughness import THOROUGH
@@ -90,7 +90,7 @@ def test_tables_are_published_and_their_numbers_are_those_of_the_analysis(output
     expected = [
         row
         for choice in comparison.choices
-        for row in compare_clip(clip, choice, comparison.modes, comparison.radii, shared=False).rows
+        for row in compare_clip(clip, choice, comparison.modes, comparison.radii).rows
     ]
     assert [row.split(",")[:2] for row in rows] == [["toss", row.mode] for row in expected]
     assert all(repr(row.rms_shell_m) in line for row, line in zip(expected, rows, strict=True))
@@ -103,7 +103,7 @@ def test_what_is_kept_of_a_clip_is_what_was_found(tmp_path: Path, toss: Path, ch
     if body:
         write_body(source)
     ((clip,), _) = read_clips([str(source)], None)
-    result = compare_clip(clip, choice, ("lerp_slerp", "motor_spline"), planned(source).radii, shared=False)
+    result = compare_clip(clip, choice, ("lerp_slerp", "motor_spline"), planned(source).radii)
     values.write(tmp_path / "result", result)
     read = result_in(tmp_path)
     assert (read.choice, read.first, read.rows, read.joints) == (

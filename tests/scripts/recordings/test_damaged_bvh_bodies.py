@@ -10,9 +10,10 @@ import pytest
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.analysis.choices import Choice, Uniform
 from rigid_motion_batch.analysis.radii import Radii
-from rigid_motion_batch.analysis.results import clip_result, compare_clip
+from rigid_motion_batch.analysis.results import clip_result
 from rigid_motion_batch.recordings.clip_reading import read_source
 from rigid_motion_batch.recordings.clips import Clip
+from tests.scripts.clips.recordings import compare_clip
 
 
 def hierarchy(name: str, depth: int, channels: str, children: int = 1) -> str:
@@ -47,7 +48,7 @@ SEEDS = (seed("ZXY", 12), seed("XYZ", 30, moved=True), seed("YXZ", 8, roots=2, e
 
 def assert_can_be_shown(clip: Clip, choice: Choice, mode: str) -> None:
     """Measured by the program, with numbers that are some, in tables and in all that a page shows."""
-    result = compare_clip(clip, choice, (mode,), Radii(), shared=False)
+    result = compare_clip(clip, choice, (mode,), Radii())
     if result is None:
         return
     for row in (*result.rows, *result.joints):

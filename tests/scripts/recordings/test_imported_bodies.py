@@ -16,6 +16,7 @@ from rigid_motion.motion import Poses
 from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.quaternions import rotate
 from rigid_motion_batch.recordings import Trajectory, gltf, importing, read_trajectories, rigs
+from rigid_motion_batch.recordings.clip_reading import make_clip
 from rigid_motion_batch.recordings.fbx_records import FIRST
 from rigid_motion_batch.scenes.armature import Rest
 from rigid_motion_batch.scenes.physique import body_size
@@ -131,7 +132,7 @@ def test_a_body_is_as_large_as_its_joints_wherever_an_importer_has_its_bones_end
     (result,) = recording.trajectories
     assert (result.metres_per_unit, recording.note, result.warnings) == (1.0, "", ())
     assert np.linalg.norm(result.rest_body.tails, axis=-1).max() < 1.0
-    rest = Rest.of(result.rest_body, 1.0, "blender")
+    rest = Rest.of(make_clip(result, str(path), "soldier", "blender"))
     assert body_size(rest) == pytest.approx(1.73, abs=0.01)
     assert rest.joints.positions[:, 2].min() < 0.3, "the ground is below its feet, and not below the ends of bones"
     far = replace(rest, tails=rest.joints.positions + np.array([0.0, 0.0, 40.0]))

@@ -7,8 +7,9 @@ from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.analysis.choices import Choice, Uniform
 from rigid_motion_batch.analysis.needed import OfRigidBody, keys_needed
 from rigid_motion_batch.analysis.radii import EVERYWHERE, RIGID
-from rigid_motion_batch.analysis.results import ClipResult, clip_result, compare_clip
+from rigid_motion_batch.analysis.results import ClipResult, clip_result
 from rigid_motion_batch.recordings.clips import Clip, ClipWarning
+from tests.scripts.clips.recordings import compare_clip
 
 MODES = tuple(KEYFRAME_MODES)
 RATES = tuple(map(Uniform, ("5", "10", "15", "20")))
@@ -23,6 +24,6 @@ def result_of(
     needed: bool = False,
 ) -> ClipResult:
     """What the analysis finds of a clip under some choices of keys."""
-    result = [compare_clip(clip, choice, modes, EVERYWHERE, shared=False) for choice in choices]
+    result = [compare_clip(clip, choice, modes, EVERYWHERE) for choice in choices]
     counted = keys_needed(OfRigidBody(clip, RIGID), modes) if needed else None
     return clip_result(replace(clip, warnings=(*clip.warnings, *warnings)), [item for item in result if item], counted)

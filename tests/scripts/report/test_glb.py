@@ -10,6 +10,7 @@ from rigid_motion.motion import Poses
 from rigid_motion_batch.analysis import results
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.radii import EVERYWHERE
+from rigid_motion_batch.analysis.reconstructions import Reconstruction
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.palette import colour_of, linear
 from rigid_motion_batch.recordings.clip_reading import read_source
@@ -27,14 +28,14 @@ SINGLE = 5e-6
 """Metres, of the single precision of the file."""
 
 
-def made_of(source: Path, axes: str | None = None) -> results.Made:
+def made_of(source: Path, axes: str | None = None) -> Reconstruction:
     ((clip,), _) = read_source(str(source), axes)
     made = results.made_of(clip, Uniform("5"), MODES, EVERYWHERE, shared=False)
     assert made is not None
     return made
 
 
-def written(made: results.Made, folder: Path) -> File:
+def written(made: Reconstruction, folder: Path) -> File:
     path = folder / "comparison.glb"
     path.write_bytes(comparison_glb(made, [(mode,) for mode in MODES]))
     return File(path)
@@ -72,7 +73,10 @@ def test_lanes_of_a_rigid_body_move_as_the_modes_do(tmp_path, axes):
     write_csv(tmp_path / "hand.csv")
     made = made_of(tmp_path / "hand.csv", axes)
     file = written(made, tmp_path)
-    truth = {RECORDING: made.clip.poses[made.samples], **{NAMES[mode]: made.poses[mode] for mode in MODES}}
+    truth = {
+        RECORDING: made.clip.poses[made.samples],
+        **{NAMES[mode]: made.filled_in(mode, made.times) for mode in MODES},
+    }
     require_lanes(
         file, made.times, {name: in_gltf(made.clip.in_metres(poses), axes)[None] for name, poses in truth.items()}
     )

@@ -137,36 +137,24 @@ def test_the_keys_needed_come_first_where_they_were_looked_for(needed: KeysNeede
     assert str(verdict(TWO, [needed])) == expected
 
 
-def facts(run: Numbers) -> list[str]:
-    return [as_text(fact) for fact in verdict(run).facts]
-
-
-def test_facts_are_the_gain_the_wins_and_what_did_not_pay() -> None:
+def test_the_cases_that_the_best_mode_won_are_beside_the_sentence() -> None:
     run = numbers(
         (FIVE, TEN), {REF: (16, 4), SCREW: (17, 4.1), SMOOTH: (8, 1)}, {REF: (8, 4), SCREW: (8.5, 4.1), SMOOTH: (10, 2)}
     )
-    assert facts(run) == [
-        "65 % lower error from Smooth Screw than from Vector + Quaternion at 10 keys/s",
-        "Closest in 3 of 4 cases; not in clip2 at 5 keys/s: there Vector + Quaternion is, by 20 %",
-        "2 to 6 % higher error from Screw beside Vector + Quaternion",
-    ]
+    said = "Closest in 3 of 4 cases; not in clip2 at 5 keys/s: there Vector + Quaternion is, by 20 %"
+    assert as_text(verdict(run).wins) == said
+    every = numbers((FIVE, TEN), {REF: (16, 4), SMOOTH: (8, 1)})
+    assert as_text(verdict(every).wins) == "Closest in 2 of 2 cases"
+    within = numbers((Tolerance("5mm"),), {REF: (8,), SMOOTH: (6,)}, {REF: (6,), SMOOTH: (5,)})
+    assert as_text(verdict(within).wins) == "Fewest keys in 2 of 2 cases"
 
 
 def test_the_exception_is_a_link_to_its_clip_and_choice() -> None:
     run = numbers((TEN,), {REF: (4,), SMOOTH: (1,)}, {REF: (4,), SMOOTH: (5,)})
-    (link,) = [part for fact in verdict(run).facts for part in fact if part.kind == "link"]
+    (link,) = [part for part in verdict(run).wins if part.kind == "link"]
     assert (link.text, link.target) == ("clip2 at 10 keys/s", "clip2,10")
 
 
-def test_the_best_mode_of_each_segment_is_held_against_the_best_single_one() -> None:
-    run = numbers((TEN,), {REF: (4,), SMOOTH: (2,), "best_of": (1,)})
-    assert facts(run) == ["50 % lower error from the best mode of each segment than from the best single one"]
-
-
-def test_a_run_in_which_nothing_is_off_has_no_facts() -> None:
-    assert facts(numbers((TEN,), {REF: (0,), SMOOTH: (0,)})) == []
-
-
-def test_the_fewest_keys_within_a_tolerance_are_a_fact_beside_rates() -> None:
-    run = numbers((TEN, Tolerance("5mm")), {REF: (4, 8), SMOOTH: (1, 6)})
-    assert "25 % fewer keys from Smooth Screw than from Vector + Quaternion within 5 mm" in facts(run)
+def test_of_a_single_case_or_without_any_error_nothing_is_said_of_wins() -> None:
+    assert verdict(numbers((TEN,), {REF: (4,), SMOOTH: (2,)})).wins == ()
+    assert verdict(numbers((TEN,), {REF: (0,), SMOOTH: (0,)})).wins == ()

@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 from rigid_motion import animation
 from rigid_motion.motion import KEYFRAME_MODES, MODES, Poses
 from rigid_motion.motion.quaternions import angle_between
-from rigid_motion_batch.analysis.bodies import BodyReconstruction, reconstruct_body
 from rigid_motion_batch.analysis.choices import Tolerance, Uniform
+from rigid_motion_batch.analysis.reconstructions import Reconstruction, reconstruct
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.scenes import layout
 from rigid_motion_batch.scenes.armature import Rest
@@ -28,13 +28,13 @@ RADIUS = 0.03
 RADII = np.full(len(JOINTS), RADIUS)
 
 
-def made_of(clip, modes=TWO, rate="5") -> BodyReconstruction:
-    made = reconstruct_body(clip, Uniform(rate), modes, RADIUS)
+def made_of(clip, modes=TWO, rate="5") -> Reconstruction:
+    made = reconstruct(clip, Uniform(rate), modes, RADIUS)
     assert made is not None
     return made
 
 
-def timeline_of(made: BodyReconstruction) -> Timeline:
+def timeline_of(made: Reconstruction) -> Timeline:
     return Timeline.between(float(made.times[0]), float(made.times[-1]), SETTINGS.fps, SETTINGS.slow_motion)
 
 
@@ -58,12 +58,12 @@ def turns_of(rig: bpy.types.Object, rest: Rest) -> np.ndarray:
     return (joints.inv() * Rotation.from_matrix(bones)).as_quat(scalar_first=True)
 
 
-def assert_played(made: BodyReconstruction, scene: bpy.types.Scene, modes: tuple[str, ...]) -> None:
+def assert_played(made: Reconstruction, scene: bpy.types.Scene, modes: tuple[str, ...]) -> None:
     timeline = timeline_of(made)
     times = timeline.times_of(timeline.frames)
     centre = np.array(scene["recording_centre_m"])
     clip = made.clip
-    rest = Rest.of(clip.rest_body, clip.metres_per_unit, clip.axes)
+    rest = Rest.of(clip)
     expected = {mode: to_blender(made.shown(mode, times), clip.axes) for mode in modes}
     turns = {mode: turns_of(bpy.data.objects[mode], rest) for mode in modes}
     columns = [np.interp(times, clip.times, column) for column in clip.poses.positions[0].T]
@@ -88,13 +88,13 @@ def assert_played(made: BodyReconstruction, scene: bpy.types.Scene, modes: tuple
 def test_every_mode_is_played_on_every_frame_as_it_was_computed(axes, metres_per_unit):
     modes = tuple(MODES)
     made = made_of(dancing_clip(axes=axes, metres_per_unit=metres_per_unit), modes)
-    assert_played(made, build_body_scene(made, SETTINGS, RADII), modes)
+    assert_played(made, build_body_scene(made, SETTINGS), modes)
 
 
 def test_keys_between_frames_and_of_each_joint_its_own_are_played_too_from_a_file_without_the_extension(tmp_path):
-    made = reconstruct_body(dancing_clip(rate=97.0), Tolerance("0.02"), TWO, RADIUS)
+    made = reconstruct(dancing_clip(rate=97.0), Tolerance("0.02"), TWO, RADIUS)
     assert len({len(own) for own in made.keys["lerp_slerp"]}) > 1
-    build_body_scene(made, SETTINGS, RADII)
+    build_body_scene(made, SETTINGS)
     save_blend(tmp_path / "stage.blend")
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "stage.blend"), use_scripts=False)
     assert not hasattr(bpy.types.PoseBone, "rigid_motion")
@@ -103,7 +103,7 @@ def test_keys_between_frames_and_of_each_joint_its_own_are_played_too_from_a_fil
 
 def test_bones_have_the_keys_that_were_kept_and_their_mode(tmp_path):
     made = made_of(dancing_clip(still=[2]))
-    build_body_scene(made, SETTINGS, RADII)
+    build_body_scene(made, SETTINGS)
     save_blend(tmp_path / "stage.blend")
     animation.register()
     try:
@@ -122,7 +122,7 @@ def test_bones_have_the_keys_that_were_kept_and_their_mode(tmp_path):
         animation.unregister()
 
 
-def errors_at(made: BodyReconstruction, mode: str, frame: int) -> np.ndarray:
+def errors_at(made: Reconstruction, mode: str, frame: int) -> np.ndarray:
     """How far any point of the ball at each joint is off, tried with many points."""
     time = np.atleast_1d(timeline_of(made).times_of(np.array(float(frame))))
     number = int(np.searchsorted(made.clip.times, time[0] - 1e-9))
@@ -142,7 +142,7 @@ def errors_at(made: BodyReconstruction, mode: str, frame: int) -> np.ndarray:
 def test_the_colour_of_each_face_is_that_of_its_joints_error(skin):
     # Every frame shows a sample.
     made = made_of(dancing_clip(rate=48.0, skin=skin))
-    scene = build_body_scene(made, SETTINGS, RADII)
+    scene = build_body_scene(made, SETTINGS)
     materials = bpy.data.objects["lerp_slerp figure"].data.materials
     full = float(materials[SHADES - 1].name.split()[1]) * 1e-3
     for mode in TWO:
@@ -171,7 +171,7 @@ def in_picture(scene: bpy.types.Scene, place: np.ndarray) -> np.ndarray:
 
 def test_joints_flash_at_their_keys_and_the_worst_has_the_ring():
     made = made_of(dancing_clip(still=[1], rate=48.0))
-    scene = build_body_scene(made, SETTINGS, RADII)
+    scene = build_body_scene(made, SETTINGS)
     frames = timeline_of(made).frames_of(made.clip.times[made.keys["lerp_slerp"][0]])
     scene.frame_set(int(frames[1]))
     assert len(instances_of("lerp_slerp keys")) == len(JOINTS) - 1
@@ -190,7 +190,7 @@ def test_joints_flash_at_their_keys_and_the_worst_has_the_ring():
 def test_a_skin_is_carried_as_linear_blending_does():
     made = made_of(dancing_clip(skin=True, axes="opengl", metres_per_unit=0.01))
     clip = made.clip
-    scene = build_body_scene(made, SETTINGS, RADII)
+    scene = build_body_scene(made, SETTINGS)
     scene.frame_set(9)
     centre = np.array(scene["recording_centre_m"])
     time = timeline_of(made).times_of(np.array([9.0]))
@@ -216,7 +216,7 @@ HOSTILE = ("a" * 300, "a" * 299, 'quo"te\\', "['x']", "", "Kopf\n<b>\u00e4")
 
 def test_hostile_names_of_joints_are_names_of_bones():
     made = made_of(dancing_clip(joints=HOSTILE))
-    assert_played(made, build_body_scene(made, SETTINGS, RADII), TWO)
+    assert_played(made, build_body_scene(made, SETTINGS), TWO)
     assert len(bpy.data.objects["lerp_slerp"].pose.bones) == len(HOSTILE)
 
 
@@ -224,7 +224,7 @@ def test_hostile_names_of_joints_are_names_of_bones():
 @pytest.mark.parametrize("modes", [TWO, tuple(KEYFRAME_MODES)], ids=["two", "all"])
 def test_bodies_stay_within_their_cards(walked, modes):
     made = made_of(dancing_clip(walked=walked), modes)
-    scene = build_body_scene(made, SETTINGS, RADII)
+    scene = build_body_scene(made, SETTINGS)
     for frame in sample(range(1, scene.frame_end + 1, 3)):
         scene.frame_set(frame)
         depsgraph = bpy.context.evaluated_depsgraph_get()

@@ -8,10 +8,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rigid_motion.motion import Poses
-from rigid_motion_batch.analysis.bodies import BodyReconstruction, reconstruct_body
 from rigid_motion_batch.analysis.body_decimated import DECIMATE, OWN, SHARED
 from rigid_motion_batch.analysis.body_metrics import measure_modes
 from rigid_motion_batch.analysis.choices import Tolerance
+from rigid_motion_batch.analysis.reconstructions import Reconstruction, reconstruct
 from rigid_motion_batch.axes import AXES
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.rest_bodies import RestBody
@@ -45,8 +45,8 @@ def leg(name: str = "leg", samples: int = 40) -> Clip:
     return Clip(name, f"{name}.bvh", "opengl", times, poses, (), 0.01, rest_body=replace(rest_body, rest=rest))
 
 
-def made_of(clip: Clip, *, shared: bool = False, tolerance: str = "1cm") -> BodyReconstruction:
-    return reconstruct_body(clip, Tolerance(tolerance), MODES, RADIUS, shared=shared)
+def made_of(clip: Clip, *, shared: bool = False, tolerance: str = "1cm") -> Reconstruction:
+    return reconstruct(clip, Tolerance(tolerance), MODES, RADIUS, shared=shared)
 
 
 def in_world(clip: Clip) -> np.ndarray:
@@ -84,7 +84,7 @@ def errors_by_hand(shown: np.ndarray, recorded: np.ndarray, truth: np.ndarray) -
 
 def test_errors_of_decimated_curves_are_those_of_what_blender_shows() -> None:
     clip = leg()
-    body, truth = DecimatedBody(made_of(clip), RADIUS), in_world(clip)
+    body, truth = DecimatedBody(made_of(clip)), in_world(clip)
     recorded = as_blender_shows(body)
     assert body.errors().max() < 1e-6
     assert errors_by_hand(recorded, recorded, truth).max() < 2e-6
@@ -117,8 +117,8 @@ def test_decimate_is_held_to_our_largest_error_and_all_is_counted(monkeypatch, s
 
     monkeypatch.setattr(DecimatedBody, "left", counted)
     made = made_of(leg(), shared=shared)
-    measured = measure_modes(made, RADIUS)
-    rows = beside_decimate(made, RADIUS, measured.rows)
+    measured = measure_modes(made)
+    rows = beside_decimate(made, measured.rows)
     how = SHARED if shared else OWN
     assert [(row.mode, row.how) for row in rows] == [(mode, item) for mode in MODES for item in (how, DECIMATE)]
     for own, theirs, metrics in zip(rows[::2], rows[1::2], measured.rows, strict=True):
@@ -130,7 +130,7 @@ def test_decimate_is_held_to_our_largest_error_and_all_is_counted(monkeypatch, s
         assert own.numbers == channels + (len(keys[0]) if shared else sum(map(len, keys)))
         assert own.max_shell_m == metrics.max_shell_m
         assert 0.0 < theirs.max_shell_m <= own.max_shell_m
-        result = Left(DECIMATE, theirs.frames_with_keys, theirs.keys, theirs.numbers, theirs.max_shell_m)
+        result = Left(theirs.frames_with_keys, theirs.keys, theirs.numbers, theirs.max_shell_m)
         assert result in tried
         assert result.keys == min(item.keys for item in tried if item.largest <= own.max_shell_m)
         assert result.keys < max(item.keys for item in tried)
@@ -140,9 +140,9 @@ def test_a_body_that_stays_and_an_error_beyond_single_precision_have_no_row_of_d
     clip = leg(samples=10)
     still = replace(clip, poses=Poses(clip.poses.positions[:, [0] * 10], clip.poses.quaternions[:, [0] * 10]))
     made = made_of(still)
-    assert [row.how for row in beside_decimate(made, RADIUS, measure_modes(made, RADIUS).rows)] == [OWN, OWN]
-    every = BodyReconstruction(clip, Tolerance("1cm"), dict.fromkeys(MODES, (np.arange(10),) * 4), shared=False)
-    rows = beside_decimate(every, RADIUS, measure_modes(every, RADIUS).rows)
+    assert [row.how for row in beside_decimate(made, measure_modes(made).rows)] == [OWN, OWN]
+    every = Reconstruction(clip, Tolerance("1cm"), dict.fromkeys(MODES, (np.arange(10),) * 4), RADIUS)
+    rows = beside_decimate(every, measure_modes(every).rows)
     assert [row.how for row in rows] == [OWN, OWN]
 
 

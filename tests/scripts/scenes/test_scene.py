@@ -77,7 +77,7 @@ def test_every_mode_is_played_on_every_frame_as_it_was_computed(axes):
         behind = np.array(bpy.data.objects[f"{mode} recording"].delta_location)
         assert rotate(turn, behind) @ layout.AWAY == pytest.approx(np.linalg.norm(behind))
         places = results_of[f"Lane {mode}"].positions
-        kept = reconstruction.keys[mode]
+        kept = reconstruction.keys[mode][0]
         shown = {
             mode: interpolate(clip.times[kept], clip.poses[kept], times, mode),
             f"{mode} recording": interpolate(clip.times, clip.poses, times, "dq_sclerp"),
@@ -163,7 +163,7 @@ def test_the_number_shows_the_error_of_the_frame_and_the_graph_has_passed_so_far
     for mode in TWO:
         number, graph = bpy.data.objects[f"{mode} error"], bpy.data.objects[f"{mode} graph"]
         written = channelbag_of(number).fcurves.find(input_path(number.modifiers[0], "Value"), index=0)
-        errors = 1e3 * np.interp(times, reconstruction.times, reconstruction.errors[mode].shell)
+        errors = 1e3 * np.interp(times, reconstruction.times, reconstruction.shell(mode)[0])
         right = vertices_of(graph.data)[:, 0]
         drawn = []
         for frame, error in enumerate(errors, start=1):
@@ -210,8 +210,8 @@ def test_adaptive_keys_are_marked_in_the_lane_of_the_mode_they_are_of_and_counte
     assert scene.name == "swing tolerance-5mm"
     assert bpy.data.curves["Choice of keys"].body == "within 5 mm"
     timeline = Timeline.of(reconstruction, SETTINGS.fps, 1.0)
-    assert len(reconstruction.keys["motor_spline"]) < len(reconstruction.keys["lerp_slerp"])
-    for mode, keys in reconstruction.keys.items():
+    assert len(reconstruction.keys["motor_spline"][0]) < len(reconstruction.keys["lerp_slerp"][0])
+    for mode, (keys,) in reconstruction.keys.items():
         marks = bpy.data.objects[f"{mode} keys"].data
         frames = np.empty(len(marks.vertices), dtype=np.float32)
         marks.attributes["frame"].data.foreach_get("value", frames)

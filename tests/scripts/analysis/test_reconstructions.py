@@ -5,21 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigid_motion.motion import KEYFRAME_MODES, Poses
-from rigid_motion_batch.analysis import bodies
-from rigid_motion_batch.analysis.bodies import (
-    BodyErrors,
-    BodyReconstruction,
-    Ground,
-    identical_body_modes,
-    measure_body,
-    moving,
-    reconstruct_body,
-    rms_of_body,
-    same_body_motions,
-)
+from rigid_motion.motion import KEYFRAME_MODES, Poses, measure, rms
+from rigid_motion_batch.analysis import reconstructions
 from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform
-from rigid_motion_batch.analysis.reconstructions import reconstruct
+from rigid_motion_batch.analysis.errors import Ground, MotionErrors, errors_of
+from rigid_motion_batch.analysis.reconstructions import (
+    Reconstruction,
+    identical_modes,
+    moving,
+    reconstruct,
+    same_motions,
+)
 from rigid_motion_batch.recordings.clips import Clip
 from tests.motion.bodies import body_errors
 from tests.scripts.clips.bodies import JOINTS, PARENTS, still_body, swinging_body
@@ -32,15 +28,15 @@ RADII = np.linspace(0.02, 0.12, len(JOINTS))
 GLOVE = JOINTS.index("Glove")
 
 
-def evenly(clip: Clip, rate: str = "5", modes: tuple[str, ...] = MODES) -> BodyReconstruction:
-    return reconstruct_body(clip, Uniform(rate), modes, RADII)
+def evenly(clip: Clip, rate: str = "5", modes: tuple[str, ...] = MODES) -> Reconstruction:
+    return reconstruct(clip, Uniform(rate), modes, RADII)
 
 
-def measured(made: BodyReconstruction, mode: str = "lerp_slerp", radii: np.ndarray | float = RADII) -> BodyErrors:
-    return measure_body(made, mode, radii, Ground.of(made))
+def measured(made: Reconstruction, mode: str = "lerp_slerp") -> MotionErrors:
+    return errors_of(made, mode, Ground.of(made))
 
 
-def independently(made: BodyReconstruction, mode: str) -> np.ndarray:
+def independently(made: Reconstruction, mode: str) -> np.ndarray:
     """The shell errors by matrices, in metres."""
     clip = made.clip
     metres = Poses(clip.poses.positions * clip.metres_per_unit, clip.poses.quaternions)
@@ -71,7 +67,7 @@ def test_how_little_a_joint_may_move_to_stay_does_not_depend_on_the_unit(metres_
 @pytest.mark.parametrize("choice", [Uniform("5"), Budget("5"), Tolerance("1cm")], ids=str)
 @pytest.mark.parametrize("shared", [False, True])
 def test_a_body_of_which_nothing_moves_is_everywhere_as_it_was(choice: Choice, shared: bool) -> None:
-    made = reconstruct_body(still_body(), choice, MODES, RADII, shared=shared)
+    made = reconstruct(still_body(), choice, MODES, RADII, shared=shared)
     for mode in MODES:
         assert [len(own) for own in made.keys[mode]] == [1] * len(JOINTS)
         errors = measured(made, mode)
@@ -83,7 +79,7 @@ def test_a_body_of_which_nothing_moves_is_everywhere_as_it_was(choice: Choice, s
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("shared", [False, True])
 def test_keys_that_the_motion_chooses_keep_every_joint_within_the_tolerance(mode: str, shared: bool) -> None:
-    made = reconstruct_body(swinging_body(), Tolerance("15mm"), (mode,), RADII, shared=shared)
+    made = reconstruct(swinging_body(), Tolerance("15mm"), (mode,), RADII, shared=shared)
     errors = measured(made, mode)
     assert errors.shell.max() <= 0.015 * (1.0 + 1e-9)
     np.testing.assert_allclose(errors.shell, independently(made, mode), atol=1e-9)
@@ -94,7 +90,7 @@ def test_keys_that_the_motion_chooses_keep_every_joint_within_the_tolerance(mode
 
 @pytest.mark.parametrize("choice", [Uniform("0.3"), Budget("0.3")], ids=str)
 def test_a_body_too_short_for_two_keys_is_not_reconstructed(choice: Choice) -> None:
-    assert reconstruct_body(swinging_body(), choice, MODES, RADII) is None
+    assert reconstruct(swinging_body(), choice, MODES, RADII) is None
 
 
 # -- errors -----------------------------------------------------------------------------------------------------------
@@ -105,21 +101,21 @@ def test_errors_are_had_again_by_matrices(mode: str) -> None:
     made = evenly(swinging_body(seed=5), "4", (mode,))
     errors = measured(made, mode).shell
     np.testing.assert_allclose(errors, independently(made, mode), atol=1e-9)
-    assert rms_of_body(made, mode, RADII) == pytest.approx(np.sqrt(np.mean(errors**2)), rel=1e-12)
+    assert rms(made.shell(mode)) == pytest.approx(np.sqrt(np.mean(errors**2)), rel=1e-12)
 
 
 @pytest.mark.parametrize("block", [1, 2, 7, 60, 61])
 def test_blocks_of_any_size_give_the_same_numbers(block: int, monkeypatch: pytest.MonkeyPatch) -> None:
     made = evenly(swinging_body())
     whole, ground = measured(made), Ground.of(made)
-    monkeypatch.setattr(bodies, "BLOCK", block)
+    monkeypatch.setattr(reconstructions, "BLOCK", block)
     pieces, of_pieces = measured(made), Ground.of(made)
     for name in ("shell", "position", "rotation", "velocity", "slide"):
         np.testing.assert_allclose(getattr(pieces, name), getattr(whole, name), rtol=1e-9, atol=1e-15)
     assert pieces.worst == whole.worst
     assert np.array_equal(of_pieces.joints, ground.joints)
     assert np.array_equal(of_pieces.stands, ground.stands)
-    assert rms_of_body(made, "lerp_slerp", RADII) == pytest.approx(np.sqrt(np.mean(whole.shell**2)), rel=1e-12)
+    assert rms(made.shell("lerp_slerp")) == pytest.approx(np.sqrt(np.mean(whole.shell**2)), rel=1e-12)
 
 
 @pytest.mark.parametrize("mode", KEYFRAME_MODES)
@@ -133,11 +129,14 @@ def test_a_body_of_one_joint_has_the_errors_of_a_single_rigid_one(mode: str) -> 
         tails=np.zeros((1, 3)),
     )
     poses = Poses(single.poses.positions[None], single.poses.quaternions[None])
-    made = reconstruct_body(replace(single, poses=poses, rest_body=rest_body), Uniform("6"), (mode,), 0.1)
-    errors, expected = measured(made, mode, 0.1), reconstruct(single, Uniform("6"), (mode,), 0.1).errors[mode]
-    np.testing.assert_allclose(errors.shell[0], expected.shell, atol=1e-12)
-    assert errors.velocity[0] == pytest.approx(np.sqrt(np.mean(expected.velocity**2)))
-    assert errors.rotation[0] == pytest.approx(np.sqrt(np.mean(expected.rotation**2)))
+    body = reconstruct(replace(single, poses=poses, rest_body=rest_body), Uniform("6"), (mode,), 0.1)
+    made = reconstruct(single, Uniform("6"), (mode,), 0.1)
+    errors, of_body = measured(made, mode), measured(body, mode)
+    expected = measure(made.times, made.filled_in(mode, made.times), single.poses[made.samples], 0.1)
+    for own in (errors, of_body):
+        np.testing.assert_allclose(own.shell[0], expected.shell, atol=1e-12)
+        assert own.velocity[0] == pytest.approx(np.sqrt(np.mean(expected.velocity**2)))
+        assert own.rotation[0] == pytest.approx(np.sqrt(np.mean(expected.rotation**2)))
 
 
 # -- feet -------------------------------------------------------------------------------------------------------------
@@ -173,20 +172,21 @@ def test_a_body_in_the_air_has_nothing_that_stands() -> None:
 
 def test_modes_that_are_one_motion_are_together_and_have_the_same_keys() -> None:
     clip = swinging_body(seed=3)
-    groups = same_body_motions(clip, tuple(KEYFRAME_MODES))
+    groups = same_motions(clip, tuple(KEYFRAME_MODES))
     assert ("dq_sclerp", "pga_slerp", "cga_slerp") in groups
     assert sorted(mode for group in groups for mode in group) == sorted(KEYFRAME_MODES)
-    made = reconstruct_body(clip, Tolerance("2cm"), tuple(KEYFRAME_MODES), RADII)
+    made = reconstruct(clip, Tolerance("2cm"), tuple(KEYFRAME_MODES), RADII)
     assert tuple(made.keys) == tuple(KEYFRAME_MODES)
     for group in groups:
         for mode in group:
             assert made.keys[mode] is made.keys[group[0]]
-    assert identical_body_modes(evenly(clip, "5", tuple(KEYFRAME_MODES))) == groups
+    assert identical_modes(evenly(clip, "5", tuple(KEYFRAME_MODES))) == groups
 
 
-def test_the_best_mode_has_the_fewest_keys_and_is_the_reference_where_all_have_as_many() -> None:
+def test_the_best_mode_has_the_fewest_keys_and_of_as_many_the_least_error() -> None:
     clip = swinging_body()
-    assert evenly(clip, "5", ("dq_sclerp", "lerp_slerp")).best_mode == "lerp_slerp"
-    made = reconstruct_body(clip, Tolerance("2cm"), MODES, RADII)
+    even = evenly(clip)
+    assert even.best_mode == min(MODES, key=lambda mode: rms(even.shell(mode)))
+    made = reconstruct(clip, Tolerance("2cm"), MODES, RADII)
     counts = {mode: sum(map(len, keys)) for mode, keys in made.keys.items()}
     assert counts[made.best_mode] == min(counts.values())
