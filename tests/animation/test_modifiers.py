@@ -14,7 +14,7 @@ import pytest
 from mathutils import Euler, Matrix, Quaternion
 
 from rigid_motion.animation import Refused, bake, problem_of, reduce_keys_of, refresh, set_mode, unbake
-from rigid_motion.animation.curves import Stepped, held
+from rigid_motion.animation.curves.keys import Stepped, held
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
 from tests.animation.bones.rigs import key_bone, new_rig

@@ -9,7 +9,7 @@ import pytest
 from pythonosc.osc_bundle import OscBundle
 from pythonosc.osc_message_builder import OscMessageBuilder
 
-from rigid_motion.live.retargeting import Retargeting, matched
+from rigid_motion.live.driving import Retargeting, matched
 from rigid_motion.motion import Poses, Skeleton, shell_error
 from rigid_motion.motion.humanoid import HUMANOID, humanoid_bones
 from rigid_motion.motion.quaternions import multiply, rotate

@@ -16,9 +16,9 @@ from bpy.app.translations import contexts
 import rigid_motion
 from rigid_motion import ui
 from rigid_motion.animation import properties
-from rigid_motion.ui.on_targets import OnTargets
 from rigid_motion.ui.overlay.settings import RigidMotionOverlay
 from rigid_motion.ui.shown import ShownTransform
+from rigid_motion.ui.targets import OnTargets
 from rigid_motion.ui.wording import DESCRIPTIONS, OWN_WORDS, SHORT_LABELS, spoken_of
 
 PACKAGE = Path(rigid_motion.__file__).parent

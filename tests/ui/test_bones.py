@@ -8,11 +8,11 @@ import pytest
 
 from rigid_motion import animation
 from rigid_motion.animation import constraint_trouble, modes_of, restore_constraints, set_mode
-from rigid_motion.animation.baking.sizes import first_tolerance
 from rigid_motion.animation.transforms import CONSTRAINT, Refused, transform_of
-from rigid_motion.animation.writers.constraint_repair import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
+from rigid_motion.animation.transforms.sizes import first_tolerance
+from rigid_motion.animation.writers.bone_constraints import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
 from rigid_motion.ui import menus
-from rigid_motion.ui.notes import facts_and_notes
+from rigid_motion.ui.panels import facts_and_notes
 from rigid_motion.ui.targets import (
     KEY_EDITORS,
     SELECTED,

@@ -10,8 +10,7 @@ import pytest
 
 from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate
-from rigid_motion.ui.breakdown import CLASSES
-from rigid_motion.ui.slider import WAY, Slider
+from rigid_motion.ui.breakdown import CLASSES, WAY, Slider
 from tests.animation.keyed import snapshot
 from tests.ui.conftest import FRAMES
 

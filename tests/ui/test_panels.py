@@ -10,7 +10,7 @@ import pytest
 from mathutils import Euler, Matrix, Quaternion, Vector
 
 from rigid_motion.animation import bake, set_enabled, set_mode, unbake
-from rigid_motion.ui.notes import facts_and_notes
+from rigid_motion.ui.panels import facts_and_notes
 from rigid_motion.ui.wording import BAKED, DELTA_EDITED, OUT_OF_DATE, STRIPS
 from tests.animation.keyed import curves_of
 from tests.animation.scenes import give_own_deltas, key, new_object

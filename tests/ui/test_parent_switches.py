@@ -11,7 +11,7 @@ import pytest
 from mathutils import Euler
 
 from rigid_motion.animation import key_frames, set_mode
-from rigid_motion.ui.parent_switches import Switch, switches_in, switches_of
+from rigid_motion.ui.pose_operators import Switch, switches_in, switches_of
 from tests.animation.bones.rigs import pose_mode, select_bones
 
 HAND, TORSO, POLE = "hand_ik.L", "torso", "upper_arm_ik_target.L"

@@ -8,8 +8,7 @@ import pytest
 
 import rigid_motion
 from rigid_motion.animation import set_mode
-from rigid_motion.ui.look import DEFAULT_LOOK
-from rigid_motion.ui.preferences import EXTENSION, default_mode, preferences
+from rigid_motion.ui.preferences import DEFAULT_LOOK, EXTENSION, default_mode, preferences
 from tests.ui.conftest import keyed
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from rigid_motion.animation import is_reduced, modes_of
 from rigid_motion.animation.transforms import transform_of
-from rigid_motion.ui.notes import facts_and_notes
+from rigid_motion.ui.panels import facts_and_notes
 from rigid_motion.ui.targets import (
     CURRENT,
     KEY_EDITORS,

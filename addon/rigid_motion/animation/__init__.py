@@ -29,17 +29,16 @@ from .baking.reducing import (
     restore_keys,
     total_reduction,
 )
-from .baking.sizes import radius_of
-from .compute.modes import MODE_IDS
+from .compute.components import MODE_IDS
 from .edits.breakdowns import Breakdowns, breakdown
-from .edits.exactness import error_between_frames, set_exact
+from .edits.constraints import constraint_trouble, error_between_frames, restore_constraints, set_exact
 from .edits.mode_keys import set_mode, set_turns
-from .edits.repair import constraint_trouble, restore_constraints
-from .live import edit_mode, follower
+from .live import follower, rigs
 from .live.follower import refresh, set_enabled
 from .queries.keyed import key_frames, modes_of
-from .queries.problems import problem_of
+from .queries.segments import problem_of
 from .transforms import Refused
+from .transforms.sizes import radius_of
 
 __all__ = [
     "MODE_IDS",
@@ -81,11 +80,11 @@ __all__ = [
 
 def register() -> None:
     properties.register()
-    edit_mode.register()
+    rigs.register()
     follower.register()
 
 
 def unregister() -> None:
     follower.unregister()
-    edit_mode.unregister()
+    rigs.unregister()
     properties.unregister()

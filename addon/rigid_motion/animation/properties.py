@@ -8,6 +8,7 @@ names that these were first given, so no property is ever renamed.
 from __future__ import annotations
 
 from contextlib import suppress
+from typing import Any
 
 import bpy
 from bpy.props import (
@@ -24,7 +25,7 @@ from bpy.props import (
 
 from ..motion import KEYFRAME_MODES
 from .actions.refusals import MOST_TURNS
-from .baking.copies import BAKED, REDUCED
+from .baking.originals import BAKED, REDUCED
 from .compute.sources import SCREW_AXIS
 from .edits import mode_keys
 from .live import follower
@@ -162,6 +163,13 @@ def _on_original(motion: ObjectMotion, _context: bpy.types.Context) -> None:
     follower.follow_original(transform_of(motion.id_data))
 
 
+KEPT: Any = {"options": {"HIDDEN"}, "override": {"LIBRARY_OVERRIDABLE"}}
+"""How what is kept of something is declared."""
+
+ORIGINAL: Any = {"options": set(), "override": {"LIBRARY_OVERRIDABLE"}, "update": _on_original}
+"""How an object's own delta transforms are."""
+
+
 class _Motion:
     """What all that is moved has."""
 
@@ -190,13 +198,11 @@ class _Motion:
     awaited: EnumProperty(
         description="The mode that was chosen before there was an Action to keep it",
         items=MODE_ITEMS,
-        options={"HIDDEN"},
-        override={"LIBRARY_OVERRIDABLE"},
+        **KEPT,
     )
     mounted: StringProperty(
         description="The constraints that it was given. Who takes one off does so on purpose",
-        options={"HIDDEN"},
-        override={"LIBRARY_OVERRIDABLE"},
+        **KEPT,
     )
     bakes: CollectionProperty(type=ChangedAction, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"})
 
@@ -204,16 +210,14 @@ class _Motion:
 class BoneMotion(_Motion, bpy.types.PropertyGroup):
     recorded_as: StringProperty(
         description="The name that Actions have records of the bone under. Where it has another, it was renamed",
-        options={"HIDDEN"},
-        override={"LIBRARY_OVERRIDABLE"},
+        **KEPT,
     )
 
 
 class ObjectMotion(_Motion, bpy.types.PropertyGroup):
     is_exact: BoolProperty(
         description="Whether in-betweens are exact between frames, by a constraint, and not in delta transforms",
-        options={"HIDDEN"},
-        override={"LIBRARY_OVERRIDABLE"},
+        **KEPT,
     )
     filled: BoolVectorProperty(
         description="Which delta transforms in-betweens are in; the object's own are kept here meanwhile",
@@ -223,16 +227,13 @@ class ObjectMotion(_Motion, bpy.types.PropertyGroup):
     )
     filled_components: IntProperty(
         description="Which components of them, as bits",
-        options={"HIDDEN"},
-        override={"LIBRARY_OVERRIDABLE"},
+        **KEPT,
     )
     own_location: FloatVectorProperty(
         name="Delta Location",
         description="The object's own delta location, to which the in-betweens are added",
         subtype="TRANSLATION",
-        options=set(),
-        override={"LIBRARY_OVERRIDABLE"},
-        update=_on_original,
+        **ORIGINAL,
     )
     own_quaternion: FloatVectorProperty(
         name="Delta Rotation",
@@ -241,37 +242,29 @@ class ObjectMotion(_Motion, bpy.types.PropertyGroup):
         size=4,
         default=(1.0, 0.0, 0.0, 0.0),
         subtype="QUATERNION",
-        options=set(),
-        override={"LIBRARY_OVERRIDABLE"},
-        update=_on_original,
+        **ORIGINAL,
     )
     own_euler: FloatVectorProperty(
         name="Delta Rotation",
         translation_context=OWN_WORDS,
         description="The object's own delta rotation, to which the in-betweens are added",
         subtype="EULER",
-        options=set(),
-        override={"LIBRARY_OVERRIDABLE"},
-        update=_on_original,
+        **ORIGINAL,
     )
     own_scale: FloatVectorProperty(
         name="Delta Scale",
         description="The object's own delta scale, by which the in-betweens are multiplied",
         default=(1.0, 1.0, 1.0),
         subtype="XYZ",
-        options=set(),
-        override={"LIBRARY_OVERRIDABLE"},
-        update=_on_original,
+        **ORIGINAL,
     )
     has_bones: BoolProperty(
         description="Whether bones have modes, or constraints for them",
-        options={"HIDDEN"},
-        override={"LIBRARY_OVERRIDABLE"},
+        **KEPT,
     )
     detached: BoolProperty(
         description="Whether the constraints of bones show nothing, for as long as the rig is in Edit Mode",
-        options={"HIDDEN"},
-        override={"LIBRARY_OVERRIDABLE"},
+        **KEPT,
     )
 
 

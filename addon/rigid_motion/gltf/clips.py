@@ -14,14 +14,11 @@ import numpy as np
 
 from ..motion import SeparateKeys
 from ..motion.skeleton_stretches import Run
-from .errors import NOWHERE, PARTS, World
-from .feet import Feet
+from .errors import NOWHERE, PARTS, Feet, World
 from .nodes import Nodes, by_target, steadied
-from .rewriting import StoredTrack
+from .rewriting import Amount, EveryKey, StoredTrack, amount, amount_before, key_size, shown, stored
 from .search import Search
-from .settling import moments, settled
-from .storing import Amount, EveryKey, amount, amount_before, key_size, shown, stored
-from .thinning import shared_times
+from .settling import moments, settled, shared_times
 from .tracks import ROTATION, TRANSLATION, Clip, Track, Tracks
 from .vertices import largest_displacement
 

@@ -18,6 +18,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
+from urllib.parse import quote, unquote
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = b"glTF", b"JSON", b"BIN\0"
 
@@ -28,9 +29,6 @@ MOST_BYTES = 2**32 - 1
 """Of a GLB, which counts them in 32 bits."""
 
 SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
-
-PLAIN = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-._~/")
-"""What a URI has as it is."""
 
 AGAIN = "export it again"
 
@@ -113,7 +111,7 @@ class Document:
         for number, (buffer, data) in enumerate(zip(objects(self.json, "buffers"), self.buffers, strict=True)):
             if number in self.changed and data is not None and "uri" in buffer and not is_data(buffer["uri"]):
                 file = f"{Path(name).stem}{number or ''}.bin"
-                beside[file], buffer = bytes(data), {**buffer, "uri": quoted(file)}
+                beside[file], buffer = bytes(data), {**buffer, "uri": quote(file)}
             buffers.append(buffer)
         document = {**self.json, "buffers": buffers} if beside else self.json
         text = _as_text(document)
@@ -137,9 +135,7 @@ class Document:
         """Files that the document names and that have not changed, from its folder: names, and what is in them."""
         buffers = [buffer for number, buffer in enumerate(objects(self.json, "buffers")) if number not in self.changed]
         uris = [part.get("uri") for part in (*buffers, *objects(self.json, "images"))]
-        names = {
-            unquoted(uri) for uri in uris if isinstance(uri, str) and not is_data(uri) and is_inside(unquoted(uri))
-        }
+        names = {unquote(uri) for uri in uris if isinstance(uri, str) and not is_data(uri) and is_inside(unquote(uri))}
         return {name: (folder / name).read_bytes() for name in names if (folder / name).is_file()}
 
     @property
@@ -259,18 +255,6 @@ def bytes_of_uri(uri: str) -> bytes:
     return base64.b64decode(data)
 
 
-def unquoted(uri: str) -> str:
-    """Return a path as it is on a disk, of a URI in which signs may be %20 and the like."""
-    return re.sub(
-        b"%([0-9A-Fa-f]{2})", lambda match: bytes.fromhex(match[1].decode()), uri.encode(errors="replace")
-    ).decode(errors="replace")
-
-
-def quoted(path: str) -> str:
-    """Return the URI of a path."""
-    return "".join(chr(byte) if chr(byte) in PLAIN else f"%{byte:02X}" for byte in path.encode())
-
-
 def is_inside(uri: str) -> bool:
     """Whether a path stays in its folder, on whatever system."""
     if SCHEME.match(uri) or PurePosixPath(uri).is_absolute() or PureWindowsPath(uri).anchor:
@@ -291,18 +275,18 @@ def file_of(folder: Path, number: int, uri: object) -> Path:
     GltfError
         Where it is not in the folder or below, or is no file.
     """
-    if not isinstance(uri, str) or not is_inside(uri) or not is_inside(unquoted(uri)):
+    if not isinstance(uri, str) or not is_inside(uri) or not is_inside(unquote(uri)):
         raise GltfError(
             f"buffer {number} is outside of its folder ({shown(uri)})", "export it as .glb, which is one file"
         )
-    path = folder / unquoted(uri)
+    path = folder / unquote(uri)
     try:
         is_there = path.is_file()
     except ValueError:
         is_there = False
     if not is_there:
         raise GltfError(
-            f"buffer {number}, {shown(unquoted(uri))}, is not there",
+            f"buffer {number}, {shown(unquote(uri))}, is not there",
             "bring that file along, or export it as .glb, which is one file",
         )
     return path

@@ -3,22 +3,23 @@
 What animations alone used goes out of the buffers, what they use now comes in behind the rest, in one view. Views and
 images that stay have the same bytes. In files with extensions that are not known here, which may name accessors and
 views in ways of their own, all that stays keeps its number.
+
+How tracks are stored, what they show then, and how many bytes that takes, is told as well.
 """
 
 from __future__ import annotations
 
 import copy
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from .accessors import raw_numbers
-from .documents import Document, FileBytes, Json, data_uri, objects
-from .tracks import LINEAR
-from .writing import GrowingView
+from .accessors import GrowingView, denormalised, raw_numbers, stored_size
+from .documents import Document, FileBytes, Json, data_uri, is_data, objects
+from .tracks import LINEAR, PATHS, ROTATION, TO_WXYZ, TO_XYZW, WEIGHTS, WIDTHS, Clip, Track
 
 KNOWN = re.compile(
     "(?:KHR|EXT)_(?:materials|texture|lights|mesh|animation|node|xmp)_.*|.*_meshopt_compression"
@@ -33,6 +34,12 @@ ALIGNED = 8
 
 Range = tuple[int, int]
 """The first byte, and that behind the last."""
+
+INTEGER = np.iinfo(np.int16).max
+"""What stands for 1 where 16-bit integers are normalised."""
+
+NUMBER, SHORT = 4, 2
+"""Bytes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,9 +91,8 @@ class _Rewriting:
             if number < self.first_new and removed & set(_views_of(self.accessors[number])):
                 self._move(number)
         self.view.json["byteLength"] = max(len(self.view.data), 1)
-        self._renumber(
-            "accessors", unused, list(_accessor_slots(self.json)), {"componentType": 5126, "count": 1, "type": "SCALAR"}
-        )
+        slots = [*_sampler_slots(self.json), *_other_slots(self.json)]
+        self._renumber("accessors", unused, slots, {"componentType": 5126, "count": 1, "type": "SCALAR"})
         buffers = self._buffers(removed)
         self._renumber("bufferViews", removed, list(_view_slots(self.json)), {**self.view.json, "byteLength": 1})
         return buffers
@@ -157,9 +163,9 @@ class _Rewriting:
         target = max(ranges, key=lambda buffer: sum(end - first for first, end in ranges[buffer]), default=-1)
         if target < 0:
             target = len(contents)
-            json.setdefault("buffers", []).append(
-                {"byteLength": 0} | ({} if self._has_room else {"uri": data_uri(b"")})
-            )
+            # A first buffer may be that inside of a GLB.
+            has_room = self.before.chunks is not None and not self.before.buffers
+            json.setdefault("buffers", []).append({"byteLength": 0} | ({} if has_room else {"uri": data_uri(b"")}))
             contents.append(b"")
         users = [user for number, view in enumerate(self.views[:-1]) if number not in removed for user in _spans(view)]
         for buffer in {*ranges, target}:
@@ -179,39 +185,25 @@ class _Rewriting:
         for buffer in {*ranges, target}:
             described = json["buffers"][buffer]
             described["byteLength"] = len(contents[buffer])
-            if isinstance(described.get("uri"), str) and described["uri"][:5].lower() == "data:":
+            if is_data(described.get("uri")):
                 described["uri"] = data_uri(contents[buffer])
         return replace(self.before, json=json, buffers=tuple(contents), changed=self.before.changed | {*ranges, target})
-
-    @property
-    def _has_room(self) -> bool:
-        """Whether a first buffer may be that inside of a GLB."""
-        return self.before.chunks is not None and not self.before.buffers
 
 
 def is_track(channel: Json) -> bool:
     """Whether a channel moves a node in a way that glTF itself knows."""
-    return "node" in channel["target"] and channel["target"].get("path") in (
-        "translation",
-        "rotation",
-        "scale",
-        "weights",
-    )
-
-
-def _accessor_slots(json: Json) -> Iterator[tuple[Any, Any]]:
-    """Every place that names an accessor: what it is in, and by which key."""
-    yield from _sampler_slots(json)
-    yield from _other_slots(json)
+    return "node" in channel["target"] and channel["target"].get("path") in PATHS
 
 
 def _sampler_slots(json: Json) -> Iterator[tuple[Json, str]]:
+    """Every place of animations that names an accessor: what it is in, and by which key."""
     for animation in objects(json, "animations"):
         for sampler in objects(animation, "samplers"):
             yield from ((sampler, key) for key in ("input", "output"))
 
 
 def _other_slots(json: Json) -> Iterator[tuple[Json, str]]:
+    """Every other place that does."""
     for mesh in objects(json, "meshes"):
         for primitive in objects(mesh, "primitives"):
             if "indices" in primitive:
@@ -284,3 +276,76 @@ def _cuts(removed: list[Range], kept: list[Range]) -> list[Range]:
 def _without(data: bytes | FileBytes, cuts: list[Range]) -> bytes:
     begins, ends = [0, *(end for _, end in cuts)], [*(first for first, _ in cuts), len(data)]
     return b"".join(bytes(data[first:end]) for first, end in zip(begins, ends, strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class EveryKey:
+    """The values of a track with a key at all of these times (n,), as they are shown: like an array (n, width)."""
+
+    track: Track
+    times: np.ndarray
+    integers: bool
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        keyed = self.track.keyed(self.times[rows])
+        return shown(keyed, stored(keyed, integers=self.integers)).values
+
+
+@dataclass(frozen=True)
+class Amount:
+    """How much there is of a clip."""
+
+    keys: int
+    """Of all channels together."""
+
+    size: int
+    """Bytes of key times and values."""
+
+
+def stored(track: Track, *, integers: bool) -> StoredTrack:
+    """Return a track without tangents as it is stored; rotations as 16-bit integers where these are asked for."""
+    values = track.values[..., TO_XYZW] if track.path == ROTATION else track.values
+    values = values.reshape(-1, 1 if track.path == WEIGHTS else values.shape[-1])
+    if integers and is_integral(track):
+        values = np.rint(values * INTEGER).astype(np.int16)
+    else:
+        values = values.astype(np.float32)
+    return StoredTrack(track.channel, track.interpolation, track.times.astype(np.float32), values)
+
+
+def is_integral(track: Track) -> bool:
+    """Whether a track may be stored as integers."""
+    return track.path == ROTATION and track.interpolation == LINEAR
+
+
+def shown(track: Track, stored: StoredTrack) -> Track:
+    """Return what is shown by a track as it is stored."""
+    values = denormalised(stored.values) if stored.values.dtype.kind == "i" else stored.values.astype(np.float64)
+    values = values.reshape(len(stored.times), -1)
+    if track.path == ROTATION:
+        values = values[..., TO_WXYZ]
+    return replace(track, interpolation=stored.interpolation, times=stored.times.astype(np.float64), values=values)
+
+
+def key_size(path: str, *, integers: bool) -> int:
+    """Return the bytes of the value of a key of rotation or translation."""
+    return (SHORT if integers and path == ROTATION else NUMBER) * WIDTHS[path]
+
+
+def amount(tracks: Iterable[StoredTrack]) -> Amount:
+    """Keys and bytes of tracks that are to be stored; what is the same is stored once."""
+    tracks = tuple(tracks)
+    parts = {(part.dtype.str, part.tobytes()) for track in tracks for part in track.accessors}
+    return Amount(sum(len(track.times) for track in tracks), sum(len(content) for _, content in parts))
+
+
+def amount_before(document: Document, clip: Clip) -> Amount:
+    """Keys and bytes of the tracks of a clip as it is in the file."""
+    animation = document.json["animations"][clip.number]
+    samplers = [animation["samplers"][animation["channels"][track.channel]["sampler"]] for track in clip.tracks]
+    accessors = {sampler[key] for sampler in samplers for key in ("input", "output")}
+    size = sum(stored_size(document, number) for number in accessors)
+    return Amount(sum(len(track.times) for track in clip.tracks), size)

@@ -1,8 +1,7 @@
 """Bodies that come over a network, in Blender's viewport: heard, shown, recorded as keys; and sent. No user interface.
 
 sockets      the only module that opens one; of commands as well
-retargeting  poses of a stream's skeleton as those of a rig
-driving      from bodies to objects and bones
+driving      from bodies to objects and bones, by which joint is which
 recording    from what came to keys
 ticking      the timer of the two that follow
 receiving    what listens, and what becomes of what comes

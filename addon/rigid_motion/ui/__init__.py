@@ -1,19 +1,13 @@
 """What an animator sees: operators, menus, panels, the overlay and the preferences. No mathematics.
 
-targets      the transforms and keys an editor means    operators    what can be done to them
-on_targets   what these operators have in common        reducing     fewer keys, and all of them again
-keymap       shortcuts
-pose_operators  Blender's operators, with the pose that is seen; parent_switches has Rigify's
-menus        entries in Blender's menus, and the pies   panels       the sidebar
-rows         its lines, aligned                         notes        what the panel notes on a target
-shown        the transform seen on the screen           overlay      paths in the viewport
-look         how they look                              wording      labels and texts
-bake         the one that bakes, with its dialog        slider       a factor, dragged with the mouse
-breakdown    those that key poses by a slider
-exactness    exact between frames, or not
-preferences  of the extension                           manual       where the documentation is
-turn_operator  whole turns between keys
-gltf_export  glTF files with few keys                   live         bodies over a network
+targets         what an editor means, and operators on it    operators    what can be done to that
+pose_operators  Blender's and Rigify's, as is seen           reducing     fewer keys, and all of them again
+menus           entries in Blender's menus, and the pies     breakdown    those that key poses by a slider
+keymap          shortcuts                                    panels       the sidebar, with its notes
+shown           the transform seen on the screen             overlay      paths in the viewport
+wording         labels, texts and lines of a panel           preferences  of the extension
+gltf_export     glTF files with few keys                     live         bodies over a network
+manual          where the documentation is
 """
 
 from __future__ import annotations
@@ -22,7 +16,6 @@ import bpy
 
 from . import (
     breakdown,
-    exactness,
     gltf_export,
     keymap,
     live,
@@ -31,22 +24,17 @@ from . import (
     operators,
     overlay,
     panels,
-    parent_switches,
     pose_operators,
     preferences,
     reducing,
     shown,
-    turn_operator,
 )
 
 CLASSES = (
     *preferences.CLASSES,
     *operators.CLASSES,
-    *turn_operator.CLASSES,
     *breakdown.CLASSES,
-    *exactness.CLASSES,
     *pose_operators.CLASSES,
-    *parent_switches.CLASSES,
     *reducing.CLASSES,
     *gltf_export.CLASSES,
     *menus.CLASSES,

@@ -13,12 +13,12 @@ from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProper
 
 from ..animation.properties import MODE_ITEMS
 from ..live import receiving, sending
-from ..live.retargeting import matched
+from ..live.driving import matched
 from ..live.sockets import NotAllowed
 from ..streams import Body
 from ..streams.vmc import PORT
 from .panels import Folded
-from .rows import draw_text, labelled
+from .wording import draw_text, labelled
 
 HOST = "127.0.0.1"
 

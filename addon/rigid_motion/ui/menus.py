@@ -13,8 +13,7 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ..animation.transforms import OWN_WORDS
 from .gltf_export import RIGID_MOTION_OT_export_gltf
-from .parent_switches import draw_parent_switch
-from .pose_operators import RIGID_MOTION_OT_copy_pose, RIGID_MOTION_OT_create_pose_asset
+from .pose_operators import RIGID_MOTION_OT_copy_pose, RIGID_MOTION_OT_create_pose_asset, draw_parent_switch
 from .targets import CURRENT, SELECTED, WHOLE, active_target, is_posing, modes_meant
 from .wording import LABELS, SHORT_LABELS
 

@@ -9,29 +9,40 @@ import bpy
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.app.translations import pgettext_tip as tip_
-from bpy.props import EnumProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from .. import animation
-from ..animation import Refused
-from ..animation.baking.copies import BAKED
-from ..animation.edits.repair import with_troubles
+from ..animation.actions.records import recorded
+from ..animation.baking.originals import BAKED
+from ..animation.edits.constraints import with_troubles
 from ..animation.live.follower import paused
-from ..animation.properties import MODE_ITEMS, OWN_WORDS
-from ..animation.queries.polls import with_modes
-from ..animation.transforms import Transform
-from .bake import RIGID_MOTION_OT_bake
-from .on_targets import OnChanged, OnTargets
+from ..animation.properties import MODE_ITEMS, MOST_TURNS, SCREW_AXIS, TURN_AXIS_ITEMS
+from ..animation.queries.keyed import active_binding
+from ..animation.queries.polls import with_in_betweens, with_modes
+from ..animation.transforms import OWN_WORDS, Refused, Transform
 from .preferences import DEFAULT_MODE, default_mode
 from .targets import (
+    CURRENT,
     SCOPES,
     SELECTED,
     WHOLE,
+    OnChanged,
+    OnTargets,
+    active_target,
     grouped_by_frames,
+    is_key_editor,
     is_posing,
     scope_for,
     targets_of,
 )
 from .wording import DESCRIPTIONS, LABELS, algebra_of, listed, spoken_of
+
+TURN_SCOPES = [
+    (WHOLE, "All Segments", "All segments get so many turns"),
+    (CURRENT, "Current Segment", "The segment that the playhead is in. The others keep their turns"),
+    (SELECTED, "Selected Keys", "The segments that the selected keys begin. The others keep their turns"),
+]
+"""The parts of a target that get turns, as the items of an enum property."""
 
 SCOPE_NAMES = {scope: label for scope, label, _ in SCOPES}
 
@@ -41,6 +52,167 @@ REFRESHED = (
     n_("In-betweens of {count} Actions refreshed"),
 )
 """The text on what was refreshed, by the number of Actions."""
+
+
+class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
+    bl_idname = "rigid_motion.bake"
+    bl_label = "Bake to Keys"
+    bl_description = (
+        "Put the in-betweens on location, rotation and scale as real keys of type Generated, in a copy of the Action, "
+        "for hand-over to programs that read keys only. Un-Bake gives the original back"
+    )
+
+    nothing_to_do = n_("There are no rigid in-betweens to bake: choose a mode for keys of these objects first")
+    with_work = staticmethod(with_in_betweens)
+
+    step: FloatProperty(
+        name="Step",
+        description="Frames from one baked key to the next. Below 1 there are keys between the frames, for motion blur",
+        default=1.0,
+        min=0.01,
+        soft_min=0.1,
+        soft_max=10.0,
+        step=25,
+        precision=2,
+    )
+    interpolation: EnumProperty(
+        name="Interpolation",
+        description="What is between baked keys",
+        items=[
+            ("LINEAR", "Linear", "Straight lines"),
+            ("CONSTANT", "Constant", "Each pose holds until the next key: with a step of 2 the motion is on twos"),
+        ],
+        translation_context=OWN_WORDS,
+    )
+    frames: EnumProperty(
+        name="Frames",
+        description="What to bake, widened to whole segments, and those of smooth modes beside them",
+        items=[
+            ("ACTION", "Action", "From the first key of each to its last"),
+            ("SCENE", "Scene", "The frame range of the scene, or its preview range while that is in use"),
+            ("CUSTOM", "Custom", "From one frame to another"),
+        ],
+        translation_context=OWN_WORDS,
+    )
+    first: FloatProperty(name="Start", description="First frame to bake", default=1.0, step=100, precision=2)
+    last: FloatProperty(name="End", description="Last frame to bake", default=250.0, step=100, precision=2)
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        if self.frames != "CUSTOM":
+            self.first, self.last = _range_of(context.scene)
+        return context.window_manager.invoke_props_dialog(self, confirm_text="Bake")
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(self, "step")
+        layout.row().prop(self, "interpolation", expand=True)
+        layout.row().prop(self, "frames", expand=True)
+        if self.frames == "CUSTOM":
+            column = layout.column(align=True)
+            column.prop(self, "first")
+            column.prop(self, "last")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        first, last = self._range(context)
+        if first is not None and first > last:
+            text = rpt_("The range to bake ends on frame {last:g}, before its start, {first:g}")
+            self.report({"ERROR"}, text.format(last=last, first=first))
+            return {"CANCELLED"}
+        return super().execute(context)
+
+    def do(self, context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
+        first, last = self._range(context)
+        begin, end = animation.bake(
+            targets, step=self.step, first=first, last=last, interpolation=self.interpolation, refused=refused
+        )
+        return rpt_("baked from frame {first:g} to {last:g}").format(first=begin, last=end)
+
+    def _range(self, context: bpy.types.Context) -> tuple[float, float] | tuple[None, None]:
+        if self.frames == "ACTION":
+            return None, None
+        return _range_of(context.scene) if self.frames == "SCENE" else (self.first, self.last)
+
+
+def _range_of(scene: bpy.types.Scene) -> tuple[int, int]:
+    if scene.use_preview_range:
+        return scene.frame_preview_start, scene.frame_preview_end
+    return scene.frame_start, scene.frame_end
+
+
+class RIGID_MOTION_OT_set_turns(OnTargets, bpy.types.Operator):
+    bl_idname = "rigid_motion.set_turns"
+    bl_label = "Set Turns"
+    bl_description = "Have the selected objects make whole turns more from key to key"
+
+    turns: IntProperty(
+        name="Turns",
+        description="Whole turns more than there are without, in the same sense; against it where negative",
+        default=1,
+        min=-MOST_TURNS,
+        max=MOST_TURNS,
+        soft_min=-20,
+        soft_max=20,
+    )
+    axis: EnumProperty(
+        name="Axis",
+        description="What the turns are about, in all segments",
+        items=TURN_AXIS_ITEMS,
+        default=SCREW_AXIS,
+        translation_context=OWN_WORDS,
+    )
+    on: EnumProperty(
+        name="Segments",
+        description="Which segments get the turns",
+        items=TURN_SCOPES,
+        default=CURRENT,
+        translation_context=OWN_WORDS,
+        options={"SKIP_SAVE"},
+    )
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        if not self.properties.is_property_set("on"):
+            self.on = SELECTED if is_key_editor(context) else CURRENT
+        active = active_target(context)
+        if active is not None and (binding := active_binding(active)) is not None:
+            self.turns, self.axis = active.motion.turns or 1, recorded(binding).turns_axis
+        return context.window_manager.invoke_props_dialog(self, confirm_text="Set Turns")
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        for name in ("turns", "axis", "on"):
+            layout.prop(self, name)
+
+    def do(self, context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
+        axis = self.axis if self.properties.is_property_set("axis") else None
+        for frames, group in grouped_by_frames(context, targets, self.on, refused).items():
+            animation.set_turns(group, self.turns, frames, axis=axis, refused=refused)
+        return rpt_("{turns} turns more").format(turns=self.turns)
+
+
+class RIGID_MOTION_OT_exact(OnTargets, bpy.types.Operator):
+    bl_idname = "rigid_motion.exact"
+    bl_label = "Exact Between Frames"
+    bl_description = (
+        "Follow the modes between whole frames as well, for motion blur, strips in slow motion and fast moves: "
+        "by a constraint in place of delta transforms"
+    )
+    nothing_to_do = n_("What is selected is exact between frames anyway")
+    with_work = staticmethod(lambda targets: (target for target in targets if not target.is_part))
+    leaves_others = True
+
+    is_exact: BoolProperty(
+        name="Exact",
+        description="Off, in-betweens are in delta transforms, which are right on whole frames",
+        default=True,
+    )
+
+    def do(self, _context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
+        animation.set_exact(targets, self.is_exact, refused=refused)
+        return rpt_("exact between frames") if self.is_exact else rpt_("exact on whole frames")
 
 
 class RIGID_MOTION_OT_set_mode(OnTargets, bpy.types.Operator):
@@ -162,6 +334,8 @@ class RIGID_MOTION_OT_refresh(bpy.types.Operator):
 CLASSES = (
     RIGID_MOTION_OT_set_mode,
     RIGID_MOTION_OT_clear,
+    RIGID_MOTION_OT_set_turns,
+    RIGID_MOTION_OT_exact,
     RIGID_MOTION_OT_bake,
     RIGID_MOTION_OT_unbake,
     RIGID_MOTION_OT_mend,

@@ -10,32 +10,113 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from .. import animation
-from ..animation.actions.records import record_of
+from ..animation.actions.records import record_of, recorded_digest
+from ..animation.actions.slots import active_fcurves
 from ..animation.compute.components import SCALE
-from ..animation.queries.keyed import active_binding
+from ..animation.compute.sources import Source
+from ..animation.queries.keyed import active_binding, active_binding_alone, source_of
 from ..animation.queries.polls import with_in_betweens
-from ..animation.queries.segments import SegmentFacts, parts_with_in_betweens
-from ..animation.transforms import ORIGINALS, OWN_WORDS, Refused, Transform
-from . import exactness, overlay
-from .notes import facts_and_notes
-from .parent_switches import RIGID_MOTION_OT_switch_parent, draw_parent_switch
-from .rows import draw_text, labelled
-from .targets import (
-    CURRENT,
-    SELECTED,
-    WHOLE,
-    active_target,
-    fcurves_of,
-    is_key_editor,
-    modes_meant,
-    with_keyed_bones,
+from ..animation.queries.segments import (
+    SegmentFacts,
+    frame_in_action,
+    has_edited_differences,
+    is_blended,
+    is_up_to_date,
+    parts_with_in_betweens,
+    segment_at,
 )
-from .wording import LABELS, NO_BONE, OUT_OF_DATE, TROUBLES, length, reduced_to, turn
+from ..animation.transforms import ORIGINALS, OWN_WORDS, Refused, Transform, transform_of
+from ..animation.transforms.sizes import metres_per_unit
+from . import overlay
+from .pose_operators import RIGID_MOTION_OT_switch_parent, draw_parent_switch
+from .targets import CURRENT, SELECTED, WHOLE, active_target, is_key_editor, modes_meant, with_keyed_bones
+from .wording import (
+    BAKED,
+    BLENDED,
+    DELTA_EDITED,
+    KEYED_BONES,
+    LABELS,
+    NO_BONE,
+    NO_KEYS,
+    NO_SEGMENT,
+    OUT_OF_DATE,
+    STRIPS,
+    TROUBLES,
+    cautions,
+    draw_text,
+    labelled,
+    length,
+    reduced_to,
+    turn,
+)
+
+Notes = list[tuple[str, str]]
+"""Texts, each behind its icon."""
 
 CATEGORY = "Animation"
 """The tab of the sidebar: in the viewport Blender has its own tools for animation there."""
 
 SPACES = ("VIEW_3D", "DOPESHEET_EDITOR", "GRAPH_EDITOR")
+
+PROMISED = 0.0001
+"""The largest error between frames of what is to be exact there, in metres."""
+
+WORTH_OFFERING = 0.001
+"""From which error on, in metres, an object is offered to be exact."""
+
+
+def facts_and_notes(
+    target: bpy.types.Object | bpy.types.PoseBone | Transform, frame: float
+) -> tuple[SegmentFacts | None, Notes]:
+    """Return the segment that a frame of the scene is in, and notes on it."""
+    target = transform_of(target)
+    source, problem = _read(target)
+    segment = None
+    notes = []
+    if problem:
+        notes.append(("ERROR", problem))
+    elif source is None:
+        data = target.animated.animation_data
+        in_strips = data is not None and any(track.strips for track in data.nla_tracks)
+        of_bones = with_keyed_bones(target) != [target]
+        notes.append(("INFO", KEYED_BONES if of_bones else STRIPS if in_strips else NO_KEYS))
+    else:
+        frame = frame_in_action(target.animated, frame)
+        segment = segment_at(source, frame)
+        notes += [("ERROR", caution) for caution in cautions(segment)] if segment else [("INFO", NO_SEGMENT)]
+        if not is_up_to_date(target, source):
+            notes.append(("ERROR", OUT_OF_DATE))
+        elif target.animated.visible_get() and has_edited_differences(target, frame):
+            # What is hidden need not have been evaluated on this frame.
+            notes.append(("INFO", DELTA_EDITED))
+    if trouble := animation.constraint_trouble(target):
+        notes.append(TROUBLES[trouble])
+    if is_blended(target):
+        notes.append(("INFO", BLENDED))
+    if animation.is_baked(target):
+        notes.append(("INFO", BAKED))
+    return segment, notes
+
+
+_problem: tuple[tuple, str] = ((), "")
+"""The last answer of `problem_of`, which looks through all frames; and before it, all that it depends on."""
+
+
+def _read(target: Transform) -> tuple[Source | None, str]:
+    """Return what is keyed, or why rigid motion cannot act on it."""
+    global _problem
+    try:
+        source = source_of(target)
+    except ValueError as problem:
+        return None, str(problem)
+    if source is None:
+        return None, animation.problem_of(target)
+    # What the slot was filled in from as well: of several users it is the source of the leading one.
+    binding = active_binding_alone(target)
+    depends_on = (target.animated.session_uid, target.prefix, source.digest, binding and recorded_digest(binding))
+    if _problem[0] != depends_on:
+        _problem = depends_on, animation.problem_of(target)
+    return (None if _problem[1] else source), _problem[1]
 
 
 class InSidebar:
@@ -66,7 +147,7 @@ class _Main(InSidebar):
             )
         label = iface_(target.label, OWN_WORDS)
         mode_path, _ = target.mode_channel
-        if any(fcurve.data_path == mode_path for fcurve in fcurves_of(target.animated)):
+        if any(fcurve.data_path == mode_path for fcurve in active_fcurves(target.animated)):
             _draw_mode_menu(labelled(layout, label), WHOLE, modes_meant(context, target, WHOLE))
         else:
             labelled(layout, label).prop(target.motion, "mode", text="")
@@ -74,7 +155,7 @@ class _Main(InSidebar):
             _draw_segment(context, layout, segment)
             if segment.mode != "BLENDER":
                 _draw_turns(layout, target)
-        exactness.draw(context, layout, target)
+        _draw_exactness(context, layout, target)
         for icon, text in notes:
             draw_text(context, layout, text, icon)
         if ("ERROR", OUT_OF_DATE) in notes:
@@ -185,6 +266,23 @@ def _draw_mode_menu(layout: bpy.types.UILayout, scope: str, modes: set[str]) -> 
     layout.enabled = bool(modes)
     text = iface_(LABELS[next(iter(modes))]) if len(modes) == 1 else iface_("Mixed") if modes else iface_("None")
     layout.operator_menu_enum("rigid_motion.set_mode", "mode", text=text, translate=False).on = scope
+
+
+def _draw_exactness(context: bpy.types.Context, layout: bpy.types.UILayout, target: Transform) -> None:
+    """Draw how far off a target is between frames, where that is more than there should be, and what to do about it."""
+    error, is_exact = animation.error_between_frames(target), target.has_difference_slot
+    is_off = error > (PROMISED if is_exact else WORTH_OFFERING)
+    if not is_off and (target.is_part or not is_exact):
+        return
+    scene = context.scene
+    text = iface_("Exact")
+    if is_off:
+        text = iface_("{distance} off").format(distance=length(scene, error / metres_per_unit(scene), precision=2))
+    row = labelled(layout, iface_("Subframes", OWN_WORDS))
+    if target.is_part:
+        row.label(text=text, translate=False)
+    else:
+        row.operator("rigid_motion.exact", text=text, translate=False, depress=is_exact).is_exact = not is_exact
 
 
 def _draw_reduction(context: bpy.types.Context, layout: bpy.types.UILayout, target: Transform) -> None:

@@ -1,6 +1,12 @@
-"""The preferences of the extension. They go with Blender's own, and not with a file."""
+"""The preferences of the extension, and how the overlay looks before anybody has changed them.
+
+They go with Blender's own, and not with a file. Colours are red, green, blue, alpha, as on the screen, widths in pixels
+at a resolution scale of 1.
+"""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty
@@ -8,12 +14,26 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 from .. import animation
 from ..animation.properties import MODE_ITEMS, OWN_WORDS
 from . import keymap, manual
-from .look import DEFAULT_LOOK
+
+Color = tuple[float, float, float, float]
 
 EXTENSION = __package__.rpartition(".")[0]
 """The name that Blender knows the extension by: the package that this one is in."""
 
 DEFAULT_MODE = "motor_spline"
+
+
+class Look(NamedTuple):
+    """The preferences of the overlay. Those of the extension have the same names."""
+
+    native_color: Color = (0.80, 0.80, 0.80, 1.0)
+    mode_color: Color = (0.20, 0.72, 1.0, 1.0)
+    key_color: Color = (1.0, 0.75, 0.20, 1.0)
+    tick_color: Color = (1.0, 1.0, 1.0, 1.0)
+    line_width: float = 2.0
+
+
+DEFAULT_LOOK = Look()
 
 
 def preferences() -> RigidMotionPreferences | None:

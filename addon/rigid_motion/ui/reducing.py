@@ -12,15 +12,13 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from .. import animation
 from ..animation import Refused
-from ..animation.baking.copies import REDUCED
-from ..animation.baking.sizes import first_tolerance
+from ..animation.baking.originals import REDUCED
 from ..animation.properties import MODE_ITEMS, OWN_WORDS
 from ..animation.queries.polls import with_more_keys_than
 from ..animation.transforms import Transform
-from .on_targets import OnChanged, OnTargets
-from .rows import labelled
-from .targets import each_target, with_bones_of_rigs
-from .wording import counted_modes, reduced_to, reduction_rows, reduction_summary
+from ..animation.transforms.sizes import first_tolerance
+from .targets import OnChanged, OnTargets, each_target, with_bones_of_rigs
+from .wording import counted_modes, labelled, reduced_to, reduction_rows, reduction_summary
 
 MOST_LISTED = 5
 """Targets whose reductions are listed one by one."""
@@ -136,7 +134,10 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
         for name in ("radius", "mode", "best_of", *(of_rigs if rigs else ())):
             layout.prop(self, name)
         if rigs:
-            self._draw_rigs(context.scene, targets)
+            reduction = animation.total_reduction(targets)
+            column = layout.column(align=True)
+            for label, text in () if reduction is None else reduction_rows(context.scene, reduction):
+                labelled(column, label).label(text=text, translate=False)
             return
         for target in targets[:MOST_LISTED]:
             if (reduction := animation.reduction_of(target)) is not None:
@@ -145,14 +146,6 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
                     column = layout.column(align=True)
                     for line in counted_modes(reduction.segments):
                         labelled(column).label(text=line, translate=False)
-
-    def _draw_rigs(self, scene: bpy.types.Scene, targets: list[Transform]) -> None:
-        reduction = animation.total_reduction(targets)
-        if reduction is None:
-            return
-        column = self.layout.column(align=True)
-        for label, text in reduction_rows(scene, reduction):
-            labelled(column, label).label(text=text, translate=False)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         targets = list(self.each_target(context))

@@ -1,4 +1,8 @@
-"""The words of the interface: names of modes, notes on a segment, summaries, lines that fit a panel."""
+"""The words of the interface: names of modes, notes on a segment, summaries, and lines of a panel.
+
+Lines are aligned with one another: a narrow label, and to the right of it what belongs to it. Blender's own split gives
+labels two fifths of the width, and cuts the names of modes off in a sidebar as it opens.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +10,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
+import blf
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
@@ -15,7 +20,7 @@ from ..animation import Reduction, WholeRig
 from ..animation.properties import MODE_ITEMS, OWN_WORDS
 from ..animation.queries.segments import NEAR_HALF_TURN, SegmentFacts
 from ..animation.transforms import Transform
-from ..animation.writers.constraint_repair import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
+from ..animation.writers.bone_constraints import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
 from ..motion import KEYFRAME_MODES
 
 LABELS = {name: label for name, label, *_ in MODE_ITEMS}
@@ -67,6 +72,12 @@ COUNTED = {
     "objects and bones": n_("{count} objects and bones"),
 }
 """Several targets by their number."""
+
+LABEL = 0.28
+"""The part of the width that labels have."""
+
+MARGIN = 84
+"""Pixels of a sidebar that text cannot have, at a resolution scale of 1: tabs, an icon, and the panel's edges."""
 
 
 def cautions(segment: SegmentFacts) -> list[str]:
@@ -207,10 +218,10 @@ def listed(items: Sequence[str], most: int = 3) -> str:
 
 def names_of(targets: Sequence[Transform]) -> str:
     """Return one target by its name, several by their number."""
-    return targets[0].name if len(targets) == 1 else rpt_(COUNTED[kind_of(targets)]).format(count=len(targets))
+    return targets[0].name if len(targets) == 1 else rpt_(COUNTED[plural_of(targets)]).format(count=len(targets))
 
 
-def kind_of(targets: Iterable[Transform]) -> str:
+def plural_of(targets: Iterable[Transform]) -> str:
     """Return what several targets are called together."""
     kinds = {target.plural for target in targets}
     return "objects and bones" if len(kinds) > 1 else next(iter(kinds), "objects")
@@ -236,3 +247,24 @@ def wrapped(text: str, fits: Callable[[str], bool]) -> list[str]:
         else:
             lines.append(word)
     return lines
+
+
+def labelled(layout: bpy.types.UILayout, label: str = "") -> bpy.types.UILayout:
+    """Return the right-hand part of a row, with a label on the left, in the user's language."""
+    split = layout.split(factor=LABEL)
+    left = split.row()
+    left.alignment = "RIGHT"
+    left.label(text=label, translate=False)
+    return split.row()
+
+
+def draw_text(context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str) -> None:
+    """Draw a text that is broken into as many lines as the region's width asks for."""
+    system = context.preferences.system
+    width = context.region.width - MARGIN * system.ui_scale
+    blf.size(0, context.preferences.ui_styles[0].widget.points * system.ui_scale)
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    for line in wrapped(iface_(text), lambda line: blf.dimensions(0, line)[0] <= width):
+        column.label(text=line, icon=icon, translate=False)
+        icon = "BLANK1"

@@ -9,10 +9,9 @@ import bpy
 
 from rigid_motion import animation
 from rigid_motion.animation import NeedsItsKeys, Reduction, Refused, WholeRig
-from rigid_motion.animation.baking.sizes import first_tolerance, rig_size
 from rigid_motion.animation.queries.polls import with_more_keys_than
 from rigid_motion.animation.transforms import Transform
-from rigid_motion.animation.transforms.reaches import metres_per_unit
+from rigid_motion.animation.transforms.sizes import first_tolerance, metres_per_unit, rig_size
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.keying.reductions import Reductions, doubt, fewer, off
 from rigid_motion_batch.keying.sessions import counted

@@ -12,10 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigid_motion.gltf.accessors import numbers
+from rigid_motion.gltf.accessors import GrowingView, numbers
 from rigid_motion.gltf.documents import Document, Json, objects
 from rigid_motion.gltf.tracks import CUBICSPLINE, LINEAR, ROTATION, STEP, TRANSLATION, WIDTHS, Track
-from rigid_motion.gltf.writing import GrowingView
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion.motion.repair import LARGEST
 

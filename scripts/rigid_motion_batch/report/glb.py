@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from rigid_motion.gltf import Document, Options, reduced
-from rigid_motion.gltf.writing import GrowingView, in_one_buffer
+from rigid_motion.gltf.accessors import GrowingView, in_one_buffer
 from rigid_motion.motion import Poses, interpolate
 from rigid_motion.motion.quaternions import align_signs
 from rigid_motion_batch.analysis.modes import label_of

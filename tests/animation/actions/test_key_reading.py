@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigid_motion.animation.actions.key_reading import read_keys
-from rigid_motion.animation.curves import Cycles
+from rigid_motion.animation.actions.channels import read_keys
+from rigid_motion.animation.curves.keys import Cycles
 from tests.animation.curves.examples import as_fcurve, keys_of, read_one
 
 

@@ -9,7 +9,7 @@ from hypothesis import settings
 from hypothesis.stateful import rule
 
 from rigid_motion.animation.live import follower
-from rigid_motion.animation.writers import drafts
+from rigid_motion.animation.writers import filling
 from tests.animation.bones.test_bone_states import EditingBones
 from tests.animation.editing import frames_in
 from tests.thoroughness import THOROUGH
@@ -20,11 +20,11 @@ class EditingBonesInAWindow(EditingBones):
 
     def __init__(self) -> None:
         super().__init__()
-        self.large, drafts.LARGE = drafts.LARGE, 0
+        self.large, filling.LARGE = filling.LARGE, 0
         follower.set_drafts(True)
 
     def teardown(self) -> None:
-        drafts.LARGE = self.large
+        filling.LARGE = self.large
         super().teardown()
 
     @rule(frame=frames_in)

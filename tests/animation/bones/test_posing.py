@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 from hypothesis import HealthCheck, given, settings
 
-from rigid_motion.animation.baking.channel_maps import evaluated
+from rigid_motion.animation.baking.motions import evaluated
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion.animation.transforms.posing import Hierarchy
 from rigid_motion.motion.affine import AffineMaps

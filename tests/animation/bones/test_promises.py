@@ -16,7 +16,7 @@ from hypothesis import HealthCheck, given, settings
 
 from rigid_motion import animation
 from rigid_motion.animation import Refused, reduce_keys_of, total_reduction
-from rigid_motion.animation.baking.followers import not_promised
+from rigid_motion.animation.baking.motions import not_promised
 from rigid_motion.animation.queries.polls import with_more_keys_than
 from rigid_motion.animation.transforms import transform_of
 from tests.animation.bones.players import Player

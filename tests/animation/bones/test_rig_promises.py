@@ -9,9 +9,9 @@ from mathutils import Vector
 
 from rigid_motion import animation
 from rigid_motion.animation import is_reduced, reduce_keys_of, reduction_of, total_reduction, write_channel
-from rigid_motion.animation.baking.followers import not_promised
-from rigid_motion.animation.baking.sizes import first_tolerance, reach_of, rig_size
+from rigid_motion.animation.baking.motions import not_promised
 from rigid_motion.animation.transforms import transform_of
+from rigid_motion.animation.transforms.sizes import first_tolerance, reach_of, rig_size
 from tests.animation.bones.test_rig_reducing import RADIUS, TOLERANCE, bones, errors, matrices
 from tests.animation.scenes import new_object
 from tests.rigs.recorded import FRAMES, NAMES, recorded_rig

@@ -9,7 +9,7 @@ import pytest
 from rigid_motion.animation import modes_of, refresh, set_mode
 from rigid_motion.animation.actions.records import recorded_mode
 from rigid_motion.animation.actions.slots import bindings_for
-from rigid_motion.animation.compute.modes import MODE_NAMES
+from rigid_motion.animation.compute.components import MODE_NAMES
 from rigid_motion.animation.transforms import transform_of
 from tests.animation.bones.poses import assert_posed
 from tests.animation.bones.rigs import ARM, FRAMES, PLAYED, Rest, key_all, moving_rig, new_rig, own_constraints

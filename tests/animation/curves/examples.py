@@ -10,8 +10,9 @@ import bpy
 import numpy as np
 from hypothesis import strategies as st
 
-from rigid_motion.animation.actions.key_reading import read_keys
-from rigid_motion.animation.curves import EASINGS, ELASTIC, INTERPOLATIONS, Cycles, Keys, evaluate
+from rigid_motion.animation.actions.channels import read_keys
+from rigid_motion.animation.curves.evaluation import evaluate
+from rigid_motion.animation.curves.keys import EASINGS, ELASTIC, INTERPOLATIONS, Cycles, Keys
 
 CODES = {name: code for code, name in INTERPOLATIONS.items()}
 MODES = ("NONE", "REPEAT", "REPEAT_OFFSET", "MIRROR")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from rigid_motion.animation.curves import Cycles, TooManyRounds, cycled, cyclic_times
+from rigid_motion.animation.curves.keys import Cycles, TooManyRounds, cycled, cyclic_times
 from tests.animation.curves.examples import MODES, all_cycles, curves, evaluate_one, frames_about, keys_of
 from tests.thoroughness import tried
 

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_motion.animation.curves import EASINGS, INTERPOLATIONS, Keys, cycled, cyclic_times, evaluate
+from rigid_motion.animation.curves.evaluation import evaluate
+from rigid_motion.animation.curves.keys import EASINGS, INTERPOLATIONS, Keys, cycled, cyclic_times
 from tests.animation.curves.examples import (
     CODES,
     all_cycles,

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from rigid_motion.animation.curves.fitting import fit_together
+from rigid_motion.animation.curves.solvers import fit_together
 
 TIMES = np.linspace(0.0, 1.0, 41)
 

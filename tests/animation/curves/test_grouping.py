@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_motion.animation.curves import EASINGS, evaluate
+from rigid_motion.animation.curves.evaluation import evaluate
+from rigid_motion.animation.curves.keys import EASINGS
 from tests.animation.curves.examples import all_cycles, curves, evaluate_one, frames_about, joined, keys_of
 from tests.thoroughness import tried
 

@@ -8,7 +8,8 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation.curves import EASINGS, INTERPOLATIONS, evaluate
+from rigid_motion.animation.curves.evaluation import evaluate
+from rigid_motion.animation.curves.keys import EASINGS, INTERPOLATIONS
 from tests.animation.curves.examples import as_fcurve, evaluate_one, joined, keys_of, read_one
 
 EDITS: dict[str, Callable[[bpy.types.FCurve], None]] = {

@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 import pytest
 
-from rigid_motion.animation.live.depsgraphs import objects_to_evaluate
+from rigid_motion.animation.live.edited import objects_to_evaluate
 from tests.animation.scenes import new_object
 from tests.blank import blank
 

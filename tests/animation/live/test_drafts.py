@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from rigid_motion import animation
-from rigid_motion.animation.live import between_frames, follower
-from rigid_motion.animation.writers import drafts
+from rigid_motion.animation.live import edited, follower
+from rigid_motion.animation.writers import filling
 from tests.animation.bones.rigs import moving_rig
 from tests.animation.bones.test_between_frames import EIGHTHS, PROMISE, largest_error
 from tests.animation.keyed import curves_of
@@ -23,7 +23,7 @@ WHOLE = np.arange(1.0, 41.0)
 @pytest.fixture
 def window(live_file, monkeypatch) -> Iterator[bpy.types.Context]:
     """A new file that is edited as in a window, in which every rig is large."""
-    monkeypatch.setattr(drafts, "LARGE", 0)
+    monkeypatch.setattr(filling, "LARGE", 0)
     follower.set_drafts(True)
     yield live_file
     follower.set_drafts(False)
@@ -194,7 +194,7 @@ def test_small_rigs_are_exact_at_once(window, monkeypatch):
 
 
 def test_nothing_is_in_draft_without_a_window(live_file, monkeypatch):
-    monkeypatch.setattr(drafts, "LARGE", 0)
+    monkeypatch.setattr(filling, "LARGE", 0)
     assert bpy.app.background
     rig = moving_rig()
     edit(rig)
@@ -202,9 +202,9 @@ def test_nothing_is_in_draft_without_a_window(live_file, monkeypatch):
 
 
 def test_a_render_waits_for_the_main_thread_but_not_for_ever(monkeypatch):
-    monkeypatch.setattr(between_frames, "PATIENCE", 0.0)
+    monkeypatch.setattr(edited, "PATIENCE", 0.0)
     done: list[str] = []
-    thread = threading.Thread(target=between_frames.on_main_thread, args=(lambda: done.append("done"),))
+    thread = threading.Thread(target=edited.on_main_thread, args=(lambda: done.append("done"),))
     thread.start()
     thread.join()
     assert done == ["done"]

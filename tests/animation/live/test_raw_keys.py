@@ -9,8 +9,8 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation.live import raw_keys
-from rigid_motion.animation.live.raw_keys import key_reader
+from rigid_motion.animation.live import snapshots
+from rigid_motion.animation.live.snapshots import key_reader
 from tests.animation.keyed import curves_of
 from tests.animation.scenes import key, new_object
 
@@ -20,7 +20,7 @@ WARNING = "not in memory as expected"
 @pytest.fixture(autouse=True)
 def unchecked(monkeypatch: pytest.MonkeyPatch) -> None:
     """Memory that was not checked yet."""
-    monkeypatch.setattr(raw_keys._Layout, "size", None)
+    monkeypatch.setattr(snapshots._Layout, "size", None)
 
 
 @pytest.fixture
@@ -38,12 +38,12 @@ def test_memory_of_this_blender_is_as_expected(channels, caplog):
     read = key_reader(channels)
     with caplog.at_level(logging.WARNING):
         sizes = [len(content) for content in read()]
-    assert raw_keys._Layout.size >= 4 * raw_keys.NUMBERS
-    assert sizes == [raw_keys._Layout.size * len(keys) for keys in channels]
+    assert snapshots._Layout.size >= 4 * snapshots.NUMBERS
+    assert sizes == [snapshots._Layout.size * len(keys) for keys in channels]
     assert WARNING not in caplog.text
 
 
-read_memory = raw_keys._view
+read_memory = snapshots._view
 
 
 def shifted(address: int, size: int) -> np.ndarray:
@@ -100,18 +100,18 @@ def assert_changes_are_seen(channels, read) -> None:
 def test_every_change_is_seen_however_keys_are_in_memory(channels, monkeypatch, caplog, how):
     read = key_reader([Scattered(keys) for keys in channels] if how == "scattered" else channels)
     if how != "as expected":
-        monkeypatch.setattr(raw_keys, "_view", shifted if how == "shifted" else unread)
+        monkeypatch.setattr(snapshots, "_view", shifted if how == "shifted" else unread)
         with caplog.at_level(logging.WARNING):
             read()
-        assert raw_keys._Layout.size == 0
+        assert snapshots._Layout.size == 0
         assert caplog.text.count(WARNING) == 1
-        monkeypatch.setattr(raw_keys, "_view", unread)
+        monkeypatch.setattr(snapshots, "_view", unread)
     assert_changes_are_seen(channels, read)
 
 
 def test_single_keys_are_read_before_anything_is_known_of_memory(channels):
     read = key_reader(channels[-1:])
     before = read()
-    assert raw_keys._Layout.size is None
+    assert snapshots._Layout.size is None
     channels[-1][0].co.y += 1.0
     assert read() != before

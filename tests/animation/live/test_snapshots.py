@@ -10,7 +10,7 @@ import pytest
 
 from rigid_motion.animation import set_enabled
 from rigid_motion.animation.actions.slots import Slot, slots_in
-from rigid_motion.animation.live import raw_keys
+from rigid_motion.animation.live import snapshots
 from rigid_motion.animation.live.follower import follower
 from rigid_motion.animation.live.snapshots import Snapshots
 from tests.animation.bones.rigs import key_all, new_rig
@@ -28,9 +28,9 @@ def view_of_other_memory(address: int, size: int) -> np.ndarray:
 def rig(request, live_file, monkeypatch, caplog) -> Iterator[bpy.types.Object]:
     """A rig with keys on all bones, one of which has a single key; a snapshot is taken of it, by no other."""
     set_enabled(False)
-    monkeypatch.setattr(raw_keys._Layout, "size", None)
+    monkeypatch.setattr(snapshots._Layout, "size", None)
     if request.param == "by property":
-        monkeypatch.setattr(raw_keys, "_view", view_of_other_memory)
+        monkeypatch.setattr(snapshots, "_view", view_of_other_memory)
     monkeypatch.setattr(follower, "snapshots", Snapshots())
     rig = new_rig()
     key_all(rig)
@@ -39,7 +39,7 @@ def rig(request, live_file, monkeypatch, caplog) -> Iterator[bpy.types.Object]:
             rig.pose.bones["Hand"].keyframe_delete(path, frame=frame)
     assert edited(rig) == EVERYTHING
     warnings = [record for record in caplog.records if "not in memory as expected" in record.message]
-    assert (raw_keys._Layout.size == 0, len(warnings)) == ((True, 1) if request.param == "by property" else (False, 0))
+    assert (snapshots._Layout.size == 0, len(warnings)) == ((True, 1) if request.param == "by property" else (False, 0))
     caplog.clear()
     yield rig
     set_enabled(True)

@@ -28,18 +28,18 @@ def speak(language: str) -> None:
 @contextmanager
 def panel_texts() -> Iterator[list[str]]:
     """The notes of the panel as they are broken into lines, in the language that they are drawn in."""
-    rows = import_module(f"{extension().module}.ui.rows")
-    wrapped, seen = rows.wrapped, []
+    wording = import_module(f"{extension().module}.ui.wording")
+    wrapped, seen = wording.wrapped, []
 
     def noted(text, fits):
         seen.append(text)
         return wrapped(text, fits)
 
-    rows.wrapped = noted
+    wording.wrapped = noted
     try:
         yield seen
     finally:
-        rows.wrapped = wrapped
+        wording.wrapped = wrapped
 
 
 def refusal() -> str:

@@ -47,7 +47,7 @@ class Reader:
 
     def __init__(self, hand: Hand, view: bpy.types.Area) -> None:
         self.hand, self.view = hand, view
-        self.notes = import_module(f"{extension().module}.ui.notes")
+        self.panels = import_module(f"{extension().module}.ui.panels")
         self.before = np.empty(0)
 
     def read(self, name: str, *words: str, mode: str | None = None) -> Steps[None]:
@@ -63,7 +63,7 @@ class Reader:
             That of the segment under the playhead, None where the panel shows no segment.
         """
         yield
-        segment, notes = self.notes.facts_and_notes(cube(), bpy.context.scene.frame_current)
+        segment, notes = self.panels.facts_and_notes(cube(), bpy.context.scene.frame_current)
         assert (segment.mode if segment else None) == mode, segment
         assert len(notes) == len(words), notes
         for (_, text), part in zip(notes, words, strict=True):

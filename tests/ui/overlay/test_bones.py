@@ -9,8 +9,8 @@ import pytest
 from rigid_motion.animation import set_mode
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion.ui.overlay import drawing
-from rigid_motion.ui.overlay.bones import space_of_bone
 from rigid_motion.ui.overlay.cache import notice_selection, paths_of
+from rigid_motion.ui.overlay.kinds import space_of_bone
 from tests.ui.rigs import FRAMES, key_bone, keyed_rig, new_rig, select, select_keys
 
 WHOLE = np.arange(FRAMES[0], FRAMES[-1] + 1.0)

@@ -8,9 +8,9 @@ import pytest
 
 from rigid_motion.animation import set_mode
 from rigid_motion.animation.transforms import transform_of
-from rigid_motion.ui.overlay.bones import space_of_bone
 from rigid_motion.ui.overlay.cache import path_of, paths_of
 from rigid_motion.ui.overlay.ghosts import MOST_EDGES, MOST_GHOSTS, ghost_frames, octahedron, shape_of
+from rigid_motion.ui.overlay.kinds import space_of_bone
 from rigid_motion.ui.overlay.points import space_of
 from tests.animation.scenes import key, new_object
 from tests.ui.overlay.test_parents import SETTINGS

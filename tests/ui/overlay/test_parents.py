@@ -8,8 +8,8 @@ import pytest
 
 from rigid_motion.animation import set_mode
 from rigid_motion.animation.transforms import transform_of
-from rigid_motion.ui.overlay.bones import space_of_bone
 from rigid_motion.ui.overlay.cache import path_of, paths_of
+from rigid_motion.ui.overlay.kinds import space_of_bone
 from tests.animation.keyed import curves_of
 from tests.animation.scenes import give_own_deltas, key, new_object
 from tests.ui.rigs import FRAMES, key_bone, new_rig

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigid_motion.ui.overlay.points import Path
-from rigid_motion.ui.overlay.spacing import CLEAR, TICK_GAP, on_screen, readable
+from rigid_motion.ui.overlay.points import CLEAR, TICK_GAP, Path, on_screen, readable
 
 SIZE = (1000.0, 500.0)
 

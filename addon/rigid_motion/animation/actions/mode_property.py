@@ -2,15 +2,23 @@
 
 The one home of a mode is the Action, see `records`. The property is there to choose by, from Python and by a button,
 and for the mode channel to animate; nothing else reads it.
+
+Slots may be duplicated in their Action, or moved into another: their F-curves come along, and no records of them.
+*Merge Animation* leaves the differences of bones where they were, and their records with them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import replace
 
-from ..compute.modes import MODE_NAMES, MODE_NUMBERS
-from ..transforms import Transform
-from .duplicates import mode_before_move, original_of
+import bpy
+import numpy as np
+
+from ..compute.components import MODE_NAMES, MODE_NUMBERS
+from ..transforms import Refused, Transform
+from .reading import read
 from .records import (
     NOTHING_RECORDED,
     has_in_betweens,
@@ -18,9 +26,60 @@ from .records import (
     record_mode,
     record_turns_axis,
     recorded,
+    recorded_digest,
     recorded_mode,
 )
-from .slots import Binding
+from .slots import Binding, handles_of_differences, is_time, read_again
+
+
+def original_of(binding: Binding) -> Binding | None:
+    """Return the same transform in the slot with a mode that this is a duplicate of, None where it is none.
+
+    It has what only in-betweens have, none of which are recorded, and its F-curves are those of the other slot.
+    """
+    if recorded_digest(binding) or not (binding.filled or any(map(is_time, binding.curves.values()))):
+        return None
+    action = binding.slot.action
+    handles = {slot.handle for slot in action.slots} - handles_of_differences(action) - {binding.slot.handle}
+    others = (replace(binding, slot=replace(binding.slot, handle=handle)) for handle in sorted(handles))
+    # To look at F-curves takes longer, and those that Actions hold for one another in the NLA look like in-betweens.
+    with_modes = read_again([other for other in others if has_mode(other)])
+    return next((other for other in with_modes if _have_same_curves(binding, other)), None)
+
+
+def mode_before_move(binding: Binding) -> int | None:
+    """Return the number of the mode that a bone had in the Action that its slot was moved from, None where it was not.
+
+    What a slot was moved from has its differences and not the slot; and was filled in from the same keys. Of several,
+    it is the one with the mode that the bone shows.
+    """
+    result = []
+    for action in bpy.data.actions if binding.kind.has_difference_slot else ():
+        moved = {pair.handle for pair in action.rigid_motion.bone_slots} - {slot.handle for slot in action.slots}
+        for record in action.rigid_motion.slots if moved and action != binding.slot.action else ():
+            if record.handle in moved and record.prefix == binding.prefix and record.digest:
+                number = MODE_NUMBERS.get(record.mode, 0)
+                with suppress(Refused):
+                    if read(binding, number).digest == record.digest:
+                        result.append(number)
+    shown = {MODE_NUMBERS.get(user.motion.mode) for user in binding.users}
+    return next((number for number in result if number in shown), result[0] if result else None)
+
+
+def _have_same_curves(one: Binding, other: Binding) -> bool:
+    return one.curves.keys() == other.curves.keys() and all(
+        np.array_equal(_numbers_of(fcurve), _numbers_of(other.curves[channel]))
+        for channel, fcurve in one.curves.items()
+    )
+
+
+def _numbers_of(fcurve: bpy.types.FCurve) -> np.ndarray:
+    """Return the keys or samples of an F-curve, or the line that it is."""
+    points = fcurve.keyframe_points if len(fcurve.keyframe_points) else fcurve.sampled_points
+    result = np.empty(2 * len(points), np.float32)
+    points.foreach_get("co", result)
+    lines = (modifier.coefficients for modifier in fcurve.modifiers if modifier.type == "GENERATOR")
+    return np.concatenate((result, *lines))
 
 
 def set_pending_mode(transform: Transform, mode: str) -> None:
@@ -46,7 +105,13 @@ def has_to_do_with_modes(binding: Binding) -> bool:
 def show_modes(bindings: Iterable[Binding]) -> None:
     """Have the property of all users say what is in their slots, and have slots take what their users waited with."""
     for binding in bindings:
-        users = [user for user in binding.users if _is_shown(user, binding) and user.animated.is_editable]
+        # Of its Action, or of a strip where there is none.
+        users = [
+            user
+            for user in binding.users
+            if user.animated.is_editable
+            and (user.animated.animation_data.action is None or binding.slot.plays_in(user.animated))
+        ]
         keyed = is_keyed(binding)
         if not has_mode(binding) and has_in_betweens(binding) and not (keyed or binding.slot.action.is_editable):
             # From a library of a version that kept modes on objects.
@@ -78,12 +143,6 @@ def adopt_from_properties(transforms: Iterable[Transform]) -> None:
         motion = transform.motion
         if motion.mode not in ("BLENDER", "", motion.awaited) and transform.animated.is_editable:
             motion.awaited = motion.mode
-
-
-def _is_shown(user: Transform, binding: Binding) -> bool:
-    """Return whether a user's property speaks of a binding: of its Action, or of a strip where it has none."""
-    data = user.animated.animation_data
-    return data.action is None or (data.action, data.action_slot_handle) == (binding.slot.action, binding.slot.handle)
 
 
 def _adopt(binding: Binding, users: Sequence[Transform]) -> None:

@@ -2,18 +2,25 @@
 
 It goes where the Action goes: to another object, into another file, into a strip. The mode of a transform is in its
 mode channel where there is one with keys, and in its record otherwise; nowhere else.
+
+Where bones are renamed, Blender renames the F-curves of their Actions, and the records of these have to follow. A bone
+keeps the name that records have it under. Where it has another one by now, it was renamed. Several are followed at
+once, so that two can swap their names. Actions from before keys were baked or reduced, which nothing plays, Blender
+leaves as they are: there the F-curves follow as well.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 import bpy
 
-from ..compute.modes import MODE_NAMES, MODE_NUMBERS, UNKNOWN
+from ..compute.components import MODE_NAMES, MODE_NUMBERS, UNKNOWN
 from ..compute.sources import SCREW_AXIS
-from .slots import Binding, Slot
+from ..transforms import Transform, bone_name, prefix_of, split_path, transform_of
+from .slots import Binding, Slot, in_action, slots_in, slots_of
 
 
 class Recorded(NamedTuple):
@@ -141,7 +148,7 @@ def record_constraint(binding: Binding, name: str) -> None:
 
 
 def keep_name(binding: Binding) -> None:
-    """Have a bone keep the name that its record is under, see `renaming`."""
+    """Have a bone keep the name that its record is under."""
     for user in binding.users if binding.kind.is_part else ():
         if user.motion.recorded_as != user.carrier.name and user.animated.is_editable:
             user.motion.recorded_as = user.carrier.name
@@ -150,14 +157,14 @@ def keep_name(binding: Binding) -> None:
 def rename_records(slot: Slot, prefixes: Mapping[str, str]) -> None:
     """Give the records of a slot other prefixes, all at once, in place of what bones left that are gone."""
     records = slot.action.rigid_motion.slots
-    present = {record.prefix for record in records if record.handle == slot.handle}
+    present = {record.prefix for record in slot.records}
     moved = {old: new for old, new in prefixes.items() if old in present}
     replaced = set(moved.values()) - set(moved)
     for number, record in reversed(list(enumerate(records))):
         if record.handle == slot.handle and record.prefix in replaced:
             records.remove(number)
-    for record in records:
-        if record.handle == slot.handle and record.prefix in moved:
+    for record in slot.records:
+        if record.prefix in moved:
             record.prefix = moved[record.prefix]
             record.name = _key(slot, record.prefix)
 
@@ -165,8 +172,8 @@ def rename_records(slot: Slot, prefixes: Mapping[str, str]) -> None:
 def forget_in_betweens(slot: Slot, prefixes: Iterable[str]) -> None:
     """Have records of a slot not say what in-betweens were made from: then they are made anew."""
     prefixes = set(prefixes)
-    for record in slot.action.rigid_motion.slots:
-        if record.handle == slot.handle and record.prefix in prefixes:
+    for record in slot.records:
+        if record.prefix in prefixes:
             record.digest = ""
 
 
@@ -211,3 +218,127 @@ def _tidy(binding: Binding, record: bpy.types.PropertyGroup) -> None:
     if not record.digest and not record.is_property_set("mode") and record.turns_axis == SCREW_AXIS:
         records = binding.slot.action.rigid_motion.slots
         records.remove(next(number for number, one in enumerate(records) if one == record))
+
+
+def follow_renamed(bindings: Iterable[Binding]) -> None:
+    """Have records follow the bones of these that were renamed; where there are several, all bones of their rigs."""
+    bones = [binding for binding in bindings if binding.kind.is_part]
+    users = {user for binding in bones for user in binding.users}
+    rigs = {user.animated for user in users}
+    looked_at = (bone for rig in rigs for bone in _bones_of(rig)) if len(bones) > 1 else users
+    _follow({bone.animated for bone in looked_at if _is_renamed(bone)})
+    for binding in bones:
+        if recorded(binding) != NOTHING_RECORDED:
+            keep_name(binding)
+
+
+def follow_renamed_in(rig: bpy.types.Object) -> None:
+    """Have records follow the bones of a rig that were renamed."""
+    if any(map(_is_renamed, _bones_of(rig))):
+        _follow({rig})
+
+
+def _follow(renamed: Collection[bpy.types.Object]) -> None:
+    """Have records follow the bones of these rigs, all of which have some that were renamed."""
+    for slot in slots_of(renamed) if renamed else ():
+        names = _renamed_in(slot)
+        if slot.action.is_editable:
+            rename_records(slot, names)
+            # Of what no constraint shows Blender renames nothing: where two have swapped names, all looks complete.
+            if any(user.rigid_motion.detached for user in slot.users):
+                forget_in_betweens(slot, names.values())
+            _take_out_doubles(slot, names.values())
+        for original in _originals_of(slot) if names else ():
+            rename_records(original, names)
+            for channelbag in filter(None, (original.channelbag, original.bones_channelbag)):
+                _rename_channels(channelbag, names)
+    for rig in renamed:
+        for bone in filter(_is_renamed, _bones_of(rig)):
+            bone.motion.recorded_as = bone.carrier.name
+
+
+def keep_names(rig: bpy.types.Object) -> None:
+    """Have all bones of a rig keep their names, for Actions from before keys were baked or reduced."""
+    for bone in _bones_of(rig):
+        if not bone.motion.recorded_as:
+            bone.motion.recorded_as = bone.carrier.name
+
+
+def forget_names(transforms: Iterable[Transform]) -> None:
+    """Forget the names of what no slot moves any more: it has no F-curves that Blender would rename with it."""
+    for bone in transforms:
+        if bone.is_part and bone.motion.recorded_as and bone.animated.is_editable:
+            bone.motion.recorded_as = ""
+
+
+def _bones_of(rig: bpy.types.Object) -> Iterator[Transform]:
+    return map(transform_of, rig.pose.bones) if rig.is_editable else iter(())
+
+
+def _is_renamed(bone: Transform) -> bool:
+    """Return whether records have a bone under another name. So have they a copy of it, which they do not speak of."""
+    return bone.motion.recorded_as not in ("", bone.carrier.name)
+
+
+def _renamed_in(slot: Slot) -> dict[str, str]:
+    """Return the prefixes that bones of a slot's users have by now, by those that records have them under.
+
+    Of several, a bone and its copy or bones of two rigs, it is the one that Blender has given the F-curves.
+    """
+    keyed = {split_path(fcurve.data_path)[0] for fcurve in slot.fcurves}
+    names: dict[str, list[str]] = {}
+    for bone in (bone for user in slot.users if user.pose is not None for bone in user.pose.bones):
+        if known := bone.rigid_motion.recorded_as:
+            names.setdefault(known, []).append(bone.name)
+    now = {
+        known: max(result, key=lambda name, known=known: (prefix_of(name) in keyed, name == known))
+        for known, result in names.items()
+    }
+    return {prefix_of(known): prefix_of(name) for known, name in now.items() if name != known}
+
+
+def _originals_of(slot: Slot) -> list[Slot]:
+    """Return the slots from before keys of rigs were baked or reduced in this one, as far as nothing moves by them."""
+    rigs = [user for user in slot.users if user.pose is not None]
+    owners = [owner for rig in rigs for owner in (rig, *rig.pose.bones)]
+    notes = [entry for owner in owners for entry in owner.rigid_motion.bakes if entry.changed == slot.action]
+    actions = {entry.original for entry in notes if entry.original is not None and entry.original.is_editable}
+    played = {other.key for other in slots_in(actions)}
+    result = (in_action(action, slot) for action in actions)
+    return [item for item in result if item is not None and item.key not in played]
+
+
+def _take_out_doubles(slot: Slot, prefixes: Iterable[str]) -> None:
+    """Take out in-betweens that bones have twice: by their own, and by those of bones that are gone, whose names they
+    have. Of both Blender makes two groups of one name, and leaves it open which of them counts.
+    """
+    channelbag = slot.bones_channelbag
+    if channelbag is None:
+        return
+    counts = Counter(group.name for group in channelbag.groups)
+    doubled = {prefix for prefix in prefixes if counts[bone_name(prefix)] > 1}
+    for fcurve in list(channelbag.fcurves) if doubled else ():
+        if split_path(fcurve.data_path)[0] in doubled:
+            # Groups that nothing is left in go with it.
+            channelbag.fcurves.remove(fcurve)
+    forget_in_betweens(slot, doubled)
+
+
+def _rename_channels(channelbag: bpy.types.ActionChannelbag, prefixes: Mapping[str, str]) -> None:
+    """Give F-curves and their groups the names of other bones, all at once, in place of those that are gone."""
+    curves = [(fcurve, *split_path(fcurve.data_path)) for fcurve in channelbag.fcurves]
+    moved = {prefix for _, prefix, _ in curves} & set(prefixes)
+    gone = {prefixes[prefix] for prefix in moved} - moved
+    groups: dict[str, bpy.types.ActionGroup] = {}
+    for fcurve, prefix, rest in curves:
+        if prefix in moved:
+            fcurve.data_path = prefixes[prefix] + rest
+            if fcurve.group is not None and fcurve.group.name == bone_name(prefix):
+                groups[bone_name(prefixes[prefix])] = fcurve.group
+        elif prefix in gone:
+            channelbag.fcurves.remove(fcurve)
+    # Two groups that swap their names cannot have the same one in between.
+    for number, group in enumerate(groups.values()):
+        group.name = f"#{number}"
+    for name, group in groups.items():
+        group.name = name

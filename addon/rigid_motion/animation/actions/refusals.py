@@ -11,11 +11,11 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ..compute.modes import MODE_NAMES, UNKNOWN
+from ..compute.components import MODE_NAMES, UNKNOWN
 from ..compute.sources import Source
-from ..curves import LARGEST, Keys, TooManyRounds
+from ..curves.keys import LARGEST, Keys, TooManyRounds
 from ..transforms import GROUP, LINKED, Channel, Refused, Transform
-from .key_reading import read_steps
+from .channels import read_steps
 from .modifiers import FOLLOWED, is_added, is_whole, may_add
 from .records import recorded_digest, recorded_rows
 from .slots import Binding, is_filled_in
@@ -62,6 +62,41 @@ MODIFIED_IN_PART = n_(
     "in-betweens cannot follow: mute or remove it, or bake the channel (Graph Editor, Channel)"
 )
 
+TURNED_INTO_KEYS = n_(
+    "{name}: {channel} has in-betweens that were turned into keys: "
+    "delete that channel, and they are made anew (Dope Sheet, X)"
+)
+ANIMATED = n_(
+    "{name}: {channel} is animated already: move that animation to a parent, or to "
+    "{other} (Object > Apply > Animated Transforms to Deltas does the reverse)"
+)
+SAMPLED = n_(
+    "{name}: {channel} is sampled and has no keys: turn its samples into keys (Graph Editor, Channel > Samples to Keys)"
+)
+CHANGED_BY_MODIFIERS = n_(
+    "{name} has Stepped modifiers, or such as add to its channels: mute them while its keys are reduced, "
+    "or bake them into the keys first"
+)
+TOO_LONG = n_(
+    "{name} has keys over {frames:.0f} frames, at most {most} can be filled in: delete the keys that are far off"
+)
+GOES_ON = n_(
+    "{name} goes on outside of its keys for all {frames} frames of its scene, at most {most} "
+    "can be filled in: shorten the scene, or give the channels constant extrapolation and no cycles"
+)
+VALUE_NOT_FINITE = n_("{name}: {channel} is not a finite number: set it anew (sidebar, Item)")
+OUT_OF_ORDER = n_(
+    "{name}: the keys of {channel} are not in the order of their frames: move one of them and back (Dope Sheet, G)"
+)
+NO_SUCH_MODE = n_(
+    "{name}: key {number} of the mode channel has no mode that this version knows: "
+    "delete it (Dope Sheet, X), or choose a mode for the whole object"
+)
+NO_SUCH_TURNS = n_(
+    "{name}: key {number} of the channel Turns does not have a number of turns up to {most}: "
+    "delete it (Dope Sheet, X), or set the turns anew"
+)
+
 KEY = n_("key {number} of {channel}")
 LEFT_HANDLE = n_("left handle of key {number} of {channel}")
 RIGHT_HANDLE = n_("right handle of key {number} of {channel}")
@@ -93,17 +128,9 @@ def refuse_what_is_taken(user: Transform, binding: Binding, drivers: Collection[
         fcurve = binding.curves.get(channel)
         if fcurve is not None and not (is_filled_in(fcurve) or _was_filled_in(fcurve, user, binding)):
             if fcurve.group is not None and fcurve.group.name == GROUP:
-                raise Refused(
-                    rpt_(
-                        "{name}: {channel} has in-betweens that were turned into keys: "
-                        "delete that channel, and they are made anew (Dope Sheet, X)"
-                    ).format(name=user.name, channel=_label(fcurve))
-                )
+                raise Refused(TURNED_INTO_KEYS, name=user.name, channel=_label(fcurve))
             raise Refused(
-                rpt_(
-                    "{name}: {channel} is animated already: move that animation to a parent, or to "
-                    "{other} (Object > Apply > Animated Transforms to Deltas does the reverse)"
-                ).format(name=user.name, channel=_label(fcurve), other=_label_of(channel[0].rpartition("delta_")[2]))
+                ANIMATED, name=user.name, channel=_label(fcurve), other=_label_of(channel[0].rpartition("delta_")[2])
             )
 
 
@@ -115,9 +142,7 @@ def refuse_drivers(user: Transform, driven: Collection[int]) -> None:
 
 def _refuse_driver(name: str, channel: Channel) -> None:
     raise Refused(
-        rpt_("{name}: {channel} is driven: remove the driver, or bake it to keys").format(
-            name=name, channel=_label_at(*channel)
-        )
+        n_("{name}: {channel} is driven: remove the driver, or bake it to keys"), name=name, channel=_label_at(*channel)
     )
 
 
@@ -131,9 +156,9 @@ def _was_filled_in(fcurve: bpy.types.FCurve, user: Transform, binding: Binding) 
 def refuse_linked(user: Transform, binding: Binding | None = None) -> None:
     """Raise `Refused` where what is moved, or the Action that moves it, belongs to another file."""
     if not user.animated.is_editable:
-        raise Refused(rpt_(user.linked_text).format(name=user.animated.name))
+        raise Refused(user.linked_text, name=user.animated.name)
     if binding is not None and not binding.slot.action.is_editable:
-        raise Refused(rpt_(LINKED).format(name=binding.slot.action.name))
+        raise Refused(LINKED, name=binding.slot.action.name)
 
 
 def refuse_channel(name: str, fcurve: bpy.types.FCurve) -> None:
@@ -147,19 +172,13 @@ def refuse_channel(name: str, fcurve: bpy.types.FCurve) -> None:
             if may_add(modifier) and fcurve.keyframe_points:
                 text = REPLACED
             raise Refused(
-                rpt_(text).format(
-                    name=name,
-                    channel=_label(fcurve),
-                    modifier=iface_(kinds.enum_items[modifier.type].name, kinds.translation_context),
-                )
+                text,
+                name=name,
+                channel=_label(fcurve),
+                modifier=iface_(kinds.enum_items[modifier.type].name, kinds.translation_context),
             )
     if not fcurve.keyframe_points and fcurve.sampled_points:
-        raise Refused(
-            rpt_(
-                "{name}: {channel} is sampled and has no keys: turn its samples into keys "
-                "(Graph Editor, Channel > Samples to Keys)"
-            ).format(name=name, channel=_label(fcurve))
-        )
+        raise Refused(SAMPLED, name=name, channel=_label(fcurve))
 
 
 def refuse_different_steps(name: str, fcurves: Iterable[bpy.types.FCurve]) -> None:
@@ -167,19 +186,13 @@ def refuse_different_steps(name: str, fcurves: Iterable[bpy.types.FCurve]) -> No
     moving = [(fcurve, read_steps(fcurve.modifiers)) for fcurve in fcurves if len(fcurve.keyframe_points) > 1]
     for fcurve, steps in moving:
         if steps != moving[0][1]:
-            text = rpt_(DIFFERENT_STEPS)
-            raise Refused(text.format(name=name, channel=_label(moving[0][0]), other=_label(fcurve)))
+            raise Refused(DIFFERENT_STEPS, name=name, channel=_label(moving[0][0]), other=_label(fcurve))
 
 
 def refuse_modified(name: str, source: Source) -> None:
     """Raise `Refused` where modifiers change what keys say, so that other keys would not say the same."""
     if source.steps or source.modified:
-        raise Refused(
-            rpt_(
-                "{name} has Stepped modifiers, or such as add to its channels: mute them while its keys are reduced, "
-                "or bake them into the keys first"
-            ).format(name=name)
-        )
+        raise Refused(CHANGED_BY_MODIFIERS, name=name)
 
 
 def refuse_numbers(name: str, source: Source) -> None:
@@ -193,20 +206,10 @@ def refuse_numbers(name: str, source: Source) -> None:
         _explain_numbers(name, source)
     first, last = source.keyed_range
     if last - first > MOST_FRAMES:
-        raise Refused(
-            rpt_(
-                "{name} has keys over {frames:.0f} frames, at most {most} can be filled in: "
-                "delete the keys that are far off"
-            ).format(name=name, frames=last - first, most=MOST_FRAMES)
-        )
+        raise Refused(TOO_LONG, name=name, frames=last - first, most=MOST_FRAMES)
     first, last = source.seen_range
     if last - first > MOST_FRAMES and not source.repeats:
-        raise Refused(
-            rpt_(
-                "{name} goes on outside of its keys for all {frames} frames of its scene, at most {most} "
-                "can be filled in: shorten the scene, or give the channels constant extrapolation and no cycles"
-            ).format(name=name, frames=last - first, most=MOST_FRAMES)
-        )
+        raise Refused(GOES_ON, name=name, frames=last - first, most=MOST_FRAMES)
     try:
         source.key_frames  # noqa: B018 - raises where cycles make too many
     except TooManyRounds as problem:
@@ -230,11 +233,7 @@ def _explain_numbers(name: str, source: Source) -> None:
 
     for row, value in source.rest.items():
         if not math.isfinite(value):
-            raise Refused(
-                rpt_("{name}: {channel} is not a finite number: set it anew (sidebar, Item)").format(
-                    name=name, channel=label(row)
-                )
-            )
+            raise Refused(VALUE_NOT_FINITE, name=name, channel=label(row))
     for rows, keys in source.channels:
         for part, numbers in _numbers(keys).items():
             # What is no number is not smaller, either.
@@ -246,18 +245,12 @@ def _explain_numbers(name: str, source: Source) -> None:
                 if math.isfinite(number):
                     text = BAD_SETTING if part == EASING else (BAD_FRAME, BAD_VALUE)[axis[0]]
                 which = rpt_(part).format(number=key + 1, channel=label(rows[channel]))
-                raise Refused(rpt_(text).format(name=name, key=which, number=number))
+                raise Refused(text, name=name, key=which, number=number)
         if np.any(np.diff(keys.times) < 0.0):
-            raise Refused(
-                rpt_(
-                    "{name}: the keys of {channel} are not in the order of their frames: "
-                    "move one of them and back (Dope Sheet, G)"
-                ).format(name=name, channel=label(rows[0]))
-            )
+            raise Refused(OUT_OF_ORDER, name=name, channel=label(rows[0]))
     raise Refused(
-        rpt_(
-            "{name}: a delta transform is not a finite number: set it anew (Object Properties, Delta Transform)"
-        ).format(name=name)
+        n_("{name}: a delta transform is not a finite number: set it anew (Object Properties, Delta Transform)"),
+        name=name,
     )
 
 
@@ -265,16 +258,11 @@ def _refuse_modes(name: str, mode: int | Keys) -> None:
     """Raise `Refused` where an object, or a key of its mode channel, has what is no mode."""
     if not isinstance(mode, Keys):
         if mode == UNKNOWN:
-            raise Refused(rpt_("{name} has a mode that this version does not know: choose another").format(name=name))
+            raise Refused(n_("{name} has a mode that this version does not know: choose another"), name=name)
         return
     known = np.isin(np.rint(mode.values[0]), list(MODE_NAMES)) & np.isfinite(mode.times)
     if not known.all():
-        raise Refused(
-            rpt_(
-                "{name}: key {number} of the mode channel has no mode that this version knows: "
-                "delete it (Dope Sheet, X), or choose a mode for the whole object"
-            ).format(name=name, number=int(np.argmin(known)) + 1)
-        )
+        raise Refused(NO_SUCH_MODE, name=name, number=int(np.argmin(known)) + 1)
 
 
 def _refuse_turns(name: str, turns: Keys | None) -> None:
@@ -283,12 +271,7 @@ def _refuse_turns(name: str, turns: Keys | None) -> None:
         return
     usable = (np.abs(turns.values[0]) <= MOST_TURNS) & np.isfinite(turns.times)
     if not usable.all():
-        raise Refused(
-            rpt_(
-                "{name}: key {number} of the channel Turns does not have a number of turns up to {most}: "
-                "delete it (Dope Sheet, X), or set the turns anew"
-            ).format(name=name, number=int(np.argmin(usable)) + 1, most=MOST_TURNS)
-        )
+        raise Refused(NO_SUCH_TURNS, name=name, number=int(np.argmin(usable)) + 1, most=MOST_TURNS)
 
 
 def _label(fcurve: bpy.types.FCurve) -> str:

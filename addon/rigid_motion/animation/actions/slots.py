@@ -42,6 +42,10 @@ class Slot:
     """The frames of the Action that strips show; None where it plays by itself."""
 
     @property
+    def key(self) -> tuple[bpy.types.Action, int]:
+        return self.action, self.handle
+
+    @property
     def seen(self) -> tuple[int, int]:
         """The frames that are seen: those of the strips, and of all scenes where it plays by itself."""
         spans = [strip for strip in self.strips if strip is not None]
@@ -57,15 +61,34 @@ class Slot:
 
     @property
     def channelbag(self) -> bpy.types.ActionChannelbag | None:
-        return _channelbag(self.action, self.handle)
+        slot = slot_with(self.action, self.handle)
+        return None if slot is None else action_get_channelbag_for_slot(self.action, slot)
+
+    @property
+    def fcurves(self) -> Iterable[bpy.types.FCurve]:
+        return () if (channelbag := self.channelbag) is None else channelbag.fcurves
+
+    @property
+    def differences(self) -> int:
+        """The handle of the slot that the differences of bones are in, 0 where there is none yet."""
+        pairs = self.action.rigid_motion.bone_slots
+        return next((pair.differences for pair in pairs if pair.handle == self.handle), 0)
 
     @property
     def bones_channelbag(self) -> bpy.types.ActionChannelbag | None:
         """The channelbag with the differences of bones: of the slot that goes with this one."""
-        for pair in self.action.rigid_motion.bone_slots:
-            if pair.handle == self.handle:
-                return _channelbag(self.action, pair.differences)
-        return None
+        slot = slot_with(self.action, self.differences)
+        return None if slot is None else action_get_channelbag_for_slot(self.action, slot)
+
+    @property
+    def records(self) -> Iterator[bpy.types.PropertyGroup]:
+        """What its Action keeps of what it moves."""
+        return (record for record in self.action.rigid_motion.slots if record.handle == self.handle)
+
+    def plays_in(self, animated: bpy.types.Object) -> bool:
+        """Return whether something moves by it outside of strips, or in the strip that is being edited."""
+        data = animated.animation_data
+        return data is not None and (data.action, data.action_slot_handle) == self.key
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +141,11 @@ class Binding:
             if not fcurve.keyframe_points and is_own(path := fcurve.data_path)
         }
 
+    @property
+    def is_keyed(self) -> bool:
+        """Return whether it has channels of location, rotation or scale."""
+        return any(path.removeprefix(self.prefix) in WIDTHS for path, _ in self.curves)
+
     def has_filled(self, curves: Curves) -> None:
         """Take note of the F-curves that in-betweens are in by now."""
         self.__dict__["filled"] = curves
@@ -130,10 +158,6 @@ class Binding:
             fcurve = self.curves[channel] = self.channelbag.fcurves.new(path, index=index)
         return fcurve
 
-    def read_again(self) -> Binding:
-        """Return this binding with the F-curves that there are by now."""
-        return read_again([self])[0]
-
 
 def bindings_in_slot(slot: Slot, prefixes: Collection[str] | None = None) -> list[Binding]:
     """Return what a slot moves, transform by transform: these, or all that it has something of."""
@@ -141,14 +165,13 @@ def bindings_in_slot(slot: Slot, prefixes: Collection[str] | None = None) -> lis
     if prefixes is not None:
         return _bindings(slot, channelbag, prefixes, cache(partial(_curves_under, channelbag, prefixes)))
     curves: dict[str, Curves] = {"": {}}
-    for fcurve in () if channelbag is None else channelbag.fcurves:
+    for fcurve in slot.fcurves:
         path = fcurve.data_path
         prefix, prop = split_path(path)
         if prefix in curves or prop in WIDTHS or prop in SEGMENT_PROPERTIES or prop.startswith(_TIMES):
             curves.setdefault(prefix, {})[path, fcurve.array_index] = fcurve
-    for record in slot.action.rigid_motion.slots:
-        if record.handle == slot.handle:
-            curves.setdefault(record.prefix, {})
+    for record in slot.records:
+        curves.setdefault(record.prefix, {})
     return bindings_with(slot, channelbag, curves)
 
 
@@ -202,9 +225,8 @@ def _users_of(slot: Slot, prefix: str) -> tuple[Transform, ...]:
     return () if kind is None else kind.together(tuple(user for user in users if user is not None))
 
 
-def _channelbag(action: bpy.types.Action, handle: int) -> bpy.types.ActionChannelbag | None:
-    slot = next((slot for slot in action.slots if slot.handle == handle), None)
-    return None if slot is None else action_get_channelbag_for_slot(action, slot)
+def slot_with(action: bpy.types.Action, handle: int) -> bpy.types.ActionSlot | None:
+    return next((slot for slot in action.slots if slot.handle == handle), None)
 
 
 def bindings_of(transforms: Iterable[Transform]) -> list[Binding]:
@@ -226,18 +248,14 @@ def bindings_in(actions: Iterable[bpy.types.Action]) -> list[Binding]:
 
 def bindings_for(transform: Transform) -> list[Binding]:
     """Return what moves a transform, as if nothing else used the same slots: without a look at other objects."""
-    slots = (
-        Slot(action, handle, (transform.animated,), frozenset(strips))
-        for action, handle, strips in uses_of(transform.animated).values()
-    )
+    slots = slots_alone(transform.animated)
     return [binding for slot in slots for binding in bindings_in_slot(slot, (transform.prefix,))]
 
 
 def filled_bindings(obj: bpy.types.Object) -> list[Binding]:
     """Return what is filled in of all that an object's Actions move of it, as if nothing else used the same slots."""
     result = []
-    for action, handle, strips in uses_of(obj).values():
-        slot = Slot(action, handle, (obj,), frozenset(strips))
+    for slot in slots_alone(obj):
         channelbag = slot.bones_channelbag
         bones = () if channelbag is None else map(prefix_of, channelbag.groups.keys())
         result += [binding for binding in bindings_in_slot(slot, {"", *bones}) if binding.filled]
@@ -246,23 +264,21 @@ def filled_bindings(obj: bpy.types.Object) -> list[Binding]:
 
 def slots_of(objects: Iterable[bpy.types.Object]) -> list[Slot]:
     """Return the slots that move these objects, in Actions of their own and in NLA strips; each once."""
-    known = {obj: uses_of(obj) for obj in objects}
-    desired = {key for uses in known.values() for key in uses}
-    actions = {action for uses in known.values() for action, *_ in uses.values()}
-    return _slots(actions, lambda key: key in desired, known)
+    known = {obj: slots_alone(obj) for obj in objects}
+    desired = {slot.key for slots in known.values() for slot in slots}
+    return _slots({action for action, _ in desired}, lambda slot: slot.key in desired, known)
 
 
 def slots_in(actions: Iterable[bpy.types.Action]) -> list[Slot]:
     """Return the slots of these Actions that move an object."""
     actions = set(actions)
-    desired = {action.as_pointer() for action in actions}
-    return _slots(actions, lambda key: key[0] in desired, {})
+    return _slots(actions, lambda slot: slot.action in actions, {})
 
 
 def _slots(
     actions: set[bpy.types.Action],
-    is_desired: Callable[[tuple[int, int]], bool],
-    known: Mapping[bpy.types.Object, Uses],
+    is_desired: Callable[[Slot], bool],
+    known: Mapping[bpy.types.Object, list[Slot]],
 ) -> list[Slot]:
     """Return slots of these Actions, by the names of their users, and of one user from the bottom of its NLA to the
     top: what depends on the order comes out the same whichever was edited.
@@ -271,20 +287,15 @@ def _slots(
         return []
     # A slot's own list of users may have some that are gone, which crashes Blender 5.2.
     owners = bpy.data.user_map(subset=actions, key_types={"ACTION"}, value_types={"OBJECT"})
-    uses: Uses = {}
-    users: dict[tuple[int, int], list[bpy.types.Object]] = {}
+    same: dict[tuple[bpy.types.Action, int], list[Slot]] = {}
     for obj in sorted(set().union(*owners.values()), key=lambda obj: obj.name_full):
-        for key, (action, handle, strips) in (known[obj] if obj in known else uses_of(obj)).items():
-            if is_desired(key):
-                users.setdefault(key, []).append(obj)
-                uses.setdefault(key, (action, handle, set()))[2].update(strips)
+        for slot in known[obj] if obj in known else slots_alone(obj):
+            if is_desired(slot):
+                same.setdefault(slot.key, []).append(slot)
     return [
-        Slot(action, handle, tuple(users[key]), frozenset(strips)) for key, (action, handle, strips) in uses.items()
+        Slot(*key, tuple(slot.users[0] for slot in slots), frozenset().union(*(slot.strips for slot in slots)))
+        for key, slots in same.items()
     ]
-
-
-Uses = dict[tuple[int, int], tuple[bpy.types.Action, int, set[tuple[int, int] | None]]]
-"""The slots that move an object: Action, handle, and the frames that strips show, None outside of the NLA."""
 
 
 def actions_of(animated: bpy.types.ID) -> Iterator[bpy.types.Action]:
@@ -297,46 +308,60 @@ def actions_of(animated: bpy.types.ID) -> Iterator[bpy.types.Action]:
             yield from (strip.action for strip in strips_of(animated) if strip.action is not None)
 
 
-def uses_of(obj: bpy.types.Object) -> Uses:
+def slots_alone(obj: bpy.types.Object) -> list[Slot]:
+    """Return the slots that move an object, as if nothing else used them."""
     data = obj.animation_data
     if data is None:
-        return {}
-    result = {}
+        return []
+    result: dict[tuple[bpy.types.Action, int], set[tuple[int, int] | None]] = {}
     # Some of Blender's operators leave the handle of a slot that is no longer there.
     if data.action is not None and (slot := data.action_slot) is not None:
-        result[data.action.as_pointer(), slot.handle] = (data.action, slot.handle, {None})
+        result[data.action, slot.handle] = {None}
     if len(data.nla_tracks):
         for strip in strips_of(obj):
             if (action := strip.action) is not None and (slot := strip.action_slot) is not None:
                 span = int(np.floor(strip.action_frame_start)), int(np.ceil(strip.action_frame_end))
-                result.setdefault((action.as_pointer(), slot.handle), (action, slot.handle, set()))[2].add(span)
-    return result
+                result.setdefault((action, slot.handle), set()).add(span)
+    return [Slot(*key, (obj,), frozenset(strips)) for key, strips in result.items()]
+
+
+def active_fcurves(animated: bpy.types.Object) -> bpy.types.bpy_prop_collection | tuple:
+    """Return the F-curves of an object's slot. Looks at nothing else in the file, for it is asked of many objects."""
+    data = animated.animation_data
+    if data is None or data.action is None or data.action_slot is None:
+        return ()
+    channelbag = action_get_channelbag_for_slot(data.action, data.action_slot)
+    return () if channelbag is None else channelbag.fcurves
+
+
+def handles_of_differences(action: bpy.types.Action) -> set[int]:
+    """Return the handles of the slots that differences of bones are in."""
+    return {pair.differences for pair in action.rigid_motion.bone_slots}
 
 
 def counterpart_in(action: bpy.types.Action, slot: bpy.types.ActionSlot) -> bpy.types.ActionSlot | None:
     """Return the slot in a copy of an Action, or in the original, that is the same: by its name,
     or renamed by its handle.
     """
-    result = action.slots.get(slot.identifier)
-    return result or next((item for item in action.slots if item.handle == slot.handle), None)
+    return action.slots.get(slot.identifier) or slot_with(action, slot.handle)
 
 
 def in_action(action: bpy.types.Action, slot: Slot) -> Slot | None:
     """Return the same slot in a copy of its Action, or in the original. None where it was taken out of it."""
-    action_slot = next(item for item in slot.action.slots if item.handle == slot.handle)
-    result = counterpart_in(action, action_slot)
+    result = counterpart_in(action, slot_with(*slot.key))
     return None if result is None else replace(slot, action=action, handle=result.handle)
 
 
 def strips_of(obj: bpy.types.Object) -> Iterator[bpy.types.NlaStrip]:
     """Return the strips in the NLA of an object, those in strips of strips among them."""
-    return _strips(strip for track in obj.animation_data.nla_tracks for strip in track.strips)
+    return with_inner_strips(strip for track in obj.animation_data.nla_tracks for strip in track.strips)
 
 
-def _strips(strips: Iterable[bpy.types.NlaStrip]) -> Iterator[bpy.types.NlaStrip]:
+def with_inner_strips(strips: Iterable[bpy.types.NlaStrip]) -> Iterator[bpy.types.NlaStrip]:
+    """Yield strips, and those in strips of strips."""
     for strip in strips:
         yield strip
-        yield from _strips(strip.strips)
+        yield from with_inner_strips(strip.strips)
 
 
 def choose_slots(obj: bpy.types.Object) -> None:
@@ -358,7 +383,7 @@ def _slot_to_choose(strip: bpy.types.NlaStrip) -> bpy.types.ActionSlot | None:
     action = strip.action
     if action is None or strip.action_slot_handle or strip.last_slot_identifier in action.slots:
         return None
-    differences = {pair.differences for pair in action.rigid_motion.bone_slots}
+    differences = handles_of_differences(action)
     keyed = [slot for slot in strip.action_suitable_slots if slot.handle not in differences]
     return keyed[0] if differences and len(keyed) == 1 else None
 
@@ -377,42 +402,6 @@ def _give_length(strip: bpy.types.NlaStrip, track: bpy.types.NlaTrack, slot: bpy
     room = min((item.frame_start for item in track.strips if item.frame_start > strip.frame_start), default=math.inf)
     strip.action_frame_end = min(last, first + room - strip.frame_start)
     strip.action_frame_start = first
-
-
-def is_replacing(obj: bpy.types.Object, slot: Slot) -> bool:
-    """Return whether a slot, wherever it moves an object in the NLA, takes the place of what is below it:
-    nothing is added.
-    """
-    data = obj.animation_data
-    if data.action == slot.action and data.action_blend_type != "REPLACE":
-        return False
-    # Without an Action it is a strip of strips, and these may be in it.
-    return all(strip.blend_type == "REPLACE" for strip in strips_of(obj) if strip.action in (None, slot.action))
-
-
-def is_above(obj: bpy.types.Object, slot: Slot, other: Slot) -> bool:
-    """Return whether a slot plays above another one in the NLA of an object, on some frame."""
-    return any(
-        level > below and start < end_below and start_below < end
-        for level, start, end in _spans(obj, slot)
-        for below, start_below, end_below in _spans(obj, other)
-    )
-
-
-def _spans(obj: bpy.types.Object, slot: Slot) -> list[tuple[int, float, float]]:
-    """Return where in the NLA of an object a slot plays: the number of the track, that of its Action behind all of
-    them, and the frames of the scene.
-    """
-    data, used = obj.animation_data, (slot.action, slot.handle)
-    spans = [
-        (level, strip.frame_start, strip.frame_end)
-        for level, track in enumerate(data.nla_tracks)
-        for strip in _strips(track.strips)
-        if (strip.action, strip.action_slot_handle) == used
-    ]
-    if not data.use_tweak_mode and (data.action, data.action_slot_handle) == used:
-        spans.append((len(data.nla_tracks), -math.inf, math.inf))
-    return spans
 
 
 def is_filled_in(fcurve: bpy.types.FCurve) -> bool:

@@ -8,30 +8,25 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.app.translations import pgettext_n as n_
 
 from ...motion import Poses
 from ...motion.eulers import ORDERS, extrinsic_eulers_from_quaternions
 from ...motion.quaternions import align_signs
-from ..actions.channels import (
-    add_cycles,
-    code_of,
-    empty_key_fields,
-    key_fields,
-    set_key_fields,
-    write_channel,
-)
+from ..actions.channels import add_cycles, code_of, empty_key_fields, key_fields, set_key_fields, write_channel
 from ..actions.modifiers import added_values
 from ..actions.slots import Binding
-from ..compute.differences import SMOOTH, in_betweens
+from ..compute.components import SMOOTH
+from ..compute.differences import in_betweens
 from ..compute.sources import SAME_FRAME, Source
 from ..edits.apply import Readings, Target, Targets, apply_edit, readable, transforms_of
 from ..edits.mode_keys import set_whole
 from ..live.segment_keys import set_mode_in
 from ..transforms import Refused, Transform, transform_of
 from ..writers.channel_values import channel_values
-from .copies import BAKED, Lookup
 from .originals import (
+    BAKED,
+    Lookup,
     has_original,
     move_by_copy,
     put_back,
@@ -123,16 +118,14 @@ def bake(
     if interpolation not in ("LINEAR", "CONSTANT"):
         raise ValueError(f"interpolation: LINEAR or CONSTANT, not {interpolation!r}")
     if not step > 0.0:
-        raise Refused(rpt_("the step between baked keys has to be above zero, not {step}").format(step=step))
+        raise Refused(n_("the step between baked keys has to be above zero, not {step}"), step=step)
 
     def plan(transform: Transform, readings: Readings) -> list[tuple[Binding, Source, np.ndarray]]:
         refuse_tweak_mode(transform)
         live = [(binding, source) for binding, source in readable(transform, readings) if source.is_live]
         if not live:
             raise Refused(
-                rpt_("{name} has no rigid in-betweens to bake: choose a mode for its keys first").format(
-                    name=transform.name
-                )
+                n_("{name} has no rigid in-betweens to bake: choose a mode for its keys first"), name=transform.name
             )
         return [
             (binding, source, _frames(source, *_widened(transform, source, first, last), step))
@@ -198,9 +191,10 @@ def _widened(transform: Transform, source: Source, first: float | None, last: fl
         return tuple(map(float, source.seen_range))
     if (first is not None and first > keys[-1]) or (last is not None and last < keys[0]):
         raise Refused(
-            rpt_("{name} has its keys from frame {first:g} to {last:g}: none of them is in that range").format(
-                name=transform.name, first=keys[0], last=keys[-1]
-            )
+            n_("{name} has its keys from frame {first:g} to {last:g}: none of them is in that range"),
+            name=transform.name,
+            first=keys[0],
+            last=keys[-1],
         )
     if source.steps or source.modified:
         # Without its modifiers no part can be left as it is.

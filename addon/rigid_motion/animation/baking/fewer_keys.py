@@ -11,26 +11,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.app.translations import pgettext_n as n_
 
 from ...motion import KEYFRAME_MODES, Poses, reduce_keys, shell_error
 from ...motion.affine import AffineMaps, ball_displacement
 from ...motion.best_of import least_errors
 from ..actions.slots import Binding
-from ..compute.components import ROWS, SCALE
+from ..compute.components import MODE_NUMBERS, ROWS, SCALE
 from ..compute.differences import in_betweens
-from ..compute.modes import MODE_NUMBERS
 from ..compute.sources import SAME_FRAME, Source, distinct
-from ..curves import CODE, CONSTANT, LINEAR, Keys
+from ..curves.keys import CODE, CONSTANT, LINEAR, Keys
 from ..transforms import Channel, Refused, Transform
+from ..transforms.sizes import into_scene, scale_in_scene
 from ..writers.channel_values import channel_values
-from .channel_maps import shown
-from .followers import ALL_PROMISED, NotPromised
-from .sizes import into_scene, scale_in_scene
-
-SMALLEST = 1e-6
-"""Errors of single precision, relative to how far something gets."""
-
+from .motions import ALL_PROMISED, SMALLEST, NotPromised, shown
 
 NO_FRAMES = np.empty(0)
 
@@ -158,9 +152,8 @@ def fewer_keys(
         searched = radius
         if not np.all(poses.scales > 0.0):
             raise Refused(
-                rpt_(
-                    "{name}: its scale passes zero between two keys: ease those in another way (Dope Sheet, T)"
-                ).format(name=transform.name)
+                n_("{name}: its scale passes zero between two keys: ease those in another way (Dope Sheet, T)"),
+                name=transform.name,
             )
     wish = {"tolerance": tolerance / unit} if count is None else {"budget": count}
     chosen = samples[reduce_keys(frames, poses[samples], mode, radius=searched, **wish)]
@@ -250,10 +243,11 @@ def seen_frames(frames: np.ndarray, sources: Sequence[Source]) -> np.ndarray:
 def goes_elsewhere(name: str) -> Refused:
     """Return why something cannot have fewer keys, although those that are left say all about the time between them."""
     return Refused(
-        rpt_(
+        n_(
             "{name} goes on outside of its keys, and with fewer of them would go elsewhere there: "
             "give its channels constant extrapolation and no cycles, or cycles that all have the same range"
-        ).format(name=name)
+        ),
+        name=name,
     )
 
 

@@ -14,7 +14,6 @@ from dataclasses import replace
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
-from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...motion import Poses, Skeleton, reduce_skeleton_keys, shell_error
 from ...motion.contacts import slide, standing
@@ -25,7 +24,7 @@ from ..actions.slots import Binding, Slot
 from ..compute.sources import SAME_FRAME, Source, distinct
 from ..edits.apply import Readings, readable
 from ..transforms import Refused, Transform, transform_of
-from .channel_maps import shown
+from ..transforms.sizes import scale_in_scene
 from .fewer_keys import (
     FewerKeys,
     NeedsItsKeys,
@@ -38,9 +37,7 @@ from .fewer_keys import (
     with_best_modes,
     with_keys,
 )
-from .followers import not_promised
-from .rig_motion import SMALLEST, RigMotion
-from .sizes import scale_in_scene
+from .motions import SMALLEST, RigMotion, not_promised, shown
 
 NO_FEWER = n_(
     "{name}: its bones need their keys on all of {frames} frames to stay within the tolerance: allow a larger one"
@@ -117,8 +114,8 @@ def fewer_keys_of_rigs(
             plans.update(dict.fromkeys(members, refusal))
             continue
         except ValueError as problem:
-            why = rpt_("{name} cannot be reduced: {problem}").format(name=obj.name, problem=problem)
-            plans.update(dict.fromkeys(members, Refused(why)))
+            refusal = Refused(n_("{name} cannot be reduced: {problem}"), name=obj.name, problem=problem)
+            plans.update(dict.fromkeys(members, refusal))
             continue
         for transform, plan in fewer.items():
             result = plans.setdefault(transform, [])
@@ -151,14 +148,11 @@ class _Rig:
         self.largest_own = 0.0
         self.key_poses: np.ndarray | None = None
         """The moments of the key poses, where so many of them were asked for."""
-        self._stand(hold=hold)
-        self._search_in()
-
-    def _stand(self, *, hold: bool) -> None:
-        """Find which bones stand on the ground, and how much their errors count."""
         render, truth = bpy.context.scene.render, self.motion.truth.origins
         self.stands = standing(self.frames * render.fps_base / render.fps, truth)
+        """True for the bones that stand on the ground, at each moment."""
         self.weights = np.where(self.stands, HOLD, 1.0) if hold else np.ones(self.stands.shape)
+        self._search_in()
 
     def _search_in(self) -> None:
         """Make the rig as the search has it: rigid, with even scale, in chains of bones that inherit all."""
@@ -166,10 +160,11 @@ class _Rig:
         for number, bone in enumerate(motion.bones):
             if motion.passes_zero(number):
                 raise Refused(
-                    rpt_(
+                    n_(
                         "{name}: its scale passes zero, and with it the size of all that hangs on "
                         "it: reduce the bones above and below it apart from one another"
-                    ).format(name=f"{self.rig.name}/{bone.name}")
+                    ),
+                    name=f"{self.rig.name}/{bone.name}",
                 )
         grows = any(np.abs(poses.scales - 1.0).max() > SMALLEST for poses in motion.poses)
         follows = [_follows(bone, grows) for bone in motion.bones]
@@ -269,7 +264,7 @@ class _Rig:
         fewer = self._proven(chosen, mode, shared=shared)
         if not fewer:
             text = NOT_SO_MANY if self.key_poses is not None else NO_FEWER_POSES if shared else NO_FEWER
-            raise NeedsItsKeys(rpt_(text).format(name=self.rig.name, frames=len(samples)))
+            raise NeedsItsKeys(text, name=self.rig.name, frames=len(samples))
         if best_of:
             if self.key_poses is not None:
                 # As far off as it is by now, and no farther.

@@ -23,26 +23,28 @@ from ...motion.modes import no_such_mode
 from ..actions.channels import replace_keys
 from ..actions.refusals import refuse_drivers, refuse_modified
 from ..actions.slots import Binding, bindings_for, bindings_in_slot, slots_of
-from ..compute.modes import MODE_NAMES
+from ..compute.components import MODE_NAMES
 from ..compute.sources import distinct
 from ..edits.apply import Readings, Target, Targets, apply_edit, readable, transforms_of
 from ..edits.mode_keys import set_whole
 from ..live.segment_keys import set_mode_in
 from ..queries.keyed import segment_modes
 from ..transforms import Refused, Transform, shows_differences, transform_of
+from ..transforms.sizes import radius_of
 from .bake import go_back
-from .copies import REDUCED, entries_in_use, entries_of
 from .fewer_keys import FewerKeys, NeedsItsKeys, WholeRig, fewer_keys, has_uneven_scale
 from .fewer_rig_keys import Plans, fewer_keys_of_rigs
-from .followers import NotPromised
+from .motions import NotPromised
 from .originals import (
+    REDUCED,
     discard_originals,
+    entries_in_use,
+    entries_of,
     has_original,
     move_by_copy,
     refuse_tweak_mode,
     refuse_without_original,
 )
-from .sizes import radius_of
 
 HAS_KEYS = (
     n_("{name} has no keys of location, rotation or scale"),
@@ -140,12 +142,10 @@ def reduce_keys_of(
     if mode not in KEYFRAME_MODES:
         raise Refused(no_such_mode(mode, KEYFRAME_MODES))
     if not 0.0 < tolerance < math.inf:
-        raise Refused(
-            rpt_("the tolerance has to be a number above zero, not {tolerance:g}").format(tolerance=tolerance)
-        )
+        raise Refused(n_("the tolerance has to be a number above zero, not {tolerance:g}"), tolerance=tolerance)
 
     if count is not None and count < 2:
-        raise Refused(rpt_("a motion has 2 keys at least, not {count}").format(count=count))
+        raise Refused(n_("a motion has 2 keys at least, not {count}"), count=count)
     of_rigs: Plans = {}
 
     def survey(readings: Mapping[Transform, Readings]) -> None:
@@ -328,17 +328,19 @@ def _no_fewer(transform: Transform, before: int, *, keeps_scale: bool, count: in
         return Refused(_why_nothing_is_keyed(transform, before))
     if keeps_scale:
         return Refused(
-            rpt_(
+            n_(
                 "{name} keeps its {count} keys: its scale changes differently along its axes, which is no "
                 "part of a pose; move that animation to a child, or remove keys of the scale by hand"
-            ).format(name=transform.name, count=before)
+            ),
+            name=transform.name,
+            count=before,
         )
     if count is not None:
-        return NeedsItsKeys(rpt_("{name} has {count} keys: ask for fewer").format(name=transform.name, count=before))
+        return NeedsItsKeys(n_("{name} has {count} keys: ask for fewer"), name=transform.name, count=before)
     return NeedsItsKeys(
-        rpt_("{name} needs its {count} keys to stay within the tolerance: allow a larger one").format(
-            name=transform.name, count=before
-        )
+        n_("{name} needs its {count} keys to stay within the tolerance: allow a larger one"),
+        name=transform.name,
+        count=before,
     )
 
 

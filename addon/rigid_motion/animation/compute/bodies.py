@@ -1,16 +1,182 @@
-"""From channels to the poses of a body, and back to what the channels differ by."""
+"""From channels to rows of values, to the poses of a body, and back to what the channels differ by.
+
+Values are rows of components, each of many sources behind the other. Progress in a segment is the share of the chord
+over all channels, a radian counting as much as a unit of length. Where no channel changes, and the body makes whole
+turns all the same, it is what the interpolation of the keys says.
+
+For an NLA strip that has less than full influence, with nothing below it, Blender blends each property with its default
+by itself: the channels that are keyed, and the delta transforms beside them. Both together are then not what the same
+strip would show with real keys. So delta transforms get those values that, blended likewise, are what is lacking.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from operator import itemgetter
 
 import numpy as np
 
 from ...motion import Poses
-from ...motion.eulers import quaternions_from_extrinsic_eulers
-from ...motion.quaternions import conjugate, multiply
-from .components import LOCATION, ROTATION, ROWS, SCALE
-from .sources import Source
+from ...motion.eulers import extrinsic_eulers_from_quaternions, quaternions_from_extrinsic_eulers
+from ...motion.quaternions import conjugate, multiply, normalise
+from ..curves.evaluation import evaluate
+from ..curves.keys import Keys
+from .components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
+from .sources import FULL_TURN, SAME_FRAME, Source
+
+LEAST = 1e-3
+"""The influence below which nothing is to be seen of a strip, and that is not made up for."""
+
+
+def each(sources: Sequence[Source], counts: Iterator[int]) -> list[tuple[Source, slice]]:
+    """Return each source with the span of what it has this many of."""
+    bounds = [0, *itertools.accumulate(counts)]
+    return [(source, slice(*span)) for source, span in zip(sources, itertools.pairwise(bounds), strict=True)]
+
+
+def sampled(
+    samples: list[tuple[Source, slice]],
+    frames: Sequence[np.ndarray],
+    *,
+    unit_elastic: bool = False,
+    out: np.ndarray | None = None,
+) -> np.ndarray:
+    """Return the channels' own values at the frames of each source, m in all, with a row for each of the `height`."""
+    rows = np.empty((height([source for source, _ in samples]), samples[-1][1].stop)) if out is None else out
+    curves, times, out, apart = [], [], [], []
+    for (source, span), at in zip(samples, frames, strict=True):
+        _rest(rows[:, span], source)
+        for keyed_rows, keys in source.channels:
+            if at is source.key_frames and source.is_together:
+                rows[keyed_rows, span] = keys.values
+                continue
+            curves.append(keys)
+            times.append(at)
+            if keyed_rows[-1] - keyed_rows[0] < len(keyed_rows):
+                out.append(rows[keyed_rows[0] : keyed_rows[-1] + 1, span])
+            else:
+                out.append(np.empty((len(keyed_rows), len(at))))
+                apart.append((keyed_rows, span, out[-1]))
+    evaluate(curves, times, unit_elastic=unit_elastic, out=out)
+    for keyed_rows, span, values in apart:
+        rows[keyed_rows, span] = values
+    return rows
+
+
+def channels_at_ends(
+    segments: list[tuple[Source, slice]], *, unit_elastic: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the channels' own values where each segment starts and where it ends, rows as `sampled` has them."""
+    sources = [source for source, _ in segments]
+    keys = each(sources, (len(source.key_frames) for source in sources))
+    rows = sampled(keys, [source.key_frames for source in sources], unit_elastic=unit_elastic)
+    begins = np.delete(np.arange(rows.shape[1]), [span.stop - 1 for _, span in keys])
+    start, end = rows[:, begins], rows[:, begins + 1]
+    for source, span in segments:
+        for keyed_rows, channels in source.channels:
+            if channels.cycles is None:
+                continue
+            # A cycle whose ends differ jumps: one round ends on its last value, the next starts on its first.
+            jumps = _jumps(channels, source.key_frames)
+            for row, values in zip(keyed_rows, channels.values, strict=True):
+                start[row, span][jumps[:-1]], end[row, span][jumps[1:]] = values[0], values[-1]
+    return start, end
+
+
+def height(sources: Sequence[Source]) -> int:
+    """Return how many of the components are needed for what the sources key."""
+    return ROWS[SCALE].stop if any(SCALE in source.keyed for source in sources) else ROWS[ROTATION].stop
+
+
+def filled_height(sources: Sequence[Source]) -> int:
+    """Return how many of them for what is filled in."""
+    return ROWS[SCALE].stop if sources[0].uniform_scale else ROWS[ROTATION].stop
+
+
+def _rest(rows: np.ndarray, source: Source) -> None:
+    """Fill in what a source does not key."""
+    for name, part in ROWS.items():
+        if name not in source.keyed and part.start < len(rows):
+            rows[part] = REST[part, None]
+    for row, value in source.rest.items():
+        rows[row] = value
+    if source.order is not None:
+        rows[6] = 0.0
+
+
+def _jumps(keys: Keys, times: np.ndarray) -> np.ndarray:
+    """Return at which of these times a cyclic channel goes from its last value to its first, shape (n,)."""
+    cycles = keys.cycles
+    first, last = keys.times[[0, -1]]
+    if cycles is None or first == last:
+        return np.zeros(times.shape, dtype=bool)
+    rounds = (times - first) / (last - first)
+    whole = np.rint(rounds)
+    after = (whole >= 1) & (cycles.after == "REPEAT") & ((whole <= cycles.after_count) | (cycles.after_count == 0))
+    before = (whole <= 0) & (cycles.before == "REPEAT") & ((whole > -cycles.before_count) | (cycles.before_count == 0))
+    return (np.abs(rounds - whole) * (last - first) < SAME_FRAME) & (after | before)
+
+
+def progress_weights(start: np.ndarray, end: np.ndarray, order: str | None) -> tuple[np.ndarray, np.ndarray]:
+    """Return what a segment's progress is made of: weights (10, S) for the channels,
+    and what to take off their sum, (S,).
+    """
+    chord = end - start
+    weights = chord.copy()
+    if order is None:
+        # A unit quaternion moves by half of the angle that the object turns.
+        weights[ROWS[ROTATION]] *= 4.0
+    total = np.einsum("rs,rs->s", weights, chord)
+    weights /= np.where(total > 0.0, total, np.inf)
+    return weights, np.einsum("rs,rs->s", weights, start)
+
+
+def are_idle(weights: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """Return whether segments turn although no channel changes in them,
+    from the weights (., S) of their progress, (S,).
+    """
+    return (turns != 0) & ~weights.any(axis=0)
+
+
+def idle_progress(source: Source, frames: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Return how far segments have come on frames (m,) where no channel changes: by the interpolation of their keys.
+
+    `first` and `last` are the frames that each runs between, (m,). It is that of a value with the same keys, which
+    goes up by one from each to the next, and rests at a key where handles are: those of the first channel that turns.
+    """
+    turning = [
+        (row, keys.only([index]))
+        for rows, keys in source.channels
+        for index, row in enumerate(rows)
+        if PART_OF[row] == ROTATION
+    ]
+    _, keys = min(turning, key=itemgetter(0), default=(0, source.curves[0].only([0])))
+    begin, at, end = evaluate([_counting(keys)] * 3, [first, frames, last])
+    way, duration = end - begin, np.where(last > first, last - first, np.inf)
+    counted = np.divide(at - begin, way, out=np.zeros_like(at), where=way != 0.0)
+    return np.where(way != 0.0, counted, (frames - first) / duration)[0]
+
+
+def _counting(keys: Keys) -> Keys:
+    """Return the curve with the frames and interpolations of these keys, and their numbers for values."""
+    numbers = np.arange(len(keys.times), dtype=np.float32)
+
+    def numbered(points: np.ndarray | None) -> np.ndarray | None:
+        if points is None:
+            return None
+        points = points.copy()
+        points[0, :, 1] = numbers
+        return points
+
+    cycles = keys.cycles
+    if cycles is not None:
+        before, after = ("REPEAT_OFFSET" if mode == "REPEAT" else mode for mode in (cycles.before, cycles.after))
+        cycles = replace(cycles, before=before, after=after)
+    return replace(
+        keys, points=numbered(keys.points), left=numbered(keys.left), right=numbered(keys.right), cycles=cycles
+    )
 
 
 def turn_into_quaternions(rows: np.ndarray, order: str | None) -> None:
@@ -83,3 +249,68 @@ def align(quaternions: np.ndarray, starts: Sequence[int]) -> None:
         lengths = np.diff((*starts, quaternions.shape[1]))
         odd = (flips - np.repeat(flips[list(starts)], lengths)) % 2 == 1
         np.negative(quaternions, out=quaternions, where=odd)
+
+
+def influence_at(source: Source, frames: np.ndarray) -> np.ndarray:
+    """Return the influence of the strip on frames (m,) of the Action."""
+    at, values = np.array(source.influence).T
+    return np.interp(frames, at, values)
+
+
+def blended(source: Source, frames: np.ndarray, native: np.ndarray, delta: np.ndarray) -> None:
+    """Turn differences (., m), rotations as quaternions, into those that hold where a strip has its influence.
+
+    For Euler angles they are what `undo_blending` takes afterwards. `native` is what the channels have, shape (., m).
+    """
+    influence = influence_at(source, frames)
+    some = (influence > LEAST) & (influence < 1.0)
+    if not some.any():
+        return
+    # What is blended has a sign that counts.
+    delta[ROWS[ROTATION]] *= np.where(delta[ROWS[ROTATION].start] < 0.0, -1.0, 1.0)
+    v, turns = influence[some], delta[ROWS[ROTATION]][:, some].T
+    if source.order is None:
+        channels = native[ROWS[ROTATION]][:, some].T
+        desired = multiply(turns, normalise(channels))
+        desired = np.where(np.einsum("mi,mi->m", desired, channels)[:, None] < 0.0, -desired, desired)
+        lacking = multiply(normalise(_mixed(desired, v)), conjugate(normalise(_mixed(channels, v))))
+        lacking = np.where(lacking[:, :1] < 0.0, -lacking, lacking)
+        size = np.linalg.norm(_mixed(turns, v), axis=1)[:, None]
+        delta[ROWS[ROTATION], some] = ((size * lacking - _mixed(0.0 * turns, v)) / v[:, None]).T
+    else:
+        angles = native[3:6][:, some].T
+        desired = multiply(turns, quaternions_from_extrinsic_eulers(angles, source.order))
+        desired = _near(angles, extrinsic_eulers_from_quaternions(desired, source.order), source.order)
+        now = quaternions_from_extrinsic_eulers(v[:, None] * angles, source.order)
+        desired = quaternions_from_extrinsic_eulers(v[:, None] * desired, source.order)
+        delta[ROWS[ROTATION], some] = multiply(desired, conjugate(now)).T
+    if len(delta) > ROWS[SCALE].start:
+        channels = native[ROWS[SCALE]][:, some]
+        now, desired = 1.0 - v + v * channels, 1.0 - v + v * channels * delta[ROWS[SCALE]][:, some]
+        delta[ROWS[SCALE], some] = (desired / np.where(now == 0.0, 1.0, now) - 1.0 + v) / v
+
+
+def undo_blending(source: Source, frames: np.ndarray, angles: np.ndarray) -> None:
+    """Make delta angles (3, m) larger by as much as the influence of the strip makes them smaller."""
+    influence = influence_at(source, frames)
+    angles /= np.where((influence > LEAST) & (influence < 1.0), influence, 1.0)
+
+
+def _mixed(quaternions: np.ndarray, influence: np.ndarray) -> np.ndarray:
+    """Return what Blender makes of quaternions (m, 4) over no rotation."""
+    return (1.0 - influence[:, None]) * REST[ROWS[ROTATION]] + influence[:, None] * quaternions
+
+
+def other_angles(angles: np.ndarray, order: str) -> np.ndarray:
+    """Return the other Euler angles (..., 3) that turn alike: half a turn more about the outer axes, and the middle one
+    from the other side.
+    """
+    return np.where(np.arange(3) == "XYZ".index(order[1]), np.pi - angles, angles + np.pi)
+
+
+def _near(angles: np.ndarray, others: np.ndarray, order: str) -> np.ndarray:
+    """Return the same turns as the other angles (m, 3), as near to these as may be."""
+    both = others, other_angles(others, order)
+    both = np.stack([turned + FULL_TURN * np.rint((angles - turned) / FULL_TURN) for turned in both])
+    best = np.abs(both - angles).sum(axis=2).argmin(axis=0)
+    return both[best, np.arange(len(angles))]

@@ -20,18 +20,25 @@ from ...motion import KEYFRAME_MODES, Poses
 from ...motion.eulers import extrinsic_eulers_from_quaternions
 from ...motion.piecewise import blocks, combine
 from ...motion.quaternions import multiply
-from .between_samples import Samples, largest_errors
-from .bodies import align, differ, take_off, turn_into_quaternions
+from .bodies import (
+    align,
+    are_idle,
+    blended,
+    channels_at_ends,
+    differ,
+    each,
+    filled_height,
+    height,
+    progress_weights,
+    sampled,
+    take_off,
+    turn_into_quaternions,
+    undo_blending,
+)
 from .breakdowns import Passages
-from .channel_rows import channels_at_ends, each, filled_height, height, sampled
-from .components import LOCATION, REST, ROTATION, ROWS, SCALE
-from .ends import Ends, measured_in
-from .influences import blended, undo_blending
-from .key_speeds import MEASURED, corrected
-from .modes import MODE_NAMES, MODE_NUMBERS
-from .neighbours import packed
-from .progress import are_idle, progress_weights
-from .samples import kept_rows, range_of_each
+from .components import LOCATION, MODE_NAMES, MODE_NUMBERS, REST, ROTATION, ROWS, SCALE, SMOOTH
+from .ends import MEASURED, Ends, corrected, measured_in, packed
+from .samples import Samples, kept_rows, largest_errors, range_of_each
 from .sources import Source
 
 AT_ONCE = 131072
@@ -40,9 +47,6 @@ AT_ONCE = 131072
 BLOCK = 24576
 """Samples worked on at once: few enough for the processor's caches."""
 
-
-SMOOTH = [mode.number for mode in KEYFRAME_MODES.values() if mode.is_smooth]
-"""The numbers of modes for which the keys around a segment count."""
 
 if any(mode.behind > 1 or mode.ahead > 1 for mode in KEYFRAME_MODES.values()):
     raise NotImplementedError(
@@ -110,14 +114,14 @@ def progress_at(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> list
     """Return how far along its segment of the path, from 0 to 1,
     each source has come on rising frames of its own, (m,).
     """
-    result, of_source = {}, {id(source): times for source, times in zip(sources, frames, strict=True)}
-    for portion in _portions(sources, {name: (0, len(times)) for name, times in of_source.items()}):
-        times = [of_source[id(source)] for source in portion]
+    result, of_source = {}, dict(zip(sources, frames, strict=True))
+    for portion in _portions(sources, {source: (0, len(times)) for source, times in of_source.items()}):
+        times = [of_source[source] for source in portion]
         samples = each(portion, map(len, times))
         native, delta = np.empty((2, height(portion), samples[-1][1].stop))
         along = _move(portion, times, native, delta[: filled_height(portion)])
-        result.update((id(source), along[span]) for source, span in samples)
-    return [result[id(source)] for source in sources]
+        result.update((source, along[span]) for source, span in samples)
+    return [result[source] for source in sources]
 
 
 def differences(
@@ -146,16 +150,16 @@ def differences(
     """
     result = {}
     rates = rates or [1] * len(sources)
-    rate_of = {id(source): rate for source, rate in zip(sources, rates, strict=True)}
-    reach_of = {id(source): reach for source, reach in zip(sources, reaches or rates, strict=True)}
-    range_of = {id(source): source.sample_range(rate) for source, rate in zip(sources, rates, strict=True)}
+    rate_of = dict(zip(sources, rates, strict=True))
+    reach_of = dict(zip(sources, reaches or rates, strict=True))
+    range_of = {source: source.sample_range(rate) for source, rate in rate_of.items()}
     if ranges is not None:
-        range_of = {id(source): span for source, span in zip(sources, ranges, strict=True)}
+        range_of = dict(zip(sources, ranges, strict=True))
     for portion in _portions(sources, range_of):
-        spans = [(*range_of[id(source)], rate_of[id(source)]) for source in portion]
+        spans = [(*range_of[source], rate_of[source]) for source in portion]
         of_range = {span: np.arange(span[0], span[1] + 1.0) / span[2] for span in set(spans)}
         frames = [of_range[span] for span in spans]
-        frames_of = {id(source): times for source, times in zip(portion, frames, strict=True)}
+        frames_of = dict(zip(portion, frames, strict=True))
         samples = each(portion, map(len, frames))
         # Both in one array: of smaller ones the C library gives the memory back at once, and asks for it the next time.
         rows, points = np.empty((2, height(portion), samples[-1][1].stop))
@@ -167,20 +171,20 @@ def differences(
         order = portion[0].order
         partial = [(source, span) for source, span in samples if source.influence is not None]
         for source, span in partial:
-            times = frames_of[id(source)]
+            times = frames_of[source]
             blended(source, times, sampled([(source, slice(len(times)))], [times]), delta[:, span])
         if order is not None:
             for some, span in blocks(np.array((0, *(part.stop for _, part in samples))), BLOCK):
                 starts = [part.start - span.start for _, part in samples[some]]
                 delta[3:6, span] = extrinsic_eulers_from_quaternions(delta[ROWS[ROTATION], span].T, order, starts).T
             for source, span in partial:
-                undo_blending(source, frames_of[id(source)], delta[3:6, span])
+                undo_blending(source, frames_of[source], delta[3:6, span])
         else:
             align(delta[ROWS[ROTATION]], [span.start for _, span in samples])
         starts = [span.start for _, span in samples]
         errors = itertools.repeat(0.0)
         if reaches is not None:
-            errors = largest_errors(delta, samples, spans, [reach_of[id(source)] for source in portion])
+            errors = largest_errors(delta, samples, spans, [reach_of[source] for source in portion])
         kept = [source.filled_rows for source in portion]
         if ranges is None:
             kept = kept_rows(portion, delta[:, starts], range_of_each(delta, starts))
@@ -189,12 +193,12 @@ def differences(
         points[..., 1] = delta
         for (source, span), rows_of_source, error in zip(samples, kept, errors, strict=False):
             filled = Samples({row: points[row, span].ravel() for row in rows_of_source})
-            filled.rate, filled.error = rate_of[id(source)], float(error)
-            result[id(source)] = filled
-    return [result[id(source)] for source in sources]
+            filled.rate, filled.error = rate_of[source], float(error)
+            result[source] = filled
+    return [result[source] for source in sources]
 
 
-def _portions(sources: Sequence[Source], range_of: dict[int, tuple[int, int]]) -> Iterator[list[Source]]:
+def _portions(sources: Sequence[Source], range_of: dict[Source, tuple[int, int]]) -> Iterator[list[Source]]:
     """Yield the sources in lists of about `AT_ONCE` samples, those apart that scale evenly or turn otherwise."""
     alike: dict[tuple, list[Source]] = {}
     for source in sources:
@@ -203,7 +207,7 @@ def _portions(sources: Sequence[Source], range_of: dict[int, tuple[int, int]]) -
         portion, samples = [], 0
         for source in group:
             portion.append(source)
-            first, last = range_of[id(source)]
+            first, last = range_of[source]
             samples += last - first + 1
             if samples >= AT_ONCE:
                 yield portion

@@ -1,4 +1,18 @@
-"""What segments run between: the poses at their ends, how they turn, and what the modes make of them."""
+"""What segments run between: the poses at their ends, how they turn, the keys beside them, and what modes make of them.
+
+Arrays are of S segments, one behind the other.
+
+A smooth mode looks at the keys beside a segment, and with handles at how fast the motion passes its keys. The direction
+of the tangent at a key is that of the mode, a mean of the twists before and after it. How far the motion has come in a
+segment is what the channels say, as in the other modes: their progress along the segment's chord. The screws on both
+sides of a key differ in speed and direction. So the tangent is made as long on either side as the screw is along the
+mean of both, which makes the speed the same where handles are smooth and the path is straight; what is lacking on a
+bent path, for the speed that Blender's own in-betweens have in that direction, is added to the progress. With two keys,
+and where no handle has a say, nothing changes.
+
+Twists (6, S) are along the body's own axes at the key, a radian counting as much as a unit of length; segments stand
+along the last axis.
+"""
 
 from __future__ import annotations
 
@@ -9,15 +23,168 @@ from functools import partial
 import numpy as np
 
 from ...motion import KEYFRAME_MODES, Poses, prepare, twists
+from ...motion.curves import twist_shares
+from ...motion.poses import beyond
 from ...motion.segments import prepare_within
-from .bodies import body_poses, location_axes
+from .bodies import body_poses, each, height, idle_progress, location_axes, sampled
 from .breakdowns import moved_by
-from .channel_rows import each, height, sampled
-from .key_speeds import MEASURED, native_twists, progress_slopes, tangents_and_lacks
-from .neighbours import meeting, spins_of_neighbours, with_neighbours
-from .progress import idle_progress
 from .sources import Source
 from .turning import Turning, needs_turning, turning_of, without_spins
+
+STEP = 1.0 / 8.0
+"""The part of a segment that slopes are measured over: exact for cubics in time, and finite for vertical handles."""
+
+SLOPES = np.array((18.0, -9.0, 2.0)) / (6.0 * STEP)
+"""The slope at 0 of the cubic through 0 and three values that are `STEP` apart."""
+
+MEASURED = np.concatenate((np.arange(1, 4) * STEP, 1.0 - np.arange(3, 0, -1) * STEP))
+"""The moments in the time of a segment where it is measured: next to its first key, and next to its second."""
+
+FASTEST = 3.0
+"""The largest slope of progress that is corrected: up to here a cubic between two keys does not turn back.
+Source: Fritsch and Carlson, "Monotone piecewise cubic interpolation", 1980."""
+
+SHORTEST = 0.1
+"""The length of a tangent from which on progress is not corrected any further to make up for it."""
+
+SMALL = 0.01
+"""The least part that the mean has of the squared speeds that it is made of: where the motion turns back on itself
+there is no direction to measure along."""
+
+
+def with_neighbours(
+    times: np.ndarray, keys: Poses, holds: np.ndarray, pairs: tuple[np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, Poses]:
+    """Return frames and poses (S, 4) of the keys around each segment, from those (S, 2) at its ends.
+
+    `pairs` are the segments that meet, as `meeting` finds them. Where there is none, or a cycle jumps, the motion goes
+    on as in the segment; where a segment holds, it rests.
+    """
+    rows = packed(keys)
+    previous, following = packed(beyond(keys[:, 0], keys[:, 1])), packed(beyond(keys[:, 1], keys[:, 0]))
+    # Between two keys on one frame there is nothing, and what is on either side meets there.
+    lasts = times[:, 1] > times[:, 0]
+    duration = np.where(lasts, times[:, 1] - times[:, 0], 1.0)
+    left, right = pairs
+    previous[right] = np.where(holds[left, None], rows[right, 0], rows[left, 0])
+    following[left] = np.where(holds[right, None], rows[left, 1], rows[right, 1])
+    before, behind = duration.copy(), duration.copy()
+    before[right], behind[left] = duration[left], duration[right]
+    start, end = times[:, 0], np.where(lasts, times[:, 1], times[:, 0] + duration)
+    four = np.stack((previous, rows[:, 0], rows[:, 1], following), axis=1)
+    return (
+        np.stack((start - before, start, end, end + behind), axis=1),
+        Poses(four[..., :3], four[..., 3:7], None if keys.scales is None else four[..., 7]),
+    )
+
+
+def spins_of_neighbours(
+    signs: np.ndarray, spins: np.ndarray, around: Poses, holds: np.ndarray, pairs: tuple[np.ndarray, np.ndarray]
+) -> tuple[Poses, np.ndarray]:
+    """Return what spins make of `with_neighbours`: the keys (S, 4) in signs that say which way round segments turn, and
+    the angular velocities (3, 2, S, 3) that spins add at both ends of the three segments between them.
+
+    From the signs (S,) and velocities (3, 2, S) of the segments.
+    """
+    quaternions = around.quaternions.copy()
+    # Where nothing is beside a segment, its motion goes on.
+    steps = signs[:, None].repeat(3, axis=1)
+    beside = np.stack((spins[:, [0, 0]], spins, spins[:, [1, 1]]), axis=3)
+    left, right = pairs
+    for segments, others, side in ((right, left, 0), (left, right, 2)):
+        steps[segments, side] = np.where(holds[others], 1.0, signs[others])
+        beside[:, :, segments, side] = np.where(holds[others], 0.0, spins[:, :, others])
+    quaternions[:, 1:] *= np.cumprod(steps, axis=1)[..., None]
+    return Poses(around.positions, quaternions, around.scales), beside
+
+
+def meeting(owners: np.ndarray, times: np.ndarray, keys: Poses) -> tuple[np.ndarray, np.ndarray]:
+    """Return the segments (p,) before and after each key at which two of them meet: both have the same pose there."""
+    rows, lasts = packed(keys), np.flatnonzero(times[:, 1] > times[:, 0])
+    left, right = lasts[:-1], lasts[1:]
+    meet = (owners[right] == owners[left]) & np.all(rows[right, 0] == rows[left, 1], axis=1)
+    return left[meet], right[meet]
+
+
+def packed(poses: Poses) -> np.ndarray:
+    """Return positions, quaternions and scales in one array (..., 7 or 8)."""
+    scales = () if poses.scales is None else (poses.scales[..., None],)
+    return np.concatenate((poses.positions, poses.quaternions, *scales), axis=-1)
+
+
+def progress_slopes(progress: np.ndarray) -> np.ndarray:
+    """Return the slopes at both ends (2, S) from the progress at the moments `MEASURED` (S, 6), in unit time."""
+    return np.stack((progress[:, :3] @ SLOPES, (1.0 - progress[:, :2:-1]) @ SLOPES))
+
+
+def native_twists(keys: Poses, measured: Poses) -> np.ndarray:
+    """Return Blender's own twists at both ends, shape (2, 6, S), in unit time.
+
+    From the poses at both keys (S, 2) and those of Blender's own in-betweens at the moments `MEASURED` (S, 6).
+    """
+    ends = np.zeros(6, dtype=int)
+    ends[3:] = 1
+    result = twists.between(
+        keys.positions[:, ends].reshape(-1, 3),
+        keys.quaternions[:, ends].reshape(-1, 4),
+        measured.positions.reshape(-1, 3),
+        measured.quaternions.reshape(-1, 4),
+    ).reshape(6, -1, 6)
+    return np.stack((result[..., :3] @ SLOPES, -(result[..., :2:-1] @ SLOPES)))
+
+
+def tangents_and_lacks(
+    slopes: np.ndarray, native: np.ndarray, screws: np.ndarray, times: np.ndarray, pairs: tuple[np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lengths of tangents at both ends of S segments, and what the slopes of progress lack there, (2, S).
+
+    Where no segment meets another these are 1 and 0.
+
+    Parameters
+    ----------
+    slopes : array, shape (2, S)
+        Of progress, as `progress_slopes` has them.
+    native : array, shape (2, 6, S)
+        As `native_twists` has them.
+    screws : array, shape (2, 6, S)
+        The twists that lead from key to key in unit time, as they are at both ends: spins turn about axes of their own.
+    times : array, shape (S, 2)
+        The frames of both keys.
+    pairs : tuple of array of int, shape (p,)
+        The segments that meet at a key: those before it, and those after it.
+    """
+    tangents, lacks = np.ones(slopes.shape), np.zeros(slopes.shape)
+    durations = times[:, 1] - times[:, 0]
+    speeds = screws / np.where(durations > 0.0, durations, np.inf)
+    before, after = pairs
+    share = twist_shares(durations[before], durations[after])
+    parts = share * speeds[1][:, before], (1.0 - share) * speeds[0][:, after]
+    mean = parts[0] + parts[1]
+    squared = np.maximum(_dot(mean, mean), SMALL * sum(_dot(part, part) for part in parts))
+    for side, segments, alone in ((1, before, share == 1.0), (0, after, share == 0.0)):
+        length = _ratio(_dot(speeds[side][:, segments], mean), squared)
+        speed = _ratio(_dot(native[side][:, segments], mean), durations[segments] * squared)
+        slope = speed / np.copysign(np.maximum(np.abs(length), SHORTEST), length)
+        tangents[side, segments] = length
+        lack = np.clip(slope, -FASTEST, FASTEST) - np.clip(slopes[side, segments], -FASTEST, FASTEST)
+        lacks[side, segments] = np.where(alone, 0.0, lack)
+    return tangents, lacks
+
+
+def corrected(progress: np.ndarray, elapsed: np.ndarray, lacks: np.ndarray) -> np.ndarray:
+    """Return progress (m,) with the slopes that it lacks (2, m) at either end, at times from 0 to 1 in its segment."""
+    left = 1.0 - elapsed
+    added = elapsed * left * (left * lacks[0] - elapsed * lacks[1])
+    return np.where((elapsed > 0.0) & (left > 0.0), progress + added, progress)
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.einsum("rs,rs->s", a, b)
+
+
+def _ratio(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return a / b, 0 where b is 0."""
+    return np.divide(a, b, out=np.zeros_like(a), where=b != 0.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .between_samples import MOST_SAMPLES, Samples, largest_errors
 from .components import ROTATION, ROWS
 from .differences import differences
+from .samples import MOST_SAMPLES, Samples, largest_errors
 from .sources import Source
 
 
@@ -44,7 +44,7 @@ def sampled(
     rates = [need.fewest for need in needs]
     if all(math.isinf(need.tolerance) for need in needs):
         return differences(sources, ranges, rates)
-    result = _differences(sources, needs, ranges, rates)
+    result = differences(sources, ranges, rates, [need.reach for need in needs])
     coarser: dict[int, Samples] = {}
     pending = [
         number for number, (samples, need) in enumerate(zip(result, needs, strict=True)) if _is_open(samples, need)
@@ -59,9 +59,9 @@ def sampled(
                 for number, rate in zip(pending, rates, strict=True)
             ]
         )
-        chosen = [sources[number] for number in pending], [needs[number] for number in pending]
-        open_still = []
-        for number, finer in zip(pending, _differences(*chosen, finer_ranges, rates), strict=True):
+        reaches, open_still = [needs[number].reach for number in pending], []
+        finer_samples = differences([sources[number] for number in pending], finer_ranges, rates, reaches)
+        for number, finer in zip(pending, finer_samples, strict=True):
             need, before = needs[number], result[number]
             first = coarser.get(number, before)
             if math.isinf(before.error):
@@ -91,15 +91,6 @@ def error_of(source: Source, points: Mapping[int, np.ndarray], rate: int, reach:
         delta[row] = samples[1::2]
     (error,) = largest_errors(delta, [(source, slice(0, last - first + 1))], [(first, last, rate)], [reach])
     return float(error) if math.isfinite(error) else 0.0
-
-
-def _differences(
-    sources: Sequence[Source],
-    needs: Sequence[Need],
-    ranges: Sequence[tuple[int, int]] | None,
-    rates: Sequence[int],
-) -> list[Samples]:
-    return differences(sources, ranges, rates, [need.reach for need in needs])
 
 
 def _is_open(samples: Samples, need: Need) -> bool:

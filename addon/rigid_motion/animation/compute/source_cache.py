@@ -10,7 +10,7 @@ from collections import OrderedDict
 
 import numpy as np
 
-from ..curves import Keys
+from ..curves.keys import Keys
 from .sources import Source
 
 MOST_BYTES = 32 * 2**20
@@ -65,12 +65,7 @@ def changed_range(old: Source, new: Source) -> tuple[int, int] | None:
         == (new.order, new.keyed, new.in_nla, new.frame_range, new.uniform_scale, new.driven, new.influence)
         and not (old.goes_on or new.goes_on)
         and not (old.passed.any() or new.passed.any())
-        and {row: value for row, value in old.rest.items() if row >= 3}
-        == {row: value for row, value in new.rest.items() if row >= 3}
-        and old.original.tobytes() == new.original.tobytes()
-        and _axes_bytes(old) == _axes_bytes(new)
-        and _mode_bytes(old) == _mode_bytes(new)
-        and _turns_bytes(old) == _turns_bytes(new)
+        and old.settings == new.settings
         and [rows for rows, _ in old.channels] == [rows for rows, _ in new.channels]
     )
     if not alike:
@@ -148,15 +143,3 @@ def _arrays(keys: Keys) -> dict[str, np.ndarray]:
     """Return the arrays that keys are made of."""
     arrays = {name: getattr(keys, name) for name in _OTHER_AXES}
     return {name: array for name, array in arrays.items() if array is not None}
-
-
-def _axes_bytes(source: Source) -> bytes | None:
-    return None if source.location_axes is None else source.location_axes.tobytes()
-
-
-def _mode_bytes(source: Source) -> bytes | int:
-    return source.mode.raw if isinstance(source.mode, Keys) else source.mode
-
-
-def _turns_bytes(source: Source) -> bytes | None:
-    return None if source.turns is None else source.turns.raw + source.turns_axis.encode()

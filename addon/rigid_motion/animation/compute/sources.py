@@ -14,10 +14,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ...motion import KEYFRAME_MODES
-from ..curves import BEZIER, CONSTANT, ELASTIC, LINEAR, Keys, Stepped, cycled, cyclic_times, evaluate, held
-from .components import PART_OF, REST, ROTATION, ROWS, SCALE
-from .modes import DEPENDS_ON_KEYS, MODE_NAMES
+from ..curves.evaluation import evaluate
+from ..curves.keys import BEZIER, CONSTANT, ELASTIC, LINEAR, Keys, Stepped, cycled, cyclic_times, held
+from .components import DEPENDS_ON_KEYS, PART_OF, REST, ROTATION, ROWS, SCALE, SMOOTH
 
 LAYOUT = b"3"
 """The layout of in-betweens in F-curves. With another number, those of older files are made anew."""
@@ -104,15 +103,7 @@ class Source:
         for rows, keys in self.channels:
             summary.update(bytes(rows))
             summary.update(keys.raw)
-        # Where something stands that is not keyed does not change how far off its in-betweens are.
-        if any(row >= ROWS[ROTATION].start for row in self.rest):
-            summary.update(repr({row: value for row, value in self.rest.items() if row >= 3}).encode())
-        summary.update(self.original.tobytes())
-        if self.location_axes is not None:
-            summary.update(self.location_axes.tobytes())
-        summary.update(self.mode.raw if isinstance(self.mode, Keys) else b"%d" % self.mode)
-        if self.turns is not None:
-            summary.update(self.turns.raw + self.turns_axis.encode())
+        summary.update(self.settings)
         if self.has_half_turns:
             summary.update(b"spins")
         span = self.seen if self.goes_on and not self.repeats else None
@@ -124,6 +115,19 @@ class Source:
         if self.has_modified_scale:
             summary.update(b"modified scale")
         return summary.hexdigest()
+
+    @property
+    def settings(self) -> bytes:
+        """What in-betweens depend on beside the keys of location, rotation and scale, and what is seen of them."""
+        # Where something stands that is not keyed does not change how far off its in-betweens are.
+        rest = {row: value for row, value in self.rest.items() if row >= ROWS[ROTATION].start}
+        parts = [repr(rest).encode() if rest else b"", self.original.tobytes()]
+        if self.location_axes is not None:
+            parts.append(self.location_axes.tobytes())
+        parts.append(self.mode.raw if isinstance(self.mode, Keys) else b"%d" % self.mode)
+        if self.turns is not None:
+            parts += [self.turns.raw, self.turns_axis.encode()]
+        return b"".join(parts)
 
     @property
     def difference_at_keys(self) -> np.ndarray:
@@ -238,16 +242,19 @@ class Source:
     @cached_property
     def is_smooth(self) -> bool:
         """Return whether a mode in it looks at the keys around a segment."""
-        numbers = np.unique(np.rint(self.mode.values)) if isinstance(self.mode, Keys) else (self.mode,)
-        names = [MODE_NAMES.get(int(number), "BLENDER") for number in numbers]
-        return any(name != "BLENDER" and KEYFRAME_MODES[name].is_smooth for name in names)
+        return bool(np.isin(np.rint(self.mode.values) if isinstance(self.mode, Keys) else self.mode, SMOOTH).any())
 
     @cached_property
     def modes(self) -> np.ndarray:
         """The number of the mode of each segment, shape (n - 1,)."""
-        # A moment into the segment; in a copy that runs backwards that is a moment before its original's end.
+        return self.modes_at(self._starts[0])
+
+    @cached_property
+    def _starts(self) -> tuple[np.ndarray, np.ndarray]:
+        """A moment into each segment, as the cycles have it, and whether they run backwards there, both (n - 1,)."""
+        # In a copy that runs backwards that is a moment before its original's end.
         starts = self.key_frames[:-1] + SAME_FRAME
-        return self.modes_at(starts if self.cyclic is None else cycled(self.cyclic, starts)[0])
+        return (starts, np.zeros(len(starts), dtype=bool)) if self.cyclic is None else cycled(self.cyclic, starts)
 
     def modes_at(self, frames: np.ndarray) -> np.ndarray:
         """Return the numbers of the modes at these frames: each key of the mode channel holds until the next."""
@@ -269,20 +276,16 @@ class Source:
         """The turns more of each segment that is not Blender's own, whole ones but for inserted keys, (n - 1,)."""
         if self.turns is None:
             return np.zeros(len(self.key_frames) - 1)
-        starts = self.key_frames[:-1] + SAME_FRAME
-        if self.cyclic is not None:
-            starts = cycled(self.cyclic, starts)[0]
-        at = np.searchsorted(self.turns.times, starts, side="right") - 1
+        at = np.searchsorted(self.turns.times, self._starts[0], side="right") - 1
         turns = np.where(at < 0, 0.0, self.turns.values[0, np.clip(at, 0, None)])
         whole = np.rint(turns)
         turns = np.where(np.abs(turns - whole) < WHOLE_TURN, whole, turns)
         return np.where(self.modes == 0, 0.0, turns)
 
-    @cached_property
+    @property
     def run_backwards(self) -> np.ndarray:
         """Return whether cycles run through a segment backwards, shape (n - 1,)."""
-        starts = self.key_frames[:-1] + SAME_FRAME
-        return np.zeros(len(starts), dtype=bool) if self.cyclic is None else cycled(self.cyclic, starts)[1]
+        return self._starts[1]
 
     @cached_property
     def has_half_turns(self) -> bool:
@@ -355,12 +358,8 @@ class Source:
     @property
     def held_range(self) -> tuple[float, float]:
         """The first and the last frame on which there may be anything between keys: holds show it behind these, too."""
-        (first, last), longest = self.keyed_range, self._longest_hold
+        (first, last), longest = self.keyed_range, sum(step.step for step in self.steps)
         return (first - longest if any(first < step.offset for step in self.steps) else first), last + longest
-
-    @property
-    def _longest_hold(self) -> float:
-        return sum(step.step for step in self.steps)
 
     @cached_property
     def seen_range(self) -> tuple[int, int]:
@@ -370,7 +369,7 @@ class Source:
         first, last = self.keyed_range
         if self.seen is not None and self.goes_on:
             # What is held there may be from before, or before an offset from behind.
-            longest = self._longest_hold
+            longest = sum(step.step for step in self.steps)
             first, last = min(first, self.seen[0] - longest), max(last, self.seen[1] + longest)
         return math.floor(first), math.ceil(last)
 

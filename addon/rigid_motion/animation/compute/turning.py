@@ -117,17 +117,6 @@ def turning(
     return result
 
 
-def in_whole_turns(result: Turning, by_angles: Turning) -> Turning:
-    """Return the same motion with whole turns alone: the rest of it by the shortest way between the keys.
-
-    `by_angles` is how they turn without what the channel has.
-    """
-    is_whole = result.spins.turns == np.rint(result.spins.turns)
-    lacking = result.about - np.einsum("ks,ks->s", by_angles.turn, result.axes_in_body)
-    turns = np.where(is_whole, result.spins.turns, np.rint(lacking / FULL_TURN))
-    return replace(by_angles, spins=replace(result.spins, turns=turns))
-
-
 def turning_of(
     sources: Sequence[Source], start: np.ndarray, end: np.ndarray, keys: Poses, original: np.ndarray
 ) -> tuple[Turning, Turning]:
@@ -142,20 +131,28 @@ def turning_of(
     result = turning(*given, turns, axes, backwards)
     if np.all(turns == np.rint(turns)):
         return result, result
-    return result, in_whole_turns(result, turning(*given, np.zeros_like(turns), axes, backwards))
+    # What is not whole goes by the shortest way between the keys, as without what the channel has.
+    by_angles, spins = turning(*given, np.zeros_like(turns), axes, backwards), result.spins
+    lacking = result.about - np.einsum("ks,ks->s", by_angles.turn, result.axes_in_body)
+    whole = np.where(spins.turns == np.rint(spins.turns), spins.turns, np.rint(lacking / FULL_TURN))
+    return result, replace(by_angles, spins=replace(spins, turns=whole))
 
 
 def turning_in(source: Source, segment: int, turns: float | None = None) -> Turning:
     """Return how one of the segments of a source turns, with other turns than those of its channel if so given."""
-    keys, original = source.key_frames[segment : segment + 2], source.original[:, None]
-    # As seen from within the segment where cycles jump.
-    rows = source.values_at(keys if source.cyclic is None else keys + np.array((MOMENT, -MOMENT)))
+    rows, original = values_at_ends(source, segment), source.original[:, None]
     start, end = rows[:, :1], rows[:, 1:]
     poses = body_poses(rows[:, None], original[..., None], None, source)
     at = slice(segment, segment + 1)
     channel = source.segment_turns[at] if turns is None else np.array([turns])
     axes, backwards = np.array([source.turns_axis]), source.run_backwards[at]
     return turning(start, end, poses, original[ROWS[ROTATION]].T, source.order, channel, axes, backwards)
+
+
+def values_at_ends(source: Source, segment: int) -> np.ndarray:
+    """Return what the channels have at both ends of a segment, (10, 2), as seen from within it where cycles jump."""
+    keys = source.key_frames[segment : segment + 2]
+    return source.values_at(keys if source.cyclic is None else keys + np.array((MOMENT, -MOMENT)))
 
 
 def shortest_turns(first: np.ndarray, second: np.ndarray) -> np.ndarray:

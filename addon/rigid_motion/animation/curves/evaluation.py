@@ -1,18 +1,131 @@
-"""The values of many curves on many frames. Results are doubles."""
+"""The values of many curves on many frames. Curves that share their timing and frames are evaluated together.
+
+Results are doubles.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...motion.piecewise import combine
-from .grouping import Group, blocks, group_by_timing
-from .keys import BEZIER, Keys
+from .keys import BEZIER, Keys, fold
 from .spans import Spans
+
+BLOCK = 16384
+"""Frames worked on at once: few enough for the processor's caches, enough to make light of the calls to NumPy."""
 
 CHUNK = 65536
 """Values of curves with the same timing that are worked out at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Curves with the same timing, and which spans their frames fall into."""
+
+    members: list[tuple[int, slice]]
+    """The curves: which of the `Keys` asked for, and which channels of them."""
+
+    curves: np.ndarray
+    """Their numbers among all curves, shape (c,)."""
+
+    frames: np.ndarray
+    """Frames, rising, shape (m,)."""
+
+    spans: np.ndarray
+    """Spans of the first of the curves, shape (s,)."""
+
+    counts: np.ndarray
+    """The number of frames, one after the other, that fall into each, shape (s,)."""
+
+    order: np.ndarray | None
+    """The places of the frames in the result, shape (m,). None: those that they have."""
+
+    offsets: np.ndarray | None
+    """Values that cycles add to each curve, in the order of the result, shape (c, m). None: nothing."""
+
+    def chunks(self, size: int) -> Iterator[tuple[slice, Group]]:
+        """Yield this group with about `size` of the curves at a time, and which these are."""
+        begin = first = end = 0
+        for stop, (_, channels) in enumerate(self.members, start=1):
+            end += channels.stop - channels.start
+            if end - begin >= size or stop == len(self.members):
+                chunk = slice(begin, end)
+                offsets = None if self.offsets is None else self.offsets[chunk]
+                members = self.members[first:stop]
+                yield chunk, replace(self, members=members, curves=self.curves[chunk], offsets=offsets)
+                begin, first = end, stop
+
+    def write(self, values: np.ndarray, out: Sequence[np.ndarray]) -> None:
+        """Write values (c, m) of the rising frames to where they belong, see `evaluate`."""
+        if self.order is not None:
+            rising, values = values, np.empty_like(values)
+            values[:, self.order] = rising
+        if self.offsets is not None:
+            values += self.offsets
+        begin = 0
+        for number, channels in self.members:
+            end = begin + channels.stop - channels.start
+            out[number][channels] = values[begin:end]
+            begin = end
+
+
+def group_by_timing(curves: Sequence[Keys], times: Sequence[np.ndarray], spans: Spans) -> Iterator[Group]:
+    """Yield curves that share their timing and are asked for the same frames, wherever in the list they are."""
+    requests, distinct = _requests(times)
+    groups: dict[tuple, list[tuple[int, slice]]] = {}
+    for number, (request, timings) in enumerate(zip(requests, spans.timings(curves), strict=True)):
+        for channels, timing in timings:
+            groups.setdefault((request, timing), []).append((number, channels))
+    rising = [bool(np.all(frames[1:] >= frames[:-1])) for frames in distinct]
+    for (request, _), members in groups.items():
+        first, frames = curves[members[0][0]], distinct[request]
+        offsets = order = None
+        if first.cycles is not None:
+            frames, _, rounds = fold(first, frames)
+            if np.any(rounds):
+                ends = [curves[number].values[channels] for number, channels in members]
+                offsets = np.multiply.outer(np.concatenate([values[:, -1] - values[:, 0] for values in ends]), rounds)
+        if first.cycles is not None or not rising[request]:
+            order = np.argsort(frames, kind="stable")
+            frames = frames[order]
+        ranges = [
+            range(spans.first_curve[number] + channels.start, spans.first_curve[number] + channels.stop)
+            for number, channels in members
+        ]
+        rows = np.array([curve for curves_of_keys in ranges for curve in curves_of_keys])
+        yield Group(members, rows, frames, *spans.at(int(rows[0]), frames), order, offsets)
+
+
+def _requests(times: Sequence[np.ndarray]) -> tuple[list[int], list[np.ndarray]]:
+    """Return which of the distinct arrays of frames each curve is asked for, and those, in Blender's precision."""
+    requests: list[int] = []
+    distinct: list[np.ndarray] = []
+    of_array: dict[int, int] = {}
+    of_content: dict[bytes, int] = {}
+    for frames in times:
+        if id(frames) not in of_array:
+            single = np.asarray(frames).astype(np.float32)
+            request = of_array[id(frames)] = of_content.setdefault(single.tobytes(), len(distinct))
+            if request == len(distinct):
+                distinct.append(single.astype(np.float64))
+        requests.append(of_array[id(frames)])
+    return requests, distinct
+
+
+def blocks(groups: Iterable[Group]) -> Iterator[list[Group]]:
+    """Yield groups of equally many curves, in lists of about `BLOCK` frames."""
+    block: list[Group] = []
+    size = 0
+    for group in sorted(groups, key=lambda group: len(group.curves)):
+        if block and (size >= BLOCK or len(block[0].curves) != len(group.curves)):
+            yield block
+            block, size = [], 0
+        block.append(group)
+        size += len(group.frames)
+    yield block
 
 
 def evaluate(

@@ -11,8 +11,8 @@ from typing import TypeVar
 import bpy
 
 from ..actions.reading import sources_of_users
+from ..actions.records import follow_renamed
 from ..actions.refusals import refuse_numbers
-from ..actions.renaming import follow_renamed
 from ..actions.slots import Binding, bindings_of
 from ..compute.sources import Source
 from ..live import follower

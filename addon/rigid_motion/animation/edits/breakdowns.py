@@ -10,25 +10,25 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import bpy
 import numpy as np
-from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.app.translations import pgettext_n as n_
 
 from ...motion import Poses, interpolate
 from ..actions.channels import KeyFields, key_fields, set_key_fields
 from ..actions.modifiers import added_values
 from ..actions.reading import read
 from ..actions.refusals import refuse_linked
-from ..actions.slots import Binding
+from ..actions.slots import Binding, read_again
 from ..compute.bodies import body_poses
+from ..compute.components import DEPENDS_ON_KEYS, MODE_NAMES, MODE_NUMBERS
 from ..compute.differences import in_betweens
-from ..compute.modes import DEPENDS_ON_KEYS, MODE_NAMES, MODE_NUMBERS
 from ..compute.sources import SAME_FRAME, Source
 from ..compute.turning import needs_turning
 from ..live import follower
 from ..live.inserted_keys import set_key
+from ..live.kept_timing import nearest_key
 from ..live.segment_keys import share_out_turns
 from ..queries.keyed import active_binding
 from ..queries.segments import frame_in_action
@@ -101,15 +101,10 @@ class _Between:
     def mode(self) -> str:
         return MODE_NAMES[self.source.mode_at(self.ends[0] + SAME_FRAME)]
 
-    @cached_property
-    def _values_at_ends(self) -> np.ndarray:
-        """The components at both keys, shape (2, 10)."""
-        return self.source.values_at(np.array(self.ends)).T
-
     def pose(self, kind: str, factor: float) -> np.ndarray:
         """Return the components to be keyed, shape (10,)."""
         if kind == BREAKDOWN:
-            first, last = self._values_at_ends
+            first, last = self.source.values_at(np.array(self.ends)).T
             straight = first + factor * (last - first)
             if self.mode == "BLENDER" and self.source.order is not None:
                 return straight
@@ -160,9 +155,9 @@ class _Between:
                 before = len(fcurve.keyframe_points)
                 set_key(fcurve, self.frame, components[row])
                 if len(fcurve.keyframe_points) > before:
-                    next(point for point in fcurve.keyframe_points if _is_on(point, self.frame)).type = key_type
+                    fcurve.keyframe_points[nearest_key(fcurve, self.frame)[0]].type = key_type
         if needs_turning(self.source):
-            binding = self.binding.read_again()
+            binding = read_again([self.binding])[0]
             share_out_turns(binding, read(binding), self.source, factor if kind == BREAKDOWN else None)
             self.binding.curves.update(binding.curves)
 
@@ -215,9 +210,8 @@ class Breakdowns:
         binding = active_binding(transform, [binding for binding, _ in readings])
         if binding is None:
             raise Refused(
-                rpt_("{name} has no Action with keys: key it first, or enter a strip (NLA Editor, Tab)").format(
-                    name=transform.name
-                )
+                n_("{name} has no Action with keys: key it first, or enter a strip (NLA Editor, Tab)"),
+                name=transform.name,
             )
         refuse_linked(transform, binding)
         frame = frame_in_action(transform.animated, self._frame)
@@ -227,9 +221,9 @@ class Breakdowns:
         first, last = source.keyed_range if source.channels else (np.inf, -np.inf)
         if not first < frame < last:
             raise Refused(
-                rpt_(
-                    "{name} needs a key before and a key after frame {frame:g}: go to a frame between two keys"
-                ).format(name=transform.name, frame=frame)
+                n_("{name} needs a key before and a key after frame {frame:g}: go to a frame between two keys"),
+                name=transform.name,
+                frame=frame,
             )
         keys = source.key_frames
         after = int(np.searchsorted(keys, frame))
@@ -258,7 +252,3 @@ def _without(source: Source, frame: float) -> Source:
         else:
             rest |= dict(zip(rows, keys.values[:, 0].tolist(), strict=True))
     return replace(source, channels=tuple(channels), rest=rest).unheld
-
-
-def _is_on(key: bpy.types.Keyframe, frame: float) -> bool:
-    return abs(key.co.x - frame) < SAME_FRAME

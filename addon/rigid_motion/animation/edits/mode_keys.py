@@ -14,16 +14,15 @@ from functools import partial
 
 import bpy
 import numpy as np
-from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.app.translations import pgettext_n as n_
 
 from ...motion.modes import no_such_mode
 from ..actions.mode_property import is_keyed, set_pending_mode
 from ..actions.reading import keyed_in, read
-from ..actions.records import record_mode, record_turns_axis
+from ..actions.records import follow_renamed, record_mode, record_turns_axis
 from ..actions.refusals import MOST_TURNS, refuse_linked, refuse_numbers
-from ..actions.renaming import follow_renamed
 from ..actions.slots import Binding, bindings_of
-from ..compute.modes import MODE_NUMBERS
+from ..compute.components import MODE_NUMBERS
 from ..compute.sources import TURN_AXES
 from ..live import follower
 from ..live.segment_keys import set_mode_in, set_turns_in
@@ -110,8 +109,8 @@ def set_turns(
     def plan(transform: Transform, readings: Readings) -> Binding:
         binding = _binding_of(transform, able(transform, readings))
         if turns and not any(modes_in(binding, frames_in(binding) if frames is None else np.asarray(frames))):
-            text = rpt_("{name}: Blender's own in-betweens make no turns more: choose a mode first")
-            raise Refused(text.format(name=transform.name))
+            text = n_("{name}: Blender's own in-betweens make no turns more: choose a mode first")
+            raise Refused(text, name=transform.name)
         return binding
 
     def act(_: Transform, binding: Binding) -> None:
@@ -120,11 +119,10 @@ def set_turns(
         set_turns_in(binding, turns, frames_in(binding)[:-1] if frames is None else frames)
 
     if isinstance(turns, bool) or not isinstance(turns, int) or abs(turns) > MOST_TURNS:
-        text = rpt_("{turns} is no number of turns: give a whole number from -{most} to {most}")
-        raise Refused(text.format(turns=turns, most=MOST_TURNS))
+        text = n_("{turns} is no number of turns: give a whole number from -{most} to {most}")
+        raise Refused(text, turns=turns, most=MOST_TURNS)
     if axis is not None and axis not in TURN_AXES:
-        text = rpt_("{axis} is no axis of turns: give one of {axes}")
-        raise Refused(text.format(axis=axis, axes=", ".join(TURN_AXES)))
+        raise Refused(n_("{axis} is no axis of turns: give one of {axes}"), axis=axis, axes=", ".join(TURN_AXES))
     apply_edit(targets, plan, act, refused)
 
 
@@ -133,9 +131,8 @@ def _binding_of(transform: Transform, bindings: Sequence[Binding]) -> Binding:
     binding = active_binding(transform, bindings)
     if binding is None:
         raise Refused(
-            rpt_(
-                "{name} has no Action with keys to set a mode on: key it first, or enter a strip (NLA Editor, Tab)"
-            ).format(name=transform.name)
+            n_("{name} has no Action with keys to set a mode on: key it first, or enter a strip (NLA Editor, Tab)"),
+            name=transform.name,
         )
     return binding
 

@@ -9,14 +9,14 @@ from __future__ import annotations
 import functools
 import logging
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 
 import bpy
 from bpy.app.handlers import persistent
 
 from ..actions.mode_property import adopt_from_properties, show_pending_modes
 from ..actions.reading import leading
-from ..actions.renaming import forget_names
+from ..actions.records import forget_names
 from ..actions.slots import Binding, bindings_of, choose_slots, filled_bindings, slots_in
 from ..compute import source_cache
 from ..compute.sources import Source
@@ -24,23 +24,26 @@ from ..handlers import append_handlers, remove_handlers
 from ..transforms import ObjectTransform, Refused, Transform, let_override_be_read, prefix_of, transform_of
 from ..writers.filling import finish_drafts
 from ..writers.table import release, writer_of
-from .between_frames import on_main_thread, shows_between_frames
-from .depsgraphs import (
+from .edited import (
     BlockKey,
+    OperatorWatch,
     actions_to_evaluate,
     add_actions,
     edited_actions,
+    has_bones,
+    has_mode,
     key_of,
     objects_of,
     objects_to_evaluate,
+    on_main_thread,
+    shows_between_frames,
+    transforms_under,
+    uses_modes,
 )
 from .inserted_keys import InsertedKeys
-from .left_in_place import LeftInPlace
-from .modes_in_use import has_bones, has_mode, transforms_under, uses_modes
-from .operators import OperatorWatch
 from .refreshing import refresh_bindings
-from .seen_in_channels import SeenInChannels, is_baking
-from .separated_slots import SlotNames, are_separated, discard, give_keys_back, notice_slots
+from .rigs import SlotNames, are_separated, discard, give_keys_back, notice_slots
+from .seen_pose import LeftInPlace, SeenInChannels, is_baking
 from .snapshots import Snapshots
 
 log = logging.getLogger(__package__)
@@ -57,7 +60,7 @@ class Follower:
         self.busy = False
         """True if the edits that Blender tells of are the extension's."""
         self.drafts = False
-        """True if large Actions may be edited in draft: see `writers.drafts`."""
+        """True if large Actions may be edited in draft: see `writers.filling`."""
         self.operators = OperatorWatch()
         self.handlers = {
             "depsgraph_update_pre": self._handler(self.before_update),
@@ -113,24 +116,28 @@ class Follower:
         return follow
 
     @contextmanager
-    def turn(self) -> Iterator[bool]:
-        """Yield whether edits are to be followed: not while they are the extension's."""
-        is_first = not self.busy
-        self.busy = True
+    def turn(self) -> Iterator[None]:
+        """Have the edits that Blender tells of meanwhile be the extension's."""
+        before, self.busy = self.busy, True
         try:
-            yield is_first
+            yield
         finally:
-            if is_first:
-                self.busy = False
+            self.busy = before
+
+    def alone(self, act: Callable, *arguments: object) -> None:
+        """Do something in a turn, unless there is one already."""
+        if not self.busy:
+            with self.turn():
+                act(*arguments)
 
     def refresh(self, targets: Targets | None = None, *, again: bool = False) -> int:
         """Bring the in-betweens of these up to date, or of all in the file: see the function of this name."""
         transforms = (
             transforms_under(bpy.data.objects) if targets is None else [transform_of(target) for target in targets]
         )
-        with self.turn() as is_first:
-            if not is_first:
-                return 0
+        if self.busy:
+            return 0
+        with self.turn():
             separated = give_keys_back(bpy.data.actions, self.slot_names) if targets is None else set()
             bindings = bindings_of(transforms)
             moved = {user for binding in bindings for user in binding.users}
@@ -172,9 +179,7 @@ class Follower:
         slots = slots_in(actions)
         notice_slots(slots, self.slot_names)
         bindings = [binding for slot in slots for binding in self.snapshots.edited_in(slot)]
-        with self.turn() as is_first:
-            if is_first:
-                self.refresh_bindings(bindings)
+        self.alone(self.refresh_bindings, bindings)
         return {user for binding in bindings for user in binding.users}
 
     def refresh_objects(self, depsgraph: bpy.types.Depsgraph, seen: set[Transform]) -> None:
@@ -223,9 +228,7 @@ class Follower:
             if depsgraph is not None:
                 self.left.notice_assignments(obj, depsgraph)
             for binding in filled_bindings(obj):
-                with self.turn() as is_first:
-                    if is_first:
-                        writer_of(binding).prepare(binding)
+                self.alone(writer_of(binding).prepare, binding)
                 if depsgraph is not None:
                     for transform in binding.users:
                         with suppress(Refused):
@@ -299,9 +302,7 @@ class Follower:
         self.inserted.forget_undo()
         self.frame = scene.frame_current_final
         if is_baking():
-            with self.turn() as is_first:
-                if is_first:
-                    self.channels.show(transforms_under(filter(uses_modes, scene.objects)))
+            self.alone(self.channels.show, transforms_under(filter(uses_modes, scene.objects)))
 
     def after_undo(self, *_: object) -> None:
         self.snapshots.clear()
@@ -318,10 +319,10 @@ class Follower:
     def after_load(self, *_: object) -> None:
         source_cache.clear()
         self.begin_file()
-        with self.turn() as is_first:
-            if is_first:
-                transforms = transforms_under(bpy.data.objects)
-                moved = {user for binding in bindings_of(transforms) for user in binding.users}
+        if not self.busy:
+            transforms = transforms_under(bpy.data.objects)
+            moved = {user for binding in bindings_of(transforms) for user in binding.users}
+            with self.turn():
                 adopt_from_properties(transform for transform in transforms if transform not in moved)
         self.look_again()
 
@@ -377,18 +378,18 @@ def refresh(targets: Targets | None = None) -> int:
 
 def refresh_read(readings: Sequence[tuple[Binding, list[Source | Refused]]]) -> None:
     """Bring the in-betweens of these up to date, which are read already, as each of their users has them."""
-    with follower.turn() as is_first:
-        if is_first:
-            sources = [leading(binding, of_users) for binding, of_users in readings]
-            follower.refresh_bindings([binding for binding, _ in readings], sources)
+    sources = [leading(binding, of_users) for binding, of_users in readings]
+    follower.alone(follower.refresh_bindings, [binding for binding, _ in readings], sources)
 
 
 def follow_original(transform: ObjectTransform) -> None:
     """Follow an edit of what is written down of a transform's original difference."""
-    with follower.turn() as is_first:
-        if is_first:
-            transform.follow_original()
-            follower.refresh_bindings(bindings_of([transform]))
+
+    def follow() -> None:
+        transform.follow_original()
+        follower.refresh_bindings(bindings_of([transform]))
+
+    follower.alone(follow)
 
 
 def show_seen_in_channels(transforms: Iterable[Transform]) -> None:
@@ -397,11 +398,9 @@ def show_seen_in_channels(transforms: Iterable[Transform]) -> None:
         follower.inserted.notice_whole(transform, follower.frame)
 
 
-@contextmanager
-def paused() -> Iterator[None]:
+def paused() -> AbstractContextManager[None]:
     """Do several things, and refresh after them."""
-    with follower.turn():
-        yield
+    return follower.turn()
 
 
 def first_look() -> None:

@@ -38,11 +38,12 @@ from ..compute.components import PART_OF, rows_left_to
 from ..compute.source_cache import cached_source
 from ..compute.sources import SAME_FRAME, Source, values_of
 from ..compute.turning import needs_turning
+from ..queries.segments import frame_in_action
 from ..queries.visible_pose import shown_components, visible_components
 from ..transforms import Transform
 from ..writers.table import writer_of
+from .edited import Operators
 from .kept_timing import Insertion, keep_timing, mark_breakdown, nearest_key
-from .operators import Operators
 
 MOST_INSERTED = 256
 """Insertions that undo and redo can bring back as they were."""
@@ -146,9 +147,7 @@ class InsertedKeys:
         for binding, before, source in changes:
             if (old := _before_insertion(before, source)) is not None:
                 for user in self._by_precedence(binding):
-                    data, action_frame = user.animated.animation_data, frame
-                    if data.use_tweak_mode:
-                        action_frame = data.nla_tweak_strip_time_to_scene(frame, invert=True)
+                    action_frame = frame_in_action(user.animated, frame)
                     if _is_inserted(old, source, action_frame):
                         result.append((binding, user, old, source, action_frame))
         had = values_of(
@@ -156,7 +155,7 @@ class InsertedKeys:
             [old.held(np.array([action_frame])) for _, _, old, _, action_frame in result],
         )
         for (binding, user, old, source, action_frame), values in zip(result, had, strict=True):
-            posed = self._posed.get(_identity(user))
+            posed = self._posed.get(user.identity)
             posed = posed if posed is not None and posed.frame == frame else None
             self._new[binding].append(_NewKey(user, posed, old, source, action_frame, values[:, 0]))
 
@@ -166,7 +165,7 @@ class InsertedKeys:
         if len(users) > 1:
             layer = bpy.context.view_layer
             active = None if layer is None else layer.objects.active
-            users.sort(key=lambda user: (_identity(user) not in self._posed, user.animated != active))
+            users.sort(key=lambda user: (user.identity not in self._posed, user.animated != active))
         return users
 
     def keep_timing(self) -> None:
@@ -176,7 +175,7 @@ class InsertedKeys:
         keep_timing(insertions)
 
     def _keep(self, transform: Transform, posed: _Posed) -> None:
-        identity = _identity(transform)
+        identity = transform.identity
         self._posed[identity] = posed
         if posed.is_whole:
             self._whole[identity, posed.components.tobytes()] = posed
@@ -186,7 +185,7 @@ class InsertedKeys:
 
     def notice_undo(self, transform: Transform) -> None:
         """Undo or redo gave a transform its properties: they were not set, though others were evaluated."""
-        self._undone[_identity(transform)] = transform.components().tobytes()
+        self._undone[transform.identity] = transform.components().tobytes()
 
     def forget_undo(self) -> None:
         """Forget what undo or redo posed: all has been evaluated since."""
@@ -194,10 +193,10 @@ class InsertedKeys:
 
     def is_whole_again(self, transform: Transform, frame: float) -> bool:
         """Return whether undo or redo brought a whole pose back that was put on a transform on this frame."""
-        posed = self._whole.get((_identity(transform), transform.components().tobytes()))
+        posed = self._whole.get((transform.identity, transform.components().tobytes()))
         if posed is None or posed.frame != frame:
             return False
-        self._posed[_identity(transform)] = posed
+        self._posed[transform.identity] = posed
         return True
 
     def notice_pose(self, transform: Transform, frame: float) -> None:
@@ -211,7 +210,7 @@ class InsertedKeys:
 
     def _is_shown_whole(self, transform: Transform) -> bool:
         """Return whether a whole pose was put on a transform, and it has been shown without the difference since."""
-        before = self._posed.get(_identity(transform))
+        before = self._posed.get(transform.identity)
         if before is None or not before.is_whole:
             return False
         seen = shown_components(transform)
@@ -236,7 +235,7 @@ class InsertedKeys:
             evaluated is not None and tuple(getattr(carrier, prop)) != tuple(getattr(evaluated, prop))
             for prop in ("location", transform.rotation, "scale")
         )
-        if not changed or self._undone.get(_identity(transform)) == transform.components().tobytes():
+        if not changed or self._undone.get(transform.identity) == transform.components().tobytes():
             return False
         is_whole = self._is_shown_whole(transform) or operators.are_any(transform.stored_by)
         if not is_whole and not transform.matrix_lacks_difference and operators.is_script:
@@ -256,7 +255,7 @@ class InsertedKeys:
             self._posed.clear()
         else:
             for transform in transforms:
-                self._posed.pop(_identity(transform), None)
+                self._posed.pop(transform.identity, None)
 
     def keep_pose(self, binding: Binding, *, again: bool) -> bool:
         """Give a key that was found in a binding the pose of one of the users of the slot, if it can be of any.
@@ -298,10 +297,6 @@ class InsertedKeys:
                 mark_breakdown(curves.values(), old, frame)
             self._insertions.append(Insertion(curves, old, frame))
         return True
-
-
-def _identity(transform: Transform) -> tuple[int, str]:
-    return transform.animated.session_uid, transform.prefix
 
 
 def _before_insertion(digest: str, source: Source) -> Source | None:

@@ -16,12 +16,11 @@ from itertools import pairwise
 import bpy
 import numpy as np
 
-from ..compute.components import PART_OF, ROTATION
+from ..actions.channels import key_points
+from ..compute.components import DEPENDS_ON_KEYS, PART_OF, ROTATION
 from ..compute.differences import progress_at
-from ..compute.modes import DEPENDS_ON_KEYS
 from ..compute.sources import SAME_FRAME, Source, values_of
-from ..curves.fitting import GOOD, cubics_in_time, fit_together
-from ..curves.solvers import bezier_cubics, solve_cubics
+from ..curves.solvers import GOOD, bezier_cubics, cubics_in_time, fit_together, solve_cubics
 
 MOMENTS = np.linspace(0.0, 1.0, 41)
 """Moments of either side, at which the timing is looked at."""
@@ -85,8 +84,7 @@ class _Channels:
 
 def nearest_key(fcurve: bpy.types.FCurve, frame: float) -> tuple[int, np.ndarray]:
     """Return the number of the key nearest to a frame, 0 where there is none, and frame and value of all, (n, 2)."""
-    points = np.empty((len(fcurve.keyframe_points), 2), np.float32)
-    fcurve.keyframe_points.foreach_get("co", points.ravel())
+    points = key_points(fcurve)
     return int(np.abs(points[:, 0] - frame).argmin()) if len(points) else 0, points
 
 

@@ -11,14 +11,13 @@ from collections.abc import Iterable, Sequence
 
 from ..actions.mode_property import has_to_do_with_modes, show_modes
 from ..actions.reading import keyed_in
-from ..actions.records import recorded_digest
+from ..actions.records import follow_renamed, recorded_digest
 from ..actions.refusals import refuse_numbers
-from ..actions.renaming import follow_renamed
 from ..actions.slots import Binding, bindings_of, read_again
 from ..compute.source_cache import cache_source
 from ..compute.sources import Source
 from ..transforms import Refused, Transform
-from ..writers.filling import clear, fill_in, finish_drafts, follow_ranges, hold, is_complete
+from ..writers.filling import clear, fill_in, finish_drafts, hold, is_complete, limit_ranges
 from ..writers.sampled import regroup
 from ..writers.table import leave_other_way, release, remove_orphans, writer_of
 from .dense_keys import keep_motion
@@ -83,17 +82,13 @@ def refresh_bindings(
     inserted.keep_timing()
     clear(emptied)
     release(user for binding in idle for user in binding.users)
-    read = read_again(keyed_anew)
-    stale += [pair for pair in zip(read, keyed_in(read), strict=True) if _is_desired(*pair, recorded_digest(pair[0]))]
+    stale += _read_anew(keyed_anew)
     if divided := [binding for binding, source in stale if share_out_turns(binding, source)]:
-        read = read_again(divided)
-        anew = zip(read, keyed_in(read), strict=True)
-        stale = [pair for pair in stale if pair[0] not in divided]
-        stale += [pair for pair in anew if _is_desired(*pair, recorded_digest(pair[0]))]
+        stale = [pair for pair in stale if pair[0] not in divided] + _read_anew(divided)
     idle += _fill_in(stale, in_draft)
     editable = [binding for binding in bindings if binding.slot.action.is_editable]
     # Keys of what has no mode count in the frame range of an Action as well.
-    follow_ranges({binding.slot.action for binding in editable} - {binding.slot.action for binding, _ in stale})
+    limit_ranges({binding.slot.action for binding in editable} - {binding.slot.action for binding, _ in stale})
     finish_drafts({binding.slot.action for binding in editable if binding.slot.in_nla})
     _hold(idle, editable)
     # A bone was renamed or deleted: then it is no edit of a single one.
@@ -116,6 +111,12 @@ def _fill_in(readings: Sequence[tuple[Binding, Source]], in_draft: bool) -> list
                 failed.append(binding)
         return failed
     return []
+
+
+def _read_anew(bindings: Sequence[Binding]) -> list[tuple[Binding, Source]]:
+    """Return what is keyed by now in those of these bindings that are to be filled in."""
+    read = read_again(bindings)
+    return [pair for pair in zip(read, keyed_in(read), strict=True) if _is_desired(*pair, recorded_digest(pair[0]))]
 
 
 def _is_desired(binding: Binding, source: Source | Refused | None, before: str) -> bool:

@@ -10,12 +10,11 @@ import numpy as np
 
 from ...motion.quaternions import conjugate, rotate
 from ...motion.spins import FULL_TURN
-from ..actions.channels import ensure_group, replace_keys
+from ..actions.channels import ensure_group, key_points, replace_keys, selected_keys
 from ..actions.records import recorded_digest
 from ..actions.slots import Binding
-from ..compute.components import LOCATION, ROWS
+from ..compute.components import LOCATION, MODE_NAMES, MODE_NUMBERS, ROWS
 from ..compute.differences import in_betweens
-from ..compute.modes import MODE_NAMES, MODE_NUMBERS
 from ..compute.source_cache import cached_source
 from ..compute.sources import SAME_FRAME, WHOLE_TURN, Source
 from ..compute.turning import Turning, needs_turning, shortest_turns, turning_in
@@ -75,13 +74,7 @@ def _key_segments(
 
 def _keys_in(fcurve: bpy.types.FCurve) -> list[tuple[float, float, bool]]:
     """Return frame, value and whether it is selected, of each key."""
-    points, selected = (
-        np.empty(2 * len(fcurve.keyframe_points), np.float32),
-        np.empty(len(fcurve.keyframe_points), bool),
-    )
-    fcurve.keyframe_points.foreach_get("co", points)
-    fcurve.keyframe_points.foreach_get("select_control_point", selected)
-    return list(zip(points[::2].tolist(), points[1::2].tolist(), selected.tolist(), strict=True))
+    return [(*point, chosen) for point, chosen in zip(key_points(fcurve).tolist(), selected_keys(fcurve), strict=True)]
 
 
 def _is_among(chosen: np.ndarray, frames: np.ndarray) -> np.ndarray:

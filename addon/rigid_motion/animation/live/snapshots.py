@@ -3,23 +3,149 @@
 Blender tells that an Action or an object was edited, and no more. To read all channels of a rig after every edit of one
 of them takes longer than all the rest, so a snapshot of them is kept, as bytes, and compared. A change that means
 nothing, of what is selected for example, counts too: whether in-betweens depend on it the digest tells.
+
+Blender offers no way to get at all of a key at once: property by property it takes four times as long as to read the
+memory that the keys are in. How much memory a key takes and what is where in it Blender promises nowhere, so the first
+F-curves that come are read in both ways. Where these disagree, all keys are read by Blender's own functions from then
+on, for as long as the process lives.
 """
 
 from __future__ import annotations
 
 import itertools
+import logging
 import operator
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 import bpy
 import numpy as np
-from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
-from ..actions.slots import Binding, Curves, Slot, bindings_in_slot, bindings_with, slots_in, slots_of, uses_of
+from ..actions.channels import KEY_FIELDS
+from ..actions.slots import (
+    Binding,
+    Curves,
+    Slot,
+    active_fcurves,
+    bindings_in_slot,
+    bindings_with,
+    slots_alone,
+    slots_in,
+    slots_of,
+)
 from ..transforms import WIDTHS, Channel, prefix_of, shows_differences, split_path
-from .raw_keys import key_reader
+
+log = logging.getLogger(__package__)
+
+Channels = Sequence[bpy.types.bpy_prop_collection]
+"""`keyframe_points` of F-curves."""
+
+POINTS = {"handle_left": slice(0, 2), "co": slice(3, 5), "handle_right": slice(6, 8)}
+"""The places of a key's points in its memory, counted in single-precision numbers: behind each is an unused one."""
+
+NUMBERS = 9
+"""The number of numbers that a key begins with."""
+
+_NOTHING = np.empty(0, np.uint8)
+
+_COLUMNS = [(prop, index) for prop, width in WIDTHS.items() for index in range(width)]
+"""Properties in the columns of `_Poses.numbers`, but for the last one: the rotation mode."""
+
+SAME_VALUE = 1e-6
+"""The distance that a property may have from its channel, relative to its value or absolute below 1:
+single precision."""
+
+
+def key_reader(channels: Channels) -> Callable[[], list[bytes]]:
+    """Return a function that reads the keys of these channels, for as long as Blender keeps the channels.
+
+    It returns the bytes of each channel's keys. They differ wherever anything of a key differs, selection included, and
+    also where the same keys were read in the other way before.
+    """
+    return _Reader(channels).read
+
+
+class _Layout:
+    """What is known of the memory of keys."""
+
+    size: int | None = None
+    """The bytes that a key takes. None as long as no two of one F-curve were seen, 0 where it is not as expected."""
+
+
+class _Reader:
+    """Reads the keys of some channels, again and again.
+
+    What leads to the memory of each channel is kept, for as long as Blender keeps the keys where they are.
+    """
+
+    def __init__(self, channels: Channels) -> None:
+        self.channels = channels
+        self.addresses = [(0, 0)] * len(channels)
+        """The addresses of the keys of each channel in memory, and how many bytes they are."""
+        self.views = [_NOTHING] * len(channels)
+
+    def read(self) -> list[bytes]:
+        if _Layout.size is None:
+            _Layout.size = _checked_size(self.channels)
+        size = _Layout.size
+        if not size:
+            return [_by_property(keys) for keys in self.channels]
+        addresses = [(keys[0].as_pointer(), size * count) if (count := len(keys)) else (0, 0) for keys in self.channels]
+        if addresses != self.addresses:
+            for number, (address, before) in enumerate(zip(addresses, self.addresses, strict=True)):
+                if address != before:
+                    self.views[number] = _view(*address) if address[1] else _NOTHING
+            self.addresses = addresses
+        return [view.tobytes() for view in self.views]
+
+
+def _checked_size(channels: Channels) -> int | None:
+    """Return how many bytes a key takes: see `_Layout.size`."""
+    several = [keys for keys in channels if len(keys) > 1]
+    if not several:
+        return None
+    size = several[0][1].as_pointer() - several[0][0].as_pointer()
+    if all(_agrees(keys, size) for keys in several):
+        return size
+    log.warning("Keys are not in memory as expected, and are read by Blender's own functions, which takes longer")
+    return 0
+
+
+def _agrees(keys: bpy.types.bpy_prop_collection, size: int) -> bool:
+    """Return whether memory has the same keys as Blender says, one behind the other and each of so many bytes."""
+    count, first = len(keys), keys[0].as_pointer()
+    if size < 4 * NUMBERS or size % 4 or keys[count - 1].as_pointer() - first != size * (count - 1):
+        return False
+    numbers = _view(first, size * count).reshape(count, size)[:, : 4 * NUMBERS].copy().view(np.int32)
+    for name, columns in POINTS.items():
+        expected = np.empty((count, 2), np.float32)
+        keys.foreach_get(name, expected.ravel())
+        if not np.array_equal(numbers[:, columns], expected.view(np.int32)):
+            return False
+    return True
+
+
+def _by_property(keys: bpy.types.bpy_prop_collection) -> bytes:
+    """Return all there is to keys, as Blender's own functions have it."""
+    result = []
+    for name, (width, kind) in KEY_FIELDS.items():
+        values = np.empty(len(keys) * width, kind)
+        keys.foreach_get(name, values)
+        result.append(values.tobytes())
+    return b"".join(result)
+
+
+class _Memory:
+    """A stretch of memory that NumPy can read."""
+
+    __array_interface__: dict[str, object]
+
+
+def _view(address: int, size: int) -> np.ndarray:
+    memory = _Memory()
+    memory.__array_interface__ = {"data": (address, True), "shape": (size,), "typestr": "|u1", "version": 3}
+    return np.asarray(memory)
 
 
 class Snapshots:
@@ -68,7 +194,7 @@ class Snapshots:
             return [*bones, *(bone for other in _users_of(left) for bone in other.pose.bones)]
         changed = now.changed_from(before[1])
         if changed and before[2] != frame:
-            changed = now.posed_since(before[1], changed, _played_fcurves(rig), frame)
+            changed = now.posed_since(before[1], changed, active_fcurves(rig), frame)
         return [bones[number] for number in changed]
 
 
@@ -125,14 +251,6 @@ class _SlotSnapshot:
         for row, name in zip(flags, ("mute", "extrapolation", "array_index"), strict=True):
             self.channelbag.fcurves.foreach_get(name, row)
         return flags
-
-
-_COLUMNS = [(prop, index) for prop, width in WIDTHS.items() for index in range(width)]
-"""Properties in the columns of `_Poses.numbers`, but for the last one: the rotation mode."""
-
-SAME_VALUE = 1e-6
-"""The distance that a property may have from its channel, relative to its value or absolute below 1:
-single precision."""
 
 
 class _Poses:
@@ -206,9 +324,9 @@ class _Dependencies(NamedTuple):
 
     @classmethod
     def of(cls, rig: bpy.types.Object, before: _Dependencies | None) -> _Dependencies:
-        uses = uses_of(rig)
-        moved_by = [(key, sorted(map(str, strips))) for key, (_, _, strips) in uses.items()]
-        counts = [action.users for action, *_ in uses.values()]
+        slots = slots_alone(rig)
+        moved_by = [((slot.action.as_pointer(), slot.handle), sorted(map(str, slot.strips))) for slot in slots]
+        counts = [slot.action.users for slot in slots]
         if before is not None and (before.moved_by, before.counts) == (moved_by, counts):
             users = before.users
         else:
@@ -239,12 +357,3 @@ def _rest_of(bones: bpy.types.ArmatureBones) -> bytes:
     at_rest = np.empty((len(bones), 16), np.float32)
     bones.foreach_get("matrix_local", at_rest.ravel())
     return is_local.tobytes() + at_rest.tobytes()
-
-
-def _played_fcurves(rig: bpy.types.Object) -> Iterable[bpy.types.FCurve]:
-    """Return the F-curves of the Action that a rig plays by itself."""
-    data = rig.animation_data
-    if data is None or data.action is None or data.action_slot is None:
-        return ()
-    channelbag = action_get_channelbag_for_slot(data.action, data.action_slot)
-    return () if channelbag is None else channelbag.fcurves

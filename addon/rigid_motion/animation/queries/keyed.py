@@ -8,11 +8,12 @@ from collections.abc import Iterable, Sequence
 import bpy
 import numpy as np
 
+from ..actions.channels import key_points, selected_keys
 from ..actions.reading import keyed_in, read
 from ..actions.records import recorded_mode
 from ..actions.refusals import refuse_numbers
 from ..actions.slots import Binding, bindings_for, bindings_of
-from ..compute.modes import MODE_NAMES, UNKNOWN
+from ..compute.components import MODE_NAMES, UNKNOWN
 from ..compute.sources import SAME_FRAME, Source, distinct
 from ..transforms import WIDTHS, Refused, Transform, transform_of
 
@@ -25,16 +26,14 @@ def active_binding(transform: Transform, bindings: Iterable[Binding] | None = No
     data = transform.animated.animation_data
     if data is None or data.action is None:
         return None
-    active = (data.action, data.action_slot_handle)
     bindings = bindings_of([transform]) if bindings is None else bindings
-    return next(
-        (
-            binding
-            for binding in bindings
-            if (binding.slot.action, binding.slot.handle) == active and transform in binding.users
-        ),
-        None,
-    )
+    active = (item for item in bindings if item.slot.plays_in(transform.animated) and transform in item.users)
+    return next(active, None)
+
+
+def active_binding_alone(transform: Transform) -> Binding | None:
+    """Return what `active_binding` does, as if nothing else used the slot: for polls."""
+    return active_binding(transform, bindings_for(transform))
 
 
 def active_bindings(transforms: Sequence[Transform]) -> dict[Transform, Binding]:
@@ -42,8 +41,7 @@ def active_bindings(transforms: Sequence[Transform]) -> dict[Transform, Binding]
     desired, result = set(transforms), {}
     for binding in bindings_of(transforms):
         for user in binding.users:
-            data = user.animated.animation_data
-            if user in desired and (data.action, data.action_slot_handle) == (binding.slot.action, binding.slot.handle):
+            if user in desired and binding.slot.plays_in(user.animated):
                 result[user] = binding
     return result
 
@@ -74,15 +72,14 @@ def key_frames(carrier: bpy.types.Object | Transform, *, selected: bool = False)
 
     Keys of the channels of modes and turns count among the selected ones.
     """
-    transform = transform_of(carrier)
-    binding = active_binding(transform, bindings_for(transform))
+    binding = active_binding_alone(transform_of(carrier))
     return np.empty(0) if binding is None else frames_in(binding, selected=selected)
 
 
 def modes_of(carrier: bpy.types.Object | Transform, frames: np.ndarray) -> list[str]:
     """Return the modes of the segments at these frames. Without an Action, the mode that is awaited."""
     transform = transform_of(carrier)
-    binding = active_binding(transform, bindings_for(transform))
+    binding = active_binding_alone(transform)
     if binding is None:
         return [transform.motion.mode or "BLENDER"] * len(frames)
     return [MODE_NAMES[number] for number in modes_in(binding, np.asarray(frames, dtype=np.float64))]
@@ -100,12 +97,8 @@ def frames_in(binding: Binding, *, selected: bool = False) -> np.ndarray:
     for channel, fcurve in binding.curves.items():
         path = channel[0].removeprefix(binding.prefix)
         if path in WIDTHS or (selected and channel in (transform.mode_channel, transform.turns_channel)):
-            keys = fcurve.keyframe_points
-            points, chosen = np.empty(2 * len(keys), np.float32), np.ones(len(keys), dtype=bool)
-            keys.foreach_get("co", points)
-            if selected:
-                keys.foreach_get("select_control_point", chosen)
-            result.append(points[::2][chosen])
+            keyed = key_points(fcurve)[:, 0]
+            result.append(keyed[selected_keys(fcurve)] if selected else keyed)
     frames = np.unique(np.concatenate(result)).astype(np.float64) if result else np.empty(0)
     return distinct(frames)
 
@@ -125,11 +118,9 @@ def turns_in(binding: Binding, frames: np.ndarray) -> np.ndarray:
     fcurve = binding.curves.get(binding.users[0].turns_channel)
     if fcurve is None or fcurve.mute or not fcurve.keyframe_points:
         return np.zeros(len(frames))
-    keys = fcurve.keyframe_points
-    points = np.empty(2 * len(keys), np.float32)
-    keys.foreach_get("co", points)
-    at = np.searchsorted(points[::2], frames + 0.5 * SAME_FRAME, side="right") - 1
-    turns = np.where(at < 0, 0.0, points[1::2][np.clip(at, 0, None)])
+    times, values = key_points(fcurve).T
+    at = np.searchsorted(times, frames + 0.5 * SAME_FRAME, side="right") - 1
+    turns = np.where(at < 0, 0.0, values[np.clip(at, 0, None)])
     return np.nan_to_num(turns)
 
 

@@ -1,4 +1,4 @@
-"""What there is to tell of an object's motion at one frame, in numbers.
+"""What there is to tell of an object's motion at one frame, in numbers, and why it does not move as its mode says.
 
 Frames are those of the Action, angles are radians, lengths are Blender's units in the space of the object's channels.
 """
@@ -9,16 +9,20 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 
+from ..actions.mode_property import has_to_do_with_modes
+from ..actions.reading import differing_users, sources_of_users
 from ..actions.records import recorded_digest
-from ..actions.slots import bindings_for
-from ..compute.components import PART_OF
-from ..compute.modes import MODE_NAMES
+from ..actions.refusals import refuse_numbers
+from ..actions.slots import Binding, bindings_for, bindings_of
+from ..compute.components import MODE_NAMES, PART_OF
+from ..compute.differences import differences
 from ..compute.sources import SAME_FRAME, Source
-from ..compute.turning import turning_in
-from ..curves import cycled
-from ..transforms import Transform, transform_of
-from .keyed import active_binding
+from ..compute.turning import turning_in, values_at_ends
+from ..curves.keys import cycled
+from ..transforms import Refused, Transform, transform_of
+from .keyed import active_binding_alone
 
 HALF_TURN = np.pi + 1e-3
 """Half a turn, and what single precision makes of it."""
@@ -31,9 +35,6 @@ NEAR = 1e-6
 
 SAME_VALUE = 1e-5
 """Values of properties that differ by less are the same but for single precision."""
-
-MOMENT = 1e-3
-"""A time too short to see, in frames."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ def segment_at(source: Source, frame: float) -> SegmentFacts | None:
         return None
     index = int(np.clip(np.searchsorted(keys, frame + SAME_FRAME, side="right") - 1, 0, len(keys) - 2))
     ends = keys[index : index + 2]
-    rows = _components(source, ends)
+    rows = values_at_ends(source, index)
     location, rotation, scale = np.split(rows, (3, 7))
     alike = float(rotation[:, 0] @ rotation[:, 1]) / float(np.prod(np.linalg.norm(rotation, axis=0)) or 1.0)
     swept, turned = np.abs(np.diff(rotation[:3])), turning_in(source, index)
@@ -113,8 +114,7 @@ def segment_at(source: Source, frame: float) -> SegmentFacts | None:
 
 def is_up_to_date(target: bpy.types.Object | Transform, source: Source) -> bool:
     """Return whether in-betweens are those of the keys as they are, which they need not be while live update is off."""
-    transform = transform_of(target)
-    binding = active_binding(transform, bindings_for(transform))
+    binding = active_binding_alone(transform_of(target))
     return binding is not None and recorded_digest(binding) == (source.digest if source.is_live else "")
 
 
@@ -132,9 +132,7 @@ def is_blended(transform: Transform) -> bool:
     data = transform.animated.animation_data
     if not transform.has_difference_slot or data is None or not len(data.nla_tracks):
         return False
-    slots = {
-        (binding.slot.action, binding.slot.handle) for binding in bindings_for(transform) if recorded_digest(binding)
-    }
+    slots = {binding.slot.key for binding in bindings_for(transform) if recorded_digest(binding)}
     if (data.action, data.action_slot_handle) in slots:
         below = any(track.strips for track in data.nla_tracks)
         if below and (data.action_influence < 1.0 or data.action_blend_type != "REPLACE"):
@@ -155,7 +153,7 @@ def has_edited_differences(transform: Transform, frame: float) -> bool:
     if transform.has_difference_slot:
         # What a constraint adds cannot be edited.
         return False
-    binding = active_binding(transform, bindings_for(transform))
+    binding = active_binding_alone(transform)
     if binding is None or binding.slot.in_nla:
         # Strips are blended with one another.
         return False
@@ -166,13 +164,6 @@ def has_edited_differences(transform: Transform, frame: float) -> bool:
     )
 
 
-def _components(source: Source, ends: np.ndarray) -> np.ndarray:
-    """Return what the channels have at both ends of a segment, shape (10, 2),
-    as seen from within it where cycles jump.
-    """
-    return source.values_at(ends if source.cyclic is None else ends + np.array((MOMENT, -MOMENT)))
-
-
 def _deciding_key(source: Source, start: float) -> float:
     """Return the key that a segment's mode hangs on."""
     cyclic = source.cyclic
@@ -181,3 +172,34 @@ def _deciding_key(source: Source, start: float) -> float:
     moment = cycled(cyclic, np.array([start + SAME_FRAME]))[0][0]
     keys = source.keyed_frames
     return float(keys[max(np.searchsorted(keys, moment, side="right") - 1, 0)])
+
+
+def problem_of(target: bpy.types.Object | bpy.types.PoseBone | Transform) -> str:
+    """Return why something does not move as its mode says, and the way out; "" where nothing is amiss."""
+    transform = transform_of(target)
+    bindings = bindings_of([transform])
+    try:
+        for binding, sources in zip(bindings, sources_of_users(bindings), strict=True):
+            source = sources[binding.users.index(transform)]
+            if isinstance(source, Refused):
+                if not has_to_do_with_modes(binding):
+                    continue
+                raise source
+            refuse_numbers(transform.name, source)
+            if source.is_live:
+                differences([source])
+                _refuse_differing(transform, binding, sources)
+    except Refused as problem:
+        return str(problem)
+    except ValueError as problem:
+        return rpt_("{name} has keys too large to compute with ({problem}): delete them (Dope Sheet, X)").format(
+            name=transform.name, problem=problem
+        )
+    return ""
+
+
+def _refuse_differing(transform: Transform, binding: Binding, sources: list[Source | Refused]) -> None:
+    """Raise `Refused` where the in-betweens of a slot are those of another user, which do not fit."""
+    if transform in (differing := differing_users(binding, sources)):
+        leader = next(user for user in binding.users if user not in differing)
+        raise Refused(transform.differing_text, name=transform.name, leader=leader.name)

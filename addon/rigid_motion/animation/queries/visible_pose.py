@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
-from mathutils import Euler, Quaternion
+from mathutils import Quaternion
 
 from ..compute.components import LOCATION, ROTATION, ROWS, SCALE
-from ..transforms import Transform
-from ..writers.table import shown_differences
+from ..transforms import Transform, rotation_of, set_rotation
+from ..writers.table import writer_of
 
 
 def shown_components(transform: Transform) -> np.ndarray | None:
@@ -26,13 +26,12 @@ def shown_components(transform: Transform) -> np.ndarray | None:
     Refused
         Where it turns by axis and angle.
     """
-    differences = shown_differences(transform)
+    differences = writer_of(transform).shown_differences(transform)
     if not differences:
         return None
     seen = transform.components()
-    order = None if transform.rotation == "rotation_quaternion" else transform.carrier.rotation_mode
     for difference, parts in differences:
-        seen = visible_components(seen, transform.original(), difference, order, parts)
+        seen = visible_components(seen, transform.original(), difference, transform.order, parts)
     return seen
 
 
@@ -59,19 +58,12 @@ def visible_components(
     array, shape (10,)
     """
     seen = components.copy()
-    location, rotation, scale = ROWS[LOCATION], ROWS[ROTATION], ROWS[SCALE]
+    location, scale = ROWS[LOCATION], ROWS[SCALE]
     if LOCATION in parts:
         seen[location] += difference[location] - original[location]
     if SCALE in parts:
         seen[scale] *= difference[scale] / np.where(original[scale] == 0.0, 1.0, original[scale])
     if ROTATION in parts:
-        taken_off = Quaternion(original[rotation]).inverted()
-        if order is None:
-            turned = Quaternion(components[rotation])
-            quaternion = taken_off @ Quaternion(difference[rotation]).normalized() @ turned
-            seen[rotation] = -quaternion if quaternion.dot(turned) < 0.0 else quaternion
-        else:
-            angles = Euler(components[3:6], order)
-            added = Euler(difference[3:6], order).to_quaternion()
-            seen[3:6] = (taken_off @ added @ angles.to_quaternion()).to_euler(order, angles)
+        taken_off, added = Quaternion(original[ROWS[ROTATION]]).inverted(), rotation_of(difference, order).normalized()
+        set_rotation(seen, order, taken_off @ added @ rotation_of(components, order), components)
     return seen

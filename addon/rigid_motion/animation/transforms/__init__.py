@@ -4,10 +4,8 @@ A transform knows whose Action animates it, on which property its channels are, 
 Blender's in-betweens and the desired ones goes.
 
 transform  the interface: channels, and where differences go
-objects    objects, by their delta transforms, or by a constraint where they are to be exact between frames
-bones      pose bones, by a constraint
-kinds      the table of both
-reaches    how far things reach
+kinds      objects, by their delta transforms, or by a constraint where they are to be exact between frames; bones
+sizes      how large things are, and how far they reach
 posing     where the poses of bones put them
 
 Each module imports only those above it.
@@ -15,9 +13,25 @@ Each module imports only those above it.
 
 from __future__ import annotations
 
-from .bones import CONSTRAINT, BoneTransform, bone_name, let_override_be_read, prefix_of, shows_differences, split_path
-from .kinds import KINDS, is_part, kind_of, transform_of
-from .objects import GROUP, ORIGINALS, ExactObjectTransform, ObjectTransform, default_of
+from .kinds import (
+    CONSTRAINT,
+    GROUP,
+    KINDS,
+    ORIGINALS,
+    BoneTransform,
+    ExactObjectTransform,
+    ObjectTransform,
+    bone_name,
+    default_of,
+    difference_constraints,
+    is_part,
+    kind_of,
+    let_override_be_read,
+    prefix_of,
+    shows_differences,
+    split_path,
+    transform_of,
+)
 from .transform import (
     LINKED,
     MODE_PROPERTY,
@@ -27,7 +41,8 @@ from .transform import (
     Channel,
     Refused,
     Transform,
-    properties_for,
+    rotation_of,
+    set_rotation,
 )
 
 __all__ = [
@@ -48,11 +63,13 @@ __all__ = [
     "Transform",
     "bone_name",
     "default_of",
+    "difference_constraints",
     "is_part",
     "kind_of",
     "let_override_be_read",
     "prefix_of",
-    "properties_for",
+    "rotation_of",
+    "set_rotation",
     "shows_differences",
     "split_path",
     "transform_of",

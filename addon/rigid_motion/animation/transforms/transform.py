@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
+from mathutils import Euler, Quaternion
 
 from ...motion.eulers import ORDERS
 from ..compute.components import LOCATION, REST, ROTATION, ROWS, SCALE
@@ -33,7 +34,18 @@ Channel = tuple[str, int]
 
 
 class Refused(ValueError):
-    """Why rigid motion cannot act on something: names it, and the way out."""
+    """Why rigid motion cannot act on something: names it, and the way out.
+
+    Parameters
+    ----------
+    text : str
+        In English, with placeholders.
+    facts
+        What stands for these in the user's language. Without any, the text stays as it is.
+    """
+
+    def __init__(self, text: str, **facts: object) -> None:
+        super().__init__(rpt_(text).format(**facts) if facts else text)
 
 
 class Transform(ABC):
@@ -116,6 +128,11 @@ class Transform(ABC):
         return hash((self.animated, self.prefix))
 
     @property
+    def identity(self) -> tuple[int, str]:
+        """What it is known by where nothing of Blender's can be kept: its data-block's session id, and its prefix."""
+        return self.animated.session_uid, self.prefix
+
+    @property
     def name(self) -> str:
         return self.carrier.name
 
@@ -157,11 +174,17 @@ class Transform(ABC):
         if mode in ORDERS:
             return "rotation_euler"
         raise Refused(
-            rpt_(
+            n_(
                 "{name} turns by axis and angle, which has no rigid in-betweens: "
                 "set its rotation mode to Quaternion first (sidebar, Item)"
-            ).format(name=self.name)
+            ),
+            name=self.name,
         )
+
+    @property
+    def order(self) -> str | None:
+        """The order of the Euler angles that it turns by, None for quaternions. `Refused` like `rotation`."""
+        return None if self.rotation == "rotation_quaternion" else self.carrier.rotation_mode
 
     @property
     def properties(self) -> dict[str, str]:
@@ -223,6 +246,25 @@ class Transform(ABC):
             "owner_space": "LOCAL",
             "target_space": "LOCAL",
         }
+
+
+def rotation_of(components: np.ndarray, order: str | None) -> Quaternion:
+    """Return the rotation among components (10,): of Euler angles in this order, or a quaternion."""
+    if order is None:
+        return Quaternion(components[ROWS[ROTATION]])
+    return Euler(components[3:6], order).to_quaternion()
+
+
+def set_rotation(
+    components: np.ndarray, order: str | None, rotation: Quaternion, near: np.ndarray | None = None
+) -> None:
+    """Set the rotation among components (10,), in the sign or the turn that others have which it is to be near to."""
+    if order is not None:
+        compatible = () if near is None else (Euler(near[3:6], order),)
+        components[3:6] = rotation.to_euler(order, *compatible)
+    else:
+        is_other_sign = near is not None and rotation.dot(Quaternion(near[ROWS[ROTATION]])) < 0.0
+        components[ROWS[ROTATION]] = -rotation if is_other_sign else rotation
 
 
 def properties_for(rotation: str) -> dict[str, str]:

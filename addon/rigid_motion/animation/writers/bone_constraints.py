@@ -1,15 +1,21 @@
-"""Constraints on bones: each shows the differences of one slot, and who takes one off does so on purpose."""
+"""Constraints that show differences, each those of one slot: on bones, and on objects that are exact between frames.
+
+An animator can mute, move or remove them: what is amiss then is told, and put right. Who takes one off does so on
+purpose.
+"""
 
 from __future__ import annotations
-
-from collections.abc import Iterator
 
 import bpy
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
-from ..actions.slots import Binding, Curves, uses_of
-from ..transforms import BoneTransform, Transform, shows_differences
-from .times import constraint_path, name_of, span_of
+from ..actions.slots import Binding, Curves, slot_with, slots_alone
+from ..transforms import BoneTransform, Transform, difference_constraints, shows_differences
+from .times import name_of, path_of, span_of
+
+REMOVED, OTHER_SLOT, MUTED, CHANGED, NOT_FIRST, WEAK = "REMOVED", "OTHER_SLOT", "MUTED", "CHANGED", "NOT_FIRST", "WEAK"
+"""The troubles that may keep a bone from being seen where its in-betweens have it: the constraint is gone, shows
+another slot, is muted, has other settings, comes behind another constraint, or has an influence below 1."""
 
 
 def constraint_of(user: Transform, binding: Binding) -> bpy.types.ActionConstraint | None:
@@ -48,20 +54,16 @@ def detach_slots(rig: bpy.types.Object) -> None:
 
     Blender's Symmetrize mirrors the keys of what Action constraints show, and crashes on F-curves that have none.
     """
-    for constraint in _constraints_on(rig):
+    for constraint in difference_constraints(rig):
         if constraint.action_slot_handle:
             constraint.action_slot = None
 
 
 def attach_slots(rig: bpy.types.Object) -> None:
     """Have the constraints of a rig that were detached show their slots again."""
-    for constraint in _constraints_on(rig):
+    for constraint in difference_constraints(rig):
         if not constraint.action_slot_handle and (slot := _last_slot(constraint)) is not None:
             constraint.action_slot = slot
-
-
-def _constraints_on(rig: bpy.types.Object) -> Iterator[bpy.types.ActionConstraint]:
-    return (constraint for bone in rig.pose.bones for constraint in bone.constraints if shows_differences(constraint))
 
 
 def _last_slot(constraint: bpy.types.ActionConstraint) -> bpy.types.ActionSlot | None:
@@ -71,9 +73,7 @@ def _last_slot(constraint: bpy.types.ActionConstraint) -> bpy.types.ActionSlot |
 
 def slot_of_differences(binding: Binding) -> tuple[bpy.types.Action, int]:
     """Return the Action and the handle of the slot in it that the differences are in, 0 where there is none yet."""
-    pairs = binding.slot.action.rigid_motion.bone_slots
-    handle = next((pair.differences for pair in pairs if pair.handle == binding.slot.handle), 0)
-    return binding.slot.action, handle
+    return binding.slot.action, binding.slot.differences
 
 
 def has_constraint(user: Transform, binding: Binding) -> bool:
@@ -105,18 +105,18 @@ def ensure_constraint(user: BoneTransform, binding: Binding) -> None:
     """Have a bone show the differences of a slot, by a constraint that it has already or by a new one."""
     constraints, name = user.carrier.constraints, name_of(binding)
     constraint = constraint_of(user, binding) or constraints.get(name)
-    if constraint is not None and not (shows_differences(constraint) and _can_be_reused(constraint, user, binding)):
-        # This slot gets a constraint of another name when it is written.
-        return
+    action, handle = desired = slot_of_differences(binding)
     if constraint is None:
         constraint = _new(user, 0, name)
+    elif not shows_differences(constraint) or shown_by(constraint) in _in_use(user.animated) - {desired}:
+        # This slot gets a constraint of another name when it is written.
+        return
     names = [item for item in user.motion.mounted.split("\n") if item not in ("", name, constraint.name)]
     if constraint.name != name:
         constraint = _renamed(constraint, name, user, binding)
-    action, handle = slot_of_differences(binding)
-    if shown_by(constraint) != (action, handle):
+    if shown_by(constraint) != desired:
         constraint.action = action
-        constraint.action_slot = next(slot for slot in action.slots if slot.handle == handle)
+        constraint.action_slot = slot_with(action, handle)
     constraint.frame_start, constraint.frame_end = span_of(binding)
     if (mounted := "\n".join((*names, name))) != user.motion.mounted:
         user.motion.mounted = mounted
@@ -153,27 +153,16 @@ def _renamed(
     constraint = _new(user, index, name)
     for setting, value in settings.items():
         setattr(constraint, setting, value)
-    keyed = binding.curves.pop((f"{constraint_path(binding, before)}.influence", 0), None)
+    keyed = binding.curves.pop((path_of(binding, "influence", before), 0), None)
     if keyed is not None:
-        keyed.data_path = f"{constraint_path(binding, name)}.influence"
+        keyed.data_path = path_of(binding, "influence", name)
         binding.curves[keyed.data_path, 0] = keyed
     return constraint
 
 
-def _can_be_reused(constraint: bpy.types.ActionConstraint, user: BoneTransform, binding: Binding) -> bool:
-    """Return whether a constraint shows a slot already, or one that does not move the rig any more."""
-    shown = shown_by(constraint)
-    return shown == slot_of_differences(binding) or shown not in _in_use(user.animated)
-
-
 def _in_use(rig: bpy.types.Object) -> set[tuple[bpy.types.Action, int]]:
     """Return the Actions of a rig, and the handles of the slots in them that differences of its bones are in."""
-    return {
-        (action, pair.differences)
-        for action, handle, _ in uses_of(rig).values()
-        for pair in action.rigid_motion.bone_slots
-        if pair.handle == handle
-    }
+    return {(slot.action, slot.differences) for slot in slots_alone(rig)}
 
 
 def remove_constraints(user: BoneTransform, shown: set[tuple[bpy.types.Action, int]]) -> None:
@@ -189,3 +178,53 @@ def remove_constraints(user: BoneTransform, shown: set[tuple[bpy.types.Action, i
     mounted = "\n".join((*names, *taken_off))
     if user.motion.mounted != mounted:
         user.motion.mounted = mounted
+
+
+def trouble_of(user: Transform, binding: Binding) -> str:
+    """Return what is amiss with the constraint by which a bone shows the differences of a slot, "" where nothing is.
+
+    An influence that is animated or driven is meant so.
+    """
+    desired, name, is_behind = slot_of_differences(binding), name_of(binding), False
+    for constraint in user.carrier.constraints:
+        if not shows_differences(constraint):
+            is_behind |= constraint.enabled and constraint.influence > 0.0
+        elif shown_by(constraint) == desired:
+            return _trouble_with(constraint, user, binding, is_behind=is_behind)
+    present = user.carrier.constraints.get(name)
+    return OTHER_SLOT if present is not None and shows_differences(present) else REMOVED
+
+
+def _trouble_with(constraint: bpy.types.ActionConstraint, user: Transform, binding: Binding, *, is_behind: bool) -> str:
+    if not constraint.enabled:
+        return MUTED
+    if any(getattr(constraint, setting) != value for setting, value in user.constraint_settings.items()):
+        return CHANGED
+    if is_behind:
+        return NOT_FIRST
+    return WEAK if constraint.influence < 1.0 and not _is_influence_animated(constraint, user, binding) else ""
+
+
+def _is_influence_animated(constraint: bpy.types.ActionConstraint, user: Transform, binding: Binding) -> bool:
+    path = path_of(binding, "influence", constraint.name)
+    channelbag, drivers = binding.slot.channelbag, user.animated.animation_data.drivers
+    return (channelbag is not None and channelbag.fcurves.find(path) is not None) or drivers.find(path) is not None
+
+
+def restore(user: BoneTransform, binding: Binding) -> None:
+    """Have a bone show the differences of a slot in full: by its constraint as it was made, or by a new one."""
+    constraints, desired, name = user.carrier.constraints, slot_of_differences(binding), name_of(binding)
+    if constraint_of(user, binding) is None:
+        # One that was given another name, or frames by a target, still shows them.
+        for item in constraints:
+            if item.type == "ACTION" and shown_by(item) == desired:
+                item.name, item.use_eval_time = name, True
+                break
+    ensure_constraint(user, binding)
+    constraint = constraint_of(user, binding)
+    for setting, value in user.constraint_settings.items():
+        setattr(constraint, setting, value)
+    constraint.enabled = True
+    if not _is_influence_animated(constraint, user, binding):
+        constraint.influence = 1.0
+    constraints.move(list(constraints).index(constraint), 0)

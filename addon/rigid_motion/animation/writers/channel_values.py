@@ -7,10 +7,10 @@ import numpy as np
 from ...motion import Poses
 from ...motion.eulers import extrinsic_eulers_from_quaternions
 from ...motion.quaternions import align_signs, conjugate, multiply
-from ..compute.bodies import turn_into_quaternions
+from ..compute.bodies import other_angles, turn_into_quaternions
 from ..compute.components import LOCATION, ROTATION, ROWS
 from ..compute.differences import InBetweens
-from ..compute.sources import SAME_FRAME, Source
+from ..compute.sources import FULL_TURN, SAME_FRAME, Source
 from ..transforms import Transform
 
 
@@ -90,9 +90,6 @@ def components_near(source: Source, pose: Poses, near: np.ndarray) -> np.ndarray
 
 def _beginning_near(first: np.ndarray, angles: np.ndarray, order: str) -> np.ndarray:
     """Return the same turns as these Euler angles (m, 3), of which the first are as near to `first` (3,) as may be."""
-    # Half a turn more about the outer axes, and the middle one from the other side, turn alike.
-    middle = "XYZ".index(order[1])
-    others = angles + np.pi
-    others[:, middle] = np.pi - angles[:, middle]
-    near = [turned + 2.0 * np.pi * np.rint((first - turned[0]) / (2.0 * np.pi)) for turned in (angles, others)]
+    both = angles, other_angles(angles, order)
+    near = [turned + FULL_TURN * np.rint((first - turned[0]) / FULL_TURN) for turned in both]
     return min(near, key=lambda turned: float(np.abs(turned[0] - first).sum()))

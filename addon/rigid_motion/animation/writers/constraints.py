@@ -11,10 +11,10 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 
 import bpy
 import numpy as np
-from mathutils import Euler, Quaternion
+from mathutils import Quaternion
 
 from ..actions.records import record_constraint, recorded_digest
-from ..actions.slots import Binding, Curves, Slot, bindings_for, bindings_of, uses_of
+from ..actions.slots import Binding, Curves, Slot, bindings_for, bindings_of, is_time, slot_with, slots_alone
 from ..compute.components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
 from ..compute.sources import Source
 from ..transforms import (
@@ -25,10 +25,11 @@ from ..transforms import (
     bone_name,
     is_part,
     prefix_of,
+    rotation_of,
+    set_rotation,
     shows_differences,
     split_path,
 )
-from . import constraint_repair
 from .bone_constraints import (
     constraint_of,
     curves_shown_by,
@@ -36,24 +37,12 @@ from .bone_constraints import (
     has_constraint,
     has_stale_constraint,
     remove_constraints,
+    restore,
     slot_of_differences,
+    trouble_of,
 )
-from .layout import Layout, Pieces
-from .sampled import remove_if_empty, replace_samples
-from .times import (
-    constraint_path,
-    held_by,
-    is_line,
-    is_same,
-    most_samples,
-    name_of,
-    new_line,
-    remove_time,
-    says,
-    time_of,
-    write_line,
-    write_time,
-)
+from .sampled import Layout, Pieces, remove_if_empty, replace_samples
+from .times import held_by, is_line, most_samples, name_of, new_line, remove_time, says, time_of, write_line, write_time
 from .writer import Writer
 
 AT_REST = "Rigid Motion Rest"
@@ -135,9 +124,7 @@ class ConstraintWriter(Writer):
         present = {
             channel: fcurve
             for channel, fcurve in binding.curves.items()
-            if channel[0].startswith(constraint_path(binding, CONSTRAINT)[:-2])
-            and fcurve != time_of(binding)
-            and not fcurve.keyframe_points
+            if is_time(fcurve) and fcurve != time_of(binding) and not fcurve.keyframe_points
         }
         for channel, fcurve in present.items():
             if channel not in held or not is_line(fcurve, held[channel]):
@@ -150,10 +137,10 @@ class ConstraintWriter(Writer):
         return bool(missing) or len(present) > len(held)
 
     def trouble_of(self, user: Transform, binding: Binding) -> str:
-        return constraint_repair.trouble_of(user, binding)
+        return trouble_of(user, binding)
 
     def restore(self, user: Transform, binding: Binding) -> None:
-        constraint_repair.restore(user, binding)
+        restore(user, binding)
 
     def remove_orphans(self, slot: Slot) -> None:
         """Take out what a slot has for bones that are in none of its users any more, and are not keyed in it either.
@@ -162,7 +149,7 @@ class ConstraintWriter(Writer):
         """
         action, channelbag, differences = slot.action, slot.channelbag, slot.bones_channelbag
         records = action.rigid_motion.slots
-        prefixes = {record.prefix for record in records if record.handle == slot.handle and is_part(record.prefix)}
+        prefixes = {record.prefix for record in slot.records if is_part(record.prefix)}
         groups = () if differences is None else differences.groups
         prefixes |= {prefix_of(group.name) for group in groups}
         gone = {
@@ -170,10 +157,9 @@ class ConstraintWriter(Writer):
             for prefix in prefixes
             if all(user.pose is None or bone_name(prefix) not in user.pose.bones for user in slot.users)
         }
-        if gone and channelbag is not None:
-            gone -= {
-                prefix for prefix, prop in (split_path(item.data_path) for item in channelbag.fcurves) if prop in WIDTHS
-            }
+        if gone:
+            paths = (split_path(fcurve.data_path) for fcurve in slot.fcurves)
+            gone -= {prefix for prefix, prop in paths if prop in WIDTHS}
         if not gone:
             return
         for bag in (channelbag, differences):
@@ -216,9 +202,9 @@ def _avoid_names(binding: Binding) -> None:
     tracked = [
         user
         for user in binding.users
-        if len(user.animated.animation_data.nla_tracks) and len(uses_of(user.animated)) > 1
+        if len(user.animated.animation_data.nla_tracks) and len(slots_alone(user.animated)) > 1
     ]
-    others = (other for user in tracked for other in bindings_for(user) if not is_same(other, binding))
+    others = (other for user in tracked for other in bindings_for(user) if other.slot.key != binding.slot.key)
     taken |= {name_of(other) for other in others if recorded_digest(other)}
     if name_of(binding) in taken:
         remove_time(binding)
@@ -235,8 +221,7 @@ def _channelbag(binding: Binding) -> bpy.types.ActionChannelbag:
     action = binding.slot.action
     pairs = action.rigid_motion.bone_slots
     pair = next((pair for pair in pairs if pair.handle == binding.slot.handle), None) or pairs.add()
-    slot = next((slot for slot in action.slots if slot.handle == pair.differences), None)
-    slot = slot or action.slots.new("OBJECT", CONSTRAINT)
+    slot = slot_with(action, pair.differences) or action.slots.new("OBJECT", CONSTRAINT)
     pair.handle, pair.differences = binding.slot.handle, slot.handle
     return action.layers[0].strips[0].channelbag(slot, ensure=True)
 
@@ -245,9 +230,8 @@ def _remove_slot_if_empty(slot: Slot) -> None:
     channelbag = slot.bones_channelbag
     if channelbag is not None and not len(channelbag.fcurves):
         pairs = slot.action.rigid_motion.bone_slots
-        number, pair = next((number, pair) for number, pair in enumerate(pairs) if pair.handle == slot.handle)
-        slot.action.slots.remove(next(item for item in slot.action.slots if item.handle == pair.differences))
-        pairs.remove(number)
+        slot.action.slots.remove(slot_with(slot.action, slot.differences))
+        pairs.remove(next(number for number, pair in enumerate(pairs) if pair.handle == slot.handle))
 
 
 def _shown_on(user: Transform) -> Iterator[tuple[bpy.types.ActionConstraint, Curves, set[str]]]:
@@ -261,7 +245,7 @@ def _shown_on(user: Transform) -> Iterator[tuple[bpy.types.ActionConstraint, Cur
 
 def _no_difference(user: Transform) -> np.ndarray:
     difference = REST.copy()
-    if user.rotation == "rotation_euler":
+    if user.order is not None:
         difference[ROWS[ROTATION]] = 0.0
     return difference
 
@@ -327,15 +311,10 @@ def _with_original(difference: np.ndarray, user: Transform) -> np.ndarray:
     original = user.original()
     if np.array_equal(original, REST):
         return difference
-    location, rotation, scale = ROWS[LOCATION], ROWS[ROTATION], ROWS[SCALE]
-    difference[location] += original[location]
-    difference[scale] *= original[scale]
-    if user.rotation == "rotation_quaternion":
-        difference[rotation] = Quaternion(difference[rotation]) @ Quaternion(original[rotation])
-    else:
-        order = user.carrier.rotation_mode
-        turned = Euler(difference[3:6], order).to_quaternion() @ Quaternion(original[rotation])
-        difference[3:6] = turned.to_euler(order)
+    difference[ROWS[LOCATION]] += original[ROWS[LOCATION]]
+    difference[ROWS[SCALE]] *= original[ROWS[SCALE]]
+    turned = rotation_of(difference, user.order) @ Quaternion(original[ROWS[ROTATION]])
+    set_rotation(difference, user.order, turned)
     return difference
 
 
@@ -343,14 +322,8 @@ def _weighted(difference: np.ndarray, influence: float, user: Transform) -> np.n
     """Return a difference as the influence of a constraint lets it through."""
     if influence == 1.0:
         return difference
-    location, rotation, scale = ROWS[LOCATION], ROWS[ROTATION], ROWS[SCALE]
-    difference[location] *= influence
-    difference[scale] = 1.0 + influence * (difference[scale] - 1.0)
-    none = Quaternion()
-    if user.rotation == "rotation_quaternion":
-        difference[rotation] = none.slerp(Quaternion(difference[rotation]).normalized(), influence)
-    else:
-        order = user.carrier.rotation_mode
-        turned = none.slerp(Euler(difference[3:6], order).to_quaternion(), influence)
-        difference[3:6] = turned.to_euler(order)
+    difference[ROWS[LOCATION]] *= influence
+    difference[ROWS[SCALE]] = 1.0 + influence * (difference[ROWS[SCALE]] - 1.0)
+    turned = Quaternion().slerp(rotation_of(difference, user.order).normalized(), influence)
+    set_rotation(difference, user.order, turned)
     return difference

@@ -7,15 +7,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
 
 import numpy as np
 
 from ...motion.eulers import extrinsic_eulers_from_quaternions
+from ..compute.bodies import other_angles
 from ..compute.components import PART_OF, ROTATION, ROWS
 from ..compute.sample_rates import Need
 from ..compute.sources import FULL_TURN, SAME_FRAME, Source
-from .layout import Layout, Piece
+from .sampled import Layout, Piece
 
 MOST_CORNERS = 64
 """Keys that are reached in one F-curve. Blender asks all modifiers on every frame."""
@@ -24,24 +24,19 @@ SHARE = 0.05
 """The least share of the tolerance that makes a corner worth a modifier."""
 
 
-class Corners(NamedTuple):
-    """What is added to the samples of a source."""
+def corners(
+    source: Source, samples: Mapping[int, np.ndarray], layout: Layout, need: Need
+) -> tuple[dict[int, list[Piece]], float]:
+    """Return what samples, as `differences` returns them, lack at the keys between them.
 
-    pieces: dict[int, list[Piece]]
-    """For the rows of components that lack anything."""
-
-    error: float
-    """The error of the body at keys where nothing can be added."""
-
-
-def corners(source: Source, samples: Mapping[int, np.ndarray], layout: Layout, need: Need) -> Corners:
-    """Return what samples, as `differences` returns them, lack at the keys between them."""
+    That is added to the rows of components that lack anything; and the error of the body at keys where nothing can be.
+    """
     if math.isinf(need.tolerance):
-        return Corners({}, 0.0)
+        return {}, 0.0
     keys = _keys(source, layout)
     rows = list(samples)
     if not len(keys) or not rows:
-        return Corners({}, 0.0)
+        return {}, 0.0
     values = np.stack([samples[row][1::2] for row in rows]).astype(np.float64)
     at = np.floor(keys * layout.rate).astype(int) - layout.first
     shares = keys * layout.rate - layout.first - at
@@ -56,9 +51,7 @@ def corners(source: Source, samples: Mapping[int, np.ndarray], layout: Layout, n
     left = np.delete(errors, chosen)
     knots = _knots(keys[chosen], at[chosen] + layout.first, layout)
     pieces = {row: list(_pieces(knots, lack[chosen], layout)) for row, lack in zip(rows, lacks, strict=True)}
-    return Corners(
-        {row: pieces_of_row for row, pieces_of_row in pieces.items() if pieces_of_row}, float(left.max(initial=0.0))
-    )
+    return {row: of_row for row, of_row in pieces.items() if of_row}, float(left.max(initial=0.0))
 
 
 def _keys(source: Source, layout: Layout) -> np.ndarray:
@@ -84,11 +77,9 @@ def _at_keys(source: Source, rows: list[int], near: np.ndarray) -> np.ndarray:
         result[turning] *= np.where(np.einsum("rk,rk->k", result[turning], near[turning]) < 0.0, -1.0, 1.0)
         return result
     angles = extrinsic_eulers_from_quaternions(original[None, ROWS[ROTATION]], source.order)[0]
-    # The same rotation by other angles.
-    others = np.where(np.arange(3) == "XYZ".index(source.order[1]), np.pi - angles, angles + np.pi)
     axes = [row - ROWS[ROTATION].start for row in np.array(rows)[turning]]
     candidates = []
-    for candidate in (angles, others):
+    for candidate in (angles, other_angles(angles, source.order)):
         turned = candidate[axes, None]
         candidates.append(turned + FULL_TURN * np.rint((near[turning] - turned) / FULL_TURN))
     apart = [np.abs(candidate - near[turning]).max(axis=0) for candidate in candidates]

@@ -9,12 +9,11 @@ import bpy
 import numpy as np
 
 from ..actions.records import recorded_digest
-from ..actions.slots import Binding, bindings_of, is_above, is_filled_in, is_replacing
+from ..actions.slots import Binding, Slot, bindings_of, is_filled_in, strips_of, with_inner_strips
 from ..compute.components import PART_OF
 from ..compute.sources import Source
 from ..transforms import GROUP, ORIGINALS, Channel, ObjectTransform, Transform, default_of
-from .layout import Layout, Pieces
-from .sampled import hold_constants, replace_samples
+from .sampled import Layout, Pieces, hold_constants, replace_samples
 from .writer import Writer
 
 
@@ -135,14 +134,50 @@ def _held(binding: Binding, beside: Sequence[Binding]) -> dict[Channel, float]:
 def _held_for(user: ObjectTransform, binding: Binding, beside: Sequence[Binding]) -> dict[Channel, float]:
     originals = {path: getattr(user.motion, original)[:] for path, (original, _) in ORIGINALS.items()}
     originals = {path: values for path, values in originals.items() if all(map(math.isfinite, values))}
-    if not is_replacing(user.animated, binding.slot):
+    if not _is_replacing(user.animated, binding.slot):
         return {}
     others = [other for other in beside if user in other.users and recorded_digest(other)]
     filled = {path for other in others for path, _ in other.filled}
-    below = {path for other in others if is_above(user.animated, binding.slot, other.slot) for path, _ in other.filled}
+    below = {path for other in others if _is_above(user.animated, binding.slot, other.slot) for path, _ in other.filled}
     return {
         (path, index): value
         for path, values in originals.items()
         if path in below or (path in filled and values != default_of(path))
         for index, value in enumerate(values)
     }
+
+
+def _is_replacing(obj: bpy.types.Object, slot: Slot) -> bool:
+    """Return whether a slot, wherever it moves an object in the NLA, takes the place of what is below it:
+    nothing is added.
+    """
+    data = obj.animation_data
+    if data.action == slot.action and data.action_blend_type != "REPLACE":
+        return False
+    # Without an Action it is a strip of strips, and these may be in it.
+    return all(strip.blend_type == "REPLACE" for strip in strips_of(obj) if strip.action in (None, slot.action))
+
+
+def _is_above(obj: bpy.types.Object, slot: Slot, other: Slot) -> bool:
+    """Return whether a slot plays above another one in the NLA of an object, on some frame."""
+    return any(
+        level > below and start < end_below and start_below < end
+        for level, start, end in _spans(obj, slot)
+        for below, start_below, end_below in _spans(obj, other)
+    )
+
+
+def _spans(obj: bpy.types.Object, slot: Slot) -> list[tuple[int, float, float]]:
+    """Return where in the NLA of an object a slot plays: the number of the track, that of its Action behind all of
+    them, and the frames of the scene.
+    """
+    data = obj.animation_data
+    spans = [
+        (level, strip.frame_start, strip.frame_end)
+        for level, track in enumerate(data.nla_tracks)
+        for strip in with_inner_strips(track.strips)
+        if (strip.action, strip.action_slot_handle) == slot.key
+    ]
+    if not data.use_tweak_mode and slot.plays_in(obj):
+        spans.append((len(data.nla_tracks), -math.inf, math.inf))
+    return spans

@@ -4,12 +4,18 @@ A sampled F-curve has a value on every whole frame and no keys: Blender alone ev
 nothing of it. There are samples only where a mode counts, and only of components that it changes; which F-curves these
 are is up to the writer. Where some have to lie outside of the keys, a manual frame range keeps the Action, its strips
 and exports from being longer for it.
+
+Large Actions are in *draft* while they are edited: they have one sample a frame, and as many as they need once it
+matters. After every edit Blender copies all of an Action, with up to 16 samples a frame of each bone. On whole frames,
+which is what is seen in the viewport, one is as good. An Action keeps itself that it is in draft: so it goes through
+undo.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -18,19 +24,20 @@ import numpy as np
 
 from ..actions.reading import keyed_in
 from ..actions.records import record_in_betweens, recorded, recorded_digest, recorded_rows
-from ..actions.slots import Binding, bindings_in, is_filled_in, is_time
-from ..compute.between_samples import Samples
+from ..actions.slots import Binding, bindings_in, handles_of_differences, is_filled_in, is_time, slots_in
 from ..compute.components import PART_OF, ROTATION
 from ..compute.sample_rates import Need, error_of, sampled
-from ..compute.samples import NOTHING
+from ..compute.samples import NOTHING, Samples
 from ..compute.source_cache import cached_source, changed_range
 from ..compute.sources import FULL_TURN, Source
 from ..transforms import Channel
-from ..transforms.reaches import metres_per_channel_unit, reach_at_rest
+from ..transforms.sizes import metres_per_channel_unit, reach_at_rest
 from .corners import corners
-from .drafts import begin_drafts, drafts_among, end_drafts, is_draft
-from .layout import Layout
+from .sampled import Layout
 from .table import release, writer_of
+
+LARGE = 10_000
+"""Bones times frames. Blender copies less in a few milliseconds, however many samples a frame there are."""
 
 TOLERANCE = 0.00005
 """The largest error of a body between frames, in metres, within a metre of its origin; and what reaches farther, by
@@ -38,6 +45,70 @@ this part of its reach. It is half of what is promised, for bones hang on one an
 
 SAME_ROTATION = 1e-4
 """Components of rotations that are one, in single precision, and far from those a turn or a sign apart."""
+
+
+def begin_drafts(readings: Sequence[tuple[Binding, Source]]) -> None:
+    """Have large Actions that are to be filled in go on in draft."""
+    apart: defaultdict[bpy.types.Action, list[tuple[Binding, Source]]] = defaultdict(list)
+    for binding, source in readings:
+        if binding.kind.has_difference_slot:
+            apart[binding.slot.action].append((binding, source))
+    for action, large in apart.items():
+        if not is_draft(action):
+            longest = max(last - first for first, last in (source.frame_range for _, source in large))
+            if max(len(large), len(action.rigid_motion.slots)) * longest >= LARGE:
+                _begin_draft(action, [binding for binding, _ in large])
+
+
+def _begin_draft(action: bpy.types.Action, known: Iterable[Binding]) -> None:
+    """Take out of an Action the samples between frames. `known` are some of its bindings."""
+    # Strips may show what is between the frames of an Action on whole frames of the scene.
+    if any(slot.in_nla for slot in slots_in([action])):
+        return
+    action.rigid_motion.is_draft = action.rigid_motion.has_longer = True
+    if any(record.rate > 1 for record in action.rigid_motion.slots):
+        bindings = {(binding.slot.handle, binding.prefix): binding for binding in (*bindings_in([action]), *known)}
+        for binding in bindings.values():
+            _take_out_between_frames(binding)
+
+
+def _take_out_between_frames(binding: Binding) -> None:
+    """Leave the samples on whole frames, where it is known how they lie."""
+    written, source, rows = recorded(binding), cached_source(recorded_digest(binding)), recorded_rows(binding)
+    if written.rate == 1 or source is None:
+        return
+    (first, last), (begin, end) = source.sample_range(1), source.sample_range(written.rate)
+    frames = np.arange(first, last + 1)
+    # Beside the outermost keys, off whole frames, all is as it is on these.
+    chosen = np.clip(frames * written.rate - begin, 0, end - begin)
+    samples = np.empty(2 * (end - begin + 1), np.float32)
+    layout, points = writer_of(binding).layout(source, 1), {}
+    for channel, fcurve in binding.filled.items():
+        if 2 * len(fcurve.sampled_points) != len(samples):
+            return
+        fcurve.sampled_points.foreach_get("co", samples)
+        points[channel] = layout.points(np.stack((frames, samples[1::2][chosen]), axis=1, dtype=np.float32).ravel())
+    record_in_betweens(binding, source.digest, rows, 1, written.error)
+    writer_of(binding).write(binding, points, layout, {})
+
+
+def is_draft(action: bpy.types.Action) -> bool:
+    """Return whether an Action is in draft; none is while the extension is off."""
+    motion = getattr(action, "rigid_motion", None)
+    return motion is not None and motion.is_draft
+
+
+def end_drafts(actions: Collection[bpy.types.Action], filled_in: Iterable[Binding]) -> None:
+    """Have these Actions be in draft no more, all of which is about to be filled in anew but what moves nothing now.
+
+    That will be when it does.
+    """
+    result = {(binding.slot.action, binding.slot.handle, binding.prefix) for binding in filled_in}
+    for action in actions:
+        action.rigid_motion.is_draft = False
+        for record in action.rigid_motion.slots:
+            if (action, record.handle, record.prefix) not in result:
+                record.digest = ""
 
 
 def fill_in(readings: Sequence[tuple[Binding, Source]], *, in_draft: bool = False) -> None:
@@ -77,12 +148,12 @@ def fill_in(readings: Sequence[tuple[Binding, Source]], *, in_draft: bool = Fals
         if layout.outermost[0] < first or layout.outermost[1] > last:
             longer.add(binding.slot.action)
     release(emptied)
-    _limit_ranges({binding.slot.action for binding, _ in readings}, longer)
+    limit_ranges({binding.slot.action for binding, _ in readings}, longer)
 
 
 def finish_drafts(actions: Iterable[bpy.types.Action]) -> None:
     """Have those of these Actions that are in draft be exact between frames as well."""
-    drafts = drafts_among(actions)
+    drafts = {action for action in actions if is_draft(action) and action.is_editable}
     if not drafts:
         return
     bindings = [binding for binding in bindings_in(drafts) if recorded_digest(binding)]
@@ -215,12 +286,7 @@ def clear(bindings: Sequence[Binding]) -> None:
         _tag(binding)
         record_in_betweens(binding, "", ())
     release(user for binding in bindings for user in binding.users)
-    _limit_ranges({binding.slot.action for binding in bindings}, set())
-
-
-def follow_ranges(actions: Iterable[bpy.types.Action]) -> None:
-    """Have the manual frame ranges that were set for samples follow the keys of Actions that were edited."""
-    _limit_ranges(actions, set())
+    limit_ranges({binding.slot.action for binding in bindings})
 
 
 def hold(binding: Binding, beside: Sequence[Binding]) -> None:
@@ -240,7 +306,7 @@ def _channels(binding: Binding, source: Source) -> dict[int, Channel]:
     return binding.users[0].differences_for(rotation)
 
 
-def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.types.Action]) -> None:
+def limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.types.Action] = ()) -> None:
     """Have Actions begin and end with their keys where samples lie outside of these, by a manual frame range.
 
     `longer` are those in which samples were just written there. A range that the animator has set stays.
@@ -253,7 +319,7 @@ def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.type
         if (action.use_frame_range and not was_set_for_samples) or not (was_set_for_samples or motion.has_longer):
             continue
         bags = [bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
-        apart = {pair.differences for pair in motion.bone_slots}
+        apart = handles_of_differences(action)
         # Those of bones first: one that lies outside is enough to know, and in a draft any is going to again.
         most = 1 if is_draft(action) else None
         samples = [fcurve for bag in bags if bag.slot_handle in apart for fcurve in bag.fcurves[:most]]
@@ -263,12 +329,12 @@ def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.type
             # There may be thousands: no more are asked than can say anything.
             if samples and (begin, end) == farthest:
                 break
-            first, last = fcurve.range()
-            if (begin <= first and last <= end) or not _has_range(fcurve):
+            if not _is_outside(fcurve, begin, end):
                 continue
             if is_filled_in(fcurve) or is_time(fcurve):
                 samples.append(fcurve)
             else:
+                first, last = fcurve.range()
                 begin, end = min(begin, first), max(end, last)
         is_outside = (samples and is_draft(action)) or any(_is_outside(fcurve, begin, end) for fcurve in samples)
         if begin <= end and is_outside:
@@ -283,14 +349,9 @@ def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.type
             motion.has_longer = motion.is_draft = False
 
 
-def _has_range(fcurve: bpy.types.FCurve) -> bool:
-    """Return whether an F-curve begins and ends anywhere. A modifier alone makes no range,
-    be it the time of a constraint.
-    """
-    return len(fcurve.keyframe_points) > 0 or len(fcurve.sampled_points) > 0
-
-
 def _is_outside(fcurve: bpy.types.FCurve, begin: float, end: float) -> bool:
-    """Return whether samples of an F-curve lie outside of these frames."""
+    """Return whether keys or samples of an F-curve lie outside of these frames. A modifier alone makes no range, be it
+    the time of a constraint.
+    """
     first, last = fcurve.range()
-    return (first < begin or last > end) and _has_range(fcurve)
+    return (first < begin or last > end) and (len(fcurve.keyframe_points) > 0 or len(fcurve.sampled_points) > 0)

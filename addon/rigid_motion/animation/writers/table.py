@@ -6,8 +6,6 @@ from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import replace
 
-import numpy as np
-
 from ..actions.slots import Binding, Slot
 from ..transforms import BoneTransform, ExactObjectTransform, ObjectTransform, Transform
 from .constraints import ConstraintWriter
@@ -22,9 +20,9 @@ WRITERS: dict[type[Transform], Writer] = {
 """A row for each of the `transforms.KINDS`."""
 
 
-def writer_of(binding: Binding) -> Writer:
+def writer_of(moved: Binding | Transform) -> Writer:
     """Return where the differences of a transform go."""
-    return WRITERS[binding.kind]
+    return WRITERS[moved.kind]
 
 
 def leave_other_way(binding: Binding) -> None:
@@ -52,16 +50,6 @@ def release(transforms: Iterable[Transform]) -> None:
         by_kind[transform.kind].append(transform)
     for kind, same in by_kind.items():
         WRITERS[kind].release(same)
-
-
-def shown_differences(user: Transform) -> list[tuple[np.ndarray, set[str]]]:
-    """Return what is on top of a transform as it is shown now: see `Writer.shown_differences`."""
-    return WRITERS[user.kind].shown_differences(user)
-
-
-def shown_parts(user: Transform) -> set[str]:
-    """Return which of location, rotation and scale that is in."""
-    return WRITERS[user.kind].shown_parts(user)
 
 
 def remove_orphans(bindings: Iterable[Binding]) -> None:

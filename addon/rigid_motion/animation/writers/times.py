@@ -16,16 +16,14 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 
-from ..actions.channels import add_cycles, ensure_group, replace_keys
-from ..actions.key_reading import read_steps
+from ..actions.channels import add_cycles, ensure_group, read_cycles, read_steps, replace_keys
 from ..actions.records import recorded
 from ..actions.slots import Binding, Slot, strips_of
-from ..compute.between_samples import MOST_SAMPLES
+from ..compute.samples import MOST_SAMPLES
 from ..compute.sources import Source
-from ..curves import Cycles, Stepped
-from ..transforms import CONSTRAINT, WIDTHS, Channel
-from .layout import Layout, add_modifiers
-from .sampled import hide_fcurve, remove_if_empty
+from ..curves.keys import Stepped
+from ..transforms import CONSTRAINT, Channel
+from .sampled import Layout, add_modifiers, hide_fcurve, remove_if_empty
 
 MOST_FRAMES = 1_048_574
 """The last frame that Blender lets a constraint have."""
@@ -39,24 +37,14 @@ def name_of(binding: Binding) -> str:
     return recorded(binding).constraint or CONSTRAINT
 
 
-def constraint_path(binding: Binding, name: str) -> str:
-    """Return the data path of a constraint of this name."""
-    return f'{binding.prefix}constraints["{name}"]'
-
-
-def time_path(binding: Binding) -> str:
-    """Return the data path of the evaluation time of a slot's constraint is."""
-    return f"{constraint_path(binding, name_of(binding))}.eval_time"
-
-
-def influence_path(binding: Binding) -> str:
-    """Return the data path of the influence of a slot's constraint."""
-    return f"{constraint_path(binding, name_of(binding))}.influence"
+def path_of(binding: Binding, prop: str, name: str = "") -> str:
+    """Return the data path of a property of a slot's constraint, or of a constraint of this name."""
+    return f'{binding.prefix}constraints["{bpy.utils.escape_identifier(name or name_of(binding))}"].{prop}'
 
 
 def time_of(binding: Binding) -> bpy.types.FCurve | None:
     """Return the channel of its own constraint's evaluation time."""
-    return binding.curves.get((time_path(binding), 0)) if binding.filled else None
+    return binding.curves.get((path_of(binding, "eval_time"), 0)) if binding.filled else None
 
 
 def span_of(binding: Binding) -> tuple[int, int]:
@@ -86,23 +74,19 @@ def held_by(binding: Binding, beside: Sequence[Binding]) -> dict[Channel, Line]:
     The others are among what is `beside` it there.
     """
     held: dict[Channel, Line] = {}
-    for user in binding.users if _moves_bone(binding) else ():
+    for user in binding.users if binding.is_keyed else ():
         if not len(user.animated.animation_data.nla_tracks):
             continue
         others = [
-            other for other in beside if user in other.users and not is_same(other, binding) and _moves_bone(other)
+            other for other in beside if user in other.users and other.slot.key != binding.slot.key and other.is_keyed
         ]
         for other in others:
             if other.filled:
-                held[influence_path(other), 0] = (0.0, 0.0)
-                held[time_path(other), 0] = _time_seen_from(binding, other, user.animated)
+                held[path_of(other, "influence"), 0] = (0.0, 0.0)
+                held[path_of(other, "eval_time"), 0] = _time_seen_from(binding, other, user.animated)
         if others and binding.filled:
-            held[influence_path(binding), 0] = (1.0, 0.0)
+            held[path_of(binding, "influence"), 0] = (1.0, 0.0)
     return held
-
-
-def _moves_bone(binding: Binding) -> bool:
-    return any(path.removeprefix(binding.prefix) in WIDTHS for path, _ in binding.curves)
 
 
 def _time_seen_from(binding: Binding, other: Binding, rig: bpy.types.Object) -> Line:
@@ -123,12 +107,9 @@ def _time_seen_from(binding: Binding, other: Binding, rig: bpy.types.Object) -> 
 
 def _frames_of(rig: bpy.types.Object, slot: Slot) -> Line | None:
     """Return the scene's frames by those of an Action, where it plays once."""
-    data = rig.animation_data
-    lines: list[Line | None] = []
-    if (data.action, data.action_slot_handle) == (slot.action, slot.handle):
-        lines.append((0.0, 1.0))
+    lines: list[Line | None] = [(0.0, 1.0)] if slot.plays_in(rig) else []
     for strip in strips_of(rig):
-        if (strip.action, strip.action_slot_handle) == (slot.action, slot.handle) and not strip.mute:
+        if (strip.action, strip.action_slot_handle) == slot.key and not strip.mute:
             if strip.repeat > 1.0 or strip.use_animated_time:
                 lines.append(None)
             elif strip.use_reverse:
@@ -143,14 +124,14 @@ def write_time(binding: Binding, layout: Layout) -> None:
         if says(present, layout):
             return
         remove_time(binding)
-    path = time_path(binding)
+    path = path_of(binding, "eval_time")
     if layout.cycles is None:
         add_modifiers(write_line(binding, path, _line(layout)), layout.stepping)
         return
     fcurve = binding.curves[path, 0] = binding.channelbag.fcurves.new(path)
     frames, times = np.array(_seams(layout)).T
     replace_keys(fcurve, frames, times)
-    add_cycles(fcurve, _without_offset(layout.cycles))
+    add_cycles(fcurve, layout.cycles.without_offset)
     add_modifiers(fcurve, layout.stepping)
     hide_fcurve(fcurve, ensure_group(binding.channelbag, binding.kind.difference_group(binding.prefix)))
 
@@ -180,11 +161,8 @@ def says(fcurve: bpy.types.FCurve, layout: Layout) -> bool:
     kinds = [modifier.type for modifier in fcurve.modifiers]
     if fcurve.mute or kinds[:1] != ["CYCLES"] or not _holds(fcurve, layout.steps):
         return False
-    modifier = fcurve.modifiers[0]
-    cycles = Cycles(modifier.mode_before, modifier.mode_after, modifier.cycles_before, modifier.cycles_after)
-    return cycles == _without_offset(layout.cycles) and np.array_equal(
-        [key.co for key in fcurve.keyframe_points], np.float32(_seams(layout))
-    )
+    is_cyclic = read_cycles(fcurve.modifiers) == layout.cycles.without_offset
+    return is_cyclic and np.array_equal([key.co for key in fcurve.keyframe_points], np.float32(_seams(layout)))
 
 
 def is_line(fcurve: bpy.types.FCurve, line: Line, steps: tuple[Stepped, ...] = ()) -> bool:
@@ -217,20 +195,8 @@ def _seams(layout: Layout) -> list[tuple[float, float]]:
     return [(frame, start + step * frame) for frame in layout.frames]
 
 
-def _without_offset(cycles: Cycles) -> Cycles:
-    """Return cycles without offset: the difference repeats as it is also where the channels go on from
-    where they have come.
-    """
-    before, after = (mode.removesuffix("_OFFSET") for mode in (cycles.before, cycles.after))
-    return Cycles(before, after, cycles.before_count, cycles.after_count)
-
-
 def remove_time(binding: Binding) -> None:
-    fcurve = binding.curves.pop((time_path(binding), 0), None)
+    fcurve = binding.curves.pop((path_of(binding, "eval_time"), 0), None)
     if fcurve is not None:
         binding.channelbag.fcurves.remove(fcurve)
         remove_if_empty(binding.channelbag, binding.kind.difference_group(binding.prefix))
-
-
-def is_same(one: Binding, other: Binding) -> bool:
-    return (one.slot.action, one.slot.handle) == (other.slot.action, other.slot.handle)

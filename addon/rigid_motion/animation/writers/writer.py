@@ -11,7 +11,7 @@ import numpy as np
 from ..actions.slots import Binding, Slot
 from ..compute.sources import Source
 from ..transforms import Channel, Transform
-from .layout import Layout, Pieces
+from .sampled import Layout, Pieces
 
 
 class Writer(ABC):
@@ -79,7 +79,7 @@ class Writer(ABC):
         """
 
     def trouble_of(self, user: Transform, binding: Binding) -> str:
-        """Return why a user is not seen where its in-betweens have it, see `constraint_repair`;
+        """Return why a user is not seen where its in-betweens have it, see `bone_constraints`;
         "" where nothing is amiss.
         """
         return ""

@@ -1,10 +1,9 @@
 """The overlay of the 3D viewport: paths of selected objects or bones, Blender's own beside that of a rigid-motion mode.
 
-settings    what to show                    points         where the paths lead, as arrays
-bones       which point of a bone is shown   spacing        which ticks can be told apart in a view
-parents     where parents carry it          ghosts         poses every few frames, as arrays
-cache       what is worked out already      drawing        lines and dots on the screen
-                                            ghost_drawing  ghosts on the screen
+settings  what to show                  points   where the paths lead, and which ticks can be told apart in a view
+kinds     by what each kind is drawn    parents  where parents carry it
+ghosts    poses every few frames        cache    what is worked out already
+drawing   lines, dots and ghosts on the screen
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import PointerProperty
 
-from . import cache, drawing, ghost_drawing
+from . import cache, drawing
 from .settings import RigidMotionOverlay, draw_settings, draw_toggle
 
 __all__ = ["draw_settings", "register", "unregister"]
@@ -23,13 +22,11 @@ def register() -> None:
     bpy.types.Scene.rigid_motion_overlay = PointerProperty(type=RigidMotionOverlay)
     bpy.types.VIEW3D_PT_overlay_object.append(draw_toggle)
     cache.register()
-    ghost_drawing.register()
     drawing.register()
 
 
 def unregister() -> None:
     drawing.unregister()
-    ghost_drawing.unregister()
     cache.unregister()
     bpy.types.VIEW3D_PT_overlay_object.remove(draw_toggle)
     del bpy.types.Scene.rigid_motion_overlay

@@ -16,6 +16,7 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
+from ...animation.actions.channels import selected_keys
 from ...animation.actions.slots import Binding
 from ...animation.compute.sources import Source
 from ...animation.handlers import append_handlers, remove_handlers
@@ -74,18 +75,18 @@ def paths_of(
     )
     stale: dict[Transform, np.ndarray | None] = {}
     for target in targets:
-        entry, turn = _entries.get(_identity(target)), (turned or {}).get(target)
+        entry, turn = _entries.get(target.identity), (turned or {}).get(target)
         if entry is None or entry.stale or entry.settings != (*settings, b"" if entry.above else _bytes(turn)):
             stale[target] = turn
     if stale:
         carried = Carried()
         for target, (binding, source) in carried.read(stale).items():
-            before = _entries.get(_identity(target))
+            before = _entries.get(target.identity)
             entry = _read(target, binding, source, settings, stale[target], before, carried)
-            _entries[_identity(target)] = entry
+            _entries[target.identity] = entry
     for target in targets:
-        _entries.move_to_end(_identity(target))
-    return [_entries[_identity(target)].path for target in targets]
+        _entries.move_to_end(target.identity)
+    return [_entries[target.identity].path for target in targets]
 
 
 def _bytes(turn: np.ndarray | None) -> bytes:
@@ -103,7 +104,7 @@ def notice_selection(targets: Iterable[bpy.types.Object | Transform]) -> bool:
 
     Selecting is no edit, so Blender's handlers are silent about it.
     """
-    entries = {target: entry for target in map(transform_of, targets) if (entry := _entries.get(_identity(target)))}
+    entries = {target: entry for target in map(transform_of, targets) if (entry := _entries.get(target.identity))}
     drawn = [target for target, entry in entries.items() if entry.path]
     bindings = active_bindings(drawn) if drawn else {}
     changed = [entries[target] for target in drawn if entries[target].selected != _selection(bindings.get(target))]
@@ -112,18 +113,10 @@ def notice_selection(targets: Iterable[bpy.types.Object | Transform]) -> bool:
     return bool(changed)
 
 
-def _identity(target: Transform) -> tuple[int, str]:
-    return target.animated.session_uid, target.prefix
-
-
 def _selection(binding: Binding | None) -> bytes:
     """Return which keys are selected, channel by channel: quicker to have than their frames."""
-    result = []
-    for fcurve in binding.curves.values() if binding is not None else ():
-        chosen = np.empty(len(fcurve.keyframe_points), bool)
-        fcurve.keyframe_points.foreach_get("select_control_point", chosen)
-        result.append(chosen.tobytes())
-    return b"".join(result)
+    curves = () if binding is None else binding.curves.values()
+    return b"".join(selected_keys(fcurve).tobytes() for fcurve in curves)
 
 
 def _read(

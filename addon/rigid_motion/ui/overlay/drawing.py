@@ -1,7 +1,8 @@
-"""Drawing paths in the 3D viewport: points, once computed, become batches on the graphics card, and stay there.
+"""Drawing paths and ghosts in the 3D viewport: what was computed becomes batches on the graphics card, and stays there.
 
 Batches are in the space of the objects' channels; from there into the world it is a matrix at drawing, so a parent that
-moves costs nothing. Colours are as on the screen, widths in pixels at a resolution scale of 1.
+moves costs nothing. What ghosts look like is there once, and placed by a matrix each. Colours are as on the screen,
+widths in pixels at a resolution scale of 1.
 """
 
 from __future__ import annotations
@@ -15,19 +16,19 @@ from weakref import WeakKeyDictionary
 import bpy
 import gpu
 import numpy as np
+from bpy.app.handlers import persistent
 from mathutils import Matrix, Vector
 
+from ...animation.handlers import append_handlers, remove_handlers
 from ...animation.queries.segments import frame_in_action
-from ...animation.transforms import transform_of
-from ..look import DEFAULT_LOOK, Color
-from ..preferences import preferences
+from ...animation.transforms import Transform, transform_of
+from ..preferences import DEFAULT_LOOK, Color, preferences
 from ..targets import selected_in_view
 from . import cache
-from .ghost_drawing import draw_ghosts
+from .ghosts import Ghosts, shape_of
 from .kinds import PATH_KINDS
-from .points import TICKS, Path, thinned
+from .points import TICKS, Path, Readable, readable, thinned
 from .settings import RigidMotionOverlay, is_shown
-from .spacing import Readable, readable
 
 log = logging.getLogger(__package__)
 
@@ -41,6 +42,15 @@ TICK, KEY, NOW = 6.0, 10.0, 12.0
 """Diameters of dots, outline included: ticks, keys, and where the object is on the current frame."""
 
 AXIS_OPACITY = 0.8
+
+SOLID, EDGES = 0.15, 0.55
+"""Opacity of the triangles and of the edges of a ghost."""
+
+EDGE_WIDTH = 1.0
+"""The width of edges, in pixels at a resolution scale of 1."""
+
+NEAR = 0.5
+"""Frames from the current one within which there is no ghost, since the thing itself is there."""
 
 MOST_VIEWS = 24
 """Choices of ticks or axes that stay on the graphics card for each path, while it is looked at from here and there."""
@@ -204,6 +214,36 @@ class _Pen:
             batch.draw(self.dots)
 
 
+_shapes: dict[tuple[int, str], tuple[Batch, Batch]] = {}
+"""The triangles and the edges of ghosts, by the identity of what is moved."""
+
+
+def _draw_ghosts(pen: _Pen, transform: Transform, ghosts: Ghosts, frame: float, color: Color) -> None:
+    """Draw all ghosts of something but that of this frame, as the keys have it, in the space of the matrix stack."""
+    identity = transform.identity
+    if identity not in _shapes:
+        shape = shape_of(transform, bpy.context.view_layer.depsgraph)
+        _shapes[identity] = _batch("TRIS", shape.triangles), _batch("LINES", shape.lines)
+    triangles, lines = _shapes[identity]
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    red, green, blue, opacity = color
+    gpu.state.depth_test_set("LESS_EQUAL")
+    gpu.state.face_culling_set("BACK")
+    try:
+        for at, matrix in zip(ghosts.frames.tolist(), ghosts.matrices, strict=True):
+            if abs(at - frame) < NEAR:
+                continue
+            with gpu.matrix.push_pop():
+                gpu.matrix.multiply_matrix(Matrix(matrix))
+                if triangles:
+                    shader.uniform_float("color", (red, green, blue, SOLID * opacity))
+                    triangles.draw(shader)
+                pen.line(lines, (red, green, blue, EDGES * opacity), EDGE_WIDTH)
+    finally:
+        gpu.state.face_culling_set("NONE")
+        gpu.state.depth_test_set("NONE")
+
+
 def draw_paths() -> None:
     """Draw paths and ghosts of the selected objects or bones in the viewport that is being drawn. It never raises."""
     try:
@@ -259,7 +299,7 @@ def _draw(context: bpy.types.Context) -> None:
                 gpu.matrix.multiply_matrix(space)
                 if path.ghosts is not None:
                     color = pen.look.native_color if path.desired is None else pen.look.mode_color
-                    draw_ghosts(target, path.ghosts, frame, color, pen.line, _batch)
+                    _draw_ghosts(pen, target, path.ghosts, frame, color)
                 if not settings.show_paths:
                     continue
                 _draw_path(pen, path, settings)
@@ -295,6 +335,21 @@ def _draw_path(pen: _Pen, path: Path, settings: RigidMotionOverlay) -> None:
     pen.dot(batches.selected, look.key_color, diameter)
 
 
+@persistent
+def _on_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    if _shapes:
+        edited = {update.id.original.session_uid for update in depsgraph.updates if update.is_updated_geometry}
+        for identity in [identity for identity in _shapes if identity[0] in edited]:
+            del _shapes[identity]
+
+
+@persistent
+def _on_file(*_: object) -> None:
+    _shapes.clear()
+
+
+HANDLERS = {"depsgraph_update_post": _on_update, "undo_post": _on_file, "redo_post": _on_file, "load_post": _on_file}
+
 PLACES = (
     (bpy.types.SpaceView3D, draw_paths, "POST_VIEW"),
     (bpy.types.SpaceDopeSheetEditor, follow_selection, "POST_PIXEL"),
@@ -310,6 +365,7 @@ _complaint = ""
 
 
 def register() -> None:
+    append_handlers(HANDLERS)
     if not bpy.app.background:
         for space, draw, moment in PLACES:
             _handles.append((space, space.draw_handler_add(draw, (), "WINDOW", moment)))
@@ -319,6 +375,8 @@ def unregister() -> None:
     for space, handle in _handles:
         space.draw_handler_remove(handle, "WINDOW")
     _handles.clear()
+    remove_handlers(HANDLERS)
+    _shapes.clear()
     _batches.clear()
     _dot_shader.cache_clear()
     _vertex_format.cache_clear()

@@ -11,10 +11,11 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ...animation.baking.channel_maps import shown
-from ...animation.compute.modes import MODE_NUMBERS
+from ...animation.baking.motions import shown
+from ...animation.compute.components import MODE_NUMBERS
 from ...animation.compute.sources import Source
 from ...animation.transforms import Transform
+from ...animation.transforms.sizes import drawn_size
 from ...motion.affine import AffineMaps
 from .parents import Parents
 
@@ -142,6 +143,6 @@ def _plain(obj: bpy.types.Object) -> Shape:
     corners = np.array(obj.bound_box)
     if np.ptp(corners) > 0.0:
         return Shape(corners[np.ravel(BOX)], np.empty((0, 3)))
-    size = obj.empty_display_size if obj.type == "EMPTY" else 1.0
+    size = drawn_size(obj) or 1.0
     ends = size * np.concatenate((np.eye(3), -np.eye(3)))
     return Shape(ends[[0, 3, 1, 4, 2, 5]], np.empty((0, 3)))

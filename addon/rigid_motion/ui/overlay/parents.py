@@ -13,11 +13,10 @@ import numpy as np
 from mathutils import Matrix
 
 from ...animation.actions.slots import Binding
-from ...animation.baking.channel_maps import shown
-from ...animation.baking.followers import MOVING, NotPromised, not_promised
+from ...animation.baking.motions import MOVING, NotPromised, not_promised, shown
 from ...animation.compute.sources import Source
 from ...animation.queries.keyed import active_bindings, sources_of
-from ...animation.transforms import WIDTHS, Transform, shows_differences, transform_of
+from ...animation.transforms import Transform, shows_differences, transform_of
 from ...animation.transforms.posing import Hierarchy
 from ...motion.affine import AffineMaps
 
@@ -97,7 +96,7 @@ class Parents:
         self.target, self._carried = target, carried
         self._read = carried.read(_above(target))
         self.move_by_keys = any(source is not None for _, source in self._read.values()) and all(
-            _moves_by_keys(one, carried) and (source is not None or not _is_keyed(binding))
+            _moves_by_keys(one, carried) and (source is not None or binding is None or not binding.is_keyed)
             for one, (binding, source) in self._read.items()
         )
         """True if they move, and by keys alone."""
@@ -193,10 +192,6 @@ def _hangs_on_a_whole(obj: bpy.types.Object) -> bool:
         return True
     bones = obj.parent.pose.bones if obj.parent_type == "BONE" and obj.parent.pose is not None else {}
     return obj.parent_bone in bones and not bones[obj.parent_bone].bone.use_relative_parent
-
-
-def _is_keyed(binding: Binding | None) -> bool:
-    return binding is not None and any(path.removeprefix(binding.prefix) in WIDTHS for path, _ in binding.curves)
 
 
 def _hung(transform: Transform) -> tuple:

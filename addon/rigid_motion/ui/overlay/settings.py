@@ -8,7 +8,7 @@ from bpy.app.translations import pgettext_n as n_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ...animation.properties import MODE_ITEMS, OWN_WORDS
-from ..rows import draw_text, labelled
+from ..wording import draw_text, labelled
 
 MODE_CHOICES = [("CHOSEN", "As Keyed", "The mode that each segment has", 0), *MODE_ITEMS[1:]]
 

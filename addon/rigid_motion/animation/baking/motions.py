@@ -1,29 +1,181 @@
-"""How all bones of a rig move as one slot has it, and how far off they are with other keys: exactly, frame by frame.
+"""How transforms and whole rigs move as their channels say: poses for the search for keys, affine maps for its proof.
 
 Bones are numbered as the rig has them. Moments are the frames that are looked at, those between and around samples
-among them. Poses are those that the channels give: constraints and drivers have no part in it.
+among them. Poses are those that the channels give: constraints and drivers have no part in it, and of the bones that
+follow these it is told which they are.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from mathutils import Euler, Quaternion
 
+from ...motion import Poses
 from ...motion.affine import AffineMaps, ball_displacement, displacement_bound
+from ...motion.eulers import ORDERS
+from ...motion.quaternions import matrices, multiply
 from ..actions.reading import sources_of_users
 from ..actions.refusals import refuse_numbers
-from ..actions.slots import Slot, bindings_in_slot
+from ..actions.slots import Slot, bindings_in_slot, slots_alone
+from ..compute.bodies import turn_into_quaternions
+from ..compute.components import LOCATION, ROTATION, ROWS, SCALE
+from ..compute.differences import in_betweens
 from ..compute.sources import Source
-from ..transforms import Channel, Refused, split_path, transform_of
+from ..curves.keys import LARGEST
+from ..transforms import WIDTHS, Channel, Refused, Transform, shows_differences, split_path, transform_of
 from ..transforms.posing import Hierarchy
-from .channel_maps import evaluated, shown
-from .sizes import into_scene, reach_of, scale_in_scene
+from ..transforms.sizes import into_scene, reach_of, scale_in_scene
+
+MOVING = {*WIDTHS, "rotation_axis_angle", "rotation_mode"}
+"""Properties of bones that a driver moves them by."""
+
+CHAINS = ("IK", "SPLINE_IK")
+"""Constraints that move bones above the one that has them."""
 
 SMALLEST = 1e-6
 """Errors of single precision, relative to how far something gets."""
+
+
+@dataclass(frozen=True)
+class NotPromised:
+    """The bones that a tolerance is not promised for, by their names."""
+
+    followers: tuple[str, ...] = ()
+    """Bones that follow constraints or drivers."""
+
+    below: tuple[str, ...] = ()
+    """Bones that hang on these."""
+
+    def __bool__(self) -> bool:
+        return bool(self.followers)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.followers or name in self.below
+
+
+ALL_PROMISED = NotPromised()
+
+
+def not_promised(rig: bpy.types.Object) -> NotPromised:
+    """Return the bones of a rig whose motion is not that of their channels, and of those above them, alone."""
+    followers = {*_constrained(rig), *_driven(rig)}
+    bones = rig.pose.bones
+    below = {bone.name for bone in bones if any(parent.name in followers for parent in bone.parent_recursive)}
+    ordered = [bone.name for bone in bones]
+    return NotPromised(
+        tuple(name for name in ordered if name in followers),
+        tuple(name for name in ordered if name in below - followers),
+    )
+
+
+def _constrained(rig: bpy.types.Object) -> Iterator[str]:
+    animated = _animated_paths(rig)
+    for bone in rig.pose.bones:
+        for constraint in bone.constraints:
+            if shows_differences(constraint):
+                continue
+            path = constraint.path_from_id()
+            is_switched = any(f"{path}.{name}" in animated for name in ("influence", "mute", "enabled"))
+            if is_switched or (not constraint.mute and constraint.influence > 0.0):
+                yield bone.name
+                if constraint.type in CHAINS:
+                    # The bone itself is the last of a chain, unless that is to reach for its head.
+                    count = constraint.chain_count - getattr(constraint, "use_tail", True)
+                    above = bone.parent_recursive[:count] if constraint.chain_count else bone.parent_recursive
+                    yield from (parent.name for parent in above)
+
+
+def _driven(rig: bpy.types.Object) -> Iterator[str]:
+    names = {f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].': bone.name for bone in rig.pose.bones}
+    for driver in _drivers(rig):
+        prefix, prop = split_path(driver.data_path)
+        if prefix in names and prop in MOVING and not driver.mute:
+            yield names[prefix]
+
+
+def _drivers(rig: bpy.types.Object) -> Iterator[bpy.types.FCurve]:
+    data = rig.animation_data
+    yield from data.drivers if data is not None else ()
+
+
+def _animated_paths(rig: bpy.types.Object) -> set[str]:
+    """Return the data paths that drivers or F-curves of the rig set."""
+    curves = {fcurve.data_path for slot in slots_alone(rig) for fcurve in slot.fcurves}
+    return curves | {driver.data_path for driver in _drivers(rig)}
+
+
+def shown(transform: Transform, source: Source, frames: np.ndarray) -> tuple[Poses, AffineMaps]:
+    """Return how a source is seen on these frames (n,), with the object's own delta transforms, and what is not keyed.
+
+    Returns
+    -------
+    poses : Poses, shape (n,)
+        Along the axes of the body at rest. Where the scale is uneven, its geometric mean.
+    maps : AffineMaps, shape (n,)
+        Of the channels as Blender has them: location runs along its own axes, and scale may be uneven or negative.
+    """
+    desired = in_betweens(source, frames).desired
+    delta, rest, along, count = source.original, transform.components(), source.location_axes, len(frames)
+    positions, quaternions = desired.positions, desired.quaternions
+    if LOCATION not in source.keyed:
+        position = rest[ROWS[LOCATION]] + delta[ROWS[LOCATION]]
+        positions = np.tile(position if along is None else along @ position, (count, 1))
+    if ROTATION not in source.keyed:
+        column = rest[:, None].copy()
+        turn_into_quaternions(column, source.order)
+        quaternions = np.tile(multiply(delta[ROWS[ROTATION]], column[ROWS[ROTATION], 0]), (count, 1))
+    if desired.scales is not None:
+        return Poses(positions, quaternions, desired.scales), _maps(
+            positions, quaternions, desired.scales[:, None], along
+        )
+    scale = np.tile(rest[ROWS[SCALE]] * delta[ROWS[SCALE]], (count, 1))
+    if SCALE in source.keyed:
+        scale = (source.values_at(frames)[ROWS[SCALE]] * delta[ROWS[SCALE], None]).T
+    mean = np.cbrt(np.abs(scale.prod(axis=1)))
+    return Poses(positions, quaternions, mean), _maps(positions, quaternions, scale, along)
+
+
+def evaluated(
+    transform: Transform, curves: Mapping[Channel, bpy.types.FCurve], frames: np.ndarray
+) -> tuple[Poses, AffineMaps]:
+    """Return what `shown` does, for a bone that makes no source: by its F-curves as Blender evaluates them,
+    or as it stands.
+    """
+    bone, frame_list = transform.carrier, frames.tolist()
+
+    def values(name: str) -> np.ndarray:
+        stands = getattr(bone, name)
+        columns = []
+        for index, value in enumerate(stands):
+            fcurve = curves.get((transform.prefix + name, index))
+            has_say = fcurve is not None and not fcurve.mute and not fcurve.is_empty
+            columns.append([fcurve.evaluate(frame) for frame in frame_list] if has_say else [value] * len(frame_list))
+        result = np.array(columns, dtype=np.float64).T
+        return result if (np.abs(result) < LARGEST).all() else np.tile(np.array(stands), (len(frame_list), 1))
+
+    mode = bone.rotation_mode
+    if mode in ORDERS:
+        turns = [Euler(angles, mode).to_quaternion() for angles in values("rotation_euler").tolist()]
+    elif mode == "AXIS_ANGLE":
+        turns = [Quaternion(axis, angle) for angle, *axis in values("rotation_axis_angle").tolist()]
+    else:
+        turns = [Quaternion(turn).normalized() for turn in values("rotation_quaternion").tolist()]
+    along, scale = transform.location_axes, values("scale")
+    positions = values("location") if along is None else values("location") @ along.T
+    quaternions = np.array(turns, dtype=np.float64)
+    mean = np.cbrt(np.abs(scale.prod(axis=1)))
+    return Poses(positions, quaternions, mean), _maps(positions, quaternions, scale, along)
+
+
+def _maps(positions: np.ndarray, quaternions: np.ndarray, scale: np.ndarray, along: np.ndarray | None) -> AffineMaps:
+    """Return the maps with positions (n, 3) along the body's axes, quaternions (n, 4) and scales (n, 3) or (n, 1)."""
+    axes = np.moveaxis(matrices(quaternions), -1, 0) * scale[:, None, :]
+    return AffineMaps(axes, positions if along is None else positions @ along)
 
 
 class RigMotion:
@@ -163,7 +315,7 @@ def _keyed_in(
                     refuse_numbers(user.name, source)
                     sources[binding.prefix] = source
     curves: dict[str, dict[Channel, bpy.types.FCurve]] = {}
-    for fcurve in () if slot.channelbag is None else slot.channelbag.fcurves:
+    for fcurve in slot.fcurves:
         path = fcurve.data_path
         curves.setdefault(split_path(path)[0], {})[path, fcurve.array_index] = fcurve
     return sources, curves

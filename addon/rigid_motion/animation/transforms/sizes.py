@@ -1,4 +1,4 @@
-"""How large things are: in the scene's units, and in those of their channels."""
+"""How large things are, whatever hangs on them included: in the scene's units, and in those of their channels."""
 
 from __future__ import annotations
 
@@ -8,11 +8,81 @@ import bpy
 import numpy as np
 
 from ...gltf.sizes import OF_A_BODY, OF_KEY_POSES
-from ..transforms import Transform
-from ..transforms.reaches import SOME_SIZE, metres_per_unit, reach_of, size_of
+from .transform import Transform
+
+SOME_SIZE = 0.1
+"""The radius, in metres, of what has no size."""
 
 SAME_PLACE = 0.1
 """Heads of bones that are closer than this, of a bone's length, make no size."""
+
+
+def reach_of(bone: bpy.types.PoseBone) -> float:
+    """Return how far a bone reaches from its head at rest, in the rig's unit: its length.
+
+    Importers make up the lengths of bones that nothing hangs on: such a bone reaches no further than the one before it,
+    as far as that is long, or its head is from the head of that.
+    """
+    return _length(bone.bone) or _some_size()
+
+
+def _length(bone: bpy.types.Bone) -> float:
+    parent = bone.parent
+    if parent is None or bone.children:
+        return bone.length
+    return min(bone.length, max((bone.head_local - parent.head_local).length, parent.length))
+
+
+def drawn_size(obj: bpy.types.Object) -> float:
+    """Return how large an empty or a camera is drawn, 0 for all else."""
+    return obj.empty_display_size if obj.type == "EMPTY" else obj.data.display_size if obj.type == "CAMERA" else 0.0
+
+
+def _some_size() -> float:
+    return SOME_SIZE / metres_per_unit(bpy.context.scene)
+
+
+def metres_per_unit(scene: bpy.types.Scene) -> float:
+    return 1.0 if scene.unit_settings.system == "NONE" else scene.unit_settings.scale_length
+
+
+def size_of(matrix: object) -> float:
+    """Return the scale of a matrix, the same along all axes."""
+    return float(np.cbrt(abs(np.linalg.det(np.array(matrix)[:3, :3]))))
+
+
+def reach_at_rest(transform: Transform, known: dict[bpy.types.Bone, float]) -> float:
+    """Return how far a transform reaches from its origin, in the units of its channels: with all bones that hang on it,
+    as far as these stretch in one line; an object's box without its modifiers.
+
+    `known` keeps what was found of bones.
+    """
+    if transform.is_part:
+        return _reach_of_chain(transform.carrier.bone, known)
+    obj = transform.carrier
+    size = float(np.linalg.norm(np.array(obj.bound_box), axis=1).max()) or drawn_size(obj)
+    return size * max(map(abs, obj.scale)) or _some_size()
+
+
+def metres_per_channel_unit(transform: Transform) -> float:
+    """Return how many metres a unit of its channels is as it stands, 1 where its parents have no size."""
+    obj = transform.carrier.id_data
+    space = obj if transform.is_part else obj.parent
+    return metres_per_unit(bpy.context.scene) * (1.0 if space is None else size_of(space.matrix_world) or 1.0)
+
+
+def _reach_of_chain(bone: bpy.types.Bone | None, known: dict[bpy.types.Bone, float]) -> float:
+    if bone is None:  # It was just made in Edit Mode.
+        return _some_size()
+    chain = [bone]
+    for item in chain:
+        if item not in known:
+            chain += item.children
+    for item in reversed(chain):
+        if item not in known:
+            children = [(other.head_local - item.head_local).length + known[other] for other in item.children]
+            known[item] = max(children, default=0.0) or _length(item)
+    return known[bone]
 
 
 def radius_of(obj: bpy.types.Object | bpy.types.PoseBone) -> float:
@@ -29,16 +99,11 @@ def radius_of(obj: bpy.types.Object | bpy.types.PoseBone) -> float:
         axes = np.array(evaluated.matrix_world.to_3x3())
         heads = np.array([bone.head for bone in evaluated.pose.bones]) @ axes.T
         reaches = np.array([reach_of(bone) for bone in obj.pose.bones]) * size_of(axes)
-        return float((np.linalg.norm(heads, axis=1) + reaches).max()) or SOME_SIZE / metres_per_unit(bpy.context.scene)
+        return float((np.linalg.norm(heads, axis=1) + reaches).max()) or _some_size()
     corners = np.array(evaluated.bound_box)
-    size = 0.0
     if np.ptp(corners) > 0.0:
-        size = float(np.linalg.norm(corners @ np.array(evaluated.matrix_world.to_3x3()).T, axis=1).max())
-    elif obj.type == "EMPTY":
-        size = obj.empty_display_size * size_of(evaluated.matrix_world)
-    elif obj.type == "CAMERA":
-        size = obj.data.display_size * size_of(evaluated.matrix_world)
-    return size or SOME_SIZE / metres_per_unit(bpy.context.scene)
+        return float(np.linalg.norm(corners @ np.array(evaluated.matrix_world.to_3x3()).T, axis=1).max())
+    return drawn_size(obj) * size_of(evaluated.matrix_world) or _some_size()
 
 
 def rig_size(rig: bpy.types.Object) -> float:
