@@ -17,7 +17,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..motion import Poses
-from ..motion.poses import joined
 from ..motion.quaternions import normalise
 from . import wire
 from .bodies import Body, Forest
@@ -204,16 +203,14 @@ class Sender:
 
     def _remember(self, time: float, poses: Poses) -> float:
         """Keep a sample, and return its time by a clock that only goes on."""
-        times, before = self._samples.moments, self._samples.poses
-        now = time + self._slip
+        times, now = self._samples.moments, time + self._slip
         if len(times) and not 0.0 < now - times[-1] <= STEP:
             usual = times[-1] - times[-2] if len(times) > 1 else 1.0 / TICKS
             self._slip += float(times[-1] + usual - now)
             now = time + self._slip
         if len(times):
             self._interval = max(now - float(times[-1]), CALMER * self._interval)
-        new = Poses(poses.positions, normalise(poses.quaternions))[:, None]
-        samples = Path(np.append(times, now), joined((before, new), axis=1))
+        samples = self._samples.extended(now, Poses(poses.positions, normalise(poses.quaternions)))
         past = now - self._delay - STEP
         self._samples = samples.since(past) if np.searchsorted(samples.moments, past) > AT_ONCE else samples
         return now

@@ -116,7 +116,7 @@ def send_performer(options: argparse.Namespace, stopped: list[int]) -> None:
                     sending.say(sending.sender.join())
                 sent, sending.ahead = keys.bodies, ahead
                 for sample, moment in enumerate(keys.moments.tolist()):
-                    poses = {name: poses[sample] for name, poses in keys.poses.items()}
+                    poses = {name: poses[:, sample] for name, poses in keys.poses.items()}
                     sending.say(sending.sender.add(moment, poses))
             if sending:
                 sending.answer(FRAME)
