@@ -13,7 +13,7 @@ from rigid_motion.motion.quaternions import align_signs, normalise
 from rigid_motion.streams import Body
 from rigid_motion.streams.paths import Path
 
-from .measuring import HEADERS, errors
+from .measuring import HEADERS
 
 WAYS: dict[str, tuple[float, int | None]] = {
     "float32 at 30 Hz": (30.0, None),
@@ -46,7 +46,7 @@ def packed(body: Body, times: np.ndarray, poses: Poses) -> dict[str, dict[str, f
             positions = np.where(sliding[:, None, None], np.rint(positions / step) * step, positions)
             quaternions = smallest_three(quaternions, bits)
         shown = Path(moments, Poses(positions, normalise(quaternions))).at(times)
-        worst = errors(body, shown, samples.at(times)).max(axis=0)
+        worst = body.errors(shown, samples.at(times)).max(axis=0)
         size = -(-(len(body.joints) * turn + np.count_nonzero(sliding) * place) // 8)
         result[label] = {
             "bytes_a_second": rate * size,

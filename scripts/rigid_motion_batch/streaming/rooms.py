@@ -137,20 +137,20 @@ class Room:
     def __exit__(self, *_: object) -> None:
         self._session.close()
 
-    def listen(self, user: str, stream: str) -> None:
-        """Take what a user says from now on, or everybody with `*`."""
-        key = f"{self.name}/{user}/{stream}"
-        self._declared[f"listen {key}"] = self._session.declare_subscriber(key, self._take)
-
-    def show_presence(self, user: str) -> None:
-        """Let senders know that somebody listens, now that everything is listened to."""
+    def listen(self, user: str) -> None:
+        """Take what everybody sends from now on, and let senders know that a user listens."""
+        for stream in (SKELETON, MOTION):
+            self._subscribe(self._session, f"*/{stream}")
         key = f"{self.name}/{user}/{LISTENING}/{self._session.zid()}"
         self._declared[key] = self._session.liveliness().declare_token(key)
 
-    def watch_presence(self) -> None:
-        """Take it as something that came whenever another begins to listen, or does already."""
-        key = f"{self.name}/*/{LISTENING}/*"
-        self._declared[key] = self._session.liveliness().declare_subscriber(key, self._take, history=True)
+    def speak(self, user: str) -> None:
+        """Take the answers to a user, and whoever begins to listen, or does already."""
+        self._subscribe(self._session, f"{user}/{ANSWERS}")
+        self._subscribe(self._session.liveliness(), f"*/{LISTENING}/*", history=True)
+
+    def _subscribe(self, to: zenoh.Session | zenoh.Liveliness, keys: str, **options: bool) -> None:
+        self._declared[f"take {keys}"] = to.declare_subscriber(f"{self.name}/{keys}", self._take, **options)
 
     def send(self, user: str, stream: str, datagram: bytes) -> None:
         """Say something as a user, or answers to one."""

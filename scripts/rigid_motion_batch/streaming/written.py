@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple, TextIO, cast
 
 import numpy as np
 
 from rigid_motion.motion import Poses, interpolate
+from rigid_motion.motion.poses import joined
 from rigid_motion.streams import Body
 from rigid_motion_batch.analysis.metrics import lines_of_poses, write_poses
 from rigid_motion_batch.axes import from_blender
@@ -30,6 +31,26 @@ class Motion(NamedTuple):
         """Return so many poses a second instead, with the in-betweens of a mode."""
         times = self.times[0] + np.arange(int((self.times[-1] - self.times[0]) * fps + 1e-6) + 1) / fps
         return self._replace(times=times, poses=interpolate(self.times, self.poses, times, mode))
+
+
+class Tracks(dict[tuple[str, Body], list[tuple[np.ndarray, Poses]]]):
+    """What was shown of all bodies of all users, or their keys, piece by piece."""
+
+    def add(self, user: object, bodies: Iterable[Body], moments: np.ndarray, poses: Mapping[str, Poses]) -> None:
+        """Add a piece of a user's bodies: moments (n,), and of each body poses (joints, n)."""
+        for body in bodies:
+            self.setdefault((str(user), body), []).append((moments, poses[body.name]))
+
+    def motions(self) -> list[Motion]:
+        """Return those of which there is more than a pose, at moments that rise."""
+        result = []
+        for (user, body), pieces in self.items():
+            times = np.concatenate([moments for moments, _ in pieces])
+            rising = np.flatnonzero(np.diff(np.maximum.accumulate(times), prepend=-np.inf) > 0.0)
+            if len(rising) > 1:
+                poses = joined([poses for _, poses in pieces], axis=1)[:, rising]
+                result.append(Motion(f"{user}-{body.name}", body, times[rising], poses))
+        return result
 
 
 def write_motions(path: Path, motions: Sequence[Motion], fps: float) -> list[Path]:
