@@ -77,9 +77,9 @@ class Fitting:
         exact = (ticks - inside * TICKS) / grid
         # A jump between two cells takes both of them, everything else the nearest.
         for cells in (np.rint(exact), np.concatenate((np.floor(exact), np.ceil(exact)))):
-            cells = np.unique(cells.astype(int))
-            cells = cells[(cells > 0) & (cells * grid < delay - max(self._head.late - 1, 0))]
-            self._grid = (ticks - cells[::-1] * grid) / TICKS
+            cells = np.unique(cells.astype(int))[::-1]
+            self._cells = cells[(cells > 0) & (cells * grid < delay - max(self._head.late - 1, 0))]
+            self._grid = (ticks - self._cells * grid) / TICKS
             between = self._grid[np.abs(self._grid[:, None] - looked).min(axis=1) > NOTHING]
             self._moments = closely(np.unique(np.concatenate((looked, between))))[1:]
             if is_still:
@@ -89,17 +89,17 @@ class Fitting:
             window, _, error = self._fitted()
             if error <= tolerance:
                 break
-        inner = [round((ticks - moment * TICKS) / grid) for moment in window.inner]
         groups = np.array(window.numbers).tolist()
-        return self._head._replace(finer=window.finer, cells=inner, groups=groups), error <= tolerance
+        return self._head._replace(finer=window.finer, cells=window.cells[1:], groups=groups), error <= tolerance
 
     def _fitted(self) -> Fitted:
         """Return the message with knots on the grid, of what is shown at the moments (n,) that are looked at."""
-        tolerance, knots = self._codec.tolerance, list[float]()
+        tolerance, cells = self._codec.tolerance, [0]
         for finer in range(FINEST + 1):
-            result = self._near(knots, finer)
+            result = self._near(cells, finer)
             if result.error <= NEAR * tolerance:
                 break
+            cells = result.window.cells
         left = np.maximum(self._end - self._moments, 0.0) / (self._end - self._start)
         most = tolerance * np.minimum(AT_END + (1.0 - AT_END) * left / TAPER, 1.0)
         for margin in MARGINS:
@@ -108,23 +108,22 @@ class Fitting:
                 return smaller
         return result
 
-    def _near(self, knots: list[float], finer: int) -> Fitted:
+    def _near(self, cells: list[int], finer: int) -> Fitted:
         """Return the numbers nearest to the truth, with knots and, where that is not enough, with more of them."""
         tolerance, most_knots = self._codec.tolerance, min(MOST_KNOTS, max(MOST_GROUPS // len(self._forest.groups), 1))
         window = Window(self._codec, self._base, self._head, finer)
-        for moment in (None, *knots):
-            window.say(None, moment, self._samples)
+        for cell in cells:
+            window.say(cell, samples=self._samples)
         while True:
             result, errors = self._look(window)
-            worst, free = self._moments[np.argmax(errors)], self._grid[~np.isin(self._grid, window.moments)]
-            if result.error <= NEAR * tolerance or not len(free) or len(knots) + 1 == most_knots:
+            worst, free = self._moments[np.argmax(errors)], ~np.isin(self._cells, window.cells)
+            if result.error <= NEAR * tolerance or not free.any() or len(window.cells) == most_knots:
                 return result
-            nearest = float(free[np.argmin(np.abs(free - worst))])
+            away = np.where(free, np.abs(self._grid - worst), np.inf)
             good = finer < FINEST or result.error <= tolerance
-            if good and np.abs(window.moments[1:] - worst).min() < abs(nearest - worst):
+            if good and np.abs(window.moments[1:] - worst).min() < away.min():
                 return result
-            knots.append(nearest)
-            window.say(None, nearest, self._samples)
+            window.say(int(self._cells[np.argmin(away)]), samples=self._samples)
 
     def _look(self, window: Window) -> tuple[Fitted, np.ndarray]:
         """Return what is shown with a window, and the largest error of each moment within it."""
@@ -144,7 +143,7 @@ class Fitting:
             list(map(components, (there.positions - self._truth.positions, 2.0 * turn * radii[..., None])))
         )
         places, axes = np.array(components(there.positions), order="C"), matrices(there.quaternions)
-        numbers, last = np.array(window.numbers), max([self._start, *window.inner])
+        numbers, last = np.array(window.numbers), window.moments[-2]
         for own, support in zip(numbers[::-1], window.supports[::-1], strict=True):
             hat = window.factor * _hat(support, self._moments, self._end, last)
             for values, (joint, slide, _) in zip(own[::-1], self._forest.groups[::-1], strict=True):
@@ -161,8 +160,8 @@ class Fitting:
                     does = np.stack([cross(about, arms), about * radii[hung]])
                 _reduce(values, errors, hung, does, most)
         smaller = Window(self._codec, self._base, self._head, window.finer)
-        for moment, own in zip((None, *window.inner), numbers, strict=True):
-            smaller.say(own, moment)
+        for cell, own in zip(window.cells, numbers, strict=True):
+            smaller.say(cell, own)
         return self._look(smaller)[0]
 
 
