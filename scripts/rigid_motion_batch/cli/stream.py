@@ -126,7 +126,7 @@ def send_performer(options: argparse.Namespace, stopped: list[int]) -> None:
                 time.sleep(FRAME)
         if sending is None:
             raise RoomError(f"nothing came by VMC at port {performers.number}; give the other program this port")
-        room.leave(options.user, MOTION)
+        room.send(options.user, MOTION, None)
         _say(f"datagrams: {sending.datagrams}", f"bytes: {sending.bytes}")
 
 

@@ -140,5 +140,5 @@ class Sending:
         if not stopped:
             self.say(self.sender.finish())
             self.until(last + delay + AFTER, stopped)
-        self.room.leave(self.user, MOTION)
+        self.room.send(self.user, MOTION, None)
         return seconds
