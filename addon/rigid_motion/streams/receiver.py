@@ -54,6 +54,7 @@ class Shown:
     each joint in its parent's space.
     """
 
+    stream: Stream
     moment: float
     bodies: tuple[Body, ...]
     poses: dict[str, Poses]
@@ -99,7 +100,7 @@ class Playback:
         if self.moment is None or self.path is None or self.moment < self.begins:
             return None
         poses = self.fading.show(self.path.pose(self.moment), now)
-        return Shown(self.moment, self.forest.bodies, self.forest.parted(poses))
+        return Shown(self.stream, self.moment, self.forest.bodies, self.forest.parted(poses))
 
     def keys(self) -> Keys | None:
         """Return the knots that are settled and were not handed out yet."""

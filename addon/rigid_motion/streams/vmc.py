@@ -18,6 +18,7 @@ import numpy as np
 
 from ..motion import Poses
 from ..motion.humanoid import HUMANOID, alignments, beside, humanoid_bones
+from ..motion.poses import in_other_axes
 from ..motion.quaternions import conjugate, multiply
 from .bodies import LONGEST_NAME, Body, Forest
 from .osc import Message, read, write_bundle, write_message
@@ -53,17 +54,12 @@ _TO_BLENDER = np.array(((-1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)))
 
 def from_unity(poses: Poses) -> Poses:
     """Poses in Unity's axes as poses in Blender's."""
-    return _changed(poses, _TO_BLENDER)
+    return in_other_axes(poses, _TO_BLENDER)
 
 
 def to_unity(poses: Poses) -> Poses:
     """Poses in Blender's axes as poses in Unity's."""
-    return _changed(poses, _TO_BLENDER.T)
-
-
-def _changed(poses: Poses, change: np.ndarray) -> Poses:
-    turned = -poses.quaternions[..., 1:] @ change.T
-    return Poses(poses.positions @ change.T, np.concatenate((poses.quaternions[..., :1], turned), axis=-1))
+    return in_other_axes(poses, _TO_BLENDER.T)
 
 
 def write(time: float, poses: Mapping[str, Poses]) -> list[bytes]:

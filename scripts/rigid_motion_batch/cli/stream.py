@@ -29,7 +29,7 @@ from rigid_motion_batch.streaming.rooms import (
     opened,
 )
 from rigid_motion_batch.streaming.sending import Sending, even_rate, samples_of, together
-from rigid_motion_batch.streaming.written import Motion, write_motions
+from rigid_motion_batch.streaming.written import Motion, Tracks, write_motions
 from rigid_motion_batch.supervising import report, stop_signals
 
 from . import stream_measure
@@ -133,14 +133,18 @@ def send_performer(options: argparse.Namespace, stopped: list[int]) -> None:
 def receive(options: argparse.Namespace, stopped: list[int]) -> None:
     """Show what comes. Raises what says why there is nothing."""
     truth = _read([options.truth], options)[0] if options.truth else None
-    keeps = "keys" if options.mode else "shown" if options.output or truth else ""
+    tracks = Tracks()
     with (
         _room(options) as room,
         Progress() as progress,
-        closing(Receiving(room, options.user, options.fps, options.margin, options.to_blender, keeps)) as receiving,
+        closing(Receiving(room, options.user, options.fps, options.margin, options.to_blender)) as receiving,
     ):
         if options.to_vmc:
             receiving.on_frame.append(vmc.ToVmc(options.to_vmc).show)
+        if options.mode:
+            receiving.on_frame.append(lambda _: tracks.add_keys(receiving.receiver.keys()))
+        elif options.output or truth:
+            receiving.on_frame.append(tracks.add_shown)
         _say(f"{options.user} listens in {options.room}")
         until = time.monotonic() + (options.seconds or float("inf"))
         with _stage(progress, "Receiving", options.seconds) as stage:
@@ -151,8 +155,8 @@ def receive(options: argparse.Namespace, stopped: list[int]) -> None:
                 stage.total = max(stage.done, 1e-9)
     for user, datagrams in receiving.datagrams.items():
         _say(f"{user}: {datagrams} datagrams, {receiving.bytes[user]} bytes")
-    motions = receiving.tracks.motions()
-    if not (motions if keeps else receiving.datagrams):
+    motions, is_kept = tracks.motions(), options.mode or options.output or truth
+    if not (motions if is_kept else receiving.datagrams):
         came = "nothing that could be shown came" if receiving.datagrams else f"nobody sent anything in {options.room}"
         raise RoomError(f"{came}, so nothing is written; see --room and --at of the sender")
     if options.mode:

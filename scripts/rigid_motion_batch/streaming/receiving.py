@@ -7,14 +7,11 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
-import numpy as np
-
 from rigid_motion.live.sockets import Address, Outlet
 from rigid_motion.streams import Receiver, Shown
 from rigid_motion.streams.receiver import MOST_STREAMS, SILENT
 
 from .rooms import ANSWERS, Came, Room
-from .written import Tracks
 
 ANSWERS_A_SECOND = 100.0
 """To all streams together."""
@@ -37,16 +34,11 @@ class Receiving:
         Seconds that are waited longer for each datagram.
     to : address, optional
         What gets all datagrams by UDP as well, from a port for each user, and whose answers go back to them.
-    keeps : str, optional
-        What is to be there in the end: what was `shown`, the `keys`, or nothing.
     """
 
-    def __init__(
-        self, room: Room, user: str, fps: float, margin: float, to: Address | None = None, keeps: str = ""
-    ) -> None:
-        self._room, self._fps, self._margin, self._to, self._keeps = room, fps, margin, to, keeps
-        self.receiver, self.tracks = Receiver(), Tracks()
-        """`tracks` have what is to be there in the end."""
+    def __init__(self, room: Room, user: str, fps: float, margin: float, to: Address | None = None) -> None:
+        self._room, self._fps, self._margin, self._to = room, fps, margin, to
+        self.receiver = Receiver()
         self.datagrams, self.bytes = Counter[str](), Counter[str]()
         """Counts for each user."""
         self.on_frame: list[Callable[[Iterable[Shown]], None]] = []
@@ -95,14 +87,9 @@ class Receiving:
                 self._room.send(user, ANSWERS, answer)
 
     def _show(self, now: float) -> None:
-        shown = self.receiver.show(now)
+        shown = list(self.receiver.show(now).values())
         for act in self.on_frame:
-            act(shown.values())
-        for stream, what in shown.items() if self._keeps == "shown" else ():
-            poses = {name: own[:, None] for name, own in what.poses.items()}
-            self.tracks.add(stream.source, what.bodies, np.array([what.moment]), poses)
-        for keys in self.receiver.keys() if self._keeps == "keys" else ():
-            self.tracks.add(keys.stream.source, keys.bodies, keys.moments, keys.poses)
+            act(shown)
         for user in [user for user, heard in self._heard.items() if now - heard > SILENT]:
             self._leave(user)
         if self.datagrams and not self._heard and self._silent == math.inf:

@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from rigid_motion.motion import Poses
+from rigid_motion.motion.humanoid import beside
 from rigid_motion.motion.poses import joined
-from rigid_motion.motion.quaternions import conjugate, multiply
 from rigid_motion.streams import Body, Sender
 from rigid_motion.streams.bodies import RADIUS
 from rigid_motion.streams.paths import Path
@@ -45,8 +45,8 @@ def body_of(clip: Clip, poses: Poses, radius: float = RADIUS) -> Body:
     """Return what is streamed of a clip. A rigid body is at rest as in its first sample."""
     if clip.rest_body is None:
         return Body.rigid(clip.name, poses[:, 0], radius)
-    parents, turns = clip.rest_body.parents, to_blender(clip.rest_body.rest, clip.axes).quaternions
-    turns = np.where((parents >= 0)[:, None], multiply(conjugate(turns[parents]), turns), turns)
+    parents = clip.rest_body.parents
+    turns = beside(to_blender(clip.rest_body.rest, clip.axes), parents).quaternions
     sliding = np.ptp(poses.positions, axis=1).max(axis=1) > SLIDES
     rest = Poses(poses.positions[:, 0], turns)
     return Body(clip.name, clip.rest_body.joints, parents, rest, radius, sliding | (parents < 0))

@@ -34,17 +34,19 @@ class ToVmc(Outlet):
         self.datagrams = 0
         self._began = time.monotonic()
 
-    def show(self, shown: Iterable[Shown], moment: float | None = None) -> None:
-        """Show what streams show; the moment is that of the clock, unless it is given."""
-        moment = time.monotonic() - self._began if moment is None else moment
+    def show(self, shown: Iterable[Shown]) -> None:
+        """Show what streams show now."""
+        bodies = [(body, what.poses[body.name]) for what in shown for body in what.bodies]
+        self.say_frame(time.monotonic() - self._began, bodies)
+
+    def say_frame(self, moment: float, bodies: Iterable[tuple[Body, Poses]]) -> None:
+        """Say the poses (joints,) of bodies, each joint in its parent's space, at a moment."""
         trackers, datagrams = {}, list[bytes]()
-        for what in shown:
-            for body in what.bodies:
-                poses = what.poses[body.name]
-                if len(body.joints) == 1:
-                    trackers[body.name] = poses[0]
-                elif not datagrams and (performer := performer_of(body)):
-                    datagrams = write(moment, performer(body.in_root_space(poses)))
+        for body, poses in bodies:
+            if len(body.joints) == 1:
+                trackers[body.name] = poses[0]
+            elif not datagrams and (performer := performer_of(body)):
+                datagrams = write(moment, performer(body.in_root_space(poses)))
         for datagram in datagrams + write_trackers(trackers):
             self.say(datagram)
             self.datagrams += 1
@@ -63,20 +65,19 @@ def play(
     `stopped` ends it as soon as something is in it; `reach` is given the seconds that were played.
     Raises OSError where `to` is no address, and ValueError where no bone of a body is a person's.
     """
+    moments = moments - moments[0]
+    _, rows = np.unique(np.floor(moments * RATE + 0.01), return_index=True)
     with ToVmc(to) as outlet:
         if len(body.joints) > 1 and not performer_of(body):
             raise ValueError(f"{body.name}: none of its joints is named as the hips of a person, which VMC begins with")
-        began, last = time.monotonic(), -np.inf
-        for row, moment in enumerate((moments - moments[0]).tolist()):
-            if moment - last < 0.99 / RATE and row < len(moments) - 1:
-                continue
-            while not stopped and (wait := began + moment - time.monotonic()) > 0.0:
+        began = time.monotonic()
+        for row in np.union1d(rows, len(moments) - 1).tolist():
+            while not stopped and (wait := began + moments[row] - time.monotonic()) > 0.0:
                 time.sleep(min(wait, 0.1))
             if stopped:
                 break
-            outlet.show([Shown(moment, (body,), {body.name: poses[:, row]})], moment)
-            last = moment
-            reach(moment)
+            outlet.say_frame(moments[row], [(body, poses[:, row])])
+            reach(moments[row])
         return outlet.datagrams
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple, TextIO, cast
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from rigid_motion.motion import Poses, interpolate
 from rigid_motion.motion.poses import joined
-from rigid_motion.streams import Body
+from rigid_motion.streams import Body, Keys, Shown
 from rigid_motion_batch.analysis.metrics import lines_of_poses, write_poses
 from rigid_motion_batch.axes import from_blender
 from rigid_motion_batch.files import replacing
@@ -36,10 +36,17 @@ class Motion(NamedTuple):
 class Tracks(dict[tuple[str, Body], list[tuple[np.ndarray, Poses]]]):
     """What was shown of all bodies of all users, or their keys, piece by piece."""
 
-    def add(self, user: object, bodies: Iterable[Body], moments: np.ndarray, poses: Mapping[str, Poses]) -> None:
-        """Add a piece of a user's bodies: moments (n,), and of each body poses (joints, n)."""
-        for body in bodies:
-            self.setdefault((str(user), body), []).append((moments, poses[body.name]))
+    def add_shown(self, shown: Iterable[Shown]) -> None:
+        """Add a frame."""
+        for what in shown:
+            poses = {name: own[:, None] for name, own in what.poses.items()}
+            self.add_keys([Keys(what.stream, what.bodies, np.array([what.moment]), poses)])
+
+    def add_keys(self, came: Iterable[Keys]) -> None:
+        """Add keys."""
+        for keys in came:
+            for body in keys.bodies:
+                self.setdefault((str(keys.stream.source), body), []).append((keys.moments, keys.poses[body.name]))
 
     def motions(self) -> list[Motion]:
         """Return those of which there is more than a pose, at moments that rise."""
