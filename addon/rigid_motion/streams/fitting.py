@@ -45,18 +45,9 @@ class Fitted(NamedTuple):
 
 
 class Fitting:
-    """Finds what to say of a window.
+    """Finds what to say of a window of samples, where something is `shown` so far, or nothing.
 
-    Parameters
-    ----------
-    codec : Codec
-    shown : Path, optional
-        What is shown so far.
-    base : State
-        What the message builds on.
-    head : Said
-        Its window, and how it builds on that.
-    samples : Path
+    The message builds on `base`; `head` says how it does, and its window.
     """
 
     def __init__(self, codec: Codec, shown: Path | None, base: State, head: Said, samples: Path) -> None:
@@ -195,7 +186,7 @@ def smaller_than(values: np.ndarray) -> np.ndarray:
 
 def _off(errors: np.ndarray) -> np.ndarray:
     """Return by how much balls are off (...) of errors (2, 3, ...)."""
-    return largest_displacement(errors[0], errors[1].copy(), 0.5)
+    return largest_displacement(errors[0], errors[1].copy(), np.array(0.5))
 
 
 def _hat(support: tuple[float, float, float], moments: np.ndarray, end: float, last: float) -> np.ndarray:

@@ -85,15 +85,7 @@ def _bundles(messages: list[bytes]) -> list[bytes]:
 
 
 class Performer:
-    """A skeleton of any kind as VMC.
-
-    Parameters
-    ----------
-    joints : sequence of str
-        Parents first.
-    rest : Poses, shape (joints,)
-        In the space of the roots.
-    """
+    """A skeleton of any kind as VMC: joints, parents first, at rest at poses (joints,) in the space of the roots."""
 
     def __init__(self, joints: tuple[str, ...], rest: Poses) -> None:
         self.bones = humanoid_bones(joints)

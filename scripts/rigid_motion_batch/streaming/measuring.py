@@ -194,7 +194,7 @@ def _receive(to: int, times: np.ndarray, answers: bool) -> tuple[list[tuple[floa
                 now, sample = due, sample + 1
                 # Nothing where the motion of that moment was over when the first datagram came.
                 for shown in receiver.show(due).values():
-                    frames.append((shown.moment, due - shown.moment, *shown.poses.values()))
+                    frames += [(shown.moment, due - shown.moment, poses) for poses in shown.poses.values()]
             if not data:
                 return frames, answered
             receiver.take(data[ARRIVAL.size :], arrival, to)

@@ -21,19 +21,10 @@ LINGER = 0.3
 
 
 class Receiving:
-    """A receiver in a room.
+    """A receiver in a room, which is a user there.
 
-    Parameters
-    ----------
-    room : Room
-    user : str
-        Who listens.
-    fps : float
-        Frames a second of a display.
-    margin : float
-        Seconds that are waited longer for each datagram.
-    to : address, optional
-        What gets all datagrams by UDP as well, from a port for each user, and whose answers go back to them.
+    It shows so many frames a second, and waits `margin` seconds longer for each datagram. All of them go to an address
+    by UDP as well, if one is given, from a port for each user, and its answers go back to them.
     """
 
     def __init__(self, room: Room, user: str, fps: float, margin: float, to: Address | None = None) -> None:
