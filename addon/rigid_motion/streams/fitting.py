@@ -8,7 +8,6 @@ outcome is looked at exactly. Arrays have joints first, (joints, n), and compone
 
 from __future__ import annotations
 
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -21,9 +20,9 @@ from .paths import Path, carried
 from .residuals import FINEST, MOST_GROUPS, MOST_KNOTS
 from .wire import TICKS
 
-NEAR, MARGINS, PASSES = 0.97, (1.0, 0.93, 0.8), 2
+NEAR, MARGINS = 0.97, (0.97, 0.85, 0.7)
 """Parts of the tolerance that rounding may use; and that smaller numbers may, one after another, while the outcome is
-off by more; and how often each number is made smaller, where that is possible."""
+off by more."""
 
 AT_END, TAPER = 0.85, 0.4
 """Part of that at the end of a window, from where the motion has to go on well by itself; from this part of it on."""
@@ -34,6 +33,9 @@ that are not further apart than so many are the same."""
 
 FAR_APART, MOST_PARTS = 0.013, 8
 """Seconds between samples beyond which it is looked at what is shown between them, and into how many parts at most."""
+
+CHOICES = np.array([[1, 1, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=bool)
+"""Which of three numbers are made smaller."""
 
 
 class Fitted(NamedTuple):
@@ -133,7 +135,7 @@ class Fitting:
         )
         places, axes = np.array(components(there.positions), order="C"), matrices(there.quaternions)
         numbers, last = np.array(window.numbers), window.moments[-2]
-        for own, support in [*zip(numbers[::-1], window.supports[::-1], strict=True)] * PASSES:
+        for own, support in zip(numbers[::-1], window.supports[::-1], strict=True):
             hat = window.factor * _hat(support, self._moments, self._end, last)
             for values, (joint, slide, _) in zip(own[::-1], self._forest.groups[::-1], strict=True):
                 if not values.any():
@@ -179,9 +181,9 @@ def _reduce(values: np.ndarray, errors: np.ndarray, hung: np.ndarray, does: np.n
 
 def smaller_than(values: np.ndarray) -> np.ndarray:
     """Numbers (c, 3) that cost less than three, the least first."""
-    ways = product(*((value - int(np.sign(value)), value) for value in values.tolist()))
-    *result, _ = dict.fromkeys([(0, 0, 0), *ways])
-    return np.array(result)
+    result = np.where(CHOICES & (values != 0), values - np.sign(values), values)
+    result = np.concatenate((np.zeros((1, 3), dtype=values.dtype), result))
+    return result[(result != values).any(axis=1)]
 
 
 def _off(errors: np.ndarray) -> np.ndarray:
