@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigid_motion.motion import Poses
+from rigid_motion.motion.poses import in_other_axes
 
 AXES: dict[str, np.ndarray] = {
     # Right-handed, z up, y forward: nothing to do.
@@ -37,24 +38,12 @@ def to_blender(poses: Poses, axes: str) -> Poses:
     ------
     ValueError
         Where there is no such convention.
-
-    Notes
-    -----
-    Conjugation by C turns a rotation's axis v into det(C) C v and keeps its angle: a mirror image of a rotation
-    turns the other way. So w stays and the vector part is mapped, whether or not C is a rotation itself.
     """
     if axes not in AXES:
         raise ValueError(f"there are no axes named {axes!r}; known are {', '.join(AXES)}")
-    return _changed(poses, AXES[axes])
+    return in_other_axes(poses, AXES[axes])
 
 
 def from_blender(poses: Poses, axes: str) -> Poses:
     """Return the opposite of `to_blender`."""
-    return _changed(poses, AXES[axes].T)
-
-
-def _changed(poses: Poses, change: np.ndarray) -> Poses:
-    handedness = np.sign(np.linalg.det(change))
-    quaternions = poses.quaternions.copy()
-    quaternions[..., 1:] = handedness * poses.quaternions[..., 1:] @ change.T
-    return Poses(poses.positions @ change.T, quaternions, poses.scales)
+    return in_other_axes(poses, AXES[axes].T)

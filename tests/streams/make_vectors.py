@@ -75,8 +75,10 @@ def stream() -> dict:
         "messages": messages,
         "answers": answers,
         "moments": keys.moments.tolist(),
-        "positions": {name: np.round(part.positions, 9).tolist() for name, part in keys.poses.items()},
-        "quaternions": {name: np.round(part.quaternions, 9).tolist() for name, part in keys.poses.items()},
+        "positions": {name: np.round(part.positions.swapaxes(0, 1), 9).tolist() for name, part in keys.poses.items()},
+        "quaternions": {
+            name: np.round(part.quaternions.swapaxes(0, 1), 9).tolist() for name, part in keys.poses.items()
+        },
     }
 
 

@@ -60,8 +60,8 @@ def test_what_is_shown() -> None:
     (keys,) = receiver.keys()
     np.testing.assert_allclose(keys.moments, STREAM["moments"], atol=1e-12)
     for name, poses in keys.poses.items():
-        np.testing.assert_allclose(poses.positions, STREAM["positions"][name], atol=2e-9)
-        np.testing.assert_allclose(poses.quaternions, STREAM["quaternions"][name], atol=2e-9)
+        np.testing.assert_allclose(poses.positions.swapaxes(0, 1), STREAM["positions"][name], atol=2e-9)
+        np.testing.assert_allclose(poses.quaternions.swapaxes(0, 1), STREAM["quaternions"][name], atol=2e-9)
 
 
 def test_answers() -> None:

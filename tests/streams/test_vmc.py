@@ -168,7 +168,7 @@ def test_without_times_a_bone_that_comes_again_begins_a_frame():
         heard([osc.write_message("/VMC/Ext/Bone/Pos", *hips)], 0.1 * row, receiver)
     (keys,) = receiver.keys()
     assert keys.moments == pytest.approx([0.0, 0.1, 0.2])
-    assert keys.poses["VMC"].positions[:, 1, 1] == pytest.approx([0.0, -1.0, -2.0])
+    assert keys.poses["VMC"].positions[1, :, 1] == pytest.approx([0.0, -1.0, -2.0])
 
 
 def test_what_is_written_is_what_is_shown():
@@ -181,7 +181,7 @@ def test_what_is_written_is_what_is_shown():
     for joint, name in enumerate(body.joints[1:], 1):
         frames = [frame(row)[name] for row in range(20)]
         sent = Poses([one.positions for one in frames], [one.quaternions for one in frames])
-        assert shell_error(sent, keys.poses["VMC"][:, joint], 0.1).max() < 1e-6
+        assert shell_error(sent, keys.poses["VMC"][joint], 0.1).max() < 1e-6
     shown = receiver.show(5.0 + 19 / 60)[keys.stream]
     assert shown.moment == pytest.approx(19 / 60 - 0.05, abs=1e-6)
     assert receiver.show(30.0) == {}
@@ -226,7 +226,7 @@ def test_trackers_that_are_written_are_shown_without_times():
     (keys,) = receiver.keys()
     assert len(keys.poses) == MOST_DEVICES
     for number in range(MOST_DEVICES):
-        assert keys.poses[f"ball {number}"].positions[:, 0] == pytest.approx(places[:3, number], abs=1e-6)
+        assert keys.poses[f"ball {number}"].positions[0] == pytest.approx(places[:3, number], abs=1e-6)
 
 
 def skeleton(rest_turns: np.ndarray, arms_down: float, larger: float, prefix: str) -> tuple[list[str], Poses]:
@@ -257,7 +257,7 @@ def test_a_skeleton_of_another_size_rest_and_naming_does_the_same():
     sliding = np.array([name == "Hips" for name in pairs])
     bones = {name: row for row, name in enumerate(pairs)}
     retarget = Retargeting(world(body, body.rest[:, None])[:, 0], rest, rows, parents, bones, sliding)
-    back = retarget(world(body, keys.poses["VMC"][0][:, None])[:, 0])
+    back = retarget(world(body, keys.poses["VMC"][:, :1])[:, 0])
     assert retarget.scale == pytest.approx(1.0)
     assert np.abs(np.einsum("ij,ij->i", back.quaternions, rest.quaternions[rows[:, 1]])) == pytest.approx(1.0)
     assert back.positions[0] == pytest.approx(rest.positions[0], abs=1e-6)

@@ -66,7 +66,7 @@ class _Heard:
     moment: float = 0.0
 
     ahead: deque[tuple[np.ndarray, Poses]] = field(default_factory=lambda: deque(maxlen=MOST_AHEAD))
-    """Moments (k,) and poses (k, joints) of keys that are not shown yet."""
+    """Moments (k,) and poses (joints, k) of keys that are not shown yet."""
 
     take: Take | None = None
     origin: float | None = None
@@ -205,7 +205,7 @@ class Listening:
 
     def _add_shown(self, heard: _Heard) -> None:
         """Have the picture itself among what is recorded: where it begins, and where it ends."""
-        self._add(heard, np.array([heard.moment]), heard.poses[None])
+        self._add(heard, np.array([heard.moment]), heard.poses[:, None])
 
     def _add(self, heard: _Heard, moments: np.ndarray, poses: Poses) -> None:
         recording = self._recording

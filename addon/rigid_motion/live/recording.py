@@ -15,7 +15,6 @@ from ..motion.eulers import ORDERS, extrinsic_eulers_from_quaternions
 from ..motion.poses import joined
 from ..motion.quaternions import align_signs
 from ..streams.bodies import RADIUS
-from ..streams.paths import transposed
 from .driving import Driver, Values
 
 STRETCH = 60
@@ -51,11 +50,11 @@ class Take:
         """For each channel and stretch the frames (k,) of its keys, and what it has there."""
 
     def add(self, frames: np.ndarray, poses: Poses) -> None:
-        """Take poses (n, joints) on rising frames (n,), those that are later than all before."""
+        """Take poses (joints, n) on rising frames (n,), those that are later than all before."""
         later = frames > self._last
         if not later.any():
             return
-        frames, poses = frames[later], transposed(poses[later])
+        frames, poses = frames[later], poses[:, later]
         self._last = float(frames[-1])
         self._frames = np.concatenate((self._frames, frames))
         self._poses = poses if self._poses is None else joined((self._poses, poses), axis=1)

@@ -292,6 +292,17 @@ def joined(parts: Sequence[Poses], axis: int = 0) -> Poses:
     return Poses(positions, np.concatenate([part.quaternions for part in parts], axis=axis), scales)
 
 
+def in_other_axes(poses: Poses, change: np.ndarray) -> Poses:
+    """Return poses (...) in the axes that a matrix (3, 3) takes points to, a rotation or a mirror.
+
+    Conjugation by C turns a rotation's axis v into det(C) C v and keeps its angle: a mirror image of a rotation turns
+    the other way. So w stays and the vector part is mapped.
+    """
+    quaternions = poses.quaternions.copy()
+    quaternions[..., 1:] = np.sign(np.linalg.det(change)) * poses.quaternions[..., 1:] @ change.T
+    return Poses(poses.positions @ change.T, quaternions, poses.scales)
+
+
 def placed(above: Poses, poses: Poses) -> Poses:
     """Where poses (...) are that are given in the space of others (...), with a scale where either has one.
 

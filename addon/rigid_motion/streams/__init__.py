@@ -24,7 +24,7 @@ A receiver takes any bytes, from anybody, without ever raising an exception:
         shown.poses["performer"]                  # Poses (joints,), each joint in its parent's space
         shown.bodies                              # each Body: name, joints, parents, rest
     for keys in receiver.keys():                  # since the last call: what was sent, to be recorded
-        keys.stream, keys.moments, keys.poses     # (k,) seconds; of each body Poses (k, joints)
+        keys.stream, keys.moments, keys.poses     # (k,) seconds; of each body Poses (joints, k)
 
 Between keys, places go straight and turns about one axis: `lerp_slerp`, and `dq_sclerp` hardly differs. Metres,
 seconds, Blender's axes, quaternions w, x, y, z. docs/wire.md has every byte.

@@ -72,6 +72,12 @@ class Body:
         """Return poses (joints,) of the joints, each in its parent's space, as they are in that of the roots."""
         return self.skeleton.in_root_space(poses[:, None])[:, 0]
 
+    def errors(self, shown: Poses, truth: Poses) -> np.ndarray:
+        """Return how far off any point of each joint's ball is at most, in metres, of poses (joints, n) in their
+        parents' spaces, shape (joints, n).
+        """
+        return shell_error(self.skeleton.in_root_space(shown), self.skeleton.in_root_space(truth), self.radius)
+
     @classmethod
     def rigid(cls, name: str, pose: Poses | None = None, radius: float = RADIUS) -> Body:
         """Return a single rigid body, at rest at `pose` (1,), or in the middle of everything."""
@@ -88,8 +94,9 @@ class Forest:
         if len(bodies) > MOST_BODIES or sum(counts) > MOST_JOINTS:
             raise ValueError(f"more than {MOST_BODIES} bodies or {MOST_JOINTS} joints are too many for one sender")
         self.bodies = tuple(bodies)
+        self._ends = np.cumsum(counts)
         parents = np.concatenate([body.parents for body in bodies])
-        self.parents = np.where(parents < 0, -1, parents + np.repeat(np.cumsum(counts) - counts, counts))
+        self.parents = np.where(parents < 0, -1, parents + np.repeat(self._ends - counts, counts))
         self.rest = joined([body.rest for body in bodies])
         self.radii = np.repeat([body.radius for body in bodies], counts)
         self.sliding = np.concatenate([body.sliding for body in bodies])
@@ -104,11 +111,9 @@ class Forest:
 
     def parted(self, poses: Poses) -> dict[str, Poses]:
         """Return the poses of each body by its name, of those of all joints (joints, ...)."""
-        result, first = {}, 0
-        for body in self.bodies:
-            result[body.name] = poses[first : first + len(body.joints)]
-            first += len(body.joints)
-        return result
+        return {
+            body.name: poses[end - len(body.joints) : end] for body, end in zip(self.bodies, self._ends, strict=True)
+        }
 
     def errors(self, shown: Poses, truth: Poses) -> np.ndarray:
         """Return how far off any point of each joint's ball is at most, in metres, shape (joints, n).
@@ -123,25 +128,17 @@ class Forest:
 
         That is the one of the same kind of the joint's parent or, where it has none, the parent's turn; -1 for roots.
         """
-        result: list[tuple[int, int, int]] = []
-        numbers: dict[tuple[int, int], int] = {}
-        for joint, (parent, slides) in enumerate(zip(self.parents.tolist(), self.sliding.tolist(), strict=True)):
-            for slide in range(1 + slides):
-                numbers[joint, slide] = len(result)
-                result.append((joint, slide, numbers.get((parent, slide), numbers.get((parent, 0), -1))))
-        return result
-
-    @cached_property
-    def below(self) -> list[np.ndarray]:
-        """Each joint and all that hang on it."""
-        return [self.skeleton.below(joint) for joint in range(len(self))]
+        groups = [(joint, slide) for joint, slides in enumerate(self.sliding.tolist()) for slide in range(1 + slides)]
+        numbers, parents = {group: number for number, group in enumerate(groups)}, self.parents.tolist()
+        above = [numbers.get((parents[joint], slide), numbers.get((parents[joint], 0), -1)) for joint, slide in groups]
+        return [(*group, number) for group, number in zip(groups, above, strict=True)]
 
     @cached_property
     def reaches(self) -> np.ndarray:
         """How far from each joint anything is that hangs on it, with the balls around it, shape (joints,)."""
         reaches = self.radii.copy()
         arms = np.linalg.norm(self.rest.positions, axis=1)
-        for joint in range(len(self) - 1, 0, -1):
-            if (parent := self.parents[joint]) >= 0:
-                reaches[parent] = max(reaches[parent], arms[joint] + reaches[joint])
+        for joint in np.flatnonzero(self.parents >= 0)[::-1]:
+            parent = self.parents[joint]
+            reaches[parent] = max(reaches[parent], arms[joint] + reaches[joint])
         return reaches

@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..motion import shell_error
-from ..motion.quaternions import conjugate, cross, matrices, multiply
+from ..motion.measures import largest_displacement
+from ..motion.quaternions import components, conjugate, cross, matrices, multiply
 from .messages import Codec, Said, State, Window
 from .paths import Path, carried
 from .residuals import FINEST, MOST_GROUPS, MOST_KNOTS
@@ -46,18 +47,9 @@ class Fitted(NamedTuple):
 
 
 class Fitting:
-    """Finds what to say of a window.
+    """Finds what to say of a window of samples, where something is `shown` so far, or nothing.
 
-    Parameters
-    ----------
-    codec : Codec
-    shown : Path, optional
-        What is shown so far.
-    base : State
-        What the message builds on.
-    head : Said
-        Its window, and how it builds on that.
-    samples : Path
+    The message builds on `base`; `head` says how it does, and its window.
     """
 
     def __init__(self, codec: Codec, shown: Path | None, base: State, head: Said, samples: Path) -> None:
@@ -76,9 +68,9 @@ class Fitting:
         exact = (ticks - inside * TICKS) / grid
         # A jump between two cells takes both of them, everything else the nearest.
         for cells in (np.rint(exact), np.concatenate((np.floor(exact), np.ceil(exact)))):
-            cells = np.unique(cells.astype(int))
-            cells = cells[(cells > 0) & (cells * grid < delay - max(self._head.late - 1, 0))]
-            self._grid = (ticks - cells[::-1] * grid) / TICKS
+            cells = np.unique(cells.astype(int))[::-1]
+            self._cells = cells[(cells > 0) & (cells * grid < delay - max(self._head.late - 1, 0))]
+            self._grid = (ticks - self._cells * grid) / TICKS
             between = self._grid[np.abs(self._grid[:, None] - looked).min(axis=1) > NOTHING]
             self._moments = closely(np.unique(np.concatenate((looked, between))))[1:]
             if is_still:
@@ -88,42 +80,41 @@ class Fitting:
             window, _, error = self._fitted()
             if error <= tolerance:
                 break
-        inner = [round((ticks - moment * TICKS) / grid) for moment in window.inner]
         groups = np.array(window.numbers).tolist()
-        return self._head._replace(finer=window.finer, cells=inner, groups=groups), error <= tolerance
+        return self._head._replace(finer=window.finer, cells=window.cells[1:], groups=groups), error <= tolerance
 
     def _fitted(self) -> Fitted:
         """Return the message with knots on the grid, of what is shown at the moments (n,) that are looked at."""
-        tolerance, knots = self._codec.tolerance, list[float]()
+        tolerance, cells = self._codec.tolerance, [0]
         for finer in range(FINEST + 1):
-            result = self._near(knots, finer)
+            result = self._near(cells, finer)
             if result.error <= NEAR * tolerance:
                 break
+            cells = result.window.cells
         left = np.maximum(self._end - self._moments, 0.0) / (self._end - self._start)
         most = tolerance * np.minimum(AT_END + (1.0 - AT_END) * left / TAPER, 1.0)
         for margin in MARGINS:
-            smaller = self._smaller(result, (margin * most) ** 2)
+            smaller = self._smaller(result, margin * most)
             if smaller.error <= max(tolerance, result.error):
                 return smaller
         return result
 
-    def _near(self, knots: list[float], finer: int) -> Fitted:
+    def _near(self, cells: list[int], finer: int) -> Fitted:
         """Return the numbers nearest to the truth, with knots and, where that is not enough, with more of them."""
         tolerance, most_knots = self._codec.tolerance, min(MOST_KNOTS, max(MOST_GROUPS // len(self._forest.groups), 1))
         window = Window(self._codec, self._base, self._head, finer)
-        for moment in (None, *knots):
-            window.say(None, moment, self._samples)
+        for cell in cells:
+            window.say(cell, samples=self._samples)
         while True:
             result, errors = self._look(window)
-            worst, free = self._moments[np.argmax(errors)], self._grid[~np.isin(self._grid, window.moments)]
-            if result.error <= NEAR * tolerance or not len(free) or len(knots) + 1 == most_knots:
+            worst, free = self._moments[np.argmax(errors)], ~np.isin(self._cells, window.cells)
+            if result.error <= NEAR * tolerance or not free.any() or len(window.cells) == most_knots:
                 return result
-            nearest = float(free[np.argmin(np.abs(free - worst))])
+            away = np.where(free, np.abs(self._grid - worst), np.inf)
             good = finer < FINEST or result.error <= tolerance
-            if good and np.abs(window.moments[1:] - worst).min() < abs(nearest - worst):
+            if good and np.abs(window.moments[1:] - worst).min() < away.min():
                 return result
-            knots.append(nearest)
-            window.say(None, nearest, self._samples)
+            window.say(int(self._cells[np.argmin(away)]), samples=self._samples)
 
     def _look(self, window: Window) -> tuple[Fitted, np.ndarray]:
         """Return what is shown with a window, and the largest error of each moment within it."""
@@ -133,21 +124,23 @@ class Fitting:
         return Fitted(window, path, float(errors.max())), errors
 
     def _smaller(self, result: Fitted, most: np.ndarray) -> Fitted:
-        """Return a message with smaller numbers, with which the square of no joint's error is more than `most` (n,)."""
+        """Return a message with smaller numbers, with which no joint's error is more than `most` (n,)."""
         window, radii = result.window, self._forest.radii[:, None]
         there = self._forest.skeleton.in_root_space(result.path.at(self._moments))
         turn = multiply(there.quaternions, conjugate(self._truth.quaternions))
-        turn = 2.0 * turn[..., 1:] * np.where(turn[..., :1] < 0.0, -1.0, 1.0) * radii[..., None]
-        # How far balls are off, and by how much their shells are turned.
-        errors = np.stack([_apart(there.positions - self._truth.positions), _apart(turn)])
-        places, axes = _apart(there.positions), matrices(there.quaternions)
-        numbers, last = np.array(window.numbers), max([self._start, *window.inner])
+        turn = turn[..., 1:] * np.where(turn[..., :1] < 0.0, -1.0, 1.0)
+        # How far balls are off, and by how much their shells are turned: components first, and free to be written to.
+        errors = np.stack(
+            list(map(components, (there.positions - self._truth.positions, 2.0 * turn * radii[..., None])))
+        )
+        places, axes = np.array(components(there.positions), order="C"), matrices(there.quaternions)
+        numbers, last = np.array(window.numbers), window.moments[-2]
         for own, support in zip(numbers[::-1], window.supports[::-1], strict=True):
             hat = window.factor * _hat(support, self._moments, self._end, last)
             for values, (joint, slide, _) in zip(own[::-1], self._forest.groups[::-1], strict=True):
                 if not values.any():
                     continue
-                hung, parent = self._forest.below[joint], self._forest.parents[joint]
+                hung, parent = self._forest.skeleton.below(joint), self._forest.parents[joint]
                 if slide:
                     along = np.eye(3)[..., None] if parent < 0 else axes[:, :, parent]
                     does = np.zeros((2, 3, 3, 1, len(hat)))
@@ -158,18 +151,17 @@ class Fitting:
                     does = np.stack([cross(about, arms), about * radii[hung]])
                 _reduce(values, errors, hung, does, most)
         smaller = Window(self._codec, self._base, self._head, window.finer)
-        for moment, own in zip((None, *window.inner), numbers, strict=True):
-            smaller.say(own, moment)
+        for cell, own in zip(window.cells, numbers, strict=True):
+            smaller.say(cell, own)
         return self._look(smaller)[0]
 
 
 def closely(moments: np.ndarray) -> np.ndarray:
     """Moments (n,) with others between them, where they are far apart."""
-    parts = np.ceil(np.diff(moments) / FAR_APART).astype(int)
-    parts = np.clip(parts, 1, MOST_PARTS)
-    share = np.concatenate([np.arange(1, count + 1) / count for count in parts]) if len(parts) else np.empty(0)
-    before = np.repeat(moments[:-1], parts)
-    return np.append(moments[:1], before + share * np.repeat(np.diff(moments), parts))
+    parts = np.clip(np.ceil(np.diff(moments) / FAR_APART).astype(int), 1, MOST_PARTS)
+    steps = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts) + 1
+    between = np.repeat(moments[:-1], parts) + steps / np.repeat(parts, parts) * np.repeat(np.diff(moments), parts)
+    return np.append(moments[:1], between)
 
 
 def _reduce(values: np.ndarray, errors: np.ndarray, hung: np.ndarray, does: np.ndarray, most: np.ndarray) -> None:
@@ -181,7 +173,7 @@ def _reduce(values: np.ndarray, errors: np.ndarray, hung: np.ndarray, does: np.n
     before = errors[:, :, hung]
     after = before[:, :, None] + np.einsum("ca,ewahn->ewchn", (fewer - values).astype(np.float64), does)
     # Where it is off by more already, it may not become worse.
-    good = (_squared(after) <= np.maximum(most, _squared(before))).all(axis=(1, 2))
+    good = (_off(after) <= np.maximum(most, _off(before))).all(axis=(1, 2))
     if good.any():
         first = int(np.argmax(good))
         values[:], errors[:, :, hung] = fewer[first], after[:, :, first]
@@ -194,11 +186,9 @@ def smaller_than(values: np.ndarray) -> np.ndarray:
     return result[(result != values).any(axis=1)]
 
 
-def _squared(errors: np.ndarray) -> np.ndarray:
-    """Of balls that are off by d (3, ...), and whose shells are turned by v: see `motion.shell_error`."""
-    d, v = errors
-    across = cross(d, v)
-    return (d * d).sum(axis=0) + (v * v).sum(axis=0) + 2.0 * np.sqrt((across * across).sum(axis=0))
+def _off(errors: np.ndarray) -> np.ndarray:
+    """Return by how much balls are off (...) of errors (2, 3, ...)."""
+    return largest_displacement(errors[0], errors[1].copy(), np.array(0.5))
 
 
 def _hat(support: tuple[float, float, float], moments: np.ndarray, end: float, last: float) -> np.ndarray:
@@ -207,8 +197,3 @@ def _hat(support: tuple[float, float, float], moments: np.ndarray, end: float, l
     line = (before, own, max(after, own + NOTHING)), (0.0, 1.0, float(after == own))
     ends, lasts = np.interp((end, last), *line)
     return np.interp(moments, *line) + (ends - lasts) / (end - last) * carried(moments - end)
-
-
-def _apart(vectors: np.ndarray) -> np.ndarray:
-    """Vectors (joints, n, 3) as components (3, joints, n) that may be written to."""
-    return np.array(np.moveaxis(vectors, -1, 0), order="C")

@@ -140,18 +140,18 @@ class Codec:
             late += coder.flat(terms.delay, said.late - 2)
         finer = coder.symbol(self._fineness, said.finer)
         inner = coder.symbol(KNOT_COUNTS, len(said.cells))
-        if (inner + 1) * size > max(MOST_GROUPS, size) or inner > terms.cells:
+        most_cells = (terms.delay - 1) // terms.grid
+        if (inner + 1) * size > max(MOST_GROUPS, size) or inner > most_cells:
             return None
-        cells = [1 + coder.flat(terms.cells, cell - 1) for cell in said.cells or [1] * inner]
+        cells = [1 + coder.flat(most_cells, cell - 1) for cell in said.cells or [1] * inner]
         if len(set(cells)) < inner or max(cells, default=0) * terms.grid >= terms.delay - max(late - 1, 0):
             return None
         groups = said.groups or [[[0, 0, 0] for _ in range(size)] for _ in range(inner + 1)]
         said = Said(back, end, late, finer, cells, groups)
         memory = code(coder, self.forest, groups, said.kind(base), base.memory)
         window = Window(self, base, said, finer)
-        moments = [(end - cell * terms.grid) / TICKS for cell in cells]
-        for moment, numbers in zip([None, *moments], np.array(groups, dtype=np.float64), strict=True):
-            window.say(numbers, moment)
+        for cell, numbers in zip([0, *cells], np.array(groups, dtype=np.float64), strict=True):
+            window.say(cell, numbers)
         path = window.path()
         return (said, State(path, memory, end)) if np.abs(path.poses.positions).max() < NOWHERE else None
 
@@ -160,41 +160,38 @@ class Window:
     """The knots of a window: the end, and then others, each between two that are there already."""
 
     def __init__(self, codec: Codec, base: State, said: Said, finer: int = 0) -> None:
-        self._codec, self.finer, self.factor = codec, finer, 0.5**finer
+        self._codec, self._said, self.finer, self.factor = codec, said, finer, 0.5**finer
         self._goes_on = said.kind(base) in (NEAR, FAR)
-        start, end = said.window(codec.terms)
-        self.moments = np.array([start, end])
+        self.moments = np.array(said.window(codec.terms))
         """Of the start and all knots, rising."""
         # What the motion would do if nothing new came.
         self._poses = base.path.at(self.moments) if self._goes_on else base.path.poses[:, [-1, -1]]
-        self.supports = [(start, end, end)]
-        """Of each knot, in the order in which they came, the moments between which it has a say, its own in between."""
+        self.cells: list[int] = []
+        """Of each knot, in the order in which they came, how many cells it is before the end."""
+        self.supports: list[tuple[float, float, float]] = []
+        """Of each the moments between which it has a say, its own in between."""
         self.numbers: list[np.ndarray] = []
-        """Of each of them the whole numbers (groups, 3)."""
+        """Of each the whole numbers (groups, 3)."""
 
-    @property
-    def inner(self) -> list[float]:
-        """The moments of the knots besides the end, in the order in which they came."""
-        return [moment for _, moment, _ in self.supports[1:]]
-
-    def say(self, numbers: np.ndarray | None, moment: float | None = None, samples: Path | None = None) -> None:
-        """Move the end, which comes first, or else a new knot at a moment, by whole numbers (groups, 3).
+    def say(self, cell: int, numbers: np.ndarray | None = None, samples: Path | None = None) -> None:
+        """Move the end, which comes first and is cell 0, or else a new knot, by whole numbers (groups, 3).
 
         Without numbers it is moved as near to what samples have there as these bring it.
         """
-        at = 1
-        if moment is not None:
+        at, moment = 1, (self._said.end - cell * self._codec.terms.grid) / TICKS
+        if cell:
             at = int(np.searchsorted(self.moments, moment))
-            self.supports.append((self.moments[at - 1], moment, self.moments[at]))
             on_the_way = Path(self.moments, self._poses).pose(moment)[:, None]
             self.moments = np.insert(self.moments, at, moment)
             self._poses = joined((self._poses[:, :at], on_the_way, self._poses[:, at:]), axis=1)
+        self.cells.append(cell)
+        self.supports.append((self.moments[at - 1], moment, self.moments[min(at + 1, len(self.moments) - 1)]))
         if numbers is None:
             assert samples is not None
-            numbers = self._codec.rounded(self._poses[:, at], samples.pose(self.moments[at]), self.factor)
+            numbers = self._codec.rounded(self._poses[:, at], samples.pose(moment), self.factor)
         self.numbers.append(numbers)
         self._poses[:, at] = self._codec.moved(self._poses[:, at], numbers, self.factor)
-        if moment is None and not self._goes_on:
+        if not (cell or self._goes_on):
             # How the motion got there is not known.
             self._poses[:, 0] = self._poses[:, 1]
 

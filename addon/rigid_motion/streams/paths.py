@@ -24,11 +24,6 @@ def carried(after: np.ndarray | float) -> np.ndarray:
     return np.asarray(CARRY * -np.expm1(-np.maximum(after, 0.0) / CARRY))
 
 
-def transposed(poses: Poses) -> Poses:
-    """Poses (a, b) as poses (b, a)."""
-    return Poses(poses.positions.swapaxes(0, 1), poses.quaternions.swapaxes(0, 1))
-
-
 @dataclass(frozen=True, eq=False)
 class Path:
     """Knots of all joints: rising moments (knots,), poses (joints, knots), and how the joints move at the last of them,
@@ -69,6 +64,10 @@ class Path:
         moments = np.concatenate((self.moments[:kept], [start], other.moments[1:]))
         poses = joined((self.poses[:, :kept], self.at(np.array([start])), other.poses[:, 1:]), axis=1)
         return Path(moments, poses, other.velocities, other.spins)
+
+    def extended(self, moment: float, poses: Poses) -> Path:
+        """Return this path with another knot behind the others, of poses (joints,)."""
+        return Path(np.append(self.moments, moment), joined((self.poses, poses[:, None]), axis=1))
 
     def since(self, moment: float) -> Path:
         """Return the same without knots that nothing from this moment on depends on."""

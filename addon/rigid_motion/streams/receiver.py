@@ -20,7 +20,7 @@ from . import wire
 from .bodies import Body, Forest
 from .coding import Coder
 from .messages import Codec, State
-from .paths import Path, transposed
+from .paths import Path
 from .playing import Fading, Playing
 from .wire import NEEDS_DESCRIPTION, NEEDS_REFRESH, TICKS, Answer, Motion, Terms
 
@@ -54,6 +54,7 @@ class Shown:
     each joint in its parent's space.
     """
 
+    stream: Stream
     moment: float
     bodies: tuple[Body, ...]
     poses: dict[str, Poses]
@@ -61,7 +62,7 @@ class Shown:
 
 @dataclass(frozen=True, eq=False)
 class Keys:
-    """What was sent, to be recorded: rising moments (k,) in seconds by the sender's clock, and poses (k, joints)."""
+    """What was sent, to be recorded: rising moments (k,) in seconds by the sender's clock, and poses (joints, k)."""
 
     stream: Stream
     bodies: tuple[Body, ...]
@@ -69,8 +70,50 @@ class Keys:
     poses: dict[str, Poses]
 
 
+class Playback:
+    """A stream that is shown: its bodies, the path of what came, and the moment of that which is due.
+
+    `heard` is when something new came, `begins` the first moment that can be shown, and `settled` that until which the
+    path is not going to change any more.
+    """
+
+    def __init__(self, stream: Stream, delay: float, heard: float = -np.inf, forest: Forest | None = None) -> None:
+        self.stream, self.heard, self.playing = stream, heard, Playing(delay)
+        self.forest: Any = forest
+        """The Forest of all bodies, None for as long as nothing is known of them."""
+        self.path: Path | None = None
+        self.begins, self.settled = -np.inf, np.inf
+        self.fading = Fading()
+        self.moment: float | None = None
+        self.kept = -np.inf
+        """Until this moment keys were handed out."""
+
+    def put(self, path: Path) -> None:
+        """Show a path from now on, of which the knots remain that are to be shown or handed out."""
+        count = min(max(MOST_JOINT_KNOTS // len(self.forest), MOST_KNOTS), len(path.moments))
+        shown = path.moments[0] if self.moment is None else self.moment
+        self.path = path.since(max(min(self.kept, shown) - 1e-6, path.moments[-count]))
+
+    def show(self, now: float) -> Shown | None:
+        """Return what is shown now."""
+        self.moment = self.playing.moment(now)
+        if self.moment is None or self.path is None or self.moment < self.begins:
+            return None
+        poses = self.fading.show(self.path.pose(self.moment), now)
+        return Shown(self.stream, self.moment, self.forest.bodies, self.forest.parted(poses))
+
+    def keys(self) -> Keys | None:
+        """Return the knots that are settled and were not handed out yet."""
+        moments = self.path.moments if self.path else np.empty(0)
+        rows = np.flatnonzero((moments > self.kept) & (moments <= self.settled))
+        if self.path is None or not len(rows):
+            return None
+        self.kept = float(moments[rows[-1]])
+        return Keys(self.stream, self.forest.bodies, moments[rows], self.forest.parted(self.path.poses[:, rows]))
+
+
 class Streams:
-    """Streams that are shown until they were silent for so many seconds: each has bodies and keys, and shows itself."""
+    """Streams that are shown until they were silent for so many seconds."""
 
     def __init__(self, silent: float) -> None:
         self._silent = silent
@@ -79,8 +122,8 @@ class Streams:
     def show(self, now: float) -> dict[Stream, Shown]:
         """Return what every stream shows."""
         self._forget_silent(now)
-        shown = {stream: (it.bodies, it.show(now)) for stream, it in self._streams.items()}
-        return {stream: Shown(what[0], bodies, what[1]) for stream, (bodies, what) in shown.items() if what}
+        shown = {stream: it.show(now) for stream, it in self._streams.items()}
+        return {stream: what for stream, what in shown.items() if what}
 
     @property
     def streams(self) -> list[Stream]:
@@ -89,8 +132,7 @@ class Streams:
 
     def keys(self) -> list[Keys]:
         """Return what came since the last call and is not going to change any more."""
-        result = [Keys(stream, it.bodies, *it.keys()) for stream, it in self._streams.items()]
-        return [keys for keys in result if len(keys.moments)]
+        return [keys for it in self._streams.values() if (keys := it.keys())]
 
     def _forget_silent(self, now: float) -> None:
         self._forget([own for own, it in self._streams.items() if not -self._silent < now - it.heard < self._silent])
@@ -131,7 +173,7 @@ class Receiver(Streams):
         elif stream not in self._streams and (described := wire.read_description(read.data)):
             waiting = self._waiting.pop(stream, ())
             if self._has_room_for(stream, described[0], arrival):
-                self._streams[stream] = _Playback(*described, arrival)
+                self._streams[stream] = _Coded(stream, *described, arrival)
                 for motion, when in waiting:
                     self._streams[stream].take(motion, when)
 
@@ -167,23 +209,17 @@ class Receiver(Streams):
         self._gone.extend(streams)
 
 
-class _Playback:
-    """A stream with its description, of which `heard` was the newest moment."""
+class _Coded(Playback):
+    """A stream with its description."""
 
-    def __init__(self, forest: Forest, terms: Terms, heard: float) -> None:
-        self.forest, self.bodies, self.heard = forest, forest.bodies, heard
+    def __init__(self, stream: Stream, forest: Forest, terms: Terms, heard: float) -> None:
+        super().__init__(stream, terms.delay / TICKS, heard, forest)
         self._codec = Codec(forest, terms)
         self._states: OrderedDict[int, State] = OrderedDict()
         self._windows: dict[int, Path] = {}
         """Of the newest messages, by their sequence numbers."""
-        self._path: Path | None = None
         self._newest, self._needs = -1, NEEDS_REFRESH
-        self.playing, self._fading = Playing(terms.delay / TICKS), Fading()
-        self._moment: float | None = None
-        self._begins = np.inf
-        """The first moment that can be shown."""
-        self._kept = -np.inf
-        """Until this moment keys were handed out."""
+        self.begins = np.inf
 
     def take(self, motion: Motion, arrival: float) -> bool:
         """Take a message, if it can be read, and say whether it is a new one."""
@@ -208,49 +244,22 @@ class _Playback:
         self._put(sequence, read[1].path, lost)
         return True
 
-    def _put(self, sequence: int, path: Path, lost: int) -> None:
+    def _put(self, sequence: int, window: Path, lost: int) -> None:
         """Let a window take part in what is shown; before it so many are lost, or it came late where that is < 0."""
-        before = self._path
-        self._windows[sequence] = path
-        for old in sorted(self._windows)[:-MOST_WINDOWS]:
-            del self._windows[old]
-        if before is None:
+        if self.path is None or (lost >= 0 and window.moments[0] < self.begins):
             # How the motion got to the first knot is not known.
-            self._path, self._begins = path, float(path.moments[1])
-        elif lost >= 0:
-            self._path = before.followed(path, lost)
-            if path.moments[0] < self._begins:
-                self._begins = float(path.moments[1])
-            count = min(max(MOST_JOINT_KNOTS // len(self.forest), MOST_KNOTS), len(self._path.moments))
-            shown = path.moments[0] if self._moment is None else self._moment
-            self._path = self._path.since(max(min(self._kept, shown) - 1e-6, self._path.moments[-count]))
-        else:
-            numbers = sorted(self._windows)
-            first = self._windows[numbers[0]]
-            self._path = before.followed(first) if before.moments[0] < first.moments[0] else first
-            for last, number in pairwise(numbers):
-                self._path = self._path.followed(self._windows[number], number - last - 1)
-        if self._moment is not None and (lost or path.moments[0] < self._moment):
-            self._fading.changed(self._path.pose(self._moment))
-
-    def show(self, now: float) -> tuple[float, dict[str, Poses]] | None:
-        """Return the moment and the poses that are shown now."""
-        self._moment = self.playing.moment(now)
-        if self._moment is None or self._path is None or self._moment < self._begins:
-            return None
-        return self._moment, self.forest.parted(self._fading.show(self._path.pose(self._moment), now))
-
-    def keys(self) -> tuple[np.ndarray, dict[str, Poses]]:
-        """Return the knots until the start of the newest window that were not handed out yet."""
-        path = self._path
-        if path is None:
-            return np.empty(0), {}
-        until = self._windows[max(self._windows)].moments[0]
-        rows = np.flatnonzero((path.moments > self._kept) & (path.moments <= until))
-        if len(rows):
-            self._kept = float(path.moments[rows[-1]])
-        poses = self.forest.parted(path.poses[:, rows])
-        return path.moments[rows], {name: transposed(own) for name, own in poses.items()}
+            self.begins = float(window.moments[1])
+        self._windows[sequence] = window
+        numbers = sorted(self._windows)[-MOST_WINDOWS:]
+        self._windows = {number: self._windows[number] for number in numbers}
+        path, first = self.path, self._windows[numbers[0]]
+        path = path.followed(first) if path and path.moments[0] < first.moments[0] else first
+        for last, number in pairwise(numbers):
+            path = path.followed(self._windows[number], number - last - 1)
+        self.put(path)
+        self.settled = float(self._windows[numbers[-1]].moments[0])
+        if self.moment is not None and (lost or window.moments[0] < self.moment):
+            self.fading.changed(path.pose(self.moment))
 
     def there(self) -> tuple[int, int, int]:
         """Return what an answer says: the newest message, which there are of those before it, and what is needed."""

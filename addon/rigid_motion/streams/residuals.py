@@ -57,16 +57,8 @@ def symbols_of(table: int) -> int:
 def code(coder: Coder, forest: Forest, groups: Groups, kind: int, memory: Sequence[int]) -> tuple[int, ...]:
     """Write or read the groups of a message, and return what is remembered of each group.
 
-    Parameters
-    ----------
-    coder : Coder
-    forest : Forest
-    groups : list
-        Of each knot and group three numbers; overwritten by what is read.
-    kind : int
-        Of the last knot.
-    memory : sequence of int
-        What is remembered of each group with the pose that the message is coded against.
+    They are of each knot and group three numbers, which what is read overwrites. `kind` is that of the last knot, and
+    `memory` what is remembered of each group with the pose that the message is coded against.
     """
     sums: list[list[int]] = []
     for number, knot in enumerate(groups):

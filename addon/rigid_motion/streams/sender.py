@@ -17,7 +17,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..motion import Poses
-from ..motion.poses import joined
 from ..motion.quaternions import normalise
 from . import wire
 from .bodies import Body, Forest
@@ -153,7 +152,17 @@ class Sender:
         finite = np.isfinite(poses.positions).all() and np.isfinite(poses.quaternions).all()
         if poses.shape != (len(self._forest),) or not (finite and math.isfinite(time)):
             raise ValueError(f"a sample needs {len(self._forest)} finite poses and a time")
-        now = self._remember(time, poses)
+        times, now = self._samples.moments, time + self._slip
+        if len(times) and not 0.0 < now - times[-1] <= STEP:
+            usual = times[-1] - times[-2] if len(times) > 1 else 1.0 / TICKS
+            self._slip += float(times[-1] + usual - now)
+            now = time + self._slip
+        if len(times):
+            self._interval = max(now - float(times[-1]), CALMER * self._interval)
+        self._samples = self._samples.extended(now, Poses(poses.positions, normalise(poses.quaternions)))
+        past = now - self._delay - STEP
+        if np.searchsorted(self._samples.moments, past) > AT_ONCE:
+            self._samples = self._samples.since(past)
         if self._sequence > LAST:
             self._begin()
         return self._due(now, self._interval)
@@ -201,22 +210,6 @@ class Sender:
         self._lossy = heard - self._missed < CALM
         self._desired |= bool(answer.needs & NEEDS_REFRESH) and heard - self._refreshed > PATIENCE
         return self.describe() if answer.needs & NEEDS_DESCRIPTION else []
-
-    def _remember(self, time: float, poses: Poses) -> float:
-        """Keep a sample, and return its time by a clock that only goes on."""
-        times, before = self._samples.moments, self._samples.poses
-        now = time + self._slip
-        if len(times) and not 0.0 < now - times[-1] <= STEP:
-            usual = times[-1] - times[-2] if len(times) > 1 else 1.0 / TICKS
-            self._slip += float(times[-1] + usual - now)
-            now = time + self._slip
-        if len(times):
-            self._interval = max(now - float(times[-1]), CALMER * self._interval)
-        new = Poses(poses.positions, normalise(poses.quaternions))[:, None]
-        samples = Path(np.append(times, now), joined((before, new), axis=1))
-        past = now - self._delay - STEP
-        self._samples = samples.since(past) if np.searchsorted(samples.moments, past) > AT_ONCE else samples
-        return now
 
     def _due(self, now: float, interval: float) -> list[bytes]:
         """Return what is to be sent now, where nobody asks again before the interval is over."""

@@ -9,22 +9,22 @@ Source: https://protocol.vmc.info/marionette-spec
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Hashable, Iterable, Mapping, Sequence, Set
-from itertools import islice
+from collections.abc import Hashable, Mapping, Sequence
+from itertools import groupby
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 
 from ..motion import Poses
 from ..motion.humanoid import HUMANOID, alignments, beside, humanoid_bones
-from ..motion.poses import joined
+from ..motion.poses import in_other_axes
 from ..motion.quaternions import conjugate, multiply
-from .bodies import LONGEST_NAME, Body
+from .bodies import LONGEST_NAME, Body, Forest
 from .osc import Message, read, write_bundle, write_message
-from .paths import Path, transposed
-from .playing import SET, Playing
-from .receiver import Stream, Streams
+from .paths import Path
+from .playing import SET
+from .receiver import Playback, Stream, Streams
 
 PORT = 39539
 """That programs which show a performer listen on."""
@@ -35,14 +35,14 @@ ROOT, PERFORMER = "Root", "VMC"
 JOINTS = (ROOT, *HUMANOID)
 PARENTS = {ROOT: "", **{bone: above or ROOT for bone, above in HUMANOID.items()}}
 
-Joint = tuple[bool, str]
-"""Whether it is a device, and the name of the bone or its serial number."""
+Joint = tuple[str, str]
+"""The name of the body, which is its serial number if it is a device, and that of the joint."""
 
 DEVICES = {f"/VMC/Ext/{kind}/Pos" for kind in ("Tra", "Con", "Hmd")}
 """Trackers, controllers and headsets: rigid bodies in the world, by their serial numbers."""
 
-MOST_SOURCES, MOST_DEVICES, MOST_SAMPLES = 16, 32, 512
-"""Programs; devices of each, and samples that wait to be shown or to be recorded."""
+MOST_SOURCES, MOST_DEVICES = 16, 32
+"""Programs, and devices of each."""
 
 SILENT, FURTHEST, AT_ONCE = 2.0, 1e5, 12
 """Seconds after which a performer, who is sent on every frame, has gone; metres beyond which there is only damage; and
@@ -54,17 +54,12 @@ _TO_BLENDER = np.array(((-1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)))
 
 def from_unity(poses: Poses) -> Poses:
     """Poses in Unity's axes as poses in Blender's."""
-    return _changed(poses, _TO_BLENDER)
+    return in_other_axes(poses, _TO_BLENDER)
 
 
 def to_unity(poses: Poses) -> Poses:
     """Poses in Blender's axes as poses in Unity's."""
-    return _changed(poses, _TO_BLENDER.T)
-
-
-def _changed(poses: Poses, change: np.ndarray) -> Poses:
-    turned = -poses.quaternions[..., 1:] @ change.T
-    return Poses(poses.positions @ change.T, np.concatenate((poses.quaternions[..., :1], turned), axis=-1))
+    return in_other_axes(poses, _TO_BLENDER.T)
 
 
 def write(time: float, poses: Mapping[str, Poses]) -> list[bytes]:
@@ -90,15 +85,7 @@ def _bundles(messages: list[bytes]) -> list[bytes]:
 
 
 class Performer:
-    """A skeleton of any kind as VMC.
-
-    Parameters
-    ----------
-    joints : sequence of str
-        Parents first.
-    rest : Poses, shape (joints,)
-        In the space of the roots.
-    """
+    """A skeleton of any kind as VMC: joints, parents first, at rest at poses (joints,) in the space of the roots."""
 
     def __init__(self, joints: tuple[str, ...], rest: Poses) -> None:
         self.bones = humanoid_bones(joints)
@@ -120,7 +107,7 @@ def _parents(names: Sequence[str]) -> list[int]:
     """Return which of some joints each of them hangs on, -1 for none."""
     result = []
     for name in names:
-        while (name := PARENTS[name]) and name not in names:
+        while (name := PARENTS.get(name, "")) and name not in names:
             pass
         result.append(names.index(name) if name else -1)
     return result
@@ -139,40 +126,36 @@ class VmcReceiver(Streams):
         for message in read(datagram):
             if message.address.startswith("/VMC/Ext/"):
                 if stream not in self._streams and len(self._streams) < MOST_SOURCES:
-                    self._streams[stream] = _Source(self.delay)
+                    self._streams[stream] = _Source(stream, self.delay)
                 if stream in self._streams:
                     self._streams[stream].hear(message, arrival)
 
 
-class _Source:
+class _Source(Playback):
     """What one program sends: a performer, devices, or both."""
 
-    def __init__(self, delay: float) -> None:
-        self.heard = -np.inf
-        self.bodies: tuple[Body, ...] = ()
-        self._playing = Playing(delay)
-        self._newest: dict[Joint, list[float]] = {(False, ROOT): [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]}
+    def __init__(self, stream: Stream, delay: float) -> None:
+        super().__init__(stream, delay)
+        self._newest: dict[Joint, list[float]] = {(PERFORMER, ROOT): [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]}
         """Place and turn of all that was ever said, in Unity's axes."""
-        self._rows: dict[str, list[int]] = {}
-        """Which of these each body is."""
+        self._joints: list[Joint] = []
+        """Which of these the joints of all bodies are."""
         self._frame: dict[Joint, list[float]] = {}
         """What was said of this frame, and when it began."""
         self._begun = 0.0
-        self._samples: deque[tuple[float, Poses]] = deque(maxlen=MOST_SAMPLES)
-        self._unkept: deque[tuple[float, Poses]] = deque(maxlen=MOST_SAMPLES)
         self._has_time = False
 
     def hear(self, message: Message, arrival: float) -> None:
         """Take one message."""
         address, (name, *numbers) = message.address, message.arguments or (None,)
         if address == "/VMC/Ext/Root/Pos":
-            self._place((False, ROOT), numbers, arrival)
+            self._place((PERFORMER, ROOT), numbers, arrival)
         elif address == "/VMC/Ext/Bone/Pos" and name in HUMANOID:
-            self._place((False, str(name)), numbers, arrival)
+            self._place((PERFORMER, str(name)), numbers, arrival)
         elif address in DEVICES and isinstance(name, str) and name != PERFORMER:
-            known = {serial for is_device, serial in (*self._newest, *self._frame) if is_device}
+            known = {body for body, _ in (*self._newest, *self._frame)} - {PERFORMER}
             if 0 < len(name.encode()) <= LONGEST_NAME and (name in known or len(known) < MOST_DEVICES):
-                self._place((True, name), numbers, arrival)
+                self._place((name, name), numbers, arrival)
         elif address == "/VMC/Ext/T" and not numbers and isinstance(name, float | int) and math.isfinite(name):
             self._has_time = True
             self._sample(float(name), arrival)
@@ -194,60 +177,39 @@ class _Source:
 
     def _sample(self, moment: float, arrival: float) -> None:
         """Take the frame that is complete."""
-        if not self._frame.keys() - {(False, ROOT)}:
+        if not self._frame.keys() - {(PERFORMER, ROOT)}:
             return
-        new = self._frame.keys() - self._newest.keys()
+        is_new = bool(self._frame.keys() - self._newest.keys())
         self._newest |= self._frame
         self._frame = {}
-        rows = np.array(list(self._newest.values()))
-        poses = from_unity(Poses(rows[:, :3], rows[:, 3:]))
-        if new:
-            self._describe(new, poses)
-        last = self._samples[-1][0] if self._samples else -np.inf
-        if new or abs(moment - last) > SET:
-            self._samples.clear()
-        elif moment <= last:
+        if is_new:
+            self._describe()
+        last = self.path.moments[-1] if self.path else -np.inf
+        if not is_new and last - SET <= moment <= last:
             return
-        self._samples.append((moment, poses))
-        self._unkept.append((moment, poses))
-        self._playing.heard(moment, arrival)
+        poses = self._poses(self._joints)
+        if is_new or moment < last:
+            self.path, self.kept = None, -np.inf
+        self.put(self.path.extended(moment, poses) if self.path else Path(np.array([moment]), poses[:, None]))
+        self.playing.heard(moment, arrival)
         self.heard = arrival
 
-    def _describe(self, new: Set[Joint], poses: Poses) -> None:
-        """Have bodies for what was never said before; the others stay the same."""
-        self._unkept.clear()
-        numbers = {joint: row for row, joint in enumerate(self._newest)}
-        bodies = {body.name: body for body in self.bodies}
-        if not all(is_device for is_device, _ in new):
-            names = tuple(name for name in JOINTS if (False, name) in numbers)
-            rows = self._rows[PERFORMER] = [numbers[False, name] for name in names]
-            rest = Poses(poses.positions[rows], np.tile((1.0, 0.0, 0.0, 0.0), (len(names), 1)))
-            sliding = np.array([name in (ROOT, "Hips") for name in names])
-            performer = Body(PERFORMER, names, np.array(_parents(names)), rest, sliding=sliding)
-            bodies = {PERFORMER: performer} | {name: body for name, body in bodies.items() if name != PERFORMER}
-        for joint, row in numbers.items():
-            if joint in new and joint[0]:
-                bodies[joint[1]], self._rows[joint[1]] = Body.rigid(joint[1], poses[row : row + 1]), [row]
-        self.bodies = tuple(bodies.values())
+    def _poses(self, joints: list[Joint]) -> Poses:
+        rows = np.array([self._newest[joint] for joint in joints])
+        return from_unity(Poses(rows[:, :3], rows[:, 3:]))
 
-    def _of_bodies(self, samples: Iterable[tuple[float, Poses]]) -> tuple[np.ndarray, dict[str, Poses]]:
-        """Return the moments (n,) of samples, and poses (joints, n) of each body."""
-        moments, poses = zip(*samples, strict=True)
-        every = joined([own[:, None] for own in poses], axis=1)
-        return np.array(moments), {body.name: every[self._rows[body.name]] for body in self.bodies}
-
-    def show(self, now: float) -> tuple[float, dict[str, Poses]] | None:
-        moment = self._playing.moment(now)
-        if moment is None or not self._samples:
-            return None
-        while len(self._samples) > 2 and self._samples[1][0] <= moment:
-            self._samples.popleft()
-        moments, bodies = self._of_bodies(islice(self._samples, 2))
-        return moment, {name: Path(moments, poses).pose(moment) for name, poses in bodies.items()}
-
-    def keys(self) -> tuple[np.ndarray, dict[str, Poses]]:
-        if not self._unkept:
-            return np.empty(0), {}
-        moments, bodies = self._of_bodies(self._unkept)
-        self._unkept.clear()
-        return moments, {name: transposed(poses) for name, poses in bodies.items()}
+    def _describe(self) -> None:
+        """Have bodies of all that was ever said; those of which nothing is new stay the same."""
+        before = {(body.name, body.joints): body for body in self.forest.bodies} if self.forest else {}
+        bones = [(PERFORMER, bone) for bone in JOINTS if (PERFORMER, bone) in self._newest]
+        self._joints = bones if len(bones) > 1 else []
+        self._joints = self._joints + [joint for joint in self._newest if joint[0] != PERFORMER]
+        bodies = []
+        for name, group in groupby(self._joints, itemgetter(0)):
+            own = list(group)
+            joints = tuple(joint for _, joint in own)
+            rest = Poses(self._poses(own).positions, np.tile((1.0, 0.0, 0.0, 0.0), (len(own), 1)))
+            sliding = np.array([joint in (ROOT, "Hips", name) for joint in joints])
+            new = Body(name, joints, np.array(_parents(joints)), rest, sliding=sliding)
+            bodies.append(before.get((name, joints), new))
+        self.forest = Forest(bodies)

@@ -47,11 +47,6 @@ class Terms(NamedTuple):
     delay: int
     grid: int
 
-    @property
-    def cells(self) -> int:
-        """Moments of the grid within a window."""
-        return max((self.delay - 1) // self.grid, 0)
-
 
 class Description(NamedTuple):
     """Bodies and terms, packed."""

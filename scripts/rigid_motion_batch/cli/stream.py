@@ -11,13 +11,14 @@ from contextlib import AbstractContextManager, closing, contextmanager, nullcont
 from rigid_motion.motion import rms
 from rigid_motion.streams import Body, Sender
 from rigid_motion.streams.paths import Path
+from rigid_motion.streams.sender import KEEPALIVE
 from rigid_motion_batch.command_line import complain, path_line
 from rigid_motion_batch.progress import Progress, Stage
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.streaming import vmc
-from rigid_motion_batch.streaming.measuring import HEADERS, errors
+from rigid_motion_batch.streaming.measuring import HEADERS
 from rigid_motion_batch.streaming.receiving import Receiving
 from rigid_motion_batch.streaming.rooms import (
     EVERYWHERE,
@@ -27,8 +28,8 @@ from rigid_motion_batch.streaming.rooms import (
     RoomError,
     opened,
 )
-from rigid_motion_batch.streaming.sending import Sending, play, samples_of, sender_of, together
-from rigid_motion_batch.streaming.written import Motion, write_motions
+from rigid_motion_batch.streaming.sending import Sending, even_rate, samples_of, together
+from rigid_motion_batch.streaming.written import Motion, Tracks, write_motions
 from rigid_motion_batch.supervising import report, stop_signals
 
 from . import stream_measure
@@ -39,6 +40,9 @@ LOOK = 0.2
 
 FRAME = 0.01
 """Seconds after which what another program performs is looked at."""
+
+ALMOST = 0.9
+"""Part of the interval of an even stream after which a key is due."""
 
 
 def main(arguments: list[str]) -> int:
@@ -73,20 +77,18 @@ def send(options: argparse.Namespace, stopped: list[int]) -> None:
             _say(f"datagrams: {vmc.play(bodies[0], moments, poses, options.to_vmc, stopped, stage.reach)}")
         return
     delay = options.delay or (1.0 / options.rate if options.rate else DELAY)
-    sender = sender_of(bodies, moments, options.tolerance.tolerance(clips[0]), delay, options.rate)
+    keepalive = ALMOST / options.rate if options.rate else KEEPALIVE
+    tolerance, rate = options.tolerance.tolerance(clips[0]), options.rate or even_rate(moments)
+    sender = Sender(bodies, tolerance, delay, rate, keepalive)
     with _room(options) as room, Progress() as progress:
         _say(f"{options.user} sends {', '.join(body.name for body in bodies)} to {options.room}")
         with progress.stage("Sending", float(moments[-1] - moments[0])) as stage:
-            sending, seconds = play(
-                room,
-                options.user,
-                sender,
-                moments,
-                poses,
-                delay,
-                stopped,
-                lambda done, sending: stage.reach(done, f"{sending.datagrams} datagrams"),
-            )
+            sending = Sending(room, options.user, sender)
+
+            def reach(done: float) -> None:
+                stage.reach(done, f"{sending.datagrams} datagrams")
+
+            seconds = sending.play(moments, poses, delay, stopped, reach)
             if stopped:
                 stage.total = max(stage.done, 1e-9)
         a_second = 1.0 / max(seconds, 1e-9)
@@ -116,7 +118,7 @@ def send_performer(options: argparse.Namespace, stopped: list[int]) -> None:
                     sending.say(sending.sender.join())
                 sent, sending.ahead = keys.bodies, ahead
                 for sample, moment in enumerate(keys.moments.tolist()):
-                    poses = {name: poses[sample] for name, poses in keys.poses.items()}
+                    poses = {name: poses[:, sample] for name, poses in keys.poses.items()}
                     sending.say(sending.sender.add(moment, poses))
             if sending:
                 sending.answer(FRAME)
@@ -124,21 +126,25 @@ def send_performer(options: argparse.Namespace, stopped: list[int]) -> None:
                 time.sleep(FRAME)
         if sending is None:
             raise RoomError(f"nothing came by VMC at port {performers.number}; give the other program this port")
-        room.leave(options.user, MOTION)
+        room.send(options.user, MOTION, None)
         _say(f"datagrams: {sending.datagrams}", f"bytes: {sending.bytes}")
 
 
 def receive(options: argparse.Namespace, stopped: list[int]) -> None:
     """Show what comes. Raises what says why there is nothing."""
     truth = _read([options.truth], options)[0] if options.truth else None
-    keeps = "keys" if options.mode else "shown" if options.output or truth else ""
+    tracks = Tracks()
     with (
         _room(options) as room,
         Progress() as progress,
-        closing(Receiving(room, options.user, options.fps, options.margin, options.to_blender, keeps)) as receiving,
+        closing(Receiving(room, options.user, options.fps, options.margin, options.to_blender)) as receiving,
     ):
         if options.to_vmc:
             receiving.on_frame.append(vmc.ToVmc(options.to_vmc).show)
+        if options.mode:
+            receiving.on_frame.append(lambda _: tracks.add_keys(receiving.receiver.keys()))
+        elif options.output or truth:
+            receiving.on_frame.append(tracks.add_shown)
         _say(f"{options.user} listens in {options.room}")
         until = time.monotonic() + (options.seconds or float("inf"))
         with _stage(progress, "Receiving", options.seconds) as stage:
@@ -149,8 +155,8 @@ def receive(options: argparse.Namespace, stopped: list[int]) -> None:
                 stage.total = max(stage.done, 1e-9)
     for user, datagrams in receiving.datagrams.items():
         _say(f"{user}: {datagrams} datagrams, {receiving.bytes[user]} bytes")
-    motions = receiving.tracks.motions()
-    if not (motions if keeps else receiving.datagrams):
+    motions, is_kept = tracks.motions(), options.mode or options.output or truth
+    if not (motions if is_kept else receiving.datagrams):
         came = "nothing that could be shown came" if receiving.datagrams else f"nobody sent anything in {options.room}"
         raise RoomError(f"{came}, so nothing is written; see --room and --at of the sender")
     if options.mode:
@@ -221,7 +227,7 @@ def _error(motion: Motion, truth: Clip | None) -> str:
     within = (motion.times >= times[0]) & (motion.times <= times[-1])
     if len(motion.body.joints) != len(poses) or not within.any():
         return ", which are not those of --truth"
-    off = errors(motion.body, motion.poses[:, within], Path(times, poses).at(motion.times[within])).max(axis=0)
+    off = motion.body.errors(motion.poses[:, within], Path(times, poses).at(motion.times[within])).max(axis=0)
     return f", error {1000.0 * rms(off):.2f} mm RMS, {1000.0 * float(off.max()):.2f} mm at most"
 
 

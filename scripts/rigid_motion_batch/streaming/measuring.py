@@ -10,19 +10,17 @@ from __future__ import annotations
 import heapq
 import multiprocessing
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
 from struct import Struct
-from typing import Any
 
 import numpy as np
 
-from rigid_motion.live.sockets import Outlet, Port
+from rigid_motion.live.sockets import Address, Outlet, Port
 from rigid_motion.motion import Poses, rms
 from rigid_motion.motion.poses import joined
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion.streams import Body, Receiver, Sender
-from rigid_motion.streams.bodies import Forest
 from rigid_motion.streams.paths import Path
 from rigid_motion.streams.wire import Description, read
 
@@ -34,9 +32,7 @@ HEADERS = 28
 """Bytes of UDP and IPv4 in front of every datagram."""
 
 PATIENCE, AFTER = 30.0, 0.5
-"""Seconds in which the other process has to be there; and for which it goes on behind the last sample and the delay."""
-
-MISSING = f"the receiver's process did not answer within {PATIENCE:g} s"
+"""Seconds in which the other process has to answer; and for which it goes on behind the last sample and the delay."""
 
 ARRIVAL = Struct("<d")
 """In front of every datagram: by the clock of the recording."""
@@ -92,34 +88,32 @@ def measure(
     RuntimeError
         Where the other process ended.
     """
-    context = multiprocessing.get_context("spawn")
-    here, there = context.Pipe()
-    process = context.Process(target=_receive, args=(there, times, answers), daemon=True)
-    process.start()
-    there.close()
-    try:
-        with Outlet(LOOPBACK, _given(here)) as outlet:
+    with Port(LOOPBACK) as port, ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as processes:
+        receiving = processes.submit(_receive, port.number, times, answers)
 
-            def carry(datagram: bytes, arrival: float) -> bytes:
-                outlet.say(ARRIVAL.pack(arrival) + datagram)
-                for answer, _ in outlet.received(PATIENCE):
-                    return answer
-                raise RuntimeError(MISSING)
+        def received() -> tuple[bytes, Address]:
+            if came := port.received(PATIENCE):
+                return came[0]
+            raise RuntimeError(f"the receiver's process did not answer within {PATIENCE:g} s")
 
-            run = _Run(Sender([body], tolerance, delay, even_rate(times)), carry, link, seed)
+        def carry(datagram: bytes, arrival: float) -> bytes:
+            port.send(ARRIVAL.pack(arrival) + datagram, receiver)
+            return received()[0]
+
+        _, receiver = received()
+        run = _Run(Sender([body], tolerance, delay, even_rate(times)), carry, link, seed)
+        try:
             run.play(times, poses, delay + link.latency + AFTER)
-            outlet.say(b"")
-            moments, drawn, lags, answered = _given(here)
-    finally:
-        here.close()
-        process.join(AFTER)
-        process.terminate()
-    if not len(moments):
+        finally:
+            port.send(b"", receiver)
+        frames, answered = receiving.result(PATIENCE)
+    if not frames:
         raise RuntimeError("nothing was shown: no datagram came through")
-    moments, first = np.unique(moments, return_index=True)
-    shown = Path(moments, Poses(drawn.positions[:, first], normalise(drawn.quaternions[:, first]))).at(times)
+    moments, first = np.unique([moment for moment, _, _ in frames], return_index=True)
+    drawn = joined([frames[row][2][:, None] for row in first.tolist()], axis=1)
+    shown = Path(moments, Poses(drawn.positions, normalise(drawn.quaternions))).at(times)
     compared = times >= moments[0] - 1e-6
-    off = errors(body, shown[:, compared], poses[:, compared]).max(axis=0)
+    off = body.errors(shown[:, compared], poses[:, compared]).max(axis=0)
     seconds = float(times[-1] - times[0])
     joining = [datagram for datagram in run.sent if isinstance(read(datagram), Description)]
     joining_bytes = sum(map(len, joining))
@@ -136,24 +130,9 @@ def measure(
         largest_mm=1000.0 * float(off.max()),
         share_within_tolerance=float(np.mean(off <= tolerance)),
         share_within_20_mm=float(np.mean(off <= 0.02)),
-        delay_s=float(np.median(lags)),
+        delay_s=float(np.median([lag for _, lag, _ in frames])),
     )
     return cost, shown
-
-
-def errors(body: Body, shown: Poses, truth: Poses) -> np.ndarray:
-    """Return how far off any point of each joint's ball is at most, of poses (joints, n), shape (joints, n)."""
-    forest = Forest([body])
-    return forest.errors(shown, forest.skeleton.in_root_space(truth))
-
-
-def _given(pipe: Connection) -> Any:
-    try:
-        if pipe.poll(PATIENCE):
-            return pipe.recv()
-    except EOFError:
-        raise RuntimeError("the receiver's process ended") from None
-    raise RuntimeError(MISSING)
 
 
 class _Run:
@@ -191,7 +170,6 @@ class _Run:
             heapq.heappush(self._on_the_way, (now + takes, self._count, datagram, back))
 
     def _until(self, now: float) -> None:
-        """Let come what comes by a time."""
         while self._on_the_way and self._on_the_way[0][0] <= now:
             arrival, _, datagram, back = heapq.heappop(self._on_the_way)
             if back:
@@ -200,32 +178,26 @@ class _Run:
                 self._post([answer], arrival, back=True)
 
 
-def _receive(pipe: Connection, times: np.ndarray, answers: bool) -> None:
-    """Show what comes, in a process of its own: whenever a sample's moment is due, draw."""
-    receiver, frames = Receiver(), list[tuple[Any, ...] | None]()
-    answered, now = 0, float(times[0])
+def _receive(to: int, times: np.ndarray, answers: bool) -> tuple[list[tuple[float, float, Poses]], int]:
+    """Show what comes from a port: whenever a sample's moment is due, draw.
 
-    def draw(until: float) -> None:
-        due = now
-        while len(frames) < len(times):
-            due = max(due, receiver.due(times[len(frames)]))
-            if due > until:
-                return
-            # Nothing where the motion of that moment was over when the first datagram came.
-            shown = next(iter(receiver.show(due).values()), None)
-            frames.append((shown.moment, due - shown.moment, *shown.poses.values()) if shown else None)
-
-    with Port() as port:
-        pipe.send(port.number)
-        while (came := port.received(PATIENCE)[0])[0]:
-            data, source = came
-            (arrival,) = ARRIVAL.unpack_from(data)
-            draw(arrival)
-            receiver.take(data[ARRIVAL.size :], arrival, source)
+    Returns the moment of each frame, by how much it is behind, and poses (joints,); and the bytes of answers.
+    """
+    receiver, frames, sample, answered = Receiver(), list[tuple[float, float, Poses]](), 0, 0
+    with Outlet(LOOPBACK, to) as outlet:
+        outlet.say(b"")
+        now = float(times[0])
+        while True:
+            data = outlet.received(PATIENCE)[0][0]
+            arrival = ARRIVAL.unpack_from(data)[0] if data else np.inf
+            while sample < len(times) and (due := max(now, receiver.due(times[sample]))) <= arrival:
+                now, sample = due, sample + 1
+                # Nothing where the motion of that moment was over when the first datagram came.
+                for shown in receiver.show(due).values():
+                    frames += [(shown.moment, due - shown.moment, poses) for poses in shown.poses.values()]
+            if not data:
+                return frames, answered
+            receiver.take(data[ARRIVAL.size :], arrival, to)
             now, replies = max(now, arrival), receiver.answers() if answers else []
             answered += sum(HEADERS + len(answer) for _, answer in replies)
-            port.send(b"".join(answer for _, answer in replies), source)
-        draw(np.inf)
-    drawn = [frame for frame in frames if frame]
-    shown = joined([poses[:, None] for *_, poses in drawn], axis=1) if drawn else None
-    pipe.send((np.array([frame[0] for frame in drawn]), shown, [frame[1] for frame in drawn], answered))
+            outlet.say(b"".join(answer for _, answer in replies))

@@ -13,7 +13,7 @@ from rigid_motion.motion.quaternions import align_signs, normalise
 from rigid_motion.streams import Body
 from rigid_motion.streams.paths import Path
 
-from .measuring import HEADERS, errors
+from .measuring import HEADERS
 
 WAYS: dict[str, tuple[float, int | None]] = {
     "float32 at 30 Hz": (30.0, None),
@@ -32,21 +32,21 @@ PLACE_BITS, CUBE = 16, 8.0
 
 def packed(body: Body, times: np.ndarray, poses: Poses) -> dict[str, dict[str, float]]:
     """Return what each way costs of samples (n,) of poses (joints, n), and how far off they are."""
-    result, sliding = {}, np.asarray(body.sliding)
+    result, sliding, step = {}, np.asarray(body.sliding), CUBE / (2**PLACE_BITS - 1)
     samples = Path(times, Poses(poses.positions, align_signs(poses.quaternions)))
     for label, (rate, bits) in WAYS.items():
         moments = np.arange(times[0], times[-1] + 1.0 / rate, 1.0 / rate)
         sent = samples.at(np.minimum(moments, times[-1]))
-        positions, quaternions = sent.positions, normalise(sent.quaternions)
         if bits is None:
             turn, place = 128, 96
-            positions, quaternions = (part.astype(np.float32).astype(np.float64) for part in (positions, quaternions))
+            positions, quaternions = sent.positions.astype(np.float32), sent.quaternions.astype(np.float32)
         else:
-            turn, place, step = 2 + 3 * bits, 3 * PLACE_BITS, CUBE / (2**PLACE_BITS - 1)
-            positions = np.where(sliding[:, None, None], np.rint(positions / step) * step, positions)
-            quaternions = smallest_three(quaternions, bits)
-        shown = Path(moments, Poses(positions, normalise(quaternions))).at(times)
-        worst = errors(body, shown, samples.at(times)).max(axis=0)
+            turn, place = 2 + 3 * bits, 3 * PLACE_BITS
+            rounded = np.rint(sent.positions / step) * step
+            positions = np.where(sliding[:, None, None], rounded, sent.positions)
+            quaternions = smallest_three(normalise(sent.quaternions), bits)
+        shown = Path(moments, Poses(positions, normalise(quaternions.astype(np.float64)))).at(times)
+        worst = body.errors(shown, samples.at(times)).max(axis=0)
         size = -(-(len(body.joints) * turn + np.count_nonzero(sliding) * place) // 8)
         result[label] = {
             "bytes_a_second": rate * size,

@@ -5,18 +5,13 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-
-import numpy as np
+from collections.abc import Callable, Iterable, Sequence
 
 from rigid_motion.live.sockets import Address, Outlet
-from rigid_motion.motion import Poses
-from rigid_motion.motion.poses import joined
-from rigid_motion.streams import Body, Receiver, Shown
+from rigid_motion.streams import Receiver, Shown
 from rigid_motion.streams.receiver import MOST_STREAMS, SILENT
 
-from .rooms import ANSWERS, MOTION, SKELETON, Came, Room
-from .written import Motion
+from .rooms import ANSWERS, Came, Room
 
 ANSWERS_A_SECOND = 100.0
 """To all streams together."""
@@ -25,49 +20,16 @@ LINGER = 0.3
 """Seconds without anybody who sends, after somebody did, that are the end: a sender may be followed by another."""
 
 
-class Tracks(dict[tuple[str, Body], dict[float, Poses]]):
-    """What was shown of all bodies of all users, or their keys: poses (joints,) by rising moments of the sender."""
-
-    def add(self, user: object, bodies: Iterable[Body], moment: float, poses: Mapping[str, Poses]) -> None:
-        """Add the poses (joints,) of a user's bodies at a moment."""
-        for body in bodies:
-            known = self.setdefault((str(user), body), {})
-            if moment > next(reversed(known), -math.inf):
-                known[moment] = poses[body.name]
-
-    def motions(self) -> list[Motion]:
-        """Return those of which there is more than a pose."""
-        result = []
-        for (user, body), known in self.items():
-            if len(known) > 1:
-                poses = joined([pose[:, None] for pose in known.values()], axis=1)
-                result.append(Motion(f"{user}-{body.name}", body, np.array(list(known)), poses))
-        return result
-
-
 class Receiving:
-    """A receiver in a room.
+    """A receiver in a room, which is a user there.
 
-    Parameters
-    ----------
-    room : Room
-    user : str
-        Who listens.
-    fps : float
-        Frames a second of a display.
-    margin : float
-        Seconds that are waited longer for each datagram.
-    to : address, optional
-        What gets all datagrams by UDP as well, from a port for each user, and whose answers go back to them.
-    keeps : str, optional
-        What is to be there in the end: what was `shown`, the `keys`, or nothing.
+    It shows so many frames a second, and waits `margin` seconds longer for each datagram. All of them go to an address
+    by UDP as well, if one is given, from a port for each user, and its answers go back to them.
     """
 
-    def __init__(
-        self, room: Room, user: str, fps: float, margin: float, to: Address | None = None, keeps: str = ""
-    ) -> None:
-        self._room, self._fps, self._margin, self._to, self._keeps = room, fps, margin, to, keeps
-        self.receiver, self.tracks = Receiver(), Tracks()
+    def __init__(self, room: Room, user: str, fps: float, margin: float, to: Address | None = None) -> None:
+        self._room, self._fps, self._margin, self._to = room, fps, margin, to
+        self.receiver = Receiver()
         self.datagrams, self.bytes = Counter[str](), Counter[str]()
         """Counts for each user."""
         self.on_frame: list[Callable[[Iterable[Shown]], None]] = []
@@ -78,9 +40,7 @@ class Receiving:
         self._silent = math.inf
         """Since when nobody is sending, after somebody was."""
         self._answer_at = -math.inf
-        for stream in (SKELETON, MOTION):
-            room.listen("*", stream)
-        room.show_presence(user)
+        room.listen(user)
 
     def hear(self, until: float, stopped: Sequence[int]) -> None:
         """Show what comes until a moment of `time.monotonic`, or until all who sent have gone."""
@@ -118,16 +78,9 @@ class Receiving:
                 self._room.send(user, ANSWERS, answer)
 
     def _show(self, now: float) -> None:
-        shown = self.receiver.show(now)
+        shown = list(self.receiver.show(now).values())
         for act in self.on_frame:
-            act(shown.values())
-        if self._keeps == "shown":
-            for stream, what in shown.items():
-                self.tracks.add(stream.source, what.bodies, what.moment, what.poses)
-        for keys in self.receiver.keys() if self._keeps == "keys" else ():
-            for row, moment in enumerate(keys.moments.tolist()):
-                poses = {name: poses[row] for name, poses in keys.poses.items()}
-                self.tracks.add(keys.stream.source, keys.bodies, moment, poses)
+            act(shown)
         for user in [user for user, heard in self._heard.items() if now - heard > SILENT]:
             self._leave(user)
         if self.datagrams and not self._heard and self._silent == math.inf:

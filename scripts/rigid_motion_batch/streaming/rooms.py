@@ -137,28 +137,37 @@ class Room:
     def __exit__(self, *_: object) -> None:
         self._session.close()
 
-    def listen(self, user: str, stream: str) -> None:
-        """Take what a user says from now on, or everybody with `*`."""
-        key = f"{self.name}/{user}/{stream}"
-        self._declared[f"listen {key}"] = self._session.declare_subscriber(key, self._take)
-
-    def show_presence(self, user: str) -> None:
-        """Let senders know that somebody listens, now that everything is listened to."""
+    def listen(self, user: str) -> None:
+        """Take what everybody sends from now on, and let senders know that a user listens."""
+        for stream in (SKELETON, MOTION):
+            self._subscribe(self._session, f"*/{stream}")
         key = f"{self.name}/{user}/{LISTENING}/{self._session.zid()}"
         self._declared[key] = self._session.liveliness().declare_token(key)
 
-    def watch_presence(self) -> None:
-        """Take it as something that came whenever another begins to listen, or does already."""
-        key = f"{self.name}/*/{LISTENING}/*"
-        self._declared[key] = self._session.liveliness().declare_subscriber(key, self._take, history=True)
+    def speak(self, user: str) -> None:
+        """Take the answers to a user, and whoever begins to listen, or does already."""
+        self._subscribe(self._session, f"{user}/{ANSWERS}")
+        self._subscribe(self._session.liveliness(), f"*/{LISTENING}/*", history=True)
 
-    def send(self, user: str, stream: str, datagram: bytes) -> None:
-        """Say something as a user, or answers to one."""
-        self._publisher(user, stream).put(datagram)
+    def _subscribe(self, to: zenoh.Session | zenoh.Liveliness, keys: str, **options: bool) -> None:
+        self._declared[f"take {keys}"] = to.declare_subscriber(f"{self.name}/{keys}", self._take, **options)
 
-    def leave(self, user: str, stream: str) -> None:
-        """Say that a stream is over."""
-        self._publisher(user, stream).delete()
+    def send(self, user: str, stream: str, datagram: bytes | None) -> None:
+        """Say something as a user, or answers to one; None where the stream is over."""
+        import zenoh
+
+        key, is_sure = f"{self.name}/{user}/{stream}", stream == SKELETON
+        if key not in self._declared:
+            self._declared[key] = self._session.declare_publisher(
+                key,
+                reliability=zenoh.Reliability.RELIABLE if is_sure else zenoh.Reliability.BEST_EFFORT,
+                congestion_control=zenoh.CongestionControl.DROP,
+                express=not is_sure,
+            )
+        if datagram is None:
+            self._declared[key].delete()
+        else:
+            self._declared[key].put(datagram)
 
     def come(self, seconds: float) -> list[Came]:
         """Return what came since the last call or, where that is nothing, the first thing within so many seconds."""
@@ -169,25 +178,10 @@ class Room:
                 result.append(self._came.get_nowait())
         return result
 
-    def _publisher(self, user: str, stream: str) -> Any:
-        import zenoh
-
-        key = f"{self.name}/{user}/{stream}"
-        if key not in self._declared:
-            sure = stream == SKELETON
-            self._declared[key] = self._session.declare_publisher(
-                key,
-                reliability=zenoh.Reliability.RELIABLE if sure else zenoh.Reliability.BEST_EFFORT,
-                congestion_control=zenoh.CongestionControl.DROP,
-                express=not sure,
-            )
-        return self._declared[key]
-
     def _take(self, sample: zenoh.Sample) -> None:
         """Take what came: called by Zenoh, in a thread of its own."""
         user, stream, *_ = str(sample.key_expr).removeprefix(f"{self.name}/").split("/")
-        gone = str(sample.kind) == "SampleKind.DELETE"
-        datagram: bytes | None = None if gone else sample.payload.to_bytes()
+        datagram = None if str(sample.kind) == "SampleKind.DELETE" else sample.payload.to_bytes()
         if datagram is None or len(datagram) <= LONGEST:
             with suppress(queue.Full):
                 self._came.put_nowait(Came(user, stream, datagram))

@@ -9,12 +9,11 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from rigid_motion.motion import Poses
+from rigid_motion.motion.humanoid import beside
 from rigid_motion.motion.poses import joined
-from rigid_motion.motion.quaternions import conjugate, multiply
 from rigid_motion.streams import Body, Sender
 from rigid_motion.streams.bodies import RADIUS
 from rigid_motion.streams.paths import Path
-from rigid_motion.streams.sender import KEEPALIVE
 from rigid_motion.streams.wire import Description, read
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.clips import Clip
@@ -27,9 +26,6 @@ SLIDES = 1e-4
 LOOK, AGAIN, AFTER = 0.02, 0.03, 0.3
 """Seconds after which a loop looks up, whatever comes or does not; after which the description is sent again, for many
 may ask for it at once; and for which a sender stays behind the end, beside the delay: what was lost is asked for."""
-
-ALMOST = 0.9
-"""Part of the interval of an even stream after which a key is due."""
 
 
 def samples_of(clip: Clip) -> tuple[np.ndarray, Poses]:
@@ -49,8 +45,8 @@ def body_of(clip: Clip, poses: Poses, radius: float = RADIUS) -> Body:
     """Return what is streamed of a clip. A rigid body is at rest as in its first sample."""
     if clip.rest_body is None:
         return Body.rigid(clip.name, poses[:, 0], radius)
-    parents, turns = clip.rest_body.parents, to_blender(clip.rest_body.rest, clip.axes).quaternions
-    turns = np.where((parents >= 0)[:, None], multiply(conjugate(turns[parents]), turns), turns)
+    parents = clip.rest_body.parents
+    turns = beside(to_blender(clip.rest_body.rest, clip.axes), parents).quaternions
     sliding = np.ptp(poses.positions, axis=1).max(axis=1) > SLIDES
     rest = Poses(poses.positions[:, 0], turns)
     return Body(clip.name, clip.rest_body.joints, parents, rest, radius, sliding | (parents < 0))
@@ -79,21 +75,15 @@ def even_rate(times: np.ndarray) -> float | None:
     return float(round(rate)) if abs(rate - round(rate)) < 0.01 else None
 
 
-def sender_of(bodies: list[Body], moments: np.ndarray, tolerance: float, delay: float, rate: float | None) -> Sender:
-    """Return a sender that says what is needed or, with a rate, a key at each of its ticks."""
-    return Sender(bodies, tolerance, delay, rate or even_rate(moments), ALMOST / rate if rate else KEEPALIVE)
-
-
 class Sending:
     """A sender in a room, under the name of a user."""
 
-    def __init__(self, room: Room, user: str, sender: Sender, ahead: float) -> None:
+    def __init__(self, room: Room, user: str, sender: Sender, ahead: float = 0.0) -> None:
         self.room, self.user, self.sender, self.ahead = room, user, sender, ahead
         """`ahead` by so many seconds is the clock of the motion."""
         self.datagrams = self.bytes = self.joined = 0
         self._described = -math.inf
-        room.listen(user, ANSWERS)
-        room.watch_presence()
+        room.speak(user)
 
     @property
     def now(self) -> float:
@@ -128,30 +118,27 @@ class Sending:
             if self.sender.next <= (now := self.now) < moment:
                 self.say(self.sender.poll(now))
 
-
-def play(
-    room: Room,
-    user: str,
-    sender: Sender,
-    moments: np.ndarray,
-    poses: Poses,
-    delay: float,
-    stopped: Sequence[int],
-    reach: Callable[[float, Sending], None] = lambda *_: None,
-) -> tuple[Sending, float]:
-    """Send samples (n,) of poses (joints, n) when they are due, and return the seconds that were sent."""
-    first, last = float(moments[0]), float(moments[-1])
-    sending = Sending(room, user, sender, first - time.monotonic())
-    for sample, moment in enumerate(moments.tolist()):
-        sending.until(moment, stopped)
-        if stopped:
-            break
-        sending.answer(0.0)
-        sending.say(sender.add(moment, poses[:, sample]))
-        reach(moment - first, sending)
-    seconds = sending.now - first
-    if not stopped:
-        sending.say(sender.finish())
-        sending.until(last + delay + AFTER, stopped)
-    room.leave(user, MOTION)
-    return sending, seconds
+    def play(
+        self,
+        moments: np.ndarray,
+        poses: Poses,
+        delay: float,
+        stopped: Sequence[int],
+        reach: Callable[[float], None] = lambda _: None,
+    ) -> float:
+        """Send samples (n,) of poses (joints, n) when they are due, and return the seconds that were sent."""
+        first, last = float(moments[0]), float(moments[-1])
+        self.ahead = first - time.monotonic()
+        for sample, moment in enumerate(moments.tolist()):
+            self.until(moment, stopped)
+            if stopped:
+                break
+            self.answer(0.0)
+            self.say(self.sender.add(moment, poses[:, sample]))
+            reach(moment - first)
+        seconds = self.now - first
+        if not stopped:
+            self.say(self.sender.finish())
+            self.until(last + delay + AFTER, stopped)
+        self.room.send(self.user, MOTION, None)
+        return seconds

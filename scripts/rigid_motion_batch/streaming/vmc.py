@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
 
 import numpy as np
 
 from rigid_motion.live.sockets import Address, Outlet, Port
 from rigid_motion.motion import Poses
 from rigid_motion.streams import Body, Keys, Shown
-from rigid_motion.streams.receiver import Stream
-from rigid_motion.streams.vmc import SILENT, Performer, VmcReceiver, write, write_trackers
+from rigid_motion.streams.vmc import Performer, VmcReceiver, write, write_trackers
 
 RATE = 90.0
 """Frames a second at most: programs draw no faster."""
+
+
+@lru_cache(maxsize=16)
+def performer_of(body: Body) -> Performer | None:
+    """Return what a skeleton is to VMC; None where it is no person."""
+    performer = Performer(body.joints, body.in_root_space(body.rest))
+    return performer if "Hips" in performer.bones else None
 
 
 class ToVmc(Outlet):
@@ -27,29 +33,23 @@ class ToVmc(Outlet):
         super().__init__(*to)
         self.datagrams = 0
         self._began = time.monotonic()
-        self._performer: tuple[Body | None, Performer | None] = None, None
 
-    def show(self, shown: Iterable[Shown], moment: float | None = None) -> None:
-        """Show what streams show; the moment is that of the clock, unless it is given."""
-        moment = time.monotonic() - self._began if moment is None else moment
+    def show(self, shown: Iterable[Shown]) -> None:
+        """Show what streams show now."""
+        bodies = [(body, what.poses[body.name]) for what in shown for body in what.bodies]
+        self.say_frame(time.monotonic() - self._began, bodies)
+
+    def say_frame(self, moment: float, bodies: Iterable[tuple[Body, Poses]]) -> None:
+        """Say the poses (joints,) of bodies, each joint in its parent's space, at a moment."""
         trackers, datagrams = {}, list[bytes]()
-        for what in shown:
-            for body in what.bodies:
-                poses = what.poses[body.name]
-                if len(body.joints) == 1:
-                    trackers[body.name] = poses[0]
-                elif not datagrams and (performer := self.performer_of(body)):
-                    datagrams = write(moment, performer(body.in_root_space(poses)))
+        for body, poses in bodies:
+            if len(body.joints) == 1:
+                trackers[body.name] = poses[0]
+            elif not datagrams and (performer := performer_of(body)):
+                datagrams = write(moment, performer(body.in_root_space(poses)))
         for datagram in datagrams + write_trackers(trackers):
             self.say(datagram)
             self.datagrams += 1
-
-    def performer_of(self, body: Body) -> Performer | None:
-        """Return what a skeleton is to VMC; None where it is no person."""
-        if self._performer[0] is not body:
-            performer = Performer(body.joints, body.in_root_space(body.rest))
-            self._performer = body, performer if "Hips" in performer.bones else None
-        return self._performer[1]
 
 
 def play(
@@ -65,20 +65,19 @@ def play(
     `stopped` ends it as soon as something is in it; `reach` is given the seconds that were played.
     Raises OSError where `to` is no address, and ValueError where no bone of a body is a person's.
     """
+    moments = moments - moments[0]
+    _, rows = np.unique(np.floor(moments * RATE + 0.01), return_index=True)
     with ToVmc(to) as outlet:
-        if len(body.joints) > 1 and not outlet.performer_of(body):
+        if len(body.joints) > 1 and not performer_of(body):
             raise ValueError(f"{body.name}: none of its joints is named as the hips of a person, which VMC begins with")
-        began, last = time.monotonic(), -np.inf
-        for row, moment in enumerate((moments - moments[0]).tolist()):
-            if moment - last < 0.99 / RATE and row < len(moments) - 1:
-                continue
-            while not stopped and (wait := began + moment - time.monotonic()) > 0.0:
+        began = time.monotonic()
+        for row in np.union1d(rows, len(moments) - 1).tolist():
+            while not stopped and (wait := began + moments[row] - time.monotonic()) > 0.0:
                 time.sleep(min(wait, 0.1))
             if stopped:
                 break
-            outlet.show([Shown(moment, (body,), {body.name: poses[:, row]})], moment)
-            last = moment
-            reach(moment)
+            outlet.say_frame(moments[row], [(body, poses[:, row])])
+            reach(moments[row])
         return outlet.datagrams
 
 
@@ -91,20 +90,12 @@ class Performers(Port):
     def __init__(self, port: int) -> None:
         super().__init__(port=port)
         self._receiver = VmcReceiver()
-        self._stream: Stream | None = None
-        self._heard = -math.inf
 
     def samples(self) -> list[Keys]:
         """Return what came since the last call. Bodies are others as soon as bones or devices come that are new."""
-        now, result = time.monotonic(), []
+        now = time.monotonic()
         for datagram, source in self.received():
             self._receiver.take(datagram, now, source)
         self._receiver.show(now)
-        came = self._receiver.keys()
-        for keys in came:
-            if now - self._heard > SILENT:
-                self._stream = keys.stream
-            if keys.stream == self._stream:
-                self._heard = now
-                result.append(keys)
-        return result
+        came, first = self._receiver.keys(), self._receiver.streams[:1]
+        return [keys for keys in came if keys.stream in first]

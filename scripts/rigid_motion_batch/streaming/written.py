@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple, TextIO, cast
 
 import numpy as np
 
 from rigid_motion.motion import Poses, interpolate
-from rigid_motion.streams import Body
+from rigid_motion.motion.poses import joined
+from rigid_motion.streams import Body, Keys, Shown
 from rigid_motion_batch.analysis.metrics import lines_of_poses, write_poses
 from rigid_motion_batch.axes import from_blender
 from rigid_motion_batch.files import replacing
@@ -30,6 +31,33 @@ class Motion(NamedTuple):
         """Return so many poses a second instead, with the in-betweens of a mode."""
         times = self.times[0] + np.arange(int((self.times[-1] - self.times[0]) * fps + 1e-6) + 1) / fps
         return self._replace(times=times, poses=interpolate(self.times, self.poses, times, mode))
+
+
+class Tracks(dict[tuple[str, Body], list[tuple[np.ndarray, Poses]]]):
+    """What was shown of all bodies of all users, or their keys, piece by piece."""
+
+    def add_shown(self, shown: Iterable[Shown]) -> None:
+        """Add a frame."""
+        for what in shown:
+            poses = {name: own[:, None] for name, own in what.poses.items()}
+            self.add_keys([Keys(what.stream, what.bodies, np.array([what.moment]), poses)])
+
+    def add_keys(self, came: Iterable[Keys]) -> None:
+        """Add keys."""
+        for keys in came:
+            for body in keys.bodies:
+                self.setdefault((str(keys.stream.source), body), []).append((keys.moments, keys.poses[body.name]))
+
+    def motions(self) -> list[Motion]:
+        """Return those of which there is more than a pose, at moments that rise."""
+        result = []
+        for (user, body), pieces in self.items():
+            times = np.concatenate([moments for moments, _ in pieces])
+            rising = np.flatnonzero(np.diff(np.maximum.accumulate(times), prepend=-np.inf) > 0.0)
+            if len(rising) > 1:
+                poses = joined([poses for _, poses in pieces], axis=1)[:, rising]
+                result.append(Motion(f"{user}-{body.name}", body, times[rising], poses))
+        return result
 
 
 def write_motions(path: Path, motions: Sequence[Motion], fps: float) -> list[Path]:

@@ -12,7 +12,6 @@ import pytest
 
 from rigid_motion.motion import Poses, Skeleton
 from rigid_motion.streams import Body, Receiver, Sender
-from rigid_motion.streams.paths import transposed
 from rigid_motion.streams.vmc import VmcReceiver, write_trackers
 from rigid_motion_batch.cli import stream
 from rigid_motion_batch.places import CHECKOUT
@@ -109,7 +108,7 @@ def test_the_command_plays_a_body_in_real_time(walk, listener):
     (body,) = keys.bodies
     assert body.joints == ("Root", "Hips", "LeftUpperLeg", "LeftLowerLeg", "LeftFoot")
     # Blender has the y axis of a BVH up; centimetres are found out by the size of the body.
-    assert keys.poses["VMC"].positions[5, 1] == pytest.approx([0.05, 0.0, 1.65], abs=1e-5)
+    assert keys.poses["VMC"].positions[1, 5] == pytest.approx([0.05, 0.0, 1.65], abs=1e-5)
 
 
 def test_a_single_body_is_a_tracker(hand, listener):
@@ -143,11 +142,11 @@ def test_performers_are_bodies_with_samples():
         assert performers.samples() == []
     (body,), poses = keys.bodies, keys.poses["VMC"]
     assert keys.moments == pytest.approx(TIMES_OF_A_SECOND, abs=1e-6)
-    shown = dict(zip(body.joints, Skeleton(body.parents).in_root_space(transposed(poses)).positions, strict=True))
+    shown = dict(zip(body.joints, Skeleton(body.parents).in_root_space(poses).positions, strict=True))
     for name, places in zip(JOINTS, in_world(dance(TIMES_OF_A_SECOND)).positions, strict=True):
         assert shown[name] == pytest.approx(places, abs=1e-5)
     # What a sender of a room takes.
-    assert Sender([body]).add(float(keys.moments[0]), poses[0])
+    assert Sender([body]).add(float(keys.moments[0]), poses[:, 0])
 
 
 def test_trackers_beside_a_performer_are_bodies_with_samples():
@@ -159,8 +158,8 @@ def test_trackers_beside_a_performer_are_bodies_with_samples():
         time.sleep(0.01)
         (keys,) = performers.samples()
     assert [body.name for body in keys.bodies] == ["VMC", "ball"]
-    assert keys.poses["ball"].positions[:, 0, 0] == pytest.approx(keys.moments, abs=1e-6)
-    assert Sender(keys.bodies).add(float(keys.moments[0]), {name: poses[0] for name, poses in keys.poses.items()})
+    assert keys.poses["ball"].positions[0, :, 0] == pytest.approx(keys.moments, abs=1e-6)
+    assert Sender(keys.bodies).add(float(keys.moments[0]), {name: poses[:, 0] for name, poses in keys.poses.items()})
 
 
 def test_what_a_receiver_shows_goes_to_another_program(listener):
@@ -181,7 +180,7 @@ def test_what_a_receiver_shows_goes_to_another_program(listener):
     for row, datagram in enumerate(datagrams):
         performer.take(datagram, 0.001 * row)
     (keys,) = performer.keys()
-    assert keys.poses["VMC"].positions[-1, 1] == pytest.approx(in_world(poses).positions[0, -7], abs=0.005)
+    assert keys.poses["VMC"].positions[1, -1] == pytest.approx(in_world(poses).positions[0, -7], abs=0.005)
 
 
 @pytest.mark.parametrize(
