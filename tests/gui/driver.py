@@ -83,6 +83,11 @@ class Hand:
         """The largest area of this type in the window."""
         return places.area(self.window, kind)
 
+    def open_animation_workspace(self) -> Steps[None]:
+        """Show the viewport beside the Dope Sheet."""
+        self.window.workspace = bpy.data.workspaces["Animation"]
+        yield from self.wait_until(lambda: self.window.screen.name == "Animation", "the Animation workspace opens")
+
     # What a mouse does
 
     def hover(self, place: Place) -> Steps[None]:
