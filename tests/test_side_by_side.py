@@ -1,4 +1,4 @@
-"""Tests in workers: what goes wrong in one of them makes the whole run red, and nothing else does."""
+"""Tests in workers, where every test has to run: slow ones do, and what goes wrong makes the whole run red."""
 
 import os
 import subprocess
@@ -9,7 +9,7 @@ import pytest
 
 from tests.conftest import EVERY_TEST
 
-SOUND = "def test_sound(): pass"
+SLOW = "import pytest\n@pytest.mark.slow\ndef test_slow(): pass"
 SKIPPED = "import pytest\ndef test_skipped(): pytest.skip()"
 LOST_AT_THE_END = """
 import os
@@ -34,8 +34,8 @@ def run(folder: Path, files: dict[str, str], *options: str) -> subprocess.Comple
 @pytest.mark.parametrize(
     ("files", "said"),
     [
-        ({"test_a.py": SOUND, "test_b.py": SKIPPED}, "1 failed, 1 passed"),
-        ({"end/test_a.py": SOUND, "end/conftest.py": LOST_AT_THE_END}, "A worker ended before its time"),
+        ({"test_a.py": SLOW, "test_b.py": SKIPPED}, "1 failed, 1 passed"),
+        ({"end/test_a.py": SLOW, "end/conftest.py": LOST_AT_THE_END}, "A worker ended before its time"),
     ],
     ids=["skipped", "lost at the end"],
 )
