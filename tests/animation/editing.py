@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import bpy
 import numpy as np
 from hypothesis import strategies as st
@@ -129,39 +127,6 @@ class Editing(Machine):
                     if abs(point.co[0] - frame) < SAME_FRAME:
                         yield fcurve, point
 
-    def _edit_curve(self, who: float, which: float, change: Callable[[bpy.types.FCurve], None]) -> None:
-        """Edit one of the channels that a carrier has keys in, if there is any."""
-        name = self._named(who)
-
-        def edit() -> None:
-            fcurve = self._curve(self._found(name), which)
-            if fcurve is not None:
-                change(fcurve)
-                fcurve.update()
-
-        self._edit(edit)
-
-    def _edit_keys(
-        self,
-        who: float,
-        which: float,
-        change: Callable[[bpy.types.FCurve, bpy.types.Keyframe], None],
-        *,
-        one_channel: bool = False,
-        with_mode: bool = False,
-    ) -> None:
-        """Edit the keys on one of the frames that a carrier has any on, of all channels or of the first."""
-        name = self._named(who)
-
-        def edit() -> None:
-            obj = self._found(name)
-            frame = self._frame(obj, which)
-            if frame is not None:
-                for fcurve, point in list(self._keys_on(obj, frame, with_mode))[: 1 if one_channel else None]:
-                    change(fcurve, point)
-
-        self._edit(edit)
-
     # Edits
 
     @precondition(lambda self: self.on)
@@ -231,11 +196,17 @@ class Editing(Machine):
 
     @rule(who=shares, which=shares, kind=st.sampled_from(("KEYFRAME", "BREAKDOWN")))
     def set_the_type_of_keys(self, who, which, kind):
-        def change(fcurve: bpy.types.FCurve, point: bpy.types.Keyframe) -> None:
-            point.type = kind
-            fcurve.update()
+        name = self._named(who)
 
-        self._edit_keys(who, which, change)
+        def change() -> None:
+            obj = self._found(name)
+            frame = self._frame(obj, which)
+            if frame is not None:
+                for fcurve, point in self._keys_on(obj, frame, False):
+                    point.type = kind
+                    fcurve.update()
+
+        self._edit(change)
 
     @rule(who=shares, seed=seeds, frame=frames_in)
     def pose_it_without_a_key_and_go_elsewhere(self, who, seed, frame):
@@ -277,18 +248,29 @@ class Editing(Machine):
 
     @rule(who=shares, which=shares, one_channel=st.booleans())
     def delete_keys(self, who, which, one_channel):
-        def delete(fcurve: bpy.types.FCurve, point: bpy.types.Keyframe) -> None:
-            fcurve.keyframe_points.remove(point)
+        name = self._named(who)
 
-        self._edit_keys(who, which, delete, one_channel=one_channel, with_mode=True)
+        def delete() -> None:
+            obj = self._found(name)
+            frame = self._frame(obj, which)
+            if frame is not None:
+                for fcurve, point in list(self._keys_on(obj, frame))[: 1 if one_channel else None]:
+                    fcurve.keyframe_points.remove(point)
+
+        self._edit(delete)
 
     @rule(who=shares, which=shares, at=shares, seed=seeds)
     def change_a_value(self, who, which, at, seed):
-        def change(fcurve: bpy.types.FCurve) -> None:
-            point = fcurve.keyframe_points[int(at * len(fcurve.keyframe_points))]
-            point.co_ui.y = np.exp(np.random.default_rng(seed).normal())
+        name = self._named(who)
 
-        self._edit_curve(who, which, change)
+        def change() -> None:
+            fcurve = self._curve(self._found(name), which)
+            if fcurve is not None:
+                point = fcurve.keyframe_points[int(at * len(fcurve.keyframe_points))]
+                point.co_ui.y = np.exp(np.random.default_rng(seed).normal())
+                fcurve.update()
+
+        self._edit(change)
 
     @rule(
         who=shares,
@@ -299,34 +281,60 @@ class Editing(Machine):
         shape=st.tuples(st.floats(0.0, 3.0), st.floats(0.0, 2.0), periods),
     )
     def ease(self, who, which, interpolation, easing, one_channel, shape):
-        def change(fcurve: bpy.types.FCurve, point: bpy.types.Keyframe) -> None:
-            point.interpolation, point.easing = interpolation, easing
-            point.back, point.amplitude, point.period = shape
-            fcurve.update()
+        name = self._named(who)
 
-        self._edit_keys(who, which, change, one_channel=one_channel)
+        def change() -> None:
+            obj = self._found(name)
+            frame = self._frame(obj, which)
+            if frame is not None:
+                for fcurve, point in list(self._keys_on(obj, frame, False))[: 1 if one_channel else None]:
+                    point.interpolation, point.easing = interpolation, easing
+                    point.back, point.amplitude, point.period = shape
+                    fcurve.update()
+
+        self._edit(change)
 
     @rule(who=shares, which=shares, at=shares, kind=st.sampled_from(HANDLES), seed=seeds)
     def shape_handles(self, who, which, at, kind, seed):
-        def change(fcurve: bpy.types.FCurve) -> None:
-            point = fcurve.keyframe_points[int(at * len(fcurve.keyframe_points))]
-            point.interpolation = "BEZIER"
-            point.handle_left_type = point.handle_right_type = kind
-            by = np.random.default_rng(seed).normal(size=4) * (5.0, 1.0, 5.0, 1.0)
-            point.handle_left = point.co[0] - abs(by[0]), point.co[1] + by[1]
-            point.handle_right = point.co[0] + abs(by[2]), point.co[1] + by[3]
+        name = self._named(who)
 
-        self._edit_curve(who, which, change)
+        def change() -> None:
+            fcurve = self._curve(self._found(name), which)
+            if fcurve is not None:
+                point = fcurve.keyframe_points[int(at * len(fcurve.keyframe_points))]
+                point.interpolation = "BEZIER"
+                point.handle_left_type = point.handle_right_type = kind
+                by = np.random.default_rng(seed).normal(size=4) * (5.0, 1.0, 5.0, 1.0)
+                point.handle_left = point.co[0] - abs(by[0]), point.co[1] + by[1]
+                point.handle_right = point.co[0] + abs(by[2]), point.co[1] + by[3]
+                fcurve.update()
+
+        self._edit(change)
 
     @rule(who=shares, which=shares, linear=st.booleans())
     def extrapolate(self, who, which, linear):
-        kind = "LINEAR" if linear else "CONSTANT"
-        self._edit_curve(who, which, lambda fcurve: setattr(fcurve, "extrapolation", kind))
+        name = self._named(who)
+
+        def change() -> None:
+            fcurve = self._curve(self._found(name), which)
+            if fcurve is not None:
+                fcurve.extrapolation = "LINEAR" if linear else "CONSTANT"
+                fcurve.update()
+
+        self._edit(change)
 
     @rule(who=shares, which=shares)
     def mute_a_channel(self, who, which):
-        if len(self._sharing(self._named(who))) == 1:
-            self._edit_curve(who, which, lambda fcurve: setattr(fcurve, "mute", not fcurve.mute))
+        name = self._named(who)
+        if len(self._sharing(name)) > 1:
+            return
+
+        def change() -> None:
+            fcurve = self._curve(self._found(name), which)
+            if fcurve is not None:
+                fcurve.mute = not fcurve.mute
+
+        self._edit(change)
 
     @rule(who=shares, at=shares, mode=st.none() | st.sampled_from(MODE_IDS))
     def mute_the_mode_channel_or_change_a_key_of_it(self, who, at, mode):
@@ -373,7 +381,10 @@ class Editing(Machine):
             return
         chosen = sorted({float(keys[number % len(keys)]) for number in which})
 
-        self._edit(lambda: animation.set_turns(self._found(name), turns, chosen, refused=[]) and None)
+        def change() -> None:
+            animation.set_turns(self._found(name), turns, chosen, refused=[])
+
+        self._edit(change)
 
     @precondition(lambda self: self.on)
     @rule(who=shares, mode=st.sampled_from(MODE_IDS))

@@ -48,6 +48,6 @@ class EditingBonesInAWindow(EditingBones):
 
 
 EditingBonesInAWindow.TestCase.settings = settings(
-    EditingBones.TestCase.settings, max_examples=12 if THOROUGH else 4, stateful_step_count=30
+    EditingBones.TestCase.settings, max_examples=20 if THOROUGH else 4, stateful_step_count=30
 )
 TestBoneEditsInAWindow = EditingBonesInAWindow.TestCase

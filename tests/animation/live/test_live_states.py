@@ -308,7 +308,7 @@ class EditingObjects(TakenAway, Exchanging):
 
 
 EditingObjects.TestCase.settings = settings(
-    max_examples=24 if THOROUGH else 6,
+    max_examples=40 if THOROUGH else 6,
     stateful_step_count=25,
     deadline=None,
     derandomize=True,
