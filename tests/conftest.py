@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 os.environ["PYTHONPATH"] = os.pathsep.join(str(ROOT / folder) for folder in ("", "addon", "scripts"))
 """Processes that tests start find what the tests find; pytest has put these on the path of its own alone."""
 
-EVERY_TEST = "RIGID_MOTION_EVERY_TEST"
+EVERY_TEST, THOROUGH = "RIGID_MOTION_EVERY_TEST", "RIGID_MOTION_THOROUGH"
 
 WORKERS = 8
 """The most that are started: each is a Blender of half a gigabyte, which first collects all tests."""
@@ -51,11 +51,15 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
     option = config.option
     at_liberty = getattr(option, "numprocesses", 0) is None and not hasattr(config, "workerinput")
     watched = option.usepdb or option.trace or option.capture == "no"
-    files = {config.invocation_params.dir / argument.split("::")[0] for argument in config.args}
-    if at_liberty and not watched and (len(files) > 1 or any(file.is_dir() for file in files)):
+    if at_liberty and not watched and _has_several_files(config):
         option.numprocesses = "auto"
         # A worker begins with neighbouring tests, which share what a module sets up, and helps others when it is done.
         option.dist = "worksteal" if option.dist == "no" else option.dist
+
+
+def _has_several_files(config: pytest.Config) -> bool:
+    files = {config.invocation_params.dir / argument.split("::")[0] for argument in config.args}
+    return len(files) > 1 or any(file.is_dir() for file in files)
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -115,13 +119,20 @@ def pytest_make_collect_report(collector: pytest.Collector):
     return report
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what needs Blender in this process, and what opens windows of it."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark what needs Blender in this process, and what opens windows of it; leave out what is slow.
+
+    Slow tests run where every test has to, in thorough runs, where `-m` chooses, and where their file is named alone.
+    """
     for item in items:
         if hasattr(item.module, "bpy") or IN_BLENDER & {*item.fixturenames}:
             item.add_marker("blender")
         if (ROOT / "tests" / "gui") in item.path.parents:
             item.add_marker("gui")
+    asked_for = os.environ.get(EVERY_TEST) or os.environ.get(THOROUGH) or config.option.markexpr
+    if not asked_for and _has_several_files(config):
+        config.hook.pytest_deselected(items=[item for item in items if item.get_closest_marker("slow")])
+        items[:] = [item for item in items if not item.get_closest_marker("slow")]
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

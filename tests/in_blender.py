@@ -2,11 +2,13 @@
 
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 import pytest
 
+import rigid_motion
 from rigid_motion_batch.cli.build_extension import build
 from tests.blank import blank
 from tests.rigs import human as rigify
@@ -36,6 +38,16 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 def empty_file() -> bpy.types.Context:
     """A new file without objects, at factory settings."""
     return blank()
+
+
+@pytest.fixture
+def extension(empty_file: bpy.types.Context) -> Iterator[bpy.types.Context]:
+    """A new file, and the extension as it is when Blender has switched it on."""
+    rigid_motion.register()
+    try:
+        yield empty_file
+    finally:
+        rigid_motion.unregister()
 
 
 @pytest.fixture

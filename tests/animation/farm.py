@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,12 +24,32 @@ opened = np.array(worlds())
 """
 
 PLAY = """
-played = []
+rigs = [name for name in names if bpy.data.objects[name].pose]
+assert not hasattr(bpy.types.PoseBone, "rigid_motion")
+poses = lambda: [bone.matrix for name in rigs for bone in bpy.data.objects[name].evaluated_get(graph).pose.bones]
+opened_poses, played, played_poses = np.array(poses()), [], []
 for frame in np.load(found):
     scene.frame_set(int(frame))
     played.append(np.array(worlds()))
-np.savez(found.replace(".npy", ".npz"), opened=opened, played=np.array(played))
+    played_poses.append(np.array(poses()))
+worlds, poses = np.swapaxes(played, 0, 1), np.swapaxes(played_poses, 0, 1)
+np.savez(found.replace(".npy", ".npz"), opened=opened, worlds=worlds, opened_poses=opened_poses, poses=poses)
 """
+
+SAVE = """
+bpy.ops.wm.save_as_mainfile(filepath=found if found.endswith(".blend") else found.replace(".npy", "-farm.blend"))
+"""
+
+
+class Played(NamedTuple):
+    """What a file shows as it is opened, and on all frames played: world matrices of objects, and those of the bones of
+    rigs in their armature's space, (., 4, 4) and (., frames, 4, 4).
+    """
+
+    opened: np.ndarray
+    worlds: np.ndarray
+    opened_poses: np.ndarray
+    poses: np.ndarray
 
 
 def on_a_farm(program: str, *arguments: object) -> None:
@@ -43,10 +64,10 @@ def on_a_farm(program: str, *arguments: object) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def played_on_a_farm(path: Path, names: Sequence[str], played: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """World matrices as the file is opened (objects, 4, 4), and on all frames played (objects, frames, 4, 4)."""
-    frames = path.with_suffix(".npy")
-    np.save(frames, played)
-    on_a_farm(PLAY, path, frames, *names)
-    with np.load(frames.with_suffix(".npz")) as result:
-        return result["opened"], result["played"].swapaxes(0, 1)
+def played_on_a_farm(path: Path, names: Sequence[str], frames: np.ndarray, then: str = "") -> Played:
+    """Play a file there, and run a program on it afterwards; `SAVE` saves it as NAME-farm.blend."""
+    found = path.with_suffix(".npy")
+    np.save(found, frames)
+    on_a_farm(PLAY + then, path, found, *names)
+    with np.load(found.with_suffix(".npz")) as result:
+        return Played(**result)

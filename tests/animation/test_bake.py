@@ -5,7 +5,6 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
 from rigid_motion.animation import bake, bake_poses, read_poses, set_mode, unbake, write_channel
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
@@ -19,14 +18,7 @@ from tests.animation.scenes import FRAMES, key, new_object
 @pytest.fixture
 def empty(empty_file) -> bpy.types.Object:
     """An empty in quaternion mode, in the scene."""
-    return new_empty("Tool")
-
-
-def new_empty(name: str) -> bpy.types.Object:
-    obj = bpy.data.objects.new(name, None)
-    obj.rotation_mode = "QUATERNION"
-    bpy.context.collection.objects.link(obj)
-    return obj
+    return new_object("Tool")
 
 
 def motion(count: int = 60, scaled: bool = False, step: float = 1.0) -> tuple[np.ndarray, Poses]:
@@ -41,12 +33,6 @@ def motion(count: int = 60, scaled: bool = False, step: float = 1.0) -> tuple[np
     poses = interpolate(np.linspace(frames[0], frames[-1], 8), keys, frames, "dq_sclerp")
     poses.quaternions[::2] *= -1.0
     return frames, poses
-
-
-def keys_of(obj: bpy.types.Object) -> dict[tuple[str, int], bpy.types.FCurve]:
-    data = obj.animation_data
-    channelbag = action_get_channelbag_for_slot(data.action, data.action_slot)
-    return {(fcurve.data_path, fcurve.array_index): fcurve for fcurve in channelbag.fcurves}
 
 
 def assert_read_back(obj: bpy.types.Object, frames: np.ndarray, poses: Poses) -> None:
@@ -75,7 +61,7 @@ def test_baking_again_replaces_the_keys_and_leaves_other_channels(empty):
     write_channel(empty, "hide_render", frames[:2], np.array([0.0, 1.0]), interpolation="CONSTANT")
     bake_poses(empty, frames, poses)
     bake_poses(empty, frames[:30], poses[:30])
-    curves = keys_of(empty)
+    curves = curves_of(empty)
     assert len(curves["location", 0].keyframe_points) == 30
     assert len(curves["hide_render", 0].keyframe_points) == 2
     assert len(curves) == 8
@@ -84,7 +70,7 @@ def test_baking_again_replaces_the_keys_and_leaves_other_channels(empty):
 def test_a_shared_action_keeps_what_others_have_in_it(empty):
     frames, poses = motion()
     bake_poses(empty, frames, poses)
-    other = new_empty("Other")
+    other = new_object("Other")
     data = other.animation_data_create()
     data.action = empty.animation_data.action
     data.action_slot = data.action.slots.new("OBJECT", "Other")
@@ -99,7 +85,7 @@ def test_euler_objects_of_every_order_take_the_same_poses(empty, order):
     frames, poses = motion(200)
     empty.rotation_mode = order
     bake_poses(empty, frames, poses)
-    assert {path for path, _ in keys_of(empty)} == {"location", "rotation_euler"}
+    assert {path for path, _ in curves_of(empty)} == {"location", "rotation_euler"}
     assert_read_back(empty, frames, poses)
 
 
@@ -169,3 +155,24 @@ def test_delta_scales_that_cancel_out_leave_the_scale_to_blender(live_file):
     for index in range(3):
         points = curves_of(obj)["scale", index].keyframe_points
         assert np.isfinite([point.co.y for point in points]).all()
+
+
+@pytest.mark.parametrize(
+    ("modes", "options", "baked"),
+    [
+        ({1: "motor_spline"}, {"last": 12}, (1.0, 41.0)),
+        ({1: "motor_spline"}, {"first": 30}, (1.0, 41.0)),
+        ({1: "motor_spline", 31: "dq_sclerp"}, {"last": 12}, (1.0, 31.0)),
+        ({1: "dq_sclerp", 11: "motor_spline"}, {"last": 5}, (1.0, 41.0)),
+        ({1: "dq_sclerp", 11: "pga_lerp", 31: "motor_spline"}, {"last": 5}, (1.0, 11.0)),
+    ],
+    ids=str,
+)
+def test_what_a_smooth_mode_hangs_together_with_is_baked_as_a_whole(live_file, modes, options, baked):
+    frames = np.arange(1.0, 42.0)
+    obj = key(new_object(), frames[::10], interpolation="LINEAR")
+    for frame, mode in modes.items():
+        set_mode(obj, mode, [one for one in frames[::10] if one >= frame])
+    before = read_poses(obj, frames)
+    assert bake(obj, **options) == baked
+    assert_read_back(obj, frames, before)

@@ -31,6 +31,7 @@ from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate, interpolate_
 from rigid_motion.motion.quaternions import multiply
 from tests.animation.bones.rigs import in_turn
 from tests.animation.keyed import curves_of, rotation_path, snapshot
+from tests.animation.oracle import shown_worlds
 from tests.animation.reduced import RADIUS, TOLERANCE, keys_of, motion, off, recorded
 from tests.animation.scenes import give_own_deltas, key, new_object
 
@@ -263,18 +264,12 @@ def test_a_scale_that_only_stands_there_on_every_frame_goes_with_the_keys(live_f
     obj = recorded()
     frames = key_frames(obj)
     write_channel(obj, "scale", frames, np.repeat(np.array((scale,)), len(frames), axis=0))
-    before = [np.array(matrix) for matrix in worlds(obj, frames)]
+    (before,) = shown_worlds([obj], frames)
     reduction = reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
     assert keys_of(obj, "scale") == keys_of(obj, "location")
     assert reduction.after < 0.5 * reduction.before
-    moved = [np.array(matrix)[:3, 3] for matrix in worlds(obj, frames)]
-    assert max(np.linalg.norm(a - b[:3, 3]) for a, b in zip(moved, before, strict=True)) <= TOLERANCE * (1.0 + 1e-5)
-
-
-def worlds(obj: bpy.types.Object, frames: np.ndarray):
-    for frame in frames.tolist():
-        bpy.context.scene.frame_set(int(frame))
-        yield obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.copy()
+    moved = (shown_worlds([obj], frames)[0] - before)[:, :3, 3]
+    assert np.linalg.norm(moved, axis=1).max() <= TOLERANCE * (1.0 + 1e-5)
 
 
 def test_a_scale_that_differs_from_axis_to_axis_keeps_its_keys_and_the_motion_keeps_to_the_tolerance(live_file):
@@ -284,11 +279,11 @@ def test_a_scale_that_differs_from_axis_to_axis_keeps_its_keys_and_the_motion_ke
         obj, "scale", frames[[0, 50, 90]], np.array(((1, 1, 1), (1, 2, 0.5), (1, 1, 3))), interpolation="SINE"
     )
     scales = {name: value for name, value in snapshot(obj).items() if name[0] == "scale"}
-    truth = np.array([matrix.translation for matrix in worlds(obj, frames)])
+    (truth,) = shown_worlds([obj], frames)
     reduction = reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
     assert scales.items() <= snapshot(obj).items()
-    shown = np.array([matrix.translation for matrix in worlds(obj, frames)])
-    assert np.linalg.norm(shown - truth, axis=1).max() <= TOLERANCE * (1.0 + 1e-5)
+    moved = (shown_worlds([obj], frames)[0] - truth)[:, :3, 3]
+    assert np.linalg.norm(moved, axis=1).max() <= TOLERANCE * (1.0 + 1e-5)
     assert reduction.after == len(key_frames(obj)) < reduction.before
 
 

@@ -13,16 +13,16 @@ import numpy as np
 import pytest
 
 from rigid_motion import animation
-from rigid_motion.animation import is_baked, modes_of, refresh, set_enabled, set_mode
+from rigid_motion.animation import is_baked, modes_of, problem_of, refresh, set_enabled, set_mode
 from rigid_motion.motion import KEYFRAME_MODES
-from tests.animation.farm import on_a_farm, played_on_a_farm
+from tests.animation.bones import rigs
+from tests.animation.bones.poses import assert_posed, assert_same_poses, expected_poses, names_of, shown_poses
+from tests.animation.bones.rigs import INHERIT_SCALES, PLAYED, key_all, moving_rig, new_rig
+from tests.animation.farm import SAVE, on_a_farm, played_on_a_farm
 from tests.animation.keyed import curves_of, snapshot
 from tests.animation.oracle import Own, assert_shown, expected_worlds, shown_worlds
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own_deltas
 from tests.thoroughness import sample
-
-PLAYED = np.arange(-2.0, 44.0)
-"""From before the first key until after the last."""
 
 ORDERS = ("QUATERNION", "XYZ", "ZYX", "YXZ")
 
@@ -56,12 +56,24 @@ def every_mode_and_kind() -> tuple[list[bpy.types.Object], dict[str, Own]]:
     return [*objects, parent], owns
 
 
-def test_every_mode_plays_alike_in_a_blender_without_the_extension(live_file, tmp_path):
+def named(rig: bpy.types.Object, poses: np.ndarray) -> dict[str, np.ndarray]:
+    """Matrices of the bones of a rig (bones, ...) by their names."""
+    return dict(zip(names_of(rig), poses, strict=True))
+
+
+@pytest.mark.parametrize("order", sample(rigs.ORDERS))
+def test_every_mode_plays_alike_in_a_blender_without_the_extension(live_file, tmp_path, order):
     objects, owns = every_mode_and_kind()
+    rig = key_all(new_rig(rotation_mode=order), scale="even")
+    for place, (mode, bone) in enumerate(zip(list(KEYFRAME_MODES) * 2, rig.pose.bones, strict=False)):
+        bone.bone.inherit_scale = INHERIT_SCALES[place]
+        set_mode(bone, mode)
+    set_mode(rig.pose.bones["Lower"], "motor_spline", [FRAMES[1]])
     assert_shown(objects, PLAYED, owns)
-    shown = shown_worlds(objects, PLAYED)
-    _, played = played_on_a_farm(save(tmp_path / "shot.blend"), [obj.name for obj in objects], PLAYED)
-    assert_same(played, shown)
+    shown, posed = shown_worlds(objects, PLAYED), expected_poses(rig, PLAYED)
+    played = played_on_a_farm(save(tmp_path / "shot.blend"), [obj.name for obj in (*objects, rig)], PLAYED)
+    assert_same(played.worlds[:-1], shown)
+    assert_same_poses(rig, PLAYED, named(rig, played.poses), posed)
     for obj in objects:
         set_mode(obj, "BLENDER")
     native = shown_worlds(objects, PLAYED)
@@ -69,55 +81,71 @@ def test_every_mode_plays_alike_in_a_blender_without_the_extension(live_file, tm
     assert np.mean(differing) > 0.7, "in most of these the modes are to be seen, or this test says nothing"
 
 
+def tool_and_rig(mode: str, order: str = "QUATERNION", own: bool = True, **settings: object):
+    """An object and a rig that have a mode, and the object's delta transforms of its own."""
+    obj = new_object("Tool", order)
+    owns = {"Tool": give_own_deltas(obj)} if own else {}
+    key(obj, **settings)
+    rig = moving_rig(mode, **settings)
+    set_mode(obj, mode)
+    return obj, rig, owns
+
+
+def reopened(path: Path) -> tuple[bpy.types.Object, bpy.types.Object]:
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    return bpy.data.objects["Tool"], bpy.data.objects["Rig"]
+
+
 @pytest.mark.parametrize("frame", sample([17.25, 7.0, 400.0]))
 def test_a_file_opens_as_it_was_to_be_seen_on_the_frame_it_was_saved_on(live_file, tmp_path, frame):
-    obj = key(new_object())
-    own = give_own_deltas(obj)
-    set_mode(obj, "pga_slerp")
+    obj, rig, owns = tool_and_rig("pga_slerp")
     live_file.scene.frame_set(int(frame), subframe=frame % 1.0)
     shown = np.array(obj.evaluated_get(live_file.evaluated_depsgraph_get()).matrix_world)
-    opened, played = played_on_a_farm(save(tmp_path / "shot.blend"), ["Tool"], PLAYED)
-    assert_same(opened, [shown])
-    assert_same(played, [expected_worlds(obj, PLAYED, {"Tool": own})], 1e-5)
+    (posed,) = shown_poses([rig], [frame])
+    played = played_on_a_farm(save(tmp_path / "shot.blend"), ["Tool", "Rig"], PLAYED)
+    assert_same(played.opened[:1], [shown])
+    assert_same_poses(rig, np.array((frame,)), named(rig, played.opened_poses[:, None]), posed)
+    assert_same(played.worlds[:1], [expected_worlds(obj, PLAYED, owns)], 1e-5)
 
 
 @pytest.mark.parametrize(
     ("order", "own"), sample([(order, own) for order in ("ZXY", "QUATERNION") for own in (True, False)])
 )
 def test_what_a_farm_saves_again_comes_back_whole(live_file, tmp_path, order, own):
-    obj = new_object("Tool", order)
-    owns = {"Tool": give_own_deltas(obj)} if own else {}
-    key(obj, scale="even")
-    set_mode(obj, "cga_slerp")
-    set_mode(obj, "dq_sclerp", [11.0])
-    keys = snapshot(obj)
-    on_a_farm("bpy.ops.wm.save_as_mainfile(filepath=found)", save(tmp_path / "shot.blend"), tmp_path / "farm.blend")
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "farm.blend"))
-    obj = bpy.data.objects["Tool"]
-    assert snapshot(obj) == keys
-    assert modes_of(obj, np.array(FRAMES[:3])) == ["cga_slerp", "dq_sclerp", "cga_slerp"]
+    obj, rig, owns = tool_and_rig("cga_slerp", order, own, scale="even")
+    set_mode([obj, rig.pose.bones["Hand"]], "dq_sclerp", [11.0])
+    keys = [snapshot(obj), snapshot(rig)]
+    on_a_farm(SAVE, save(tmp_path / "shot.blend"), tmp_path / "farm.blend")
+    obj, rig = reopened(tmp_path / "farm.blend")
+    assert [snapshot(obj), snapshot(rig)] == keys
+    for carrier in (obj, rig.pose.bones["Hand"]):
+        assert modes_of(carrier, np.array(FRAMES[:3])) == ["cga_slerp", "dq_sclerp", "cga_slerp"]
+    assert {problem_of(carrier) for carrier in (obj, *rig.pose.bones)} == {""}
     assert refresh() == 0, "the in-betweens that are there are those of these keys"
     assert_shown([obj], PLAYED, owns)
-    set_mode(obj, "BLENDER")
+    assert_posed(rig, PLAYED)
+    set_mode([obj, *rig.pose.bones], "BLENDER")
     assert not any(path.startswith("delta") for path, _ in curves_of(obj))
     assert own_deltas(obj) == owns.get("Tool", Own())
+    assert_posed(rig, PLAYED)
+    assert not any(len(bone.constraints) for bone in rig.pose.bones)
 
 
-def test_keys_that_a_farm_edits_are_followed_when_the_extension_is_there_again(live_file, tmp_path):
-    obj = key(new_object())
-    set_mode(obj, "dq_sclerp")
+def test_what_a_farm_edits_and_renames_is_followed_when_the_extension_is_there_again(live_file, tmp_path):
+    obj, rig, owns = tool_and_rig("dq_sclerp")
     edit = """
-for fcurve in bpy.data.actions[0].layers[0].strips[0].channelbags[0].fcurves:
+for fcurve in bpy.data.objects["Tool"].animation_data.action.layers[0].strips[0].channelbags[0].fcurves:
     if fcurve.data_path == "location":
         fcurve.keyframe_points[1].co_ui.y += 2.0
-bpy.ops.wm.save_as_mainfile(filepath=found)
+bpy.data.armatures[0].bones["Lower"].name = "Fore"
 """
     before = shown_worlds([obj], PLAYED)[0]
-    on_a_farm(edit, save(tmp_path / "shot.blend"), tmp_path / "farm.blend")
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "farm.blend"))
-    obj = bpy.data.objects["Tool"]
-    assert_shown([obj], PLAYED)
+    on_a_farm(edit + SAVE, save(tmp_path / "shot.blend"), tmp_path / "farm.blend")
+    obj, rig = reopened(tmp_path / "farm.blend")
+    assert_shown([obj], PLAYED, owns)
     assert np.abs(shown_worlds([obj], PLAYED)[0] - before).max() > 1.0
+    assert modes_of(rig.pose.bones["Fore"], np.array(FRAMES[:1])) == ["dq_sclerp"]
+    assert_posed(rig, PLAYED)
 
 
 def test_what_was_not_followed_before_saving_is_caught_up_with_after_loading(live_file, tmp_path):
@@ -138,17 +166,17 @@ def test_what_was_not_followed_before_saving_is_caught_up_with_after_loading(liv
     assert np.abs(shown_worlds([obj], PLAYED)[0] - before).max() > 0.1
 
 
-def test_a_baked_object_plays_alike_on_a_farm_and_can_be_un_baked_after_it_saved_the_file(live_file, tmp_path):
-    obj = key(new_object())
-    set_mode(obj, "dq_sclerp")
-    keys, expected = snapshot(obj), expected_worlds(obj, PLAYED)
-    animation.bake(obj)
-    path = save(tmp_path / "shot.blend")
-    assert_same(played_on_a_farm(path, ["Tool"], PLAYED)[1], [expected], 1e-5)
-    on_a_farm("bpy.ops.wm.save_as_mainfile(filepath=found)", path, tmp_path / "farm.blend")
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "farm.blend"))
-    obj = bpy.data.objects["Tool"]
-    assert is_baked(obj)
-    animation.unbake(obj)
-    assert snapshot(obj) == keys
-    assert_shown([obj], PLAYED)
+def test_what_is_baked_plays_alike_on_a_farm_and_can_be_un_baked_after_it_saved_the_file(live_file, tmp_path):
+    obj, rig, owns = tool_and_rig("dq_sclerp")
+    keys = [snapshot(obj), snapshot(rig)]
+    expected, posed = expected_worlds(obj, PLAYED, owns), expected_poses(rig, PLAYED)
+    animation.bake([obj, *rig.pose.bones])
+    played = played_on_a_farm(save(tmp_path / "shot.blend"), ["Tool", "Rig"], PLAYED, then=SAVE)
+    assert_same(played.worlds[:1], [expected], 1e-5)
+    assert_same_poses(rig, PLAYED, named(rig, played.poses), posed)
+    obj, rig = reopened(tmp_path / "shot-farm.blend")
+    assert all(is_baked(carrier) for carrier in (obj, *rig.pose.bones))
+    animation.unbake([obj, *rig.pose.bones])
+    assert [snapshot(obj), snapshot(rig)] == keys
+    assert_shown([obj], PLAYED, owns)
+    assert_posed(rig, PLAYED)

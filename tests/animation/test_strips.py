@@ -5,6 +5,8 @@ In-betweens are exact on the whole frames of the Action, so strips are looked at
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import bpy
 import numpy as np
 import pytest
@@ -66,6 +68,34 @@ def test_a_mode_is_chosen_for_an_action_that_is_in_a_strip_already(live_file):
     assert_at(obj, np.arange(101.0, 142.0), expected)
 
 
+def two_strips(
+    order: str = "QUATERNION",
+    *,
+    own: bool = True,
+    modes: Sequence[str] = ("dq_sclerp", "BLENDER"),
+    one_track: bool = False,
+    extrapolations: Sequence[str] = ("NOTHING", "NOTHING"),
+) -> tuple[bpy.types.Object, Own, list[bpy.types.Action], list[np.ndarray]]:
+    """An object, its own delta transforms, the Actions of two strips with modes, and its place in each."""
+    obj = new_object("Tool", order)
+    deltas, actions, expected = give_own_deltas(obj) if own else Own(), [], []
+    data = obj.animation_data_create()
+    for seed, mode in enumerate(modes):
+        data.action = None
+        key(obj, KEYS, seed=seed)
+        set_mode(obj, mode, KEYS)
+        actions.append(data.action)
+        expected.append(expected_bases(obj, ACTION_FRAMES, deltas))
+    slots, data.action = [action.slots[0] for action in actions], None
+    track = data.nla_tracks.new()
+    for start, action, slot, extrapolation in zip((1, 101), actions, slots, extrapolations, strict=True):
+        strip = track.strips.new("Strip", start, action)
+        strip.action_slot, strip.extrapolation = slot, extrapolation
+        track = track if one_track or start > 1 else data.nla_tracks.new()
+    bpy.context.view_layer.update()
+    return obj, deltas, actions, expected
+
+
 @pytest.mark.parametrize("one_track", [True, False], ids=["one track", "two tracks"])
 @pytest.mark.parametrize(
     ("modes", "own"),
@@ -79,46 +109,11 @@ def test_a_mode_is_chosen_for_an_action_that_is_in_a_strip_already(live_file):
     ],
 )
 def test_two_strips_each_have_the_mode_that_is_keyed_in_their_action(live_file, modes, own, one_track):
-    obj = new_object()
-    deltas = give_own_deltas(obj) if own else Own()
-    data, actions, expected = obj.animation_data_create(), [], []
-    for seed, mode in enumerate(modes):
-        data.action = None
-        key(obj, KEYS, seed=seed)
-        set_mode(obj, mode, KEYS)
-        actions.append((data.action, data.action_slot))
-        expected.append(expected_bases(obj, ACTION_FRAMES, deltas))
-    data.action = None
-    track = data.nla_tracks.new()
-    for start, (action, slot) in zip((1, 101), actions, strict=True):
-        strip = (track if one_track else data.nla_tracks.new()).strips.new("Strip", start, action)
-        strip.action_slot, strip.extrapolation = slot, "HOLD_FORWARD" if start > 1 else "HOLD"
-    bpy.context.view_layer.update()
+    obj, _, _, expected = two_strips(own=own, modes=modes, one_track=one_track, extrapolations=("HOLD", "HOLD_FORWARD"))
     assert refresh() == 0
     for start, worlds in zip((1, 101), expected, strict=True):
         assert_at(obj, ACTION_FRAMES + start - 1, worlds)
     assert_at(obj, np.array((60.0, 90.0)), expected[0][[-1, -1]])
-
-
-def two_strips(
-    order: str = "QUATERNION", *, own: bool = True
-) -> tuple[bpy.types.Object, Own, list[bpy.types.Action], list[np.ndarray]]:
-    """An object, its own delta transforms, the Actions of a strip with a mode and one without, its place in each."""
-    obj = new_object("Tool", order)
-    deltas, actions, expected = give_own_deltas(obj) if own else Own(), [], []
-    data = obj.animation_data_create()
-    for seed, mode in enumerate(("dq_sclerp", "BLENDER")):
-        data.action = None
-        key(obj, KEYS, seed=seed)
-        set_mode(obj, mode, KEYS)
-        actions.append(data.action)
-        expected.append(expected_bases(obj, ACTION_FRAMES, deltas))
-    slots, data.action = [action.slots[0] for action in actions], None
-    for start, action, slot in zip((1, 101), actions, slots, strict=True):
-        strip = data.nla_tracks.new().strips.new("Strip", start, action)
-        strip.action_slot, strip.extrapolation = slot, "NOTHING"
-    bpy.context.view_layer.update()
-    return obj, deltas, actions, expected
 
 
 def fcurves_of(action: bpy.types.Action) -> bpy.types.ActionChannelbagFCurves:

@@ -33,8 +33,11 @@ PAUSE = 0.1
 """Seconds between two steps: a button that is pressed flashes for a moment before it does what it is for."""
 
 QUICK, SMOOTH = "OFF", "8"
-"""How edges are smoothed in 3D Views while the hand works, and in what an eye sees, as Blender comes: it draws a view
-as often, which without a graphics card is two thirds of the time."""
+"""How edges are smoothed in 3D Views, and in pictures that pages show, as Blender comes: it draws a view as often,
+which without a graphics card is two thirds of the time."""
+
+SHOWN = Path(__file__).resolve().parents[2] / "docs" / "window"
+"""The pictures that pages show, as SCENARIO/NAME.png."""
 
 PATIENCE = 30.0
 """Seconds that something may take to become true, where other windows and tests keep the processors busy as well."""
@@ -79,6 +82,11 @@ class Hand:
     def area(self, kind: str) -> bpy.types.Area:
         """The largest area of this type in the window."""
         return places.area(self.window, kind)
+
+    def open_animation_workspace(self) -> Steps[None]:
+        """Show the viewport beside the Dope Sheet."""
+        self.window.workspace = bpy.data.workspaces["Animation"]
+        yield from self.wait_until(lambda: self.window.screen.name == "Animation", "the Animation workspace opens")
 
     # What a mouse does
 
@@ -221,8 +229,11 @@ class Hand:
         part = places.region(area, kind)
         flat = part.height < 40  # a header: one row of narrow buttons, where a sidebar has many rows of wide ones
         right, down = 15 if flat or narrow else part.width // 4, part.height // 2 if flat else 15
-        for y in range(part.y + part.height - down, part.y, -down):
-            for x in range(part.x + right, part.x + part.width, right):
+        columns = range(part.x + right, part.x + part.width, right)
+        if right > 15:  # most buttons of a sidebar reach to its middle
+            columns = sorted(columns, key=lambda x: abs(x - part.x - part.width // 2))
+        for x in columns:
+            for y in range(part.y + part.height - down, part.y, -down):
                 yield from self.hover((x, y))
                 if f".{self._under_the_mouse(area, part)}".endswith(f".{what}"):
                     return x, y
@@ -250,10 +261,10 @@ class Hand:
             assert time.monotonic() < end, f"not within {seconds} s: {what}"
             yield
 
-    def look(self) -> Steps[np.ndarray]:
-        """What is on the screen, drawn anew and with smooth edges: pixels as in `tests.gui.pictures`."""
+    def look(self, edges: str = QUICK) -> Steps[np.ndarray]:
+        """What is on the screen, drawn anew: pixels as in `tests.gui.pictures`."""
         system = bpy.context.preferences.system
-        system.viewport_aa = SMOOTH
+        system.viewport_aa = edges
         for area in self.window.screen.areas:
             area.tag_redraw()
         yield 0.5  # the screen is the affair of another process, which may be behind
@@ -264,7 +275,8 @@ class Hand:
 
     def picture(self, name: str, box: Box | None = None) -> Steps[np.ndarray]:
         """Keep what is on the screen, or the part of it in a box, as NAME.png; and have its pixels."""
-        pixels = yield from self.look()
+        shown = (SHOWN / self.pictures.name / f"{name}.png").is_file()
+        pixels = yield from self.look(SMOOTH if shown else QUICK)
         if box:
             pixels = part_of(pixels, box)
         write_png(self.pictures / f"{name}.png", pixels)

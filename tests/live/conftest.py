@@ -8,18 +8,7 @@ from collections.abc import Iterator
 import bpy
 import pytest
 
-import rigid_motion
 from tests.live.performing import Sent
-
-
-@pytest.fixture
-def extension(empty_file) -> Iterator[bpy.types.Context]:
-    """The extension as it is when Blender has switched it on."""
-    rigid_motion.register()
-    try:
-        yield empty_file
-    finally:
-        rigid_motion.unregister()
 
 
 @pytest.fixture

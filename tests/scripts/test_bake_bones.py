@@ -77,7 +77,7 @@ def test_a_baked_rig_plays_in_any_blender_as_the_live_one_does_with_the_extensio
     with extension():
         open_again(path)
         expected = shown_worlds([bpy.data.objects[name] for name in ("Rig", *probes())], PLAYED)
-    _, played = played_on_a_farm(baked_name(path), ("Rig", *probes()), PLAYED)
+    played = played_on_a_farm(baked_name(path), ("Rig", *probes()), PLAYED).worlds
     np.testing.assert_allclose(played, expected, atol=1e-4)
 
 

@@ -8,6 +8,7 @@ import pytest
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import turned
 from rigid_motion.streams import Body, Receiver, Sender
+from tests.thoroughness import tried
 
 from .links import backs_of, body, dance, run
 
@@ -137,7 +138,7 @@ def test_poses_that_are_none_are_refused() -> None:
         sender.add(0.0, Poses(np.full((3, 3), np.nan), np.tile((1.0, 0, 0, 0), (3, 1))))
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(tried(4)))
 def test_a_source_that_leaps_and_then_stops_leaves_keepalives(seed: int) -> None:
     rng = np.random.default_rng(seed)
     times = np.arange(60) / 120.0 + rng.uniform(0.0, 0.003, 60)

@@ -6,21 +6,10 @@ import bpy
 import numpy as np
 import pytest
 
-import rigid_motion
 from rigid_motion.animation import write_channel
 from tests.animation.scenes import new_object
 
 FRAMES = np.array((1.0, 11.0, 21.0, 41.0))
-
-
-@pytest.fixture
-def extension(empty_file) -> bpy.types.Context:
-    """The extension as it is when Blender has switched it on."""
-    rigid_motion.register()
-    try:
-        yield empty_file
-    finally:
-        rigid_motion.unregister()
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import bpy
-import numpy as np
 import pytest
 
 from rigid_motion import animation
@@ -22,6 +21,7 @@ from rigid_motion.ui.targets import (
     targets_of,
 )
 from rigid_motion.ui.wording import BLENDED, NO_KEYS, NO_SEGMENT, TROUBLES
+from tests.animation.bones.poses import seen
 from tests.animation.scenes import editor
 from tests.rigs.recorded import FRAMES as RECORDED
 from tests.rigs.recorded import recorded_rig
@@ -48,12 +48,6 @@ def names(targets):
 
 def modes(rig, name):
     return modes_of(bone(rig, name), FRAMES[:-1])
-
-
-def pose_of(rig, name="Hand"):
-    """Where a bone is seen, in the space of the armature."""
-    evaluated = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    return np.array(evaluated.pose.bones[name].matrix)
 
 
 def test_in_pose_mode_the_selected_bones_are_meant_and_not_the_rig(rig):
@@ -213,7 +207,7 @@ def test_the_transform_on_screen_is_that_of_the_bone(extension, order):
     select(rig, ("Hand",))
     set_mode(bone, SCREW)
     bpy.context.scene.frame_set(6)
-    seen = pose_of(rig)
+    before = seen(rig, "Hand")
     shown = bpy.context.window_manager.rigid_motion_shown
     values = [tuple(shown.location), tuple(getattr(shown, rotation)), tuple(shown.scale)]
     assert values[0] != pytest.approx(tuple(bone.location), abs=1e-3)
@@ -223,7 +217,7 @@ def test_the_transform_on_screen_is_that_of_the_bone(extension, order):
     bone.location, bone.scale = values[0], values[2]
     setattr(bone, rotation, values[1])
     bpy.context.view_layer.update()
-    assert pose_of(rig) == pytest.approx(seen, abs=1e-5)
+    assert seen(rig, "Hand") == pytest.approx(before, abs=1e-5)
 
 
 def _remove(bone):
@@ -277,7 +271,7 @@ def test_a_constraint_that_is_not_as_it_was_made_is_noted_and_mended(rig, tamper
     hand = bone(rig)
     set_mode([hand, bone(rig, "Arm")], SCREW)
     bpy.context.scene.frame_set(5)
-    seen = pose_of(rig)
+    before = seen(rig, "Hand")
     tamper(hand)
     bpy.context.view_layer.update()
     assert constraint_trouble(hand) == trouble
@@ -293,7 +287,7 @@ def test_a_constraint_that_is_not_as_it_was_made_is_noted_and_mended(rig, tamper
         hand.constraints.remove(constraint)
     bpy.context.scene.frame_set(4)
     bpy.context.scene.frame_set(5)
-    assert pose_of(rig) == pytest.approx(seen, abs=1e-5)
+    assert seen(rig, "Hand") == pytest.approx(before, abs=1e-5)
     assert not operators.mend.poll()
 
 

@@ -12,6 +12,7 @@ from mathutils import Euler
 
 from rigid_motion.animation import key_frames, set_mode
 from rigid_motion.ui.pose_operators import Switch, switches_in, switches_of
+from tests.animation.bones.poses import seen
 from tests.animation.bones.rigs import pose_mode, select_bones
 
 HAND, TORSO, POLE = "hand_ik.L", "torso", "upper_arm_ik_target.L"
@@ -43,11 +44,6 @@ def key(rig: bpy.types.Object, name: str, location: tuple, angles: tuple) -> Non
             bone.keyframe_insert(path, frame=frame)
     set_mode(bone, "dq_sclerp")
     select_bones(rig, name)
-
-
-def seen(rig: bpy.types.Object, name: str = HAND) -> np.ndarray:
-    bpy.context.view_layer.update()
-    return np.array(rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones[name].matrix)
 
 
 def go(frame: int) -> None:
@@ -87,15 +83,15 @@ def test_between_keys_the_hand_stays_when_parents_are_switched(rig, auto_key, ke
     for frame in (6, 11, 16):
         go(frame)
         for parent in ("Torso", "Head", "None"):
-            before = seen(rig)
+            before = seen(rig, HAND)
             assert switch(parent) == {"FINISHED"}
             assert rig.pose.bones["upper_arm_parent.L"]["IK_parent"] == PARENTS[parent]
-            assert np.abs(seen(rig) - before).max() < STAYS
+            assert np.abs(seen(rig, HAND) - before).max() < STAYS
             assert is_keyed(rig, frame) == auto_key
             if auto_key:
                 go(frame + 1)
                 go(frame)
-                assert np.abs(seen(rig) - before).max() < STAYS
+                assert np.abs(seen(rig, HAND) - before).max() < STAYS
 
 
 def test_rigify_s_own_operator_moves_the_hand(rig):
@@ -106,19 +102,19 @@ def test_rigify_s_own_operator_moves_the_hand(rig):
     switch("Root")  # Rigify's has the names of the parents from then on
     go(12)
     go(11)
-    before = seen(rig)
+    before = seen(rig, HAND)
     settings = dict(zip(one._fields[2:], one[2:], strict=True))
     getattr(bpy.ops.pose, one.operator)("EXEC_DEFAULT", True, selected=str(PARENTS["Head"]), **settings)
-    assert np.abs(seen(rig) - before).max() > 0.05
+    assert np.abs(seen(rig, HAND) - before).max() > 0.05
 
 
 def test_what_was_moved_by_hand_stays_there(rig, auto_key):
     select_bones(rig, HAND)
     go(11)
     bpy.ops.transform.translate("EXEC_DEFAULT", True, value=(0.1, 0.2, 0.0))
-    before = seen(rig)
+    before = seen(rig, HAND)
     switch("Head")
-    assert np.abs(seen(rig) - before).max() < STAYS
+    assert np.abs(seen(rig, HAND) - before).max() < STAYS
 
 
 def test_of_a_pole_the_place_stays(rig, auto_key):
@@ -146,19 +142,19 @@ def test_a_switch_is_one_step_back_and_forth(rig, auto_key):
     select_bones(rig, HAND)
     go(11)
     bpy.ops.ed.undo_push(message="Begin")
-    before = seen(rig)
+    before = seen(rig, HAND)
     switch("Head")
     with bpy.context.temp_override(mode="OBJECT"):
         bpy.ops.ed.undo()
     rig = bpy.data.objects["rig"]
     assert rig.pose.bones["upper_arm_parent.L"]["IK_parent"] == PARENTS["Root"]
-    assert np.abs(seen(rig) - before).max() < STAYS
+    assert np.abs(seen(rig, HAND) - before).max() < STAYS
     assert not is_keyed(rig, 11)
     with bpy.context.temp_override(mode="OBJECT"):
         bpy.ops.ed.redo()
     rig = bpy.data.objects["rig"]
     assert rig.pose.bones["upper_arm_parent.L"]["IK_parent"] == PARENTS["Head"]
-    assert np.abs(seen(rig) - before).max() < STAYS
+    assert np.abs(seen(rig, HAND) - before).max() < STAYS
     assert is_keyed(rig, 11) == auto_key
 
 
@@ -168,9 +164,9 @@ def test_the_visual_transform_applied_after_switches_leaves_the_hand_where_it_is
         go(frame)
         switch(parent)
         go(frame + 2)
-        before = seen(rig)
+        before = seen(rig, HAND)
         bpy.ops.pose.visual_transform_apply("EXEC_DEFAULT", True)
-        assert np.abs(seen(rig) - before).max() < STAYS
+        assert np.abs(seen(rig, HAND) - before).max() < STAYS
 
 
 def test_switches_are_offered_of_selected_bones_with_a_mode(rig):
@@ -192,14 +188,14 @@ def test_without_rigify_s_operator_the_hand_stays_as_it_is_and_one_line_says_wha
     select_bones(rig, HAND)
     go(11)
     (one,) = switches_of(extension)
-    before = seen(rig)
+    before = seen(rig, HAND)
     operator = bpy.types.Operator.bl_rna_get_subclass_py(f"POSE_OT_{one.operator}")
     bpy.utils.unregister_class(operator)
     with pytest.raises(RuntimeError, match=r"run its script rig_ui\.py in the Text Editor") as refusal:
         switch("Head")
     bpy.utils.register_class(operator)
     assert str(refusal.value).strip().count("\n") == 0
-    assert np.abs(seen(rig) - before).max() < 1e-6
+    assert np.abs(seen(rig, HAND) - before).max() < 1e-6
 
 
 BUTTON = """

@@ -9,6 +9,7 @@ import pytest
 from rigid_motion.animation import key_frames, set_mode
 from rigid_motion.animation.live.follower import show_seen_in_channels
 from rigid_motion.animation.transforms import transform_of
+from tests.animation.bones.poses import seen
 from tests.animation.bones.rigs import Rest, key_all, new_rig, pose_mode, select_bones
 from tests.animation.keyed import rotation_path
 
@@ -28,11 +29,6 @@ def rig(request, extension) -> bpy.types.Object:
     return rig
 
 
-def seen(rig: bpy.types.Object, name: str = "Hand.L") -> np.ndarray:
-    bpy.context.view_layer.update()
-    return np.array(rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones[name].matrix)
-
-
 def key_pose(rig: bpy.types.Object, name: str = "Hand.L") -> None:
     bone = rig.pose.bones[name]
     for path in ("location", rotation_path(bone)):
@@ -40,22 +36,22 @@ def key_pose(rig: bpy.types.Object, name: str = "Hand.L") -> None:
 
 
 def test_a_copied_pose_is_pasted_as_it_was_seen(rig, extension):
-    copied = seen(rig)
+    copied = seen(rig, "Hand.L")
     assert bpy.ops.rigid_motion.copy_pose("EXEC_DEFAULT", True) == {"FINISHED"}
-    assert np.abs(seen(rig) - copied).max() < 1e-5
+    assert np.abs(seen(rig, "Hand.L") - copied).max() < 1e-5
     extension.scene.frame_set(OTHER)
-    assert np.abs(seen(rig) - copied).max() > 0.1
+    assert np.abs(seen(rig, "Hand.L") - copied).max() > 0.1
     bpy.ops.pose.paste("EXEC_DEFAULT", True)
-    assert np.abs(seen(rig) - copied).max() < 2e-5
+    assert np.abs(seen(rig, "Hand.L") - copied).max() < 2e-5
     key_pose(rig)
     assert OTHER in key_frames(rig.pose.bones["Hand.L"])
-    assert np.abs(seen(rig) - copied).max() < 2e-5
+    assert np.abs(seen(rig, "Hand.L") - copied).max() < 2e-5
     extension.scene.frame_set(BETWEEN)
     assert BETWEEN not in key_frames(rig.pose.bones["Hand.L"])
 
 
 def test_a_copied_pose_is_pasted_flipped_as_it_was_seen(rig, extension):
-    copied = seen(rig)
+    copied = seen(rig, "Hand.L")
     bpy.ops.rigid_motion.copy_pose("EXEC_DEFAULT", True)
     extension.scene.frame_set(OTHER)
     bpy.ops.pose.paste("EXEC_DEFAULT", True, flipped=True)
@@ -66,7 +62,7 @@ def test_a_copied_pose_is_pasted_flipped_as_it_was_seen(rig, extension):
 
 
 def test_an_asset_has_the_pose_that_was_seen(rig, extension):
-    expected = seen(rig)
+    expected = seen(rig, "Hand.L")
     made = set(bpy.data.actions)
     # What the operator does, whose dialog asks for a name and a library.
     show_seen_in_channels([transform_of(rig.pose.bones["Hand.L"])])
@@ -74,10 +70,10 @@ def test_an_asset_has_the_pose_that_was_seen(rig, extension):
     assert bpy.ops.poselib.create_pose_asset("EXEC_DEFAULT", True, **settings) == {"FINISHED"}
     (asset,) = set(bpy.data.actions) - made
     assert asset.asset_data is not None
-    assert np.abs(seen(rig) - expected).max() < 1e-5
+    assert np.abs(seen(rig, "Hand.L") - expected).max() < 1e-5
     extension.scene.frame_set(OTHER)
     rig.pose.apply_pose_from_action(asset)
-    assert np.abs(seen(rig) - expected).max() < 2e-5
+    assert np.abs(seen(rig, "Hand.L") - expected).max() < 2e-5
 
 
 @pytest.mark.parametrize("name", ["copy_pose", "create_pose_asset"])

@@ -9,6 +9,7 @@ import pytest
 import rigid_motion
 from rigid_motion.animation import set_mode
 from rigid_motion.ui.preferences import DEFAULT_LOOK, EXTENSION, default_mode, preferences
+from tests.animation.keyed import curves_of
 from tests.ui.conftest import keyed
 
 
@@ -42,37 +43,22 @@ def test_the_mode_where_none_is_named_is_the_default_one(chosen):
     assert obj.rigid_motion.mode == "pga_lerp"
 
 
-def test_without_live_update_edits_wait_until_it_is_on_again(chosen):
+@pytest.mark.parametrize("again", [False, True], ids=["switched off", "switched off before the extension is on"])
+def test_without_live_update_edits_wait_until_it_is_on_again(chosen, again):
+    chosen.live_update = False
+    if again:
+        rigid_motion.unregister()
+        rigid_motion.register()
     obj = keyed("Tool")
     set_mode(obj, "dq_sclerp")
     bpy.context.scene.frame_set(6)
     before = tuple(obj.delta_location)
-    chosen.live_update = False
-    slot = obj.animation_data.action_slot
-    fcurve = obj.animation_data.action.layers[0].strips[0].channelbag(slot).fcurves.find("location", index=0)
-    fcurve.keyframe_points[1].co_ui.y += 3.0
-    fcurve.update()
+    curves_of(obj)["location", 0].keyframe_points[1].co_ui.y += 3.0
     bpy.context.scene.frame_set(6)
     assert tuple(obj.delta_location) == pytest.approx(before)
-    chosen.live_update = True
+    preferences().live_update = True
     bpy.context.scene.frame_set(6)
     assert tuple(obj.delta_location) != pytest.approx(before)
-
-
-def test_live_update_that_was_off_is_off_when_the_extension_is_switched_on(chosen):
-    chosen.live_update = False
-    rigid_motion.unregister()
-    rigid_motion.register()
-    obj = keyed("Tool")
-    obj.rigid_motion.mode = "BLENDER"
-    set_mode(obj, "dq_sclerp")
-    bpy.context.scene.frame_set(6)
-    before = tuple(obj.delta_location)
-    obj.animation_data.action.layers[0].strips[0].channelbag(obj.animation_data.action_slot).fcurves.find(
-        "location", index=0
-    ).keyframe_points[1].co_ui.y += 3.0
-    bpy.context.scene.frame_set(6)
-    assert tuple(obj.delta_location) == pytest.approx(before)
 
 
 def test_every_preference_says_what_it_is_for(chosen):

@@ -40,6 +40,18 @@ def shown_poses(rigs: Iterable[bpy.types.Object], frames: Sequence[float]) -> li
     return shown
 
 
+def placed(rig: bpy.types.Object) -> np.ndarray:
+    """Where the bones of a rig are seen now, in the space of the armature, shape (bones, 4, 4)."""
+    bpy.context.view_layer.update()
+    bones = rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones
+    return np.array([bone.matrix for bone in bones])
+
+
+def seen(rig: bpy.types.Object, name: str) -> np.ndarray:
+    """Where one of them is seen, shape (4, 4)."""
+    return placed(rig)[rig.pose.bones.find(name)]
+
+
 def names_of(rig: bpy.types.Object) -> list[str]:
     return [pose_bone.name for pose_bone in rig.pose.bones]
 

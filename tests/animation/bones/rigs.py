@@ -29,12 +29,16 @@ INHERIT_SCALES = ("FULL", "FIX_SHEAR", "ALIGNED", "AVERAGE", "NONE", "NONE_LEGAC
 
 Case, Other = TypeVar("Case"), TypeVar("Other")
 
+THIS_BLENDER = 10 * bpy.app.version[0] + bpy.app.version[1]
+
 
 def in_turn(cases: Iterable[Case], others: Sequence[Other]) -> list[tuple[Case, Other]]:
-    """Each case with one of the others by default, one after the other, and with all of them in thorough runs."""
-    if THOROUGH:
-        return list(itertools.product(cases, others))
-    return list(zip(cases, itertools.cycle(others), strict=False))
+    """Each case with one of the others by default, which is another one on each Blender, and with half of them in
+    thorough runs: every second of all pairs, of each case and of each of the others.
+    """
+    step = 2 if THOROUGH else len(others)
+    pairs = itertools.product(enumerate(cases), enumerate(others))
+    return [(case, other) for (i, case), (j, other) in pairs if (i + j + THIS_BLENDER) % step == 0]
 
 
 @dataclass(frozen=True)

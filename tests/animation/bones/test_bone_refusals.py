@@ -3,67 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 
 import bpy
 import numpy as np
 import pytest
 
 from rigid_motion.animation import Refused, bake, problem_of, refresh, set_mode
+from tests.animation.actions.test_refusals import HINDRANCES as HINDRANCES_OF_OBJECTS
 from tests.animation.bones.poses import assert_posed, shown_poses
 from tests.animation.bones.rigs import PLAYED, key_all, moving_rig, new_rig
 from tests.animation.keyed import curves_of, snapshot
 
-Hinder = Callable[[bpy.types.PoseBone], None]
-
-
-def modifier(kind: str, **settings: object) -> Hinder:
-    def add(bone: bpy.types.PoseBone) -> None:
-        added = curves_of(bone)["location", 1].modifiers.new(kind)
-        for name, value in settings.items():
-            setattr(added, name, value)
-
-    return add
-
-
-def driver(path: str, index: int = 0) -> Hinder:
-    def add(bone: bpy.types.PoseBone) -> None:
-        bone.driver_add(path, index).driver.expression = "0.01 * frame"
-
-    return add
-
-
-def all_driven(bone: bpy.types.PoseBone) -> None:
-    for path, index in (("location", 0), ("location", 1), ("location", 2), ("rotation_quaternion", 3), ("scale", 1)):
-        driver(path, index)(bone)
-
-
-def turned_by_axis_and_angle(bone: bpy.types.PoseBone) -> None:
-    bone.rotation_mode = "AXIS_ANGLE"
-
-
-def sampled(bone: bpy.types.PoseBone) -> None:
-    curves_of(bone)["location", 2].convert_to_samples(1, 41)
-
-
-def not_a_number(bone: bpy.types.PoseBone) -> None:
-    keys = curves_of(bone)["location", 1].keyframe_points
-    points = np.empty(2 * len(keys), np.float32)
-    keys.foreach_get("co", points)
-    points[5] = np.nan
-    keys.foreach_set("co", points)
-
-
-HINDRANCES: dict[str, tuple[Hinder, str]] = {
-    "axis and angle": (turned_by_axis_and_angle, "turns by axis and angle.*set its rotation mode to Quaternion"),
-    "noise": (
-        modifier("NOISE", blend_type="MULTIPLY"),
-        "Location Y has a modifier of type Noise that does not just add.*mute or remove it, or bake",
-    ),
-    "cycles in part": (modifier("CYCLES", use_influence=True, influence=0.5), "restricted range or influence"),
-    "all driven": (all_driven, "Location X is driven: remove the driver, or bake it"),
-    "sampled keys": (sampled, "Location Z is sampled and has no keys"),
-    "not a number": (not_a_number, "key 3 of Location Y is not a finite number: delete it"),
+HINDRANCES = {
+    name: HINDRANCES_OF_OBJECTS[name]
+    for name in ("axis and angle", "noise", "cycles in part", "all driven", "sampled keys", "not a number")
 }
 """What to do to a bone, and what it is told."""
 

@@ -29,6 +29,15 @@ from tests.animation.scenes import editor, key, new_object, new_strip, push_down
 
 Change = tuple[bpy.types.Object, Callable[[], None]]
 
+OF_BOTH = pytest.mark.parametrize("of_bones", [False, True], ids=["object", "bones"])
+
+
+def moving(of_bones: bool, mode: str = "dq_sclerp", name: str = "Mover") -> tuple[bpy.types.Object, list]:
+    """A rig or an object that has a mode, and what has it."""
+    obj = moving_rig(mode, name=name) if of_bones else key(new_object(name), seed=len(mode))
+    set_mode(targets := list(obj.pose.bones) if of_bones else [obj], mode)
+    return obj, targets
+
 
 @pytest.fixture(params=["all bones baked", "some bones baked", "all bones reduced"])
 def changed(request, live_file) -> Iterator[Change]:
@@ -92,7 +101,7 @@ def test_an_original_that_another_rig_plays_keeps_its_names(live_file):
 
 
 @pytest.mark.parametrize("muted", [False, True], ids=["without keys", "muted"])
-@pytest.mark.parametrize("of_bones", [False, True], ids=["object", "bones"])
+@OF_BOTH
 def test_what_has_no_keys_gets_its_value_back(live_file, of_bones, muted):
     obj = key_all(new_rig()) if of_bones else key(new_object())
     carrier, targets = (obj.pose.bones["Upper"], list(obj.pose.bones)) if of_bones else (obj, obj)
@@ -118,11 +127,10 @@ def test_what_has_no_keys_gets_its_value_back(live_file, of_bones, muted):
         assert np.abs(shown_worlds([obj], PLAYED)[0] - expected).max() < 1e-5
 
 
-def sharing(of_bones: bool) -> tuple[bpy.types.Object, list | bpy.types.Object, bpy.types.Object]:
+def sharing(of_bones: bool) -> tuple[bpy.types.Object, list, bpy.types.Object]:
     """Something baked, its targets, and what still moves by its original."""
-    obj = moving_rig() if of_bones else key(new_object())
-    targets = list(obj.pose.bones)[:2] if of_bones else obj
-    set_mode(targets, "dq_sclerp")
+    obj, targets = moving(of_bones)
+    targets = targets[:2]
     other = obj.copy()
     bpy.context.scene.collection.objects.link(other)
     bake(targets)
@@ -130,7 +138,7 @@ def sharing(of_bones: bool) -> tuple[bpy.types.Object, list | bpy.types.Object, 
     return obj, targets, other
 
 
-@pytest.mark.parametrize("of_bones", [False, True], ids=["object", "bones"])
+@OF_BOTH
 def test_a_slot_that_was_renamed_in_the_original_is_found(live_file, of_bones):
     obj, targets, other = sharing(of_bones)
     other.animation_data.action_slot.name_display = "Hero"
@@ -141,7 +149,7 @@ def test_a_slot_that_was_renamed_in_the_original_is_found(live_file, of_bones):
     )
 
 
-@pytest.mark.parametrize("of_bones", [False, True], ids=["object", "bones"])
+@OF_BOTH
 def test_a_slot_that_was_taken_out_of_the_original_refuses_the_way_back_with_a_way_out(live_file, of_bones):
     obj, targets, other = sharing(of_bones)
     baked, original = obj.animation_data.action, other.animation_data.action
@@ -150,9 +158,9 @@ def test_a_slot_that_was_taken_out_of_the_original_refuses_the_way_back_with_a_w
     with pytest.raises(Refused, match=f"their slot was taken out of the Action {original.name}. Choose by hand"):
         unbake(targets)
     assert obj.animation_data.action == baked
-    assert is_baked(targets[0] if of_bones else obj)
+    assert is_baked(targets[0])
     refused = []
-    bake(other if not of_bones else list(other.pose.bones), refused=refused)
+    bake(list(other.pose.bones) if of_bones else other, refused=refused)
     assert refused == []
 
 
@@ -189,11 +197,9 @@ def shown(obj: bpy.types.Object, frames: np.ndarray) -> np.ndarray:
     return np.stack([*shown_poses([obj], frames)[0].values()])
 
 
-@pytest.mark.parametrize("of_bones", [False, True], ids=["object", "bones"])
+@OF_BOTH
 def test_what_plays_in_a_strip_of_strips_is_baked_there(live_file, of_bones):
-    obj = moving_rig() if of_bones else key(new_object())
-    targets = list(obj.pose.bones) if of_bones else obj
-    set_mode(targets, "dq_sclerp")
+    obj, targets = moving(of_bones)
     own = push_down(obj).action
     select_only(obj)
     put_into_a_meta_strip(obj)
@@ -207,11 +213,9 @@ def test_what_plays_in_a_strip_of_strips_is_baked_there(live_file, of_bones):
         assert np.abs(shown(obj, PLAYED) - before).max() < 2e-5
 
 
-@pytest.mark.parametrize("of_bones", [False, True], ids=["object", "bones"])
+@OF_BOTH
 def test_beside_a_strip_that_shows_no_slot_keys_are_baked_and_come_back(live_file, of_bones):
-    obj = moving_rig() if of_bones else key(new_object())
-    targets = list(obj.pose.bones) if of_bones else obj
-    set_mode(targets, "dq_sclerp")
+    obj, targets = moving(of_bones)
     own = obj.animation_data.action
     strip = obj.animation_data.nla_tracks.new().strips.new("Mute", 60, own)
     strip.action_slot = None
@@ -223,17 +227,12 @@ def test_beside_a_strip_that_shows_no_slot_keys_are_baked_and_come_back(live_fil
 
 
 @pytest.mark.parametrize("in_strips", [False, True], ids=["Action and strip", "two strips"])
-@pytest.mark.parametrize("of_bones", [False, True], ids=["object", "bones"])
+@OF_BOTH
 def test_two_slots_of_one_action_that_move_the_same_are_baked_each_for_itself(live_file, of_bones, in_strips):
-    def made(name: str, mode: str) -> bpy.types.Object:
-        obj = moving_rig(name=name) if of_bones else key(new_object(name), seed=len(mode))
-        set_mode(list(obj.pose.bones) if of_bones else obj, mode)
-        return obj
-
-    obj, other = made("A", "dq_sclerp"), made("B", "pga_lerp")
+    (obj, targets), (other, _) = moving(of_bones, name="A"), moving(of_bones, "pga_lerp", "B")
     select_only(obj, other)
     bpy.ops.anim.merge_animation()
-    data, targets = obj.animation_data, list(obj.pose.bones) if of_bones else obj
+    data = obj.animation_data
     action, own = data.action, data.action_slot
     starts = [(1, own)] if in_strips else []
     if in_strips:

@@ -13,9 +13,9 @@ from rigid_motion import animation
 from rigid_motion.animation import constraint_trouble, modes_of, refresh, set_enabled, set_mode
 from tests.animation.bones.poses import assert_posed, assert_same_poses, expected_poses
 from tests.animation.bones.rigs import FRAMES, PLAYED, Rest, key_all, moving_rig, new_rig, own_constraints, select_only
-from tests.animation.bones.test_bone_files import SAVE_AS, posed_on_a_farm, reopened, save
+from tests.animation.bones.test_bone_files import posed_on_a_farm, reopened, save
 from tests.animation.bones.test_rig_edits import assert_nothing_stale
-from tests.animation.farm import on_a_farm
+from tests.animation.farm import SAVE, on_a_farm
 from tests.animation.keyed import curves_of
 
 HANDS = (
@@ -175,8 +175,8 @@ def test_a_file_that_is_saved_in_edit_mode_plays_in_a_blender_without_the_extens
     with edit_mode(rig):
         path = save(tmp_path / "shot.blend")
         assert shown_slots(rig) == NONE_SHOWN
-    on_a_farm("bpy.ops.object.mode_set(mode='OBJECT')\n" + SAVE_AS, path, path)
-    _, played = posed_on_a_farm(path, rig)
+    on_a_farm("bpy.ops.object.mode_set(mode='OBJECT')\n" + SAVE, path, path)
+    played = posed_on_a_farm(path, rig)
     assert_same_poses(rig, PLAYED, played, expected)
 
 

@@ -11,18 +11,12 @@ import pytest
 from mathutils import Matrix
 
 from rigid_motion.animation import key_frames, set_mode
+from tests.animation.bones.poses import placed
 from tests.animation.bones.rigs import key_all, new_rig, pose_mode
 from tests.animation.keyed import curves_of, rotation_path
 
 BETWEEN = 15
 ORDERS = ("QUATERNION", "XYZ")
-
-
-def placed(rig: bpy.types.Object) -> np.ndarray:
-    """Where the bones of a rig are seen, shape (bones, 4, 4)."""
-    bpy.context.view_layer.update()
-    bones = rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones
-    return np.array([bone.matrix for bone in bones])
 
 
 @pytest.fixture(params=ORDERS)

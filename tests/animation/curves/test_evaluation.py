@@ -73,7 +73,7 @@ def test_every_interpolation_and_easing_has_blenders_values(interpolation, easin
         left=((-9, 0), (21, 1), (41, 0)),
         right=((16, 0), (41, 5), (61, 0)),
         easing=np.full(3, codes[easing], np.int32),
-        easing_settings=np.repeat(((1.7,), (4.0,), (9.0,)), 3, axis=1),
+        easing_settings=np.array(((1.7, 1.7, 1.7), (4.0, 4.0, 4.0), (9.0, 0.0, 9.0))),
     )
     assert_as_blender(keys, np.arange(-10.0, 62.0, 0.125), tolerance=1e-6)
 

@@ -13,6 +13,7 @@ from rigid_motion.animation.actions.reading import keyed_in
 from rigid_motion.animation.actions.slots import bindings_of
 from rigid_motion.animation.compute.differences import in_betweens
 from rigid_motion.animation.transforms import transform_of
+from tests.animation.bones.poses import shown_poses
 from tests.animation.bones.rigs import in_turn, new_rig
 from tests.animation.keyed import MODE_IDS, curves_of, snapshot
 from tests.animation.oracle import matrices, shown_worlds
@@ -170,9 +171,6 @@ def test_so_it_does_where_it_grows_and_turns_by_any_channels(live_file, mode, or
 def test_the_handles_beside_it_are_kept(live_file):
     obj = keyed(new_object())
     set_mode(obj, "dq_sclerp")
-    before = {
-        path: fcurve.keyframe_points[2].handle_left[:] for path, fcurve in curves_of(obj).items() if "d" not in path[0]
-    }
     before = snapshot(obj)
     key_on(obj, 31)
     for channel, (*_, points) in snapshot(obj).items():
@@ -188,12 +186,7 @@ def test_so_it_does_for_bones(live_file):
     set_mode(hand, "motor_spline")
 
     def poses() -> np.ndarray:
-        result = []
-        for frame in PLAYED:
-            bpy.context.scene.frame_set(int(frame))
-            evaluated = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
-            result.append(np.array(evaluated.pose.bones["Hand"].matrix) @ POINTS)
-        return np.array(result)[:, :3]
+        return (shown_poses([rig], PLAYED)[0]["Hand"] @ POINTS)[:, :3]
 
     before = poses()
     for frame in (31, 34):

@@ -11,6 +11,7 @@ from mathutils import Euler, Matrix
 
 from rigid_motion import animation
 from rigid_motion.animation import set_exact, set_mode
+from tests.animation.bones.poses import placed
 from tests.animation.bones.rig_editing import own_constraints
 from tests.animation.bones.rigs import in_turn, key_all, new_rig, pose_mode, select_only
 from tests.animation.keyed import curves_of
@@ -23,13 +24,6 @@ ORDERS = ("QUATERNION", "XYZ", "ZXY")
 def world(name: str = "Tool") -> np.ndarray:
     bpy.context.view_layer.update()
     return np.array(bpy.data.objects[name].evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
-
-
-def placed(rig: bpy.types.Object) -> np.ndarray:
-    """Where the bones of a rig are seen, shape (bones, 4, 4)."""
-    bpy.context.view_layer.update()
-    bones = rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones
-    return np.array([bone.matrix for bone in bones])
 
 
 def unlink(obj: bpy.types.Object) -> None:

@@ -25,8 +25,7 @@ def place() -> np.ndarray:
 
 def scenario(hand: Hand) -> Steps[None]:
     """An animator works with Auto Key between the keys of a screw, and exchanges its Action."""
-    hand.window.workspace = bpy.data.workspaces["Animation"]
-    yield from hand.wait_until(lambda: hand.window.screen.name == "Animation", "the Animation workspace opens")
+    yield from hand.open_animation_workspace()
     view = hand.area("VIEW_3D")
     key_the_cube()
     yield from hand.hover(places.centre(places.region(view)))

@@ -127,8 +127,7 @@ def assert_as_keyed(*frames: float, name: str = "Hand") -> None:
 
 def pose_the_rig(hand: Hand) -> Steps[bpy.types.Area]:
     """The rig in the Animation workspace, in Pose Mode with all bones selected, by hand; and the viewport."""
-    hand.window.workspace = bpy.data.workspaces["Animation"]
-    yield from hand.wait_until(lambda: hand.window.screen.name == "Animation", "the Animation workspace opens")
+    yield from hand.open_animation_workspace()
     view = hand.area("VIEW_3D")
     view.spaces.active.region_3d.view_distance, view.spaces.active.region_3d.view_location = 5, (0, 0, 1.2)
     make_the_rig()

@@ -58,8 +58,7 @@ def assert_on_the_screw(*frames: float) -> None:
 
 def scenario(hand: Hand) -> Steps[None]:
     """An animator chooses the screw for the cube, edits its keys, watches it, and bakes it."""
-    hand.window.workspace = bpy.data.workspaces["Animation"]
-    yield from hand.wait_until(lambda: hand.window.screen.name == "Animation", "the Animation workspace opens")
+    yield from hand.open_animation_workspace()
     view, sheet = hand.area("VIEW_3D"), hand.area("DOPESHEET_EDITOR")
     key_the_cube()
     native = shown()

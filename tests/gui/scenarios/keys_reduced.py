@@ -53,8 +53,7 @@ def record() -> None:
 
 def scenario(hand: Hand) -> Steps[None]:
     """An animator presses the button, asks for more, takes it back, does it again by the menu, and restores."""
-    hand.window.workspace = bpy.data.workspaces["Animation"]
-    yield from hand.wait_until(lambda: hand.window.screen.name == "Animation", "the Animation workspace opens")
+    yield from hand.open_animation_workspace()
     view = hand.area("VIEW_3D")
     record()
     truth = shown_worlds([cube()], FRAMES)[0]

@@ -18,7 +18,7 @@ from tests.animation.oracle import assert_shown, shown_worlds
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 
-STRAIGHT, SCREW, SMOOTH, BLEND, SPIRAL = "lerp_slerp", "dq_sclerp", "motor_spline", "pga_lerp", "cga_slerp"
+STRAIGHT, SCREW, SMOOTH = "lerp_slerp", "dq_sclerp", "motor_spline"
 
 SIZE = (960, 480)
 """Width and height of a picture, in pixels."""
@@ -43,18 +43,18 @@ Box = tuple[Sequence[float], Sequence[float]]
 
 
 def scenario(hand: Hand) -> Steps[None]:
-    """A lid, a hammer, a stick that is thrown, a dart on a winding way, hands of a clock, and a growing spiral."""
+    """A lid, a hammer, a stick that is thrown, and a dart on a winding way."""
     bpy.context.preferences.view.ui_scale = 1.5  # pages show pictures smaller than they are
     yield 1.0
     view = hand.area("VIEW_3D")
     settle(view)
-    for shot in (lid, hammer, throw, flight, half_turn, spiral):
+    for shot in (lid, hammer, throw, flight):
         bpy.data.batch_remove([*bpy.data.objects, *bpy.data.curves])
         bpy.context.scene.rigid_motion_overlay.tick_step = 2
         width = shot(view)
         bpy.context.scene.rigid_motion_overlay.show_paths = True
         yield
-        yield from picture(hand, view, shot.__name__.replace("_", "-"), width)
+        yield from picture(hand, view, shot.__name__, width)
 
 
 def settle(view: bpy.types.Area) -> None:
@@ -176,51 +176,6 @@ def flight(view: bpy.types.Area) -> float:
     return 4.9
 
 
-def half_turn(view: bpy.types.Area) -> float:
-    """Two hands of clocks that turn nearly half round. The screw's goes evenly, the blend's hurries in the middle."""
-    aim(view, (90, 0, 0), (0, 0, 0.35))
-    pace = {}
-    for mode, x, name in ((SCREW, -1.25, "Screw"), (BLEND, 1.25, "Motor Blend")):
-        pivot, tip = Vector((x, 0, 0)), Vector((0, 0, 1.0))
-        pointer = body(name, METAL, ((0, 0, -0.5), (0.05, 0.05, 1.0)))
-        for frame, angle in ((0, -89.0), (24, 89.0)):
-            turn = Quaternion((0, 1, 0), math.radians(angle))
-            key(pointer, frame, pivot + turn @ tip, turn)
-        run_evenly(pointer)
-        choose(pointer, mode)
-        body("Pivot", STAND, (pivot, (0.14, 0.14, 0.14)))
-        ghosts(pointer, shown(pointer), MODE, range(4, 25, 3))
-        label(name, (x, 0, -0.35), MODE, view)
-        pace[mode] = np.linalg.norm(np.diff(shown(pointer)[:, :3, 3], axis=0), axis=1)
-    assert np.ptp(pace[SCREW]) < 1e-4
-    assert pace[BLEND].max() > 1.8 * pace[BLEND].min(), pace[BLEND]
-    show_chosen_paths()
-    bpy.context.scene.rigid_motion_overlay.tick_step = 3
-    bpy.context.scene.frame_set(0)
-    return 4.9
-
-
-def spiral(view: bpy.types.Area) -> float:
-    """A block that grows by the same factor as its distance from a middle. By the spiral it does so all the time."""
-    aim(view, (40, 0, 0), (-0.05, 0.1, 0))
-    block = body("Block", WOOD, ((0, 0, 0), (0.6, 0.6, 0.6)))
-    turn = Quaternion((0, 0, 1), math.radians(130.0))
-    place, scale, turned = Vector((0.28, 0, 0)), 0.22, Quaternion()
-    for frame in (1, 17, 33, 49):
-        key(block, frame, place, turned, scale=scale)
-        place, scale, turned = 1.75 * (turn @ place), 1.75 * scale, turn @ turned
-    native = shown(block)
-    choose(block, SPIRAL)
-    assert np.ptp(shares(native)) > 0.2 * shares(native).mean()
-    assert np.ptp(shares(shown(block))) < 1e-4 * shares(native).mean()
-    body("Middle", STAND, ((0, 0, 0), (0.06, 0.06, 0.3)))
-    ghosts(block, shown(block), MODE, (9, 17, 22, 27, 33, 37, 41))
-    label("Versor Spiral", (-1.45, -0.95, 0.2), MODE, view)
-    label("Blender", (0.53, 0.43, 0.2), NATIVE, view)
-    bpy.context.scene.frame_set(49)
-    return 5.0
-
-
 # What they are built of
 
 
@@ -254,20 +209,10 @@ def add(name: str, data: bpy.types.ID, color: Sequence[float]) -> bpy.types.Obje
     return obj
 
 
-def key(
-    obj: bpy.types.Object,
-    frame: int,
-    location: Sequence[float],
-    rotation: Quaternion,
-    scale: float | None = None,
-) -> None:
+def key(obj: bpy.types.Object, frame: int, location: Sequence[float], rotation: Quaternion) -> None:
     """Key a pose."""
     obj.location, obj.rotation_quaternion = location, rotation
-    paths = ["location", "rotation_quaternion"]
-    if scale is not None:
-        obj.scale = (scale,) * 3
-        paths.append("scale")
-    for path in paths:
+    for path in ("location", "rotation_quaternion"):
         obj.keyframe_insert(path, frame=frame)
 
 
@@ -315,11 +260,6 @@ def sharpest_bend(worlds: np.ndarray) -> float:
     steps /= np.linalg.norm(steps, axis=1, keepdims=True)
     alike = np.einsum("ij,ij->i", steps[:-1], steps[1:])
     return float(np.degrees(np.arccos(np.clip(alike, -1.0, 1.0))).max())
-
-
-def shares(worlds: np.ndarray) -> np.ndarray:
-    """How far away from the middle a body is, in its own sizes."""
-    return np.linalg.norm(worlds[:, :3, 3], axis=1) / np.linalg.norm(worlds[:, :3, 0], axis=1)
 
 
 def ghosts(obj: bpy.types.Object, worlds: np.ndarray, color: Color, frames: Sequence[int]) -> None:

@@ -64,8 +64,7 @@ def assert_the_shortcut_is_free() -> None:
 
 def scenario(hand: Hand) -> Steps[None]:
     """An animator tries modes on the cube in three editors, takes some back, and bakes."""
-    hand.window.workspace = bpy.data.workspaces["Animation"]
-    yield from hand.wait_until(lambda: hand.window.screen.name == "Animation", "the Animation workspace opens")
+    yield from hand.open_animation_workspace()
     view, sheet = hand.area("VIEW_3D"), hand.area("DOPESHEET_EDITOR")
     assert_the_shortcut_is_free()
     key_the_cube()

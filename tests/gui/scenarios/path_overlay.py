@@ -61,8 +61,7 @@ def scenario(hand: Hand) -> Steps[None]:
     yield from shown_from_the_panel(hand, hand.area("VIEW_3D"))
     yield from hidden(hand, hand.area("VIEW_3D"))
 
-    hand.window.workspace = bpy.data.workspaces["Animation"]
-    yield from hand.wait_until(lambda: hand.window.screen.name == "Animation", "the Animation workspace opens")
+    yield from hand.open_animation_workspace()
     yield from beside_the_dope_sheet(hand, hand.area("VIEW_3D"), hand.area("DOPESHEET_EDITOR"))
 
 

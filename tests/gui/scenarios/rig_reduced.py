@@ -31,8 +31,7 @@ def ends() -> np.ndarray:
 
 
 def scenario(hand: Hand) -> Steps[None]:
-    hand.window.workspace = bpy.data.workspaces["Animation"]
-    yield from hand.wait_until(lambda: hand.window.screen.name == "Animation", "the Animation workspace opens")
+    yield from hand.open_animation_workspace()
     view = hand.area("VIEW_3D")
     bpy.data.batch_remove(bpy.data.objects)
     recorded_rig()
