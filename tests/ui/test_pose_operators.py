@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import key_frames, set_mode
+from rigid_motion.animation import channelbag_of, key_frames, set_mode
 from rigid_motion.animation.live.follower import show_seen_in_channels
 from rigid_motion.animation.transforms import transform_of
 from tests.animation.bones.poses import seen
@@ -74,6 +74,23 @@ def test_an_asset_has_the_pose_that_was_seen(rig, extension):
     extension.scene.frame_set(OTHER)
     rig.pose.apply_pose_from_action(asset)
     assert np.abs(seen(rig, "Hand.L") - expected).max() < 2e-5
+
+
+def test_a_muted_channel_is_shown_and_has_its_value_back_on_another_frame(rig, extension):
+    bone = rig.pose.bones["Hand.L"]
+    path = rotation_path(bone)
+    bag = channelbag_of(rig)
+    bag.fcurves.find(f'pose.bones["Hand.L"].{path}', index=1).mute = True
+    extension.view_layer.update()
+    for frame in (BETWEEN, OTHER, BETWEEN):
+        extension.scene.frame_set(frame)
+        before, expected = getattr(bone, path)[1], seen(rig, "Hand.L")
+        show_seen_in_channels([transform_of(bone)])
+        assert abs(getattr(bone, path)[1] - before) > 1e-3
+        assert np.abs(seen(rig, "Hand.L") - expected).max() < 1e-5
+        extension.scene.frame_set(frame)
+        assert getattr(bone, path)[1] == before
+        assert np.abs(seen(rig, "Hand.L") - expected).max() < 1e-5
 
 
 @pytest.mark.parametrize("name", ["copy_pose", "create_pose_asset"])

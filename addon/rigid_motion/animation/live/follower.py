@@ -197,7 +197,8 @@ class Follower:
                 if block.original.is_editable:
                     add_actions(block.original, depsgraph, self.added)
                 for transform in self.edited_of(block.original):
-                    if transform not in seen:
+                    # A muted channel has its pose from its property, and would be filled in for the one that is shown.
+                    if transform not in seen and not self.channels.is_showing(transform):
                         self.inserted.notice_pose(transform, self.frame)
                         edited.append(transform)
         if edited:
