@@ -6,12 +6,12 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import channelbag_of, key_frames, set_mode
+from rigid_motion.animation import key_frames, refresh, set_mode
 from rigid_motion.animation.live.follower import show_seen_in_channels
 from rigid_motion.animation.transforms import transform_of
 from tests.animation.bones.poses import seen
 from tests.animation.bones.rigs import Rest, key_all, new_rig, pose_mode, select_bones
-from tests.animation.keyed import rotation_path
+from tests.animation.keyed import curve_of, rotation_path
 
 BETWEEN, OTHER = 15, 33
 SIDES = [Rest(f"Hand.{side}", (x, 0.0, 1.0), (2 * x, 0.1, 1.2)) for side, x in (("L", 0.3), ("R", -0.3))]
@@ -76,12 +76,32 @@ def test_an_asset_has_the_pose_that_was_seen(rig, extension):
     assert np.abs(seen(rig, "Hand.L") - expected).max() < 2e-5
 
 
-def test_a_muted_channel_is_shown_and_has_its_value_back_on_another_frame(rig, extension):
-    bone = rig.pose.bones["Hand.L"]
+def mute_a_channel(rig: bpy.types.Object, name: str = "Hand.L") -> tuple[bpy.types.PoseBone, str]:
+    """Mute a channel of a bone's rotation, and return the bone and the property."""
+    bone = rig.pose.bones[name]
     path = rotation_path(bone)
-    bag = channelbag_of(rig)
-    bag.fcurves.find(f'pose.bones["Hand.L"].{path}', index=1).mute = True
-    extension.view_layer.update()
+    curve_of(bone, path, 1).mute = True
+    bpy.context.view_layer.update()
+    return bone, path
+
+
+def test_a_pose_pasted_where_a_channel_is_muted_stays_until_the_frame_changes(rig, extension):
+    bone, path = mute_a_channel(rig)
+    copied = seen(rig, "Hand.L")
+    bpy.ops.rigid_motion.copy_pose("EXEC_DEFAULT", True)
+    extension.scene.frame_set(OTHER)
+    bpy.ops.pose.paste("EXEC_DEFAULT", True)
+    for _ in range(2):
+        assert np.abs(seen(rig, "Hand.L") - copied).max() < 2e-5
+        extension.view_layer.update()
+    value = getattr(bone, path)[1]
+    extension.scene.frame_set(BETWEEN)
+    assert getattr(bone, path)[1] == value
+    assert refresh() == 0  # In-betweens go by the value of the muted channel.
+
+
+def test_a_muted_channel_is_shown_and_has_its_value_back_on_another_frame(rig, extension):
+    bone, path = mute_a_channel(rig)
     for frame in (BETWEEN, OTHER, BETWEEN):
         extension.scene.frame_set(frame)
         before, expected = getattr(bone, path)[1], seen(rig, "Hand.L")

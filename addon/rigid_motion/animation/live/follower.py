@@ -85,6 +85,8 @@ class Follower:
         """First and last frame of each scene when last seen, by session id."""
         self.waiting: list[BlockKey] = []
         """The objects that a script has edited before it went on to another frame."""
+        self.posed: list[BlockKey] = []
+        """Objects that have a whole pose without keys, which in-betweens go by as soon as another frame is shown."""
         self.followed: set[int] = set()
         """The Actions, by session id, that were followed before Blender evaluated them."""
         self.moved: set[Transform] = set()
@@ -197,9 +199,12 @@ class Follower:
                 if block.original.is_editable:
                     add_actions(block.original, depsgraph, self.added)
                 for transform in self.edited_of(block.original):
-                    # A muted channel has its pose from its property, and would be filled in for the one that is shown.
-                    if transform not in seen and not self.channels.is_showing(transform):
-                        self.inserted.notice_pose(transform, self.frame)
+                    if transform in seen:
+                        continue
+                    if self.inserted.notice_pose(transform, self.frame):
+                        # In-betweens depend on the properties of muted channels: filled in now, they would replace it.
+                        self.posed.append(key_of(block.original))
+                    else:
                         edited.append(transform)
         if edited:
             self.refresh(edited)
@@ -287,7 +292,8 @@ class Follower:
     def before_frame(self, scene: bpy.types.Scene, *_: object) -> None:
         self.channels.put_back()
         # Edits not seen yet were made on the frame before this one. Afterwards all that is played looks edited.
-        self.waiting = [key_of(obj) for obj in self.before_evaluation(scene)]
+        self.waiting = [*self.posed, *map(key_of, self.before_evaluation(scene))]
+        self.posed = []
         self.refresh_edited(actions_to_evaluate(scene))
         self.finish_what_is_seen()
 

@@ -199,10 +199,14 @@ class InsertedKeys:
         self._posed[transform.identity] = posed
         return True
 
-    def notice_pose(self, transform: Transform, frame: float) -> None:
-        """Keep how a transform was posed on the frame that is shown, and has been evaluated so."""
+    def notice_pose(self, transform: Transform, frame: float) -> bool:
+        """Keep how a transform was posed on the frame that is shown, and has been evaluated so.
+
+        Returns whether its properties have all of its pose, with no difference on top.
+        """
         is_whole = self._is_shown_whole(transform)
         self._keep(transform, _Posed(frame, transform.components(), not is_whole, is_whole))
+        return is_whole
 
     def notice_whole(self, transform: Transform, frame: float) -> None:
         """Keep that the properties of a transform have all of its pose, with no difference on top."""

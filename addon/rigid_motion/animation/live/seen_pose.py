@@ -148,14 +148,6 @@ class SeenInChannels:
             self._shown.append(_Shown(key, transform.prefix, rotation, parts, before, transform.components()))
         return list(seen)
 
-    def is_showing(self, transform: Transform) -> bool:
-        """Return whether the properties of a transform still have the pose that they were given."""
-        return any(
-            (shown.key, shown.prefix) == (key_of(transform.animated), transform.prefix)
-            and np.array_equal(transform.components(), shown.after)
-            for shown in self._shown
-        )
-
     def put_back(self, actions: Collection[bpy.types.Action] | None = None) -> None:
         """Give properties back what they had, before Blender evaluates the animation: what is not keyed, or muted, has
         nothing else to get it from. Those that these Actions move, or all.
