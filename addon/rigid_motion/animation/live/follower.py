@@ -203,7 +203,7 @@ class Follower:
                         continue
                     if self.inserted.notice_pose(transform, self.frame):
                         # In-betweens depend on the properties of muted channels: filled in now, they would replace it.
-                        self.posed.append(key_of(block.original))
+                        self.posed.append(key_of(transform.animated))
                     else:
                         edited.append(transform)
         if edited:
