@@ -65,7 +65,7 @@ def files(extension_zip) -> dict[str, str]:
 
 
 def may_be_imported(module: str) -> bool:
-    if module == "importlib.resources":  # files of a package, no code
+    if module in ("importlib.resources", "urllib.parse"):  # files of a package, no code; words, no network
         return True
     module = module.partition(".")[0]
     return module in OF_BLENDER or (module in sys.stdlib_module_names and module not in UNWANTED)
