@@ -9,6 +9,7 @@ import pytest
 from rigid_motion.animation import key_frames, refresh, set_mode
 from rigid_motion.animation.live.follower import show_seen_in_channels
 from rigid_motion.animation.transforms import transform_of
+from rigid_motion.ui.panels import facts_and_notes
 from tests.animation.bones.poses import seen
 from tests.animation.bones.rigs import Rest, key_all, new_rig, pose_mode, select_bones
 from tests.animation.keyed import curve_of, rotation_path
@@ -94,6 +95,7 @@ def test_a_pose_pasted_where_a_channel_is_muted_stays_until_the_frame_changes(ri
     for _ in range(2):
         assert np.abs(seen(rig, "Hand.L") - copied).max() < 2e-5
         extension.view_layer.update()
+    assert facts_and_notes(bone, OTHER)[1] == []
     value = getattr(bone, path)[1]
     extension.scene.frame_set(BETWEEN)
     assert getattr(bone, path)[1] == value

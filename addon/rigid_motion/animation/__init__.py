@@ -34,7 +34,7 @@ from .edits.breakdowns import Breakdowns, breakdown
 from .edits.constraints import constraint_trouble, error_between_frames, restore_constraints, set_exact
 from .edits.mode_keys import set_mode, set_turns
 from .live import follower, rigs
-from .live.follower import refresh, set_enabled
+from .live.follower import is_enabled, refresh, set_enabled
 from .queries.keyed import key_frames, modes_of
 from .queries.segments import problem_of
 from .transforms import Refused
@@ -55,6 +55,7 @@ __all__ = [
     "discard_dense_keys",
     "error_between_frames",
     "is_baked",
+    "is_enabled",
     "is_reduced",
     "key_frames",
     "modes_of",

@@ -358,6 +358,11 @@ def set_enabled(enabled: bool) -> None:
     follower.enabled, follower.unseen = enabled, enabled
 
 
+def is_enabled() -> bool:
+    """Return whether edits are followed at once."""
+    return follower.enabled
+
+
 def set_drafts(allowed: bool) -> None:
     """Edit large Actions in draft, as in a window: one sample a frame, until something is shown between frames, or
     rendered, or saved.
