@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rigid_motion.gltf import Options, Report, read_document, reduce_file, reduced
@@ -235,6 +235,7 @@ def test_key_poses_are_so_many_times_of_all_nodes(tmp_path):
 @pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10**9))
+@example(46804)  # A sheared node that is largest between two keys, and nearly as large elsewhere in another shape.
 def test_whatever_hangs_on_whatever_keeps_to_the_tolerance(tmp_path_factory, seed):
     random, folder = np.random.default_rng(seed), tmp_path_factory.mktemp("random")
     made, count = Making(), int(random.integers(1, 8))

@@ -34,6 +34,9 @@ EXACTLY = 64
 AS_LARGE = 1.0 - 1e-9
 """What is larger than this share of something else is no smaller but for rounding."""
 
+EVEN = 1e-4
+"""Of a scale: its axes differ by no more where it is even. Programs write some with rounding."""
+
 NOWHERE = np.empty(0, dtype=np.int64)
 
 UPWARDS = 1
@@ -144,6 +147,14 @@ class World:
             result[row] = np.linalg.norm(self.nodes.resting.axes[parent], axis=-2) if parent >= 0 else 1.0
         return result
 
+    @property
+    def _is_uneven(self) -> bool:
+        """Whether any scale is uneven by more than rounding, or may be: what turns below has another shape then."""
+        scales = [track.points for (_, path), track in self.truth.items() if path == SCALE]
+        return bool(self.nodes.matrices) or any(
+            (np.ptp(some, axis=1) > EVEN * np.abs(some).max(axis=1)).any() for some in (self.nodes.rest[SCALE], *scales)
+        )
+
     @cached_property
     def _extremes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Of each node: its axes where they are first largest (n, 3, 3), their lengths at most (n, 3), and how far it
@@ -156,7 +167,8 @@ class World:
         axes, sizes = np.zeros((count, 3, 3)), np.full(count, -1.0)
         lengths, away = np.zeros((count, 3)), np.zeros(count)
         hangs, every = self.parents >= 0, np.arange(count)
-        for block in self.seen(self.truth):
+        # Nodes that change their shape are largest for a moment, perhaps between two.
+        for block in self.seen(self.truth, parts=PARTS if self._is_uneven else 1):
             (maps,) = block.maps
             squares = np.einsum("nmij,nmij->nm", maps.axes, maps.axes)
             largest = np.argmax(squares >= AS_LARGE * squares.max(axis=1, keepdims=True), axis=1)
