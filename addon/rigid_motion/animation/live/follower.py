@@ -85,7 +85,7 @@ class Follower:
         """First and last frame of each scene when last seen, by session id."""
         self.waiting: list[BlockKey] = []
         """The objects that a script has edited before it went on to another frame."""
-        self.posed: list[BlockKey] = []
+        self.posed: set[BlockKey] = set()
         """Objects that have a whole pose without keys, which in-betweens go by as soon as another frame is shown."""
         self.followed: set[int] = set()
         """The Actions, by session id, that were followed before Blender evaluated them."""
@@ -203,7 +203,7 @@ class Follower:
                         continue
                     if self.inserted.notice_pose(transform, self.frame):
                         # In-betweens depend on the properties of muted channels: filled in now, they would replace it.
-                        self.posed.append(key_of(transform.animated))
+                        self.posed.add(key_of(transform.animated))
                     else:
                         edited.append(transform)
         if edited:
@@ -293,7 +293,7 @@ class Follower:
         self.channels.put_back()
         # Edits not seen yet were made on the frame before this one. Afterwards all that is played looks edited.
         self.waiting = [*self.posed, *map(key_of, self.before_evaluation(scene))]
-        self.posed = []
+        self.posed.clear()
         self.refresh_edited(actions_to_evaluate(scene))
         self.finish_what_is_seen()
 
