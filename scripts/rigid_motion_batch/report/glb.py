@@ -21,7 +21,6 @@ from rigid_motion.motion import Poses, interpolate
 from rigid_motion.motion.quaternions import align_signs
 from rigid_motion_batch.analysis.modes import label_of
 from rigid_motion_batch.analysis.reconstructions import Reconstruction
-from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.palette import DARK, colour_of, linear
 from rigid_motion_batch.recordings.clips import Clip
 
@@ -85,7 +84,7 @@ def _dense(times: np.ndarray) -> np.ndarray:
 
 
 def _shown(clip: Clip, poses: Poses) -> Poses:
-    poses = to_blender(clip.in_metres(poses), clip.axes)
+    poses = clip.in_blender(poses)
     return poses if clip.rest_body else poses[None]
 
 

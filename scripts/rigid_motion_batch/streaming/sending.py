@@ -33,7 +33,7 @@ def samples_of(clip: Clip) -> tuple[np.ndarray, Poses]:
 
     Of a file whose keys are not at its frames those are what it shows at its frames.
     """
-    poses = to_blender(clip.in_metres(clip.poses), clip.axes)
+    poses = clip.in_blender(clip.poses)
     times, poses = clip.times, poses if len(poses.shape) == 2 else poses[None]
     if clip.rate and len(times) != round((times[-1] - times[0]) * clip.rate) + 1:
         even = np.arange(times[0], times[-1] + 0.01 / clip.rate, 1.0 / clip.rate)
