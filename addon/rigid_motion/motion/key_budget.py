@@ -76,11 +76,10 @@ class BudgetSearch(Search):
         """Whether all samples are candidates."""
 
     def least(self, tries: int) -> np.ndarray:
-        """So many samples that are keys with as small an error as can be found, or two where those have none."""
+        """So many samples that are keys with as small an error as can be found, or two where nothing moves."""
         count = len(self.recording.times)
-        ends = np.array((0, count - 1))
-        if self.costs.peak(ends) == 0.0:
-            return ends
+        if not np.ptp(self.recording.truth.rows, axis=-1).any():
+            return np.array((0, count - 1))
         keys = self.measured(np.arange(count))
         if not self._takes_all:
             keys = self.thinned(keys, math.inf, SPREAD[min(self.reach, 1)] * self.budget)
