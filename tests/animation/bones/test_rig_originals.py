@@ -100,6 +100,26 @@ def test_an_original_that_another_rig_plays_keeps_its_names(live_file):
     assert_same_poses(other, PLAYED, shown_poses([other], PLAYED)[0], expected)
 
 
+def test_another_rig_that_plays_changed_keys_keeps_them(changed):
+    rig, change, go_back = changed
+    own, before = rig.animation_data.action, [snapshot(bone) for bone in rig.pose.bones]
+    change()
+    shared = rig.animation_data.action
+    other = new_rig("Other")
+    other.animation_data_create().action = shared
+    other.animation_data.action_slot = shared.slots[0]
+    refresh()
+    keys, expected = [snapshot(bone) for bone in other.pose.bones], shown_poses([other], PLAYED)[0]
+    go_back([bone for bone in rig.pose.bones if len(bone.rigid_motion.bakes)])
+    refresh()
+    assert (rig.animation_data.action, other.animation_data.action) == (own, shared)
+    assert [snapshot(bone) for bone in rig.pose.bones] == before
+    assert [snapshot(bone) for bone in other.pose.bones] == keys
+    assert_same_poses(other, PLAYED, shown_poses([other], PLAYED)[0], expected)
+    assert not [action for action in bpy.data.actions if not action.users]
+    assert_nothing_stale()
+
+
 @pytest.mark.parametrize("muted", [False, True], ids=["without keys", "muted"])
 @OF_BOTH
 def test_what_has_no_keys_gets_its_value_back(live_file, of_bones, muted):

@@ -104,17 +104,25 @@ def in_copy(transform: Transform, binding: Binding, changed: bpy.types.Action) -
 
 
 class Lookup:
-    """The same transforms in one slot and another: each slot is looked through once."""
+    """The same transforms in one slot and another, and who else moves by it: each slot is looked through once."""
 
     def __init__(self, transforms: Iterable[Transform]) -> None:
         self._prefixes = {transform.prefix for transform in transforms}
         self._found: dict[tuple, dict[str, Binding]] = {}
+        self._shared: dict[tuple, bool] = {}
 
     def find(self, slot: Slot, prefix: str) -> Binding:
         key = slot.action.session_uid, slot.handle, slot.users
         if key not in self._found:
             self._found[key] = {binding.prefix: binding for binding in bindings_in_slot(slot, self._prefixes)}
         return self._found[key][prefix]
+
+    def is_shared(self, rig: bpy.types.Object, slot: Slot) -> bool:
+        """Return whether others than a rig move by its slot as well."""
+        key = rig, slot.key
+        if key not in self._shared:
+            self._shared[key] = _is_shared(rig, slot)
+        return self._shared[key]
 
 
 def exchange(obj: bpy.types.Object, old: Slot, new: bpy.types.Action) -> None:
@@ -193,12 +201,9 @@ def move_by_copy(transform: Transform, binding: Binding, kind: str) -> Binding:
         noted = (entry.original for entry in _entries(rig) if entry.changed == original)
         before = next((action for action in noted if action is not None), None)
         changed, slot = original, None if before is None else in_action(before, binding.slot)
-        is_shared = any(item.users != (rig,) for item in slots_of([rig]) if item.key == binding.slot.key)
+        is_shared = _is_shared(rig, binding.slot)
         if slot is None or is_shared or not _is_as(*bindings_in_slot(slot, (binding.prefix,)), binding):
-            changed = copied(binding.slot, kind)
-            exchange(rig, binding.slot, changed)
-            _rename_in_notes(rig, original, changed)
-            keep_names(rig)
+            changed = _leave_for_copy(rig, binding.slot, kind)
         else:
             original = before
     entry = transform.motion.bakes.add()
@@ -221,7 +226,11 @@ def put_back(transform: Transform, kind: str, lookup: Lookup) -> None:
             continue
         if entry.kind != kind:
             break
-        changed, original = entry.changed, entry.original
+        original = entry.original
+        if transform.animated.pose is not None and lookup.is_shared(transform.animated, slot):
+            # The others keep the keys that they have.
+            slot = used_in(transform.animated, _leave_for_copy(transform.animated, slot, kind))
+        changed = entry.changed
         mode = entry.mode if entry.is_property_set("mode") else None
         binding, before = (lookup.find(item, transform.prefix) for item in (slot, in_action(original, slot)))
         let_rest(transform, entry, binding, before)
@@ -270,6 +279,19 @@ def _entries(rig: bpy.types.Object) -> Iterator[bpy.types.PropertyGroup]:
     yield from rig.rigid_motion.bakes
     for bone in rig.pose.bones:
         yield from bone.rigid_motion.bakes
+
+
+def _is_shared(rig: bpy.types.Object, slot: Slot) -> bool:
+    return any(item.users != (rig,) for item in slots_of([rig]) if item.key == slot.key)
+
+
+def _leave_for_copy(rig: bpy.types.Object, slot: Slot, kind: str) -> bpy.types.Action:
+    """Let a rig move by a copy of what it moves by, and return that."""
+    changed = copied(slot, kind)
+    exchange(rig, slot, changed)
+    _rename_in_notes(rig, slot.action, changed)
+    keep_names(rig)
+    return changed
 
 
 def _rename_in_notes(rig: bpy.types.Object, old: bpy.types.Action, new: bpy.types.Action) -> None:
