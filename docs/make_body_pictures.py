@@ -2,7 +2,7 @@
 
 python docs/make_body_pictures.py
 
-The body is the dancer of the tests, clothed. Writes bodies.mp4, bodies.png and bodies-heat.svg beside this file.
+The body is the dancer of the examples, clothed. Writes bodies.mp4, bodies.png and bodies-heat.svg beside this file.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from matplotlib.colors import LinearSegmentedColormap
 DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
+from examples import figure
+from examples.dancer import dance
 from rigid_motion import animation
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.radii import EVERYWHERE
@@ -30,7 +32,6 @@ from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.rest_bodies import short_names
 from rigid_motion_batch.scenes.film import render_still
 from rigid_motion_batch.scenes.materials import surface
-from tests.rigs import dancer, figure
 
 RATE, MODES = "4", ("lerp_slerp", "dq_sclerp", "motor_spline")
 
@@ -85,11 +86,11 @@ def save_dancer(path: Path) -> None:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     animation.register()
     try:
-        rig = dancer.dancer()
+        rig = dance.dancer()
         rig.name = "Dancer"
         figure.clothe(rig, surface("Cloth", "#93A0B3"))
         scene = bpy.context.scene
-        scene.render.fps, scene.frame_end = dancer.FPS, int(dancer.FRAMES[-1])
+        scene.render.fps, scene.frame_end = dance.FPS, int(dance.FRAMES[-1])
         bpy.ops.wm.save_as_mainfile(filepath=str(path))
     finally:
         animation.unregister()

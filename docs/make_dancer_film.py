@@ -19,6 +19,8 @@ from mathutils import Euler, Vector
 DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
+from examples import figure
+from examples.dancer import dance
 from rigid_motion import animation
 from rigid_motion.animation import write_channel
 from rigid_motion_batch import palette
@@ -27,9 +29,8 @@ from rigid_motion_batch.scenes.film import render_film, render_still
 from rigid_motion_batch.scenes.materials import ink, surface
 from rigid_motion_batch.scenes.scene import make_lights, set_up_render
 from rigid_motion_batch.scenes.settings import SceneSettings
-from tests.rigs import dancer, figure
 
-SETTINGS = SceneSettings(resolution=(960, 540), antialiasing="5", fps=dancer.FPS)
+SETTINGS = SceneSettings(resolution=(960, 540), antialiasing="5", fps=dance.FPS)
 
 MODE = "motor_spline"
 TOLERANCE, RADIUS = 0.01, 0.03
@@ -72,21 +73,21 @@ def build() -> bpy.types.Scene:
     """Both dancers, side by side."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
-    set_up_render(scene, SETTINGS, len(dancer.FRAMES))
+    set_up_render(scene, SETTINGS, len(dance.FRAMES))
     video = scene.render.ffmpeg
     video.constant_rate_factor, video.ffmpeg_preset, video.gopsize = "MEDIUM", "BEST", 5 * SETTINGS.fps
     make_lights(scene)
     scene.render.dither_intensity = 0.0  # Its grain is most of a file.
     camera = _camera(scene)
 
-    recorded, reduced = dancer.dancer(), dancer.dancer()
+    recorded, reduced = dance.dancer(), dance.dancer()
     bones = list(reduced.pose.bones)
     animation.reduce_keys_of(bones, MODE, TOLERANCE, RADIUS, shared=True)
     done = animation.total_reduction(bones)
     poses = key_frames(reduced)
     off = math.ceil(1e4 * done.largest_error) / 10.0
     print(
-        f"{len(dancer.FRAMES)} poses of {done.before} keys, {len(poses)} of {done.after}, off by {off:.1f} mm",
+        f"{len(dance.FRAMES)} poses of {done.before} keys, {len(poses)} of {done.after}, off by {off:.1f} mm",
         flush=True,
     )
 
@@ -104,7 +105,7 @@ def build() -> bpy.types.Scene:
     for frame in poses:
         _ghost(scene, bodies[1], int(frame))
 
-    _captions(camera, -0.5, "Recorded", RECORDED, dancer.FRAMES, f"{done.before} keys: every bone on every frame")
+    _captions(camera, -0.5, "Recorded", RECORDED, dance.FRAMES, f"{done.before} keys: every bone on every frame")
     says = f"{done.after} keys, no joint off by more than {off:.1f} mm"
     _captions(camera, 0.5, "Key poses", REDUCED, poses, says)
     return scene
@@ -131,7 +132,7 @@ def _camera(scene: bpy.types.Scene) -> bpy.types.Object:
 
 def _flash(material: bpy.types.Material, colour: str, bright: str, frames: np.ndarray) -> None:
     """Let a material light up on some frames, and go back to its colour."""
-    every = dancer.FRAMES
+    every = dance.FRAMES
     since = np.array([min((frame - key for key in frames if key <= frame), default=GLOW) for frame in every])
     share = np.clip(1.0 - since / GLOW, 0.0, 1.0)[:, None]
     values = (1.0 - share) * palette.linear(colour) + share * palette.linear(bright)
@@ -168,7 +169,7 @@ def _captions(camera: bpy.types.Object, side: float, title: str, colour: str, po
     """Title, poses that have passed, all of them on a strip, and what there is to say, below a lane."""
     bright, faint, dim = ink(f"{title} ink", colour), ink("Faint", palette.DARK.faint), ink("Dim", palette.DARK.track)
     bottom = -WIDTH * SETTINGS.resolution[1] / SETTINGS.resolution[0]
-    every, collection = dancer.FRAMES, bpy.context.scene.collection
+    every, collection = dance.FRAMES, bpy.context.scene.collection
 
     def put(obj: bpy.types.Object, x: float, y: float, lift: float = 0.0) -> bpy.types.Object:
         obj.parent, obj.location = camera, ((side + x) * WIDTH, bottom + y * WIDTH, -2.0 + lift)

@@ -20,6 +20,7 @@ from mathutils import Quaternion, Vector
 DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
+from examples import figure
 from rigid_motion import animation
 from rigid_motion.animation.compute.differences import in_betweens
 from rigid_motion.animation.queries.keyed import source_of
@@ -31,7 +32,6 @@ from rigid_motion_batch.scenes.film import render_film, render_still
 from rigid_motion_batch.scenes.materials import ink, surface
 from rigid_motion_batch.scenes.scene import make_lights, set_up_render
 from rigid_motion_batch.scenes.settings import SceneSettings
-from tests.rigs import figure
 
 SETTINGS = SceneSettings(resolution=(960, 540), antialiasing="5", fps=24)
 THEME = palette.DARK

@@ -17,11 +17,11 @@ import numpy as np
 DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
+from examples.dancer import dance
 from rigid_motion.gltf import Options, read_document, reduce_file
 from rigid_motion.gltf.nodes import Nodes, by_target
 from rigid_motion.gltf.tracks import Clip, read_clips
 from rigid_motion_batch.files import write_text
-from tests.rigs import dancer
 
 TOLERANCE, RADIUS = 0.005, 0.03
 """Metres."""
@@ -60,9 +60,9 @@ def main() -> None:
 
 def _export(path: Path) -> None:
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    dancer.dancer()
+    dance.dancer()
     scene = bpy.context.scene
-    scene.render.fps, scene.frame_start, scene.frame_end = dancer.FPS, 1, int(dancer.FRAMES[-1])
+    scene.render.fps, scene.frame_start, scene.frame_end = dance.FPS, 1, int(dance.FRAMES[-1])
     bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB")
 
 

@@ -21,6 +21,7 @@ from mathutils import Euler, Matrix, Vector
 DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
+from examples import figure
 from rigid_motion import animation
 from rigid_motion_batch import palette
 from rigid_motion_batch.scenes import captions
@@ -28,7 +29,7 @@ from rigid_motion_batch.scenes.film import render_film, render_still
 from rigid_motion_batch.scenes.materials import ink, surface
 from rigid_motion_batch.scenes.scene import make_lights, set_up_render
 from rigid_motion_batch.scenes.settings import SceneSettings
-from tests.rigs import figure, scenes
+from tests.rigs import scenes
 from tests.rigs.human import human
 
 SETTINGS = SceneSettings(resolution=(960, 540), antialiasing="8", fps=24)

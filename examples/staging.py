@@ -16,6 +16,7 @@ import bpy
 import numpy as np
 from mathutils import Euler, Matrix, Vector
 
+from examples import figure
 from rigid_motion import animation
 from rigid_motion_batch import palette
 from rigid_motion_batch.scenes import captions
@@ -23,7 +24,6 @@ from rigid_motion_batch.scenes.film import render_still, save_blend
 from rigid_motion_batch.scenes.materials import ink
 from rigid_motion_batch.scenes.scene import make_lights, set_up_render
 from rigid_motion_batch.scenes.settings import SceneSettings
-from tests.rigs import figure
 
 RESOLUTION = 960, 540
 

@@ -14,7 +14,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "addon"), str(ROOT / "scripts")]
 
-from examples import staging
+from examples import figure, staging
 from research.making.tracking import table, turn
 from rigid_motion import animation
 from rigid_motion.motion import Poses, reduce_keys, rms, shell_error
@@ -22,7 +22,6 @@ from rigid_motion.motion.quaternions import multiply
 from rigid_motion_batch import palette
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.scenes.materials import ink, surface
-from tests.rigs import figure
 
 SEED, FPS, FRAMES = 11, 24, 240
 

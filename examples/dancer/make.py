@@ -12,11 +12,11 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "addon"), str(ROOT / "scripts")]
 
-from examples import staging
+from examples import figure, staging
+from examples.dancer import dance
 from rigid_motion import animation
 from rigid_motion_batch import palette
 from rigid_motion_batch.scenes.materials import surface
-from tests.rigs import dancer, figure
 
 MODE = "motor_spline"
 TOLERANCE, RADIUS = 0.01, 0.03
@@ -35,12 +35,12 @@ STILL, GHOSTS = 98, 3
 def main(arguments: list[str] | None = None) -> None:
     """Make both dancers, and say how many keys are left and how far off that is."""
     options = staging.parse(HERE, __doc__, arguments)
-    count = len(dancer.FRAMES)
-    staging.begin(count, dancer.FPS)
+    count = len(dance.FRAMES)
+    staging.begin(count, dance.FPS)
     camera = staging.look((0.0, 0.0, 1.08), (82.0, 0.0, 0.0), WIDTH)
     rigs = []
     for name, colour, place in LANES:
-        rig = dancer.dancer()
+        rig = dance.dancer()
         rig.name, rig.location.x, rig.show_in_front = name, place, True
         figure.clothe(rig, surface(f"{name} skin", colour)).hide_select = True
         rigs.append(rig)

@@ -13,10 +13,9 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "addon"), str(ROOT / "scripts")]
 
-from examples import staging
+from examples import figure, staging
 from rigid_motion import animation
 from rigid_motion_batch.scenes.materials import ink, surface
-from tests.rigs import figure
 
 KEYS = (1, 0.0), (25, 115.0), (49, 40.0), (65, 0.0)
 """Frames, and how far the lid is open on them, in degrees."""

@@ -13,10 +13,9 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "addon"), str(ROOT / "scripts")]
 
-from examples import staging
+from examples import figure, staging
 from rigid_motion import animation
 from rigid_motion_batch.scenes.materials import surface
-from tests.rigs import figure
 
 KEYS = (1, 75.0), (19, -45.0), (31, -45.0), (55, 75.0)
 """Frames, and how far the arm is raised on them, in degrees."""

@@ -84,6 +84,10 @@ def put(*keys: str | int, to: object) -> Callable[[dict[str, Any]], None]:
         (put("buffers", 0, "uri", to="%2e%2e/secret"), "buffer 0 is outside of its folder ('%2e%2e/secret')"),
         (put("buffers", 0, "uri", to="file:///etc/passwd"), "buffer 0 is outside of its folder ('file:///etc/passwd')"),
         (put("buffers", 0, "uri", to="C:\\secret"), "buffer 0 is outside of its folder"),
+        (put("buffers", 0, "uri", to="a\\..\\..\\secret"), "buffer 0 is outside of its folder"),
+        (put("buffers", 0, "uri", to="//host/secret"), "buffer 0 is outside of its folder"),
+        (put("buffers", 0, "uri", to="HTTP://localhost:1/"), "buffer 0 is outside of its folder"),
+        (put("buffers", 0, "uri", to=7), "buffer 0 is outside of its folder"),
         (
             put("buffers", 0, "uri", to="not there.bin"),
             "buffer 0, 'not there.bin', is not there; bring that file along",

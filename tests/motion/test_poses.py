@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rigid_motion.motion import Poses
-from rigid_motion.motion.quaternions import align_signs, angle_between, conjugate, multiply, rotate
+from rigid_motion.motion.quaternions import angle_between, conjugate, multiply, rotate
 from tests.motion.cases import random_quaternions
 
 
@@ -24,14 +24,6 @@ def test_shapes_that_do_not_fit_are_refused(parts):
         Poses(*parts)
 
 
-def test_indexing_keeps_the_parts_together():
-    poses = Poses(np.arange(12.0).reshape(4, 3), np.arange(16.0).reshape(4, 4), np.arange(4.0))
-    some = poses[[3, 0]]
-    assert len(some) == 2
-    assert some.positions[0].tolist() == [9, 10, 11]
-    assert some.scales.tolist() == [3, 0]
-
-
 def test_products_and_rotations_are_scipys():
     random = np.random.default_rng(0)
     a, b = random_quaternions(random, 100), random_quaternions(random, 100)
@@ -42,14 +34,6 @@ def test_products_and_rotations_are_scipys():
     assert rotate(a, points) == pytest.approx(turn_a.apply(points), abs=1e-14)
     assert rotate(conjugate(a), points) == pytest.approx(turn_a.inv().apply(points), abs=1e-14)
     assert angle_between(a, b) == pytest.approx((turn_a.inv() * turn_b).magnitude(), abs=1e-14)
-
-
-def test_signs_follow_from_the_first_on():
-    q = random_quaternions(np.random.default_rng(1), 3, 50)
-    aligned = align_signs(q)
-    assert np.all(np.sum(aligned[:, 1:] * aligned[:, :-1], axis=-1) >= 0.0)
-    assert np.array_equal(aligned[:, 0], q[:, 0])
-    assert np.array_equal(np.abs(aligned), np.abs(q))
 
 
 ONE = Poses(np.arange(12.0).reshape(4, 3), np.tile((1.0, 0.0, 0.0, 0.0), (4, 1)), np.ones(4))

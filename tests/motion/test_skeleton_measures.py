@@ -86,10 +86,3 @@ def test_what_is_stored_at_keys_may_differ_from_what_was_recorded():
         errors, largest_displacements(there, in_root_space(poses, parents), np.full(3, 0.03)), atol=1e-9
     )
     assert errors.max() > 1e-5
-
-
-@pytest.mark.parametrize("count", [0, 1])
-def test_recordings_without_segments(count):
-    times, poses, parents = wandering_body(2, 3, 2)
-    keys = [np.arange(count)] * 3
-    assert skeleton_errors(times[:count], poses[:, :count], parents, keys).tolist() == [[0.0] * count] * 3

@@ -135,15 +135,6 @@ def test_a_body_at_rest_has_one_key_each_or_two_key_poses(count, mode):
 
 
 @TWO_WAYS
-@pytest.mark.parametrize("expected", [{"tolerance": 1e-4}, {"budget": 10}])
-def test_few_samples_are_their_own_keys(expected, shared):
-    times, poses, parents = wandering_body(40, 5, 2, resting=0.0)
-    for samples in (np.arange(0), np.arange(1), np.array((0, 39))):
-        keys = reduce_skeleton_keys(times[samples], poses[:, samples], parents, shared=shared, **expected)
-        assert [own.tolist() for own in keys] == [list(range(len(samples)))] * 5
-
-
-@TWO_WAYS
 @pytest.mark.parametrize("scaled", [False, True])
 @pytest.mark.parametrize("mode", ["lerp_slerp", "motor_spline", "motor_spline_causal"])
 @pytest.mark.parametrize("tolerance", [1e-39, 1e-17, 1e-15])

@@ -1,8 +1,5 @@
 """Long recordings of bodies in stretches: what they promise, recomputed apart from the program."""
 
-import pickle
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -12,12 +9,6 @@ from rigid_motion.motion import MODES, Poses, reduce_skeleton_keys
 from tests.motion.bodies import body_errors, in_root_space, wandering_body
 from tests.motion.test_skeleton_channels import channel_errors
 from tests.thoroughness import tried
-
-
-def as_lists(keys: tuple) -> list:
-    """Keys of joints or of their channels, for comparing."""
-    return [own.tolist() if isinstance(own, np.ndarray) else [some.tolist() for some in own] for own in keys]
-
 
 STRAIGHT = tuple(name for name, mode in MODES.items() if not mode.is_smooth)
 TWO_WAYS = pytest.mark.parametrize("separate", [False, True])
@@ -70,26 +61,3 @@ def test_what_trembles_below_the_tolerance_rests_from_beginning_to_end(separate)
         assert [len(own.location) for own in keys] == [1] * 5
         keys = [own.rotation for own in keys]
     assert [len(own) == 1 for own in keys] == [True, True, False, False, False]
-
-
-@TWO_WAYS
-def test_what_does_not_move_in_one_stretch_has_keys_at_its_ends(separate):
-    times, poses, parents = wandering_body(121, 3, 1, resting=0.0)
-    poses.positions[:, 40:81], poses.quaternions[:, 40:81] = poses.positions[:, 40:41], poses.quaternions[:, 40:41]
-    keys = reduce_skeleton_keys(times, poses, parents, "lerp_slerp", tolerance=0.002, separate=separate, stretch=40)
-    for own in [own for channels in keys for own in channels] if separate else keys:
-        assert own[(own >= 40) & (own <= 80)].tolist() == [40, 80]
-
-
-@TWO_WAYS
-def test_stretches_side_by_side_are_those_one_by_one(separate):
-    body = wandering_body(200, 5, 4)
-    options = {"mode": "lerp_slerp", "tolerance": 0.002, "separate": separate, "stretch": 60}
-    here = as_lists(reduce_skeleton_keys(*body, **options))
-    with ThreadPoolExecutor(2) as pool:
-        assert as_lists(reduce_skeleton_keys(*body, **options, run=pool.map)) == here
-
-    def elsewhere(function, arguments):
-        return map(*(pickle.loads(pickle.dumps(item)) for item in (function, list(arguments))))
-
-    assert as_lists(reduce_skeleton_keys(*body, **options, run=elsewhere)) == here

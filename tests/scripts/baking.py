@@ -5,7 +5,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
-import pytest
 
 from rigid_motion import animation
 from rigid_motion.animation import set_mode
@@ -20,12 +19,6 @@ LAST = 103
 
 def run(*arguments: object) -> int:
     return bake.main([*map(str, arguments), "--jobs", "0"])
-
-
-def exit_code(*arguments: object) -> int:
-    with pytest.raises(SystemExit) as ended:
-        run(*arguments)
-    return ended.value.code
 
 
 @contextmanager

@@ -4,21 +4,45 @@ from pathlib import Path
 
 import numpy as np
 
-JOINTS = ("Hips", "LeftHand", "Head")
+PLACES = {"Hips": (0.0, 0.9, 0.0), "LeftHand": (0.6, 0.4, 0.0), "Head": (0.0, 1.2, 0.1)}
+
+JOINTS = tuple(PLACES)
+
+TIMES = np.arange(61) / 30.0
 
 
-def write_body(path: Path, *, seconds: float = 2.0, moves: bool = True) -> None:
-    """A root with two joints, as BVH of 30 samples a second."""
-    lines = ["HIERARCHY", "ROOT Hips", "{", "OFFSET 0 0.9 0"]
-    lines.append("CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation")
-    for name, offset in zip(JOINTS[1:], ("0.4 0.4 0", "0 0.7 0"), strict=True):
-        lines += [f"JOINT {name}", "{", f"OFFSET {offset}", "CHANNELS 3 Zrotation Xrotation Yrotation"]
-        lines += ["End Site", "{", "OFFSET 0 0.1 0", "}", "}"]
-    times = np.arange(round(30 * seconds) + 1) / 30.0
-    lines += ["}", "MOTION", f"Frames: {len(times)}", f"Frame Time: {1 / 30:.8f}"]
-    waves = moves * np.sin(
-        np.outer(times, (3.0, 2.0, 4.0, 2.0, 5.0, 3.0, 4.0, 2.0, 6.0, 3.0, 2.0, 1.0)) + np.arange(12.0)
-    )
-    amplitudes = np.array((0.3, 0.1, 0.4, *(30.0,) * 9))
-    lines += [" ".join(f"{value:.6f}" for value in row) for row in waves * amplitudes]
-    path.write_text("\n".join([*lines, ""]), encoding="utf-8")
+def angles_at(times: np.ndarray) -> dict[str, np.ndarray]:
+    """Euler angles ZXY of each joint, in degrees, shape (n, 3)."""
+    return {
+        name: 30.0 * np.sin(np.outer(times, (3.0, 2.0 + joint, 4.0)) + np.arange(3.0) + joint)
+        for joint, name in enumerate(PLACES)
+    }
+
+
+def hips_at(times: np.ndarray) -> np.ndarray:
+    return np.sin(np.outer(times, (3.0, 2.0, 4.0))) * (0.3, 0.1, 0.4)
+
+
+def write_body(
+    path: Path,
+    times: np.ndarray = TIMES,
+    order: tuple[str, ...] = JOINTS[1:],
+    *,
+    unit: float = 1.0,
+    moves: bool = True,
+) -> Path:
+    """A root with two joints in this order, with the motion at these times, in a unit of which a metre has so many."""
+
+    def offset(name: str) -> str:
+        return "OFFSET " + " ".join(f"{unit * value:.9f}" for value in PLACES[name])
+
+    turns = "Zrotation Xrotation Yrotation"
+    lines = ["HIERARCHY", "ROOT Hips", "{", offset("Hips"), f"CHANNELS 6 Xposition Yposition Zposition {turns}"]
+    for name in order:
+        end = ["End Site", "{", f"OFFSET 0 {0.1 * unit} 0", "}"]
+        lines += [f"JOINT {name}", "{", offset(name), f"CHANNELS 3 {turns}", *end, "}"]
+    lines += ["}", "MOTION", f"Frames: {len(times)}", f"Frame Time: {times[1] - times[0]:.12f}"]
+    angles = angles_at(times)
+    rows = moves * np.concatenate([unit * hips_at(times), *(angles[name] for name in ("Hips", *order))], axis=1)
+    path.write_text("\n".join([*lines, *(" ".join(f"{value:.12f}" for value in row) for row in rows), ""]))
+    return path

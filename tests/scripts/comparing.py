@@ -36,12 +36,6 @@ def shown(folder: Path) -> list[Path]:
     return sorted(path for path in folder.iterdir() if path.name != OWN)
 
 
-def exit_code(*arguments: object) -> int:
-    with pytest.raises(SystemExit) as ended:
-        run(*arguments)
-    return ended.value.code
-
-
 def rows_of(path: Path) -> list[dict[str, str]]:
     return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
 

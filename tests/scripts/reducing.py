@@ -4,7 +4,6 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-import pytest
 
 from rigid_motion.animation import write_channel
 from rigid_motion.motion import Poses
@@ -37,12 +36,6 @@ BALL = RADIUS * normalise(np.random.default_rng(5).normal(size=(64, 3)))
 def run(*arguments: object) -> int:
     """The exit code, all of it being done in this process."""
     return reduce.main([*map(str, arguments), "--jobs", "0"])
-
-
-def exit_code(*arguments: object) -> int:
-    with pytest.raises(SystemExit) as ended:
-        run(*arguments)
-    return ended.value.code
 
 
 def swing(count: int, seed: int = 0) -> Poses:

@@ -45,20 +45,6 @@ def test_up_is_z_forward_is_y_and_right_is_x(axes: str, up: tuple, forward: tupl
     np.testing.assert_array_equal(converted.positions, np.eye(3))
 
 
-def test_a_turn_to_the_right_in_unity_is_one_to_the_right_in_blender() -> None:
-    """Unity's rotations are left-handed: +90 degrees about its y axis take forward (z) to the right (x)."""
-    half = np.sqrt(0.5)
-    (turn,) = to_blender(Poses([[0, 0, 0]], [[half, 0, half, 0]]), "unity").quaternions
-    np.testing.assert_allclose(Rotation.from_quat(turn[[1, 2, 3, 0]]).apply((0, 1, 0)), (1, 0, 0), atol=1e-15)
-
-
-def test_a_yaw_to_the_right_in_unreal_is_one_to_the_right_in_blender() -> None:
-    """Unreal's yaw of +90 degrees, FQuat(0, 0, 0.707, 0.707), takes forward (x) to the right (y)."""
-    half = np.sqrt(0.5)
-    (turn,) = to_blender(Poses.from_xyzw([[0, 0, 0]], [[0, 0, half, half]]), "unreal").quaternions
-    np.testing.assert_allclose(Rotation.from_quat(turn[[1, 2, 3, 0]]).apply((0, 1, 0)), (1, 0, 0), atol=1e-15)
-
-
 def test_unknown_axes_are_answered_with_the_known_ones(poses: Poses) -> None:
     with pytest.raises(ValueError, match="'maya'; known are blender, opengl, unity, ros, unreal"):
         to_blender(poses, "maya")

@@ -21,7 +21,6 @@ from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object
 from tests.scripts.baking import (
     LAST,
     baked_name,
-    exit_code,
     extension,
     frames_of_keys,
     new_file,
@@ -297,29 +296,6 @@ def test_no_python_of_a_file_is_run_and_all_of_it_stays(tmp_path):
 
 
 # How it ends
-
-
-@pytest.mark.parametrize(
-    ("arguments", "complaint"),
-    [
-        ([], "FILE.blend"),
-        (["a.blend", ""], "'' is no file: a variable of a script may be empty"),
-        (["a.blend", "--output", " "], "' ' is no folder"),
-        (["a.blend", "--step", "0"], "is no number of frames; give 0.01 to 1000000"),
-        (["a.blend", "--step", "nan"], "is no number of frames"),
-        (["a.blend", "--first", "inf"], "is no frame; give -1048574 to 1048574"),
-        (["a.blend", "--first", "9", "--last", "3"], "--last 3 is before --first 9"),
-        (["a.blend", "--objects", ","], "name an object"),
-        (["a.blend", "--unbake", "--step", "2"], "--step is for baking"),
-        (["a.blend", "--unbake", "--first", "0"], "--first is for baking"),
-        (["a.blend", "--in-place", "--output", "x"], "give one of them"),
-        (["a.blend", "--output", __file__], "a.blend becomes a .blend file here: name such a one"),
-        (["a.blend", "b.blend", "--output", __file__], "is a file, and there may be several results: give a folder"),
-    ],
-)
-def test_a_wrong_option_ends_with_code_2_and_a_way_out(arguments, complaint, capsys):
-    assert exit_code(*arguments) == 2
-    assert complaint in capsys.readouterr().err
 
 
 def test_a_folder_is_baked_and_what_was_baked_is_no_input(tmp_path, capsys):

@@ -6,9 +6,9 @@ from pathlib import Path
 import bpy
 import pytest
 
-from rigid_motion.animation import is_baked, set_mode
+from rigid_motion.animation import set_mode
 from tests.animation.scenes import key, new_object
-from tests.scripts.baking import baked_name, extension, new_file, open_again, run, save
+from tests.scripts.baking import extension, new_file, run, save
 
 WAY_OUT = "tell the file where it is now (Outliner, Blender File, right-click: Relocate)"
 
@@ -117,34 +117,3 @@ def test_a_missing_library_that_holds_meshes_only_is_named_and_does_no_harm(tmp_
     said = capsys.readouterr().err
     assert f"{shot}: library {library} was not found (Mesh Box): bring it back" in said
     assert "2 objects baked; 1 file: 1 written." in said
-
-
-@pytest.mark.parametrize("link", [link_object, link_action, link_collection])
-def test_a_library_that_is_back_is_found_by_what_was_baked_without_it(tmp_path, link):
-    library = make_library(tmp_path / "library.blend")
-    shot = shot_with(tmp_path / "shot.blend", link, library)
-    aside = library.rename(tmp_path / "aside.blend")
-    assert run(shot, "--output", tmp_path / "farm") == 1
-    aside.rename(library)
-    with extension():
-        open_again(tmp_path / "farm" / "shot-baked.blend")
-        (result,) = bpy.data.libraries
-        assert is_baked(bpy.data.objects["Tool"])
-        assert Path(bpy.path.abspath(result.filepath)).resolve() == library
-        assert result.users_id
-        assert not any(block.is_missing for block in result.users_id)
-
-
-def test_spaces_and_umlauts_in_paths_and_names_are_kept(tmp_path, capsys):
-    folder = tmp_path / "Für die Nacht" / "Größe 1"
-    folder.mkdir(parents=True)
-    library = make_library(folder / "Bücher ß.blend")
-    shot = shot_with(folder / "Schuß 01 'neu'.blend", link_mesh, library)
-    capsys.readouterr()
-    assert run(shot, "--output", tmp_path / "fertig (heute)") == 0
-    written = tmp_path / "fertig (heute)" / "Schuß 01 'neu'-baked.blend"
-    assert capsys.readouterr().out == f"{written}\n"
-    open_again(written)
-    assert Path(bpy.path.abspath(bpy.data.libraries[0].filepath)).resolve() == library
-    assert not bpy.data.meshes["Box"].is_missing
-    assert not baked_name(shot).exists()

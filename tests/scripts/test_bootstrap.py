@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rigid_motion_batch.system_libraries import DEBIAN, missing_for_rendering, way_out
+from rigid_motion_batch.system_libraries import DEBIAN, way_out
 from scripts import bootstrap
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -58,15 +58,3 @@ def test_a_missing_system_library_is_named_with_the_packages_to_install(kind):
     assert "the system library libXi.so.6," in said
     assert f"apt-get install -y {DEBIAN}" in said
     assert DEBIAN in (ROOT / "README.md").read_text(encoding="utf-8")
-
-
-def test_this_machine_can_render():
-    assert missing_for_rendering() is None
-
-
-def test_bytecode_is_kept_out_of_the_checkout_where_it_is_not_wanted_there():
-    kept = bootstrap.environment({"PYTHONDONTWRITEBYTECODE": "1", "PATH": "/bin"})
-    assert kept == {"PATH": "/bin", "PYTHONPYCACHEPREFIX": str(bootstrap.ROOT / ".venv" / "bytecode")}
-    chosen = {"PYTHONDONTWRITEBYTECODE": "1", "PYTHONPYCACHEPREFIX": "/elsewhere"}
-    assert bootstrap.environment(chosen) == {"PYTHONPYCACHEPREFIX": "/elsewhere"}
-    assert bootstrap.environment({"PATH": "/bin"}) == {"PATH": "/bin"}

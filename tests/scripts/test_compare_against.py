@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from rigid_motion_batch.analysis.modes import BEST_OF, name_of_other
 from tests.balls import largest_displacements
+from tests.scripts.bvh_bodies import PLACES, angles_at, hips_at, write_body
 from tests.scripts.comparing import ROOT, SMALL, poses_of, rows_of, run, table, write_toss
 
 FAST = ("--no-video", "--rates", "10")
@@ -91,16 +92,6 @@ def test_it_is_in_the_line_of_the_clip_the_table_and_the_page(toss, mine, tmp_pa
     assert choice["motions"][-1]["modes"] == ["mine"]
 
 
-def test_a_motion_that_lasts_as_long_is_compared_from_end_to_end(toss, tmp_path, capsys):
-    rounded = table(toss)
-    rounded["t"] = np.round(rounded["t"], 3)
-    same = write_poses(tmp_path / "same.csv", rounded)
-    assert run(toss, "--against", same, *FAST, "--output", tmp_path / "output") == 0
-    assert "compared from" not in capsys.readouterr().err
-    (row,) = (row for row in rows_of(tmp_path / "output" / "metrics.csv") if row["mode"] == "same")
-    assert int(row["samples"]) > 80
-
-
 @pytest.mark.parametrize(
     ("stem", "called"),
     [
@@ -119,42 +110,10 @@ def test_it_is_called_as_its_file_but_never_as_a_table_that_is_there(stem, calle
 
 # -- whole bodies -----------------------------------------------------------------------------------------------------
 
-PLACES = {"Hips": (0.0, 0.9, 0.0), "LeftHand": (0.6, 0.4, 0.0), "Head": (0.0, 1.2, 0.1)}
-
-
-def angles_at(times: np.ndarray) -> dict[str, np.ndarray]:
-    """Euler angles ZXY of each joint, in degrees, shape (n, 3)."""
-    return {
-        name: 30.0 * np.sin(np.outer(times, (3.0, 2.0 + joint, 4.0)) + np.arange(3.0) + joint)
-        for joint, name in enumerate(PLACES)
-    }
-
-
-def hips_at(times: np.ndarray) -> np.ndarray:
-    return np.sin(np.outer(times, (3.0, 2.0, 4.0))) * (0.3, 0.1, 0.4)
-
-
-def write_body(path: Path, times: np.ndarray, order: tuple[str, ...], unit: float = 1.0) -> Path:
-    """A root with two joints in this order, with the motion at these times, in a unit of which a metre has so many."""
-
-    def offset(name: str) -> str:
-        return "OFFSET " + " ".join(f"{unit * value:.9f}" for value in PLACES[name])
-
-    turns = "Zrotation Xrotation Yrotation"
-    lines = ["HIERARCHY", "ROOT Hips", "{", offset("Hips"), f"CHANNELS 6 Xposition Yposition Zposition {turns}"]
-    for name in order:
-        end = ["End Site", "{", f"OFFSET 0 {0.1 * unit} 0", "}"]
-        lines += [f"JOINT {name}", "{", offset(name), f"CHANNELS 3 {turns}", *end, "}"]
-    lines += ["}", "MOTION", f"Frames: {len(times)}", f"Frame Time: {times[1] - times[0]:.12f}"]
-    angles = angles_at(times)
-    rows = np.concatenate([unit * hips_at(times), *(angles[name] for name in ("Hips", *order))], axis=1)
-    path.write_text("\n".join([*lines, *(" ".join(f"{value:.12f}" for value in row) for row in rows), ""]))
-    return path
-
 
 def test_a_body_is_compared_joint_by_joint_by_name_and_in_metres(tmp_path):
     times, own = np.arange(61) / 30.0, np.arange(16) / 7.5
-    walk = write_body(tmp_path / "walk.bvh", times, ("LeftHand", "Head"))
+    walk = write_body(tmp_path / "walk.bvh")
     mine = write_body(tmp_path / "mine.bvh", own, ("Head", "LeftHand"), unit=100.0)
     output = tmp_path / "output"
     assert run(walk, "--against", mine, *FAST, "--modes", "lerp_slerp", "--output", output, "--radius", "0.05") == 0
@@ -222,7 +181,7 @@ def test_what_cannot_be_compared_is_refused_in_a_line(other, complaint, toss, tm
     (tmp_path / "broken.csv").write_text("a,b\n1,2\n")
     late = table(toss)
     write_poses(tmp_path / "late.csv", late | {"t": late["t"] - late["t"][0] + 100.0})
-    write_body(tmp_path / "body.bvh", np.arange(31) / 30.0, ("LeftHand", "Head"))
+    write_body(tmp_path / "body.bvh")
     assert run(toss, "--against", tmp_path / other, *FAST, "--quiet", "--output", tmp_path / "output") == 2
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 1
@@ -231,9 +190,8 @@ def test_what_cannot_be_compared_is_refused_in_a_line(other, complaint, toss, tm
 
 
 def test_a_body_without_a_joint_of_the_recording_is_refused(tmp_path, capsys):
-    times = np.arange(31) / 30.0
-    walk = write_body(tmp_path / "walk.bvh", times, ("LeftHand", "Head"))
-    less = write_body(tmp_path / "less.bvh", times, ("Head",))
+    walk = write_body(tmp_path / "walk.bvh")
+    less = write_body(tmp_path / "less.bvh", order=("Head",))
     assert run(walk, "--against", less, *FAST, "--output", tmp_path / "output") == 2
     assert f"{less}: it has no joint LeftHand; {walk} has it" in capsys.readouterr().err
 

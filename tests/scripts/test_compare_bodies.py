@@ -1,7 +1,6 @@
 """compare.py on whole bodies: what it writes of them, and what becomes of the others where one cannot be read."""
 
 import csv
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -14,7 +13,6 @@ from tests.blank import blank
 from tests.scripts.comparing import COLUMNS, ROOT, write_toss
 from tests.scripts.recordings.skeletons import body, export
 from tests.scripts.recordings.test_damaged_bvh_bodies import seed
-from tests.thoroughness import sample
 
 MODES = ("lerp_slerp", "dq_sclerp")
 
@@ -109,59 +107,17 @@ def test_the_joints_of_an_earlier_run_do_not_pass_for_those_of_this(tmp_path: Pa
 
 # -- bodies that cannot be read ---------------------------------------------------------------------------------------
 
-DEADLY = """
-import os, signal, sys
-
-def end(event, arguments):
-    # As where Blender crashes: in the middle of its importer, after we have looked at the file.
-    if event == "open" and str(arguments[0]).endswith("deadly.fbx"):
-        frame = sys._getframe()
-        while frame is not None:
-            if "io_scene_fbx" in frame.f_code.co_filename:
-                os.kill(os.getpid(), signal.SIGSEGV)
-            frame = frame.f_back
-
-sys.addaudithook(end)
-"""
-
 
 @pytest.fixture
 def fbx(empty_file: object, tmp_path: Path) -> Path:
     """A sound one."""
     body()
-    return export(tmp_path / "deadly.fbx")
-
-
-@pytest.fixture
-def deadly(fbx: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An FBX with which any process dies that imports it, but for this one."""
-    (tmp_path / "hook").mkdir()
-    (tmp_path / "hook" / "sitecustomize.py").write_text(DEADLY, encoding="utf-8")
-    monkeypatch.setenv(
-        "PYTHONPATH", os.pathsep.join(filter(None, (str(tmp_path / "hook"), os.environ.get("PYTHONPATH"))))
-    )
-    return fbx
+    return export(tmp_path / "sound.fbx")
 
 
 def lines_about(said: str, path: Path) -> list[str]:
     assert "Traceback" not in said
     return [line for line in said.splitlines() if str(path) in line]
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="signals end no processes there")
-@pytest.mark.parametrize("jobs", sample([2, 1]))
-def test_a_body_that_ends_a_worker_is_told_and_the_others_go_on(deadly, tmp_path, capfd, jobs):
-    walk, stroll, output = write_body(tmp_path), write_body(tmp_path, "stroll"), tmp_path / "output"
-    assert run(walk, deadly, stroll, *QUICK, "--rates", "5", "--output", output, jobs=jobs) == 1
-    lines = [line for line in lines_about(capfd.readouterr().err, deadly) if "its process died (SIGSEGV)" in line]
-    *again, last = lines
-    assert all(line.endswith("; trying again") for line in again)
-    assert last.startswith(f"compare.py: read {deadly}: its process died (SIGSEGV)")
-    assert last.endswith("; given up after 3 attempts")
-    assert {row["clip"] for row in rows_of(output / "metrics.csv")} == {"walk", "stroll"}
-    assert {row["clip"] for row in rows_of(output / "metrics_joints.csv")} == {"walk", "stroll"}
-    assert (output / "report.html").is_file()
 
 
 @pytest.mark.parametrize("jobs", [0, 1])
@@ -175,5 +131,5 @@ def test_a_damaged_body_is_told_in_one_line_and_the_others_go_on(fbx, tmp_path, 
     for path in (cut, torn):
         (line,) = lines_about(said, path)
         assert "; " in line
-    assert {row["clip"] for row in rows_of(output / "metrics.csv")} == {"walk", "deadly"}
+    assert {row["clip"] for row in rows_of(output / "metrics.csv")} == {"walk", "sound"}
     blank()

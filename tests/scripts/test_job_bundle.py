@@ -1,4 +1,4 @@
-"""job_bundle.py: a comparison as a job of a render farm; test_bundle.py runs such a job on a farm."""
+"""job_bundle.py: a comparison as a job of a render farm."""
 
 import json
 import shlex
@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from rigid_motion_batch.cli import job_bundle
+from rigid_motion_batch.cli import compare, job_bundle
+from rigid_motion_batch.cli.job_bundle import below_inputs, write_bundle
+from rigid_motion_batch.pipeline.steps import VERSION, version_here
 from tests.scripts.comparing import outputs, write_toss
 
 OPTIONS = ("--rates", "5", "--modes", "lerp_slerp,motor_spline", "--no-video")
@@ -60,3 +62,43 @@ def test_options_that_are_for_a_run_are_refused(option, clip, tmp_path, capfd):
     assert job_bundle.main(["takes/toss.csv", option, "--bundle", "bundle"]) == 2
     assert "are for a run of compare.py itself" in capfd.readouterr().err
     assert not (tmp_path / "bundle").exists()
+
+
+def test_files_are_named_from_the_folder_that_has_all_of_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for path in ("takes/day/a.csv", "takes/b.csv", "takes/radii.csv", "takes/5", "blender"):
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).touch()
+    given = [
+        "takes/day/a.csv:left",
+        "takes/b.csv",
+        "--rates",
+        "5",
+        "--radius=takes/radii.csv",
+        *("--blender", "blender", "--blender=blender"),
+        "takes/day",
+    ]
+    arguments, inputs = below_inputs(given)
+    assert inputs == tmp_path / "takes"
+    assert arguments == [
+        *("{{Param.Inputs}}/day/a.csv:left", "{{Param.Inputs}}/b.csv", "--rates", "5"),
+        *("--radius={{Param.Inputs}}/radii.csv", *given[5:8], "{{Param.Inputs}}/day"),
+    ]
+
+
+def test_a_name_that_is_an_expression_of_templates_is_refused() -> None:
+    with pytest.raises(ValueError, match="for its braces; rename it"):
+        below_inputs(["{{a}}.csv"])
+
+
+def test_a_machine_with_another_version_is_told_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    share = [str(write_toss(tmp_path / "toss.csv")), "--only", "read", "--no-video", "--output", str(tmp_path / "out")]
+    write_bundle(tmp_path, share, tmp_path, tmp_path / "out", {"read": 1})
+    variables = json.loads((tmp_path / "template.json").read_text())["jobEnvironments"][0]["variables"]
+    monkeypatch.setenv(VERSION, variables[VERSION])
+    assert compare.main(share) == 0
+    monkeypatch.setenv(VERSION, "program 0")
+    assert compare.main(share) == 2
+    assert f"this machine has {version_here()}, and the bundle is of program 0" in capsys.readouterr().err

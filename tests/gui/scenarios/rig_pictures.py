@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 from mathutils import Vector
 
+from examples import figure
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 from tests.gui.scenarios.mode_pictures import (
@@ -21,7 +22,7 @@ from tests.gui.scenarios.mode_pictures import (
     linear,
     settle,
 )
-from tests.rigs import figure, scenes
+from tests.rigs import scenes
 from tests.rigs.human import human
 
 SHOWN = ("Torso", "Arm.L (IK)")

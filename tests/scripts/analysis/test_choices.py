@@ -92,11 +92,6 @@ def test_the_best_of_each_segment_has_the_keys_of_the_best_mode_and_keeps_to_wha
         assert made.shell(BEST_OF).max() <= choice.tolerance(clip) * (1.0 + 1e-9)
 
 
-def test_no_tolerance_is_too_large_for_a_clip_that_stands_still() -> None:
-    clip = swinging_clip()
-    Tolerance("5").require_within(replace(clip, poses=clip.poses[:1][np.zeros(len(clip.times), int)]), 0.1)
-
-
 @pytest.mark.parametrize(
     ("written", "said"),
     [

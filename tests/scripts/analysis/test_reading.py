@@ -1,6 +1,5 @@
 """Reading sources: of several bodies the good ones stay, and the others are named."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -37,24 +36,11 @@ def test_a_body_without_two_poses_is_left_out_and_named(recorded):
     assert note.startswith("'tracker' is left out: 1 usable poses are left")
 
 
-def test_what_is_hard_to_believe_comes_before_what_was_repaired(recorded):
-    recorded(replace(body("left", 5, lost=1), warnings=("as slow as a snail",)))
-    ((clip,), _) = study.read_source("take.csv", "blender")
-    assert clip.repairs[0] == "as slow as a snail"
-    assert clip.repairs[1].startswith("dropped rows with numbers that are missing")
-
-
 @pytest.mark.parametrize("bodies", [("left",), ("left", "right")])
 def test_a_source_without_any_good_body_is_refused(recorded, bodies):
     recorded(*(body(name, 1, lost=3) for name in bodies))
     with pytest.raises(TrajectoryError, match="1 usable poses are left"):
         study.read_source("take.csv:*", "blender")
-
-
-def test_a_body_that_was_named_is_remembered_and_the_clip_has_the_name_of_its_file(recorded):
-    recorded(body("left", 5), named="left")
-    ((clip,), _) = study.read_source("take.csv:left", "blender")
-    assert (clip.name, clip.body) == ("take", "left")
 
 
 @pytest.mark.parametrize(

@@ -159,14 +159,6 @@ def test_a_foot_that_stands_is_seen_and_how_far_it_slides_is_the_farthest_from_w
     assert errors.slide > ground.slide
 
 
-def test_a_body_in_the_air_has_nothing_that_stands() -> None:
-    clip = swinging_body()
-    clip.poses.positions[0] += np.linspace(0.0, 500.0, len(clip.times))[:, None] * (1.0, 0.0, 0.0)
-    ground = Ground.of(evenly(clip))
-    assert len(ground.joints) == 0
-    assert ground.slide == 0.0
-
-
 # -- modes that are one motion ----------------------------------------------------------------------------------------
 
 

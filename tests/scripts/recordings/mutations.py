@@ -50,7 +50,7 @@ def mutated(content: bytes, chance: Random) -> bytes:
 def in_place(content: bytes, chance: Random) -> bytes:
     """The content with some bytes changed, and of the same length: of binary files little else is ever read far."""
     for _ in range(chance.choice((1, 1, 2, 4))):
-        content = chance.choice((change_bytes, flip_bits))(content, chance)
+        content = change_bytes(content, chance)
     return content
 
 
@@ -64,18 +64,6 @@ def change_bytes(content: bytes, chance: Random) -> bytes:
     for _ in range(chance.choice((1, 2, 10)) if changed else 0):
         changed[chance.randrange(len(changed))] = chance.randrange(256)
     return bytes(changed)
-
-
-def flip_bits(content: bytes, chance: Random) -> bytes:
-    changed = bytearray(content)
-    for _ in range(chance.choice((1, 3)) if changed else 0):
-        changed[chance.randrange(len(changed))] ^= 1 << chance.randrange(8)
-    return bytes(changed)
-
-
-def delete_piece(content: bytes, chance: Random) -> bytes:
-    first, last = _span(content, chance)
-    return content[:first] + content[last:]
 
 
 def repeat_piece(content: bytes, chance: Random) -> bytes:
@@ -108,11 +96,6 @@ def _replace(pattern: re.Pattern[bytes], instead: tuple[str, ...], content: byte
     return content
 
 
-def insert_word(content: bytes, chance: Random) -> bytes:
-    place = chance.choice([0, len(content), *(match.end() for match in WORD.finditer(content))])
-    return content[:place] + chance.choice((b" ", b"", b"\n")) + chance.choice(WORDS).encode() + content[place:]
-
-
 def delete_line(content: bytes, chance: Random) -> bytes:
     lines = content.splitlines(keepends=True)
     if lines:
@@ -125,14 +108,6 @@ def repeat_line(content: bytes, chance: Random) -> bytes:
     if lines:
         row = chance.randrange(len(lines))
         lines[row : row + 1] = [lines[row]] * chance.choice((2, 3, 300))
-    return b"".join(lines)
-
-
-def swap_lines(content: bytes, chance: Random) -> bytes:
-    lines = content.splitlines(keepends=True)
-    if len(lines) > 1:
-        first, second = chance.sample(range(len(lines)), 2)
-        lines[first], lines[second] = lines[second], lines[first]
     return b"".join(lines)
 
 
@@ -165,7 +140,7 @@ def nest(content: bytes, chance: Random) -> bytes:
 
 
 MUTATIONS: tuple[Mutation, ...] = (
-    *(change_bytes, flip_bits, delete_piece, repeat_piece, truncate, empty),
-    *(replace_numbers, replace_numbers, replace_words, insert_word),
-    *(delete_line, repeat_line, swap_lines, change_line_ends, change_encoding, nest),
+    *(change_bytes, repeat_piece, truncate, empty),
+    *(replace_numbers, replace_numbers, replace_words),
+    *(delete_line, repeat_line, change_line_ends, change_encoding, nest),
 )

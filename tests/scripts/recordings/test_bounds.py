@@ -23,11 +23,10 @@ OF_A_LINE = 250.0
 """Memory that reading may take: bytes, bytes for each byte of the file, and bytes for each of its lines."""
 
 PATIENCE = 30.0
-"""Seconds, with `tracemalloc` looking on, on a busy machine."""
+"""Seconds of a processor, with `tracemalloc` looking on."""
 
 CSV = "t,x,y,z,qx,qy,qz,qw\n"
 COLUMNS = CSV.strip().split(",")[1:]
-EUROC = "#timestamp [ns],p_RS_R_x,p_RS_R_y,p_RS_R_z,q_RS_w,q_RS_x,q_RS_y,q_RS_z\n"
 MOTIVE = "Format Version,1.23,Rotation Type,Quaternion,Length Units,Meters\n"
 ROOT = "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n"
 
@@ -45,37 +44,18 @@ BOMBS: dict[str, str] = {
     "nothing but line ends.csv": "\n" * SIZE,
     "one long number.csv": "1" * SIZE,
     "a column for every byte.csv": "," * SIZE,
-    "comments.csv": of("#\n"),
-    "wide comments.csv": of("#" + "x," * 5_000 + "\n"),
-    "short rows.csv": CSV + of("1\n"),
-    "rows.csv": CSV + of("0,0,0,0,0,0,0,1\n"),
-    "empty cells.csv": CSV + of(",,,,,,,\n"),
     "devices.csv": "device," + CSV + "".join(f"{row // 9},0,0,0,0,0,0,0,1\n" for row in range(SIZE // 20)),
-    "names.csv": "name," + CSV + "".join(f"{row},0,0,0,0,0,0,0,1\n" for row in range(SIZE // 20)),
     "bodies.csv": "t," + ",".join(f"b{body}_{column}" for body in range(300) for column in COLUMNS) + "\n" + of("0,"),
-    "quotes.csv": CSV + of('"0","0","0","0","0","0","0","1"\n'),
-    "1e308.csv": CSV + of("1e308,1e308,1e308,1e308,1e308,1e308,1e308,1e308\n"),
     "long numbers.csv": CSV + of("9" * 50_000 + ",0,0,0,0,0,0,1\n"),
     "wide characters.csv": CSV + of("0,0,0,0,0,0,0,1\n") + "#\U0001f600\n",
-    "backwards.csv": CSV + "".join(f"{-row},0,0,0,0,0,0,1\n" for row in range(SIZE // 20)),
-    "zeros.txt": "\0" * SIZE,
-    "blanks.tum": " " * SIZE,
-    "rows.tum": of("0 0 0 0 0 0 0 1\n"),
-    "rows.euroc.csv": EUROC + of("1,0,0,0,1,0,0,0\n"),
     "endless header.csv": MOTIVE + of("a\n"),
-    "wide header.csv": MOTIVE + of("rigid body," * 5_000 + "\n"),
     "deep lists.json": "[" * SIZE,
-    "deep objects.json": of('{"a":'),
-    "lists.json": f"[{of('[],')}0]",
     "objects.json": f"[{of('{},')}0]",
     "one long number.json": f"[{'9' * SIZE}]",
-    "one long string.json": f'"{"x" * SIZE}"',
     "devices.json": "{" + ",".join(f'"{device}":{{"poses":[]}}' for device in range(SIZE // 22)) + "}",
     "deep.bvh": "HIERARCHY\nROOT a {\n" + of("JOINT b {\n"),
-    "wide.bvh": ROOT + "JOINT b { }\n" * 3_000 + "}\n" + motion(2, "0\n0\n"),
     "an endless name.bvh": "HIERARCHY\nROOT " + of("a ") + "{",
     "a billion frames.bvh": ROOT + "}\n" + motion("1000000000", "0\n0\n"),
-    "1e9 frames.bvh": ROOT + "}\n" + motion("1e9", "0\n0\n"),
     "a billion channels.bvh": ROOT.replace("CHANNELS 1", "CHANNELS 1000000000"),
     "small frames.bvh": ROOT + "}\n" + motion(SIZE // 2, "0\n" * (SIZE // 2)),
     "small joints in small frames.bvh": ROOT
@@ -92,7 +72,7 @@ def assert_is_read_within_bounds(source: str, path: Path) -> bool:
     factor = OF_THE_FILE.get(path.suffix, OF_ANY_OTHER)
     allowed = BASE + factor * len(content) + OF_A_LINE * content.count(b"\n")
     del content
-    started = time.perf_counter()
+    started = time.process_time()
     tracemalloc.start()
     try:
         read_trajectories(source)
@@ -102,7 +82,7 @@ def assert_is_read_within_bounds(source: str, path: Path) -> bool:
     finally:
         _, peak = tracemalloc.get_traced_memory()
         tracemalloc.stop()
-    assert time.perf_counter() - started < PATIENCE
+    assert time.process_time() - started < PATIENCE
     assert peak <= allowed, f"{peak / allowed:.2f} of what is allowed"
     return readable
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from rigid_motion_batch.recordings import ReadingOptions
-from rigid_motion_batch.recordings.column_names import ColumnName, column_name, unit_in
+from rigid_motion_batch.recordings.column_names import ColumnName, column_name
 from rigid_motion_batch.recordings.columns import layout_of
 from tests.scripts.recordings import logs
 
@@ -27,11 +27,6 @@ from tests.scripts.recordings import logs
 def test_bodies_scales_and_frames_are_known_and_what_says_nothing_is_not_guessed_at(names, meant):
     for name in logs.spellings(names):
         assert column_name(name) == meant, name
-
-
-@pytest.mark.parametrize(("name", "unit"), [("when_ms", "ms"), ("a [cm]", "cm"), ("ms", ""), ("height", "")])
-def test_a_unit_is_found_in_a_name_that_says_nothing_else(name: str, unit: str) -> None:
-    assert unit_in(name) == unit
 
 
 # -- the page on logs -------------------------------------------------------------------------------------------------
@@ -62,10 +57,3 @@ def test_the_logger_on_the_page_writes_what_is_read_without_options() -> None:
     (header,) = re.findall(r'log\.WriteLine\("(.+)"\)', PAGE)
     assert list(layout_of(header.split(","), ReadingOptions()).bodies) == [""]
     assert len(re.findall(r"\{\d:R\}", PAGE)) == len(header.split(","))
-
-
-def test_the_orders_on_the_page_are_orders() -> None:
-    orders = re.findall(r"`--euler (\w+)", PAGE)
-    assert len(orders) >= 4
-    for order in orders:
-        assert ReadingOptions(euler=order).intrinsic_order.isupper()

@@ -30,14 +30,6 @@ def test_columns_may_be_named_one_by_one(write) -> None:
     assert_is_the_motion(read_one(source, columns=tuple(named)), MOTIONS["left"])
 
 
-def test_a_column_that_is_named_goes_before_what_its_name_says_and_keeps_its_unit(write) -> None:
-    header = ["frame_ms", *names("t", "{}", "q{}")]
-    rows = log(header[1:]).splitlines()[1:]
-    ticks = logs.time_texts("ms", 0)
-    text = "\n".join([",".join(header), *(f"{tick},7{row}" for tick, row in zip(ticks, rows, strict=True))])
-    assert_is_the_motion(read_one(write("take.csv", text), columns=[("t", "frame_ms")]), MOTIONS["left"], unit="ms")
-
-
 @pytest.mark.parametrize("name", ["take.csv", "take.tum"])
 @pytest.mark.parametrize("unit", logs.TIMES)
 @pytest.mark.parametrize("start", [0, logs.EPOCH], ids=["from 0", "from 1970"])
@@ -266,10 +258,3 @@ def test_any_spelling_any_unit_any_order_and_any_layout_is_the_motion(tmp_path_f
     assert {trajectory.name for trajectory in trajectories} == set(MOTIONS)
     for trajectory in trajectories:
         assert_is_the_motion(trajectory, MOTIONS[trajectory.name], start=start, unit=unit)
-
-
-def test_a_device_that_is_alone_is_asked_for_by_its_name(write) -> None:
-    rows = log(["t", "x", "y", "z", "qx", "qy", "qz", "qw"]).splitlines()
-    text = "\n".join([f"hand,{rows[0]}", *(f"left,{row}" for row in rows[1:])])
-    source = write("log.csv", text)
-    assert [read_one(source).name, read_one(f"{source}:left").name] == ["left", "left"]

@@ -68,9 +68,7 @@ def test_what_is_broken_in_the_recording_is_kept_for_the_repair(write) -> None:
     ("text", "line", "problem"),
     [
         ("", None, "the file is empty"),
-        ("\n \n", None, "the file is empty"),
         (f"{HEADER}\n", None, "'take' has 0 samples"),
-        (f"{HEADER}\n0,1,2,3,0,0,0,1\n", None, "'take' has 1 samples"),
         (f"{HEADER.removesuffix(',qw')}\n{ROWS}", 1, "no column named qw"),
         ("# about\n\nt,x,y,z\n0,1,2,3\n", 3, "positions only, and rotations are needed (found t, x, y, z); record"),
         (ROWS, 1, "no column has a known name"),
@@ -84,12 +82,8 @@ def test_what_is_broken_in_the_recording_is_kept_for_the_repair(write) -> None:
         (f"{HEADER}\n{ROWS}1_0,1,2,3,0,0,0,1\n", 4, "t is '1_0', not a number"),
         (f"{HEADER}\n{ROWS}{'9' * 100_000},{'x' * 100_000},2,3,0,0,0,1\n", 4, f"x is '{'x' * 24}...', not a number"),
         (f"{HEADER}\n{ROWS}\x1b[2J,1,2,3,0,0,0,1\n", 4, r"t is '\x1b[2J', not a number"),
-        (f'{HEADER}\n{ROWS}""\n', 4, "1 columns where 8 are needed"),
         (f"{HEADER}\n{ROWS}0.2,1,2 3,4,0,0,0,1\n", 4, "y is '2 3', not a number"),
-        (f"{HEADER}\n{ROWS}0.2,1,2,\t,0,0,0,1\n", 4, "z is '', not a number"),
-        (f"{HEADER}{' ' * 1_000_000}p\n{ROWS}", 1, "this line is no header"),
         ("x" * 3_000_000, 1, "no column has a known name"),
-        ("x," * 50_000, 1, "no column named t, y, z, qx, qy, qz, qw"),
         ("\0\1\2\3", 1, "this is not text but binary data"),
         (f"{HEADER}\n{ROWS}".encode() + b"0.2,\xff\xfe,2,3,0,0,0,1\n", 4, "this is not text (byte 0xff)"),
         (bytes(range(1, 256)) * 100, 2, "this is not text (byte 0x80)"),
@@ -106,7 +100,7 @@ METADATA = ["Recorder v1.2", "Date: 2026-11-22", "Rate,90", 'Operator,"Ann, Bob"
 
 
 @pytest.mark.parametrize("count", range(len(METADATA) + 1))
-@pytest.mark.parametrize("separator", [",", ";", "\t", " "])
+@pytest.mark.parametrize("separator", [",", " "])
 def test_a_header_is_found_behind_lines_that_are_none(write, count: int, separator: str) -> None:
     table = f"{HEADER}\n\n{ROWS}".replace(",", separator)
     assert_holds_the_rows(write("take.csv", "\n".join([*METADATA[:count], table])))

@@ -6,7 +6,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from rigid_motion_batch.recordings import TrajectoryError, read_trajectories
@@ -99,12 +98,6 @@ def test_an_unknown_extension_is_answered_with_the_known_ones(write, refusal) ->
     _, message = refusal(write("take.usd", "PXR-USDC"))
     assert message.startswith("unknown extension '.usd'; known are .csv, ")
     assert all(extension in message for known in FORMATS for extension in known.extensions)
-
-
-def test_a_body_with_colons_in_its_name_is_found(write) -> None:
-    (spine,) = read_trajectories(write("walk.bvh", BVH) + ":mixamorig:Spine").trajectories
-    assert spine.name == "mixamorig:Spine"
-    np.testing.assert_array_equal(spine.poses.positions, [[0, 1, 0]] * 2)
 
 
 def test_a_name_from_a_file_cannot_reach_the_terminal(write) -> None:

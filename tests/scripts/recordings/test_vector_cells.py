@@ -47,13 +47,6 @@ def test_vectors_in_cells_are_read_however_they_are_written(write, vector, separ
     np.testing.assert_array_equal(trajectory.poses.quaternions, ROWS[:, [6, 3, 4, 5]])
 
 
-def test_unreal_names_its_components(write) -> None:
-    rows = "".join(f'{row},"X={row}.5 Y=2 Z=-3","X=0.0 Y=0.0 Z=0.0 W=1.0"\n' for row in range(3))
-    (trajectory,) = read_trajectories(write("log.csv", "Time,Location,Rotation\n" + rows)).trajectories
-    assert trajectory.poses.positions.tolist() == [[0.5, 2, -3], [1.5, 2, -3], [2.5, 2, -3]]
-    assert trajectory.poses.quaternions.tolist() == [[1, 0, 0, 0]] * 3
-
-
 def test_three_numbers_in_a_cell_of_rotations_are_euler_angles_and_ask_for_their_order(write, refusal) -> None:
     source = write("log.csv", "Time,Position,Rotation\n0,(0, 0, 0),(30, 0, 0)\n.1,(0, 0, 0),(30, 0, 0)\n")
     assert refusal(source)[1].startswith("rotations are Euler angles here (Rotation.x, Rotation.y, Rotation.z), and")

@@ -1,6 +1,5 @@
 """What Python packs is what the viewer reads, and the viewer's mathematics is that of the program."""
 
-import json
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ from rigid_motion.motion.quaternions import rotate
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.results import ClipResult
 from rigid_motion_batch.report import data
-from rigid_motion_batch.report.data import Block, clip_data, json_in_page
+from rigid_motion_batch.report.data import clip_data, json_in_page
 from rigid_motion_batch.report.mesh import MOST_TRIANGLES, Mesh, drill
 from tests.scripts.clips.bodies import swinging_body
 from tests.scripts.clips.recordings import swinging_clip
@@ -35,20 +34,6 @@ def middle_of(clip: ClipResult) -> np.ndarray:
     """Of the box around the recording."""
     places = clip.truth.positions.reshape(-1, 3)
     return (places.min(axis=0) + places.max(axis=0)) / 2.0
-
-
-@pytest.mark.parametrize("width", [1, 2, 4])
-def test_packed_numbers_are_read_to_half_a_step(width: int) -> None:
-    random = np.random.default_rng(width)
-    values = np.cumsum(random.normal(size=(3, 500)), axis=1)
-    block = Block()
-    block.put(np.arange(7))
-    described = block.put(values, width)
-    result = value_of(
-        f"(async () => unpack(await inflate('{block.text()}'), {described}).map((row) => [...row]))()", "data"
-    )
-    # Differences wrap around where they are larger than the width has room for.
-    np.testing.assert_allclose(result, values, atol=0.51 * described[3], rtol=1e-6)
 
 
 def test_times_errors_and_keys_of_a_clip_are_those_of_the_analysis() -> None:
@@ -118,26 +103,6 @@ def test_a_long_recording_keeps_the_worst_moments_in_view_and_chart(monkeypatch:
         worst = clip.times[result.first + motion.errors[0].argmax()] - clip.times[0]
         assert np.abs(np.array(matches["moments"]) - worst).min() < 1e-6
         assert max(errors) == pytest.approx(1e3 * motion.errors[0].max(), rel=1e-4)
-
-
-@pytest.mark.parametrize(("low", "high", "expected", "texts"), [
-    (0.0, 9.0, 6, ["0", "2", "4", "6", "8"]),
-    (0.0, 0.6, 6, ["0.0", "0.1", "0.2", "0.3", "0.4", "0.5", "0.6"]),
-    (12.0, 3600.0, 5, ["1000", "2000", "3000"]),
-])  # fmt: skip
-def test_ticks_are_round_numbers(low: float, high: float, expected: int, texts: list[str]) -> None:
-    assert [text for _, text in value_of(f"ticks({low}, {high}, {expected})", "data", "mathematics")] == texts
-
-
-@pytest.mark.parametrize("name", ["reach", "a,b#c", "100 %", "名前", "<script>"])
-def test_the_address_of_a_moment_leads_back_to_it(name: str) -> None:
-    result = value_of(f"fromAddress(addressOf({json.dumps(name)}, 'tolerance-5mm', 1.25))", "data", "mathematics")
-    assert result == {"clip": name, "choice": "tolerance-5mm", "t": 1.25}
-
-
-@pytest.mark.parametrize("hash", ["", "#", "#numbers", "#%E0%A4%A", "#a,b,c"])
-def test_any_other_address_has_no_moment(hash: str) -> None:
-    assert "t" not in value_of(f"fromAddress({json.dumps(hash)})", "data", "mathematics")
 
 
 @pytest.mark.parametrize("count", [0, MOST_TRIANGLES + 1])

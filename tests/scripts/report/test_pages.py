@@ -20,7 +20,7 @@ from rigid_motion_batch.analysis.results import ClipResult
 from rigid_motion_batch.recordings.clips import ClipWarning
 from rigid_motion_batch.report import pages
 from rigid_motion_batch.report.numbers import ERROR, KEYS, Gathering
-from rigid_motion_batch.report.pages import HERE, SCRIPTS, script_of, write_overview, write_report
+from rigid_motion_batch.report.pages import write_overview, write_report
 from rigid_motion_batch.report.settings import Settings
 from rigid_motion_batch.report.tables import grids
 from tests.scripts.clips.bodies import swinging_body
@@ -239,17 +239,3 @@ def test_the_overview_has_what_matters_first_and_leads_to_every_page(tmp_path: P
 
 
 # -- sources ----------------------------------------------------------------------------------------------------------
-
-
-def test_the_viewer_is_small_and_its_modules_are_one_script() -> None:
-    lines = [
-        line for name in SCRIPTS for line in (HERE / "viewer" / f"{name}.js").read_text(encoding="utf-8").splitlines()
-    ]
-    assert len(lines) <= 700
-    assert max(map(len, lines)) <= 120
-    script = script_of(SCRIPTS)
-    assert not re.search(r"^(import|export) ", script, re.MULTILINE)
-    assert {path.stem for path in (HERE / "viewer").glob("*.js")} == set(SCRIPTS)
-    for place, name in enumerate(SCRIPTS):
-        imported = re.findall(r'from "\./(\w+)\.js"', (HERE / "viewer" / f"{name}.js").read_text(encoding="utf-8"))
-        assert set(imported) <= set(SCRIPTS[:place]), name

@@ -1,21 +1,7 @@
 """The benchmark of many clips: its clips are recordings, and it sees what processes take."""
 
-import sys
-
-import pytest
-
 from research import benchmark_batch
 from tests.scripts.research.keeping import written
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="only Unix tells")
-def test_it_sees_what_a_program_has_taken_at_most(tmp_path):
-    clip = tmp_path / "clip.csv"
-    clip.write_text(next(benchmark_batch.pieces(1)), encoding="utf-8")
-    run = benchmark_batch.compare([clip], tmp_path, 1, "--no-video", "--rates", "10")
-    assert 1e7 < run.worker < 1e9
-    assert 1e7 < run.program < 1e9
-    assert run.seconds > 0.1
 
 
 def test_two_workers_are_measured_beside_one(tmp_path, monkeypatch):

@@ -55,15 +55,6 @@ def test_where_all_is_there_it_says_so(ready, capsys):
     assert capsys.readouterr() == ("All is there for a release.\n", "")
 
 
-def test_stand_ins_for_addresses_are_no_release(ready):
-    change(ready, MANIFEST, WEBSITE, "https://example.org/rigid-motion")
-    change(ready, MANUAL, WEBSITE, "https://example.org/rigid-motion")
-    change(ready, MANIFEST, "@motion.dev", "@example.org")
-    website, mail, *_ = check_release.missing(ready)
-    assert "the website is https://example.org/rigid-motion" in website
-    assert "maintainer@example.org" in mail
-
-
 @pytest.mark.parametrize(
     ("name", "old", "new", "told"),
     [
@@ -76,8 +67,3 @@ def test_stand_ins_for_addresses_are_no_release(ready):
 def test_what_is_not_ready_is_told(ready, capsys, name, old, new, told):
     change(ready, name, old, new)
     assert told in missing(capsys)
-
-
-def test_a_version_that_has_its_tag_was_released(ready, capsys):
-    git(ready, "tag", "v0.1.0")
-    assert "the tag v0.1.0 is there already" in missing(capsys)

@@ -1,14 +1,12 @@
 """Pages have the figures of their studies."""
 
-import json
 import re
 from pathlib import Path
 
 import jinja2
-import numpy as np
 import pytest
 
-from research.pages import QUOTE, ROOT, alike, each, environment, filled, less, pages, spread, write_figures
+from research.pages import QUOTE, ROOT, environment, filled, pages, write_figures
 
 TEMPLATES = environment()
 
@@ -42,13 +40,6 @@ def test_every_template_and_every_file_of_figures_is_used():
         assert re.search(rf"\b{path.stem}\b[.[]", used), path.name
 
 
-def test_figures_are_numbers_of_six_digits(checkout: Path):
-    path = write_figures("found", {"a": np.float64(2 / 3), "b": np.arange(2), "c": (float("nan"),)}, "x", checkout)
-    result = json.loads(path.read_text(encoding="utf-8"))
-    assert result.pop("made_by").startswith("`x`: Python ")
-    assert result == {"a": 0.666667, "b": [0, 1], "c": [None]}
-
-
 def test_a_page_is_its_template_with_figures(checkout: Path):
     write_figures("found", {"error": 0.01234, "saved": {"a": 0.031, "b": -0.2}}, "x", checkout)
     (checkout / "docs/templates/page.md").write_text(
@@ -74,13 +65,3 @@ def test_what_no_study_found_is_refused(checkout: Path):
     (checkout / "README.md").write_text("<!--= found.nothing -->1<!-- end -->", encoding="utf-8")
     with pytest.raises(jinja2.UndefinedError, match="nothing"):
         filled(checkout / "README.md", environment(checkout))
-
-
-def test_how_figures_are_written():
-    assert spread([4.4, 6.6]) == "4 to 7"
-    assert spread([5.0, 5.2]) == "5"
-    assert less(0.031, "fewer") == "3\N{NO-BREAK SPACE}% fewer"
-    assert less(-0.031, decimals=1) == "3.1\N{NO-BREAK SPACE}% more"
-    assert alike([0.33, 0.5], "fewer") == "33 and 50\N{NO-BREAK SPACE}% fewer"
-    assert alike([0.33, -0.5]) == "33\N{NO-BREAK SPACE}% less and 50\N{NO-BREAK SPACE}% more"
-    assert each([1.234, None]) == ["1.23", "\N{EN DASH}"]

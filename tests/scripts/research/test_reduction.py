@@ -1,18 +1,13 @@
 """The figures of reduced keys and of Blender's Decimate are those of what Blender shows."""
 
-from pathlib import Path
-
-import numpy as np
 import pytest
 
 from research import reduction
 from rigid_motion import animation
 from rigid_motion.motion import shell_error
 from rigid_motion_batch.analysis.needed import part_of
-from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.scenes.decimated_bodies import decimate
-from tests.scripts.recordings.test_damaged_bvh_bodies import seed
 
 TOLERANCE, RADIUS = 0.005, 0.1
 
@@ -50,18 +45,3 @@ def test_decimated_curves_are_measured_in_the_scene(live, clip):
     assert one.largest == pytest.approx(shell_error(shown, clip.poses, RADIUS).max())
     assert {len(fcurve.keyframe_points) for fcurve in animation.channelbag_of(obj).fcurves} == {round(one.keys)}
     assert one.keys < 0.3 * len(reduction.frames_of(clip))
-
-
-def test_of_a_skeleton_the_root_is_read(tmp_path):
-    path = tmp_path / "walk.bvh"
-    path.write_text(seed("ZXY", 60), encoding="utf-8")
-    whole, root = (reduction.read(source, 30.0) for source in (path, Path(f"{path}:Hips")))
-    assert np.array_equal(whole.poses.positions, root.poses.positions)
-    assert shell_error(whole.poses, root.poses, RADIUS).max() < 1e-9
-
-
-def test_a_recording_of_too_few_poses_is_refused(tmp_path):
-    path = tmp_path / "still.csv"
-    path.write_text("t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n0,0,0,0,0,0,0,1\n", encoding="utf-8")
-    with pytest.raises(TrajectoryError, match=r"still\.csv: "):
-        reduction.read(path, 60.0)

@@ -33,13 +33,6 @@ def test_a_brisk_motion_is_within_millimetres_between_frames_and_exact_on_them(
     assert measure(BRISK, mode, rotation_mode, 0.1)["live_mm"] < 1e-2
 
 
-@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XYZ"])
-def test_baking_every_quarter_of_a_frame_leaves_a_tenth_of_the_error(live_file, rotation_mode):
-    result = measure(BRISK, "dq_sclerp", rotation_mode, 0.1)
-    assert result["quarter_mm"] < 0.1 * result["live_mm"]
-    assert result["whole_mm"] > 0.5 * result["live_mm"], "baking whole frames does not help"
-
-
 def test_the_study_writes_what_the_page_reads(empty_file, tmp_path, monkeypatch):
     monkeypatch.setattr(subframes, "SEGMENTS", 2)
     monkeypatch.setattr(subframes, "MOTIONS", subframes.MOTIONS[:1])

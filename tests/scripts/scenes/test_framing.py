@@ -27,13 +27,6 @@ def test_what_has_room_where_it_is_is_not_followed():
     assert np.array_equal(framing.focus, np.zeros((400, 3)))
 
 
-@pytest.mark.parametrize("count", [1, 2, 5])
-def test_the_shortest_of_films_has_a_frame(count):
-    way = moving(np.linspace((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), count))
-    extent = Framing.of(Solid(way, CUBE), smoothing=14.4).extent(Solid(way, CUBE))
-    assert np.all(extent.high > extent.low)
-
-
 def walking(*, climbs: float = 0.0) -> np.ndarray:
     """Joints of a body that bobs as it goes, and climbs by so many metres."""
     steps = np.linspace(0.0, 12.0, 200)

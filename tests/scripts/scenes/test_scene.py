@@ -92,16 +92,6 @@ def test_every_mode_is_played_on_every_frame_as_it_was_computed(axes):
             assert_same_poses(at_home, expected)
 
 
-def test_an_object_that_grows_grows_on_the_stage():
-    clip = swinging_clip(seconds=0.6)
-    scales = np.linspace(1.0, 2.0, len(clip.times))
-    growing = dataclasses.replace(clip, poses=Poses(clip.poses.positions, clip.poses.quaternions, scales))
-    scene = build_scene(reconstruct(growing, "5", ("cga_slerp",)), SETTINGS)
-    result = read_poses(bpy.data.objects["cga_slerp"], np.array([1.0, scene.frame_end]))
-    assert result.scales[0] == pytest.approx(1.0, abs=1e-5)
-    assert result.scales[1] > 1.6
-
-
 CLIPS = {
     "as recorded": (1.0, 0.0),
     "a millimetre": (1e-3, 0.0),
@@ -113,10 +103,11 @@ CLIPS = {
 }
 
 
-@pytest.mark.parametrize("clip", CLIPS)
-@pytest.mark.parametrize("modes", [TWO, tuple(KEYFRAME_MODES)], ids=["two", "all"])
+@pytest.mark.parametrize(
+    ("clip", "modes"), [*((clip, TWO) for clip in CLIPS), ("as recorded", KEYFRAME_MODES), ("far away", KEYFRAME_MODES)]
+)
 def test_everything_that_moves_stays_within_its_own_card(clip, modes):
-    scene = build_scene(reconstruct(changed(swinging_clip(seconds=1.0), *CLIPS[clip]), "5", modes), SETTINGS)
+    scene = build_scene(reconstruct(changed(swinging_clip(seconds=1.0), *CLIPS[clip]), "5", tuple(modes)), SETTINGS)
     aspect = SETTINGS.resolution[0] / SETTINGS.resolution[1]
     deviating = {mode: f"{mode} deviating" for mode in modes if f"{mode} deviating" in bpy.data.objects}
     moving = {mode: (deviating.get(mode, mode), f"{mode} recording") for mode in modes}
@@ -254,12 +245,6 @@ def test_a_clip_shorter_than_a_frame_is_one_frame():
     scene = build_scene(reconstruct(swinging_clip(seconds=0.05), "30", TWO), SETTINGS)
     assert (scene.frame_start, scene.frame_end) == (1, 1)
     assert len(evaluated_points(bpy.data.objects["Time"]))
-
-
-@pytest.mark.parametrize("engine", ["workbench", "eevee", "cycles"])
-def test_every_engine_can_be_chosen(engine):
-    made = reconstruct(swinging_clip(seconds=0.6), "5", ("dq_sclerp",))
-    assert engine in build_scene(made, dataclasses.replace(SETTINGS, engine=engine)).render.engine.lower()
 
 
 def test_an_object_that_would_be_lost_on_its_path_is_shown_larger_and_says_so():

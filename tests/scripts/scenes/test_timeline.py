@@ -1,25 +1,10 @@
 import numpy as np
-import pytest
 
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.modes import BEST_OF
 from rigid_motion_batch.analysis.reconstructions import reconstruct as choose
 from rigid_motion_batch.scenes.timeline import ShownMotion, Timeline, peaks
-from tests.scripts.clips.recordings import reconstruct, swinging_clip
-
-
-@pytest.fixture(scope="module")
-def swing():
-    return reconstruct(swinging_clip(seconds=1.2), "10")
-
-
-def test_the_film_runs_from_the_first_key_to_the_last(swing):
-    timeline = Timeline.of(swing, 30, 1.0)
-    times = timeline.times_of(timeline.frames)
-    assert timeline.frames[0] == 1.0
-    assert times[0] == swing.times[0]
-    assert 0.0 <= swing.times[-1] - times[-1] < 1.0 / 30.0
-    assert np.allclose(np.diff(times), 1.0 / 30.0)
+from tests.scripts.clips.recordings import swinging_clip
 
 
 def test_the_best_of_each_segment_is_shown_by_the_mode_that_was_best_there():

@@ -37,17 +37,6 @@ def test_errors_of_the_body_are_those_of_matrices() -> None:
 # -- keys needed -------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
-def test_the_figures_say_everything_of_each_body() -> None:
-    short = swinging_body("short", seconds=1.0, rate=30.0, seed=4, joints=NAMES)
-    result = bodies.measure([BODY_CLIP, short])
-    assert tuple(result["needed"]) == bodies.MODES
-    assert result["errors"]["pga_lerp"][5]["velocity"] > 0.0
-    errors = [result["by_body"][name]["lerp_slerp"][10] for name in ("walk", "short")]
-    mean = result["errors"]["lerp_slerp"][10]["shell"]
-    assert mean == pytest.approx(np.sqrt(np.prod(errors)))
-
-
 # -- files -------------------------------------------------------------------------------------------------------------
 
 

@@ -29,10 +29,3 @@ def test_a_screw_keeps_the_tool_in_the_hand_that_holds_it_and_the_state_of_the_a
         assert views()["lerp_slerp"][rate]["slip"] > 1e-3
         for mode in ("dq_sclerp", "pga_lerp", "motor_spline"):
             assert views()[mode][rate]["slip"] < 1e-9
-
-
-def test_the_film_shows_the_moment_of_the_catch():
-    moments = catching.frame_moments(CATCH)
-    assert CATCH in moments
-    assert catching.SHOWN[0] <= moments[0] < RELEASE < CATCH < moments[-1] <= catching.SHOWN[1]
-    np.testing.assert_allclose(np.diff(moments), 1.0 / (catching.FPS * catching.SLOWER))

@@ -8,7 +8,6 @@ import pytest
 from research.paper.motions import REST, read_all, read_motion
 from research.studies import files_in
 from rigid_motion_batch.recordings import TrajectoryError, read_trajectories
-from tests.recordings import RECORDINGS as FOLDER
 from tests.scripts.recordings.test_damaged_bvh_bodies import seed
 
 
@@ -27,13 +26,6 @@ def test_a_body_that_stays_within_a_centimetre_of_its_mean_is_at_rest(tmp_path: 
         read_motion(tmp_path / "rests.csv")
 
 
-def test_a_body_that_turns_on_the_spot_moves(tmp_path: Path):
-    angles = np.linspace(0.0, 2.0, 100)
-    rows = [f"{i / 50},0,0,0,0,0,{np.sin(a / 2)},{np.cos(a / 2)}" for i, a in enumerate(angles)]
-    (tmp_path / "turns.csv").write_text("\n".join(["t,x,y,z,qx,qy,qz,qw", *rows, ""]), encoding="utf-8")
-    assert len(read_motion(tmp_path / "turns.csv").times) == 100
-
-
 def test_a_skeleton_is_represented_by_its_root(tmp_path: Path):
     path = tmp_path / "walk.bvh"
     path.write_text(seed("ZXY", 60), encoding="utf-8")
@@ -50,8 +42,3 @@ def test_a_file_that_is_no_recording_is_left_out_and_says_why_without_its_folder
     assert [clip.name for clip in result] == ["moves"]
     assert list(left_out) == ["notes"]
     assert str(tmp_path) not in left_out["notes"]
-
-
-@pytest.mark.recordings
-def test_of_other_peoples_recordings_the_one_at_rest_is_left_out():
-    assert list(read_all(files_in([FOLDER]), read_motion)[1]) == ["optitrack_rigid_body"]

@@ -32,26 +32,6 @@ def test_a_part_writes_its_figures(tmp_path: Path) -> None:
     assert set(result["bows"]["circling"]) == {"5", "8", "12", "15", "20", "30"}
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--recordings", "nowhere"], "no such file or folder"),
-        (["--only", "bodies", "--bodies", "nowhere"], "no such file or folder"),
-        (["--only", "nothing"], "invalid choice"),
-        (["--unknown"], "unrecognized arguments"),
-    ],
-)
-def test_a_wrong_option_is_named_and_ends_with_code_2(
-    arguments: list[str], said: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    try:
-        code = parts.main([*arguments, "--root", str(tmp_path)])
-    except SystemExit as ended:
-        code = ended.code
-    assert code == 2
-    assert said in capfd.readouterr().err
-
-
 @pytest.mark.network
 def test_a_stream_costs_less_the_more_it_may_be_off(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sending, "DELAYS", (0.1,))

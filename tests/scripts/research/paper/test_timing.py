@@ -5,7 +5,6 @@ import pytest
 
 from research.paper import timing
 from research.paper.table import PAPER, UPDATES
-from research.studies import interleaved_seconds
 from rigid_motion.motion import MODES
 from tests.scripts.research.paper.clips import circling
 
@@ -19,14 +18,6 @@ def test_all_readings_generate_the_same_frames(mode: str):
     fast, arrays = (engine(mode).positions for engine in (case.filled_in, case.in_the_algebra))
     assert case.in_betweens == timing.USERS * 90
     np.testing.assert_allclose(arrays, fast.reshape(-1, 3), atol=1e-12)
-
-
-def test_interleaved_runs_are_as_many_of_each():
-    ran: list[str] = []
-    runs = {name: lambda name=name: ran.append(name) for name in "abc"}
-    seconds = interleaved_seconds(runs, 2, warm=True)
-    assert "".join(ran) == "aabbcc" * 2
-    assert {name: len(spent) for name, spent in seconds.items()} == dict.fromkeys("abc", 2)
 
 
 def test_the_interval_holds_the_ratio_and_narrows_with_more_rounds():

@@ -15,8 +15,7 @@ from itertools import pairwise
 import bpy
 import numpy as np
 
-from rigid_motion.animation import write_channel
-from tests.rigs.dance_plan import (
+from examples.dancer.plan import (
     BEND,
     BONES,
     DIP,
@@ -34,6 +33,7 @@ from tests.rigs.dance_plan import (
     TWIST,
     Plan,
 )
+from rigid_motion.animation import write_channel
 
 FPS, BEAT = 30, 18.75
 """Frames a second, and a beat."""

@@ -1,0 +1,237 @@
+"""Recordings of A-Frame's motion-capture components, EuRoC ground truth, Motive's CSV exports and TUM trajectories."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from rigid_motion_batch.recordings import read_trajectories
+
+# -- A-Frame ----------------------------------------------------------------------------------------------------------
+
+
+def aframe(offset: float = 0.0, **extra: object) -> dict:
+    """A device's recording, as the components write it since 2017."""
+    poses = [
+        {
+            "position": {"x": offset + frame, "y": 1.5, "z": -0.25},
+            "rotation": {"x": 10.0, "y": 120.0 + frame, "z": -60.0},
+            "timestamp": 306686.13 + 11.0 * frame,
+        }
+        for frame in range(3)
+    ]
+    return {"poses": poses, "events": [], **extra}
+
+
+def test_a_recording_of_a_headset_and_controllers_holds_them_by_name(write) -> None:
+    content = {"camera": aframe(), "left": aframe(5.0, gamepad={"hand": "left"}), "right": aframe(7.0)}
+    recording = read_trajectories(write("play.json", json.dumps(content)))
+    assert [trajectory.name for trajectory in recording.trajectories] == ["camera"]
+    assert recording.others == ("left", "right")
+    (left,) = read_trajectories(write("play.json", json.dumps(content)) + ":left").trajectories
+    np.testing.assert_array_equal(left.poses.positions[:, 0], [5.0, 6.0, 7.0])
+
+
+def test_times_are_seconds_and_angles_are_turned_in_the_order_y_x_z(write) -> None:
+    (trajectory,) = read_trajectories(write("hand.json", json.dumps(aframe()))).trajectories
+    assert trajectory.name == "hand"
+    np.testing.assert_allclose(trajectory.times, [306.68613, 306.69713, 306.70813], rtol=1e-15)
+    angles = [[120, 10, -60], [121, 10, -60], [122, 10, -60]]
+    expected = Rotation.from_euler("YXZ", angles, degrees=True).as_quat()[:, [3, 0, 1, 2]]
+    np.testing.assert_allclose(trajectory.poses.quaternions, expected, atol=1e-15)
+
+
+@pytest.mark.parametrize("bare", [True, False])
+def test_the_first_versions_wrote_lists_and_quaternions(write, bare: bool) -> None:
+    poses = [{"rotation": [0.1, 0.2, 0.3, 0.9], "position": [1, 2, 3], "timestamp": 10 * t} for t in range(2)]
+    content = json.dumps(poses if bare else {"poses": poses, "events": []})
+    (trajectory,) = read_trajectories(write("hand.json", content)).trajectories
+    np.testing.assert_array_equal(trajectory.poses.positions, [[1, 2, 3]] * 2)
+    np.testing.assert_array_equal(trajectory.poses.quaternions, [[0.9, 0.1, 0.2, 0.3]] * 2)
+
+
+def broken(**changes: object) -> str:
+    content = aframe()
+    content["poses"][2].update(changes)
+    return json.dumps(content)
+
+
+# -- EuRoC ------------------------------------------------------------------------------------------------------------
+
+EUROC_HEADER = (
+    "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], "
+    "v_RS_R_x [m s^-1], v_RS_R_y [m s^-1], v_RS_R_z [m s^-1]"
+)
+EUROC_ROWS = (
+    "1403636580838555648,4.688319,-1.786938,0.783338,0.534108,-0.153029,-0.827383,-0.082152,-0.027876,0.033207,0.8\n"
+    "1403636580843555649,4.688177,-1.786770,0.787350,0.534640,-0.152990,-0.826976,-0.082863,-0.029272,0.033992,0.8\n"
+    "1403636580848555652,4.688028,-1.786598,0.791382,0.535178,-0.152945,-0.826562,-0.083605,-0.030043,0.034999,0.8\n"
+)
+
+
+@pytest.mark.parametrize(
+    "header", [EUROC_HEADER, EUROC_HEADER.replace("#timestamp", "#timestamp [ns]"), EUROC_HEADER.replace(", ", ",")]
+)
+def test_not_a_nanosecond_is_lost(write, header: str) -> None:
+    (trajectory,) = read_trajectories(write("data.csv", f"{header}\n{EUROC_ROWS}")).trajectories
+    np.testing.assert_array_equal(trajectory.times, np.array([0, 5_000_001, 10_000_004]) / 1e9)
+    np.testing.assert_array_equal(trajectory.poses.positions[0], [4.688319, -1.786938, 0.783338])
+    np.testing.assert_array_equal(trajectory.poses.quaternions[0], [0.534108, -0.153029, -0.827383, -0.082152])
+
+
+# -- Motive, versions 1.21 to 1.25 of the format ----------------------------------------------------------------------
+
+MOTIVE_SETTINGS = (
+    "Format Version,1.23,Take Name,Take 3,Capture Frame Rate,120.000000,Export Frame Rate,120.000000,"
+    "Total Exported Frames,3,Rotation Type,Quaternion,Length Units,Millimeters,Coordinate Space,Global"
+)
+BODY = ["Rotation"] * 4 + ["Position"] * 3 + ["Mean Marker Error"]
+AXES = ["X", "Y", "Z", "W", "X", "Y", "Z", ""]
+
+
+def motive(settings: str = MOTIVE_SETTINGS, labels: bool = True, parents: bool = False) -> str:
+    """A take with a marker, two rigid bodies and a bone; the second body is lost in the middle frame."""
+
+    def header(label: str, *cells: str) -> str:
+        return ",".join(["", label if labels else "", *cells])
+
+    rows = [
+        settings,
+        "",
+        header("Type", *["Marker"] * 3, *["Rigid Body"] * 16, *["Rigid Body Marker"] * 3, *["Bone"] * 7),
+        header("Name", *["Drill:1"] * 3, *["Drill"] * 8, *['"Head, left"'] * 8, *["Drill:1"] * 3, *["Hip"] * 7),
+        header("ID", *["A1"] * 3, *["B1"] * 8, *["B2"] * 8, *["B1"] * 3, *["C1"] * 7),
+        *([header("Parent", *[""] * 29)] if parents else []),
+        header("", *["Position"] * 3, *BODY, *BODY, *["Position"] * 3, *BODY[:7]),
+        ",".join(["Frame", "Time (Seconds)" if labels else "Time", *"XYZ", *AXES, *AXES, *"XYZ", *AXES[:7]]),
+    ]
+    for frame in range(3):
+        marker = ["7", "7", "7"]
+        drill = [f"0.{frame}", "0.2", "0.3", "0.9", f"{frame}", "20", "30", "0.001"]
+        head = [""] * 8 if frame == 1 else ["0.5", "0.5", "0.5", "-0.5", "1", "2", f"{frame}", "0.001"]
+        rows.append(",".join([f"{frame}", f"{frame / 120:.6f}", *marker, *drill, *head, "", "", "", *["8"] * 7]))
+    return "\n".join(rows) + "\n"
+
+
+@pytest.mark.parametrize("labels", [True, False])
+@pytest.mark.parametrize("parents", [True, False])
+def test_the_rigid_bodies_are_found_among_markers_and_bones(write, labels: bool, parents: bool) -> None:
+    recording = read_trajectories(write("take.csv", motive(labels=labels, parents=parents)) + ":*")
+    drill, head = recording.trajectories
+    assert (drill.name, head.name) == ("Drill", "Head, left")
+    assert drill.metres_per_unit == 0.001
+    inches = motive(MOTIVE_SETTINGS.replace("Millimeters", "Inches"))
+    assert read_trajectories(write("take.csv", inches)).trajectories[0].metres_per_unit == 0.0254
+    np.testing.assert_array_equal(drill.times, [0.0, 0.008333, 0.016667])
+    np.testing.assert_array_equal(drill.poses.positions, [[0, 20, 30], [1, 20, 30], [2, 20, 30]])
+    np.testing.assert_array_equal(drill.poses.quaternions[:, 1], [0.0, 0.1, 0.2])
+    np.testing.assert_array_equal(drill.poses.quaternions[0], [0.9, 0.0, 0.2, 0.3])
+    np.testing.assert_array_equal(head.poses.quaternions[2], [-0.5, 0.5, 0.5, 0.5])
+
+
+@pytest.mark.parametrize("order", ["XYZ", "ZYX", "YZX", ""], ids=str)
+def test_euler_angles_are_turns_about_the_turned_axes(write, order: str) -> None:
+    """Those about X, Y and Z where the settings say nothing, and there is no W."""
+    kind = f"Rotation Type,{order}," if order else ""
+    order = order or "XYZ"
+    text = "\n".join(
+        [
+            MOTIVE_SETTINGS.replace("Rotation Type,Quaternion,", kind),
+            ",Type" + ",Rigid Body" * 6,
+            ",Name" + ",Drill" * 6,
+            ",ID" + ",B1" * 6,
+            "," + ",Rotation" * 3 + ",Position" * 3,
+            "Frame,Time (Seconds)," + ",".join(order) + ",X,Y,Z",
+            "0,0.0,10,20,30,1,2,3",
+            "1,0.1,40,50,60,1,2,3",
+        ]
+    )
+    (drill,) = read_trajectories(write("take.csv", text)).trajectories
+    expected = Rotation.from_euler(order, [[10, 20, 30], [40, 50, 60]], degrees=True).as_quat()[:, [3, 0, 1, 2]]
+    np.testing.assert_allclose(drill.poses.quaternions, expected, atol=1e-15)
+
+
+# -- TUM --------------------------------------------------------------------------------------------------------------
+
+TUM_COMMENTS = "# ground truth trajectory\n# file: 'dataset.bag'\n# timestamp tx ty tz qx qy qz qw\n"
+TUM_ROWS = "1305031098.6659 1.3 0.6 1.6 0.6132 0.5962 -0.3311 -0.3986\n1305031098.6758 1.4 0.7 1.7 0.1 0.2 0.3 0.4\n"
+
+
+@pytest.mark.parametrize("name", ["walk.tum", "walk.txt", "walk.csv"])
+@pytest.mark.parametrize("text", [TUM_COMMENTS + TUM_ROWS, TUM_ROWS, TUM_ROWS.replace(" ", "\t"), f"\n{TUM_ROWS}\n"])
+def test_eight_numbers_in_a_line_are_time_position_and_scalar_last_quaternion(write, name: str, text: str) -> None:
+    (trajectory,) = read_trajectories(write(name, text)).trajectories
+    assert trajectory.name == "walk"
+    np.testing.assert_array_equal(trajectory.times, [1305031098.6659, 1305031098.6758])
+    np.testing.assert_array_equal(trajectory.poses.positions, [[1.3, 0.6, 1.6], [1.4, 0.7, 1.7]])
+    np.testing.assert_array_equal(trajectory.poses.quaternions[0], [-0.3986, 0.6132, 0.5962, -0.3311])
+    assert trajectory.poses.scales is None
+
+
+def test_a_comment_that_names_another_order_is_believed(write) -> None:
+    text = "# t x y z qw qx qy qz\n0 1 2 3 0.9 0.1 0.2 0.3\n1 1 2 3 0.9 0.1 0.2 0.3\n"
+    (trajectory,) = read_trajectories(write("walk.txt", text)).trajectories
+    np.testing.assert_array_equal(trajectory.poses.quaternions[0], [0.9, 0.1, 0.2, 0.3])
+
+
+# -- refusals ---------------------------------------------------------------------------------------------------------
+
+WRONG = {
+    "hand.json": [
+        ("", 1, "this is not JSON"),
+        ('{"poses":\n[}', 2, "this is not JSON"),
+        ('{"poses": [%s]}' % ("9" * 5000), None, "this JSON cannot be a recording"),
+        ('{"camera": 1, "left": {"events": []}}', None, "this JSON holds no poses"),
+        ('{"camera": {"poses": []}}', None, "no moving body in this file"),
+        ('{"poses": [1, 2]}', None, "pose 0 of 'hand' has no number timestamp"),
+        (broken(timestamp="noon"), None, "pose 2 of 'hand' has no number timestamp"),
+        (broken(position={"x": 1, "y": 2}), None, "pose 2 of 'hand' has no number position.z"),
+        (broken(position={"x": 1, "y": [2], "z": 3}), None, "pose 2 of 'hand' has no number position.y"),
+        (broken(rotation=[0, 0, 0, 1]), None, "pose 2 of 'hand' has no number rotation.y"),
+        (broken(timestamp=10**400), None, "pose 2 of 'hand' has no number timestamp"),
+        (b"\x80\x81", 1, "this is not text"),
+    ],
+    "take.csv": [
+        (MOTIVE_SETTINGS, 1, "the rows that say what the columns are end too early"),
+        ("\n".join(motive().split("\n")[:5]), 5, "the rows that say what the columns are end too early"),
+        ("\n".join(motive().split("\n")[:7]), None, "'Drill' has 0 samples"),
+        (
+            motive().replace("Rigid Body Marker", "Marker").replace("Rigid Body", "Bone"),
+            None,
+            "no rigid body, only Marker, Bone",
+        ),
+        (motive(MOTIVE_SETTINGS.replace("Millimeters", "Cubits")), 1, "Length Units is 'Cubits'"),
+        (motive(MOTIVE_SETTINGS.replace("Quaternion", "Matrix")), 1, "Rotation Type is 'Matrix'"),
+        (
+            motive(MOTIVE_SETTINGS.replace("Quaternion", "XYZ")).replace("X,Y,Z,W", "X,Y,Q,W"),
+            7,
+            "'Drill' has no column rotat",
+        ),
+        (motive().replace("Time (Seconds),X,Y,Z,X,Y,Z,W", "Time,X,Y,Z,X,Y,Z,V"), 7, "'Drill' has no column rotation W"),
+        (motive().replace("0.1,0.2,0.3,0.9", "0.1,?,0.3,0.9"), 9, "Drill rotation y is '?', not a number"),
+        (motive() + "3,0.025,1\n", 11, "3 columns where"),
+        (motive() + "3,0.025" + ",1" * 99 + "\n", 11, "101 columns where 31 have a name"),
+        (motive().replace("Head, left", "x" * 200_000), 4, "this line is no header"),
+    ],
+    "walk.tum": [
+        ("", None, "the file is empty"),
+        (TUM_COMMENTS, None, "'walk' has 0 samples"),
+        (f"{TUM_COMMENTS}0 1 2 3 0 0 0 1\n0.1 1 2\n", 5, "3 columns where 8 are needed"),
+        (f"{TUM_COMMENTS}0 1 2 3 0 0 0 1 9\n", 4, "9 columns where 8 have a name"),
+        (f"{TUM_COMMENTS}{TUM_ROWS}0.1 1 2 3 0 0 O 1\n", 6, "qz is 'O', not a number"),
+        ("# t x y z\n0 1 2 3\n0.1 1 2 3\n", 2, "positions only, and rotations are needed"),
+        ("0 1 2 3\n0.1 1 2 3\n", 1, "positions only, and rotations are needed; write t x y z qx qy qz qw"),
+        (f"{TUM_ROWS}1,2,3\n", 3, "1 columns where 8 are needed"),
+    ],
+}
+"""Contents of files of these names, the line that is wrong, and what is said of it."""
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "line", "problem"), [(name, *row) for name, rows in WRONG.items() for row in rows]
+)
+def test_a_wrong_file_is_told_with_its_line(write, refusal, name, text, line, problem):
+    told_line, message = refusal(write(name, text))
+    assert message.startswith(problem)
+    assert told_line == line

@@ -1,0 +1,84 @@
+"""What no command line can mean is refused by a line that says what to give instead, and ends with code 2."""
+
+from importlib import import_module
+
+import pytest
+
+REFUSED = {
+    "compare": [
+        (["--rates", "0"], "rate"),
+        (["--modes", "bezier"], "lerp_slerp"),
+        (["--radius", "-1"], "above 0"),
+        (["--slow-motion", "nan"], "above 0"),
+        (["--resolution", "161x90"], "even"),
+        (["--fps", "0"], "1 to 240"),
+        (["--output", ""], "'' is no folder"),
+        (["--jobs", "-1"], "no number of processes"),
+        (["--decimate", "uniform", "--tolerance", "5mm"], "leave out --decimate uniform"),
+        (["--fit"], "--fit is for keys that are chosen by the motion: add --tolerance, --budget or --decimate"),
+        (["--modes", "motor_splin"], "did you mean motor_spline?"),
+        (["--tolerence", "5mm"], "did you mean --tolerance?"),
+        (["--decimate", "adaptive", "--tolerance", "5mm", "--budget", "10"], "exclude one another"),
+        (["--decimate", "adaptive", "--tolerance", "5 inches"], "give a length such as 5mm"),
+        (["--decimate", "adaptive", "--budget", "5mm"], "give numbers such as 5,7.5,10"),
+        (["--columns", "when"], "write t=timestamp_ms,x=pos_x,..."),
+        (["--degrees"], "--degrees is for Euler angles: add their order"),
+        (["--modes", "best_of"], "best_of chooses among the other modes that are named"),
+        (["--modes", "best_of,dq_sclerp"], "best_of chooses among the other modes that are named"),
+    ],
+    "reduce": [
+        ([], "INPUT"),
+        (["a.blend", "--tolerance", "5 apples"], "is no tolerance; give a length such as 5mm"),
+        (["a.blend", "--tolerance", "0mm"], "is no tolerance"),
+        (["a.blend", "--keys", "1"], "--keys"),
+        (["a.blend", "--keys", "5", "--tolerance", "5mm"], "--keys"),
+        (["a.blend", "--radius", "0"], "is not a length above 0, such as 3cm or 0.03"),
+        (["a.glb", "b.glb", "--output", "c.glb"], "--output c.glb is a file, and there may be several results"),
+        (["a.csv", "--output", "b.glb"], "add --glb, and a.csv becomes a GLB file"),
+        (["a.glb", "--output", "b.blend"], "a.glb becomes a .glb file here: name such a one"),
+        (["a.csv", "--jobs", "-1"], "is no number of processes; give a whole number from 0 to 999"),
+        (["a.blend", "--mode", "BLENDER"], "invalid choice"),
+        (["a.csv", "--fps", "29.97"], "is no number of frames a second; give a whole number from 1 to 240"),
+        (["a.csv", "--degrees"], "--degrees is for Euler angles"),
+        (["a.csv", "--in-place"], "--in-place is for .blend files, and a.csv is a recording"),
+        (["a.csv", "--objects", "Hand"], "name one body with FILE:BODY"),
+        (["a.blend", "--in-place", "--output", "x"], "give one of them"),
+        (["shot.blend", ""], "'' is no file: a variable of a script may be empty"),
+        (["shot.blend", "--output", ""], "'' is no folder"),
+        (["--glb", "shot.blend", "--mode", "dq_sclerp"], "GLB knows lines and even turns alone: leave it out"),
+        (["--glb", "shot.blend", "--in-place"], "--in-place is for .blend files, and --glb writes others"),
+        (["--glb", "walk.bvh", "--blend"], "--blend is for .blend files, and --glb writes others"),
+        (
+            ["--glb", "shot.blend", "--objects", "A"],
+            "--objects is for .blend files, and --glb writes others: leave one",
+        ),
+        (["--glb", "walk.fbx", "--start", "1"], "with --glb Blender imports walk.fbx whole"),
+        (["--glb", "walk.gltf"], "walk.gltf is reduced to a .gltf file: do it without --glb"),
+    ],
+    "bake": [
+        ([], "FILE.blend"),
+        (["a.blend", ""], "'' is no file: a variable of a script may be empty"),
+        (["a.blend", "--output", " "], "' ' is no folder"),
+        (["a.blend", "--step", "0"], "is no number of frames; give 0.01 to 1000000"),
+        (["a.blend", "--step", "nan"], "is no number of frames"),
+        (["a.blend", "--first", "inf"], "is no frame; give -1048574 to 1048574"),
+        (["a.blend", "--first", "9", "--last", "3"], "--last 3 is before --first 9"),
+        (["a.blend", "--objects", ","], "name an object"),
+        (["a.blend", "--unbake", "--step", "2"], "--step is for baking"),
+        (["a.blend", "--unbake", "--first", "0"], "--first is for baking"),
+        (["a.blend", "--in-place", "--output", "x"], "give one of them"),
+        (["a.blend", "--output", __file__], "a.blend becomes a .blend file here: name such a one"),
+        (["a.blend", "b.blend", "--output", __file__], "is a file, and there may be several results: give a folder"),
+    ],
+}
+"""By command: arguments, and what the line has to say."""
+
+
+@pytest.mark.parametrize(
+    ("command", "arguments", "complaint"), [(command, *row) for command, rows in REFUSED.items() for row in rows]
+)
+def test_a_wrong_option_ends_with_code_2_and_a_way_out(command, arguments, complaint, capsys):
+    with pytest.raises(SystemExit) as ended:
+        import_module(f"rigid_motion_batch.cli.{command}").main(arguments)
+    assert ended.value.code == 2
+    assert complaint in capsys.readouterr().err
