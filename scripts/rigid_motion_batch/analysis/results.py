@@ -15,7 +15,6 @@ import numpy as np
 from rigid_motion.motion import Poses
 from rigid_motion_batch.recordings.clips import Clip, ClipFacts
 
-from .body_decimated import KeysOfBody
 from .body_metrics import JointMetrics, key_samples, measure_modes, write_key_tables
 from .choices import Choice, Keys
 from .metrics import Metrics, write_reconstruction
@@ -78,9 +77,6 @@ class ChoiceResult:
 
     joints: tuple[JointMetrics, ...] = ()
     """A row of each joint of a body under each mode."""
-
-    decimated: tuple[KeysOfBody, ...] = ()
-    """The keys of a body beside those of Blender's Decimate, where that was asked for."""
 
     @property
     def rows(self) -> list[Metrics]:

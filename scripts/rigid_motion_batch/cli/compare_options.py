@@ -94,10 +94,9 @@ somebody else's motion:
 
 what is written:
   OUTPUT/report.html is one file; with more than 24 clips, each clip has a page of its own. OUTPUT/metrics.csv has all
-  numbers, with adaptive keys also OUTPUT/keys_needed.csv, and for whole bodies OUTPUT/decimated.csv, which compares
-  their keys with Blender's Decimate. Every clip and choice of keys has a folder (OUTPUT/CLIP/10, /budget-10,
-  /tolerance-5mm) with keys.csv (MODE.keys.csv for adaptive keys), MODE.csv, comparison.mp4, comparison.blend and
-  comparison.glb, which has all motions side by side for any viewer, also with --no-video.
+  numbers, with adaptive keys also OUTPUT/keys_needed.csv. Every clip and choice of keys has a folder (OUTPUT/CLIP/10,
+  /budget-10, /tolerance-5mm) with keys.csv (MODE.keys.csv for adaptive keys), MODE.csv, comparison.mp4,
+  comparison.blend and comparison.glb, which has all motions side by side for any viewer, also with --no-video.
 
 what is printed:
   As soon as the numbers are there: for every choice of keys the RMS and the largest shell error of each motion in

@@ -207,7 +207,6 @@ class _Clips:
         self.metrics: list[Metrics] = []
         self.rows: list[Any] = []
         self.joints: list[Joints] = []
-        self.decimated: list[Any] = []
         self.segments: list[tuple[str, str, str]] = []
         self.films: list[tuple[int, str, str | None]] = []
         self.models: list[tuple[int, str, str | None]] = []
@@ -237,8 +236,6 @@ class _Clips:
                 self.models.append((place, result.choice.name, self._link(self._models[name, result.choice.name])))
             if joints := joints_of(place, clip, result, own):
                 self.joints.append(joints)
-            if rows := tables.decimated_rows(result):
-                self.decimated.append((name, result.choice, rows))
             if said := tables.segments_of(result, own):
                 self.segments.append((name, result.choice.title, said))
         self.places.append({"name": name, "data": ""})
