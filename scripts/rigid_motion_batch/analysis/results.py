@@ -112,17 +112,13 @@ class ClipResult:
 
 def made_of(clip: Clip, choice: Choice, modes: Sequence[str], radii: Radii, *, shared: bool) -> Reconstruction | None:
     """Return what modes make of a clip, with radii of the shells; as `reconstruct`."""
-    return reconstruct(clip, choice, modes, _radii_of(clip, radii), shared=shared)
+    return reconstruct(clip, choice, modes, radii.of(clip), shared=shared)
 
 
 def made_again(clip: Clip, result: ChoiceResult, radii: Radii, *, shared: bool) -> Reconstruction:
     """Return the same by the keys that were chosen before."""
     keys, modes = dict(result.keys), result.mode_of_segments
-    return Reconstruction(clip, result.choice, keys, _radii_of(clip, radii), shared, modes)
-
-
-def _radii_of(clip: Clip, radii: Radii) -> np.ndarray:
-    return radii.of(clip.rest_body.joints) if clip.rest_body else np.array([radii.rigid])
+    return Reconstruction(clip, result.choice, keys, radii.of(clip), shared, modes)
 
 
 def measured(made: Reconstruction) -> ChoiceResult:

@@ -19,13 +19,11 @@ from rigid_motion_batch.analysis.choices import Choice, fewest_keys
 from rigid_motion_batch.analysis.metrics import body_table_names, table_names
 from rigid_motion_batch.analysis.modes import name_of_other, single_modes
 from rigid_motion_batch.analysis.radii import EVERYWHERE, Radii
-from rigid_motion_batch.command_line import printable
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import clip_names
 from rigid_motion_batch.recordings.clips import ClipFacts
 from rigid_motion_batch.recordings.options import AS_THE_FILE_SAYS, ReadingOptions
 from rigid_motion_batch.recordings.reading import split_source
-from rigid_motion_batch.recordings.recordings import listed
 from rigid_motion_batch.report.settings import Settings
 from rigid_motion_batch.scenes.settings import MODELS, SceneSettings, place_of_subject
 from rigid_motion_batch.scenes.timeline import Timeline
@@ -195,8 +193,6 @@ class ComparisonPlan:
         notes = [note for note, _ in (read[key] for key in keys) if note]
         bodies = [(key, body, facts) for key in keys for body, facts in enumerate(read[key][1])]
         names = clip_names([(facts.name, facts.body) for _, _, facts in bodies])
-        if unknown := comparison.radii.unknown(joint for _, _, facts in bodies for joint in facts.joint_names):
-            notes.append(printable(f"no body has a joint {listed(unknown)}, for which --radius has a radius"))
         self.studies, of_clips = [], []
         for name, (key, body, facts) in zip(names, bodies, strict=True):
             notes += [f"{name}: {note}" for note in facts.repairs]
