@@ -40,7 +40,7 @@ from rigid_motion_batch.recordings.clip_reading import folder_names
 from rigid_motion_batch.recordings.reading import split_source
 from rigid_motion_batch.report.numbers import Gathering, Numbers
 from rigid_motion_batch.report.settings import Settings
-from rigid_motion_batch.report.verdict import Verdict, as_text, verdict
+from rigid_motion_batch.report.verdict import Verdict, verdict
 from rigid_motion_batch.scenes.settings import MODELS, SubjectError
 from rigid_motion_batch.supervising import blender_program, report
 from rigid_motion_batch.system_libraries import missing_for_rendering, way_out, without_blender
@@ -414,7 +414,7 @@ class _Comparing:
             "report": os.fspath(page) if page else None,
             "exit_code": code,
             "verdict": str(said) if said else None,
-            "wins": as_text(said.wins) if said else "",
+            "wins": said.wins if said else "",
             "table": [asdict(line) for line in terminal.lines_of(numbers)] if numbers else [],
             "clips": list(numbers.clips) if numbers else [],
             "notes": self.notes,

@@ -38,14 +38,14 @@ SAMPLE_IS_KEY = "No mode is off by more than rounding: every sample is a key, or
 
 @dataclass(frozen=True)
 class Part:
-    """A stretch of text: plain, a number, the name of a mode, or a link to a clip under a choice."""
+    """A stretch of text: plain, a number, or the name of a mode."""
 
     text: str
     kind: str = ""
-    """"", "number", "mode" or "link"."""
+    """"", "number" or "mode"."""
 
     target: str = ""
-    """The id of the mode; of a link the clip and the choice's name, with a comma."""
+    """The id of the mode."""
 
 
 Text = tuple[Part, ...]
@@ -66,16 +66,12 @@ class Verdict:
     """What a run comes to."""
 
     sentence: Text
-    wins: Text = ()
-    """In how many cases the best mode was, and where it was beaten by the most; empty of a single case."""
+    wins: str = ""
+    """In how many cases the best mode was; empty of a single case."""
 
     def __str__(self) -> str:
-        return as_text(self.sentence)
-
-
-def as_text(text: Text) -> str:
-    """Return the words alone, as a terminal shows them."""
-    return "".join(part.text for part in text).replace("\u00a0", " ")
+        """Return the words of the sentence, as a terminal shows them."""
+        return "".join(part.text for part in self.sentence).replace("\u00a0", " ")
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +133,7 @@ def verdict(numbers: Numbers, needed: Sequence[KeysNeeded] = ()) -> Verdict:
     said = [sentence for sentence in sentences if sentence]
     if not said:
         return Verdict((Part(SAMPLE_IS_KEY),))
-    return Verdict(said[0], _wins(contests[0]) if contests else ())
+    return Verdict(said[0], _wins(contests[0]) if contests else "")
 
 
 def _contests(numbers: Numbers) -> Iterable[_Contest]:
@@ -266,61 +262,20 @@ def _no_winner(contest: _Contest) -> Text:
     means, within = contest.means, contest.kind is Tolerance
     known = np.flatnonzero(np.isfinite(means).all(axis=1))
     at = int(known[0] if within else known[-1])
-    much, unit, off = ("keys", "keys a second", "") if within else ("error", "mm", " off (RMS)")
-    phrase = contest.phrase(at)
-
-    def value(mean: float) -> Part:
-        return _number(f"{digits(mean)}\u00a0{unit}")
-
-    if len(contest.groups) == 1:
-        count = len(contest.groups[0])
-        alike = f"{'Both' if count == 2 else f'All {count}'} modes are one motion: " if count > 1 else ""
-        does = "needs" if within else "is"
-        return _say(f"{alike}{{}} {does} {{}}{off} {phrase}.", contest.name(0), value(means[at].min()))
-    scores = np.log(means[known]).mean(axis=0)
-    if np.ptp(scores) < TIE:
-        differ = "need as many keys" if within else "are equally close"
-        return _say(f"The {len(contest.groups)} motions {differ}: {{}}{off} {phrase}.", value(means[at].min()))
-    ranked = np.argsort(scores, kind="stable").tolist()
-    if contest.reference is None:
-        first, second = map(contest.name, ranked[:2])
-        return _say(
-            f"{{}} and {{}} are the closest, and equally close: {{}} {phrase}.", first, second, value(means[at].min())
-        )
-    reference = contest.reference
-    following = next(group for group in ranked if group != reference)
-    more = np.exp(scores[following] - scores[reference]) - 1.0
-    same = "as many keys" if within else "the same error"
-    comes = "needs fewer keys" if within else "comes closer"
-    return _say(
-        f"No mode {comes} than {{}}: {{}}{off} {phrase}. Next is {{}} with "
-        f"{f'{percent(more)} more {much}' if more >= TIE else same}.",
-        contest.name(reference),
-        value(means[at, reference]),
-        contest.name(following),
-    )
+    best = contest.reference if contest.reference is not None else int(np.argmin(means[at]))
+    unit, off = ("keys a second", "") if within else ("mm", " off (RMS)")
+    value = _number(f"{digits(means[at, best])}\u00a0{unit}")
+    said = f"{{}}: {{}}{off} {contest.phrase(at)}."
+    if len(contest.groups) > 1:
+        said = f"No mode {'needs fewer keys' if within else 'comes closer'} than {said}"
+    return _say(said, contest.name(best), value)
 
 
-def _wins(contest: _Contest) -> Text:
-    """Return in how many cases the best mode was, and where it was beaten by the most."""
+def _wins(contest: _Contest) -> str:
+    """Return in how many cases the best mode was."""
     result = _best(contest)
     if not result or contest.distinguishable.sum() < 2:
-        return ()
-    best = result[0]
-    values = np.where(contest.distinguishable[..., None], contest.values, np.nan)
-    least = np.where(contest.distinguishable, np.nanmin(np.where(np.isnan(values), np.inf, values), axis=2), np.nan)
-    loss = 1.0 - least / values[..., best]
-    lost = contest.distinguishable & (loss > TIE)
-    cases, won = int(contest.distinguishable.sum()), int((contest.distinguishable & ~lost).sum())
-    many = _number(f"{'Fewest keys' if contest.kind is Tolerance else 'Closest'} in {won} of {cases}")
-    if not lost.any():
-        return _say("{} cases", many)
-    clip, choice = np.unravel_index(np.argmax(np.where(lost, loss, -1.0)), loss.shape)
-    name, at = contest.numbers.clips[clip], contest.numbers.choices[contest.places[choice]]
-    return _say(
-        f"{{}} cases; {'not' if lost.sum() == 1 else 'farthest from it'} in {{}}: there {{}} is, "
-        f"by {percent(loss[clip, choice])}",
-        many,
-        Part(f"{name} {at.phrase}", "link", f"{name},{at.name}"),
-        contest.name(int(np.nanargmin(values[clip, choice]))),
-    )
+        return ""
+    values = contest.values[contest.distinguishable]
+    won = np.count_nonzero(values[:, result[0]] * (1.0 - TIE) <= values.min(axis=1))
+    return f"{'Fewest keys' if contest.kind is Tolerance else 'Closest'} in {won} of {len(values)} cases"
