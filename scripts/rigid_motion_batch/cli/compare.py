@@ -357,8 +357,8 @@ class _Comparing:
         if self.options.quiet or self.options.json:
             return
         numbers, said = self._numbers()
-        if numbers:
-            terminal.show(terminal.table_of(terminal.lines_of(numbers), len(numbers.clips)), str(said))
+        if numbers and said:
+            terminal.show(terminal.table_of(terminal.lines_of(numbers), len(numbers.clips)), said.sentence)
 
     def _numbers(self) -> tuple[Numbers | None, Verdict | None]:
         """Return all numbers that there are, and what they come to."""
@@ -413,7 +413,7 @@ class _Comparing:
         return {
             "report": os.fspath(page) if page else None,
             "exit_code": code,
-            "verdict": str(said) if said else None,
+            "verdict": said.sentence if said else None,
             "wins": said.wins if said else "",
             "table": [asdict(line) for line in terminal.lines_of(numbers)] if numbers else [],
             "clips": list(numbers.clips) if numbers else [],
