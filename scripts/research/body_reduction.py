@@ -10,23 +10,22 @@ from typing import Any
 
 import numpy as np
 
+from research.decimating import VARIES, DecimatedBody, figures_of
 from research.studies import interleaved_seconds, report
 from rigid_motion.motion import Poses, shell_error
-from rigid_motion_batch.analysis.body_decimated import OWN, SHARED
-from rigid_motion_batch.analysis.body_metrics import measure_modes
+from rigid_motion_batch.analysis.body_metrics import key_samples, measure_modes
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.analysis.needed import part_of
-from rigid_motion_batch.analysis.reconstructions import Reconstruction, reconstruct
+from rigid_motion_batch.analysis.reconstructions import Reconstruction, moving, reconstruct
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.scenes.decimating import beside_decimate
 
 WITHIN, RADIUS, HEIGHT = Tolerance("10mm"), 0.03, 1.7
 """The errors that are allowed, of the ball at every joint, and what every body's largest extent is made; metres."""
 
 MODE, COMPARED = "motor_spline", ("lerp_slerp", "dq_sclerp", "motor_spline")
-WAYS = {OWN: False, SHARED: True}
+WAYS = {"keys of each joint": False, "key poses": True}
 
 MOST_FRAMES = 1200  # longer recordings are cut off
 LONG = "cmu_01_01"  # the file that is timed uncut
@@ -123,20 +122,24 @@ def beside(body: Clip, way: str) -> list[dict[str, Any]]:
     report(f"{body.name}, {way}")
     made = reduced(body, shared=WAYS[way])
     (measured,) = measure_modes(made).rows
-    reduced_keys, decimated = (
-        {
-            "body": body.name,
-            "how": left.how,
-            "frames": left.frames_with_keys,
-            "key_count": left.keys,
-            "numbers": left.numbers,
-            "error_mm": 1e3 * left.max_shell_m,
-        }
-        for left in beside_decimate(made, [measured])
-    )
     slides = measured.foot_slide_m, measured.recorded_slide_m
     slide, recorded = (None if metres is None else 1e3 * metres for metres in slides)
-    return [reduced_keys | {"slide_mm": slide, "recorded_slide_mm": recorded}, decimated]
+    own = {"frames": measured.key_frames, "key_count": measured.keys, "numbers": numbers_of(made)}
+    left = DecimatedBody(made).within(measured.max_shell_m)
+    return [
+        {"body": body.name, "how": way, **own, "error_mm": 1e3 * measured.max_shell_m}
+        | {"slide_mm": slide, "recorded_slide_mm": recorded},
+        {"body": body.name, "how": "Decimate", **figures_of(left)},
+    ]
+
+
+def numbers_of(made: Reconstruction) -> int:
+    """Return how many numbers the keys take: for each its time, and the place and the turn where these vary."""
+    clip, keys = made.clip, made.keys[MODE]
+    places = np.ptp(clip.poses.positions, axis=1).max(axis=1) * clip.metres_per_unit > VARIES
+    counts, channels, moves = np.array([*map(len, keys)]), 4 + 3 * places, moving(clip)
+    times = len(key_samples(keys)) if made.shared else counts[moves].sum()
+    return int(times + (counts * channels)[moves].sum())
 
 
 def timing(body: Clip) -> list[dict[str, Any]]:

@@ -18,6 +18,7 @@ import bpy
 import numpy as np
 
 from research import body_reduction
+from research.decimating import FREE, Decimations, Left, figures_of
 from research.studies import EXTENSIONS, files_in, publish, study_parser
 from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate, shell_error
@@ -27,7 +28,6 @@ from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.scenes.body_scene import registered
-from rigid_motion_batch.scenes.decimated_bodies import FREE, Decimations, Left
 
 ROTATION_MODES = ("QUATERNION", "XYZ")
 TRIALS = 14  # error margins tried until Decimate is as good as the reduced poses
@@ -87,11 +87,6 @@ def measure(clip: Clip, rotation_mode: str, tolerance: float, radius: float) -> 
     as_good = Decimations(obj, lambda: outcome(obj, clip, radius), TRIALS).within(reduced.largest)
     about = {"name": clip.name, "frames": len(clip.times)}
     return {**about, "reduced": figures_of(reduced), "decimate": as_good and figures_of(as_good)}
-
-
-def figures_of(left: Left) -> dict[str, float]:
-    """Return the figures of what is left."""
-    return {"frames": left.frames, "key_count": left.keys, "numbers": left.numbers, "error_mm": 1e3 * left.largest}
 
 
 def means(rows: list[dict[str, Any]]) -> dict[str, float]:

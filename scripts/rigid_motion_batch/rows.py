@@ -26,11 +26,6 @@ def escaped(text: str) -> str:
     return f"'{text}" if text.lstrip("'").startswith(FORMULA) else text
 
 
-def unescaped(cell: str) -> str:
-    """Return what `escaped` made this of."""
-    return cell[1:] if cell.startswith("'") and escaped(cell) != cell else cell
-
-
 def line_of(cells: Iterable[object]) -> str:
     """Return cells as a line of CSV, which ends with LF; texts are `escaped`."""
     line = io.StringIO()

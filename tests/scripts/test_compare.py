@@ -138,9 +138,9 @@ def test_all_numbers_are_in_the_report_before_the_first_frame_is_rendered(short_
     pages = []
     render = film.render_piece
 
-    def render_piece(*arguments: object) -> float:
+    def render_piece(*arguments: object) -> None:
         pages.append((tmp_path / "report.html").read_text(encoding="utf-8"))
-        return render(*arguments)
+        render(*arguments)
 
     monkeypatch.setattr(film, "render_piece", render_piece)
     assert run(short_clip, "--output", tmp_path, "--rates", "5,10", *SMALL) == 0

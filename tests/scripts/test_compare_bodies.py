@@ -47,13 +47,10 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """A body, and what the command that people type writes of it, beside a single rigid one."""
     folder = tmp_path_factory.mktemp("bodies")
     walk, toss, output = write_body(folder), write_toss(folder / "toss.csv"), folder / "output"
-    radii = folder / "radii.csv"
-    radii.write_text("joint,radius_m\nHips1_2,0.5\nTail,0.1\n", encoding="utf-8")
     command = [sys.executable, ROOT / "scripts" / "compare.py", walk, toss, *QUICK, "--jobs", "1", "--output", output]
-    command += ["--decimate", "adaptive", "--tolerance", "1cm", "--shared", "--rates", "5,10", "--radius", radii]
+    command += ["--decimate", "adaptive", "--tolerance", "1cm", "--shared", "--rates", "5,10", "--radius", "5cm"]
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
-    assert "no body has a joint Tail, for which --radius has a radius" in done.stderr
     assert done.stdout.splitlines()[-1] == str(output / "report.html")
     return walk, output
 
@@ -81,15 +78,13 @@ def test_the_table_has_a_row_for_every_body_choice_and_mode(written: tuple[Path,
             assert float(row["max_shell_m"]) <= 0.01 * (1.0 + 1e-9)
 
 
-def test_a_radius_of_its_own_changes_the_errors_of_that_joint_alone(written: tuple[Path, Path], tmp_path: Path) -> None:
+def test_a_larger_radius_makes_shell_errors_larger_and_nothing_else(written: tuple[Path, Path], tmp_path: Path) -> None:
     walk, output = written
     assert run(walk, *QUICK, "--rates", "5", "--output", tmp_path) == 0
     without = {(row["mode"], row["joint"]): row for row in rows_of(tmp_path / "metrics_joints.csv")}
     for row in rows_of(output / "metrics_joints.csv"):
         if row["rate_hz"] == "5":
             other = without[row["mode"], row["joint"]]
-            same = float(row["rms_shell_m"]) == pytest.approx(float(other["rms_shell_m"]), rel=1e-9)
-            assert same == (row["joint"] != "Hips1_2")
             assert row["rms_position_m"] == other["rms_position_m"]
             assert float(row["rms_shell_m"]) >= float(other["rms_shell_m"]) * (1.0 - 1e-9)
 

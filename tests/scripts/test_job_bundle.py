@@ -66,7 +66,7 @@ def test_options_that_are_for_a_run_are_refused(option, clip, tmp_path, capfd):
 
 def test_files_are_named_from_the_folder_that_has_all_of_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    for path in ("takes/day/a.csv", "takes/b.csv", "takes/radii.csv", "takes/5", "blender"):
+    for path in ("takes/day/a.csv", "takes/b.csv", "takes/mine.csv", "takes/5", "blender"):
         (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / path).touch()
     given = [
@@ -74,7 +74,7 @@ def test_files_are_named_from_the_folder_that_has_all_of_them(tmp_path: Path, mo
         "takes/b.csv",
         "--rates",
         "5",
-        "--radius=takes/radii.csv",
+        "--against=takes/mine.csv",
         *("--blender", "blender", "--blender=blender"),
         "takes/day",
     ]
@@ -82,7 +82,7 @@ def test_files_are_named_from_the_folder_that_has_all_of_them(tmp_path: Path, mo
     assert inputs == tmp_path / "takes"
     assert arguments == [
         *("{{Param.Inputs}}/day/a.csv:left", "{{Param.Inputs}}/b.csv", "--rates", "5"),
-        *("--radius={{Param.Inputs}}/radii.csv", *given[5:8], "{{Param.Inputs}}/day"),
+        *("--against={{Param.Inputs}}/mine.csv", *given[5:8], "{{Param.Inputs}}/day"),
     ]
 
 

@@ -21,7 +21,7 @@ from .choices import Keys
 from .errors import Ground, MotionErrors, errors_of
 from .metrics import BYTES_PER_KEY, BYTES_PER_MODE, Metrics, lines_of_poses, of_errors
 from .modes import BEST_OF
-from .reconstructions import Groups, Reconstruction, identical_modes, moving
+from .reconstructions import Groups, Reconstruction, identical_modes
 
 
 @dataclass(frozen=True)
@@ -135,17 +135,6 @@ def key_samples(keys: Keys) -> np.ndarray:
     """Return the samples that are a key of any joint that moves."""
     moving_ones = [own for own in keys if len(own) > 1]
     return np.unique(np.concatenate(moving_ones)) if moving_ones else keys[0]
-
-
-def numbers_of(made: Reconstruction, mode: str) -> int:
-    """How many numbers the keys take: for each its time, and the place and the turn where these vary."""
-    clip = made.clip
-    places = np.ptp(clip.poses.positions, axis=1).max(axis=1) * clip.metres_per_unit > 1e-4
-    channels = 4 + 3 * places
-    counts = np.array([len(own) for own in made.keys[mode]])
-    if made.shared:
-        return int(len(key_samples(made.keys[mode])) + (counts * channels)[moving(clip)].sum())
-    return int((counts * (1 + channels))[moving(clip)].sum())
 
 
 def join_tables(path: Path, parts: Iterable[Path]) -> None:

@@ -67,4 +67,4 @@ class OfBody(Ways):
 
 def ways_of(clip: Clip, radii: Radii, *, fit: bool) -> Ways:
     """Return the ways to have fewer keys of a clip, whatever it is of; only those of a rigid body may be fitted."""
-    return OfBody(clip, radii.of(clip.rest_body.joints)) if clip.rest_body else OfRigidBody(clip, radii.rigid, fit=fit)
+    return OfBody(clip, radii.of(clip)) if clip.rest_body else OfRigidBody(clip, radii.rigid, fit=fit)

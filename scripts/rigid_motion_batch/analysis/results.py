@@ -15,7 +15,6 @@ import numpy as np
 from rigid_motion.motion import Poses
 from rigid_motion_batch.recordings.clips import Clip, ClipFacts
 
-from .body_decimated import KeysOfBody
 from .body_metrics import JointMetrics, key_samples, measure_modes, write_key_tables
 from .choices import Choice, Keys
 from .metrics import Metrics, write_reconstruction
@@ -79,9 +78,6 @@ class ChoiceResult:
     joints: tuple[JointMetrics, ...] = ()
     """A row of each joint of a body under each mode."""
 
-    decimated: tuple[KeysOfBody, ...] = ()
-    """The keys of a body beside those of Blender's Decimate, where that was asked for."""
-
     @property
     def rows(self) -> list[Metrics]:
         """The rows of all modes, in the order of these."""
@@ -116,17 +112,13 @@ class ClipResult:
 
 def made_of(clip: Clip, choice: Choice, modes: Sequence[str], radii: Radii, *, shared: bool) -> Reconstruction | None:
     """Return what modes make of a clip, with radii of the shells; as `reconstruct`."""
-    return reconstruct(clip, choice, modes, _radii_of(clip, radii), shared=shared)
+    return reconstruct(clip, choice, modes, radii.of(clip), shared=shared)
 
 
 def made_again(clip: Clip, result: ChoiceResult, radii: Radii, *, shared: bool) -> Reconstruction:
     """Return the same by the keys that were chosen before."""
     keys, modes = dict(result.keys), result.mode_of_segments
-    return Reconstruction(clip, result.choice, keys, _radii_of(clip, radii), shared, modes)
-
-
-def _radii_of(clip: Clip, radii: Radii) -> np.ndarray:
-    return radii.of(clip.rest_body.joints) if clip.rest_body else np.array([radii.rigid])
+    return Reconstruction(clip, result.choice, keys, radii.of(clip), shared, modes)
 
 
 def measured(made: Reconstruction) -> ChoiceResult:

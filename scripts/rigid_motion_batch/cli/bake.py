@@ -44,32 +44,26 @@ examples:
   blender --background --python scripts/bake.py -- shot.blend
 
 what is written:
-  NAME-baked.blend or NAME-unbaked.blend, beside the file or in --output. The program opens the new file again to check
-  it, and then moves it into place. It replaces a file that is not its own, or was edited since, only with --overwrite,
-  also where another run has written that meanwhile, and never one that is read-only. For a single input --output may be
-  the name of the file. With --in-place it replaces the file itself in the same way, and keeps the one before as
-  NAME.blend1. A file in which there is nothing to do is not written. At the end the paths of the results, also of those
-  that were there already, are printed on standard output, one a line; a path with a line break or another control
-  character is printed as JSON, "a\\nb.blend". Everything else goes to standard error.
-  Textures and libraries are found from the new place, too. A relative output path of the render, and disk caches of
-  simulations (blendcache_NAME), depend on the place and the name of the file, as after Save As.
+  NAME-baked.blend or NAME-unbaked.blend, beside the file or in --output, which for a single input may be the name of
+  the file; nothing where there is nothing to do. A file that was edited since, or that is not the program's own, is
+  replaced only with --overwrite. With --in-place the program replaces the file itself, and keeps the one before as
+  NAME.blend1. The paths of the results are printed on standard output, one a line; everything else goes to standard
+  error. Textures and libraries are found from the new place, too; a relative output path of the render, and disk caches
+  of simulations (blendcache_NAME), depend on the place and the name of the file, as after Save As.
 
 folders and many files:
-  A folder stands for the .blend files in it and in the folders below; the results lie below --output as these do. What
-  this program has written is no input, but for --unbake, which takes *-baked.blend alone. Several files are done at
-  once by as many processes as --jobs says. You can run the same command again: a file is "already baked" where its
-  result is there, made of the same bytes with the same options and version. The folder .rigid-motion beside the results
-  has the record of them.
+  A folder stands for the .blend files in it and in the folders below, but for results of this program; --unbake takes
+  *-baked.blend alone. The results lie below --output as these do. --jobs processes do several at once. The same command
+  again does what is new or has changed: the folder .rigid-motion beside the results has the record of them.
 
 what is run:
   Nothing in the files: scripts and Python expressions stay in them, switched off. If a farm should run them, let it
-  render with `blender --enable-autoexec`. Baking reads keys, and needs no scripts.
+  render with `blender --enable-autoexec`.
 
 missing libraries:
   Each is named, with what is missing from it. An object counts as not done if it is missing, if it overrides a missing
-  one or moves by a missing Action. So does a file that lacks a collection or a scene, which may hold such objects,
-  unless --objects says which ones you mean. The other objects are baked and written, and the file keeps its links.
-  Missing meshes, materials, textures and the like do not matter for baking, and do not change the exit code.
+  one or moves by a missing Action, and so does a file that lacks a collection or a scene, unless --objects says which
+  ones you mean. Missing meshes, materials, textures and the like do not matter for baking.
 
 exit code:
   0    all done, or nothing to do, so that a second command may follow:

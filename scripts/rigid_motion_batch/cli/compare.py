@@ -40,7 +40,7 @@ from rigid_motion_batch.recordings.clip_reading import folder_names
 from rigid_motion_batch.recordings.reading import split_source
 from rigid_motion_batch.report.numbers import Gathering, Numbers
 from rigid_motion_batch.report.settings import Settings
-from rigid_motion_batch.report.verdict import Verdict, as_text, verdict
+from rigid_motion_batch.report.verdict import Verdict, verdict
 from rigid_motion_batch.scenes.settings import MODELS, SubjectError
 from rigid_motion_batch.supervising import blender_program, report
 from rigid_motion_batch.system_libraries import missing_for_rendering, way_out, without_blender
@@ -357,8 +357,8 @@ class _Comparing:
         if self.options.quiet or self.options.json:
             return
         numbers, said = self._numbers()
-        if numbers:
-            terminal.show(terminal.table_of(terminal.lines_of(numbers), len(numbers.clips)), str(said))
+        if numbers and said:
+            terminal.show(terminal.table_of(terminal.lines_of(numbers), len(numbers.clips)), said.sentence)
 
     def _numbers(self) -> tuple[Numbers | None, Verdict | None]:
         """Return all numbers that there are, and what they come to."""
@@ -413,8 +413,8 @@ class _Comparing:
         return {
             "report": os.fspath(page) if page else None,
             "exit_code": code,
-            "verdict": str(said) if said else None,
-            "wins": as_text(said.wins) if said else "",
+            "verdict": said.sentence if said else None,
+            "wins": said.wins if said else "",
             "table": [asdict(line) for line in terminal.lines_of(numbers)] if numbers else [],
             "clips": list(numbers.clips) if numbers else [],
             "notes": self.notes,

@@ -43,15 +43,7 @@ inputs:
   Motive (OptiTrack) CSV, A-Frame motion capture JSON, BVH, FBX, glTF, .blend; a folder stands for the recordings in it.
   FILE:BODY takes one body of several, FILE:* all of them. A BVH, FBX or glTF is a whole body, FILE:JOINT one joint of
   it. In a .blend, a body is an object (FILE.blend:OBJECT), a bone of a rig (FILE.blend:OBJECT/BONE) or a whole rig
-  (FILE.blend:RIG), moving as Blender shows it in the world, with parents, constraints, drivers and NLA strips.
-  FILE.blend:* takes every animated object.
-
-whole bodies:
-  Each joint has its keys in its parent's space, as in a rig, and its error is measured where the chain of joints puts
-  it. The program works out the unit of a body from its size, and reports it and how sure it is; --scale sets another.
-  OUTPUT/metrics.csv has the whole body, its worst joint, and how far feet slide that should stand still;
-  OUTPUT/metrics_joints.csv has every joint. In the film each mode moves a rig of its
-  own; comparison.blend has these rigs, with the modes set on their bones.
+  (FILE.blend:RIG), moving as Blender shows it in the world.
 
 examples:
   python scripts/compare.py
@@ -60,68 +52,24 @@ examples:
   python scripts/compare.py unity.csv --axes unity --euler YXZ --degrees
   python scripts/compare.py take.csv --rates 7.5,15 --modes lerp_slerp,dq_sclerp --slow-motion 4
   python scripts/compare.py dance.bvh walk.fbx fox.glb shot.blend:Rig
-  python scripts/compare.py dances/ --no-video
-  python scripts/compare.py dance.bvh --tolerance 1cm --shared
   python scripts/compare.py dance.bvh:LeftHand --object controller
-  python scripts/compare.py shot.blend:Camera --no-video
-  python scripts/compare.py shot.blend:Rig/Hand --no-video
-  python scripts/compare.py hand_left.csv --modes all,best_of
-  python scripts/compare.py take.csv --tolerance 5mm
-  python scripts/compare.py take.csv --budget 5,10 --rates 10
+  python scripts/compare.py dances/ --tolerance 1cm --shared --no-video
+  python scripts/compare.py take.csv --budget 5,10 --rates 10 --modes all,best_of
   python scripts/compare.py take.csv --against mine.csv
   blender --background --python scripts/compare.py -- hand_left.csv --axes unity
 
-choosing keys:
-  Without more, --rates keys a second are kept, evenly spaced in time and the same for every mode. --tolerance,
-  --budget or --decimate adaptive choose keys for each mode among the recorded samples: with --tolerance, the fewest
-  that keep its shell error within that length everywhere; with --budget, so many keys a second on average over the
-  clip, placed so that its RMS shell error is small. With --decimate adaptive alone, --rates are the budgets; if you
-  give --rates beside a tolerance or budget, evenly spaced keys at these rates are added for comparison. With adaptive
-  keys, the report also shows error over number of keys, and how many keys each mode needs to be as good as lerp_slerp
-  at 30, 20, 15 and 12 keys a second; this takes up to a second for every 100 samples. --fit also counts keys that are
-  not recorded poses, but moved to where the motion follows the recording best; it takes two to three times as long.
+keys:
+  Without more, --rates keys a second are kept, evenly spaced in time and the same for every mode. With --tolerance each
+  mode keeps the fewest samples with which its shell error is within that length, with --budget so many on average,
+  where its RMS error is small. Both also count the keys that each mode needs to be as good as lerp_slerp, which takes
+  up to a second for every 100 samples. --rates beside them adds evenly spaced keys for comparison.
 
-choosing modes:
-  best_of takes, in each segment from key to key, the one of the other modes named that comes closest to the recording
-  there. Evenly spaced keys are the same for all modes; with adaptive keys it uses those of the best single mode. A
-  column of best_of.keys.csv has the mode of each segment.
-
-somebody else's motion:
-  --against FILE adds a lane, a line and a row with a motion that came from elsewhere, such as the in-betweens of
-  another program, named after its file. It is read in any format, with the same options, and compared at the samples
-  of the recording, with straight lines and SLERP between its own. Its times are taken as they are: the clip is cut to
-  those that both have. A whole body needs joints of the same names and axes, as the same rig in the same format has.
-
-what is written:
-  OUTPUT/report.html is one file; with more than 24 clips, each clip has a page of its own. OUTPUT/metrics.csv has all
-  numbers, with adaptive keys also OUTPUT/keys_needed.csv, and for whole bodies OUTPUT/decimated.csv, which compares
-  their keys with Blender's Decimate. Every clip and choice of keys has a folder (OUTPUT/CLIP/10, /budget-10,
-  /tolerance-5mm) with keys.csv (MODE.keys.csv for adaptive keys), MODE.csv, comparison.mp4, comparison.blend and
-  comparison.glb, which has all motions side by side for any viewer, also with --no-video.
-
-what is printed:
-  As soon as the numbers are there: for every choice of keys the RMS and the largest shell error of each motion in
-  millimetres, and its keys a second; modes that give the same motion are one, and the best has a star. Then a sentence
-  that says what it comes to, and as the last line the path of the report. --json prints all of that for programs,
-  --quiet the path alone, --open opens the report. Everything else goes to standard error.
-
-one folder, one comparison:
-  Without --output, a comparison goes to renders/NAME, by its first recording, with a number where that folder holds
-  another comparison. You can run again with the same recordings, with more of them or fewer: what the program wrote
-  before is replaced. Into a folder that holds another comparison, and over files that were edited or that it has not
-  written, it writes only with --overwrite, and over inputs never. --explain says what a run would do and why, and does
-  nothing.
-
-without Blender:
-  --no-video needs no Blender but for FBX, glTF and .blend files, and runs on any Python from 3.11 on. --blender PROGRAM
-  films with a Blender that is installed. Started in a Blender, the program runs in a Python that has its libraries:
-  that of --environment DIR, as `bootstrap.py environment DIR` makes it, or of .venv in the checkout.
-
-many clips:
-  The work is split into small tasks, done by as many processes as --jobs says. Results are kept: after Ctrl-C, a full
-  disk or a crash, the same command continues from there; with other options it does only what these change. A recording
-  that cannot be read, or a video that cannot be rendered, is reported, and the others go on. With --scheduler, the
-  machines of a Dask scheduler do the work; docs/farm.md says how.
+output:
+  A table of errors, one sentence, and as the last line the path of OUTPUT/report.html; everything else goes to standard
+  error. OUTPUT/metrics.csv has all numbers, and every clip and choice of keys has a folder (OUTPUT/CLIP/10, /budget-10,
+  /tolerance-5mm) with its keys and motions. What an earlier run of the same recordings wrote is replaced, and what is
+  done already is not done again. docs/comparing.md says what each file has, how errors are measured, and what many
+  clips, whole bodies and a Blender of yours need.
 
 Exit code: 0 done, 1 some recordings or videos could not be done, 2 nothing could be done, or a wrong option, 130
 stopped by Ctrl-C, and 143 by SIGTERM.
@@ -155,9 +103,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         "--radius",
         type=read_radii,
         default=EVERYWHERE,
-        metavar="LENGTH|CSV",
-        help=f"radius of the shell error: 3cm, or 0.03 for metres ({RIGID}, around the joints of bodies {JOINT}); or a "
-        "table joint,radius_m for joints by name",
+        metavar="LENGTH",
+        help=f"radius of the shell error: 3cm, or 0.03 for metres ({RIGID}, around the joints of bodies {JOINT})",
     )
     parser.add_argument(
         "--against",

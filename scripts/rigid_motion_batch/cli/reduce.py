@@ -60,60 +60,36 @@ examples:
 .blend files:
   The program reduces every object, and all bones of a rig together, with more than two keys of location or rotation. It
   keeps the keys that the mode needs, and sets the mode on them. The dense keys stay in the file, so that Restore Keys
-  brings them back; with --discard they do not. For bones, the tolerance holds through all parents, and with the rig's
-  own keys. Bones that follow constraints or drivers are not promised, nor is what hangs on them: they are named. Feet
-  that stand on the ground keep to a quarter of the tolerance. An object that needs all of its keys stays as it is, and
-  so does one whose scale has keys everywhere that differ from axis to axis. Without --radius, the radius is the size of
-  the object or the length of the bone.
+  brings them back; with --discard they do not. Bones that follow constraints or drivers, and what hangs on them, are
+  not promised: they are named. What needs all of its keys stays as it is, and so does an object whose scale has keys
+  everywhere that differ from axis to axis.
 
 glTF files:
-  walk.glb becomes walk-reduced.glb, and walk.gltf becomes walk-reduced.gltf with its .bin beside it: the same meshes,
-  skins, materials and names, and fewer keys in every clip. Blender is not needed. No point within --radius of any
-  node is off by more than the tolerance in the world, neither at keys nor at eighths between them. Rotations,
-  translations and scales have keys of their own; steps stay. Weights of morph targets are off by half a percent at
-  most. A foot that stands slides at most a millimetre farther than before, for a body of 1.7 m. A clip that would not
-  become smaller stays as it is. Without --tolerance it is a share of the size, without --radius a share of it for
-  joints, and for meshes the size of each; of recordings that become GLB files see --tolerance. A tolerance above a
-  tenth of the size is refused: the file is mostly in another unit then.
+  walk.glb becomes walk-reduced.glb, and walk.gltf becomes walk-reduced.gltf with its .bin beside it, with fewer keys in
+  every clip and nothing else changed. Blender is not needed. No point within --radius of any node is off by more than
+  the tolerance in the world, neither at keys nor at eighths between them. Weights of morph targets are off by half a
+  percent at most. With --glb, .blend and FBX files and recordings become such files: Blender exports them, sampled on
+  every frame as they are shown, for glTF knows lines and even turns alone.
 
 recordings:
-  The program reads what compare.py reads: CSV, TUM, EuRoC, Motive, A-Frame, BVH, FBX, glTF, and animated objects and
-  rigs of .blend files (shot.blend:Camera). FILE:BODY takes one body of several, FILE:* all. For a rigid motion it
-  writes a table of the keys, t,x,y,z,qw,qx,qy,qz, in the axes and units of the recording. With --blend it also writes
-  a .blend file in which an empty moves by these keys. For a whole body it writes a .blend file with a rig. These files
-  are in metres and Blender's axes, with the mode on the keys; they play in any Blender, with or without the extension.
-  The first sample is on frame 1.
-
-GLB files:
-  With --glb the program exports .blend and FBX files, and recordings, by Blender's own glTF exporter, sampled on every
-  frame as they are shown, and leaves the few keys that the motion needs, as it does for glTF files. A .blend or FBX
-  file keeps its meshes. A recording becomes a rig or an empty of its own, in metres. The modes of a .blend file are
-  sampled too: glTF knows lines and even turns alone.
+  The program reads what compare.py reads; FILE:BODY takes one body of several, FILE:* all. For a rigid motion it writes
+  a table of the keys, t,x,y,z,qw,qx,qy,qz, in the axes and units of the recording, and with --blend a .blend file in
+  which an empty moves by these keys; for a whole body a .blend file with a rig. These are in metres and Blender's axes,
+  and play in any Blender, with or without the extension. The first sample is on frame 1.
 
 folders and many files:
-  A folder stands for the .blend, glTF, FBX, BVH, CSV (.csv, .tsv) and .tum files in it and in the folders below, in the
-  order of their names; the results lie below --output as the files lie in the folder. It does not stand for results of
-  this program (*-reduced.*, and what its records name), hidden files, and links that lead out of it. What does not move
-  in a folder is left alone.
-  Several inputs are done at once by as many processes as --jobs says; what is said of each comes when it is done. An
-  input that fails, or whose process dies, costs that input alone.
-  You can run the same command again, after a stop or with more files: an input is "already reduced" where its result is
-  there, made of the same bytes with the same options by the same version of the program and of Blender. All else is
-  done again, and takes the place of what this program made of the same input. It never replaces a file that was edited
-  since or that is not its own, without --overwrite. The folder .rigid-motion beside the results has the record of them;
-  without it the program does not know its own files.
+  A folder stands for the .blend, glTF, FBX, BVH, CSV (.csv, .tsv) and .tum files in it and in the folders below, but
+  for results of this program; the results lie below --output as the files lie in the folder. --jobs processes do
+  several at once. The same command again does what is new or has changed: the folder .rigid-motion beside the results
+  has the record of them.
 
 what is written:
   NAME-reduced.blend for a .blend file, NAME-reduced.glb for a .glb file and with --glb for each, NAME-keys.csv and
-  NAME-keys.blend for a recording, beside it or in --output. For a single input --output may be the name of the file:
-  small/walk.glb, keys.blend, and .csv or .tum for a table. A file is moved into place when it is complete. With
-  --in-place the program replaces a .blend file itself, and keeps the one before as NAME.blend1. At the end the paths of
-  the results, also of those that were there already, are printed on standard output, one a line; a path with a line
-  break or another control character is printed as JSON, "a\\nb.csv". Everything else goes to standard error: for each
-  object and rig the number of keys before and after, and the largest error.
-
-what is run:
-  Nothing in the files: scripts and Python expressions stay in them, switched off.
+  NAME-keys.blend for a recording, beside it or in --output, which for a single input may be the name of the file. A
+  file that was edited since, or that is not the program's own, is replaced only with --overwrite. With --in-place the
+  program replaces a .blend file itself, and keeps the one before as NAME.blend1. The paths of the results are printed
+  on standard output, one a line; everything else goes to standard error. Scripts and Python expressions in files do not
+  run.
 
 exit code:
   0    all done, or nothing to do

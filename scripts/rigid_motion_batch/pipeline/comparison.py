@@ -19,13 +19,11 @@ from rigid_motion_batch.analysis.choices import Choice, fewest_keys
 from rigid_motion_batch.analysis.metrics import body_table_names, table_names
 from rigid_motion_batch.analysis.modes import name_of_other, single_modes
 from rigid_motion_batch.analysis.radii import EVERYWHERE, Radii
-from rigid_motion_batch.command_line import printable
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import clip_names
 from rigid_motion_batch.recordings.clips import ClipFacts
 from rigid_motion_batch.recordings.options import AS_THE_FILE_SAYS, ReadingOptions
 from rigid_motion_batch.recordings.reading import split_source
-from rigid_motion_batch.recordings.recordings import listed
 from rigid_motion_batch.report.settings import Settings
 from rigid_motion_batch.scenes.settings import MODELS, SceneSettings, place_of_subject
 from rigid_motion_batch.scenes.timeline import Timeline
@@ -36,7 +34,7 @@ from .comparison_steps import ClipOf, Page, Part
 from .steps import RunError, Task
 from .store import Store
 
-METRICS, JOINT_METRICS, DECIMATED, KEYS_NEEDED = "metrics.csv", "metrics_joints.csv", "decimated.csv", "keys_needed.csv"
+METRICS, JOINT_METRICS, KEYS_NEEDED = "metrics.csv", "metrics_joints.csv", "keys_needed.csv"
 
 ON_ONE_PAGE = 24
 """Number of clips up to which all are on one page; more have a page each."""
@@ -51,9 +49,6 @@ MOST_FRAMES = 216_000
 MOST_POSES = 600_000
 """Frames times joints of a film of a body, whose rigs take half a kilobyte for each in every lane."""
 
-MOST_DECIMATED = 50_000
-"""Samples times joints of a body that is set beside Blender's Decimate: minutes for a choice of keys."""
-
 RATE_MARGIN = 0.01
 """Share by which a rate may be above that of a recording: 90 Hz are often 89.9 in truth."""
 
@@ -63,7 +58,6 @@ MOST_MODELLED = 100_000
 TABLES = {
     METRICS: ("measure", steps.ROWS),
     JOINT_METRICS: ("measure", steps.JOINT_ROWS),
-    DECIMATED: ("decimate", steps.ROWS),
     KEYS_NEEDED: ("count_keys", steps.ROWS),
 }
 """Tables of all clips: what each is put together of, as `Part` names it, and the name of its rows there."""
@@ -115,7 +109,7 @@ class Comparison:
     Blender."""
 
     blender: str = ""
-    """The version of the Blender that films, reads and decimates; empty where there is none."""
+    """The version of the Blender that films and reads; empty where there is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,9 +124,6 @@ class Study:
     choices: dict[Choice, tuple[float, float]]
     """The choices of keys, each with the times of the first and the last key."""
 
-    blender: bool
-    """True if there is a Blender."""
-
     @property
     def name(self) -> str:
         return self.clip.name
@@ -144,13 +135,6 @@ class Study:
     def frames(self, choice: Choice, stage: SceneSettings) -> float:
         start, end = self.choices[choice]
         return (end - start) * stage.fps * stage.slow_motion + 1.0
-
-    @property
-    def decimated(self) -> list[Choice]:
-        """The choices that are set beside Blender's Decimate: evenly spaced keys are not chosen to be few."""
-        if not self.blender or not 0 < self.facts.samples * self.facts.joints <= MOST_DECIMATED:
-            return []
-        return [choice for choice in self.choices if choice.decimation == "adaptive"]
 
 
 class ComparisonPlan:
@@ -209,8 +193,6 @@ class ComparisonPlan:
         notes = [note for note, _ in (read[key] for key in keys) if note]
         bodies = [(key, body, facts) for key in keys for body, facts in enumerate(read[key][1])]
         names = clip_names([(facts.name, facts.body) for _, _, facts in bodies])
-        if unknown := comparison.radii.unknown(joint for _, _, facts in bodies for joint in facts.joint_names):
-            notes.append(printable(f"no body has a joint {listed(unknown)}, for which --radius has a radius"))
         self.studies, of_clips = [], []
         for name, (key, body, facts) in zip(names, bodies, strict=True):
             notes += [f"{name}: {note}" for note in facts.repairs]
@@ -223,7 +205,7 @@ class ComparisonPlan:
                     of_clips.append(f"{name}: too short for two keys at {choice.rate} a second; left out")
             of_clips += [f"{name}: {note}" for note in rates_above(times, comparison.choices)]
             if enough:
-                self.studies.append(Study(ClipOf(name, body), key, facts, enough, bool(comparison.blender)))
+                self.studies.append(Study(ClipOf(name, body), key, facts, enough))
                 of_clips += self._left_out(self.studies[-1])
         if self._shows_object and not comparison.blender:
             notes.append(f"the report shows a drill, for there is no Blender here that reads {comparison.subject}")
@@ -245,13 +227,6 @@ class ComparisonPlan:
                 f"{study.most_frames}; see whether its times are in seconds, cut it, or give a lower --fps or "
                 "--slow-motion"
             )
-        if joints and not study.decimated and any(choice.decimation == "adaptive" for choice in study.choices):
-            reason = (
-                f": {joints} joints with {samples} samples would take too long; cut it to {MOST_DECIMATED // joints}"
-                if study.blender
-                else ", for there is no Blender here"
-            )
-            yield f"{study.name}: not compared with Blender's Decimate{reason}"
         if not self.modelled(study):
             yield (
                 f"{study.name}: no {steps.GLB}: {max(joints, 1)} joints with {samples} samples would take too long; "
@@ -301,7 +276,6 @@ class ComparisonPlan:
             METRICS: True,
             KEYS_NEEDED: self.comparison.count_keys,
             JOINT_METRICS: any(study.facts.joints for study in self.studies),
-            DECIMATED: any(study.decimated for study in self.studies),
         }
         return [table for table in TABLES if there[table]]
 
@@ -326,14 +300,12 @@ class ComparisonPlan:
             folder = f"{name}/{choice.name}"
             names = table_names(choice, modes, comparison.form, study.facts.against)
             publish = {table: f"{folder}/{table}" for table in (body_table_names(choice, modes) if joints else names)}
-            how = clip, choice, tuple(modes), comparison.radii, comparison.shared, comparison.form
             seconds = 0.02 + 6e-6 * size * len(modes) * (1.0 if choice.decimation == "uniform" else 45.0)
-            measuring = Task(steps.Measure(*how), f"measure {folder}", after, publish=publish, seconds=seconds)
-            yield Part("measure", clip, choice.name), measuring
-            if choice in study.decimated:
-                keys, seconds = (*after, measuring.key), 0.5 + 8e-3 * size
-                decimating = Task(steps.Decimate(*how), f"decimate {folder}", keys, seconds=seconds)
-                yield Part("decimate", clip, choice.name), decimating
+            step = steps.Measure(clip, choice, tuple(modes), comparison.radii, comparison.shared, comparison.form)
+            yield (
+                Part("measure", clip, choice.name),
+                Task(step, f"measure {folder}", after, publish=publish, seconds=seconds),
+            )
         if comparison.count_keys:
             fit = comparison.fit and not joints
             step, seconds = steps.CountKeys(clip, comparison.modes, comparison.radii, fit), 0.03 if fit else 0.008

@@ -162,24 +162,6 @@ class CountKeys(Step, rooms=ANALYSIS, stage="measure"):
         values.write(job.folder / "needed", result)
 
 
-class Decimate(Measure, rooms=SCENES, blender=True):
-    """See what Blender's Decimate needs to be as good as the keys of a whole body. Before: recording, measurement."""
-
-    def make(self, job: Job) -> None:
-        from rigid_motion_batch.analysis.body_decimated import KeysOfBody
-        from rigid_motion_batch.analysis.results import made_again
-        from rigid_motion_batch.rows import write_rows
-        from rigid_motion_batch.scenes.decimating import beside_decimate
-
-        clip, result = self.clip.read(job.results[0]), result_in(job.results[1])
-        made = made_again(clip, result, self.radii, shared=self.shared)
-        known = [row for row in result.rows if row.keys]
-        with _told(f"{clip.name} {result.choice.phrase}: not compared with Blender's Decimate"):
-            rows = beside_decimate(made, known)
-        write_rows(job.folder / ROWS, KeysOfBody, rows)
-        values.write(job.folder / "decimated", tuple(rows))
-
-
 class Model(Step, rooms=MODEL, stage="report"):
     """Write all motions side by side, for any viewer. Before: the recording, and what was measured."""
 
@@ -300,7 +282,7 @@ class Part:
     """The result of a task before a page."""
 
     what: str
-    """What it is: "read", "measure", "decimate", "count_keys", "model", "encode" or "subject"."""
+    """What it is: "read", "measure", "count_keys", "model", "encode" or "subject"."""
 
     clip: ClipOf = ClipOf("")
     choice: str = ""
@@ -358,19 +340,13 @@ class Page(Step, rooms=REPORT, stage="report", partial=True):
 
     def _results(self, job: Job) -> Iterator[ClipResult]:
         """Yield the results before a page, one clip in memory at a time, without those that could not be made."""
-        from rigid_motion_batch.analysis.body_decimated import KeysOfBody
         from rigid_motion_batch.analysis.needed import KeysNeeded
         from rigid_motion_batch.analysis.results import clip_result
 
         before = zip(self.parts, job.before, strict=False)
         for clip, parts in groupby(before, key=lambda each: each[0].clip):
             made = {(part.what, part.choice): folder for part, folder in parts if folder}
-            result = []
-            for what, choice in made:
-                if what == "measure":
-                    rows = made.get(("decimate", choice))
-                    decimated = values.read(tuple[KeysOfBody, ...], rows / "decimated") if rows else ()
-                    result.append(replace(result_in(made[what, choice]), decimated=decimated))
+            result = [result_in(folder) for (what, _), folder in made.items() if what == "measure"]
             needed, recording = made.get(("count_keys", "")), made.get(("read", ""))
             if recording and result:
                 keys = values.read(KeysNeeded, needed / "needed") if needed else None

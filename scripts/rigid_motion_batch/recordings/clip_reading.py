@@ -27,9 +27,7 @@ LONGEST_NAME = 80
 MOST_BYTES = 240
 """Bytes of a clip's name in UTF-8, in which some characters have four: file systems allow 255."""
 
-NOT_FOLDERS = {
-    *("metrics.csv", "metrics_joints.csv", "decimated.csv", "keys_needed.csv", "report.html", "manifest.json"),
-}
+NOT_FOLDERS = {"metrics.csv", "metrics_joints.csv", "keys_needed.csv", "report.html", "manifest.json"}
 """Names that the output needs itself."""
 
 DEVICES = {"con", "prn", "aux", "nul"} | {

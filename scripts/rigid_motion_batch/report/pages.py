@@ -20,7 +20,7 @@ from urllib.parse import quote
 
 import jinja2
 import numpy as np
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from rigid_motion_batch.analysis.choices import Choice
 from rigid_motion_batch.analysis.metrics import Metrics
@@ -38,7 +38,7 @@ from .joints import Joints, joints_of
 from .mesh import Mesh, drill
 from .numbers import KINDS, LARGEST, MEASURES, MINUS, Gathering, Numbers, digits, percent
 from .settings import Settings
-from .verdict import Verdict, verdict
+from .verdict import verdict
 
 HERE = Path(__file__).parent
 
@@ -50,6 +50,8 @@ IN_THE_PAGE = 5_000_000
 
 MOST_TABS = 8
 """More clips are a list to choose from."""
+
+NO_BREAK = "\u00a0"
 
 MOST_WARNINGS = 3
 """More are folded."""
@@ -207,7 +209,6 @@ class _Clips:
         self.metrics: list[Metrics] = []
         self.rows: list[Any] = []
         self.joints: list[Joints] = []
-        self.decimated: list[Any] = []
         self.segments: list[tuple[str, str, str]] = []
         self.films: list[tuple[int, str, str | None]] = []
         self.models: list[tuple[int, str, str | None]] = []
@@ -237,8 +238,6 @@ class _Clips:
                 self.models.append((place, result.choice.name, self._link(self._models[name, result.choice.name])))
             if joints := joints_of(place, clip, result, own):
                 self.joints.append(joints)
-            if rows := tables.decimated_rows(result):
-                self.decimated.append((name, result.choice, rows))
             if said := tables.segments_of(result, own):
                 self.segments.append((name, result.choice.title, said))
         self.places.append({"name": name, "data": ""})
@@ -330,10 +329,9 @@ def _overview_rows(
 
 
 def _context(numbers: Numbers, needed: Sequence[KeysNeeded], settings: Settings) -> dict[str, Any]:
-    said: Verdict = verdict(numbers, needed)
     return {
         "numbers": numbers,
-        "verdict": said,
+        "verdict": verdict(numbers, needed),
         "settings": settings,
         "date": datetime.now(),
         "needed": needed,
@@ -364,6 +362,7 @@ def _templates() -> jinja2.Environment:
         "needed_rows": tables.needed_rows,
         "csv": _csv,
         "label_of": label_of,
+        "marked": marked,
         "hash": lambda text: base64.b64encode(hashlib.sha256(text.encode()).digest()).decode(),
     }
     environment.filters |= {"digits": digits}
@@ -381,6 +380,18 @@ def _csv(rows: Sequence[Metrics]) -> str:
     lines = (line_of(("" if cell is None else cell) for cell in astuple(row)) for row in rows)
     text = "".join((line_of(column.name for column in fields(Metrics)), *lines))
     return f"data:text/csv;base64,{base64.b64encode(text.encode()).decode('ascii')}"
+
+
+def marked(sentence: str, numbers: Numbers) -> Markup:
+    """Return a sentence with its numbers, and the names of modes in their colours, made to stand out."""
+    names = {str(escape(numbers.label(mode))): place for place, mode in enumerate(numbers.modes)}
+    known = "|".join(map(re.escape, sorted(names, key=len, reverse=True)))
+
+    def mark(match: re.Match[str]) -> str:
+        tag = f'span class="mode" style="color:var(--m{names[match[1]]})"' if match[1] else "b"
+        return f"<{tag}>{match[0].replace(' ', NO_BREAK)}</{tag.partition(' ')[0]}>"
+
+    return Markup(re.sub(rf"({known})|\b\d[\d.]*(?: (?:%|mm))?", mark, str(escape(sentence))))
 
 
 @cache

@@ -9,7 +9,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from rigid_motion_batch.analysis.body_decimated import DECIMATE
 from rigid_motion_batch.analysis.modes import BEST_OF
 from rigid_motion_batch.analysis.needed import DECIMATIONS, KeysNeeded, overall
 from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult
@@ -166,27 +165,6 @@ def needed_rows(needed: Sequence[KeysNeeded]) -> tuple[list[str], list[tuple[tup
                 cells.append(Cell(number, percent(share) + partly, best, float(share)))
             rows.append((modes, SPACINGS[DECIMATIONS[way]], cells))
     return [f"{together.rates[at]}/s" for at in asked], rows
-
-
-def decimated_rows(result: ChoiceResult) -> list[tuple[tuple[str, ...] | None, list[Cell]]]:
-    """Return the keys of each motion of a body, and as multiples those of Blender's Decimate with no larger error."""
-    ours = {row.mode: row for row in result.decimated if row.how != DECIMATE}
-    theirs = {row.mode: row for row in result.decimated if row.how == DECIMATE}
-    rows: list[tuple[tuple[str, ...] | None, list[Cell]]] = []
-    for motion in result.motions:
-        own, left = ours.get(motion.modes[0]), theirs.get(motion.modes[0])
-        if own is None:
-            continue
-        counts = [own.frames_with_keys, own.keys, own.numbers, 1e3 * own.max_shell_m]
-        cells = [Cell(digits(value) if isinstance(value, float) else str(value)) for value in counts]
-        for name in ("frames_with_keys", "numbers"):
-            count = getattr(own, name)
-            if left is None or not count:
-                cells.append(Cell("not reached" if count else "nothing moves"))
-            else:
-                cells.append(Cell(f"{getattr(left, name) / count:.2f}", f"{getattr(left, name)} of Decimate"))
-        rows.append((motion.modes, cells))
-    return rows
 
 
 def segments_of(result: ChoiceResult, numbers: Numbers) -> str:

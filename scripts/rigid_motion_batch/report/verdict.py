@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import zip_longest
 
 import numpy as np
 
@@ -37,45 +36,12 @@ SAMPLE_IS_KEY = "No mode is off by more than rounding: every sample is a key, or
 
 
 @dataclass(frozen=True)
-class Part:
-    """A stretch of text: plain, a number, the name of a mode, or a link to a clip under a choice."""
-
-    text: str
-    kind: str = ""
-    """"", "number", "mode" or "link"."""
-
-    target: str = ""
-    """The id of the mode; of a link the clip and the choice's name, with a comma."""
-
-
-Text = tuple[Part, ...]
-
-
-def _say(template: str, *values: Part) -> Text:
-    """Return a text with values in the places of its braces."""
-    words = map(Part, template.split("{}"))
-    return tuple(part for both in zip_longest(words, values) for part in both if part and part.text)
-
-
-def _number(value: str) -> Part:
-    return Part(value, "number")
-
-
-@dataclass(frozen=True)
 class Verdict:
     """What a run comes to."""
 
-    sentence: Text
-    wins: Text = ()
-    """In how many cases the best mode was, and where it was beaten by the most; empty of a single case."""
-
-    def __str__(self) -> str:
-        return as_text(self.sentence)
-
-
-def as_text(text: Text) -> str:
-    """Return the words alone, as a terminal shows them."""
-    return "".join(part.text for part in text).replace("\u00a0", " ")
+    sentence: str
+    wins: str = ""
+    """In how many cases the best mode was; empty of a single case."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,9 +83,8 @@ class _Contest:
     def phrase(self, choice: int) -> str:
         return self.numbers.choices[self.places[choice]].phrase
 
-    def name(self, group: int) -> Part:
-        mode = self.groups[group][0]
-        return Part(self.numbers.label(mode), "mode", mode)
+    def name(self, group: int) -> str:
+        return self.numbers.label(self.groups[group][0])
 
 
 def verdict(numbers: Numbers, needed: Sequence[KeysNeeded] = ()) -> Verdict:
@@ -136,8 +101,8 @@ def verdict(numbers: Numbers, needed: Sequence[KeysNeeded] = ()) -> Verdict:
     sentences += [tell(contest) for contest in contests for tell in (_fewer_keys, _beside_rival)]
     said = [sentence for sentence in sentences if sentence]
     if not said:
-        return Verdict((Part(SAMPLE_IS_KEY),))
-    return Verdict(said[0], _wins(contests[0]) if contests else ())
+        return Verdict(SAMPLE_IS_KEY)
+    return Verdict(said[0].replace("\u00a0", " "), _wins(contests[0]) if contests else "")
 
 
 def _contests(numbers: Numbers) -> Iterable[_Contest]:
@@ -178,7 +143,7 @@ def _best(contest: _Contest) -> tuple[int, int, np.ndarray] | None:
 # -- sentences --------------------------------------------------------------------------------------------------------
 
 
-def _keys_needed(numbers: Numbers, needed: Sequence[KeysNeeded]) -> Text | None:
+def _keys_needed(numbers: Numbers, needed: Sequence[KeysNeeded]) -> str | None:
     """How few keys are as good as those of the reference at a rate, of those that were looked for."""
     together = overall(needed)
     rate = next((rate for rate in ASKED if together.asked[together.rates.index(rate)]), None)
@@ -189,20 +154,18 @@ def _keys_needed(numbers: Numbers, needed: Sequence[KeysNeeded]) -> Text | None:
     shares = np.where(whole, together.shares[..., at], np.inf)
     group, way = np.unravel_index(np.argmin(shares), shares.shape)
     mode = together.groups[group][0]
-    reference = Part(numbers.label(REFERENCE), "mode", REFERENCE)
+    reference = numbers.label(REFERENCE)
     if shares[group, way] > 1.0 - TIE:
-        return _say("No mode needs fewer keys than {} at {} a second.", reference, _number(rate))
-    return _say(
-        f"{{}}, with {SPACED[DECIMATIONS[way]]}, does with {{}} a second where {{}} needs {{}} evenly spaced: "
-        f"{percent(1.0 - shares[group, way])} fewer for the same error.",
-        Part(numbers.label(mode), "mode", mode),
-        _number(f"{together.keys_per_s[group, way, at]:.3g}"),
-        Part("it") if mode == REFERENCE else reference,
-        _number(f"{together.reference_keys_per_s[at]:.3g}"),
+        return f"No mode needs fewer keys than {reference} at {rate} a second."
+    own, theirs = together.keys_per_s[group, way, at], together.reference_keys_per_s[at]
+    return (
+        f"{numbers.label(mode)}, with {SPACED[DECIMATIONS[way]]}, does with {own:.3g} a second where "
+        f"{'it' if mode == REFERENCE else reference} needs {theirs:.3g} evenly spaced: "
+        f"{percent(1.0 - shares[group, way])} fewer for the same error."
     )
 
 
-def _fewer_keys(contest: _Contest) -> Text | None:
+def _fewer_keys(contest: _Contest) -> str | None:
     """How far down the rate can go, until the error is that of the reference at a higher one.
 
     None where the curves of this run do not tell: rates that do not cross, or an error that does not fall with them.
@@ -227,100 +190,49 @@ def _fewer_keys(contest: _Contest) -> Text | None:
     share = 1.0 - rate / rates[highest]
     if share < TIE:
         return None
+    most, least = ("at most ", "at least ") if at_most else ("", "")
     placed = " on average" if contest.kind is Budget else ""
-    return _say(
-        f"{{}} needs {'at most ' if at_most else ''}{{}} keys a second{placed} where {{}} needs {{}}: "
-        f"{'at least ' if at_most else ''}{percent(share)} fewer keys for the same error.",
-        contest.name(best),
-        _number(f"{rate:.3g}"),
-        contest.name(reference),
-        _number(f"{rates[highest]:g}"),
+    return (
+        f"{contest.name(best)} needs {most}{rate:.3g} keys a second{placed} where {contest.name(reference)} needs "
+        f"{rates[highest]:g}: {least}{percent(share)} fewer keys for the same error."
     )
 
 
-def _beside_rival(contest: _Contest) -> Text:
+def _beside_rival(contest: _Contest) -> str:
     """How much closer the best mode is with as many keys, or how many fewer it needs within a tolerance."""
     result = _best(contest)
     if not result:
         return _no_winner(contest)
     best, rival, ratios = result
     at = int(np.nanargmin(ratios))
-    names, less = (contest.name(best), contest.name(rival)), percent(1.0 - ratios[at])
+    first, other, less = contest.name(best), contest.name(rival), percent(1.0 - ratios[at])
     if contest.kind is not Tolerance:
         keys = contest.numbers.choices[contest.places[at]].amount
-        return _say(
-            f"{{}} has {{}} less error than {{}} with the same {{}} keys a second"
-            f"{' on average' if contest.kind is Budget else ''}.",
-            names[0],
-            _number(less),
-            names[1],
-            _number(keys),
-        )
-    phrase, (own, others) = contest.phrase(at), (_number(f"{mean:.3g}") for mean in contest.means[at, [best, rival]])
-    said = f"{phrase[0].upper()}{phrase[1:]}, {{}} needs {{}} keys a second where {{}} needs {{}}: {less} fewer."
-    return _say(said, names[0], own, names[1], others)
+        placed = " on average" if contest.kind is Budget else ""
+        return f"{first} has {less} less error than {other} with the same {keys} keys a second{placed}."
+    phrase, (own, others) = contest.phrase(at), contest.means[at, [best, rival]]
+    said = f"{phrase[0].upper()}{phrase[1:]}, {first} needs {own:.3g} keys a second where {other} needs {others:.3g}"
+    return f"{said}: {less} fewer."
 
 
-def _no_winner(contest: _Contest) -> Text:
+def _no_winner(contest: _Contest) -> str:
     """Where no mode is better than the reference, or than all others; the choice with the most keys speaks."""
     means, within = contest.means, contest.kind is Tolerance
     known = np.flatnonzero(np.isfinite(means).all(axis=1))
     at = int(known[0] if within else known[-1])
-    much, unit, off = ("keys", "keys a second", "") if within else ("error", "mm", " off (RMS)")
-    phrase = contest.phrase(at)
-
-    def value(mean: float) -> Part:
-        return _number(f"{digits(mean)}\u00a0{unit}")
-
+    best = contest.reference if contest.reference is not None else int(np.argmin(means[at]))
+    unit, off = ("keys a second", "") if within else ("mm", " off (RMS)")
+    said = f"{contest.name(best)}: {digits(means[at, best])} {unit}{off} {contest.phrase(at)}."
     if len(contest.groups) == 1:
-        count = len(contest.groups[0])
-        alike = f"{'Both' if count == 2 else f'All {count}'} modes are one motion: " if count > 1 else ""
-        does = "needs" if within else "is"
-        return _say(f"{alike}{{}} {does} {{}}{off} {phrase}.", contest.name(0), value(means[at].min()))
-    scores = np.log(means[known]).mean(axis=0)
-    if np.ptp(scores) < TIE:
-        differ = "need as many keys" if within else "are equally close"
-        return _say(f"The {len(contest.groups)} motions {differ}: {{}}{off} {phrase}.", value(means[at].min()))
-    ranked = np.argsort(scores, kind="stable").tolist()
-    if contest.reference is None:
-        first, second = map(contest.name, ranked[:2])
-        return _say(
-            f"{{}} and {{}} are the closest, and equally close: {{}} {phrase}.", first, second, value(means[at].min())
-        )
-    reference = contest.reference
-    following = next(group for group in ranked if group != reference)
-    more = np.exp(scores[following] - scores[reference]) - 1.0
-    same = "as many keys" if within else "the same error"
-    comes = "needs fewer keys" if within else "comes closer"
-    return _say(
-        f"No mode {comes} than {{}}: {{}}{off} {phrase}. Next is {{}} with "
-        f"{f'{percent(more)} more {much}' if more >= TIE else same}.",
-        contest.name(reference),
-        value(means[at, reference]),
-        contest.name(following),
-    )
+        return said
+    return f"No mode {'needs fewer keys' if within else 'comes closer'} than {said}"
 
 
-def _wins(contest: _Contest) -> Text:
-    """Return in how many cases the best mode was, and where it was beaten by the most."""
+def _wins(contest: _Contest) -> str:
+    """Return in how many cases the best mode was."""
     result = _best(contest)
     if not result or contest.distinguishable.sum() < 2:
-        return ()
-    best = result[0]
-    values = np.where(contest.distinguishable[..., None], contest.values, np.nan)
-    least = np.where(contest.distinguishable, np.nanmin(np.where(np.isnan(values), np.inf, values), axis=2), np.nan)
-    loss = 1.0 - least / values[..., best]
-    lost = contest.distinguishable & (loss > TIE)
-    cases, won = int(contest.distinguishable.sum()), int((contest.distinguishable & ~lost).sum())
-    many = _number(f"{'Fewest keys' if contest.kind is Tolerance else 'Closest'} in {won} of {cases}")
-    if not lost.any():
-        return _say("{} cases", many)
-    clip, choice = np.unravel_index(np.argmax(np.where(lost, loss, -1.0)), loss.shape)
-    name, at = contest.numbers.clips[clip], contest.numbers.choices[contest.places[choice]]
-    return _say(
-        f"{{}} cases; {'not' if lost.sum() == 1 else 'farthest from it'} in {{}}: there {{}} is, "
-        f"by {percent(loss[clip, choice])}",
-        many,
-        Part(f"{name} {at.phrase}", "link", f"{name},{at.name}"),
-        contest.name(int(np.nanargmin(values[clip, choice]))),
-    )
+        return ""
+    values = contest.values[contest.distinguishable]
+    won = np.count_nonzero(values[:, result[0]] * (1.0 - TIE) <= values.min(axis=1))
+    return f"{'Fewest keys' if contest.kind is Tolerance else 'Closest'} in {won} of {len(values)} cases"

@@ -103,7 +103,7 @@ class Bodies:
         self.full = full
         self.colours, self.flashes, self.rings = _colours_group(), _flashes_group(), _rings_group()
         self.grid = ground_grid(motion, CELLS * 2.0 ** round(np.log2(self.size / TALL)))
-        self.trail_group = trails.trail_group(windowed=True)
+        self.trail_group = trails.trail_group()
         self.track = ink("Ground", cast.theme.track)
 
     def enter(self, lane: Lane) -> None:

@@ -6,7 +6,6 @@ its place and moved into it when it is whole.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,7 +19,7 @@ LOSSLESS = "HUFFYUV", "MKV", ".mkv"
 """Codec, container and extension of pieces of a film: exact to the bit, and quicker than PNG or FFV1."""
 
 
-def render_film(scene: bpy.types.Scene, path: Path, progress: Callable[[int, int], None] | None = None) -> float:
+def render_film(scene: bpy.types.Scene, path: Path, progress: Callable[[int, int], None] | None = None) -> None:
     """Render all frames of the scene to its MP4.
 
     Parameters
@@ -31,11 +30,6 @@ def render_film(scene: bpy.types.Scene, path: Path, progress: Callable[[int, int
         Ending in .mp4. A file that is there is replaced, once the new one is whole.
     progress : callable, optional
         Called after every frame with the number of frames that are done, and of all.
-
-    Returns
-    -------
-    float
-        The seconds that Blender's renderer and encoder took.
 
     Raises
     ------
@@ -49,23 +43,20 @@ def render_film(scene: bpy.types.Scene, path: Path, progress: Callable[[int, int
     total = scene.frame_end - scene.frame_start + 1
     with written_beside(path) as beside, _counting(progress, total):
         kept, scene.render.filepath = scene.render.filepath, str(beside)
-        started = time.perf_counter()
         try:
             with silenced():
                 ended = bpy.ops.render.render(animation=True, scene=scene.name)
         finally:
             scene.render.filepath = kept
-        seconds = time.perf_counter() - started
         if "CANCELLED" in ended:
             raise KeyboardInterrupt
         if not beside.is_file():
             raise RuntimeError(f"{path}: Blender rendered no video; is the resolution even, and the disk not full?")
-    return seconds
 
 
 def render_piece(
     blend: Path, first: int, last: int, path: Path, progress: Callable[[int, int], None] | None = None
-) -> float:
+) -> None:
     """Render the frames from the first to the last of a saved stage, without loss.
 
     Parameters
@@ -77,18 +68,18 @@ def render_piece(
     path : Path
         Ending as `LOSSLESS` says.
     progress : callable, optional
-        As of `render_film`, and so is what is returned and raised.
+        As of `render_film`, and so is what is raised.
     """
     scene = _open(blend)
     scene.frame_start, scene.frame_end = first, last
     video = scene.render.ffmpeg
     video.codec, video.format = LOSSLESS[:2]
-    return render_film(scene, path, progress)
+    render_film(scene, path, progress)
 
 
 def join_pieces(
     blend: Path, pieces: Sequence[Path], path: Path, progress: Callable[[int, int], None] | None = None
-) -> float:
+) -> None:
     """Encode a film from its pieces, as if it had been rendered in one: the frames are the same to the bit.
 
     Parameters
@@ -100,7 +91,7 @@ def join_pieces(
     path : Path
         Ending in .mp4.
     progress : callable, optional
-        As of `render_film`, and so is what is returned and raised.
+        As of `render_film`, and so is what is raised.
 
     Raises
     ------
@@ -117,7 +108,7 @@ def join_pieces(
     if frame != scene.frame_end + 1:
         raise RuntimeError(f"{path}: its pieces have {frame - scene.frame_start} frames of {scene.frame_end}")
     scene.render.use_sequencer = True
-    return render_film(scene, path, progress)
+    render_film(scene, path, progress)
 
 
 def _open(blend: Path) -> bpy.types.Scene:

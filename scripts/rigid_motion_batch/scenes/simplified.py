@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from .settings import SubjectError
 from .subject import load_subject, tinted_slots, vertices_of
 
 MOST_TRIANGLES = 4000
@@ -31,7 +32,7 @@ def simplified(requested: str) -> dict[str, np.ndarray]:
             return result
         # It may leave more than it is asked to, where much hangs on nothing.
         modifier.ratio *= 0.95 * MOST_TRIANGLES / len(result["triangles"])
-    return _welded(result)
+    raise SubjectError(f"{requested}: Blender cannot simplify it to {MOST_TRIANGLES} triangles")
 
 
 def _surface(obj: bpy.types.Object) -> dict[str, np.ndarray]:
@@ -50,15 +51,3 @@ def _surface(obj: bpy.types.Object) -> dict[str, np.ndarray]:
     }
     evaluated.to_mesh_clear()
     return result
-
-
-def _welded(result: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return the surface with vertices that are close together as one, as coarsely as it has to be."""
-    places, triangles, tints = result.values()
-    cell = np.ptp(places, axis=0).max() / 256.0
-    while len(triangles) > MOST_TRIANGLES:
-        _, first, same = np.unique(np.floor(places / cell), axis=0, return_index=True, return_inverse=True)
-        corners = same.ravel()[triangles]
-        left = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
-        places, triangles, tints, cell = places[first], corners[left], tints[left], 2.0 * cell
-    return dict(zip(result, (places, triangles, tints), strict=True))

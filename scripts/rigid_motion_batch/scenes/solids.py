@@ -52,7 +52,7 @@ class Solids:
         self.ghost = ghost(cast.theme)
         self.ghost_action: bpy.types.Action | None = None
         self.cut_group = trails.cut_group() if cast.extent.cut else None
-        self.trail_group, self.marks_group = trails.trail_group(windowed=True), trails.marks_group()
+        self.trail_group, self.marks_group = trails.trail_group(), trails.marks_group()
         recording = self._path_of(motion.recording)
         self.path = trails.polyline("Recording path", cast.timeline.fine_frames, recording)
 

@@ -43,19 +43,18 @@ FADE = 0.15
 """The part of the window's half, from its edge, where what is drawn begins to thin."""
 
 
-def trail_group(*, windowed: bool = False) -> bpy.types.NodeTree:
+def trail_group() -> bpy.types.NodeTree:
     """Return a tube from `Past` frames ago to `Ahead` frames from now, that thins by `Taper` towards its old end.
 
-    Windowed, also with the inputs of `WINDOW`, outside of which there is none.
+    None outside of the `WINDOW`.
     """
     inputs = {"Past": "Float", "Ahead": "Float", "Radius": "Float", "Taper": "Float", "Material": "Material"}
-    group = Group("Trail", **inputs, **(WINDOW if windowed else {}))
+    group = Group("Trail", **inputs, **WINDOW)
     age, points = _within_window(group)
     worn = group.math("MULTIPLY", group.math("DIVIDE", age, group.inputs["Past"], clamp=True), group.inputs["Taper"])
     radius = group.math("MULTIPLY", group.inputs["Radius"], group.math("SUBTRACT", 1.0, worn))
-    if windowed:
-        points, thinned = _within_picture(group, points)
-        radius = group.math("MULTIPLY", radius, thinned)
+    points, thinned = _within_picture(group, points)
+    radius = group.math("MULTIPLY", radius, thinned)
     curve = group.add("GeometryNodeMeshToCurve", points)
     profile = group.add("GeometryNodeCurvePrimitiveCircle", Resolution=4, Radius=1.0)
     tube = _tube(group, curve, profile, radius)

@@ -19,7 +19,7 @@ from rigid_motion_batch.analysis.choices import Choice, Tolerance, Uniform
 from rigid_motion_batch.analysis.errors import Ground, errors_of
 from rigid_motion_batch.analysis.metrics import body_table_names
 from rigid_motion_batch.analysis.reconstructions import reconstruct
-from rigid_motion_batch.rows import unescaped, write_rows
+from rigid_motion_batch.rows import escaped, write_rows
 from tests.scripts.clips.bodies import JOINTS, swinging_body
 
 HEADER = (
@@ -59,7 +59,7 @@ def cells_of(path: Path) -> list[list[str]]:
     assert not any(
         cell.startswith(("=", "+", "-", "@", "\t", "\r")) for row in rows for cell in row if not number(cell)
     )
-    return [[unescaped(cell) for cell in row] for row in rows]
+    return [[cell[1:] if cell[:1] == "'" and escaped(cell) != cell else cell for cell in row] for row in rows]
 
 
 def number(cell: str) -> bool:

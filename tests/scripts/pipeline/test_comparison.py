@@ -157,20 +157,16 @@ def test_a_page_may_be_made_before_its_films(output: Path, toss: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_whole_body_has_joints_films_and_a_comparison_with_decimate(output: Path, tmp_path: Path) -> None:
+def test_a_whole_body_has_joints_and_films(output: Path, tmp_path: Path) -> None:
     write_body(body := tmp_path / "body.bvh")
     outcome, _ = compared(output, planned(body, choices=(Tolerance("2cm"),), stage=STAGE, about=ABOUT, count_keys=True))
     assert outcome.failures == {}
     folder = "body/tolerance-2cm"
     assert {*published(output)} == {
-        *("metrics.csv", "metrics_joints.csv", "decimated.csv", "keys_needed.csv", "report.html"),
+        *("metrics.csv", "metrics_joints.csv", "keys_needed.csv", "report.html"),
         *(f"{folder}/{name}" for name in ("lerp_slerp.keys.csv", "motor_spline.keys.csv")),
         *(f"{folder}/{name}" for name in ("comparison.blend", "comparison.mp4", "comparison.glb")),
     }
-    _, listener = compared(tmp_path / "without", planned(body, choices=(Tolerance("2cm"),), blender=""))
-    assert "body: not compared with Blender's Decimate, for there is no Blender here" in listener.notes
-    assert {*published(tmp_path / "without")} >= {"metrics.csv", "metrics_joints.csv"}
-    assert "decimated.csv" not in published(tmp_path / "without")
 
 
 def test_more_clips_than_fit_on_a_page_have_a_page_each(

@@ -8,7 +8,7 @@ import pytest
 from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform
 from rigid_motion_batch.analysis.needed import RATES, KeysNeeded
 from rigid_motion_batch.report.numbers import ERROR, KEYS, MEASURES, Numbers
-from rigid_motion_batch.report.verdict import as_text, verdict
+from rigid_motion_batch.report.verdict import verdict
 
 FIVE, TEN, TWENTY = map(Uniform, ("5", "10", "20"))
 
@@ -64,8 +64,7 @@ CASES = {
     ),
     "the reference is the best": (
         numbers((FIVE, TEN), {REF: (4, 1), SCREW: (5, 1.25), SMOOTH: (8, 2)}),
-        "No mode comes closer than Vector + Quaternion: 1.00 mm off (RMS) at 10 keys/s. "
-        "Next is Screw with 25 % more error.",
+        "No mode comes closer than Vector + Quaternion: 1.00 mm off (RMS) at 10 keys/s.",
     ),
     "a run without the reference": (
         numbers((TEN,), {SCREW: (4,), SMOOTH: (1,), "pga_lerp": (5,)}),
@@ -81,8 +80,7 @@ CASES = {
     ),
     "a tolerance, and the reference needs the fewest keys": (
         numbers((Tolerance("5mm"), Tolerance("10mm")), {REF: (6, 4), SMOOTH: (8, 5)}),
-        "No mode needs fewer keys than Vector + Quaternion: 6.00 keys a second within 5 mm. "
-        "Next is Smooth Screw with 29 % more keys.",
+        "No mode needs fewer keys than Vector + Quaternion: 6.00 keys a second within 5 mm.",
     ),
     "budgets that cross": (
         numbers((Budget("5"), Budget("10")), {REF: (16, 4), SMOOTH: (8, 2)}),
@@ -103,7 +101,7 @@ CASES = {
 @pytest.mark.parametrize("case", CASES)
 def test_the_sentence_says_what_the_numbers_say(case: str) -> None:
     run, expected = CASES[case]
-    assert str(verdict(run)) == expected
+    assert verdict(run).sentence == expected
 
 
 TWO = numbers((TEN,), {REF: (4,), SMOOTH: (1,)})
@@ -134,27 +132,20 @@ TWO = numbers((TEN,), {REF: (4,), SMOOTH: (1,)})
     ],
 )
 def test_the_keys_needed_come_first_where_they_were_looked_for(needed: KeysNeeded, expected: str) -> None:
-    assert str(verdict(TWO, [needed])) == expected
+    assert verdict(TWO, [needed]).sentence == expected
 
 
 def test_the_cases_that_the_best_mode_won_are_beside_the_sentence() -> None:
     run = numbers(
         (FIVE, TEN), {REF: (16, 4), SCREW: (17, 4.1), SMOOTH: (8, 1)}, {REF: (8, 4), SCREW: (8.5, 4.1), SMOOTH: (10, 2)}
     )
-    said = "Closest in 3 of 4 cases; not in clip2 at 5 keys/s: there Vector + Quaternion is, by 20 %"
-    assert as_text(verdict(run).wins) == said
+    assert verdict(run).wins == "Closest in 3 of 4 cases"
     every = numbers((FIVE, TEN), {REF: (16, 4), SMOOTH: (8, 1)})
-    assert as_text(verdict(every).wins) == "Closest in 2 of 2 cases"
+    assert verdict(every).wins == "Closest in 2 of 2 cases"
     within = numbers((Tolerance("5mm"),), {REF: (8,), SMOOTH: (6,)}, {REF: (6,), SMOOTH: (5,)})
-    assert as_text(verdict(within).wins) == "Fewest keys in 2 of 2 cases"
-
-
-def test_the_exception_is_a_link_to_its_clip_and_choice() -> None:
-    run = numbers((TEN,), {REF: (4,), SMOOTH: (1,)}, {REF: (4,), SMOOTH: (5,)})
-    (link,) = [part for part in verdict(run).wins if part.kind == "link"]
-    assert (link.text, link.target) == ("clip2 at 10 keys/s", "clip2,10")
+    assert verdict(within).wins == "Fewest keys in 2 of 2 cases"
 
 
 def test_of_a_single_case_or_without_any_error_nothing_is_said_of_wins() -> None:
-    assert verdict(numbers((TEN,), {REF: (4,), SMOOTH: (2,)})).wins == ()
-    assert verdict(numbers((TEN,), {REF: (0,), SMOOTH: (0,)})).wins == ()
+    assert verdict(numbers((TEN,), {REF: (4,), SMOOTH: (2,)})).wins == ""
+    assert verdict(numbers((TEN,), {REF: (0,), SMOOTH: (0,)})).wins == ""

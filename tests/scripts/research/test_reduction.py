@@ -3,11 +3,11 @@
 import pytest
 
 from research import reduction
+from research.decimating import decimate
 from rigid_motion import animation
 from rigid_motion.motion import shell_error
 from rigid_motion_batch.analysis.needed import part_of
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.scenes.decimated_bodies import decimate
 
 TOLERANCE, RADIUS = 0.005, 0.1
 

@@ -42,12 +42,11 @@ def handlers() -> dict[str, list]:
 def test_the_film_has_every_frame_at_the_size_asked_for(scene, tmp_path):
     film = tmp_path / "clip" / "10" / "comparison.mp4"
     seen = []
-    seconds = render_film(scene, film, lambda done, total: seen.append((done, total)))
+    render_film(scene, film, lambda done, total: seen.append((done, total)))
     movie = bpy.data.movieclips.load(str(film))
     assert movie.frame_duration == scene.frame_end == 9
     assert tuple(movie.size) == (160, 90)
     assert seen == [(done, 9) for done in range(1, 10)]
-    assert seconds > 0.0
     assert [path.name for path in film.parent.iterdir()] == ["comparison.mp4"]
 
 
@@ -100,7 +99,7 @@ def test_a_film_that_was_rendered_in_pieces_is_the_same_to_the_bit(scene, tmp_pa
     seen = []
     pieces = {tmp_path / "1.mkv": (1, 4), tmp_path / "5.mkv": (5, 5), tmp_path / "6.mkv": (6, 9)}
     for path, (first, last) in pieces.items():
-        assert render_piece(blend, first, last, path, lambda done, total: seen.append((done, total))) > 0.0
+        render_piece(blend, first, last, path, lambda done, total: seen.append((done, total)))
     assert seen == [(1, 4), (2, 4), (3, 4), (4, 4), (1, 1), (1, 4), (2, 4), (3, 4), (4, 4)]
     join_pieces(blend, list(pieces), tmp_path / "joined.mp4")
     assert (tmp_path / "joined.mp4").read_bytes() == (tmp_path / "whole.mp4").read_bytes()

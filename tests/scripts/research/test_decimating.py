@@ -7,21 +7,19 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from research.body_reduction import numbers_of
+from research.decimating import DecimatedBody, Left, decimate
 from rigid_motion.motion import Poses
-from rigid_motion_batch.analysis.body_decimated import DECIMATE, OWN, SHARED
-from rigid_motion_batch.analysis.body_metrics import measure_modes
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.reconstructions import Reconstruction, reconstruct
 from rigid_motion_batch.axes import AXES
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.rest_bodies import RestBody
-from rigid_motion_batch.scenes import decimated_bodies
-from rigid_motion_batch.scenes.decimating import DecimatedBody, beside_decimate, frames_of
 from tests.balls import largest_displacements
 
 RADIUS = np.array((0.03, 0.05, 0.02, 0.03))
 
-MODES = ("lerp_slerp", "motor_spline")
+MODE = "motor_spline"
 
 JOINTS = ("Hip", "Knee", "Foot", 'A "bone" of\\any name')
 
@@ -45,7 +43,7 @@ def leg(name: str = "leg", samples: int = 40) -> Clip:
 
 
 def made_of(clip: Clip, *, shared: bool = False, tolerance: str = "1cm") -> Reconstruction:
-    return reconstruct(clip, Tolerance(tolerance), MODES, RADIUS, shared=shared)
+    return reconstruct(clip, Tolerance(tolerance), [MODE], RADIUS, shared=shared)
 
 
 def in_world(clip: Clip) -> np.ndarray:
@@ -88,7 +86,7 @@ def test_errors_of_decimated_curves_are_those_of_what_blender_shows() -> None:
     assert body.errors().max() < 1e-6
     assert errors_by_hand(recorded, recorded, truth).max() < 2e-6
     for margin in (0.003, 0.05):
-        decimated_bodies.decimate(body.rig.obj, mode="ERROR", remove_error_margin=margin)
+        decimate(body.rig.obj, mode="ERROR", remove_error_margin=margin)
         result = errors_by_hand(as_blender_shows(body), recorded, truth)
         np.testing.assert_allclose(body.errors(), result, atol=3e-6)
         assert body.left().largest == pytest.approx(result.max(), abs=3e-6)
@@ -96,43 +94,28 @@ def test_errors_of_decimated_curves_are_those_of_what_blender_shows() -> None:
 
 
 @pytest.mark.parametrize("shared", [False, True])
-def test_decimate_is_held_to_our_largest_error_and_all_is_counted(shared: bool) -> None:
+def test_decimate_is_held_to_an_error_and_all_is_counted(monkeypatch, shared: bool) -> None:
+    tried: list[Left] = []
+    left = DecimatedBody.left
+
+    def counted(body: DecimatedBody) -> Left:
+        curves = body.rig.obj.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
+        varying = [curve for curve in curves if (curve.data_path, curve.array_index) in body._counted]
+        keys = [[key.co.x for key in curve.keyframe_points] for curve in varying]
+        tried.append(left(body))
+        assert tried[-1].keys == sum(map(len, keys))
+        assert tried[-1].frames == len({frame for own in keys for frame in own})
+        assert tried[-1].numbers == 6 * tried[-1].keys
+        return tried[-1]
+
+    monkeypatch.setattr(DecimatedBody, "left", counted)
     made = made_of(leg(), shared=shared)
-    measured = measure_modes(made)
-    rows = beside_decimate(made, measured.rows)
-    how = SHARED if shared else OWN
-    assert [(row.mode, row.how) for row in rows] == [(mode, item) for mode in MODES for item in (how, DECIMATE)]
-    for own, theirs, metrics in zip(rows[::2], rows[1::2], measured.rows, strict=True):
-        keys = [joint for joint in made.keys[own.mode] if len(joint) > 1]
-        assert own.frames_with_keys == len(set(np.concatenate(keys).tolist()))
-        assert own.keys == metrics.keys
-        # The hip moves and turns, two others turn; of key poses the time is there once.
-        channels = sum(len(joint) * (7 if number == 0 else 4) for number, joint in enumerate(keys))
-        assert own.numbers == channels + (len(keys[0]) if shared else sum(map(len, keys)))
-        assert own.max_shell_m == metrics.max_shell_m
-        assert 0.0 < theirs.max_shell_m <= own.max_shell_m
-        assert theirs.numbers == 6 * theirs.keys
-        assert theirs.frames_with_keys <= min(theirs.keys, len(made.clip.times))
-
-
-def test_a_body_that_stays_and_an_error_beyond_single_precision_have_no_row_of_decimate() -> None:
-    clip = leg(samples=10)
-    still = replace(clip, poses=Poses(clip.poses.positions[:, [0] * 10], clip.poses.quaternions[:, [0] * 10]))
-    made = made_of(still)
-    assert [row.how for row in beside_decimate(made, measure_modes(made).rows)] == [OWN, OWN]
-    every = Reconstruction(clip, Tolerance("1cm"), dict.fromkeys(MODES, (np.arange(10),) * 4), RADIUS)
-    rows = beside_decimate(every, measure_modes(every).rows)
-    assert [row.how for row in rows] == [OWN, OWN]
-
-
-def test_samples_are_on_whole_frames_where_they_are_even() -> None:
-    even = 100.0 + np.arange(50) / 29.97
-    assert frames_of(even).tolist() == list(range(1, 51))
-    assert frames_of(np.round(even, 3)).tolist() == list(range(1, 51))
-    uneven = np.delete(even, (3, 4, 20))
-    np.testing.assert_allclose(frames_of(uneven), 1.0 + (uneven - uneven[0]) * 29.97, rtol=1e-6)
-    with pytest.raises(RuntimeError, match=r"too close for Blender's frames, at 101 s"):
-        frames_of(np.array((100.0, 101.0, 101.0 + 1e-9, 102.0, 103.0)))
-
-
-# -- in a comparison --------------------------------------------------------------------------------------------------
+    largest = float(made.shell(MODE).max())
+    result = DecimatedBody(made).within(largest)
+    assert result in tried
+    assert result.keys == min(item.keys for item in tried if item.largest <= largest)
+    assert result.keys < max(item.keys for item in tried)
+    # The hip moves and turns, two others turn; of key poses the time is there once.
+    keys = [joint for joint in made.keys[MODE] if len(joint) > 1]
+    channels = sum(len(joint) * (7 if number == 0 else 4) for number, joint in enumerate(keys))
+    assert numbers_of(made) == channels + (len(keys[0]) if shared else sum(map(len, keys)))

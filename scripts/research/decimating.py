@@ -1,0 +1,159 @@
+"""Blender's Decimate of the Graph Editor: the fewest keys that it leaves where an error must not become larger.
+
+Users give it one error margin for all F-curves, in the units of these. Which margin an error needs is searched for, and
+what was tried for one error is known when another is asked for. Errors are shell errors in metres.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from rigid_motion import animation
+from rigid_motion.animation.actions.channels import replace_keys
+from rigid_motion.motion import Poses, shell_error
+from rigid_motion.motion.quaternions import normalise
+from rigid_motion_batch.analysis.reconstructions import Reconstruction
+from rigid_motion_batch.scenes.armature import Rest, Rig
+
+FREE = 6  # numbers of a key with free handles
+MARGINS = (1e-5, 10.0)  # the smallest and the largest error margin of Decimate, in the units of the channels
+TRIALS = 12  # margins tried for an error, at most
+NEAR = 0.98  # part of the requested error that is as good as equal to it
+CLOSE = 1.01  # two margins whose ratio is less leave the same keys, or nearly
+VARIES = 1e-4  # a channel that never changes by more does not vary: importers calculate in single precision
+
+
+@dataclass(frozen=True)
+class Left:
+    """What is left of the keys of the channels that vary: frames with a key, keys, numbers, and the largest error."""
+
+    frames: int
+    keys: float
+    numbers: int
+    largest: float
+
+
+def figures_of(left: Left) -> dict[str, float]:
+    """Return the figures of what is left."""
+    return {"frames": left.frames, "key_count": left.keys, "numbers": left.numbers, "error_mm": 1e3 * left.largest}
+
+
+def decimate(obj: bpy.types.Object, **options: object) -> None:
+    """Decimate all keys of an object and its bones: `mode`, and `factor` or `remove_error_margin`."""
+    for fcurve in animation.channelbag_of(obj).fcurves:
+        fcurve.select = True
+        fcurve.keyframe_points.foreach_set("select_control_point", np.ones(len(fcurve.keyframe_points), dtype=bool))
+    window = bpy.context.window_manager.windows[0]
+    area = window.screen.areas[0]
+    area.type = "GRAPH_EDITOR"
+    area.spaces[0].dopesheet.show_only_selected = False
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.graph.decimate(**options)
+
+
+class Decimations:
+    """Decimate of an object, with one error margin for all F-curves.
+
+    Each margin is tried on a copy of the Action that it has now, which it has again afterwards; `left` tells what is
+    left by the F-curves that it has when it is called.
+    """
+
+    def __init__(self, obj: bpy.types.Object, left: Callable[[], Left], trials: int = TRIALS) -> None:
+        self.obj, self.left, self.trials = obj, left, trials
+        self.recorded = obj.animation_data.action
+        self.tried: dict[float, Left] = {}  # the logarithm of a margin, and what it left
+
+    def within(self, largest: float) -> Left | None:
+        """Return the fewest keys found whose error is at most this; None where no margin tried does.
+
+        Margins are halved between the smallest that is too large and the largest below it that is not.
+        """
+        for _ in range(self.trials):
+            low, high = self._between(largest)
+            near = any(NEAR * largest <= left.largest <= largest for left in self.tried.values())
+            if near or high - low < np.log(CLOSE):
+                break
+            self._try((low + high) / 2.0)
+        good = [left for left in self.tried.values() if left.largest <= largest]
+        return min(good, key=lambda left: left.keys, default=None)
+
+    def _between(self, largest: float) -> tuple[float, float]:
+        low, high = np.log(MARGINS)
+        high = min((margin for margin, left in self.tried.items() if left.largest > largest), default=high)
+        within = [margin for margin, left in self.tried.items() if left.largest <= largest and margin < high]
+        return max(within, default=low), high
+
+    def _try(self, margin: float) -> None:
+        copy = self.obj.animation_data.action = self.recorded.copy()
+        decimate(self.obj, mode="ERROR", remove_error_margin=float(np.exp(margin)))
+        self.tried[margin] = self.left()
+        self.obj.animation_data.action = self.recorded
+        bpy.data.actions.remove(copy)
+
+
+class DecimatedBody:
+    """A whole body as a rig with a key on every sample, alone in an empty file."""
+
+    def __init__(self, made: Reconstruction) -> None:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        clip = made.clip
+        self.frames = 1.0 + (made.times - made.times[0]) * clip.samples_a_second
+        self._skeleton, self._radius = made.skeleton, made.radii[:, None]
+        joints = clip.in_blender(clip.poses[:, made.samples])
+        roots = clip.whole_body.parents < 0
+        places = joints.positions[roots]
+        # Single precision is best around the origin.
+        joints.positions[roots] -= (places.min(axis=(0, 1)) + places.max(axis=(0, 1))) / 2.0
+        self._truth = self._skeleton.in_root_space(joints)
+        self.rig = Rig("Body", Rest.of(clip), clip.whole_body.joints, bpy.context.scene.collection)
+        channels = self.rig.channels_of(joints)
+        for bone in range(len(self.rig.bones)):
+            self.rig.key(bone, self.frames, channels[bone])
+        self._counted = {curve for curve, values in self._values().items() if np.ptp(values) > VARIES}
+
+    def within(self, largest: float) -> Left | None:
+        """Return the fewest keys whose error is at most this, from straight lines or curves through all of them."""
+        straight = Decimations(self.rig.obj, self.left)
+        animated = self.rig.obj.animation_data
+        result = [straight.within(largest)]
+        animated.action = animated.action.copy()
+        for fcurve in self._fcurves().values():
+            keys = np.array([key.co for key in fcurve.keyframe_points])
+            replace_keys(fcurve, keys[:, 0], keys[:, 1], interpolation="BEZIER", handle_type="AUTO_CLAMPED")
+        result.append(Decimations(self.rig.obj, self.left).within(largest))
+        animated.action = straight.recorded
+        return min(filter(None, result), key=lambda left: left.keys, default=None)
+
+    def errors(self) -> np.ndarray:
+        """Return how far off each joint is by the F-curves that the rig has now, shape (joints, n)."""
+        values, bones = self._values(), [self.rig.obj.pose.bones[name] for name in self.rig.bones]
+
+        def channels(name: str) -> np.ndarray:
+            result = np.array([getattr(bone, name) for bone in bones])[:, None].repeat(len(self.frames), axis=1)
+            for own, path in zip(result, (bone.path_from_id(name) for bone in bones), strict=True):
+                for index in range(own.shape[1]):
+                    own[:, index] = values.get((path, index), own[:, index])
+            return result
+
+        joints = self.rig.joints_of(Poses(channels("location"), normalise(channels("rotation_quaternion"))))
+        return shell_error(self._skeleton.in_root_space(joints), self._truth, self._radius)
+
+    def left(self) -> Left:
+        """Return the keys that the rig has now, and their largest error."""
+        curves = [fcurve for curve, fcurve in self._fcurves().items() if curve in self._counted]
+        keys = [key.co.x for fcurve in curves for key in fcurve.keyframe_points]
+        return Left(len(set(keys)), len(keys), FREE * len(keys), float(self.errors().max()))
+
+    def _fcurves(self) -> dict[tuple[str, int], bpy.types.FCurve]:
+        fcurves = animation.channelbag_of(self.rig.obj).fcurves
+        return {(fcurve.data_path, fcurve.array_index): fcurve for fcurve in fcurves}
+
+    def _values(self) -> dict[tuple[str, int], np.ndarray]:
+        """Return what F-curves show at the samples, by Blender's own evaluation, each of shape (n,)."""
+        frames = self.frames.tolist()
+        return {key: np.array([curve.evaluate(frame) for frame in frames]) for key, curve in self._fcurves().items()}
