@@ -52,7 +52,6 @@ UNSEEN = {
     "The mode that was chosen before there was an Action to keep it",
     "The constraints that it was given. Who takes one off does so on purpose",
     "The name that Actions have records of the bone under. Where it has another, it was renamed",
-    "Which components of them, as bits",
     "Whether bones have modes, or constraints for them",
     "Whether the constraints of bones show nothing, for as long as the rig is in Edit Mode",
     "File Filter",

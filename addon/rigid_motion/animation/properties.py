@@ -1,8 +1,7 @@
 """What is kept in the file, on Actions and on objects. Without the extension all of it is inert, and stays in the file.
 
 An Action keeps the modes of what it moves: see `records`. An object or a pose bone shows its own, to be chosen and to
-be animated; an object keeps the delta transforms that it has without in-betweens. Files have the properties by the
-names that these were first given, so no property is ever renamed.
+be animated; an object keeps the delta transforms that it has without in-betweens.
 """
 
 from __future__ import annotations
@@ -108,7 +107,7 @@ class ActionMotion(bpy.types.PropertyGroup):
 
 
 class ChangedAction(bpy.types.PropertyGroup):
-    """A copy of an Action that was given other keys, what it is a copy of, and the mode that the object had then."""
+    """A copy of an Action that was given other keys, and what it is a copy of."""
 
     kind: EnumProperty(
         items=[
@@ -119,7 +118,6 @@ class ChangedAction(bpy.types.PropertyGroup):
     )
     changed: PointerProperty(type=bpy.types.Action)
     original: PointerProperty(type=bpy.types.Action)
-    mode: EnumProperty(items=MODE_ITEMS, options={"HIDDEN"})
     # What location, rotation and scale had when the copy was made: what had no keys gets it back.
     components: FloatVectorProperty(size=10, options={"HIDDEN"})
     keys_before: IntProperty(options={"HIDDEN"})
@@ -220,14 +218,10 @@ class ObjectMotion(_Motion, bpy.types.PropertyGroup):
         **KEPT,
     )
     filled: BoolVectorProperty(
-        description="Which delta transforms in-betweens are in; the object's own are kept here meanwhile",
-        size=4,
+        description="Which components of delta transforms in-betweens are in; the object's own are kept meanwhile",
+        size=13,
         options=set(),
         override={"LIBRARY_OVERRIDABLE"},
-    )
-    filled_components: IntProperty(
-        description="Which components of them, as bits",
-        **KEPT,
     )
     own_location: FloatVectorProperty(
         name="Delta Location",

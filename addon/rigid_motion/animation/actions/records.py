@@ -81,9 +81,7 @@ def has_mode(binding: Binding) -> bool:
 
 
 def has_in_betweens(binding: Binding) -> bool:
-    """Return whether a transform was filled in, by whichever version;
-    constants that are held beside strips are none.
-    """
+    """Return whether a transform was filled in; constants that are held beside strips are none."""
     return (
         bool(recorded_digest(binding))
         or any(len(fcurve.sampled_points) > 2 for fcurve in binding.filled.values())
@@ -182,13 +180,7 @@ def record_of(binding: Binding) -> bpy.types.PropertyGroup | None:
     records, key = binding.slot.action.rigid_motion.slots, _key(binding.slot, binding.prefix)
     number = _numbers.get(key, -1)
     if not (0 <= number < len(records) and records[number].name == key):
-        number = records.find(key)
-        if number < 0 and not binding.kind.is_part:
-            # Those of versions without bones have no name to be found by.
-            unnamed = (binding.slot.handle, binding.prefix, "")
-            old = (n for n, one in enumerate(records) if (one.handle, one.prefix, one.name) == unnamed)
-            number = next(old, -1)
-        _numbers[key] = number
+        number = _numbers[key] = records.find(key)
     return records[number] if number >= 0 else None
 
 

@@ -121,9 +121,7 @@ def has_bones(obj: bpy.types.Object) -> bool:
 
 def _has_properties(obj: bpy.types.Object) -> bool:
     motion = obj.rigid_motion
-    return (
-        any(motion.filled) or bool(motion.filled_components) or motion.mode != "BLENDER" or motion.awaited != "BLENDER"
-    )
+    return any(motion.filled) or motion.mode != "BLENDER" or motion.awaited != "BLENDER"
 
 
 @dataclass(frozen=True)

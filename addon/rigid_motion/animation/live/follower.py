@@ -14,7 +14,7 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 import bpy
 from bpy.app.handlers import persistent
 
-from ..actions.mode_property import adopt_from_properties, show_pending_modes
+from ..actions.mode_property import show_pending_modes
 from ..actions.reading import leading
 from ..actions.records import forget_names
 from ..actions.slots import Binding, bindings_of, choose_slots, filled_bindings, slots_in
@@ -326,11 +326,6 @@ class Follower:
     def after_load(self, *_: object) -> None:
         source_cache.clear()
         self.begin_file()
-        if not self.busy:
-            transforms = transforms_under(bpy.data.objects)
-            moved = {user for binding in bindings_of(transforms) for user in binding.users}
-            with self.turn():
-                adopt_from_properties(transform for transform in transforms if transform not in moved)
         self.look_again()
 
     def make_exact(self) -> None:

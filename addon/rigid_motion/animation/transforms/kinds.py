@@ -10,6 +10,7 @@ rotation and the scale that its channels give it. It has nothing of its own that
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Sequence
@@ -36,20 +37,15 @@ GROUP = "Rigid Motion"
 """The group of F-curves that an object's mode channel and its differences are in."""
 
 ORIGINALS = {
-    "delta_location": ("own_location", 0),
-    "delta_rotation_quaternion": ("own_quaternion", 1),
-    "delta_rotation_euler": ("own_euler", 2),
-    "delta_scale": ("own_scale", 3),
+    "delta_location": "own_location",
+    "delta_rotation_quaternion": "own_quaternion",
+    "delta_rotation_euler": "own_euler",
+    "delta_scale": "own_scale",
 }
-"""Each delta transform: where an object's original is written down, and its place in `filled`. Files have the names."""
+"""Where an object's original of each delta transform is written down."""
 
-_BITS = {
-    channel: 1 << bit
-    for bit, channel in enumerate(
-        (path, index) for path in ORIGINALS for index in range(4 if path.endswith("quaternion") else 3)
-    )
-}
-"""The bit of each component of the delta transforms in `filled_components`."""
+_CHANNELS = [(path, index) for path in ORIGINALS for index in range(4 if path.endswith("quaternion") else 3)]
+"""The components of the delta transforms, in the order of `filled`."""
 
 
 class BoneTransform(Transform):
@@ -229,7 +225,7 @@ class ObjectTransform(Transform):
 
     def _noted_values(self, path: str, noted: Collection[Channel]) -> list[float]:
         """Return what is written down in these components of a delta property, and in the others what it has."""
-        now, then = getattr(self.carrier, path), getattr(self.motion, ORIGINALS[path][0])
+        now, then = getattr(self.carrier, path), getattr(self.motion, ORIGINALS[path])
         return [then[i] if (path, i) in noted else value for i, value in enumerate(now)]
 
     def original(self) -> np.ndarray:
@@ -247,7 +243,7 @@ class ObjectTransform(Transform):
 
     def is_recorded(self, filled: Iterable[Channel]) -> bool:
         """Return whether the original values of these channels are written down."""
-        return _BITS.keys() & filled <= self._recorded
+        return self._recorded.issuperset(channel for channel in filled if channel[0] in ORIGINALS)
 
     def is_more_noted(self, filled: Iterable[Channel]) -> bool:
         """Return whether the original values of channels other than these are written down."""
@@ -259,22 +255,22 @@ class ObjectTransform(Transform):
         `overwritten`: they have done so already, and it has none.
         """
         noted = self._recorded
-        added = (_BITS.keys() & filled) - noted
+        added = set(_CHANNELS).intersection(filled) - noted
         for path in {path for path, _ in added}:
-            now, then = getattr(self.carrier, path), list(getattr(self.motion, ORIGINALS[path][0]))
+            now, then = getattr(self.carrier, path), list(getattr(self.motion, ORIGINALS[path]))
             for i, value in enumerate(now):
                 if (path, i) in added and overwritten:
                     then[i] = default_of(path)[i]
                 elif (path, i) not in noted:
                     then[i] = value
-            _set_if_other(self.motion, ORIGINALS[path][0], then)
+            _set_if_other(self.motion, ORIGINALS[path], then)
         self._keep(noted | added)
 
     def follow_original(self) -> None:
         """Show an edit of what is written down in all components that in-betweens are not in."""
         noted = self._recorded
         for path in {path for path, _ in noted}:
-            _set_if_other(self.carrier, path, self._noted_values(path, _BITS.keys() - noted))
+            _set_if_other(self.carrier, path, self._noted_values(path, set(_CHANNELS) - noted))
 
     def show_original(self) -> None:
         """Set the delta transforms to what is written down, for as long as Blender leaves them so."""
@@ -294,20 +290,10 @@ class ObjectTransform(Transform):
     @property
     def _recorded(self) -> frozenset[Channel]:
         """The components that are written down."""
-        motion = self.motion
-        if bits := motion.filled_components:
-            return _components_in(bits)
-        # Files of a version that took all components of a delta transform, or none, have only `filled`.
-        taken = motion.filled[:]
-        return frozenset(channel for channel in _BITS if taken[ORIGINALS[channel[0]][1]]) if any(taken) else frozenset()
+        return frozenset(itertools.compress(_CHANNELS, self.motion.filled))
 
     def _keep(self, noted: Collection[Channel]) -> None:
-        motion, bits, paths = self.motion, sum(_BITS[channel] for channel in noted), {path for path, _ in noted}
-        if motion.filled_components != bits:
-            motion.filled_components = bits
-        summary = [path in paths for path in ORIGINALS]
-        if list(motion.filled) != summary:
-            motion.filled = summary
+        _set_if_other(self.motion, "filled", [channel in noted for channel in _CHANNELS])
 
 
 class ExactObjectTransform(ObjectTransform):
@@ -330,11 +316,6 @@ class ExactObjectTransform(ObjectTransform):
         # Without a parent, an object's local axes are those that it has been turned to.
         space = "WORLD" if self.carrier.parent is None else "LOCAL"
         return super().constraint_settings | {"owner_space": space}
-
-
-@cache
-def _components_in(bits: int) -> frozenset[Channel]:
-    return frozenset(channel for channel, bit in _BITS.items() if bit & bits)
 
 
 def _set_if_other(owner: bpy.types.bpy_struct, name: str, values: Iterable[float]) -> None:

@@ -132,7 +132,7 @@ def _held(binding: Binding, beside: Sequence[Binding]) -> dict[Channel, float]:
 
 
 def _held_for(user: ObjectTransform, binding: Binding, beside: Sequence[Binding]) -> dict[Channel, float]:
-    originals = {path: getattr(user.motion, original)[:] for path, (original, _) in ORIGINALS.items()}
+    originals = {path: getattr(user.motion, original)[:] for path, original in ORIGINALS.items()}
     originals = {path: values for path, values in originals.items() if all(map(math.isfinite, values))}
     if not _is_replacing(user.animated, binding.slot):
         return {}
