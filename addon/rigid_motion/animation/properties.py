@@ -120,29 +120,17 @@ class ChangedAction(bpy.types.PropertyGroup):
     original: PointerProperty(type=bpy.types.Action)
     # What location, rotation and scale had when the copy was made: what had no keys gets it back.
     components: FloatVectorProperty(size=10, options={"HIDDEN"})
-    keys_before: IntProperty(options={"HIDDEN"})
-    keys_after: IntProperty(options={"HIDDEN"})
-    channel_keys_before: IntProperty(description="How many keys all channels had together", options={"HIDDEN"})
-    channel_keys_after: IntProperty(description="How many keys all channels have together", options={"HIDDEN"})
-    largest_error: FloatProperty(
-        description="How far the reduced motion is off where it is furthest, in Blender's units", options={"HIDDEN"}
-    )
-    frames_after: IntProperty(description="On how many frames any bone of the rig has keys", options={"HIDDEN"})
-    slide_before: FloatProperty(description="How far what stands on the ground slid there", options={"HIDDEN"})
-    slide_after: FloatProperty(description="How far it slides there with fewer keys", options={"HIDDEN"})
-    # Of all bones of the rig, in Blender's units.
-    largest_error_of_rig: FloatProperty(options={"HIDDEN"})
-    # JSON: the bones that follow constraints or drivers, and those that hang on them.
-    not_promised: StringProperty(options={"HIDDEN"})
+    # What became of its keys where they were reduced: a `Reduction` as JSON.
+    reduction: StringProperty(options={"HIDDEN"})
 
 
 def _on_mode(motion: ObjectMotion | BoneMotion, _context: bpy.types.Context) -> None:
-    if not follower.is_busy():
+    if not follower.follower.busy:
         mode_keys.on_property(_transform_with(motion))
 
 
 def _on_turns(motion: ObjectMotion | BoneMotion, _context: bpy.types.Context) -> None:
-    if not follower.is_busy():
+    if not follower.follower.busy:
         # What refuses to turn says so in the panel.
         with suppress(Refused):
             mode_keys.on_turns(_transform_with(motion))

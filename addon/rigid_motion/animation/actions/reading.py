@@ -1,4 +1,7 @@
-"""From Blender's data to sources: what is keyed of a transform in a slot, and how much influence the NLA gives it."""
+"""From Blender's data to sources: what is keyed of a transform in a slot, and how much influence the NLA gives it.
+
+What modifiers add to a channel stays on top of the mode: its F-curve has it, and the difference does not know of it.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +16,15 @@ from ..compute.sources import Source
 from ..curves.keys import Keys
 from ..transforms import Channel, Refused, Transform
 from .channels import read_keys
-from .modifiers import is_modified
 from .records import recorded, recorded_digest, recorded_mode
-from .refusals import refuse_channel, refuse_different_steps, refuse_drivers, refuse_numbers, refuse_what_is_taken
+from .refusals import (
+    is_added,
+    refuse_channel,
+    refuse_different_steps,
+    refuse_drivers,
+    refuse_numbers,
+    refuse_what_is_taken,
+)
 from .slots import Binding, Slot
 
 Influence = tuple[tuple[float, float], ...]
@@ -23,9 +32,7 @@ Influence = tuple[tuple[float, float], ...]
 
 
 def influence_of(slot: Slot) -> Influence | None:
-    """Return the influence of the only strip that shows a slot, with nothing below it;
-    None where it is full or another.
-    """
+    """Return the influence of the only strip that shows a slot, with nothing below it; None where that is full."""
     if len(slot.users) != 1 or None in slot.strips or len(slot.strips) != 1:
         return None
     data = slot.users[0].animation_data
@@ -250,3 +257,19 @@ def _has_say(user: Transform, fcurve: bpy.types.FCurve) -> bool:
     if fcurve.modifiers or not has_keys:
         refuse_channel(user.name, fcurve)
     return has_keys
+
+
+def is_modified(fcurve: bpy.types.FCurve) -> bool:
+    """Return whether a channel that in-betweens can follow has something added to it."""
+    return any(is_added(modifier) and not modifier.mute for modifier in fcurve.modifiers)
+
+
+def added_values(binding: Binding, user: Transform, source: Source, frames: np.ndarray) -> np.ndarray:
+    """Return what modifiers add to the channels of a slot on these frames (m,) of its Action, shape (10, m)."""
+    added = np.zeros((10, len(frames)))
+    if source.modified:
+        native = source.values_at(source.held(frames))
+        for row in source.modified:
+            fcurve = binding.curves[user.channels[row]]
+            added[row] = [fcurve.evaluate(frame) for frame in frames.tolist()] - native[row]
+    return added

@@ -47,8 +47,7 @@ class WholeRig:
     """The distance that it slides now."""
 
     largest_error: float = 0.0
-    """The largest error of all bones that the tolerance is promised for, those without keys among them,
-    in the scene's units."""
+    """The largest error of all bones that the tolerance is promised for, with keys or without, in scene units."""
 
     not_promised: NotPromised = ALL_PROMISED
     """The bones that it is not promised for."""
@@ -95,9 +94,7 @@ class FewerKeys:
         largest_error: float,
         rig: WholeRig | None = None,
     ) -> FewerKeys:
-        """Return the plan from what was keyed to what is to be: values (k,) by the rows of components,
-        on frames (k,).
-        """
+        """Return the plan from what was keyed to what is to be: values (k,) by rows of components, on frames (k,)."""
         key_frames = distinct(fewer.keyed_frames)
         return cls(
             binding,
@@ -189,9 +186,7 @@ def with_best_modes(
     rounding: float,
     allowed: float,
 ) -> Source:
-    """Return the source with the best mode in each segment,
-    of those that keep within what is allowed on these frames.
-    """
+    """Return the source with the best mode in each segment, of those within what is allowed on these frames."""
     keys = distinct(source.keyed_frames)
     numbers = np.array([source.mode, *(mode.number for mode in KEYFRAME_MODES.values() if mode.number != source.mode)])
     alike = [shown(transform, replace(source, mode=int(number)), frames)[0] for number in numbers]
@@ -233,9 +228,7 @@ def samples_of(source: Source) -> np.ndarray:
 
 
 def seen_frames(frames: np.ndarray, sources: Sequence[Source]) -> np.ndarray:
-    """Return these frames and all whole ones that are seen: between them,
-    and outside of the keys where something goes on.
-    """
+    """Return these frames and all whole ones that are seen: between them, and outside of keys that go on."""
     first, last = min(source.seen_range[0] for source in sources), max(source.seen_range[1] for source in sources)
     return np.union1d(frames, np.arange(np.floor(first), np.ceil(last) + 1.0))
 
@@ -252,9 +245,7 @@ def goes_elsewhere(name: str) -> Refused:
 
 
 def values_on(transform: Transform, source: Source, frames: np.ndarray) -> dict[int, np.ndarray]:
-    """Return what the channels that get other keys have on these frames, each (n,),
-    by their rows among the components.
-    """
+    """Return what the channels that get other keys have on these frames, each (n,), by the rows of components."""
     by_path = channel_values(transform, source, in_betweens(source, frames))
     if SCALE in source.keyed and not source.uniform_scale:
         scale = source.values_at(frames)[ROWS[SCALE]].T

@@ -58,8 +58,7 @@ LEAST_SCALE = 1e-6
 """The scale that the search takes for one of zero."""
 
 Plans = dict[Transform, "list[FewerKeys] | Refused"]
-"""The keys that each bone is to have in each slot that moves it, or why it cannot have them;
-and rigs with keys of their own."""
+"""The keys that bones, and rigs with keys, are to have in each slot that moves them; or why they cannot."""
 
 _Members = dict[Transform, tuple[Binding, Source]]
 

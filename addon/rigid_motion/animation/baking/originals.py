@@ -259,9 +259,7 @@ def discard_originals(transform: Transform, kind: str) -> None:
 
 
 def _copy_of(rig: bpy.types.Object, slot: Slot) -> bpy.types.Action | None:
-    """Return the Action that a rig moves by and that has other keys for parts of it,
-    which this slot has from before.
-    """
+    """Return the Action with other keys for parts of this slot that a rig moves by, None where there is none yet."""
     noted = {entry.changed for entry in _entries(rig) if entry.original == slot.action}
     # One that somebody has put the original in place of by hand is not used any more.
     return next((item for item in noted if used_in(rig, item) is not None and in_action(item, slot) is not None), None)

@@ -17,8 +17,7 @@ from bpy.app.translations import pgettext_n as n_
 
 from ...motion import Poses, interpolate
 from ..actions.channels import KeyFields, key_fields, set_key_fields
-from ..actions.modifiers import added_values
-from ..actions.reading import read
+from ..actions.reading import added_values, read
 from ..actions.refusals import refuse_linked
 from ..actions.slots import Binding, read_again
 from ..compute.bodies import body_poses
@@ -32,9 +31,9 @@ from ..live.kept_timing import nearest_key
 from ..live.segment_keys import share_out_turns
 from ..queries.keyed import active_binding
 from ..queries.segments import frame_in_action
-from ..queries.visible_pose import shown_components
 from ..transforms import Channel, Refused, Transform
 from ..writers.channel_values import components_near
+from ..writers.table import shown_components
 from .apply import Readings, Targets, apply_edit, readable
 
 BREAKDOWN, PUSH, RELAX = KINDS = ("BREAKDOWN", "PUSH", "RELAX")
@@ -51,20 +50,13 @@ def breakdown(
 
     Parameters
     ----------
-    targets : bpy.types.Object or bpy.types.PoseBone, or several of them
+    targets, refused
+        See `apply`.
     factor : float
         For BREAKDOWN 0 is the pose of the key before, 1 that of the key after, and beyond that the motion goes on. For
         RELAX 0 is the pose that is seen and 1 the in-between of the mode; PUSH goes as far in the other direction.
     kind : str
         One of `KINDS`.
-    refused : list, optional
-        Takes the refusals, and all other targets are keyed.
-
-    Raises
-    ------
-    Refused
-        Where there are no keys on both sides of the frame, or rigid motion cannot act, and there is no list to take
-        that. Nothing is changed then.
     """
     Breakdowns(targets, kind, refused=refused).apply(factor)
 
@@ -198,7 +190,7 @@ class Breakdowns:
     @contextmanager
     def _edit(self) -> Iterator[None]:
         """Give all their keys back, edit them, and refresh."""
-        with follower.paused():
+        with follower.follower.turn():
             for between in self._between:
                 between.put_back()
             yield

@@ -1,4 +1,4 @@
-"""The kinds of what is moved: objects and pose bones. Each is a class, a row of `KINDS`, and one in `writers.table`.
+"""The kinds of what is moved: objects and pose bones. Each is a class, and a row in `writers.table`.
 
 What the in-betweens of objects differ in goes into delta transforms, or is put on top of them by a constraint. An
 object may have delta transforms of its own: those it had before any in-betweens are its *original* ones. They are
@@ -28,8 +28,7 @@ CONSTRAINT = "Rigid Motion"
 """The name of the constraint, and the beginning of its name where Actions of one rig need one each."""
 
 NEAR = 1e-4
-"""Matrices of bones that differ by less are the same,
-having been through the space of the rig in single precision."""
+"""Matrices of bones that differ by less are the same, in single precision by way of the rig."""
 
 _BONE = re.compile(r'pose\.bones\["((?:[^"\\]|\\.)*)"\]\.')
 
@@ -51,7 +50,6 @@ _CHANNELS = [(path, index) for path in ORIGINALS for index in range(4 if path.en
 class BoneTransform(Transform):
     """A pose bone. The difference is put on top of it by a constraint."""
 
-    carrier_type = bpy.types.PoseBone
     is_part = True
     has_difference_slot = True
     label = n_("Bone", OWN_WORDS)
@@ -78,25 +76,12 @@ class BoneTransform(Transform):
         self.animated, self.carrier, self.prefix = bone.id_data, bone, prefix_of(bone.name)
 
     @classmethod
-    def has_prefix(cls, prefix: str) -> bool:
-        return bool(bone_name(prefix))
-
-    @classmethod
-    def in_object(cls, obj: bpy.types.Object, prefix: str) -> BoneTransform | None:
-        bone = None if obj.pose is None else obj.pose.bones.get(bone_name(prefix))
-        return None if bone is None else cls(bone)
-
-    @classmethod
     def difference_group(cls, prefix: str) -> str:
         return bone_name(prefix)
 
     @property
     def name(self) -> str:
         return f"{self.animated.name}/{self.carrier.name}"
-
-    @property
-    def group(self) -> str:
-        return self.carrier.name
 
     @property
     def location_axes(self) -> np.ndarray | None:
@@ -113,9 +98,6 @@ class BoneTransform(Transform):
 
     def original(self) -> np.ndarray:
         return REST.copy()
-
-    def evaluated(self, depsgraph: bpy.types.Depsgraph) -> bpy.types.PoseBone | None:
-        return self.animated.evaluated_get(depsgraph).pose.bones.get(self.carrier.name)
 
     def is_as_seen(self, evaluated: bpy.types.PoseBone) -> bool:
         bone = self.carrier
@@ -169,7 +151,6 @@ def let_override_be_read(rig: bpy.types.Object) -> None:
 class ObjectTransform(Transform):
     """An object. The difference goes into its delta transforms."""
 
-    carrier_type = bpy.types.Object
     is_part = False
     has_difference_slot = False
     label = n_("Object", OWN_WORDS)
@@ -187,18 +168,6 @@ class ObjectTransform(Transform):
         self.animated = self.carrier = obj
 
     @classmethod
-    def has_prefix(cls, prefix: str) -> bool:
-        return not prefix
-
-    @classmethod
-    def of(cls, carrier: bpy.types.Object) -> ObjectTransform:
-        return ExactObjectTransform(carrier) if carrier.rigid_motion.is_exact else cls(carrier)
-
-    @classmethod
-    def in_object(cls, obj: bpy.types.Object, prefix: str) -> ObjectTransform:
-        return cls.of(obj)
-
-    @classmethod
     def together(cls, users: tuple[Transform, ...]) -> tuple[Transform, ...]:
         if any(user.has_difference_slot for user in users):
             return tuple(ExactObjectTransform(user.carrier) for user in users)
@@ -207,13 +176,6 @@ class ObjectTransform(Transform):
     @classmethod
     def difference_group(cls, prefix: str) -> str:
         return GROUP
-
-    @property
-    def group(self) -> str:
-        return GROUP
-
-    def evaluated(self, depsgraph: bpy.types.Depsgraph) -> bpy.types.Object:
-        return self.carrier.evaluated_get(depsgraph)
 
     def differences_for(self, rotation: str) -> dict[int, Channel]:
         return channels_under("delta_", rotation)
@@ -304,10 +266,6 @@ class ExactObjectTransform(ObjectTransform):
     has_difference_slot = True
     matrix_lacks_difference = False
 
-    @classmethod
-    def of(cls, carrier: bpy.types.Object) -> ObjectTransform:
-        return cls(carrier)
-
     def differences_for(self, rotation: str) -> dict[int, Channel]:
         return channels_under("", rotation)
 
@@ -331,26 +289,25 @@ def default_of(path: str) -> tuple[float, ...]:
     return tuple(bpy.types.Object.bl_rna.properties[path].default_array)
 
 
-KINDS: tuple[type[Transform], ...] = (BoneTransform, ObjectTransform, ExactObjectTransform)
-
-
 def transform_of(carrier: bpy.types.Object | bpy.types.PoseBone | Transform) -> Transform:
     """Return the transform of something that Blender has, where it is none already."""
     if isinstance(carrier, Transform):
         return carrier
-    for kind in KINDS:
-        if isinstance(carrier, kind.carrier_type):
-            return kind.of(carrier)
+    if isinstance(carrier, bpy.types.PoseBone):
+        return BoneTransform(carrier)
+    if isinstance(carrier, bpy.types.Object):
+        return ExactObjectTransform(carrier) if carrier.rigid_motion.is_exact else ObjectTransform(carrier)
     raise TypeError(f"neither an object nor a pose bone: {carrier!r}")
 
 
-@lru_cache(maxsize=65536)
-def kind_of(prefix: str) -> type[Transform] | None:
-    """Return the kind of what data paths that begin so lead to, None where no kind has such paths."""
-    return next((kind for kind in KINDS if kind.has_prefix(prefix)), None)
+def transform_in(obj: bpy.types.Object, prefix: str) -> Transform | None:
+    """Return what data paths that begin so lead to in an object, None where it has no such thing."""
+    if not prefix:
+        return transform_of(obj)
+    bone = None if obj.pose is None else obj.pose.bones.get(bone_name(prefix))
+    return None if bone is None else BoneTransform(bone)
 
 
 def is_part(prefix: str) -> bool:
     """Return whether data paths that begin so lead to a part of a data-block."""
-    kind = kind_of(prefix)
-    return kind is not None and kind.is_part
+    return bool(bone_name(prefix))

@@ -32,9 +32,7 @@ def constraint_of(user: Transform, binding: Binding) -> bpy.types.ActionConstrai
 
 
 def shown_by(constraint: bpy.types.ActionConstraint) -> tuple[bpy.types.Action | None, int]:
-    """Return the Action and the handle of the slot in it that a constraint shows,
-    or will when its rig leaves Edit Mode.
-    """
+    """Return the Action and the handle of the slot that a constraint shows, or will outside of Edit Mode."""
     handle = constraint.action_slot_handle
     if not handle and constraint.id_data.mode == "EDIT" and (slot := _last_slot(constraint)) is not None:
         handle = slot.handle
@@ -85,9 +83,7 @@ def has_constraint(user: Transform, binding: Binding) -> bool:
 
 
 def has_stale_constraint(user: BoneTransform, binding: Binding) -> bool:
-    """Return whether a bone has a constraint that shows what is shown already,
-    or what does not move its rig any more.
-    """
+    """Return whether a bone has a constraint that shows what another does, or what does not move its rig any more."""
     shown = [shown_by(constraint) for constraint in user.carrier.constraints if shows_differences(constraint)]
     if not shown or shown == [slot_of_differences(binding)]:
         return False

@@ -82,8 +82,7 @@ class Layout:
     is_ring: bool = False
 
     shift: int = 0
-    """The number of frames that the samples lie later than they are seen,
-    where they are looked up by a time of their own."""
+    """The frames by which samples lie later than they are seen, where a time of their own looks them up."""
 
     is_apart: bool = False
     """True if they are: it is that which repeats and holds, then."""
@@ -103,9 +102,7 @@ class Layout:
 
     @classmethod
     def apart(cls, source: Source, rate: int) -> Layout:
-        """Return the layout in an F-curve that is looked up by a time of its own,
-        which goes round where the channels do.
-        """
+        """Return the layout in an F-curve that a time of its own looks up, which goes round where the channels do."""
         first, last = source.sample_range(rate)
         cycles = source.cyclic.cycles if source.repeats else None
         shift, steps = max(0, -source.frame_range[0]), source.steps
@@ -318,7 +315,7 @@ def regroup(binding: Binding) -> None:
     rows = recorded_rows(binding)
     if len(binding.filled) >= len(rows):
         return
-    channelbag, group = binding.home
+    channelbag = binding.home
     if channelbag is None:
         return
     rotations = ("rotation_quaternion", "rotation_euler")
@@ -326,7 +323,7 @@ def regroup(binding: Binding) -> None:
     for channel in {of_rotation[row] for of_rotation in channels for row in rows if row in of_rotation}:
         fcurve = channelbag.fcurves.find(channel[0], index=channel[1])
         if fcurve is not None and channel not in binding.filled and not fcurve.keyframe_points:
-            hide_fcurve(fcurve, ensure_group(channelbag, group))
+            hide_fcurve(fcurve, ensure_group(channelbag, binding.group))
             binding.has_filled({**binding.filled, channel: fcurve})
 
 
