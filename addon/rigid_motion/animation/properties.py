@@ -76,11 +76,11 @@ class SlotRecord(bpy.types.PropertyGroup):
         translation_context=OWN_WORDS,
         update=_on_turns_axis,
     )
-    constraint: StringProperty(
-        description="What the constraint of a bone is called, where that is not its usual name", options={"HIDDEN"}
-    )
-    rate: IntProperty(description="How many samples a frame the in-betweens have", default=1, options={"HIDDEN"})
-    error: FloatProperty(description="How far off they are between samples, in Blender's units", options={"HIDDEN"})
+    # What the constraint of a bone is called, where that is not its usual name.
+    constraint: StringProperty(options={"HIDDEN"})
+    # How many samples a frame the in-betweens have, and how far off they are between these, in Blender's units.
+    rate: IntProperty(default=1, options={"HIDDEN"})
+    error: FloatProperty(options={"HIDDEN"})
 
 
 class BoneSlot(bpy.types.PropertyGroup):
@@ -93,27 +93,19 @@ class BoneSlot(bpy.types.PropertyGroup):
 class ActionMotion(bpy.types.PropertyGroup):
     slots: CollectionProperty(type=SlotRecord)
     bone_slots: CollectionProperty(type=BoneSlot)
-    range_is_set_here: BoolProperty(
-        description="Whether the manual frame range was set for samples that lie behind the keys",
-        options={"HIDDEN"},
-    )
-    has_longer: BoolProperty(
-        description="Whether samples lie outside of the keys that they are for, within those of others or not",
-        options={"HIDDEN"},
-    )
-    is_draft: BoolProperty(
-        description="Whether in-betweens of bones have one sample a frame, until more are needed", options={"HIDDEN"}
-    )
+    # Whether the manual frame range was set for samples that lie behind the keys.
+    range_is_set_here: BoolProperty(options={"HIDDEN"})
+    # Whether samples lie outside of the keys that they are for, within those of others or not.
+    has_longer: BoolProperty(options={"HIDDEN"})
+    # Whether in-betweens of bones have one sample a frame, until more are needed.
+    is_draft: BoolProperty(options={"HIDDEN"})
 
 
 class ChangedAction(bpy.types.PropertyGroup):
     """A copy of an Action that was given other keys, and what it is a copy of."""
 
     kind: EnumProperty(
-        items=[
-            (BAKED, "Baked", "It has keys for in-betweens too"),
-            (REDUCED, "Reduced", "It has few of the keys"),
-        ],
+        items=[(BAKED, "Baked", "It has keys for in-betweens too"), (REDUCED, "Reduced", "It has few of the keys")],
         options={"HIDDEN"},
     )
     changed: PointerProperty(type=bpy.types.Action)
@@ -181,36 +173,23 @@ class _Motion:
         override={"LIBRARY_OVERRIDABLE"},
         update=_on_turns,
     )
-    awaited: EnumProperty(
-        description="The mode that was chosen before there was an Action to keep it",
-        items=MODE_ITEMS,
-        **KEPT,
-    )
-    mounted: StringProperty(
-        description="The constraints that it was given. Who takes one off does so on purpose",
-        **KEPT,
-    )
+    # The mode that was chosen before there was an Action to keep it.
+    awaited: EnumProperty(items=MODE_ITEMS, **KEPT)
+    # The constraints that it was given. Who takes one off does so on purpose.
+    mounted: StringProperty(**KEPT)
     bakes: CollectionProperty(type=ChangedAction, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"})
 
 
 class BoneMotion(_Motion, bpy.types.PropertyGroup):
-    recorded_as: StringProperty(
-        description="The name that Actions have records of the bone under. Where it has another, it was renamed",
-        **KEPT,
-    )
+    # The name that Actions have records of the bone under. Where it has another, it was renamed.
+    recorded_as: StringProperty(**KEPT)
 
 
 class ObjectMotion(_Motion, bpy.types.PropertyGroup):
-    is_exact: BoolProperty(
-        description="Whether in-betweens are exact between frames, by a constraint, and not in delta transforms",
-        **KEPT,
-    )
-    filled: BoolVectorProperty(
-        description="Which components of delta transforms in-betweens are in; the object's own are kept meanwhile",
-        size=13,
-        options=set(),
-        override={"LIBRARY_OVERRIDABLE"},
-    )
+    # Whether in-betweens are exact between frames, by a constraint, and not in delta transforms.
+    is_exact: BoolProperty(**KEPT)
+    # Which components of delta transforms in-betweens are in; the object's own are kept meanwhile.
+    filled: BoolVectorProperty(size=13, **KEPT)
     own_location: FloatVectorProperty(
         name="Delta Location",
         description="The object's own delta location, to which the in-betweens are added",
@@ -240,14 +219,10 @@ class ObjectMotion(_Motion, bpy.types.PropertyGroup):
         subtype="XYZ",
         **ORIGINAL,
     )
-    has_bones: BoolProperty(
-        description="Whether bones have modes, or constraints for them",
-        **KEPT,
-    )
-    detached: BoolProperty(
-        description="Whether the constraints of bones show nothing, for as long as the rig is in Edit Mode",
-        **KEPT,
-    )
+    # Whether bones have modes, or constraints for them.
+    has_bones: BoolProperty(**KEPT)
+    # Whether the constraints of bones show nothing, for as long as the rig is in Edit Mode.
+    detached: BoolProperty(**KEPT)
 
 
 CLASSES = (SlotRecord, BoneSlot, ActionMotion, ChangedAction, BoneMotion, ObjectMotion)

@@ -189,11 +189,8 @@ def _copy_settings(source: bpy.types.bpy_struct, target: bpy.types.bpy_struct) -
     for prop in source.bl_rna.properties:
         if not prop.is_readonly and prop.type not in ("POINTER", "COLLECTION"):
             value = getattr(source, prop.identifier)
-            setattr(target, prop.identifier, value if isinstance(value, str) else _plain(value))
-
-
-def _plain(value: object) -> object:
-    return tuple(value) if hasattr(value, "__len__") else value
+            is_array = getattr(prop, "is_array", False)
+            setattr(target, prop.identifier, tuple(value) if is_array else value)
 
 
 def add_cycles(fcurve: bpy.types.FCurve, cycles: Cycles) -> None:

@@ -6,7 +6,8 @@ What modifiers add to a channel stays on top of the mode: its F-curve has it, an
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
@@ -160,20 +161,11 @@ def leading(binding: Binding, users: list[Source | Refused]) -> Source | Refused
     return max(readable, key=precedence)
 
 
-@dataclass(frozen=True)
-class _Keyed:
+class _Keyed(NamedTuple):
     """Which channels of a slot one of its users is moved by."""
-
-    user: Transform
-
-    names: frozenset[str]
-    """The parts of location, rotation and scale that are keyed."""
 
     channels: dict[int, bpy.types.FCurve]
     """The channels with keys, by the rows of their components."""
-
-    rest: dict[int, float]
-    """The values of the other components of what is keyed."""
 
     modes: list[bpy.types.FCurve]
     """The mode channel, if there is one with keys."""
@@ -181,11 +173,8 @@ class _Keyed:
     turns: list[bpy.types.FCurve]
     """The channel of turns likewise."""
 
-    modified: frozenset[int]
-    """The rows of channels that modifiers add something to."""
-
-    driven: frozenset[int]
-    """The rows of components that drivers move."""
+    others: dict[str, Any]
+    """What else a `Source` has of it."""
 
 
 def _keyed_for(user: Transform, binding: Binding, drivers: Collection[Channel]) -> _Keyed:
@@ -213,8 +202,23 @@ def _keyed_for(user: Transform, binding: Binding, drivers: Collection[Channel]) 
         [fcurve] if (fcurve := binding.curves.get(channel)) is not None and _has_say(user, fcurve) else []
         for channel in (user.mode_channel, user.turns_channel)
     )
-    modified = frozenset(row for row in has_modifiers if is_modified(keyed[row]))
-    return _Keyed(user, names, keyed, rest, modes, turns, modified, driven)
+    original = user.original()
+    # Delta transforms of its own would be blended along.
+    is_blended = not user.has_difference_slot and np.array_equal(original, REST)
+    others = {
+        "order": user.order,
+        "keyed": names,
+        "rest": rest,
+        "original": original,
+        "location_axes": user.location_axes,
+        "turns_axis": recorded(binding).turns_axis,
+        "in_nla": binding.slot.in_nla,
+        "modified": frozenset(row for row in has_modifiers if is_modified(keyed[row])),
+        "driven": driven,
+        "influence": influence_of(binding.slot) if is_blended else None,
+        "is_on_top": user.has_difference_slot,
+    }
+    return _Keyed(keyed, modes, turns, others)
 
 
 def _source(
@@ -225,27 +229,13 @@ def _source(
     turns: list[tuple[list[int], Keys]],
 ) -> Source:
     """Return what is keyed in a slot, as one of its users has it, from the keys that were read of its channels."""
-    user, rows = keyed.user, list(keyed.channels)
-    goes_on = any(keys.linear or keys.cycles is not None for _, keys in channels)
-    original = user.original()
-    # Delta transforms of its own would be blended along.
-    is_blended = not user.has_difference_slot and np.array_equal(original, REST)
+    rows, goes_on = list(keyed.channels), any(keys.linear or keys.cycles is not None for _, keys in channels)
     return Source(
-        order=user.order,
-        keyed=keyed.names,
         channels=tuple(([rows[number] for number in numbers], keys) for numbers, keys in channels),
-        rest=keyed.rest,
-        original=original,
-        location_axes=user.location_axes,
         mode=modes[0][1] if modes else recorded_mode(binding),
         turns=turns[0][1] if turns else None,
-        turns_axis=recorded(binding).turns_axis,
-        in_nla=binding.slot.in_nla,
         seen=binding.slot.seen if goes_on else None,
-        modified=keyed.modified,
-        driven=keyed.driven,
-        influence=influence_of(binding.slot) if is_blended else None,
-        is_on_top=user.has_difference_slot,
+        **keyed.others,
     )
 
 

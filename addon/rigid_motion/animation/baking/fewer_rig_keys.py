@@ -195,7 +195,7 @@ class _Rig:
             if len(distinct(fewer.keyed_frames)) >= len(distinct(source.keyed_frames)):
                 fewer = source
             self.motion.carry(fewer)
-            return FewerKeys.planned(transform, binding, source, fewer, self.frames[keys], values, 0.0)
+            return FewerKeys(binding, source, fewer, self.frames[keys], values, 0.0)
         share = SHARE * self.tolerance / self.weights.max()
         reach = self.motion.extent * scale_in_scene(transform)
         plan = fewer_keys(transform, binding, source, mode, share, reach, best_of=best_of, more_frames=self.frames)
@@ -284,8 +284,7 @@ class _Rig:
             excepted,
         )
         return {
-            self.targets[number]: FewerKeys.planned(
-                self.targets[number],
+            self.targets[number]: FewerKeys(
                 self.bindings[number],
                 self.sources[number],
                 source,

@@ -251,19 +251,19 @@ def discard_dense_keys(targets: Targets, *, refused: list[Refused] | None = None
 def _write(transform: Transform, fewer: FewerKeys) -> None:
     channel_keys = _channel_keys(fewer.binding)
     copy = move_by_copy(transform, fewer.binding, REDUCED)
-    for channel, values in fewer.values.items():
-        fcurve = copy.ensure_curve(channel)
+    for row, values in fewer.values.items():
+        fcurve = copy.ensure_curve(transform.channels[row])
         replace_keys(fcurve, fewer.frames, values, handle_type="AUTO_CLAMPED")
         fcurve.mute = False
     for channel in (transform.mode_channel, transform.turns_channel):
         if channel in copy.curves:
             copy.channelbag.fcurves.remove(copy.curves.pop(channel))
-    modes = np.unique(fewer.modes).tolist()
-    if len(modes) == 1:
+    modes = fewer.modes
+    if np.ptp(modes) == 0:
         set_whole(copy, MODE_NAMES[modes[0]])
     else:
-        for mode in modes:
-            set_mode_in(copy, MODE_NAMES[mode], fewer.key_frames[fewer.modes == mode])
+        for mode in np.unique(modes).tolist():
+            set_mode_in(copy, MODE_NAMES[mode], fewer.key_frames[modes == mode])
     keys = channel_keys, _channel_keys(copy)
     reduction = Reduction(fewer.before, len(fewer.key_frames), fewer.largest_error, {}, fewer.rig, keys)
     transform.motion.bakes[-1].reduction = json.dumps(asdict(reduction))
