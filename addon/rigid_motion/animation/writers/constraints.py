@@ -48,7 +48,7 @@ AT_REST = "Rigid Motion Rest"
 
 class ConstraintWriter(Writer):
     def layout(self, source: Source, rate: int) -> Layout:
-        return Layout.apart(source, rate)
+        return Layout.of(source, rate, is_apart=True)
 
     def most_samples(self, source: Source) -> int:
         return most_samples(source)

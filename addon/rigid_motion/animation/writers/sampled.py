@@ -94,20 +94,15 @@ class Layout:
     """The number of samples in a frame, where they are apart: then the F-curve is as many times as long."""
 
     @classmethod
-    def of(cls, source: Source) -> Layout:
-        """Return the layout in an F-curve that is read as the frames pass."""
-        first, last = source.frame_range
-        cycles = source.cyclic.cycles if source.repeats else None
-        return cls(first, last, _ends(source, first, last), cycles, first < 0 and cycles is None, steps=source.steps)
-
-    @classmethod
-    def apart(cls, source: Source, rate: int) -> Layout:
-        """Return the layout in an F-curve that a time of its own looks up, which goes round where the channels do."""
+    def of(cls, source: Source, rate: int = 1, *, is_apart: bool = False) -> Layout:
+        """Return the layout in an F-curve that is read as the frames pass, or that a time of its own looks up."""
         first, last = source.sample_range(rate)
         cycles = source.cyclic.cycles if source.repeats else None
-        shift, steps = max(0, -source.frame_range[0]), source.steps
+        is_ring, shift = first < 0 and cycles is None, max(0, -source.frame_range[0])
         ends = _ends(source, first / rate, last / rate)
-        return cls(first, last, ends, cycles, shift=shift, is_apart=True, steps=steps, rate=rate)
+        return cls(
+            first, last, ends, cycles, is_ring and not is_apart, shift if is_apart else 0, is_apart, source.steps, rate
+        )
 
     @property
     def frames(self) -> tuple[int, int]:
