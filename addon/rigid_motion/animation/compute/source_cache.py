@@ -52,7 +52,8 @@ def clear() -> None:
 
 def size_of(source: Source) -> int:
     """Return about how many bytes a source has."""
-    return sum(len(keys.raw) for keys in source.curves)
+    arrays = (array for keys in source.curves for array in vars(keys).values())
+    return sum(array.nbytes for array in arrays if isinstance(array, np.ndarray))
 
 
 def changed_range(old: Source, new: Source) -> tuple[int, int] | None:
@@ -95,16 +96,17 @@ def _changed(old: Keys, new: Keys) -> tuple[float, float] | None:
     These are the nearest keys before and behind that are the same; (inf, -inf) where all are, None where there is no
     telling.
     """
-    if old.raw == new.raw:
+    before, after = _numbers(old), _numbers(new)
+    if before.tobytes() == after.tobytes():
         return np.inf, -np.inf
-    before, after = _by_key(old), _by_key(new)
-    if before.shape[1] != after.shape[1]:
+    if (len(before), before.shape[2]) != (len(after), after.shape[2]):
         return None
-    count = min(len(before), len(after))
-    leading, trailing = (
-        int(np.argmin(np.append((before[part] == after[part]).all(axis=1)[::step], False)))
-        for part, step in ((slice(0, count), 1), (slice(-count, None), -1))
+    count = min(before.shape[1], after.shape[1])
+    from_start, from_end = (
+        (before[:, part] != after[:, part]).any(axis=(0, 2)) for part in (slice(0, count), slice(-count, None))
     )
+    leading = int(from_start.argmax()) if from_start.any() else count
+    trailing = int(from_end[::-1].argmax()) if from_end.any() else count
     trailing = min(trailing, count - leading)
     return (
         float(new.times[leading - 1]) if leading else -np.inf,
@@ -112,10 +114,9 @@ def _changed(old: Keys, new: Keys) -> tuple[float, float] | None:
     )
 
 
-def _by_key(keys: Keys) -> np.ndarray:
-    """Return all there is to each of n keys as bytes, shape (n, bytes)."""
-    parts = [part for part in (keys.points, keys.left, keys.right) if part is not None]
-    rows = [part.swapaxes(0, 1) for part in (*parts, keys.interpolation)]
+def _numbers(keys: Keys) -> np.ndarray:
+    """Return all there is to n keys of c channels, shape (c, n, numbers)."""
+    arrays = [keys.points, keys.left, keys.right, keys.interpolation[..., None]]
     if keys.easing is not None:
-        rows += [keys.easing.T, np.moveaxis(keys.easing_settings, 2, 0)]
-    return np.concatenate([np.ascontiguousarray(row).reshape(len(row), -1).view(np.uint8) for row in rows], axis=1)
+        arrays += [keys.easing[..., None], np.moveaxis(keys.easing_settings, 0, 2)]
+    return np.concatenate([array for array in arrays if array is not None], axis=2)

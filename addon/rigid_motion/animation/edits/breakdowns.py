@@ -83,11 +83,8 @@ class _Between:
     properties: dict[str, tuple[float, ...]]
     """Its properties as they were, keyed or not."""
 
-    keys: dict[Channel, KeyFields]
-    """The keys of its channels as they were."""
-
-    turns: KeyFields | None
-    """The keys of its channel of turns, None where it has none."""
+    keys: dict[Channel, KeyFields | None]
+    """The keys of its channels as they were, and of that of turns; None where there is none."""
 
     @property
     def mode(self) -> str:
@@ -126,12 +123,10 @@ class _Between:
     def put_back(self) -> None:
         """Give its channels the keys that they had."""
         for channel, fields in self.keys.items():
-            set_key_fields(self.binding.curves[channel], fields)
-        channel = self.transform.turns_channel
-        if self.turns is not None:
-            set_key_fields(self.binding.ensure_curve(channel), self.turns)
-        elif channel in self.binding.curves:
-            self.binding.channelbag.fcurves.remove(self.binding.curves.pop(channel))
+            if fields is not None:
+                set_key_fields(self.binding.ensure_curve(channel), fields)
+            elif channel in self.binding.curves:
+                self.binding.channelbag.fcurves.remove(self.binding.curves.pop(channel))
 
     def key(self, kind: str, factor: float) -> None:
         """Set a key of the pose in all channels that have keys, and share out the turns of the segment.
@@ -220,7 +215,8 @@ class Breakdowns:
         keys = source.key_frames
         after = int(np.searchsorted(keys, frame))
         seen = shown_components(transform)
-        keyed = [transform.channels[row] for rows, _ in source.channels for row in rows]
+        keyed = [*(transform.channels[row] for rows, _ in source.channels for row in rows), transform.turns_channel]
+        curves = {channel: binding.curves.get(channel) for channel in keyed}
         return _Between(
             transform,
             binding,
@@ -229,8 +225,7 @@ class Breakdowns:
             (float(keys[after - 1]), float(keys[after])),
             (transform.components() if seen is None else seen) - added,
             {name: tuple(getattr(transform.carrier, name)) for name in transform.properties.values()},
-            {channel: key_fields(binding.curves[channel]) for channel in keyed},
-            None if (turns := binding.curves.get(transform.turns_channel)) is None else key_fields(turns),
+            {channel: None if fcurve is None else key_fields(fcurve) for channel, fcurve in curves.items()},
         )
 
 

@@ -164,9 +164,9 @@ class Snapshots:
         """
         before = self._rigs.get(rig.session_uid)
         now, bones = _Poses(rig, None if is_set or before is None else before[1]), rig.pose.bones
-        shared = _Dependencies.of(rig, None if before is None else before[0])
+        shared = _Dependencies.of(rig)
         self._rigs[rig.session_uid] = shared, now, frame
-        if before is None or not shared.is_as(before[0]) or before[1].names != now.names:
+        if before is None or shared != before[0] or before[1].names != now.names:
             left = set() if before is None else dict(before[0].moved_by).keys() - dict(shared.moved_by).keys()
             return [*bones, *(bone for other in _users_of(left) for bone in other.pose.bones)]
         changed = now.changed_from(before[1])
@@ -294,28 +294,17 @@ class _Dependencies(NamedTuple):
     moved_by: list[tuple[tuple[int, int], list[str]]]
     """The slots, and the strips that show them."""
 
-    counts: list[int]
-    """The number of users of each Action, constraints among them. While these stay, so do those of the slots."""
-
     users: list[tuple]
     """The users of each slot, and whether any of them has an NLA."""
 
     rest: bytes
 
     @classmethod
-    def of(cls, rig: bpy.types.Object, before: _Dependencies | None) -> _Dependencies:
-        slots = slots_alone(rig)
-        moved_by = [((slot.action.as_pointer(), slot.handle), sorted(map(str, slot.strips))) for slot in slots]
-        counts = [slot.action.users for slot in slots]
-        if before is not None and (before.moved_by, before.counts) == (moved_by, counts):
-            users = before.users
-        else:
-            users = [(slot.in_nla, *(user.session_uid for user in slot.users)) for slot in slots_of([rig])]
-        return cls(moved_by, counts, users, _rest_of(rig.data.bones))
-
-    def is_as(self, other: _Dependencies) -> bool:
-        """Return whether the bones depend on the same, however many constraints there are."""
-        return (self.moved_by, self.users, self.rest) == (other.moved_by, other.users, other.rest)
+    def of(cls, rig: bpy.types.Object) -> _Dependencies:
+        alone = slots_alone(rig)
+        moved_by = [((slot.action.as_pointer(), slot.handle), sorted(map(str, slot.strips))) for slot in alone]
+        users = [(slot.in_nla, *(user.session_uid for user in slot.users)) for slot in slots_of([rig])]
+        return cls(moved_by, users, _rest_of(rig.data.bones))
 
 
 def _users_of(keys: set[tuple[int, int]]) -> set[bpy.types.Object]:
