@@ -58,10 +58,9 @@ def bake_poses(obj: bpy.types.Object, frames: np.ndarray, poses: Poses, *, key_t
     """
     if poses.shape != np.shape(frames):
         raise ValueError(f"{obj.name}: {np.shape(frames)} frames do not fit poses of shape {poses.shape}")
-    transform, quaternions = ObjectTransform(obj), poses.quaternions
-    is_euler = transform.order is not None
-    turns = extrinsic_eulers_from_quaternions(quaternions, transform.order) if is_euler else align_signs(quaternions)
-    channels = [("location", poses.positions), (transform.rotation, turns)]
+    order, quaternions = ObjectTransform(obj).order, poses.quaternions
+    turns = align_signs(quaternions) if order is None else extrinsic_eulers_from_quaternions(quaternions, order)
+    channels = [("location", poses.positions), (ObjectTransform(obj).rotation, turns)]
     if poses.scales is not None:
         channels.append(("scale", np.repeat(poses.scales[:, None], 3, axis=1)))
     for data_path, values in channels:
