@@ -91,7 +91,7 @@ def test_euler_objects_of_every_order_take_the_same_poses(empty, order):
 
 def test_an_object_that_turns_by_axis_and_angle_is_refused_untouched(empty):
     empty.rotation_mode = "AXIS_ANGLE"
-    with pytest.raises(ValueError, match="Tool: rotation by axis and angle"):
+    with pytest.raises(ValueError, match="Tool turns by axis and angle"):
         bake_poses(empty, *motion())
     assert empty.animation_data is None
 

@@ -174,7 +174,7 @@ def garbage_records(obj: bpy.types.Object) -> None:
 
 def right_record_without_deltas(obj: bpy.types.Object) -> None:
     without_deltas()(obj)
-    obj.rigid_motion.filled = (False,) * 4
+    obj.rigid_motion.filled = (False,) * 13
 
 
 def no_records(obj: bpy.types.Object) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from rigid_motion import animation
-from rigid_motion.animation.transforms import KINDS
+from rigid_motion.animation.writers.table import WRITERS
 
 HOUSE = Path(animation.__file__).parent
 OUTSIDE = {"handlers", "gltf_export"}
@@ -108,7 +108,7 @@ def guesses(path: Path) -> list[int]:
             tested = [node.operand]
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "isinstance":
             names = {name.id for name in ast.walk(node.args[1]) if isinstance(name, ast.Name)}
-            result += [node.lineno] if names & {kind.__name__ for kind in KINDS} else []
+            result += [node.lineno] if names & {kind.__name__ for kind in WRITERS} else []
             continue
         else:
             continue

@@ -180,3 +180,9 @@ def test_what_is_baked_plays_alike_on_a_farm_and_can_be_un_baked_after_it_saved_
     assert [snapshot(obj), snapshot(rig)] == keys
     assert_shown([obj], PLAYED, owns)
     assert_posed(rig, PLAYED)
+
+
+def test_the_numbers_of_modes_in_files_stay_what_they_are(live_file):
+    items = bpy.data.objects.new("Any", None).rigid_motion.bl_rna.properties["mode"].enum_items
+    numbers = {item.identifier: item.value for item in items}
+    assert numbers == {"BLENDER": 0, **{name: mode.number for name, mode in KEYFRAME_MODES.items()}}

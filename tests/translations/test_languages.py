@@ -17,9 +17,6 @@ LANGUAGES = translations.languages()
 GERMAN = LANGUAGES["de"]
 
 UNSEEN = {
-    "How many samples a frame the in-betweens have",
-    "How far off they are between samples, in Blender's units",
-    "Whether in-betweens are exact between frames, by a constraint, and not in delta transforms",
     "Rigid Motion Rest",
     # Names in files and in Blender's own interface
     " Live",
@@ -36,25 +33,9 @@ UNSEEN = {
     "Object > ",
     "Pose > ",
     # Descriptions of properties that are kept in files and never drawn
-    "What the constraint of a bone is called, where that is not its usual name",
-    "Whether the manual frame range was set for samples that lie behind the keys",
-    "Whether samples lie outside of the keys that they are for, within those of others or not",
-    "Whether in-betweens of bones have one sample a frame, until more are needed",
     "It has keys for in-betweens too",
     "It has few of the keys",
-    "How far the reduced motion is off where it is furthest, in Blender's units",
-    "On how many frames any bone of the rig has keys",
-    "How many keys all channels had together",
-    "How many keys all channels have together",
     "The tolerance that was offered last, for as long as nobody sets another",
-    "How far what stands on the ground slid there",
-    "How far it slides there with fewer keys",
-    "The mode that was chosen before there was an Action to keep it",
-    "The constraints that it was given. Who takes one off does so on purpose",
-    "The name that Actions have records of the bone under. Where it has another, it was renamed",
-    "Which components of them, as bits",
-    "Whether bones have modes, or constraints for them",
-    "Whether the constraints of bones show nothing, for as long as the rig is in Edit Mode",
     "File Filter",
     "Files that the dialog shows",
     "The rig that the table is for",
@@ -67,7 +48,6 @@ UNSEEN = {
     "What is selected cannot be sent",
     "The transform on the screen cannot be shown",
     "a mode for keyframes can look one key behind and ahead of a segment: see with_neighbours",
-    ": rotation by axis and angle cannot be baked; set its rotation mode to Quaternion first",
     " frames do not fit poses of shape ",
     "interpolation: LINEAR or CONSTANT, not ",
     "list[FewerKeys] | Refused",

@@ -1,8 +1,7 @@
 """What is kept in the file, on Actions and on objects. Without the extension all of it is inert, and stays in the file.
 
 An Action keeps the modes of what it moves: see `records`. An object or a pose bone shows its own, to be chosen and to
-be animated; an object keeps the delta transforms that it has without in-betweens. Files have the properties by the
-names that these were first given, so no property is ever renamed.
+be animated; an object keeps the delta transforms that it has without in-betweens.
 """
 
 from __future__ import annotations
@@ -77,11 +76,11 @@ class SlotRecord(bpy.types.PropertyGroup):
         translation_context=OWN_WORDS,
         update=_on_turns_axis,
     )
-    constraint: StringProperty(
-        description="What the constraint of a bone is called, where that is not its usual name", options={"HIDDEN"}
-    )
-    rate: IntProperty(description="How many samples a frame the in-betweens have", default=1, options={"HIDDEN"})
-    error: FloatProperty(description="How far off they are between samples, in Blender's units", options={"HIDDEN"})
+    # What the constraint of a bone is called, where that is not its usual name.
+    constraint: StringProperty(options={"HIDDEN"})
+    # How many samples a frame the in-betweens have, and how far off they are between these, in Blender's units.
+    rate: IntProperty(default=1, options={"HIDDEN"})
+    error: FloatProperty(options={"HIDDEN"})
 
 
 class BoneSlot(bpy.types.PropertyGroup):
@@ -94,57 +93,36 @@ class BoneSlot(bpy.types.PropertyGroup):
 class ActionMotion(bpy.types.PropertyGroup):
     slots: CollectionProperty(type=SlotRecord)
     bone_slots: CollectionProperty(type=BoneSlot)
-    range_is_set_here: BoolProperty(
-        description="Whether the manual frame range was set for samples that lie behind the keys",
-        options={"HIDDEN"},
-    )
-    has_longer: BoolProperty(
-        description="Whether samples lie outside of the keys that they are for, within those of others or not",
-        options={"HIDDEN"},
-    )
-    is_draft: BoolProperty(
-        description="Whether in-betweens of bones have one sample a frame, until more are needed", options={"HIDDEN"}
-    )
+    # Whether the manual frame range was set for samples that lie behind the keys.
+    range_is_set_here: BoolProperty(options={"HIDDEN"})
+    # Whether samples lie outside of the keys that they are for, within those of others or not.
+    has_longer: BoolProperty(options={"HIDDEN"})
+    # Whether in-betweens of bones have one sample a frame, until more are needed.
+    is_draft: BoolProperty(options={"HIDDEN"})
 
 
 class ChangedAction(bpy.types.PropertyGroup):
-    """A copy of an Action that was given other keys, what it is a copy of, and the mode that the object had then."""
+    """A copy of an Action that was given other keys, and what it is a copy of."""
 
     kind: EnumProperty(
-        items=[
-            (BAKED, "Baked", "It has keys for in-betweens too"),
-            (REDUCED, "Reduced", "It has few of the keys"),
-        ],
+        items=[(BAKED, "Baked", "It has keys for in-betweens too"), (REDUCED, "Reduced", "It has few of the keys")],
         options={"HIDDEN"},
     )
     changed: PointerProperty(type=bpy.types.Action)
     original: PointerProperty(type=bpy.types.Action)
-    mode: EnumProperty(items=MODE_ITEMS, options={"HIDDEN"})
     # What location, rotation and scale had when the copy was made: what had no keys gets it back.
     components: FloatVectorProperty(size=10, options={"HIDDEN"})
-    keys_before: IntProperty(options={"HIDDEN"})
-    keys_after: IntProperty(options={"HIDDEN"})
-    channel_keys_before: IntProperty(description="How many keys all channels had together", options={"HIDDEN"})
-    channel_keys_after: IntProperty(description="How many keys all channels have together", options={"HIDDEN"})
-    largest_error: FloatProperty(
-        description="How far the reduced motion is off where it is furthest, in Blender's units", options={"HIDDEN"}
-    )
-    frames_after: IntProperty(description="On how many frames any bone of the rig has keys", options={"HIDDEN"})
-    slide_before: FloatProperty(description="How far what stands on the ground slid there", options={"HIDDEN"})
-    slide_after: FloatProperty(description="How far it slides there with fewer keys", options={"HIDDEN"})
-    # Of all bones of the rig, in Blender's units.
-    largest_error_of_rig: FloatProperty(options={"HIDDEN"})
-    # JSON: the bones that follow constraints or drivers, and those that hang on them.
-    not_promised: StringProperty(options={"HIDDEN"})
+    # What became of its keys where they were reduced: a `Reduction` as JSON.
+    reduction: StringProperty(options={"HIDDEN"})
 
 
 def _on_mode(motion: ObjectMotion | BoneMotion, _context: bpy.types.Context) -> None:
-    if not follower.is_busy():
+    if not follower.follower.busy:
         mode_keys.on_property(_transform_with(motion))
 
 
 def _on_turns(motion: ObjectMotion | BoneMotion, _context: bpy.types.Context) -> None:
-    if not follower.is_busy():
+    if not follower.follower.busy:
         # What refuses to turn says so in the panel.
         with suppress(Refused):
             mode_keys.on_turns(_transform_with(motion))
@@ -195,40 +173,23 @@ class _Motion:
         override={"LIBRARY_OVERRIDABLE"},
         update=_on_turns,
     )
-    awaited: EnumProperty(
-        description="The mode that was chosen before there was an Action to keep it",
-        items=MODE_ITEMS,
-        **KEPT,
-    )
-    mounted: StringProperty(
-        description="The constraints that it was given. Who takes one off does so on purpose",
-        **KEPT,
-    )
+    # The mode that was chosen before there was an Action to keep it.
+    awaited: EnumProperty(items=MODE_ITEMS, **KEPT)
+    # The constraints that it was given. Who takes one off does so on purpose.
+    mounted: StringProperty(**KEPT)
     bakes: CollectionProperty(type=ChangedAction, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"})
 
 
 class BoneMotion(_Motion, bpy.types.PropertyGroup):
-    recorded_as: StringProperty(
-        description="The name that Actions have records of the bone under. Where it has another, it was renamed",
-        **KEPT,
-    )
+    # The name that Actions have records of the bone under. Where it has another, it was renamed.
+    recorded_as: StringProperty(**KEPT)
 
 
 class ObjectMotion(_Motion, bpy.types.PropertyGroup):
-    is_exact: BoolProperty(
-        description="Whether in-betweens are exact between frames, by a constraint, and not in delta transforms",
-        **KEPT,
-    )
-    filled: BoolVectorProperty(
-        description="Which delta transforms in-betweens are in; the object's own are kept here meanwhile",
-        size=4,
-        options=set(),
-        override={"LIBRARY_OVERRIDABLE"},
-    )
-    filled_components: IntProperty(
-        description="Which components of them, as bits",
-        **KEPT,
-    )
+    # Whether in-betweens are exact between frames, by a constraint, and not in delta transforms.
+    is_exact: BoolProperty(**KEPT)
+    # Which components of delta transforms in-betweens are in; the object's own are kept meanwhile.
+    filled: BoolVectorProperty(size=13, **KEPT)
     own_location: FloatVectorProperty(
         name="Delta Location",
         description="The object's own delta location, to which the in-betweens are added",
@@ -258,14 +219,10 @@ class ObjectMotion(_Motion, bpy.types.PropertyGroup):
         subtype="XYZ",
         **ORIGINAL,
     )
-    has_bones: BoolProperty(
-        description="Whether bones have modes, or constraints for them",
-        **KEPT,
-    )
-    detached: BoolProperty(
-        description="Whether the constraints of bones show nothing, for as long as the rig is in Edit Mode",
-        **KEPT,
-    )
+    # Whether bones have modes, or constraints for them.
+    has_bones: BoolProperty(**KEPT)
+    # Whether the constraints of bones show nothing, for as long as the rig is in Edit Mode.
+    detached: BoolProperty(**KEPT)
 
 
 CLASSES = (SlotRecord, BoneSlot, ActionMotion, ChangedAction, BoneMotion, ObjectMotion)

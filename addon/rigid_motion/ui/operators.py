@@ -15,7 +15,7 @@ from .. import animation
 from ..animation.actions.records import recorded
 from ..animation.baking.originals import BAKED
 from ..animation.edits.constraints import with_troubles
-from ..animation.live.follower import paused
+from ..animation.live.follower import follower
 from ..animation.properties import MODE_ITEMS, MOST_TURNS, SCREW_AXIS, TURN_AXIS_ITEMS
 from ..animation.queries.keyed import active_binding
 from ..animation.queries.polls import with_in_betweens, with_modes
@@ -261,7 +261,7 @@ class RIGID_MOTION_OT_set_mode(OnTargets, bpy.types.Operator):
     def _set(self, context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
         groups = grouped_by_frames(context, targets, self.on, refused)
         # Several groups are refreshed together behind the last; a single one is read only once by the verb itself.
-        with paused() if len(groups) > 1 else nullcontext():
+        with follower.turn() if len(groups) > 1 else nullcontext():
             for frames, group in groups.items():
                 animation.set_mode(group, self.mode, frames, refused=refused)
         if len(groups) > 1:

@@ -240,7 +240,7 @@ class _Delta(Folded):
                 text = axis if index else f"{label} {axis}"
                 # Where in-betweens are in a component, the object's own value is kept elsewhere.
                 if target.is_recorded([(path, index)]):
-                    column.prop(target.motion, ORIGINALS[path][0], index=index, text=text, translate=False)
+                    column.prop(target.motion, ORIGINALS[path], index=index, text=text, translate=False)
                 else:
                     column.prop(target.carrier, path, index=index, text=text, translate=False)
 

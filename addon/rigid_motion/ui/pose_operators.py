@@ -35,8 +35,8 @@ from bpy.props import EnumProperty
 
 from ..animation.live.follower import show_seen_in_channels
 from ..animation.queries.polls import with_in_betweens
-from ..animation.queries.visible_pose import shown_components
 from ..animation.transforms import Refused, Transform, transform_of
+from ..animation.writers.table import shown_components
 from .targets import selected
 
 ON_NO_IN_BETWEEN = n_("No selected bone is on an in-between: Blender's own operator does the same")

@@ -12,8 +12,8 @@ import bpy
 from bpy.props import FloatVectorProperty, PointerProperty
 
 from ..animation.compute.components import LOCATION, REST, ROTATION, ROWS, SCALE
-from ..animation.queries.visible_pose import shown_components
 from ..animation.transforms import Refused
+from ..animation.writers.table import shown_components
 from .targets import active_target
 
 log = logging.getLogger(__package__)

@@ -25,7 +25,7 @@ from ..animation.baking.originals import BAKED, REDUCED, entries_of
 from ..animation.queries.keyed import source_of
 from ..animation.queries.polls import with_more_keys_than
 from ..animation.queries.segments import frame_in_action, segment_at
-from ..animation.transforms import SEGMENT_PROPERTIES, WIDTHS, Transform, kind_of, split_path, transform_of
+from ..animation.transforms import SEGMENT_PROPERTIES, WIDTHS, Transform, split_path, transform_in, transform_of
 from .wording import names_of, plural_of, spoken_of
 
 KEY_EDITORS = ("DOPESHEET_EDITOR", "GRAPH_EDITOR")
@@ -198,7 +198,7 @@ def _shown_in_editor(context: bpy.types.Context) -> Iterator[Transform]:
             prefix, prop = split_path(fcurve.data_path)
             if prefix not in result and (prop in WIDTHS or prop in SEGMENT_PROPERTIES) and fcurve.as_pointer() in shown:
                 result.add(prefix)
-                if (target := kind_of(prefix).in_object(obj, prefix)) is not None:
+                if (target := transform_in(obj, prefix)) is not None:
                     yield target
 
 

@@ -96,7 +96,7 @@ class EditingObjects(TakenAway, Exchanging):
             obj = bpy.data.objects[name]
             motion = obj.rigid_motion
             for path, values in (("location", location), ("scale", scale)):
-                filled = motion.filled[0 if path == "location" else 3]
+                filled = any(motion.filled[:3] if path == "location" else motion.filled[10:])
                 setattr(*((motion, f"own_{path}") if filled else (obj, f"delta_{path}")), values)
 
         self.owns[name] = Own(

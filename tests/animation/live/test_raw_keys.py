@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from functools import partial
 from types import SimpleNamespace
 
 import bpy
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation.live import snapshots
-from rigid_motion.animation.live.snapshots import key_reader
+from rigid_motion.animation.live.snapshots import read_keys
 from tests.animation.keyed import curves_of
 from tests.animation.scenes import key, new_object
 
@@ -35,9 +36,8 @@ def channels(empty_file) -> list[bpy.types.bpy_prop_collection]:
 
 
 def test_memory_of_this_blender_is_as_expected(channels, caplog):
-    read = key_reader(channels)
     with caplog.at_level(logging.WARNING):
-        sizes = [len(content) for content in read()]
+        sizes = [len(content) for content in read_keys(channels)]
     assert snapshots._Layout.size >= 4 * snapshots.NUMBERS
     assert sizes == [snapshots._Layout.size * len(keys) for keys in channels]
     assert WARNING not in caplog.text
@@ -98,7 +98,7 @@ def assert_changes_are_seen(channels, read) -> None:
 
 @pytest.mark.parametrize("how", ["as expected", "shifted", "scattered"])
 def test_every_change_is_seen_however_keys_are_in_memory(channels, monkeypatch, caplog, how):
-    read = key_reader([Scattered(keys) for keys in channels] if how == "scattered" else channels)
+    read = partial(read_keys, [Scattered(keys) for keys in channels] if how == "scattered" else channels)
     if how != "as expected":
         monkeypatch.setattr(snapshots, "_view", shifted if how == "shifted" else unread)
         with caplog.at_level(logging.WARNING):
@@ -110,8 +110,7 @@ def test_every_change_is_seen_however_keys_are_in_memory(channels, monkeypatch, 
 
 
 def test_single_keys_are_read_before_anything_is_known_of_memory(channels):
-    read = key_reader(channels[-1:])
-    before = read()
+    before = read_keys(channels[-1:])
     assert snapshots._Layout.size is None
     channels[-1][0].co.y += 1.0
-    assert read() != before
+    assert read_keys(channels[-1:]) != before

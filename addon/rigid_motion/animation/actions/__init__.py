@@ -2,7 +2,6 @@
 
 channels       the F-curves of a slot, written and read as arrays
 slots          what moves something, by which F-curves
-modifiers      which modifiers can be followed, and what they add
 records        what an Action keeps: mode and digest, also of bones that were renamed
 refusals       why rigid motion cannot act on something, and the way out
 reading        from Blender's data to sources

@@ -35,9 +35,7 @@ BREAKDOWN = bpy.types.Keyframe.bl_rna.properties["type"].enum_items["BREAKDOWN"]
 
 
 def channelbag_of(animated: bpy.types.ID) -> bpy.types.ActionChannelbag:
-    """Return the channels of `animated` in its Action, and make whatever of Action, slot,
-    layer and strip is missing.
-    """
+    """Return the channels of `animated` in its Action; make what is missing of Action, slot, layer and strip."""
     data = animated.animation_data or animated.animation_data_create()
     if data.action is None:
         data.action = bpy.data.actions.new(f"{animated.name}Action")
@@ -172,9 +170,7 @@ def ensure_group(channelbag: bpy.types.ActionChannelbag, name: str) -> bpy.types
 
 
 def copy_fcurve(fcurve: bpy.types.FCurve, channelbag: bpy.types.ActionChannelbag) -> bpy.types.FCurve:
-    """Return a copy of an F-curve with keys in another slot or Action, in a group of the same name.
-    It has none there yet.
-    """
+    """Return a copy of an F-curve in another slot or Action, which has none like it, in a group of the same name."""
     copy = channelbag.fcurves.new(fcurve.data_path, index=fcurve.array_index)
     if fcurve.group is not None:
         copy.group = ensure_group(channelbag, fcurve.group.name)
@@ -193,11 +189,8 @@ def _copy_settings(source: bpy.types.bpy_struct, target: bpy.types.bpy_struct) -
     for prop in source.bl_rna.properties:
         if not prop.is_readonly and prop.type not in ("POINTER", "COLLECTION"):
             value = getattr(source, prop.identifier)
-            setattr(target, prop.identifier, value if isinstance(value, str) else _plain(value))
-
-
-def _plain(value: object) -> object:
-    return tuple(value) if hasattr(value, "__len__") else value
+            is_array = getattr(prop, "is_array", False)
+            setattr(target, prop.identifier, tuple(value) if is_array else value)
 
 
 def add_cycles(fcurve: bpy.types.FCurve, cycles: Cycles) -> None:
@@ -268,9 +261,7 @@ def read_keys(fcurves: Sequence[Sequence[bpy.types.FCurve]]) -> list[list[tuple[
 def _read_batch(
     owners: Sequence[int], channels: Sequence, linear: bool, cycles: Cycles | None, steps: tuple[Stepped, ...]
 ) -> Iterator[tuple[list[int], Keys]]:
-    """Yield the keys of channels, from their `keyframe_points` with equally many each:
-    the rows of those keyed together.
-    """
+    """Yield the keys of channels with equally many `keyframe_points` each, and the rows of those keyed together."""
     points = _read_property("co", channels, np.float32, 2)
     groups = _keyed_together(owners, points[..., 0])
     order = [row for rows in groups for row in rows]
@@ -311,9 +302,7 @@ def _read_batch(
 
 
 def _keyed_together(owners: Sequence[int], frames: np.ndarray) -> list[list[int]]:
-    """Return the rows of channels with keys on these frames (c, n),
-    those together of one owner and on the same frames.
-    """
+    """Return the rows of channels with keys on these frames (c, n), those together that one owner keys together."""
     raw, width = frames.tobytes(), frames.shape[1] * frames.itemsize
     groups: dict[tuple[int, bytes], list[int]] = {}
     for row, owner in enumerate(owners):
@@ -324,9 +313,7 @@ def _keyed_together(owners: Sequence[int], frames: np.ndarray) -> list[list[int]
 def _read_property(
     name: str, channels: Sequence, dtype: type, *width: int, rows: Sequence[int] | None = None
 ) -> np.ndarray:
-    """Return a property of the n keys of each of c channels, (c, n) or (c, n, width);
-    read for these rows, else zero.
-    """
+    """Return a property of the n keys of each of c channels, (c, n) or (c, n, width); zero but for these rows."""
     values = np.zeros((len(channels), len(channels[0]) * math.prod(width)), dtype)
     read_all = rows is None or len(rows) == len(channels)
     pairs = zip(channels, values, strict=True) if read_all else ((channels[row], values[row]) for row in rows)

@@ -113,9 +113,6 @@ def show_modes(bindings: Iterable[Binding]) -> None:
             and (user.animated.animation_data.action is None or binding.slot.plays_in(user.animated))
         ]
         keyed = is_keyed(binding)
-        if not has_mode(binding) and has_in_betweens(binding) and not (keyed or binding.slot.action.is_editable):
-            # From a library of a version that kept modes on objects.
-            continue
         if not has_mode(binding) and binding.slot.action.is_editable:
             _adopt(binding, users)
         mode = MODE_NAMES.get(recorded_mode(binding), "BLENDER")
@@ -137,20 +134,11 @@ def show_pending_modes(transforms: Iterable[Transform]) -> None:
             motion.mode = motion.awaited
 
 
-def adopt_from_properties(transforms: Iterable[Transform]) -> None:
-    """Read a file of a version that kept modes on objects: what no slot moves waits with its mode."""
-    for transform in transforms:
-        motion = transform.motion
-        if motion.mode not in ("BLENDER", "", motion.awaited) and transform.animated.is_editable:
-            motion.awaited = motion.mode
-
-
 def _adopt(binding: Binding, users: Sequence[Transform]) -> None:
     """Let a slot without a mode have that which a user waits with.
 
     Where there are in-betweens already, one of Blender's operators has moved it out of another Action, and it has the
-    mode that it had there. Or it was duplicated, and has the mode of the slot that it is a duplicate of. Or it came
-    from a version that kept the mode on the object: it goes on as its user shows it.
+    mode that it had there, or that its user shows. Or it was duplicated, and has that of the slot that it is one of.
     """
     waiting = next((user.motion.awaited for user in users if user.motion.awaited not in ("BLENDER", "")), None)
     if waiting is None and has_in_betweens(binding) and (number := mode_before_move(binding)) is not None:

@@ -1,9 +1,13 @@
-"""From Blender's data to sources: what is keyed of a transform in a slot, and how much influence the NLA gives it."""
+"""From Blender's data to sources: what is keyed of a transform in a slot, and how much influence the NLA gives it.
+
+What modifiers add to a channel stays on top of the mode: its F-curve has it, and the difference does not know of it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
@@ -13,9 +17,15 @@ from ..compute.sources import Source
 from ..curves.keys import Keys
 from ..transforms import Channel, Refused, Transform
 from .channels import read_keys
-from .modifiers import is_modified
 from .records import recorded, recorded_digest, recorded_mode
-from .refusals import refuse_channel, refuse_different_steps, refuse_drivers, refuse_numbers, refuse_what_is_taken
+from .refusals import (
+    is_added,
+    refuse_channel,
+    refuse_different_steps,
+    refuse_drivers,
+    refuse_numbers,
+    refuse_what_is_taken,
+)
 from .slots import Binding, Slot
 
 Influence = tuple[tuple[float, float], ...]
@@ -23,9 +33,7 @@ Influence = tuple[tuple[float, float], ...]
 
 
 def influence_of(slot: Slot) -> Influence | None:
-    """Return the influence of the only strip that shows a slot, with nothing below it;
-    None where it is full or another.
-    """
+    """Return the influence of the only strip that shows a slot, with nothing below it; None where that is full."""
     if len(slot.users) != 1 or None in slot.strips or len(slot.strips) != 1:
         return None
     data = slot.users[0].animation_data
@@ -153,20 +161,11 @@ def leading(binding: Binding, users: list[Source | Refused]) -> Source | Refused
     return max(readable, key=precedence)
 
 
-@dataclass(frozen=True)
-class _Keyed:
+class _Keyed(NamedTuple):
     """Which channels of a slot one of its users is moved by."""
-
-    user: Transform
-
-    names: frozenset[str]
-    """The parts of location, rotation and scale that are keyed."""
 
     channels: dict[int, bpy.types.FCurve]
     """The channels with keys, by the rows of their components."""
-
-    rest: dict[int, float]
-    """The values of the other components of what is keyed."""
 
     modes: list[bpy.types.FCurve]
     """The mode channel, if there is one with keys."""
@@ -174,11 +173,8 @@ class _Keyed:
     turns: list[bpy.types.FCurve]
     """The channel of turns likewise."""
 
-    modified: frozenset[int]
-    """The rows of channels that modifiers add something to."""
-
-    driven: frozenset[int]
-    """The rows of components that drivers move."""
+    others: dict[str, Any]
+    """What else a `Source` has of it."""
 
 
 def _keyed_for(user: Transform, binding: Binding, drivers: Collection[Channel]) -> _Keyed:
@@ -206,8 +202,23 @@ def _keyed_for(user: Transform, binding: Binding, drivers: Collection[Channel]) 
         [fcurve] if (fcurve := binding.curves.get(channel)) is not None and _has_say(user, fcurve) else []
         for channel in (user.mode_channel, user.turns_channel)
     )
-    modified = frozenset(row for row in has_modifiers if is_modified(keyed[row]))
-    return _Keyed(user, names, keyed, rest, modes, turns, modified, driven)
+    original = user.original()
+    # Delta transforms of its own would be blended along.
+    is_blended = not user.has_difference_slot and np.array_equal(original, REST)
+    others = {
+        "order": user.order,
+        "keyed": names,
+        "rest": rest,
+        "original": original,
+        "location_axes": user.location_axes,
+        "turns_axis": recorded(binding).turns_axis,
+        "in_nla": binding.slot.in_nla,
+        "modified": frozenset(row for row in has_modifiers if is_modified(keyed[row])),
+        "driven": driven,
+        "influence": influence_of(binding.slot) if is_blended else None,
+        "is_on_top": user.has_difference_slot,
+    }
+    return _Keyed(keyed, modes, turns, others)
 
 
 def _source(
@@ -218,27 +229,13 @@ def _source(
     turns: list[tuple[list[int], Keys]],
 ) -> Source:
     """Return what is keyed in a slot, as one of its users has it, from the keys that were read of its channels."""
-    user, rows = keyed.user, list(keyed.channels)
-    goes_on = any(keys.linear or keys.cycles is not None for _, keys in channels)
-    original = user.original()
-    # Delta transforms of its own would be blended along.
-    is_blended = not user.has_difference_slot and np.array_equal(original, REST)
+    rows, goes_on = list(keyed.channels), any(keys.linear or keys.cycles is not None for _, keys in channels)
     return Source(
-        order=user.order,
-        keyed=keyed.names,
         channels=tuple(([rows[number] for number in numbers], keys) for numbers, keys in channels),
-        rest=keyed.rest,
-        original=original,
-        location_axes=user.location_axes,
         mode=modes[0][1] if modes else recorded_mode(binding),
         turns=turns[0][1] if turns else None,
-        turns_axis=recorded(binding).turns_axis,
-        in_nla=binding.slot.in_nla,
         seen=binding.slot.seen if goes_on else None,
-        modified=keyed.modified,
-        driven=keyed.driven,
-        influence=influence_of(binding.slot) if is_blended else None,
-        is_on_top=user.has_difference_slot,
+        **keyed.others,
     )
 
 
@@ -250,3 +247,19 @@ def _has_say(user: Transform, fcurve: bpy.types.FCurve) -> bool:
     if fcurve.modifiers or not has_keys:
         refuse_channel(user.name, fcurve)
     return has_keys
+
+
+def is_modified(fcurve: bpy.types.FCurve) -> bool:
+    """Return whether a channel that in-betweens can follow has something added to it."""
+    return any(is_added(modifier) and not modifier.mute for modifier in fcurve.modifiers)
+
+
+def added_values(binding: Binding, user: Transform, source: Source, frames: np.ndarray) -> np.ndarray:
+    """Return what modifiers add to the channels of a slot on these frames (m,) of its Action, shape (10, m)."""
+    added = np.zeros((10, len(frames)))
+    if source.modified:
+        native = source.values_at(source.held(frames))
+        for row in source.modified:
+            fcurve = binding.curves[user.channels[row]]
+            added[row] = [fcurve.evaluate(frame) for frame in frames.tolist()] - native[row]
+    return added

@@ -41,9 +41,7 @@ NOTHING_RECORDED = Recorded()
 
 
 def recorded(binding: Binding) -> Recorded:
-    """Return what is kept about a transform in a slot: looked up once,
-    and again after it was changed by way of here.
-    """
+    """Return what is kept about a transform in a slot. It is looked up anew once it was changed by way of here."""
     result = binding.__dict__.get("recorded")
     if result is None:
         record = record_of(binding)
@@ -81,9 +79,7 @@ def has_mode(binding: Binding) -> bool:
 
 
 def has_in_betweens(binding: Binding) -> bool:
-    """Return whether a transform was filled in, by whichever version;
-    constants that are held beside strips are none.
-    """
+    """Return whether a transform was filled in; constants that are held beside strips are none."""
     return (
         bool(recorded_digest(binding))
         or any(len(fcurve.sampled_points) > 2 for fcurve in binding.filled.values())
@@ -128,9 +124,7 @@ def record_turns_axis(binding: Binding, axis: str) -> None:
 
 
 def record_in_betweens(binding: Binding, digest: str, rows: Iterable[int], rate: int = 1, error: float = 0.0) -> None:
-    """Keep what in-betweens were made from, which components they are in, how many samples a frame they have, and how
-    far off they are between these.
-    """
+    """Keep what in-betweens were made from, their components, samples a frame, and the error between these."""
     if digest:
         record = _ensure_record(binding)
         record.digest, record.rows = digest, "".join(f"{row:x}" for row in sorted(rows))
@@ -156,17 +150,21 @@ def keep_name(binding: Binding) -> None:
 
 def rename_records(slot: Slot, prefixes: Mapping[str, str]) -> None:
     """Give the records of a slot other prefixes, all at once, in place of what bones left that are gone."""
-    records = slot.action.rigid_motion.slots
     present = {record.prefix for record in slot.records}
     moved = {old: new for old, new in prefixes.items() if old in present}
-    replaced = set(moved.values()) - set(moved)
-    for number, record in reversed(list(enumerate(records))):
-        if record.handle == slot.handle and record.prefix in replaced:
-            records.remove(number)
+    remove_records(slot, set(moved.values()) - set(moved))
     for record in slot.records:
         if record.prefix in moved:
             record.prefix = moved[record.prefix]
             record.name = _key(slot, record.prefix)
+
+
+def remove_records(slot: Slot, prefixes: Collection[str]) -> None:
+    """Take the records of these out of a slot."""
+    records = slot.action.rigid_motion.slots
+    for number, record in reversed(list(enumerate(records))):
+        if record.handle == slot.handle and record.prefix in prefixes:
+            records.remove(number)
 
 
 def forget_in_betweens(slot: Slot, prefixes: Iterable[str]) -> None:
@@ -182,19 +180,12 @@ def record_of(binding: Binding) -> bpy.types.PropertyGroup | None:
     records, key = binding.slot.action.rigid_motion.slots, _key(binding.slot, binding.prefix)
     number = _numbers.get(key, -1)
     if not (0 <= number < len(records) and records[number].name == key):
-        number = records.find(key)
-        if number < 0 and not binding.kind.is_part:
-            # Those of versions without bones have no name to be found by.
-            unnamed = (binding.slot.handle, binding.prefix, "")
-            old = (n for n, one in enumerate(records) if (one.handle, one.prefix, one.name) == unnamed)
-            number = next(old, -1)
-        _numbers[key] = number
+        number = _numbers[key] = records.find(key)
     return records[number] if number >= 0 else None
 
 
 _numbers: dict[str, int] = {}
-"""The indices at which records were found last, by their names: a rig has many,
-and Blender goes through all of them for a name."""
+"""The indices at which records were found last, by their names: Blender goes through all of a rig for a name."""
 
 
 def _key(slot: Slot, prefix: str) -> str:

@@ -16,9 +16,11 @@ from ..compute.sources import Source
 from ..curves.keys import LARGEST, Keys, TooManyRounds
 from ..transforms import GROUP, LINKED, Channel, Refused, Transform
 from .channels import read_steps
-from .modifiers import FOLLOWED, is_added, is_whole, may_add
 from .records import recorded_digest, recorded_rows
 from .slots import Binding, is_filled_in
+
+FOLLOWED = ("CYCLES", "STEPPED")
+"""Types of F-curve modifiers that change which moment is shown, for all of the motion alike."""
 
 MOST_FRAMES = 250_000
 """The longest motion that is filled in: two hours and a quarter at 30 frames a second."""
@@ -179,6 +181,23 @@ def refuse_channel(name: str, fcurve: bpy.types.FCurve) -> None:
             )
     if not fcurve.keyframe_points and fcurve.sampled_points:
         raise Refused(SAMPLED, name=name, channel=_label(fcurve))
+
+
+def may_add(modifier: bpy.types.FModifier) -> bool:
+    """Return whether modifiers of this type add something, or can be set to."""
+    return modifier.type in ("NOISE", "GENERATOR", "FNGENERATOR")
+
+
+def is_added(modifier: bpy.types.FModifier) -> bool:
+    """Return whether a modifier adds something to the value that depends on the time alone."""
+    if modifier.type == "NOISE":
+        return modifier.blend_type != "MULTIPLY"
+    return may_add(modifier) and modifier.use_additive
+
+
+def is_whole(modifier: bpy.types.FModifier) -> bool:
+    """Return whether a modifier acts in full and everywhere. That of a Stepped one Blender does not show to Python."""
+    return not (modifier.use_restricted_range or (modifier.use_influence and modifier.influence < 1.0))
 
 
 def refuse_different_steps(name: str, fcurves: Iterable[bpy.types.FCurve]) -> None:

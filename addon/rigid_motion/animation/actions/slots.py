@@ -23,9 +23,9 @@ from ..transforms import (
     WIDTHS,
     Channel,
     Transform,
-    kind_of,
     prefix_of,
     split_path,
+    transform_in,
 )
 
 Curves = dict[Channel, bpy.types.FCurve]
@@ -121,17 +121,20 @@ class Binding:
         return self.users[0].name
 
     @property
-    def home(self) -> tuple[bpy.types.ActionChannelbag | None, str]:
-        """The slot that in-betweens are in, or are to be in, and the name of their group there."""
-        kind = self.kind
-        channelbag = self.slot.bones_channelbag if kind.has_difference_slot else self.channelbag
-        return channelbag, kind.difference_group(self.prefix)
+    def group(self) -> str:
+        """The name of the group of in-betweens, and of channels of modes and turns."""
+        return self.kind.difference_group(self.prefix)
+
+    @property
+    def home(self) -> bpy.types.ActionChannelbag | None:
+        """The channelbag that in-betweens are in, or are to be in."""
+        return self.slot.bones_channelbag if self.kind.has_difference_slot else self.channelbag
 
     @cached_property
     def filled(self) -> Curves:
         """The F-curves that in-betweens are in. Who writes them sets it anew."""
-        (channelbag, name), apart = self.home, self.kind.has_difference_slot
-        group = None if channelbag is None else channelbag.groups.get(name)
+        channelbag, apart = self.home, self.kind.has_difference_slot
+        group = None if channelbag is None else channelbag.groups.get(self.group)
         if group is None:
             return {}
         is_own = {self.prefix + prop for prop in WIDTHS}.__contains__ if apart else _is_difference
@@ -220,9 +223,8 @@ _TIMES = f'constraints["{CONSTRAINT}'
 
 def _users_of(slot: Slot, prefix: str) -> tuple[Transform, ...]:
     """Return what a prefix stands for in each of the users of a slot that has it."""
-    kind = kind_of(prefix)
-    users = () if kind is None else (kind.in_object(user, prefix) for user in slot.users)
-    return () if kind is None else kind.together(tuple(user for user in users if user is not None))
+    users = tuple(user for obj in slot.users if (user := transform_in(obj, prefix)) is not None)
+    return users[0].together(users) if users else ()
 
 
 def slot_with(action: bpy.types.Action, handle: int) -> bpy.types.ActionSlot | None:
@@ -340,9 +342,7 @@ def handles_of_differences(action: bpy.types.Action) -> set[int]:
 
 
 def counterpart_in(action: bpy.types.Action, slot: bpy.types.ActionSlot) -> bpy.types.ActionSlot | None:
-    """Return the slot in a copy of an Action, or in the original, that is the same: by its name,
-    or renamed by its handle.
-    """
+    """Return the same slot in a copy of an Action, or in the original: by its name, or renamed by its handle."""
     return action.slots.get(slot.identifier) or slot_with(action, slot.handle)
 
 

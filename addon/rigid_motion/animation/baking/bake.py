@@ -11,10 +11,10 @@ import numpy as np
 from bpy.app.translations import pgettext_n as n_
 
 from ...motion import Poses
-from ...motion.eulers import ORDERS, extrinsic_eulers_from_quaternions
+from ...motion.eulers import extrinsic_eulers_from_quaternions
 from ...motion.quaternions import align_signs
 from ..actions.channels import add_cycles, code_of, empty_key_fields, key_fields, set_key_fields, write_channel
-from ..actions.modifiers import added_values
+from ..actions.reading import added_values
 from ..actions.slots import Binding
 from ..compute.components import SMOOTH
 from ..compute.differences import in_betweens
@@ -22,7 +22,7 @@ from ..compute.sources import SAME_FRAME, Source
 from ..edits.apply import Readings, Target, Targets, apply_edit, readable, transforms_of
 from ..edits.mode_keys import set_whole
 from ..live.segment_keys import set_mode_in
-from ..transforms import Refused, Transform, transform_of
+from ..transforms import ObjectTransform, Refused, Transform, transform_of
 from ..writers.channel_values import channel_values
 from .originals import (
     BAKED,
@@ -58,22 +58,13 @@ def bake_poses(obj: bpy.types.Object, frames: np.ndarray, poses: Poses, *, key_t
     """
     if poses.shape != np.shape(frames):
         raise ValueError(f"{obj.name}: {np.shape(frames)} frames do not fit poses of shape {poses.shape}")
-    channels = [("location", poses.positions), _rotation(obj, poses.quaternions)]
+    order, quaternions = ObjectTransform(obj).order, poses.quaternions
+    turns = align_signs(quaternions) if order is None else extrinsic_eulers_from_quaternions(quaternions, order)
+    channels = [("location", poses.positions), (ObjectTransform(obj).rotation, turns)]
     if poses.scales is not None:
         channels.append(("scale", np.repeat(poses.scales[:, None], 3, axis=1)))
     for data_path, values in channels:
         write_channel(obj, data_path, frames, values, key_type=key_type, group="Object Transforms")
-
-
-def _rotation(obj: bpy.types.Object, quaternions: np.ndarray) -> tuple[str, np.ndarray]:
-    """Return the rotation channels of the object's mode, and their values."""
-    if obj.rotation_mode == "QUATERNION":
-        return "rotation_quaternion", align_signs(quaternions)
-    if obj.rotation_mode in ORDERS:
-        return "rotation_euler", extrinsic_eulers_from_quaternions(quaternions, obj.rotation_mode)
-    raise ValueError(
-        f"{obj.name}: rotation by axis and angle cannot be baked; set its rotation mode to Quaternion first"
-    )
 
 
 def bake(
@@ -85,7 +76,7 @@ def bake(
     interpolation: str = "LINEAR",
     refused: list[Refused] | None = None,
 ) -> tuple[float, float]:
-    """Put in-betweens on the channels that they are between, as real keys.
+    """Put in-betweens on the channels that they are between, as real keys, and return the first and the last frame.
 
     The animator's keys stay where they are; the others are of type GENERATED, and straight lines or holds run between
     all of them. Every target gets a copy of its Action for it, one for all bones of a rig. The original stays in the
@@ -93,7 +84,8 @@ def bake(
 
     Parameters
     ----------
-    targets : bpy.types.Object or bpy.types.PoseBone, or several of them
+    targets, refused
+        See `edits.apply`.
     step : float
         Frames from key to key, counted from the first. The animator's own keys are kept whatever the step.
     first, last : float, optional
@@ -101,19 +93,6 @@ def bake(
         would be others. From the first key to the last, otherwise.
     interpolation : str
         LINEAR, or CONSTANT to hold each pose until the next key: with a step of 2 the motion is on twos.
-    refused : list, optional
-        Takes the refusals, and all other targets are baked.
-
-    Returns
-    -------
-    tuple of float
-        The first and last frame with baked keys.
-
-    Raises
-    ------
-    Refused
-        Where there is nothing to bake of a target, or no way, and there is no list to take that. Nothing is changed
-        then.
     """
     if interpolation not in ("LINEAR", "CONSTANT"):
         raise ValueError(f"interpolation: LINEAR or CONSTANT, not {interpolation!r}")
@@ -147,17 +126,7 @@ def bake(
 def unbake(targets: Targets, *, refused: list[Refused] | None = None) -> None:
     """Give the keys back that there were before baking, to the last handle: of objects the Action, of bones their own.
 
-    Parameters
-    ----------
-    targets : bpy.types.Object or bpy.types.PoseBone, or several of them
-    refused : list, optional
-        Takes the refusals, and all other targets are un-baked.
-
-    Raises
-    ------
-    Refused
-        Where a target is not baked, or its Actions cannot be exchanged, and there is no list to take that. Nothing is
-        changed then.
+    For targets and refusals see `edits.apply`.
     """
     go_back(targets, BAKED, refused)
 
@@ -180,9 +149,7 @@ def is_baked(target: Target) -> bool:
 
 
 def _widened(transform: Transform, source: Source, first: float | None, last: float | None) -> tuple[float, float]:
-    """Return the range from key to key that has the frames from first to last in it,
-    and what hangs together with them.
-    """
+    """Return the range from key to key around the frames from first to last, and what hangs together with them."""
     keys = source.key_frames
     if _may_repeat(source):
         # Cycles go on from the outermost keys: what lies in between is baked as a whole.
@@ -211,9 +178,7 @@ def _widened(transform: Transform, source: Source, first: float | None, last: fl
 
 
 def _may_repeat(source: Source) -> bool:
-    """Return whether cycles of what is baked show every round:
-    holds and what is added need not be alike in all of them.
-    """
+    """Return whether cycles show every round of what is baked: holds and additions may differ from round to round."""
     return source.repeats and not source.steps and not source.modified
 
 

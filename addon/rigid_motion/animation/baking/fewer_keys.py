@@ -7,8 +7,9 @@ are those of the Action, lengths those of its channels.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
@@ -21,7 +22,7 @@ from ..compute.components import MODE_NUMBERS, ROWS, SCALE
 from ..compute.differences import in_betweens
 from ..compute.sources import SAME_FRAME, Source, distinct
 from ..curves.keys import CODE, CONSTANT, LINEAR, Keys
-from ..transforms import Channel, Refused, Transform
+from ..transforms import Refused, Transform
 from ..transforms.sizes import into_scene, scale_in_scene
 from ..writers.channel_values import channel_values
 from .motions import ALL_PROMISED, SMALLEST, NotPromised, shown
@@ -47,8 +48,7 @@ class WholeRig:
     """The distance that it slides now."""
 
     largest_error: float = 0.0
-    """The largest error of all bones that the tolerance is promised for, those without keys among them,
-    in the scene's units."""
+    """The largest error of all bones that the tolerance is promised for, with keys or without, in scene units."""
 
     not_promised: NotPromised = ALL_PROMISED
     """The bones that it is not promised for."""
@@ -59,58 +59,40 @@ class FewerKeys:
     """The keys that one slot is to have, and what had them before."""
 
     binding: Binding
-    before: int
+    source: Source
+    fewer: Source
+    """The planned motion, as a source."""
+
     frames: np.ndarray
     """Shape (k,)."""
 
-    values: dict[Channel, np.ndarray]
-    """Values that are written on these frames, by data path and index, each of shape (k,)."""
-
-    key_frames: np.ndarray
-    """These frames and those of keys that a scale keeps, shape (n,)."""
-
-    modes: np.ndarray
-    """The numbers of the modes that go on from each of these, shape (n,)."""
-
-    keeps_scale: bool
+    values: dict[int, np.ndarray]
+    """Values that are written on these frames, by the rows of components, each of shape (k,)."""
 
     largest_error: float
     """In the scene's units."""
 
-    fewer: Source
-    """The planned motion, as a source."""
-
     rig: WholeRig | None = None
     """The result for the rig that it is a bone of."""
 
-    @classmethod
-    def planned(
-        cls,
-        transform: Transform,
-        binding: Binding,
-        source: Source,
-        fewer: Source,
-        frames: np.ndarray,
-        values: dict[int, np.ndarray],
-        largest_error: float,
-        rig: WholeRig | None = None,
-    ) -> FewerKeys:
-        """Return the plan from what was keyed to what is to be: values (k,) by the rows of components,
-        on frames (k,).
-        """
-        key_frames = distinct(fewer.keyed_frames)
-        return cls(
-            binding,
-            len(distinct(source.keyed_frames)),
-            frames,
-            {transform.channels[row]: column for row, column in values.items()},
-            key_frames,
-            fewer.modes_at(key_frames + SAME_FRAME),
-            keeps_scale(source, values),
-            largest_error,
-            fewer,
-            rig,
-        )
+    @cached_property
+    def before(self) -> int:
+        return len(distinct(self.source.keyed_frames))
+
+    @cached_property
+    def key_frames(self) -> np.ndarray:
+        """The frames that are written and those of keys that a scale keeps, shape (n,)."""
+        return distinct(self.fewer.keyed_frames)
+
+    @property
+    def modes(self) -> np.ndarray:
+        """The numbers of the modes that go on from each of these, shape (n,)."""
+        return self.fewer.modes_at(self.key_frames + SAME_FRAME)
+
+    @property
+    def keeps_scale(self) -> bool:
+        """Return whether a scale keeps the keys it has."""
+        return SCALE in self.source.keyed and ROWS[SCALE].start not in self.values
 
 
 def fewer_keys(
@@ -177,7 +159,7 @@ def fewer_keys(
         if error_of_mixed.max() <= allowed:
             fewer, error = mixed, error_of_mixed
     columns = {row: column[chosen] for row, column in values.items()}
-    return FewerKeys.planned(transform, binding, source, fewer, seen[chosen], columns, float(error.max()))
+    return FewerKeys(binding, source, fewer, seen[chosen], columns, float(error.max()))
 
 
 def with_best_modes(
@@ -189,9 +171,7 @@ def with_best_modes(
     rounding: float,
     allowed: float,
 ) -> Source:
-    """Return the source with the best mode in each segment,
-    of those that keep within what is allowed on these frames.
-    """
+    """Return the source with the best mode in each segment, of those within what is allowed on these frames."""
     keys = distinct(source.keyed_frames)
     numbers = np.array([source.mode, *(mode.number for mode in KEYFRAME_MODES.values() if mode.number != source.mode)])
     alike = [shown(transform, replace(source, mode=int(number)), frames)[0] for number in numbers]
@@ -233,9 +213,7 @@ def samples_of(source: Source) -> np.ndarray:
 
 
 def seen_frames(frames: np.ndarray, sources: Sequence[Source]) -> np.ndarray:
-    """Return these frames and all whole ones that are seen: between them,
-    and outside of the keys where something goes on.
-    """
+    """Return these frames and all whole ones that are seen: between them, and outside of keys that go on."""
     first, last = min(source.seen_range[0] for source in sources), max(source.seen_range[1] for source in sources)
     return np.union1d(frames, np.arange(np.floor(first), np.ceil(last) + 1.0))
 
@@ -252,9 +230,7 @@ def goes_elsewhere(name: str) -> Refused:
 
 
 def values_on(transform: Transform, source: Source, frames: np.ndarray) -> dict[int, np.ndarray]:
-    """Return what the channels that get other keys have on these frames, each (n,),
-    by their rows among the components.
-    """
+    """Return what the channels that get other keys have on these frames, each (n,), by the rows of components."""
     by_path = channel_values(transform, source, in_betweens(source, frames))
     if SCALE in source.keyed and not source.uniform_scale:
         scale = source.values_at(frames)[ROWS[SCALE]].T
@@ -263,11 +239,6 @@ def values_on(transform: Transform, source: Source, frames: np.ndarray) -> dict[
     keyed = {row for rows, _ in source.channels for row in rows}
     columns = {row: by_path[path][:, index] for row, (path, index) in transform.channels.items() if path in by_path}
     return {row: column for row, column in columns.items() if row in keyed or not _is_constant(column)}
-
-
-def keeps_scale(source: Source, values: Mapping[int, np.ndarray]) -> bool:
-    """Return whether a scale keeps the keys it has, where these are the values of what gets others."""
-    return SCALE in source.keyed and ROWS[SCALE].start not in values
 
 
 def has_uneven_scale(source: Source) -> bool:

@@ -58,8 +58,7 @@ LEAST_SCALE = 1e-6
 """The scale that the search takes for one of zero."""
 
 Plans = dict[Transform, "list[FewerKeys] | Refused"]
-"""The keys that each bone is to have in each slot that moves it, or why it cannot have them;
-and rigs with keys of their own."""
+"""The keys that bones, and rigs with keys, are to have in each slot that moves them; or why they cannot."""
 
 _Members = dict[Transform, tuple[Binding, Source]]
 
@@ -196,7 +195,7 @@ class _Rig:
             if len(distinct(fewer.keyed_frames)) >= len(distinct(source.keyed_frames)):
                 fewer = source
             self.motion.carry(fewer)
-            return FewerKeys.planned(transform, binding, source, fewer, self.frames[keys], values, 0.0)
+            return FewerKeys(binding, source, fewer, self.frames[keys], values, 0.0)
         share = SHARE * self.tolerance / self.weights.max()
         reach = self.motion.extent * scale_in_scene(transform)
         plan = fewer_keys(transform, binding, source, mode, share, reach, best_of=best_of, more_frames=self.frames)
@@ -285,8 +284,7 @@ class _Rig:
             excepted,
         )
         return {
-            self.targets[number]: FewerKeys.planned(
-                self.targets[number],
+            self.targets[number]: FewerKeys(
                 self.bindings[number],
                 self.sources[number],
                 source,

@@ -143,9 +143,7 @@ def shown(transform: Transform, source: Source, frames: np.ndarray) -> tuple[Pos
 def evaluated(
     transform: Transform, curves: Mapping[Channel, bpy.types.FCurve], frames: np.ndarray
 ) -> tuple[Poses, AffineMaps]:
-    """Return what `shown` does, for a bone that makes no source: by its F-curves as Blender evaluates them,
-    or as it stands.
-    """
+    """Return what `shown` does, for a bone that makes no source: as Blender evaluates its F-curves, or as it stands."""
     bone, frame_list = transform.carrier, frames.tolist()
 
     def values(name: str) -> np.ndarray:

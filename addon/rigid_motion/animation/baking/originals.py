@@ -80,9 +80,6 @@ def copied(slot: Slot, kind: str) -> bpy.types.Action:
 
 def let_rest(transform: Transform, entry: bpy.types.PropertyGroup, changed: Binding, original: Binding) -> None:
     """Give properties that got keys only with a copy the values that they had before."""
-    if not entry.is_property_set("components"):
-        # From a version that did not note them.
-        return
     for row, (path, index) in transform.channels.items():
         before = original.curves.get((path, index))
         if (path, index) in changed.curves and (before is None or before.mute):
@@ -231,7 +228,6 @@ def put_back(transform: Transform, kind: str, lookup: Lookup) -> None:
             # The others keep the keys that they have.
             slot = used_in(transform.animated, _leave_for_copy(transform.animated, slot, kind))
         changed = entry.changed
-        mode = entry.mode if entry.is_property_set("mode") else None
         binding, before = (lookup.find(item, transform.prefix) for item in (slot, in_action(original, slot)))
         let_rest(transform, entry, binding, before)
         bakes.remove(number)
@@ -242,9 +238,6 @@ def put_back(transform: Transform, kind: str, lookup: Lookup) -> None:
             _go_back_to(transform.animated, changed, original, slot)
         if not changed.users:
             bpy.data.actions.remove(changed)
-        if mode is not None:
-            # From a version that kept modes on objects: the original takes it from there.
-            transform.motion.mode = mode
     if not transform.is_part:
         transform.note_original(channel for binding in bindings_for(transform) for channel in binding.filled)
 
@@ -266,9 +259,7 @@ def discard_originals(transform: Transform, kind: str) -> None:
 
 
 def _copy_of(rig: bpy.types.Object, slot: Slot) -> bpy.types.Action | None:
-    """Return the Action that a rig moves by and that has other keys for parts of it,
-    which this slot has from before.
-    """
+    """Return the Action with other keys for parts of this slot that a rig moves by, None where there is none yet."""
     noted = {entry.changed for entry in _entries(rig) if entry.original == slot.action}
     # One that somebody has put the original in place of by hand is not used any more.
     return next((item for item in noted if used_in(rig, item) is not None and in_action(item, slot) is not None), None)

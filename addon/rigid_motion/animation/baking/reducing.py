@@ -10,8 +10,8 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 
 import bpy
 import numpy as np
@@ -107,7 +107,8 @@ def reduce_keys_of(
 
     Parameters
     ----------
-    targets : bpy.types.Object or bpy.types.PoseBone, or several of them
+    targets, refused
+        See `edits.apply`.
     mode : str
         What fills in between the keys, one of `rigid_motion.motion.KEYFRAME_MODES`. It is that of all segments.
     tolerance : float
@@ -125,19 +126,11 @@ def reduce_keys_of(
     count : int, optional
         So many keys of an object, or key poses of a rig, at least 2: those with the smallest largest error that is
         found, whatever the tolerance. Bones that have fewer keys keep these.
-    refused : list, optional
-        Takes the refusals, and all other targets are reduced.
 
     Returns
     -------
     Reduction or None
         That of the last target which did not refuse.
-
-    Raises
-    ------
-    Refused
-        Where there are no keys, or no fewer will do, or rigid motion cannot act on a target, and there is no list to
-        take that. Nothing is changed then.
     """
     if mode not in KEYFRAME_MODES:
         raise Refused(no_such_mode(mode, KEYFRAME_MODES))
@@ -197,54 +190,42 @@ def reduction_of(target: Target) -> Reduction | None:
     entries = _reduced(entries_in_use(transform))
     reduced = {entry.changed for entry in entries}
     modes = [mode for binding in bindings if binding.slot.action in reduced for mode in segment_modes(binding)]
-    return _summed(entries, entries if transform.is_part else [], dict(Counter(modes)))
+    return _summed(list(map(_noted_in, entries)), dict(Counter(modes)))
 
 
-_Entries = list[bpy.types.PropertyGroup]
-
-
-def _reduced(entries: Iterable[bpy.types.PropertyGroup]) -> _Entries:
+def _reduced(entries: Iterable[bpy.types.PropertyGroup]) -> list[bpy.types.PropertyGroup]:
     return [entry for entry in entries if entry.kind == REDUCED]
 
 
-def _summed(entries: _Entries, of_bones: _Entries, segments: dict[str, int]) -> Reduction | None:
-    """Return all of these notes together; None where there are none.
-    What they say of a rig is that with the most frames.
-    """
-    if not entries:
+def _summed(reductions: Sequence[Reduction], segments: dict[str, int]) -> Reduction | None:
+    """Return all of these together, None where there are none. What they say of a rig is that with the most frames."""
+    if not reductions:
         return None
-    rig = max((_whole_rig(entry) for entry in of_bones), key=lambda reduction: reduction.frames, default=None)
+    rigs = [reduction.rig for reduction in reductions if reduction.rig is not None]
     return Reduction(
-        sum(entry.keys_before for entry in entries),
-        sum(entry.keys_after for entry in entries),
-        max(entry.largest_error for entry in entries),
+        sum(reduction.before for reduction in reductions),
+        sum(reduction.after for reduction in reductions),
+        max(reduction.largest_error for reduction in reductions),
         segments,
-        rig,
-        (sum(entry.channel_keys_before for entry in entries), sum(entry.channel_keys_after for entry in entries)),
+        max(rigs, key=lambda rig: rig.frames, default=None),
+        tuple(map(sum, zip(*(reduction.channel_keys for reduction in reductions), strict=True))),
     )
 
 
-def _whole_rig(entry: bpy.types.PropertyGroup) -> WholeRig:
-    names = json.loads(entry.not_promised) if entry.not_promised else ((), ())
-    return WholeRig(
-        entry.frames_after,
-        entry.slide_before,
-        entry.slide_after,
-        entry.largest_error_of_rig,
-        NotPromised(*map(tuple, names)),
-    )
+def _noted_in(entry: bpy.types.PropertyGroup) -> Reduction:
+    noted = json.loads(entry.reduction)
+    if rig := noted["rig"]:
+        names = {name: tuple(bones) for name, bones in rig["not_promised"].items()}
+        noted["rig"] = WholeRig(**{**rig, "not_promised": NotPromised(**names)})
+    return Reduction(**noted)
 
 
 def total_reduction(targets: Targets) -> Reduction | None:
     """Return what became of the keys of several targets together, without their modes. None where none were reduced."""
-    of_each = [(transform, _reduced(entries)) for transform, entries in entries_of(transforms_of(targets))]
-    of_bones = [entry for transform, entries in of_each if transform.is_part for entry in entries]
-    result = _summed([entry for _, entries in of_each for entry in entries], of_bones, {})
-    if result is None or result.rig is None:
-        return result
-    whole = [_whole_rig(entry) for entry in of_bones]
-    objects = [entry.largest_error for transform, entries in of_each if not transform.is_part for entry in entries]
-    return replace(result, largest_error=max([*objects, *(rig.largest_error for rig in whole)]))
+    noted = [_noted_in(entry) for _, entries in entries_of(transforms_of(targets)) for entry in _reduced(entries)]
+    # Of bones it is the error of their rigs.
+    of_whole = [replace(item, largest_error=item.rig.largest_error) if item.rig else item for item in noted]
+    return _summed(of_whole, {})
 
 
 def is_reduced(target: Target) -> bool:
@@ -253,36 +234,12 @@ def is_reduced(target: Target) -> bool:
 
 
 def restore_keys(targets: Targets, *, refused: list[Refused] | None = None) -> None:
-    """Give all the keys back that there were before they were reduced, to the last handle.
-
-    Parameters
-    ----------
-    targets : bpy.types.Object or bpy.types.PoseBone, or several of them
-    refused : list, optional
-        Takes the refusals, and all other targets get their keys back.
-
-    Raises
-    ------
-    Refused
-        Where the keys of a target are not reduced, or gone, and there is no list to take that. Nothing is changed then.
-    """
+    """Give all the keys back that there were before they were reduced, to the last handle. See `edits.apply`."""
     go_back(targets, REDUCED, refused)
 
 
 def discard_dense_keys(targets: Targets, *, refused: list[Refused] | None = None) -> None:
-    """Remove the keys from the file that there were before they were reduced.
-
-    Parameters
-    ----------
-    targets : bpy.types.Object or bpy.types.PoseBone, or several of them
-    refused : list, optional
-        Takes the refusals, and the dense keys of all other targets are removed.
-
-    Raises
-    ------
-    Refused
-        Where the keys of a target are not reduced, or gone, and there is no list to take that. Nothing is changed then.
-    """
+    """Remove the keys from the file that there were before they were reduced. See `edits.apply`."""
     apply_edit(
         targets,
         lambda transform, _: refuse_without_original(transform, REDUCED),
@@ -294,29 +251,22 @@ def discard_dense_keys(targets: Targets, *, refused: list[Refused] | None = None
 def _write(transform: Transform, fewer: FewerKeys) -> None:
     channel_keys = _channel_keys(fewer.binding)
     copy = move_by_copy(transform, fewer.binding, REDUCED)
-    entry = transform.motion.bakes[-1]
-    entry.keys_before, entry.keys_after = fewer.before, len(fewer.key_frames)
-    entry.largest_error = fewer.largest_error
-    if fewer.rig is not None:
-        entry.frames_after = fewer.rig.frames
-        entry.slide_before, entry.slide_after = fewer.rig.slide_before, fewer.rig.slide_after
-        entry.largest_error_of_rig = fewer.rig.largest_error
-        names = fewer.rig.not_promised
-        entry.not_promised = json.dumps([names.followers, names.below]) if names else ""
-    for channel, values in fewer.values.items():
-        fcurve = copy.ensure_curve(channel)
+    for row, values in fewer.values.items():
+        fcurve = copy.ensure_curve(transform.channels[row])
         replace_keys(fcurve, fewer.frames, values, handle_type="AUTO_CLAMPED")
         fcurve.mute = False
     for channel in (transform.mode_channel, transform.turns_channel):
         if channel in copy.curves:
             copy.channelbag.fcurves.remove(copy.curves.pop(channel))
-    modes = np.unique(fewer.modes).tolist()
-    if len(modes) == 1:
+    modes = fewer.modes
+    if np.ptp(modes) == 0:
         set_whole(copy, MODE_NAMES[modes[0]])
     else:
-        for mode in modes:
-            set_mode_in(copy, MODE_NAMES[mode], fewer.key_frames[fewer.modes == mode])
-    entry.channel_keys_before, entry.channel_keys_after = channel_keys, _channel_keys(copy)
+        for mode in np.unique(modes).tolist():
+            set_mode_in(copy, MODE_NAMES[mode], fewer.key_frames[modes == mode])
+    keys = channel_keys, _channel_keys(copy)
+    reduction = Reduction(fewer.before, len(fewer.key_frames), fewer.largest_error, {}, fewer.rig, keys)
+    transform.motion.bakes[-1].reduction = json.dumps(asdict(reduction))
 
 
 def _channel_keys(binding: Binding) -> int:

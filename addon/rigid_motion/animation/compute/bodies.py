@@ -120,9 +120,7 @@ def _jumps(keys: Keys, times: np.ndarray) -> np.ndarray:
 
 
 def progress_weights(start: np.ndarray, end: np.ndarray, order: str | None) -> tuple[np.ndarray, np.ndarray]:
-    """Return what a segment's progress is made of: weights (10, S) for the channels,
-    and what to take off their sum, (S,).
-    """
+    """Return what the progress in S segments is made of: weights of channels (10, S), and what to take off, (S,)."""
     chord = end - start
     weights = chord.copy()
     if order is None:
@@ -134,9 +132,7 @@ def progress_weights(start: np.ndarray, end: np.ndarray, order: str | None) -> t
 
 
 def are_idle(weights: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    """Return whether segments turn although no channel changes in them,
-    from the weights (., S) of their progress, (S,).
-    """
+    """Return which segments turn although no channel changes, by the weights (., S) of their progress, (S,)."""
     return (turns != 0) & ~weights.any(axis=0)
 
 
@@ -218,9 +214,7 @@ def differ(poses: Poses, native: np.ndarray, delta: np.ndarray) -> None:
 
 
 def location_axes(sources: Sequence[Source], owners: np.ndarray) -> np.ndarray | None:
-    """Return the axes that the location of each segment's owner runs along, (S, 3, 3);
-    None where all have their own.
-    """
+    """Return the axes that the location of each segment runs along, (S, 3, 3), None where all have their own."""
     if all(source.location_axes is None for source in sources):
         return None
     same = np.eye(3)
@@ -302,9 +296,7 @@ def _mixed(quaternions: np.ndarray, influence: np.ndarray) -> np.ndarray:
 
 
 def other_angles(angles: np.ndarray, order: str) -> np.ndarray:
-    """Return the other Euler angles (..., 3) that turn alike: half a turn more about the outer axes, and the middle one
-    from the other side.
-    """
+    """Return the other Euler angles (..., 3) that turn alike: half a turn more outside, less in the middle."""
     return np.where(np.arange(3) == "XYZ".index(order[1]), np.pi - angles, angles + np.pi)
 
 

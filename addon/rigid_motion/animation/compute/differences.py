@@ -111,9 +111,7 @@ def in_betweens(
 
 
 def progress_at(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Return how far along its segment of the path, from 0 to 1,
-    each source has come on rising frames of its own, (m,).
-    """
+    """Return how far along its segment of the path, 0 to 1, each source is on rising frames of its own, (m,)."""
     result, of_source = {}, dict(zip(sources, frames, strict=True))
     for portion in _portions(sources, {source: (0, len(times)) for source, times in of_source.items()}):
         times = [of_source[source] for source in portion]
@@ -371,9 +369,7 @@ def _fill(
 
 
 def _counts(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return how many samples each segment has, shape (segments,); which samples of all are on a key;
-    and of which source.
-    """
+    """Return how many samples segments have, (segments,); which samples are on a key; and the sources of these."""
     keys = np.concatenate([source.key_frames for source in sources])
     owners = np.repeat(np.arange(len(sources)), [len(source.key_frames) for source in sources])
     ends = np.cumsum([len(times) for times in frames])

@@ -23,9 +23,7 @@ EULER = 2.0**0.5
 
 
 def kept_rows(sources: Sequence[Source], first: np.ndarray, ranges: np.ndarray) -> list[list[int]]:
-    """Return the rows that each source has samples of, in which these are at first and vary by this much,
-    (., sources).
-    """
+    """Return the rows that each source has samples of, whose first values and ranges are these, (., sources)."""
     kept = []
     for source, constant, varies in zip(sources, first.T, (ranges > NOTHING).T.tolist(), strict=True):
         changing = {row for row in source.filled_rows if varies[row]}
@@ -130,9 +128,7 @@ def largest_errors(
 
 
 def _bends(delta: np.ndarray, reach: np.ndarray, order: str | None) -> np.ndarray:
-    """Return by how much bodies leave the straight line about each of the inner samples (m,), of differences
-    (., m + 2).
-    """
+    """Return how far bodies leave the straight line at each of the inner samples (m,), from differences (., m + 2)."""
     bends = 0.125 * (delta[:, :-2] + delta[:, 2:]) - 0.25 * delta[:, 1:-1]
     moved = np.sqrt(np.einsum("rm,rm->m", bends[ROWS[LOCATION]], bends[ROWS[LOCATION]]))
     if order is None:

@@ -52,7 +52,8 @@ def clear() -> None:
 
 def size_of(source: Source) -> int:
     """Return about how many bytes a source has."""
-    return sum(array.nbytes for keys in source.curves for array in _arrays(keys).values())
+    arrays = (array for keys in source.curves for array in vars(keys).values())
+    return sum(array.nbytes for array in arrays if isinstance(array, np.ndarray))
 
 
 def changed_range(old: Source, new: Source) -> tuple[int, int] | None:
@@ -95,51 +96,27 @@ def _changed(old: Keys, new: Keys) -> tuple[float, float] | None:
     These are the nearest keys before and behind that are the same; (inf, -inf) where all are, None where there is no
     telling.
     """
-    before, after = _arrays(old), _arrays(new)
-    if before.keys() != after.keys() or len(old.points) != len(new.points):
+    before, after = _numbers(old), _numbers(new)
+    if before.tobytes() == after.tobytes():
+        return np.inf, -np.inf
+    if (len(before), before.shape[2]) != (len(after), after.shape[2]):
         return None
-    if len(old.times) == len(new.times):
-        differing = np.flatnonzero(_differ(before, after))
-        if not len(differing):
-            return np.inf, -np.inf
-        leading, trailing = int(differing[0]), len(new.times) - 1 - int(differing[-1])
-    else:
-        count = min(len(old.times), len(new.times))
-        first, last = slice(0, count), slice(-count, None)
-        from_start = _differ(*({n: _part(n, a, first) for n, a in arrays.items()} for arrays in (before, after)))
-        from_end = _differ(*({n: _part(n, a, last) for n, a in arrays.items()} for arrays in (before, after)))[::-1]
-        leading = int(np.argmax(from_start)) if from_start.any() else count
-        trailing = min(int(np.argmax(from_end)) if from_end.any() else count, count - leading)
+    count = min(before.shape[1], after.shape[1])
+    from_start, from_end = (
+        (before[:, part] != after[:, part]).any(axis=(0, 2)) for part in (slice(0, count), slice(-count, None))
+    )
+    leading = int(from_start.argmax()) if from_start.any() else count
+    trailing = int(from_end[::-1].argmax()) if from_end.any() else count
+    trailing = min(trailing, count - leading)
     return (
         float(new.times[leading - 1]) if leading else -np.inf,
         float(new.times[len(new.times) - trailing]) if trailing else np.inf,
     )
 
 
-def _differ(before: dict[str, np.ndarray], after: dict[str, np.ndarray]) -> np.ndarray:
-    """Return which of the keys differ in anything, shape (n,), where there are equally many."""
-    differ = np.zeros(before["interpolation"].shape[1], dtype=bool)
-    for name, array in before.items():
-        # Most are the same throughout, which is told ten times as quickly.
-        if array.tobytes() != after[name].tobytes():
-            differ |= (array != after[name]).any(axis=_OTHER_AXES[name])
-    return differ
-
-
-def _part(name: str, array: np.ndarray, part: slice) -> np.ndarray:
-    """Return an array with these of the keys."""
-    return array[:, :, part] if name == "easing_settings" else array[:, part]
-
-
-_OTHER_AXES = {
-    **dict.fromkeys(("points", "left", "right"), (0, 2)),
-    **dict.fromkeys(("interpolation", "easing"), (0,)),
-    "easing_settings": (0, 1),
-}
-"""The arrays of `Keys`, and along which of their axes there is something else than keys."""
-
-
-def _arrays(keys: Keys) -> dict[str, np.ndarray]:
-    """Return the arrays that keys are made of."""
-    arrays = {name: getattr(keys, name) for name in _OTHER_AXES}
-    return {name: array for name, array in arrays.items() if array is not None}
+def _numbers(keys: Keys) -> np.ndarray:
+    """Return all there is to n keys of c channels, shape (c, n, numbers)."""
+    arrays = [keys.points, keys.left, keys.right, keys.interpolation[..., None]]
+    if keys.easing is not None:
+        arrays += [keys.easing[..., None], np.moveaxis(keys.easing_settings, 0, 2)]
+    return np.concatenate([array for array in arrays if array is not None], axis=2)

@@ -336,9 +336,7 @@ class Source:
         return self.sample_range(1)
 
     def sample_range(self, rate: int) -> tuple[int, int]:
-        """Return the numbers of the first and last sample that in-betweens are for, of so many a frame,
-        from frame 0 on.
-        """
+        """Return the numbers of the first and last sample that in-betweens are for, from frame 0 on."""
         first, last = self._live_range
         return math.floor(first * rate), math.ceil(last * rate)
 
@@ -363,9 +361,7 @@ class Source:
 
     @cached_property
     def seen_range(self) -> tuple[int, int]:
-        """The first and last whole frame that there is something to be seen on: where it goes on outside of its keys,
-        as far as it is looked at.
-        """
+        """The first and last whole frame that anything is seen on, also where it goes on outside of its keys."""
         first, last = self.keyed_range
         if self.seen is not None and self.goes_on:
             # What is held there may be from before, or before an offset from behind.
@@ -382,9 +378,7 @@ class Source:
 
     @cached_property
     def uniform_scale(self) -> bool:
-        """Return whether the scale is animated, and at every key the same along all axes and positive.
-        Else Blender scales.
-        """
+        """Return whether the scale is animated, at every key the same along all axes and positive: else it is left."""
         if SCALE not in self.keyed or self.has_modified_scale:
             return False
         x, y, z = self.values_at(self._all_key_frames)[ROWS[SCALE]]

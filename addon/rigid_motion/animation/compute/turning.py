@@ -162,9 +162,7 @@ def shortest_turns(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def _shortest(first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the second quaternions (S, 4) in the sign of the shorter way from the first,
-    and the turns (3, S) there.
-    """
+    """Return the second quaternions (S, 4), in the sign of the shorter way from the first, and the turns (3, S)."""
     signs = np.where(np.einsum("si,si->s", first, second) < 0.0, -1.0, 1.0)
     return second * signs[:, None], shortest_turns(first, second)
 
@@ -220,9 +218,7 @@ def _add_angles(
 
 
 def _axis(angles: np.ndarray, axis: np.ndarray, order: str, *, before: bool) -> np.ndarray:
-    """Return one of the axes of Euler angles (3, S) for each, (S, 3): as it is in the body, `before` the other turns,
-    or in the space around it.
-    """
+    """Return one of the axes of Euler angles (3, S) each, (S, 3): in the body, `before` other turns, or in space."""
     result = np.eye(3)[axis]
     turn = np.array([order.index(name) for name in "XYZ"])
     others = turn[:, None] < turn[axis] if before else turn[:, None] > turn[axis]

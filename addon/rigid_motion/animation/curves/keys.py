@@ -11,29 +11,18 @@ from functools import cached_property
 
 import numpy as np
 
-CONSTANT, LINEAR, BEZIER, BACK, BOUNCE, CIRC, CUBIC, ELASTIC, EXPO, QUAD, QUART, QUINT, SINE = range(13)
+_EASED = ("BACK", "BOUNCE", "CIRC", "CUBIC", "ELASTIC", "EXPO", "QUAD", "QUART", "QUINT", "SINE")
 
-INTERPOLATIONS = {
-    CONSTANT: "CONSTANT",
-    LINEAR: "LINEAR",
-    BEZIER: "BEZIER",
-    BACK: "BACK",
-    BOUNCE: "BOUNCE",
-    CIRC: "CIRC",
-    CUBIC: "CUBIC",
-    ELASTIC: "ELASTIC",
-    EXPO: "EXPO",
-    QUAD: "QUAD",
-    QUART: "QUART",
-    QUINT: "QUINT",
-    SINE: "SINE",
-}
+INTERPOLATIONS = dict(enumerate(("CONSTANT", "LINEAR", "BEZIER", *_EASED)))
 """From the code of `bpy.types.Keyframe.interpolation` to its name."""
 
-AUTO, EASE_IN, EASE_OUT, EASE_IN_OUT = range(4)
+CONSTANT, LINEAR, BEZIER, *_ = INTERPOLATIONS
+ELASTIC = 3 + _EASED.index("ELASTIC")
 
-EASINGS = {AUTO: "AUTO", EASE_IN: "EASE_IN", EASE_OUT: "EASE_OUT", EASE_IN_OUT: "EASE_IN_OUT"}
+EASINGS = dict(enumerate(("AUTO", "EASE_IN", "EASE_OUT", "EASE_IN_OUT")))
 """From the code of `bpy.types.Keyframe.easing` to its name."""
+
+AUTO = 0
 
 CODE = np.uint8
 """The type that Blender keeps codes in: any other takes longer to read."""

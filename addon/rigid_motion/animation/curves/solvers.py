@@ -99,9 +99,7 @@ def solve_cubics(u: np.ndarray, cubics: np.ndarray) -> np.ndarray:
 
 
 def _solve_bracketed(u: np.ndarray, cubics: np.ndarray) -> np.ndarray:
-    """Solve cubics as `solve_cubics` does, for the few near a vanishing slope: Newton's steps, or bisection where they
-    lead out.
-    """
+    """Solve cubics near a vanishing slope: by Newton's steps, and by bisection where these lead out."""
     c1, c2, c3 = cubics
     low, high = np.zeros_like(u), np.ones_like(u)
     t = np.clip(u, 0.0, 1.0)

@@ -142,9 +142,7 @@ class Spans:
         )
 
     def timings(self, curves: Sequence[Keys]) -> Iterator[list[tuple[slice, tuple]]]:
-        """Yield for each of the keys which channels have their timing in common,
-        and all that this timing depends on.
-        """
+        """Yield for each of the keys the channels that have their timing in common, and all that this depends on."""
         for first, keys in zip(self.first_curve, curves, strict=True):
             channels = len(keys.points)
             begin, end = (TIMING_SIZE * self.first_span[curve] for curve in (first, first + channels))
@@ -176,9 +174,7 @@ class Spans:
         return np.arange(begin, end), bounds[1:] - bounds[:-1]
 
     def parameters(self, spans: np.ndarray, counts: np.ndarray, frames: np.ndarray) -> np.ndarray:
-        """Return the parameters of the cubics on frames (m,),
-        of which each of `spans` (s,) has the next `counts` (s,).
-        """
+        """Return the parameters of the cubics on frames (m,), of which each of the spans (s,) has `counts` (s,)."""
 
         def spread(of_spans: np.ndarray) -> np.ndarray:
             return of_spans[..., spans].repeat(counts, axis=-1)
@@ -217,9 +213,7 @@ def _without_keys(channels: int) -> Keys:
 
 
 def _concatenated(curves: Sequence[Keys]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return points, left and right handles (n, 2) and codes (n,) of the keys of all curves;
-    points where handles are None.
-    """
+    """Return points and handles (n, 2), points where there are no handles, and codes (n,) of the keys of all curves."""
     points = [keys.points.reshape(-1, 2) for keys in curves]
     left, right = (
         [on_key if handles is None else handles.reshape(-1, 2) for on_key, handles in zip(points, side, strict=True)]
@@ -230,9 +224,7 @@ def _concatenated(curves: Sequence[Keys]) -> tuple[np.ndarray, np.ndarray, np.nd
 
 
 def _easings(curves: Sequence[Keys]) -> tuple[np.ndarray, np.ndarray]:
-    """Return easings and their settings for the keys of all curves, shapes (n,) and (3, n);
-    zeros where none were read.
-    """
+    """Return easings (n,) and their settings (3, n) of the keys of all curves, zeros where none were read."""
     counts = [keys.interpolation.size for keys in curves]
     easing, settings = np.zeros(sum(counts), dtype=CODE), np.zeros((3, sum(counts)))
     for keys, end, count in zip(curves, itertools.accumulate(counts), counts, strict=True):

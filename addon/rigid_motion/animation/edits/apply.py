@@ -1,6 +1,7 @@
 """What all that can be done to motions has in common: many targets at once, one look at the slots, one refresh.
 
-Every target says first whether it can be done, before anything is changed.
+Every target says first whether it can be done. Where one cannot, `Refused` is raised, and nothing is changed; a list
+`refused` takes the refusals instead, and all other targets are done.
 """
 
 from __future__ import annotations
@@ -54,8 +55,6 @@ def apply_edit(
         Says for one what there is to do, without doing any of it. May raise `Refused`.
     act
         Does it.
-    refused
-        Takes the refusals; without it nothing is done where there is one, and it is raised.
     becomes
         What becomes of a source by it, where no F-curve of the animator's is touched: nothing is read again then.
     survey
@@ -87,7 +86,7 @@ def apply_edit(
         raise refusals[0] if len(refusals) == 1 else Refused("\n".join(map(str, refusals)))
     if refused is not None:
         refused.extend(refusals)
-    with follower.paused():
+    with follower.follower.turn():
         results = {transform: act(transform, planned) for transform, planned in plans}
     acted = {transform for transform, _ in plans}
     if becomes is None:

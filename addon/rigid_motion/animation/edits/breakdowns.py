@@ -17,8 +17,7 @@ from bpy.app.translations import pgettext_n as n_
 
 from ...motion import Poses, interpolate
 from ..actions.channels import KeyFields, key_fields, set_key_fields
-from ..actions.modifiers import added_values
-from ..actions.reading import read
+from ..actions.reading import added_values, read
 from ..actions.refusals import refuse_linked
 from ..actions.slots import Binding, read_again
 from ..compute.bodies import body_poses
@@ -32,9 +31,9 @@ from ..live.kept_timing import nearest_key
 from ..live.segment_keys import share_out_turns
 from ..queries.keyed import active_binding
 from ..queries.segments import frame_in_action
-from ..queries.visible_pose import shown_components
 from ..transforms import Channel, Refused, Transform
 from ..writers.channel_values import components_near
+from ..writers.table import shown_components
 from .apply import Readings, Targets, apply_edit, readable
 
 BREAKDOWN, PUSH, RELAX = KINDS = ("BREAKDOWN", "PUSH", "RELAX")
@@ -51,20 +50,13 @@ def breakdown(
 
     Parameters
     ----------
-    targets : bpy.types.Object or bpy.types.PoseBone, or several of them
+    targets, refused
+        See `apply`.
     factor : float
         For BREAKDOWN 0 is the pose of the key before, 1 that of the key after, and beyond that the motion goes on. For
         RELAX 0 is the pose that is seen and 1 the in-between of the mode; PUSH goes as far in the other direction.
     kind : str
         One of `KINDS`.
-    refused : list, optional
-        Takes the refusals, and all other targets are keyed.
-
-    Raises
-    ------
-    Refused
-        Where there are no keys on both sides of the frame, or rigid motion cannot act, and there is no list to take
-        that. Nothing is changed then.
     """
     Breakdowns(targets, kind, refused=refused).apply(factor)
 
@@ -91,11 +83,8 @@ class _Between:
     properties: dict[str, tuple[float, ...]]
     """Its properties as they were, keyed or not."""
 
-    keys: dict[Channel, KeyFields]
-    """The keys of its channels as they were."""
-
-    turns: KeyFields | None
-    """The keys of its channel of turns, None where it has none."""
+    keys: dict[Channel, KeyFields | None]
+    """The keys of its channels as they were, and of that of turns; None where there is none."""
 
     @property
     def mode(self) -> str:
@@ -134,12 +123,10 @@ class _Between:
     def put_back(self) -> None:
         """Give its channels the keys that they had."""
         for channel, fields in self.keys.items():
-            set_key_fields(self.binding.curves[channel], fields)
-        channel = self.transform.turns_channel
-        if self.turns is not None:
-            set_key_fields(self.binding.ensure_curve(channel), self.turns)
-        elif channel in self.binding.curves:
-            self.binding.channelbag.fcurves.remove(self.binding.curves.pop(channel))
+            if fields is not None:
+                set_key_fields(self.binding.ensure_curve(channel), fields)
+            elif channel in self.binding.curves:
+                self.binding.channelbag.fcurves.remove(self.binding.curves.pop(channel))
 
     def key(self, kind: str, factor: float) -> None:
         """Set a key of the pose in all channels that have keys, and share out the turns of the segment.
@@ -198,7 +185,7 @@ class Breakdowns:
     @contextmanager
     def _edit(self) -> Iterator[None]:
         """Give all their keys back, edit them, and refresh."""
-        with follower.paused():
+        with follower.follower.turn():
             for between in self._between:
                 between.put_back()
             yield
@@ -228,7 +215,8 @@ class Breakdowns:
         keys = source.key_frames
         after = int(np.searchsorted(keys, frame))
         seen = shown_components(transform)
-        keyed = [transform.channels[row] for rows, _ in source.channels for row in rows]
+        keyed = [*(transform.channels[row] for rows, _ in source.channels for row in rows), transform.turns_channel]
+        curves = {channel: binding.curves.get(channel) for channel in keyed}
         return _Between(
             transform,
             binding,
@@ -237,8 +225,7 @@ class Breakdowns:
             (float(keys[after - 1]), float(keys[after])),
             (transform.components() if seen is None else seen) - added,
             {name: tuple(getattr(transform.carrier, name)) for name in transform.properties.values()},
-            {channel: key_fields(binding.curves[channel]) for channel in keyed},
-            None if (turns := binding.curves.get(transform.turns_channel)) is None else key_fields(turns),
+            {channel: None if fcurve is None else key_fields(fcurve) for channel, fcurve in curves.items()},
         )
 
 

@@ -9,55 +9,40 @@ from bpy.app.translations import pgettext_n as n_
 
 from ..actions.records import recorded, recorded_digest
 from ..actions.refusals import refuse_linked
-from ..actions.slots import Binding, bindings_for, bindings_of, slots_alone
+from ..actions.slots import Binding, bindings_for, slots_alone
 from ..live import follower
 from ..transforms import Refused, Transform, transform_of
 from ..transforms.sizes import metres_per_channel_unit
+from ..writers.bone_constraints import restore, trouble_of
 from ..writers.filling import clear
-from ..writers.table import WRITERS, writer_of
-from .apply import Readings, Targets, apply_edit, transforms_of
+from .apply import Readings, Targets, apply_edit
 
 
 def set_exact(targets: Targets, is_exact: bool = True, *, refused: list[Refused] | None = None) -> None:
     """Have objects be exact between frames as well, by a constraint; or by delta transforms on whole frames alone.
 
-    What moves by the same Action slot comes along.
-
-    Parameters
-    ----------
-    targets : bpy.types.Object, or several of them
-    is_exact : bool
-    refused : list, optional
-        Takes the refusals, and all others are changed.
-
-    Raises
-    ------
-    Refused
-        For what cannot be edited, where there is no list to take that. Nothing is changed then. Bones are exact anyway.
+    What moves by the same Action slot comes along. For targets and refusals see `apply`; bones are exact anyway.
     """
-    chosen, refusals = [], []
-    for transform in transforms_of(targets):
-        try:
-            refuse_linked(transform)
-            if transform.is_part:
-                raise Refused(n_("{name} is a bone, and exact between frames anyway"), name=transform.name)
-            chosen.append(transform)
-        except Refused as refusal:
-            refusals.append(refusal)
-    if refusals and refused is None:
-        raise Refused("\n".join(map(str, refusals)))
-    if refused is not None:
-        refused.extend(refusals)
-    bindings = bindings_of(chosen)
-    users = dict.fromkeys((*chosen, *(user for binding in bindings for user in binding.users)))
-    changed = [user for user in users if user.animated.is_editable and user.motion.is_exact != is_exact]
-    if not changed:
-        return
-    with follower.paused():
-        clear([binding for binding in bindings if binding.slot.action.is_editable])
+
+    def plan(transform: Transform, readings: Readings) -> list[Binding]:
+        refuse_linked(transform)
+        if transform.is_part:
+            raise Refused(n_("{name} is a bone, and exact between frames anyway"), name=transform.name)
+        return [binding for binding, _ in readings]
+
+    def act(transform: Transform, bindings: list[Binding]) -> list[Transform]:
+        users = dict.fromkeys((transform, *(user for binding in bindings for user in binding.users)))
+        changed = [user for user in users if user.animated.is_editable and user.motion.is_exact != is_exact]
+        if changed:
+            clear([binding for binding in bindings if binding.slot.action.is_editable])
         for user in changed:
             user.motion.is_exact = is_exact
-    follower.refresh([transform_of(user.carrier) for user in changed])
+        return changed
+
+    done = apply_edit(targets, plan, act, refused)
+    if others := [user for changed in done.values() for user in changed if user not in done]:
+        # They may move by other slots as well.
+        follower.refresh([transform_of(user.carrier) for user in others])
 
 
 def error_between_frames(target: bpy.types.Object | bpy.types.PoseBone | Transform) -> float:
@@ -92,32 +77,21 @@ def with_troubles(transforms: Iterable[Transform]) -> Iterator[Transform]:
 def restore_constraints(targets: Targets, *, refused: list[Refused] | None = None) -> None:
     """Put the constraints of bones back: first in their stack, unmuted, with full influence.
 
-    Parameters
-    ----------
-    targets : bpy.types.PoseBone, or several of them
-        Where nothing is amiss, nothing changes.
-    refused : list, optional
-        Takes the refusals, and those of all others are put back.
-
-    Raises
-    ------
-    Refused
-        Where something has no in-betweens that a constraint would show, or cannot be edited, and there is no list to
-        take that. Nothing is changed then.
+    Where nothing is amiss, nothing changes. For targets and refusals see `apply`.
     """
 
     def plan(transform: Transform, readings: Readings) -> list[Binding]:
         refuse_linked(transform)
-        bindings = [binding for binding, _ in readings if binding.filled and writer_of(binding).uses_constraints]
+        bindings = [binding for binding, _ in readings if binding.filled and binding.kind.has_difference_slot]
         if not bindings:
             raise Refused(
                 n_("{name} has no constraint to restore: choose a mode for keys of a bone first"), name=transform.name
             )
-        return [binding for binding in bindings if writer_of(binding).trouble_of(transform, binding)]
+        return [binding for binding in bindings if trouble_of(transform, binding)]
 
     def act(transform: Transform, bindings: list[Binding]) -> None:
         for binding in bindings:
-            writer_of(binding).restore(transform, binding)
+            restore(transform, binding)
 
     apply_edit(targets, plan, act, refused)
 
@@ -126,7 +100,7 @@ def _troubles(transforms: Iterable[Transform]) -> Iterator[tuple[Transform, str]
     """Yield what is amiss with the constraints of each."""
     by_prefix: dict[bpy.types.Object, dict[str, Transform]] = {}
     for transform in transforms:
-        if WRITERS[transform.kind].uses_constraints:
+        if transform.has_difference_slot:
             by_prefix.setdefault(transform.animated, {})[transform.prefix] = transform
     for animated, same in by_prefix.items():
         for slot in slots_alone(animated):
@@ -135,5 +109,5 @@ def _troubles(transforms: Iterable[Transform]) -> Iterator[tuple[Transform, str]
                     continue
                 # The constraint alone is looked at, not the channels.
                 binding = Binding(slot, user.prefix, None, (user,), dict)
-                if trouble := writer_of(binding).trouble_of(user, binding):
+                if trouble := trouble_of(user, binding):
                     yield user, trouble

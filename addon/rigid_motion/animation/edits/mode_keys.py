@@ -39,20 +39,14 @@ def set_mode(
 
     Parameters
     ----------
-    targets : bpy.types.Object, or several of them
+    targets, refused
+        See `apply`.
     mode : str
         One of `MODE_IDS`.
     frames : sequence of float, optional
         The frames of the keys that begin the segments meant. They get a key in the mode channel, and so does the key
         behind them where another mode goes on; all other segments keep what they have. Without frames, there is one
         mode for all segments, and the mode channel goes.
-    refused : list, optional
-        Takes the refusals, and all other targets get the mode.
-
-    Raises
-    ------
-    Refused
-        Where rigid motion cannot act on one of them, and there is no list to take that. Nothing is changed then.
     """
 
     def plan(transform: Transform, readings: Readings) -> list[Binding]:
@@ -88,7 +82,8 @@ def set_turns(
 
     Parameters
     ----------
-    targets : bpy.types.Object, or several of them
+    targets, refused
+        See `apply`.
     turns : int
         In the sense in which a segment turns anyway, against it where negative.
     frames : sequence of float, optional
@@ -96,14 +91,6 @@ def set_turns(
         segments have so many.
     axis : str, optional
         One of `TURN_AXES`, for all segments of the Action: what turns are about. Left as it is where it is not given.
-    refused : list, optional
-        Takes the refusals, and all other targets get the turns.
-
-    Raises
-    ------
-    Refused
-        Where rigid motion cannot act on one of them, and there is no list to take that; and where there is no such
-        number of turns, or axis. Nothing is changed then.
     """
 
     def plan(transform: Transform, readings: Readings) -> Binding:

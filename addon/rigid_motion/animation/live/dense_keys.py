@@ -12,7 +12,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..actions.modifiers import added_values
+from ..actions.reading import added_values
 from ..actions.slots import Binding
 from ..compute.differences import in_betweens
 from ..compute.source_cache import cached_source
@@ -71,9 +71,7 @@ def _bounds(keyed: np.ndarray, inserted: np.ndarray) -> np.ndarray:
 
 
 def _off_curves(new: Source, old: Source, frames: np.ndarray, binding: Binding) -> np.ndarray:
-    """Return how far the keys on these frames (m,) are off the curves that were there before,
-    0 where none is, (10, m).
-    """
+    """Return how far keys on these frames (m,) are off the curves that were there, 0 without keys, (10, m)."""
     off = np.zeros((10, len(frames)))
     for rows, keys in new.channels:
         indices = np.clip(np.searchsorted(frames, keys.times - SAME_FRAME), 0, len(frames) - 1)

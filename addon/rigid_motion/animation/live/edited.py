@@ -23,8 +23,7 @@ BLENDING = (
     "TRANSFORM_OT_",
     *(f"POSE_OT_{name}" for name in ("push", "relax", "breakdown", "blend", "user_transforms_clear")),
 )
-"""The beginnings of the names of operators that go on from what properties have,
-also when they are adjusted afterwards."""
+"""The beginnings of names of operators that go on from what properties have, also when adjusted afterwards."""
 
 PATIENCE = 10.0
 """Seconds to wait for the main thread, which may be waiting itself: for a render to be cancelled."""
@@ -88,9 +87,7 @@ def objects_to_evaluate(
 
 
 def transforms_under(objects: Iterable[bpy.types.Object]) -> list[Transform]:
-    """Return these objects, and of rigs all bones that their Actions move,
-    or that have modes or constraints for them.
-    """
+    """Return these objects, and all bones of rigs with Actions, modes or constraints for any."""
     result: dict[Transform, None] = {}
     for obj in objects:
         result[transform_of(obj)] = None
@@ -121,9 +118,7 @@ def has_bones(obj: bpy.types.Object) -> bool:
 
 def _has_properties(obj: bpy.types.Object) -> bool:
     motion = obj.rigid_motion
-    return (
-        any(motion.filled) or bool(motion.filled_components) or motion.mode != "BLENDER" or motion.awaited != "BLENDER"
-    )
+    return any(motion.filled) or motion.mode != "BLENDER" or motion.awaited != "BLENDER"
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,12 @@ from __future__ import annotations
 import functools
 import logging
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import contextmanager
 
 import bpy
 from bpy.app.handlers import persistent
 
-from ..actions.mode_property import adopt_from_properties, show_pending_modes
+from ..actions.mode_property import show_pending_modes
 from ..actions.reading import leading
 from ..actions.records import forget_names
 from ..actions.slots import Binding, bindings_of, choose_slots, filled_bindings, slots_in
@@ -43,7 +43,7 @@ from .edited import (
 from .inserted_keys import InsertedKeys
 from .refreshing import refresh_bindings
 from .rigs import SlotNames, are_separated, discard, give_keys_back, notice_slots
-from .seen_pose import LeftInPlace, SeenInChannels, is_baking
+from .seen_pose import LeftInPlace, SeenInChannels, assigned_to, is_baking
 from .snapshots import Snapshots
 
 log = logging.getLogger(__package__)
@@ -231,15 +231,14 @@ class Follower:
             if not obj.is_editable:
                 continue
             choose_slots(obj)
-            if depsgraph is not None:
-                self.left.notice_assignments(obj, depsgraph)
+            assigned = {} if depsgraph is None else assigned_to(obj, depsgraph)
+            self.left.notice_assignments(assigned)
             for binding in filled_bindings(obj):
                 self.alone(writer_of(binding).prepare, binding)
-                if depsgraph is not None:
-                    for transform in binding.users:
-                        with suppress(Refused):
-                            if self.inserted.notice_assignment(transform, depsgraph, self.frame, operators):
-                                writer_of(binding).hide(binding, transform)
+                for transform in assigned.keys() & binding.users:
+                    evaluated, parts = assigned[transform]
+                    if self.inserted.notice_assignment(transform, evaluated, len(parts), self.frame, operators):
+                        writer_of(binding).hide(binding, transform)
         return list(edited)
 
     def look_through(self, *, again: bool = False) -> None:
@@ -326,11 +325,6 @@ class Follower:
     def after_load(self, *_: object) -> None:
         source_cache.clear()
         self.begin_file()
-        if not self.busy:
-            transforms = transforms_under(bpy.data.objects)
-            moved = {user for binding in bindings_of(transforms) for user in binding.users}
-            with self.turn():
-                adopt_from_properties(transform for transform in transforms if transform not in moved)
         self.look_again()
 
     def make_exact(self) -> None:
@@ -364,17 +358,10 @@ def is_enabled() -> bool:
 
 
 def set_drafts(allowed: bool) -> None:
-    """Edit large Actions in draft, as in a window: one sample a frame, until something is shown between frames, or
-    rendered, or saved.
-    """
+    """Edit large Actions in draft, as in a window: see `writers.filling`."""
     follower.drafts = allowed
     if not allowed:
         follower.finish_drafts()
-
-
-def is_busy() -> bool:
-    """Return whether the edits that Blender tells of at this moment are the extension's."""
-    return follower.busy
 
 
 def refresh(targets: Targets | None = None) -> int:
@@ -408,11 +395,6 @@ def show_seen_in_channels(transforms: Iterable[Transform]) -> None:
     """Give the properties of these the pose that is seen, until the frame changes: for what reads them."""
     for transform in follower.channels.show(transforms):
         follower.inserted.notice_whole(transform, follower.frame)
-
-
-def paused() -> AbstractContextManager[None]:
-    """Do several things, and refresh after them."""
-    return follower.turn()
 
 
 def first_look() -> None:

@@ -32,16 +32,15 @@ from functools import cached_property
 import bpy
 import numpy as np
 
-from ..actions.modifiers import added_values
+from ..actions.reading import added_values
 from ..actions.slots import Binding
 from ..compute.components import PART_OF, rows_left_to
 from ..compute.source_cache import cached_source
 from ..compute.sources import SAME_FRAME, Source, values_of
 from ..compute.turning import needs_turning
 from ..queries.segments import frame_in_action
-from ..queries.visible_pose import shown_components, visible_components
-from ..transforms import Transform
-from ..writers.table import writer_of
+from ..transforms import Transform, visible_components
+from ..writers.table import shown_components, writer_of
 from .edited import Operators
 from .kept_timing import Insertion, keep_timing, mark_breakdown, nearest_key
 
@@ -225,20 +224,17 @@ class InsertedKeys:
         return {prefix for uid, prefix in self._posed if uid == animated.session_uid}
 
     def notice_assignment(
-        self, transform: Transform, depsgraph: bpy.types.Depsgraph, frame: float, operators: Operators
+        self,
+        transform: Transform,
+        evaluated: bpy.types.Object | bpy.types.PoseBone,
+        changed: int,
+        frame: float,
+        operators: Operators,
     ) -> bool:
-        """Keep what the properties of a transform were set to, where they have not been evaluated so yet.
+        """Keep what so many properties of a transform were set to since it was evaluated.
 
-        Returns
-        -------
-        bool
-            Whether they are to be shown without the difference.
+        Returns whether they are to be shown without the difference.
         """
-        carrier, evaluated = transform.carrier, transform.evaluated(depsgraph)
-        changed = sum(
-            evaluated is not None and tuple(getattr(carrier, prop)) != tuple(getattr(evaluated, prop))
-            for prop in ("location", transform.rotation, "scale")
-        )
         if not changed or self._undone.get(transform.identity) == transform.components().tobytes():
             return False
         is_whole = self._is_shown_whole(transform) or operators.are_any(transform.stored_by)

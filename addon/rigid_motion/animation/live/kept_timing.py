@@ -49,8 +49,7 @@ class _Channels:
     """The handles before the first of them and behind the last, shape (c, 2, 2)."""
 
     native: np.ndarray
-    """Handles between, with which a curve would stay as it was: before the new key and behind it, shape
-    (c, 2, 2, 2)."""
+    """Handles between with which curves would stay as they were, before and behind the new key, (c, 2, 2, 2)."""
 
     weights: np.ndarray
     """The weight of the square of its way in that of all channels, 0 where a curve is to stay as it was, (c,)."""

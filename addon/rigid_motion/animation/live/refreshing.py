@@ -17,9 +17,10 @@ from ..actions.slots import Binding, bindings_of, read_again
 from ..compute.source_cache import cache_source
 from ..compute.sources import Source
 from ..transforms import Refused, Transform
+from ..writers.constraints import remove_orphans
 from ..writers.filling import clear, fill_in, finish_drafts, hold, is_complete, limit_ranges
 from ..writers.sampled import regroup
-from ..writers.table import leave_other_way, release, remove_orphans, writer_of
+from ..writers.table import leave_other_way, release, writer_of
 from .dense_keys import keep_motion
 from .inserted_keys import InsertedKeys
 from .segment_keys import share_out_turns
@@ -93,7 +94,8 @@ def refresh_bindings(
     _hold(idle, editable)
     # A bone was renamed or deleted: then it is no edit of a single one.
     if len(editable) > 1:
-        remove_orphans(editable)
+        for slot in dict.fromkeys(binding.slot for binding in editable if binding.kind.has_difference_slot):
+            remove_orphans(slot)
     return len(stale)
 
 

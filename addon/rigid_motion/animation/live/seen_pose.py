@@ -16,7 +16,7 @@ import inspect
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
@@ -24,10 +24,13 @@ from bpy_extras.anim_utils import bake_action_objects_iter
 
 from ..actions.slots import Binding, actions_of, bindings_for, bindings_of
 from ..compute.components import PART_OF
-from ..queries.visible_pose import shown_components
-from ..transforms import WIDTHS, Refused, Transform, kind_of, transform_of
-from ..writers.table import writer_of
+from ..transforms import Refused, Transform, transform_in, transform_of
+from ..writers.table import shown_components, writer_of
 from .edited import BlockKey, key_of, objects_of
+from .snapshots import property_bits
+
+Assigned = dict[Transform, tuple[Any, set[str]]]
+"""Transforms as they were evaluated last, and the parts of location, rotation and scale that were set since."""
 
 
 class LeftInPlace:
@@ -37,23 +40,11 @@ class LeftInPlace:
         self._set: dict[Transform, set[str]] = {}
         """The parts of location, rotation and scale that were set and are not evaluated yet."""
 
-    def notice_assignments(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
-        """Keep what was set of an object and its bones since it was evaluated."""
-        evaluated = obj.evaluated_get(depsgraph)
-        if (any(obj.rigid_motion.filled) or obj.rigid_motion.is_exact) and obj.matrix_world == evaluated.matrix_world:
-            self._notice(transform_of(obj), evaluated)
-        if obj.pose is not None and obj.rigid_motion.has_bones:
-            for number in _set_bones(obj, evaluated):
-                bone = obj.pose.bones[number]
-                self._notice(transform_of(bone), evaluated.pose.bones[number])
-
-    def _notice(self, transform: Transform, evaluated: bpy.types.Object | bpy.types.PoseBone) -> None:
-        with suppress(Refused):
-            self._set[transform] = {
-                part
-                for part, prop in transform.properties.items()
-                if tuple(getattr(transform.carrier, prop)) != tuple(getattr(evaluated, prop))
-            }
+    def notice_assignments(self, assigned: Assigned) -> None:
+        """Keep what was set property by property since it was evaluated."""
+        for transform, (evaluated, parts) in assigned.items():
+            if transform.is_part or transform.carrier.matrix_world == evaluated.matrix_world:
+                self._set[transform] = parts
 
     def forget_assignments(self) -> None:
         """Forget the assignments: they are evaluated by now."""
@@ -91,18 +82,21 @@ def _animated_parts(user: Transform, binding: Binding) -> set[str]:
     }
 
 
-def _set_bones(rig: bpy.types.Object, evaluated: bpy.types.Object) -> list[int]:
-    """Return the numbers of the bones of which a property is not as it was evaluated."""
-    count = len(rig.pose.bones)
-    if len(evaluated.pose.bones) != count:
-        return []
-    other = np.zeros(count, dtype=bool)
-    for prop, width in WIDTHS.items():
-        now, then = np.empty((count, width), np.float32), np.empty((count, width), np.float32)
-        rig.pose.bones.foreach_get(prop, now.ravel())
-        evaluated.pose.bones.foreach_get(prop, then.ravel())
-        other |= (now != then).any(axis=1)
-    return np.flatnonzero(other).tolist()
+def assigned_to(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Assigned:
+    """Return what was set of an object and its bones since they were evaluated."""
+    evaluated = obj.evaluated_get(depsgraph)
+    pairs: list[tuple[Any, Any]] = [(obj, evaluated)]
+    if obj.pose is not None and obj.rigid_motion.has_bones and len(evaluated.pose.bones) == len(obj.pose.bones):
+        numbers = np.flatnonzero((property_bits(obj) != property_bits(evaluated)).any(axis=1)).tolist()
+        pairs += [(obj.pose.bones[number], evaluated.pose.bones[number]) for number in numbers]
+    result: Assigned = {}
+    for carrier, before in pairs:
+        transform = transform_of(carrier)
+        with suppress(Refused):
+            properties = transform.properties.items()
+            parts = {part for part, prop in properties if tuple(getattr(carrier, prop)) != tuple(getattr(before, prop))}
+            result[transform] = before, parts
+    return result
 
 
 class _Shown(NamedTuple):
@@ -159,7 +153,7 @@ class SeenInChannels:
             obj = next(iter(objects_of([shown.key])), None)
             if obj is not None and actions is not None and not set(actions).intersection(actions_of(obj)):
                 left.append(shown)
-            elif obj is not None and (transform := kind_of(shown.prefix).in_object(obj, shown.prefix)) is not None:
+            elif obj is not None and (transform := transform_in(obj, shown.prefix)) is not None:
                 with suppress(Refused):
                     is_same = transform.rotation == shown.rotation
                     if (

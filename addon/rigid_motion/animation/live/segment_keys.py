@@ -85,7 +85,7 @@ def _is_among(chosen: np.ndarray, frames: np.ndarray) -> np.ndarray:
 
 def _new(binding: Binding, channel: Channel) -> bpy.types.FCurve:
     fcurve = binding.ensure_curve(channel)
-    fcurve.group = ensure_group(binding.channelbag, binding.users[0].group)
+    fcurve.group = ensure_group(binding.channelbag, binding.group)
     return fcurve
 
 

@@ -16,7 +16,8 @@ import itertools
 import logging
 import operator
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import bpy
@@ -47,23 +48,11 @@ POINTS = {"handle_left": slice(0, 2), "co": slice(3, 5), "handle_right": slice(6
 NUMBERS = 9
 """The number of numbers that a key begins with."""
 
-_NOTHING = np.empty(0, np.uint8)
-
 _COLUMNS = [(prop, index) for prop, width in WIDTHS.items() for index in range(width)]
-"""Properties in the columns of `_Poses.numbers`, but for the last one: the rotation mode."""
+"""The properties of a bone, in the order of the columns of `property_bits`."""
 
 SAME_VALUE = 1e-6
-"""The distance that a property may have from its channel, relative to its value or absolute below 1:
-single precision."""
-
-
-def key_reader(channels: Channels) -> Callable[[], list[bytes]]:
-    """Return a function that reads the keys of these channels, for as long as Blender keeps the channels.
-
-    It returns the bytes of each channel's keys. They differ wherever anything of a key differs, selection included, and
-    also where the same keys were read in the other way before.
-    """
-    return _Reader(channels).read
+"""The distance of a property from its channel, relative or absolute below 1, that is single precision."""
 
 
 class _Layout:
@@ -73,31 +62,17 @@ class _Layout:
     """The bytes that a key takes. None as long as no two of one F-curve were seen, 0 where it is not as expected."""
 
 
-class _Reader:
-    """Reads the keys of some channels, again and again.
+def read_keys(channels: Channels) -> list[bytes]:
+    """Return the bytes of each channel's keys.
 
-    What leads to the memory of each channel is kept, for as long as Blender keeps the keys where they are.
+    They differ wherever anything of a key differs, selection included, and also where they were read in the other way.
     """
-
-    def __init__(self, channels: Channels) -> None:
-        self.channels = channels
-        self.addresses = [(0, 0)] * len(channels)
-        """The addresses of the keys of each channel in memory, and how many bytes they are."""
-        self.views = [_NOTHING] * len(channels)
-
-    def read(self) -> list[bytes]:
-        if _Layout.size is None:
-            _Layout.size = _checked_size(self.channels)
-        size = _Layout.size
-        if not size:
-            return [_by_property(keys) for keys in self.channels]
-        addresses = [(keys[0].as_pointer(), size * count) if (count := len(keys)) else (0, 0) for keys in self.channels]
-        if addresses != self.addresses:
-            for number, (address, before) in enumerate(zip(addresses, self.addresses, strict=True)):
-                if address != before:
-                    self.views[number] = _view(*address) if address[1] else _NOTHING
-            self.addresses = addresses
-        return [view.tobytes() for view in self.views]
+    if _Layout.size is None:
+        _Layout.size = _checked_size(channels)
+    size = _Layout.size
+    if not size:
+        return [_by_property(keys) for keys in channels]
+    return [_view(keys[0].as_pointer(), size * count).tobytes() if (count := len(keys)) else b"" for keys in channels]
 
 
 def _checked_size(channels: Channels) -> int | None:
@@ -142,7 +117,9 @@ class _Memory:
     __array_interface__: dict[str, object]
 
 
+@lru_cache(maxsize=65536)
 def _view(address: int, size: int) -> np.ndarray:
+    """Return what is in memory there, whenever it is looked at."""
     memory = _Memory()
     memory.__array_interface__ = {"data": (address, True), "shape": (size,), "typestr": "|u1", "version": 3}
     return np.asarray(memory)
@@ -187,9 +164,9 @@ class Snapshots:
         """
         before = self._rigs.get(rig.session_uid)
         now, bones = _Poses(rig, None if is_set or before is None else before[1]), rig.pose.bones
-        shared = _Dependencies.of(rig, None if before is None else before[0])
+        shared = _Dependencies.of(rig)
         self._rigs[rig.session_uid] = shared, now, frame
-        if before is None or not shared.is_as(before[0]) or before[1].names != now.names:
+        if before is None or shared != before[0] or before[1].names != now.names:
             left = set() if before is None else dict(before[0].moved_by).keys() - dict(shared.moved_by).keys()
             return [*bones, *(bone for other in _users_of(left) for bone in other.pose.bones)]
         changed = now.changed_from(before[1])
@@ -210,11 +187,11 @@ class _SlotSnapshot:
         """The numbers of the F-curves by what their data paths begin with."""
         for number, prefix in enumerate(self.prefixes):
             self.under[prefix].append(number)
-        self.read_keys = key_reader([fcurve.keyframe_points for fcurve in self.fcurves])
+        self.channels = [fcurve.keyframe_points for fcurve in self.fcurves]
         self.modifiers = [
             fcurve.modifiers if prop in WIDTHS else () for fcurve, prop in zip(self.fcurves, properties, strict=True)
         ]
-        self.flags, self.keys, self.modified = self._flags(), self.read_keys(), self._modified()
+        self.flags, self.keys, self.modified = self._flags(), read_keys(self.channels), self._modified()
 
     def is_of(self, channelbag: bpy.types.ActionChannelbag) -> bool:
         """Return whether these are still the F-curves that there are, under the same data paths."""
@@ -228,7 +205,7 @@ class _SlotSnapshot:
     def update(self) -> set[int]:
         """Take another snapshot: the numbers of those that may have something else than before."""
         flags, keys, modified = self.flags, self.keys, self.modified
-        self.flags, self.keys, self.modified = self._flags(), self.read_keys(), self._modified()
+        self.flags, self.keys, self.modified = self._flags(), read_keys(self.channels), self._modified()
         changed = {*modified, *self.modified, *np.flatnonzero((self.flags != flags).any(axis=0)).tolist()}
         if self.keys != keys:
             changed.update(itertools.compress(itertools.count(), map(operator.ne, self.keys, keys)))
@@ -240,9 +217,7 @@ class _SlotSnapshot:
         return {(self.paths[number], int(indices[number])): self.fcurves[number] for number in self.under[prefix]}
 
     def _modified(self) -> list[int]:
-        """Return the numbers of those that have modifiers, which may have been changed for all that can be
-        seen here.
-        """
+        """Return the numbers of those that have modifiers, which may have changed for all that can be seen here."""
         return [number for number, modifiers in enumerate(self.modifiers) if len(modifiers)]
 
     def _flags(self) -> np.ndarray:
@@ -253,20 +228,25 @@ class _SlotSnapshot:
         return flags
 
 
+def property_bits(rig: bpy.types.Object) -> np.ndarray:
+    """Return the properties of bones bit by bit, in `_COLUMNS`, and their rotation modes behind, (bones, columns)."""
+    bones, columns = rig.pose.bones, []
+    for name, width in WIDTHS.items():
+        values = np.empty(len(bones) * width, np.float32)
+        bones.foreach_get(name, values)
+        columns.append(values.view(np.int32).reshape(len(bones), width))
+    modes = np.empty(len(bones), np.int32)
+    bones.foreach_get("rotation_mode", modes)
+    return np.column_stack((*columns, modes))
+
+
 class _Poses:
     """All about the bones of a rig that in-betweens may depend on, but for their channels."""
 
     def __init__(self, rig: bpy.types.Object, as_in: _Poses | None) -> None:
         """Take a snapshot. Settings are those of an earlier snapshot, `as_in`, where that is of the same bones."""
         bones = rig.pose.bones
-        self.names, columns = bones.keys(), []
-        for name, width in WIDTHS.items():
-            values = np.empty(len(bones) * width, np.float32)
-            bones.foreach_get(name, values)
-            columns.append(values.view(np.int32).reshape(len(bones), width))
-        modes = np.empty(len(bones), np.int32)
-        bones.foreach_get("rotation_mode", modes)
-        self.numbers = np.column_stack((*columns, modes))
+        self.names, self.numbers = bones.keys(), property_bits(rig)
         is_known = as_in is not None and as_in.names == self.names
         self.settings = as_in.settings if is_known else [_settings_of(bone) for bone in bones]
 
@@ -314,28 +294,17 @@ class _Dependencies(NamedTuple):
     moved_by: list[tuple[tuple[int, int], list[str]]]
     """The slots, and the strips that show them."""
 
-    counts: list[int]
-    """The number of users of each Action, constraints among them. While these stay, so do those of the slots."""
-
     users: list[tuple]
     """The users of each slot, and whether any of them has an NLA."""
 
     rest: bytes
 
     @classmethod
-    def of(cls, rig: bpy.types.Object, before: _Dependencies | None) -> _Dependencies:
-        slots = slots_alone(rig)
-        moved_by = [((slot.action.as_pointer(), slot.handle), sorted(map(str, slot.strips))) for slot in slots]
-        counts = [slot.action.users for slot in slots]
-        if before is not None and (before.moved_by, before.counts) == (moved_by, counts):
-            users = before.users
-        else:
-            users = [(slot.in_nla, *(user.session_uid for user in slot.users)) for slot in slots_of([rig])]
-        return cls(moved_by, counts, users, _rest_of(rig.data.bones))
-
-    def is_as(self, other: _Dependencies) -> bool:
-        """Return whether the bones depend on the same, however many constraints there are."""
-        return (self.moved_by, self.users, self.rest) == (other.moved_by, other.users, other.rest)
+    def of(cls, rig: bpy.types.Object) -> _Dependencies:
+        alone = slots_alone(rig)
+        moved_by = [((slot.action.as_pointer(), slot.handle), sorted(map(str, slot.strips))) for slot in alone]
+        users = [(slot.in_nla, *(user.session_uid for user in slot.users)) for slot in slots_of([rig])]
+        return cls(moved_by, users, _rest_of(rig.data.bones))
 
 
 def _users_of(keys: set[tuple[int, int]]) -> set[bpy.types.Object]:
@@ -347,9 +316,7 @@ def _users_of(keys: set[tuple[int, int]]) -> set[bpy.types.Object]:
 
 
 def _rest_of(bones: bpy.types.ArmatureBones) -> bytes:
-    """Return how bones are at rest, as far as it matters to any:
-    for the axes of locations that are not the bone's own.
-    """
+    """Return how bones are at rest, as far as it matters: for the axes of locations that are not the bone's own."""
     is_local = np.empty(len(bones), bool)
     bones.foreach_get("use_local_location", is_local)
     if is_local.all():

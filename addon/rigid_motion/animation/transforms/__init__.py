@@ -16,7 +16,6 @@ from __future__ import annotations
 from .kinds import (
     CONSTRAINT,
     GROUP,
-    KINDS,
     ORIGINALS,
     BoneTransform,
     ExactObjectTransform,
@@ -25,11 +24,11 @@ from .kinds import (
     default_of,
     difference_constraints,
     is_part,
-    kind_of,
     let_override_be_read,
     prefix_of,
     shows_differences,
     split_path,
+    transform_in,
     transform_of,
 )
 from .transform import (
@@ -43,12 +42,12 @@ from .transform import (
     Transform,
     rotation_of,
     set_rotation,
+    visible_components,
 )
 
 __all__ = [
     "CONSTRAINT",
     "GROUP",
-    "KINDS",
     "LINKED",
     "MODE_PROPERTY",
     "ORIGINALS",
@@ -65,12 +64,13 @@ __all__ = [
     "default_of",
     "difference_constraints",
     "is_part",
-    "kind_of",
     "let_override_be_read",
     "prefix_of",
     "rotation_of",
     "set_rotation",
     "shows_differences",
     "split_path",
+    "transform_in",
     "transform_of",
+    "visible_components",
 ]

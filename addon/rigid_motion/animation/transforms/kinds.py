@@ -1,4 +1,4 @@
-"""The kinds of what is moved: objects and pose bones. Each is a class, a row of `KINDS`, and one in `writers.table`.
+"""The kinds of what is moved: objects and pose bones. Each is a class, and a row in `writers.table`.
 
 What the in-betweens of objects differ in goes into delta transforms, or is put on top of them by a constraint. An
 object may have delta transforms of its own: those it had before any in-betweens are its *original* ones. They are
@@ -10,6 +10,7 @@ rotation and the scale that its channels give it. It has nothing of its own that
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Sequence
@@ -27,8 +28,7 @@ CONSTRAINT = "Rigid Motion"
 """The name of the constraint, and the beginning of its name where Actions of one rig need one each."""
 
 NEAR = 1e-4
-"""Matrices of bones that differ by less are the same,
-having been through the space of the rig in single precision."""
+"""Matrices of bones that differ by less are the same, in single precision by way of the rig."""
 
 _BONE = re.compile(r'pose\.bones\["((?:[^"\\]|\\.)*)"\]\.')
 
@@ -36,26 +36,20 @@ GROUP = "Rigid Motion"
 """The group of F-curves that an object's mode channel and its differences are in."""
 
 ORIGINALS = {
-    "delta_location": ("own_location", 0),
-    "delta_rotation_quaternion": ("own_quaternion", 1),
-    "delta_rotation_euler": ("own_euler", 2),
-    "delta_scale": ("own_scale", 3),
+    "delta_location": "own_location",
+    "delta_rotation_quaternion": "own_quaternion",
+    "delta_rotation_euler": "own_euler",
+    "delta_scale": "own_scale",
 }
-"""Each delta transform: where an object's original is written down, and its place in `filled`. Files have the names."""
+"""Where an object's original of each delta transform is written down."""
 
-_BITS = {
-    channel: 1 << bit
-    for bit, channel in enumerate(
-        (path, index) for path in ORIGINALS for index in range(4 if path.endswith("quaternion") else 3)
-    )
-}
-"""The bit of each component of the delta transforms in `filled_components`."""
+_CHANNELS = [(path, index) for path in ORIGINALS for index in range(4 if path.endswith("quaternion") else 3)]
+"""The components of the delta transforms, in the order of `filled`."""
 
 
 class BoneTransform(Transform):
     """A pose bone. The difference is put on top of it by a constraint."""
 
-    carrier_type = bpy.types.PoseBone
     is_part = True
     has_difference_slot = True
     label = n_("Bone", OWN_WORDS)
@@ -82,25 +76,12 @@ class BoneTransform(Transform):
         self.animated, self.carrier, self.prefix = bone.id_data, bone, prefix_of(bone.name)
 
     @classmethod
-    def has_prefix(cls, prefix: str) -> bool:
-        return bool(bone_name(prefix))
-
-    @classmethod
-    def in_object(cls, obj: bpy.types.Object, prefix: str) -> BoneTransform | None:
-        bone = None if obj.pose is None else obj.pose.bones.get(bone_name(prefix))
-        return None if bone is None else cls(bone)
-
-    @classmethod
     def difference_group(cls, prefix: str) -> str:
         return bone_name(prefix)
 
     @property
     def name(self) -> str:
         return f"{self.animated.name}/{self.carrier.name}"
-
-    @property
-    def group(self) -> str:
-        return self.carrier.name
 
     @property
     def location_axes(self) -> np.ndarray | None:
@@ -117,9 +98,6 @@ class BoneTransform(Transform):
 
     def original(self) -> np.ndarray:
         return REST.copy()
-
-    def evaluated(self, depsgraph: bpy.types.Depsgraph) -> bpy.types.PoseBone | None:
-        return self.animated.evaluated_get(depsgraph).pose.bones.get(self.carrier.name)
 
     def is_as_seen(self, evaluated: bpy.types.PoseBone) -> bool:
         bone = self.carrier
@@ -173,7 +151,6 @@ def let_override_be_read(rig: bpy.types.Object) -> None:
 class ObjectTransform(Transform):
     """An object. The difference goes into its delta transforms."""
 
-    carrier_type = bpy.types.Object
     is_part = False
     has_difference_slot = False
     label = n_("Object", OWN_WORDS)
@@ -191,18 +168,6 @@ class ObjectTransform(Transform):
         self.animated = self.carrier = obj
 
     @classmethod
-    def has_prefix(cls, prefix: str) -> bool:
-        return not prefix
-
-    @classmethod
-    def of(cls, carrier: bpy.types.Object) -> ObjectTransform:
-        return ExactObjectTransform(carrier) if carrier.rigid_motion.is_exact else cls(carrier)
-
-    @classmethod
-    def in_object(cls, obj: bpy.types.Object, prefix: str) -> ObjectTransform:
-        return cls.of(obj)
-
-    @classmethod
     def together(cls, users: tuple[Transform, ...]) -> tuple[Transform, ...]:
         if any(user.has_difference_slot for user in users):
             return tuple(ExactObjectTransform(user.carrier) for user in users)
@@ -211,13 +176,6 @@ class ObjectTransform(Transform):
     @classmethod
     def difference_group(cls, prefix: str) -> str:
         return GROUP
-
-    @property
-    def group(self) -> str:
-        return GROUP
-
-    def evaluated(self, depsgraph: bpy.types.Depsgraph) -> bpy.types.Object:
-        return self.carrier.evaluated_get(depsgraph)
 
     def differences_for(self, rotation: str) -> dict[int, Channel]:
         return channels_under("delta_", rotation)
@@ -229,7 +187,7 @@ class ObjectTransform(Transform):
 
     def _noted_values(self, path: str, noted: Collection[Channel]) -> list[float]:
         """Return what is written down in these components of a delta property, and in the others what it has."""
-        now, then = getattr(self.carrier, path), getattr(self.motion, ORIGINALS[path][0])
+        now, then = getattr(self.carrier, path), getattr(self.motion, ORIGINALS[path])
         return [then[i] if (path, i) in noted else value for i, value in enumerate(now)]
 
     def original(self) -> np.ndarray:
@@ -247,7 +205,7 @@ class ObjectTransform(Transform):
 
     def is_recorded(self, filled: Iterable[Channel]) -> bool:
         """Return whether the original values of these channels are written down."""
-        return _BITS.keys() & filled <= self._recorded
+        return self._recorded.issuperset(channel for channel in filled if channel[0] in ORIGINALS)
 
     def is_more_noted(self, filled: Iterable[Channel]) -> bool:
         """Return whether the original values of channels other than these are written down."""
@@ -259,22 +217,22 @@ class ObjectTransform(Transform):
         `overwritten`: they have done so already, and it has none.
         """
         noted = self._recorded
-        added = (_BITS.keys() & filled) - noted
+        added = set(_CHANNELS).intersection(filled) - noted
         for path in {path for path, _ in added}:
-            now, then = getattr(self.carrier, path), list(getattr(self.motion, ORIGINALS[path][0]))
+            now, then = getattr(self.carrier, path), list(getattr(self.motion, ORIGINALS[path]))
             for i, value in enumerate(now):
                 if (path, i) in added and overwritten:
                     then[i] = default_of(path)[i]
                 elif (path, i) not in noted:
                     then[i] = value
-            _set_if_other(self.motion, ORIGINALS[path][0], then)
+            _set_if_other(self.motion, ORIGINALS[path], then)
         self._keep(noted | added)
 
     def follow_original(self) -> None:
         """Show an edit of what is written down in all components that in-betweens are not in."""
         noted = self._recorded
         for path in {path for path, _ in noted}:
-            _set_if_other(self.carrier, path, self._noted_values(path, _BITS.keys() - noted))
+            _set_if_other(self.carrier, path, self._noted_values(path, set(_CHANNELS) - noted))
 
     def show_original(self) -> None:
         """Set the delta transforms to what is written down, for as long as Blender leaves them so."""
@@ -294,20 +252,10 @@ class ObjectTransform(Transform):
     @property
     def _recorded(self) -> frozenset[Channel]:
         """The components that are written down."""
-        motion = self.motion
-        if bits := motion.filled_components:
-            return _components_in(bits)
-        # Files of a version that took all components of a delta transform, or none, have only `filled`.
-        taken = motion.filled[:]
-        return frozenset(channel for channel in _BITS if taken[ORIGINALS[channel[0]][1]]) if any(taken) else frozenset()
+        return frozenset(itertools.compress(_CHANNELS, self.motion.filled))
 
     def _keep(self, noted: Collection[Channel]) -> None:
-        motion, bits, paths = self.motion, sum(_BITS[channel] for channel in noted), {path for path, _ in noted}
-        if motion.filled_components != bits:
-            motion.filled_components = bits
-        summary = [path in paths for path in ORIGINALS]
-        if list(motion.filled) != summary:
-            motion.filled = summary
+        _set_if_other(self.motion, "filled", [channel in noted for channel in _CHANNELS])
 
 
 class ExactObjectTransform(ObjectTransform):
@@ -318,10 +266,6 @@ class ExactObjectTransform(ObjectTransform):
     has_difference_slot = True
     matrix_lacks_difference = False
 
-    @classmethod
-    def of(cls, carrier: bpy.types.Object) -> ObjectTransform:
-        return cls(carrier)
-
     def differences_for(self, rotation: str) -> dict[int, Channel]:
         return channels_under("", rotation)
 
@@ -330,11 +274,6 @@ class ExactObjectTransform(ObjectTransform):
         # Without a parent, an object's local axes are those that it has been turned to.
         space = "WORLD" if self.carrier.parent is None else "LOCAL"
         return super().constraint_settings | {"owner_space": space}
-
-
-@cache
-def _components_in(bits: int) -> frozenset[Channel]:
-    return frozenset(channel for channel, bit in _BITS.items() if bit & bits)
 
 
 def _set_if_other(owner: bpy.types.bpy_struct, name: str, values: Iterable[float]) -> None:
@@ -350,26 +289,25 @@ def default_of(path: str) -> tuple[float, ...]:
     return tuple(bpy.types.Object.bl_rna.properties[path].default_array)
 
 
-KINDS: tuple[type[Transform], ...] = (BoneTransform, ObjectTransform, ExactObjectTransform)
-
-
 def transform_of(carrier: bpy.types.Object | bpy.types.PoseBone | Transform) -> Transform:
     """Return the transform of something that Blender has, where it is none already."""
     if isinstance(carrier, Transform):
         return carrier
-    for kind in KINDS:
-        if isinstance(carrier, kind.carrier_type):
-            return kind.of(carrier)
+    if isinstance(carrier, bpy.types.PoseBone):
+        return BoneTransform(carrier)
+    if isinstance(carrier, bpy.types.Object):
+        return ExactObjectTransform(carrier) if carrier.rigid_motion.is_exact else ObjectTransform(carrier)
     raise TypeError(f"neither an object nor a pose bone: {carrier!r}")
 
 
-@lru_cache(maxsize=65536)
-def kind_of(prefix: str) -> type[Transform] | None:
-    """Return the kind of what data paths that begin so lead to, None where no kind has such paths."""
-    return next((kind for kind in KINDS if kind.has_prefix(prefix)), None)
+def transform_in(obj: bpy.types.Object, prefix: str) -> Transform | None:
+    """Return what data paths that begin so lead to in an object, None where it has no such thing."""
+    if not prefix:
+        return transform_of(obj)
+    bone = None if obj.pose is None else obj.pose.bones.get(bone_name(prefix))
+    return None if bone is None else BoneTransform(bone)
 
 
 def is_part(prefix: str) -> bool:
     """Return whether data paths that begin so lead to a part of a data-block."""
-    kind = kind_of(prefix)
-    return kind is not None and kind.is_part
+    return bool(bone_name(prefix))

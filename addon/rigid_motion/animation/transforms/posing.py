@@ -43,9 +43,7 @@ class Hierarchy:
         """The poses of bones at rest in the spaces of their parents."""
 
     def posed(self, channels: AffineMaps) -> AffineMaps:
-        """Return where bones are in the space of the rig, shape (bones, n),
-        posed by matrices (bones, n) of their channels.
-        """
+        """Return where matrices of channels (bones, n) put bones in the space of the rig, (bones, n)."""
         placed = AffineMaps(np.empty_like(channels.axes), np.empty_like(channels.origins))
         self.pose(range(len(self.bones)), channels, placed)
         return placed

@@ -140,9 +140,7 @@ def scale_in_scene(transform: Transform) -> float:
 
 
 def into_scene(transform: Transform) -> np.ndarray:
-    """Return what takes the axes of an object's channels to those of the scene, shape (3, 3): its parents,
-    as they are now.
-    """
+    """Return what takes the axes of an object's channels to those of the scene, (3, 3): its parents, as they are."""
     obj = transform.carrier
     if obj.parent is None and not obj.constraints:
         return np.eye(3)

@@ -54,9 +54,6 @@ class Transform(ABC):
     A subclass is a kind of such things. What differs from kind to kind is asked of it, never guessed from data paths.
     """
 
-    carrier_type: ClassVar[type]
-    """The type of what has the properties."""
-
     is_part: ClassVar[bool]
     """True if it is a part of its data-block, with a name that can be changed, and not the data-block itself."""
 
@@ -71,8 +68,7 @@ class Transform(ABC):
     """The name of several, in English."""
 
     linked_text: ClassVar[str]
-    """The reason why it cannot be edited where its data-block is linked, and the way out:
-    {name} is that of the data-block."""
+    """Why it cannot be edited where its data-block {name} is linked, and the way out."""
 
     differing_text: ClassVar[str]
     """The reason why it is not moved by in-betweens of its own: {leader} is the user of its slot whose they are."""
@@ -87,8 +83,7 @@ class Transform(ABC):
     """From the data-block to the carrier, in data paths."""
 
     placed_by: ClassVar[tuple[str, ...]]
-    """The beginnings of the names of operators that set its properties to bring what is on the screen
-    to a certain place."""
+    """The beginnings of names of operators that bring what is on the screen to a certain place."""
 
     stored_by: ClassVar[tuple[str, ...]]
     """The beginnings of the names of operators that set its properties to a whole pose, whatever they had before."""
@@ -98,23 +93,8 @@ class Transform(ABC):
 
     @classmethod
     @abstractmethod
-    def has_prefix(cls, prefix: str) -> bool:
-        """Return whether data paths that begin so lead to something of this kind."""
-
-    @classmethod
-    @abstractmethod
-    def in_object(cls, obj: bpy.types.Object, prefix: str) -> Transform | None:
-        """Return what such data paths lead to in an object, None where it has no such thing."""
-
-    @classmethod
-    @abstractmethod
     def difference_group(cls, prefix: str) -> str:
-        """Return the group of F-curves that its differences are in."""
-
-    @classmethod
-    def of(cls, carrier: bpy.types.Object | bpy.types.PoseBone) -> Transform:
-        """Return the transform of a carrier of this kind."""
-        return cls(carrier)
+        """Return the group of F-curves that its differences are in, and its channels of modes and turns."""
 
     @classmethod
     def together(cls, users: tuple[Transform, ...]) -> tuple[Transform, ...]:
@@ -141,19 +121,8 @@ class Transform(ABC):
         """The axes that it is moved along, as columns (3, 3) in those that it turns about; None where they are one."""
         return None
 
-    @property
-    @abstractmethod
-    def group(self) -> str:
-        """The group of F-curves that its mode channel is in."""
-
-    @abstractmethod
-    def evaluated(self, depsgraph: bpy.types.Depsgraph) -> bpy.types.Object | bpy.types.PoseBone | None:
-        """Return the carrier as it was evaluated last, None where it was not there yet."""
-
     def is_as_seen(self, _evaluated: bpy.types.Object | bpy.types.PoseBone) -> bool:
-        """Return whether its properties were set to what was seen when its carrier was evaluated,
-        difference and all.
-        """
+        """Return whether its properties were set to what was seen when it was evaluated, difference and all."""
         return False
 
     @property
@@ -231,9 +200,7 @@ class Transform(ABC):
 
     @abstractmethod
     def original(self) -> np.ndarray:
-        """Return what it has for a difference without in-betweens, as components (10,):
-        rotation as a unit quaternion.
-        """
+        """Return its difference without in-betweens, as components (10,): rotation as a unit quaternion."""
 
     @property
     def constraint_settings(self) -> dict[str, object]:
@@ -265,6 +232,40 @@ def set_rotation(
     else:
         is_other_sign = near is not None and rotation.dot(Quaternion(near[ROWS[ROTATION]])) < 0.0
         components[ROWS[ROTATION]] = -rotation if is_other_sign else rotation
+
+
+def visible_components(
+    components: np.ndarray, original: np.ndarray, difference: np.ndarray, order: str | None, parts: Collection[str]
+) -> np.ndarray:
+    """Return what the properties would have to be to look the same with the original difference alone.
+
+    Parameters
+    ----------
+    components : array, shape (10,)
+        What the properties are.
+    original : array, shape (10,)
+        The difference without in-betweens: rotation as a unit quaternion.
+    difference : array, shape (10,)
+        The one that there is: rotation as the properties have it.
+    order : str or None
+        Of Euler angles, or None for quaternions.
+    parts : collection of str
+        Which of location, rotation and scale in-betweens are in. The others stay what they are, to the last bit.
+
+    Returns
+    -------
+    array, shape (10,)
+    """
+    seen = components.copy()
+    location, scale = ROWS[LOCATION], ROWS[SCALE]
+    if LOCATION in parts:
+        seen[location] += difference[location] - original[location]
+    if SCALE in parts:
+        seen[scale] *= difference[scale] / np.where(original[scale] == 0.0, 1.0, original[scale])
+    if ROTATION in parts:
+        taken_off, added = Quaternion(original[ROWS[ROTATION]]).inverted(), rotation_of(difference, order).normalized()
+        set_rotation(seen, order, taken_off @ added @ rotation_of(components, order), components)
+    return seen
 
 
 def properties_for(rotation: str) -> dict[str, str]:

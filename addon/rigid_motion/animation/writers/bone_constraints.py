@@ -10,7 +10,7 @@ import bpy
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
 from ..actions.slots import Binding, Curves, slot_with, slots_alone
-from ..transforms import BoneTransform, Transform, difference_constraints, shows_differences
+from ..transforms import Transform, difference_constraints, shows_differences
 from .times import name_of, path_of, span_of
 
 REMOVED, OTHER_SLOT, MUTED, CHANGED, NOT_FIRST, WEAK = "REMOVED", "OTHER_SLOT", "MUTED", "CHANGED", "NOT_FIRST", "WEAK"
@@ -32,9 +32,7 @@ def constraint_of(user: Transform, binding: Binding) -> bpy.types.ActionConstrai
 
 
 def shown_by(constraint: bpy.types.ActionConstraint) -> tuple[bpy.types.Action | None, int]:
-    """Return the Action and the handle of the slot in it that a constraint shows,
-    or will when its rig leaves Edit Mode.
-    """
+    """Return the Action and the handle of the slot that a constraint shows, or will outside of Edit Mode."""
     handle = constraint.action_slot_handle
     if not handle and constraint.id_data.mode == "EDIT" and (slot := _last_slot(constraint)) is not None:
         handle = slot.handle
@@ -84,10 +82,8 @@ def has_constraint(user: Transform, binding: Binding) -> bool:
     return (constraint.name, constraint.frame_start, constraint.frame_end) == (name_of(binding), *span_of(binding))
 
 
-def has_stale_constraint(user: BoneTransform, binding: Binding) -> bool:
-    """Return whether a bone has a constraint that shows what is shown already,
-    or what does not move its rig any more.
-    """
+def has_stale_constraint(user: Transform, binding: Binding) -> bool:
+    """Return whether a bone has a constraint that shows what another does, or what does not move its rig any more."""
     shown = [shown_by(constraint) for constraint in user.carrier.constraints if shows_differences(constraint)]
     if not shown or shown == [slot_of_differences(binding)]:
         return False
@@ -101,7 +97,7 @@ def _may_add_constraint(user: Transform, binding: Binding) -> bool:
     return name not in user.motion.mounted.split("\n") or (present is not None and shows_differences(present))
 
 
-def ensure_constraint(user: BoneTransform, binding: Binding) -> None:
+def ensure_constraint(user: Transform, binding: Binding) -> None:
     """Have a bone show the differences of a slot, by a constraint that it has already or by a new one."""
     constraints, name = user.carrier.constraints, name_of(binding)
     constraint = constraint_of(user, binding) or constraints.get(name)
@@ -124,7 +120,7 @@ def ensure_constraint(user: BoneTransform, binding: Binding) -> None:
         user.animated.rigid_motion.has_bones = True
 
 
-def _new(user: BoneTransform, index: int, name: str) -> bpy.types.ActionConstraint:
+def _new(user: Transform, index: int, name: str) -> bpy.types.ActionConstraint:
     """Return a constraint of this name, at a place in the stack of a bone."""
     constraints = user.carrier.constraints
     constraint = constraints.new("ACTION")
@@ -138,7 +134,7 @@ def _new(user: BoneTransform, index: int, name: str) -> bpy.types.ActionConstrai
 
 
 def _renamed(
-    constraint: bpy.types.ActionConstraint, name: str, user: BoneTransform, binding: Binding
+    constraint: bpy.types.ActionConstraint, name: str, user: Transform, binding: Binding
 ) -> bpy.types.ActionConstraint:
     """Return a constraint of another name in place of one, and channels of it in its slot.
 
@@ -165,7 +161,7 @@ def _in_use(rig: bpy.types.Object) -> set[tuple[bpy.types.Action, int]]:
     return {(slot.action, slot.differences) for slot in slots_alone(rig)}
 
 
-def remove_constraints(user: BoneTransform, shown: set[tuple[bpy.types.Action, int]]) -> None:
+def remove_constraints(user: Transform, shown: set[tuple[bpy.types.Action, int]]) -> None:
     """Take the constraints off a bone that show something else than these."""
     constraints, names, left = user.carrier.constraints, [], set(shown)
     for constraint in [item for item in constraints if shows_differences(item)]:
@@ -211,7 +207,7 @@ def _is_influence_animated(constraint: bpy.types.ActionConstraint, user: Transfo
     return (channelbag is not None and channelbag.fcurves.find(path) is not None) or drivers.find(path) is not None
 
 
-def restore(user: BoneTransform, binding: Binding) -> None:
+def restore(user: Transform, binding: Binding) -> None:
     """Have a bone show the differences of a slot in full: by its constraint as it was made, or by a new one."""
     constraints, desired, name = user.carrier.constraints, slot_of_differences(binding), name_of(binding)
     if constraint_of(user, binding) is None:

@@ -57,9 +57,7 @@ def channel_values(
 
 
 def _with_added(source: Source, motion: InBetweens, added: np.ndarray) -> Poses:
-    """Return the desired poses with what modifiers add: in location along its axes,
-    in rotation what it turns Blender's by.
-    """
+    """Return the desired poses with what modifiers add to location along its axes, and to rotation."""
     now, then = source.values_at(source.held(motion.frames)), motion.desired
     rows = now + added
     moved = added[:3].T if source.location_axes is None else added[:3].T @ source.location_axes.T

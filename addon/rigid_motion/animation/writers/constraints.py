@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 from mathutils import Quaternion
 
-from ..actions.records import record_constraint, recorded_digest
+from ..actions.records import record_constraint, recorded_digest, remove_records
 from ..actions.slots import Binding, Curves, Slot, bindings_for, bindings_of, is_time, slot_with, slots_alone
 from ..compute.components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
 from ..compute.sources import Source
@@ -22,7 +22,6 @@ from ..transforms import (
     WIDTHS,
     Channel,
     Transform,
-    bone_name,
     is_part,
     prefix_of,
     rotation_of,
@@ -37,9 +36,7 @@ from .bone_constraints import (
     has_constraint,
     has_stale_constraint,
     remove_constraints,
-    restore,
     slot_of_differences,
-    trouble_of,
 )
 from .sampled import Layout, Pieces, remove_if_empty, replace_samples
 from .times import held_by, is_line, most_samples, name_of, new_line, remove_time, says, time_of, write_line, write_time
@@ -50,10 +47,8 @@ AT_REST = "Rigid Motion Rest"
 
 
 class ConstraintWriter(Writer):
-    uses_constraints = True
-
     def layout(self, source: Source, rate: int) -> Layout:
-        return Layout.apart(source, rate)
+        return Layout.of(source, rate, is_apart=True)
 
     def most_samples(self, source: Source) -> int:
         return most_samples(source)
@@ -63,9 +58,7 @@ class ConstraintWriter(Writer):
         if points:
             _avoid_names(binding)
             _make_room(binding, points)
-            curves, _ = replace_samples(
-                _channelbag(binding), binding.kind.difference_group(binding.prefix), present, points, layout, pieces
-            )
+            curves, _ = replace_samples(_channelbag(binding), binding.group, present, points, layout, pieces)
             binding.has_filled(curves)
             _keep_at_rest(binding, points)
             write_time(binding, layout)
@@ -74,9 +67,7 @@ class ConstraintWriter(Writer):
                     ensure_constraint(user, binding)
         elif present:
             remove_time(binding)
-            replace_samples(
-                binding.slot.bones_channelbag, binding.kind.difference_group(binding.prefix), present, {}, None, {}
-            )
+            replace_samples(binding.slot.bones_channelbag, binding.group, present, {}, None, {})
             binding.has_filled({})
             _keep_at_rest(binding, {})
             _remove_slot_if_empty(binding.slot)
@@ -133,46 +124,8 @@ class ConstraintWriter(Writer):
         for path, index in missing:
             write_line(binding, path, held[path, index])
         if len(present) > len(held):
-            remove_if_empty(binding.channelbag, binding.kind.difference_group(binding.prefix))
+            remove_if_empty(binding.channelbag, binding.group)
         return bool(missing) or len(present) > len(held)
-
-    def trouble_of(self, user: Transform, binding: Binding) -> str:
-        return trouble_of(user, binding)
-
-    def restore(self, user: Transform, binding: Binding) -> None:
-        restore(user, binding)
-
-    def remove_orphans(self, slot: Slot) -> None:
-        """Take out what a slot has for bones that are in none of its users any more, and are not keyed in it either.
-
-        So it is left of a bone that was renamed. What was deleted, keys and all, may come back.
-        """
-        action, channelbag, differences = slot.action, slot.channelbag, slot.bones_channelbag
-        records = action.rigid_motion.slots
-        prefixes = {record.prefix for record in slot.records if is_part(record.prefix)}
-        groups = () if differences is None else differences.groups
-        prefixes |= {prefix_of(group.name) for group in groups}
-        gone = {
-            prefix
-            for prefix in prefixes
-            if all(user.pose is None or bone_name(prefix) not in user.pose.bones for user in slot.users)
-        }
-        if gone:
-            paths = (split_path(fcurve.data_path) for fcurve in slot.fcurves)
-            gone -= {prefix for prefix, prop in paths if prop in WIDTHS}
-        if not gone:
-            return
-        for bag in (channelbag, differences):
-            for fcurve in list(bag.fcurves) if bag is not None else ():
-                prefix, prop = split_path(fcurve.data_path)
-                if prefix in gone and (bag is differences or prop.startswith(f'constraints["{CONSTRAINT}')):
-                    bag.fcurves.remove(fcurve)
-        for number, record in reversed(list(enumerate(records))):
-            if record.handle == slot.handle and record.prefix in gone:
-                records.remove(number)
-        for group in [group for group in groups if not group.channels]:
-            differences.groups.remove(group)
-        _remove_slot_if_empty(slot)
 
     def release(self, transforms: Iterable[Transform]) -> None:
         bones = [
@@ -188,6 +141,31 @@ class ConstraintWriter(Writer):
         for bone in bones:
             if bone.animated.is_editable:
                 remove_constraints(bone, shown.get(bone, set()))
+
+
+def remove_orphans(slot: Slot) -> None:
+    """Take out what a slot has for bones that are in none of its users any more, and are not keyed in it either.
+
+    So it is left of a bone that was renamed. What was deleted, keys and all, may come back.
+    """
+    differences = slot.bones_channelbag
+    groups = () if differences is None else differences.groups
+    prefixes = {record.prefix for record in slot.records if is_part(record.prefix)}
+    prefixes |= {prefix_of(group.name) for group in groups}
+    present = {prefix_of(bone.name) for user in slot.users if user.pose is not None for bone in user.pose.bones}
+    if gone := prefixes - present:
+        paths = (split_path(fcurve.data_path) for fcurve in slot.fcurves)
+        gone -= {prefix for prefix, prop in paths if prop in WIDTHS}
+    if not gone:
+        return
+    for bag in filter(None, (slot.channelbag, differences)):
+        for fcurve in list(bag.fcurves):
+            if split_path(fcurve.data_path)[0] in gone and (bag == differences or is_time(fcurve)):
+                bag.fcurves.remove(fcurve)
+    remove_records(slot, gone)
+    for group in [group for group in groups if not group.channels]:
+        differences.groups.remove(group)
+    _remove_slot_if_empty(slot)
 
 
 def _avoid_names(binding: Binding) -> None:

@@ -65,9 +65,7 @@ def _keys(source: Source, layout: Layout) -> np.ndarray:
 
 
 def _at_keys(source: Source, rows: list[int], near: np.ndarray) -> np.ndarray:
-    """Return what the differences are at keys, shape (rows, k): the original ones,
-    in the sign and turn near to these.
-    """
+    """Return what the differences are at keys, (rows, k): the original ones, in the sign and turn near to these."""
     original = np.array(source.difference_at_keys)
     turning = [number for number, row in enumerate(rows) if PART_OF[row] == ROTATION]
     result = np.repeat(original[rows, None], near.shape[1], axis=1)
@@ -88,9 +86,7 @@ def _at_keys(source: Source, rows: list[int], near: np.ndarray) -> np.ndarray:
 
 
 def _knots(keys: np.ndarray, before: np.ndarray, layout: Layout) -> list[tuple[float, int]]:
-    """Return frames of the F-curve between which lines run, in order, each with the number of its key;
-    -1 for a sample.
-    """
+    """Return the frames that lines run between, each with the number of its key, -1 for a sample."""
     knots: list[tuple[float, int]] = []
     shift = layout.shift * layout.rate
     for number, (key, sample) in enumerate(zip(keys.tolist(), before.tolist(), strict=True)):

@@ -132,7 +132,7 @@ def _held(binding: Binding, beside: Sequence[Binding]) -> dict[Channel, float]:
 
 
 def _held_for(user: ObjectTransform, binding: Binding, beside: Sequence[Binding]) -> dict[Channel, float]:
-    originals = {path: getattr(user.motion, original)[:] for path, (original, _) in ORIGINALS.items()}
+    originals = {path: getattr(user.motion, original)[:] for path, original in ORIGINALS.items()}
     originals = {path: values for path, values in originals.items() if all(map(math.isfinite, values))}
     if not _is_replacing(user.animated, binding.slot):
         return {}
@@ -148,9 +148,7 @@ def _held_for(user: ObjectTransform, binding: Binding, beside: Sequence[Binding]
 
 
 def _is_replacing(obj: bpy.types.Object, slot: Slot) -> bool:
-    """Return whether a slot, wherever it moves an object in the NLA, takes the place of what is below it:
-    nothing is added.
-    """
+    """Return whether a slot takes the place of what is below it wherever it moves an object in the NLA."""
     data = obj.animation_data
     if data.action == slot.action and data.action_blend_type != "REPLACE":
         return False
@@ -168,9 +166,7 @@ def _is_above(obj: bpy.types.Object, slot: Slot, other: Slot) -> bool:
 
 
 def _spans(obj: bpy.types.Object, slot: Slot) -> list[tuple[int, float, float]]:
-    """Return where in the NLA of an object a slot plays: the number of the track, that of its Action behind all of
-    them, and the frames of the scene.
-    """
+    """Return where a slot plays in the NLA of an object: track, that of its Action being last, and scene frames."""
     data = obj.animation_data
     spans = [
         (level, strip.frame_start, strip.frame_end)

@@ -47,49 +47,30 @@ SAME_ROTATION = 1e-4
 """Components of rotations that are one, in single precision, and far from those a turn or a sign apart."""
 
 
-def begin_drafts(readings: Sequence[tuple[Binding, Source]]) -> None:
-    """Have large Actions that are to be filled in go on in draft."""
+def begin_drafts(readings: Sequence[tuple[Binding, Source]]) -> list[tuple[Binding, Source]]:
+    """Have large Actions that are to be filled in go on in draft.
+
+    Returns what else of them is to be filled in anew, for the samples between frames that it has.
+    """
     apart: defaultdict[bpy.types.Action, list[tuple[Binding, Source]]] = defaultdict(list)
     for binding, source in readings:
         if binding.kind.has_difference_slot:
             apart[binding.slot.action].append((binding, source))
+    others = []
     for action, large in apart.items():
-        if not is_draft(action):
-            longest = max(last - first for first, last in (source.frame_range for _, source in large))
-            if max(len(large), len(action.rigid_motion.slots)) * longest >= LARGE:
-                _begin_draft(action, [binding for binding, _ in large])
-
-
-def _begin_draft(action: bpy.types.Action, known: Iterable[Binding]) -> None:
-    """Take out of an Action the samples between frames. `known` are some of its bindings."""
-    # Strips may show what is between the frames of an Action on whole frames of the scene.
-    if any(slot.in_nla for slot in slots_in([action])):
-        return
-    action.rigid_motion.is_draft = action.rigid_motion.has_longer = True
-    if any(record.rate > 1 for record in action.rigid_motion.slots):
-        bindings = {(binding.slot.handle, binding.prefix): binding for binding in (*bindings_in([action]), *known)}
-        for binding in bindings.values():
-            _take_out_between_frames(binding)
-
-
-def _take_out_between_frames(binding: Binding) -> None:
-    """Leave the samples on whole frames, where it is known how they lie."""
-    written, source, rows = recorded(binding), cached_source(recorded_digest(binding)), recorded_rows(binding)
-    if written.rate == 1 or source is None:
-        return
-    (first, last), (begin, end) = source.sample_range(1), source.sample_range(written.rate)
-    frames = np.arange(first, last + 1)
-    # Beside the outermost keys, off whole frames, all is as it is on these.
-    chosen = np.clip(frames * written.rate - begin, 0, end - begin)
-    samples = np.empty(2 * (end - begin + 1), np.float32)
-    layout, points = writer_of(binding).layout(source, 1), {}
-    for channel, fcurve in binding.filled.items():
-        if 2 * len(fcurve.sampled_points) != len(samples):
-            return
-        fcurve.sampled_points.foreach_get("co", samples)
-        points[channel] = layout.points(np.stack((frames, samples[1::2][chosen]), axis=1, dtype=np.float32).ravel())
-    record_in_betweens(binding, source.digest, rows, 1, written.error)
-    writer_of(binding).write(binding, points, layout, {})
+        longest = max(last - first for first, last in (source.frame_range for _, source in large))
+        is_large = max(len(large), len(action.rigid_motion.slots)) * longest >= LARGE
+        # Strips may show what is between the frames of an Action on whole frames of the scene.
+        if not is_large or is_draft(action) or any(slot.in_nla for slot in slots_in([action])):
+            continue
+        action.rigid_motion.is_draft = action.rigid_motion.has_longer = True
+        if any(record.rate > 1 for record in action.rigid_motion.slots):
+            known = {(binding.slot.key, binding.prefix) for binding, _ in large}
+            for binding in bindings_in([action]):
+                source = cached_source(recorded_digest(binding)) if recorded(binding).rate > 1 else None
+                if source is not None and (binding.slot.key, binding.prefix) not in known:
+                    others.append((binding, source))
+    return others
 
 
 def is_draft(action: bpy.types.Action) -> bool:
@@ -117,7 +98,7 @@ def fill_in(readings: Sequence[tuple[Binding, Source]], *, in_draft: bool = Fals
     Large Actions may begin a draft, where `in_draft`.
     """
     if in_draft:
-        begin_drafts(readings)
+        readings = [*readings, *begin_drafts(readings)]
     changed, anew = [], []
     for (binding, source), need in zip(readings, _needs(readings), strict=True):
         edit = _edit_of(binding, source, need)
@@ -196,7 +177,7 @@ class _Edit(NamedTuple):
 def _edit_of(binding: Binding, source: Source, need: Need) -> _Edit | None:
     """Return what has to be filled in of a binding, None where all has to be."""
     old, rate = cached_source(recorded_digest(binding)), recorded(binding).rate
-    if old is None or old is source or old.sample_range(rate) != source.sample_range(rate):
+    if old is None or old is source or rate > need.most or old.sample_range(rate) != source.sample_range(rate):
         return None
     frames, layout = changed_range(old, source), writer_of(binding).layout(source, rate)
     if frames is None or layout.is_ring or not is_complete(binding, source, layout):
@@ -242,9 +223,7 @@ def _fill_in_changed(edits: Sequence[_Edit]) -> list[tuple[Binding, Source, Need
 
 
 def _are_covered(samples: Samples, rows: Sequence[int]) -> bool:
-    """Return whether there are F-curves for all components that differ in these samples,
-    and samples for all F-curves.
-    """
+    """Return whether there are F-curves for all components that differ here, and samples for all F-curves."""
     others = samples.keys() - set(rows)
     return len(others) + len(rows) == len(samples) and all(np.ptp(samples[row][1::2]) < NOTHING for row in others)
 
@@ -350,8 +329,6 @@ def limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.types
 
 
 def _is_outside(fcurve: bpy.types.FCurve, begin: float, end: float) -> bool:
-    """Return whether keys or samples of an F-curve lie outside of these frames. A modifier alone makes no range, be it
-    the time of a constraint.
-    """
+    """Return whether keys or samples of an F-curve lie outside of these frames. A modifier alone makes no range."""
     first, last = fcurve.range()
     return (first < begin or last > end) and (len(fcurve.keyframe_points) > 0 or len(fcurve.sampled_points) > 0)

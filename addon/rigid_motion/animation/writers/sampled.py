@@ -82,8 +82,7 @@ class Layout:
     is_ring: bool = False
 
     shift: int = 0
-    """The number of frames that the samples lie later than they are seen,
-    where they are looked up by a time of their own."""
+    """The frames by which samples lie later than they are seen, where a time of their own looks them up."""
 
     is_apart: bool = False
     """True if they are: it is that which repeats and holds, then."""
@@ -95,22 +94,15 @@ class Layout:
     """The number of samples in a frame, where they are apart: then the F-curve is as many times as long."""
 
     @classmethod
-    def of(cls, source: Source) -> Layout:
-        """Return the layout in an F-curve that is read as the frames pass."""
-        first, last = source.frame_range
-        cycles = source.cyclic.cycles if source.repeats else None
-        return cls(first, last, _ends(source, first, last), cycles, first < 0 and cycles is None, steps=source.steps)
-
-    @classmethod
-    def apart(cls, source: Source, rate: int) -> Layout:
-        """Return the layout in an F-curve that is looked up by a time of its own,
-        which goes round where the channels do.
-        """
+    def of(cls, source: Source, rate: int = 1, *, is_apart: bool = False) -> Layout:
+        """Return the layout in an F-curve that is read as the frames pass, or that a time of its own looks up."""
         first, last = source.sample_range(rate)
         cycles = source.cyclic.cycles if source.repeats else None
-        shift, steps = max(0, -source.frame_range[0]), source.steps
+        is_ring, shift = first < 0 and cycles is None, max(0, -source.frame_range[0])
         ends = _ends(source, first / rate, last / rate)
-        return cls(first, last, ends, cycles, shift=shift, is_apart=True, steps=steps, rate=rate)
+        return cls(
+            first, last, ends, cycles, is_ring and not is_apart, shift if is_apart else 0, is_apart, source.steps, rate
+        )
 
     @property
     def frames(self) -> tuple[int, int]:
@@ -318,7 +310,7 @@ def regroup(binding: Binding) -> None:
     rows = recorded_rows(binding)
     if len(binding.filled) >= len(rows):
         return
-    channelbag, group = binding.home
+    channelbag = binding.home
     if channelbag is None:
         return
     rotations = ("rotation_quaternion", "rotation_euler")
@@ -326,7 +318,7 @@ def regroup(binding: Binding) -> None:
     for channel in {of_rotation[row] for of_rotation in channels for row in rows if row in of_rotation}:
         fcurve = channelbag.fcurves.find(channel[0], index=channel[1])
         if fcurve is not None and channel not in binding.filled and not fcurve.keyframe_points:
-            hide_fcurve(fcurve, ensure_group(channelbag, group))
+            hide_fcurve(fcurve, ensure_group(channelbag, binding.group))
             binding.has_filled({**binding.filled, channel: fcurve})
 
 

@@ -1,4 +1,4 @@
-"""What writes the differences of each kind of transform."""
+"""What writes the differences of each kind of transform, and how it is seen with them."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import replace
 
-from ..actions.slots import Binding, Slot
-from ..transforms import BoneTransform, ExactObjectTransform, ObjectTransform, Transform
+import numpy as np
+
+from ..actions.slots import Binding
+from ..transforms import BoneTransform, ExactObjectTransform, ObjectTransform, Transform, visible_components
 from .constraints import ConstraintWriter
 from .deltas import DeltaWriter
 from .writer import Writer
@@ -26,9 +28,7 @@ def writer_of(moved: Binding | Transform) -> Writer:
 
 
 def leave_other_way(binding: Binding) -> None:
-    """Take the in-betweens of an object out of where they are not to be any more: it came to share a slot, or an Action
-    came to it, and so it is exact between frames, or is so no more.
-    """
+    """Take the in-betweens of an object out of the other kind's place: it came to be exact, or is so no more."""
     if binding.kind.is_part:
         return
     kind = ObjectTransform if binding.kind is ExactObjectTransform else ExactObjectTransform
@@ -52,8 +52,24 @@ def release(transforms: Iterable[Transform]) -> None:
         WRITERS[kind].release(same)
 
 
-def remove_orphans(bindings: Iterable[Binding]) -> None:
-    """Take out of the slots of these what is left in them of parts that none of their users has any more."""
-    slots: dict[tuple[Slot, Writer], None] = {(binding.slot, writer_of(binding)): None for binding in bindings}
-    for slot, writer in slots:
-        writer.remove_orphans(slot)
+def shown_components(transform: Transform) -> np.ndarray | None:
+    """Return how a transform is seen now, in the terms of what an animator keys.
+
+    Returns
+    -------
+    array, shape (10,), or None
+        What its properties would have to be for it to look as it does with its original difference alone: location,
+        rotation as it turns (quaternion or Euler angles), scale. None where nothing is on top of them.
+
+    Raises
+    ------
+    Refused
+        Where it turns by axis and angle.
+    """
+    differences = writer_of(transform).shown_differences(transform)
+    if not differences:
+        return None
+    seen = transform.components()
+    for difference, parts in differences:
+        seen = visible_components(seen, transform.original(), difference, transform.order, parts)
+    return seen

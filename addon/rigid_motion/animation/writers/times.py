@@ -48,9 +48,7 @@ def time_of(binding: Binding) -> bpy.types.FCurve | None:
 
 
 def span_of(binding: Binding) -> tuple[int, int]:
-    """Return the frames of the differences that an evaluation time of 0 and one of 1 stand for: there are more than one
-    where more than one sample is shown in a frame.
-    """
+    """Return the frames of the differences at evaluation times 0 and 1, counted in samples."""
     (_, last), rate = next(iter(binding.filled.values())).range(), recorded(binding).rate
     return 0, _duration(math.ceil(last / rate)) * rate
 
@@ -90,9 +88,7 @@ def held_by(binding: Binding, beside: Sequence[Binding]) -> dict[Channel, Line]:
 
 
 def _time_seen_from(binding: Binding, other: Binding, rig: bpy.types.Object) -> Line:
-    """Return the time of another Action's constraint at frames of this one; of its first frame,
-    where there is no one time.
-    """
+    """Return the time of another Action's constraint at frames of this one, that of its first where it has several."""
     line = next((_line_of(fcurve) for fcurve in (time_of(other),) if fcurve is not None), None)
     frames, others = (_frames_of(rig, item.slot) for item in (binding, other))
     if line is None or frames is None or others is None:
@@ -133,13 +129,12 @@ def write_time(binding: Binding, layout: Layout) -> None:
     replace_keys(fcurve, frames, times)
     add_cycles(fcurve, layout.cycles.without_offset)
     add_modifiers(fcurve, layout.stepping)
-    hide_fcurve(fcurve, ensure_group(binding.channelbag, binding.kind.difference_group(binding.prefix)))
+    hide_fcurve(fcurve, ensure_group(binding.channelbag, binding.group))
 
 
 def write_line(binding: Binding, path: str, line: Line) -> bpy.types.FCurve:
     """Return an F-curve beside those of a transform that is a line, without keys."""
-    group = binding.kind.difference_group(binding.prefix)
-    fcurve = binding.curves[path, 0] = new_line(binding.channelbag, group, (path, 0), line)
+    fcurve = binding.curves[path, 0] = new_line(binding.channelbag, binding.group, (path, 0), line)
     return fcurve
 
 
@@ -199,4 +194,4 @@ def remove_time(binding: Binding) -> None:
     fcurve = binding.curves.pop((path_of(binding, "eval_time"), 0), None)
     if fcurve is not None:
         binding.channelbag.fcurves.remove(fcurve)
-        remove_if_empty(binding.channelbag, binding.kind.difference_group(binding.prefix))
+        remove_if_empty(binding.channelbag, binding.group)

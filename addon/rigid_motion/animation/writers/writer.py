@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Sequence
-from typing import ClassVar
 
 import numpy as np
 
-from ..actions.slots import Binding, Slot
+from ..actions.slots import Binding
 from ..compute.sources import Source
 from ..transforms import Channel, Transform
 from .sampled import Layout, Pieces
@@ -16,9 +15,6 @@ from .sampled import Layout, Pieces
 
 class Writer(ABC):
     """One way, for one kind of transform. It keeps nothing itself: all there is to it is in the file."""
-
-    uses_constraints: ClassVar[bool] = False
-    """True if constraints show the differences, which an animator can mute, move or remove."""
 
     @abstractmethod
     def layout(self, source: Source, rate: int) -> Layout:
@@ -57,8 +53,7 @@ class Writer(ABC):
 
     @abstractmethod
     def shown_differences(self, user: Transform) -> list[tuple[np.ndarray, set[str]]]:
-        """Return what is on top of a user as it is shown now, one behind the other,
-        even where nothing moves it any more.
+        """Return what is on top of a user as it is shown now, even where nothing moves it any more, one by one.
 
         Each as components (10,), and which of location, rotation and scale it is in.
         """
@@ -77,20 +72,6 @@ class Writer(ABC):
 
         `beside` is what moves the same users in the NLA, the binding itself among it.
         """
-
-    def trouble_of(self, user: Transform, binding: Binding) -> str:
-        """Return why a user is not seen where its in-betweens have it, see `bone_constraints`;
-        "" where nothing is amiss.
-        """
-        return ""
-
-    def restore(self, user: Transform, binding: Binding) -> None:
-        """Have a user show the differences of a slot in full, whatever an animator has done to it."""
-        return
-
-    def remove_orphans(self, slot: Slot) -> None:
-        """Take out of a slot what is left in it of parts that none of its users has any more."""
-        return
 
     @abstractmethod
     def release(self, transforms: Iterable[Transform]) -> None:
