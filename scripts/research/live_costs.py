@@ -21,8 +21,7 @@ from research.live_streams.engines import ENGINES, FPS, RATE, Way, by_codec, by_
 from research.studies import files_in, publish, report, study_parser
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.streaming.measuring import HEADERS, measure
-from rigid_motion_batch.streaming.packed import packed
+from rigid_motion_batch.streaming.measuring import HEADERS, measure, packed
 from rigid_motion_batch.streaming.sending import body_of, samples_of
 
 RADIUS, TOLERANCE = 0.03, 0.005
@@ -52,7 +51,7 @@ def costs_of(clip: Clip) -> dict[str, Any]:
     times, poses = samples_of(clip)
     body = body_of(clip, poses, RADIUS)
     costs = {
-        f"when needed, {name}": vars(measure(body, times, poses, TOLERANCE, delay)[0]) for delay, name in DELAYS.items()
+        f"when needed, {name}": measure(body, times, poses, TOLERANCE, delay)[0] for delay, name in DELAYS.items()
     } | packed(body, times, poses)
     ways = {way: {name: cost[key] for name, key in COST.items()} for way, cost in costs.items()}
     return {"name": clip.name, "joints": len(body.joints), "ways": ways}

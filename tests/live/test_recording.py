@@ -75,7 +75,7 @@ def test_vmc_is_thinned_within_the_tolerance_and_plays_again(live, sent, clock, 
 
 def test_what_had_come_and_was_not_shown_when_a_recording_began_is_in_it(live, sent, clock):
     live.armature, live.mode, live.tolerance = (rig := new_rig()), "lerp_slerp", TOLERANCE
-    receiving.listening()._vmc.delay = 0.3
+    receiving.listening()._receiver.delay = 0.3
     record(sent, clock, frames_of_vmc(TIMES))
     assert off_by(rig, 0.3) < 1.05 * TOLERANCE
 

@@ -11,8 +11,8 @@ import pytest
 
 from rigid_motion.live import sending
 from rigid_motion.motion import Skeleton
-from rigid_motion.streams import osc
-from rigid_motion.streams.vmc import ROOT, VmcReceiver
+from rigid_motion.streams import Receiver, osc
+from rigid_motion.streams.vmc import ROOT
 from tests.live.performing import JOINTS, heads_of, new_rig
 
 pytestmark = pytest.mark.network
@@ -43,7 +43,7 @@ def test_a_rig_is_a_performer(listener, prefix, turned_by):
     rig.select_set(True)
     rng = np.random.default_rng(3)
     assert bpy.ops.rigid_motion.live_send() == {"FINISHED"}
-    receiver = VmcReceiver(0.0)
+    receiver = Receiver(0.0)
     for turn in range(3):
         for bone in rig.pose.bones:
             bone.rotation_quaternion = rng.normal(size=4) * (0.0 if turn == 0 else 1.0) + (1.0, 0.0, 0.0, 0.0)

@@ -11,7 +11,7 @@ from rigid_motion_batch.cli.stream_measure import body_of, samples_of
 from rigid_motion_batch.recordings.bvh_writing import write_bvh
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.rest_bodies import RestBody
-from rigid_motion_batch.streaming.packed import packed, smallest_three
+from rigid_motion_batch.streaming.measuring import packed, smallest_three
 from tests.streams.links import body, dance
 
 pytestmark = pytest.mark.network
@@ -48,7 +48,7 @@ def test_a_body(walk: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -
 
 def test_a_single_body_with_loss(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     source, shown = Path(__file__).parents[2] / "assets/reach.csv", tmp_path / "shown.csv"
-    options = ["--radius", "0.1", "--loss", "0.05", "--latency", "0.02", "--json"]
+    options = ["--radius", "0.1", "--loss", "0.05", "--json"]
     assert main(["measure", str(source), "--output", str(shown), *options]) == 0
     result = json.loads(capfd.readouterr().out)
     assert result["share_within_20_mm"] > 0.95

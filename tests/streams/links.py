@@ -12,9 +12,8 @@ from rigid_motion.motion import Poses, shell_error
 from rigid_motion.motion.quaternions import turned
 from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.bodies import Forest
-from rigid_motion.streams.coding import Coder
+from rigid_motion.streams.coding import BASES, Coder
 from rigid_motion.streams.paths import Path
-from rigid_motion.streams.residuals import BASES
 from rigid_motion.streams.wire import Motion, read
 
 AHEAD = 1000.0

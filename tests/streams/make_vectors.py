@@ -15,7 +15,7 @@ import numpy as np
 
 from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.coding import Coder
-from rigid_motion.streams.messages import Said, State
+from rigid_motion.streams.messages import Message
 from rigid_motion.streams.tables import TABLES
 from rigid_motion.streams.wire import VERSION
 
@@ -43,6 +43,13 @@ def coding() -> list[dict]:
     return cases
 
 
+def noted_of(message: Message) -> dict:
+    """What a message says, in whole numbers; `cells` are those of the knots besides the end."""
+    said = {name: getattr(message, name) for name in ("back", "end", "finer", "kind")}
+    numbers = [own.tolist() for own in message.numbers]
+    return said | {"cells": message.cells[1:], "groups": numbers, "memory": list(message.memory)}
+
+
 def stream() -> dict:
     """The datagrams of two bodies for a second, and what each message says."""
     own, tool = body(6), Body.rigid("tool", radius=0.1)
@@ -51,18 +58,18 @@ def stream() -> dict:
     sender.identity, receiver.own = IDENTITY, RECEIVER
     write = sender.codec.write
 
-    def noted(said: Said, base: State) -> tuple[bytes, State]:
-        data, state = write(said, base)
-        messages.append(said._asdict() | {"kind": said.kind(base), "memory": state.memory, "data": data.hex()})
-        return data, state
+    def noted(message: Message, base: Message) -> bytes:
+        data = write(message, base)
+        messages.append(noted_of(message) | {"data": data.hex()})
+        return data
 
     sender.codec.write = noted
-    datagrams, answers = [], []
+    datagrams, answers, polled = [], [], False
     for row, time in enumerate(times.tolist()):
         sample = {own.name: poses[:, row], tool.name: poses[-1:, row]}
-        # Samples that are needed do not come, and a datagram is late.
-        overdue = row > 12 and math.isfinite(sender.next) and not any(message["late"] > 1 for message in messages)
-        time = sender.next if overdue else time
+        # A sample that is needed does not come.
+        overdue = row > 12 and math.isfinite(sender.next) and not polled
+        polled, time = polled or overdue, sender.next if overdue else time
         for datagram in sender.poll(time) if overdue else sender.add(time, sample):
             receiver.take(datagram, time)
             datagrams.append({"time": time, "bytes": datagram.hex()})

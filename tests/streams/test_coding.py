@@ -7,8 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from rigid_motion.streams.coding import TOTAL, Coder
-from rigid_motion.streams.residuals import BASES, COUNT, FINENESS, KNOT_COUNTS, LATES, ODD, WIDTHS, bucket, symbols_of
+from rigid_motion.streams.coding import FLAGS, KNOT_COUNTS, LARGEST, TOTAL, Coder, bucket
 from rigid_motion.streams.tables import TABLES
 
 
@@ -59,12 +58,12 @@ def test_any_bytes_are_some_symbols(seed: int) -> None:
 
 
 def test_the_tables_are_whole() -> None:
-    assert len(TABLES) == COUNT
-    for number, own in enumerate(TABLES):
-        assert len(own) == symbols_of(number) + 1
+    symbols = [len(own) - 1 for own in TABLES]
+    assert symbols[:KNOT_COUNTS] == [2] * FLAGS + [LARGEST + 1] * (KNOT_COUNTS - FLAGS)
+    for own in TABLES:
         assert (own[0], own[-1]) == (0, TOTAL)
         assert all(low < high for low, high in itertools.pairwise(own))
-    assert [symbols_of(table) for table in (KNOT_COUNTS, WIDTHS, FINENESS, BASES, ODD, LATES)] == [16, 21, 4, 3, 2, 3]
+    assert symbols[KNOT_COUNTS:] == [16, 21, 4, 4, 3, 2]
 
 
 def test_buckets() -> None:

@@ -45,7 +45,7 @@ def damaged(rng: np.random.Generator, genuine: list[bytes]) -> bytes:
     """Random bytes; or a genuine datagram with bits flipped, cut off, prolonged, or put together of two."""
     kind = rng.integers(6)
     if kind == 0:
-        head = bytes([0x30 | int(rng.integers(5))]) if rng.random() < 0.8 else b""
+        head = bytes([0x40 | int(rng.integers(5))]) if rng.random() < 0.8 else b""
         return head + rng.bytes(int(rng.integers(0, 80)))
     data = bytearray(genuine[rng.integers(len(genuine))])
     if kind in (1, 2):
@@ -174,6 +174,6 @@ def test_a_datagram_costs_little_time() -> None:
     rng = np.random.default_rng(1)
     begun = time.process_time()
     for number in range(200):
-        head = bytes([0x31]) + sender.identity + (100 + number).to_bytes(2, "little")
+        head = bytes([0x41]) + sender.identity + (100 + number).to_bytes(2, "little")
         receiver.take(head + rng.bytes(40), 0.1 + number)
     assert time.process_time() - begun < 10.0

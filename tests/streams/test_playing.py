@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import Poses
+from rigid_motion.streams import Receiver
 from rigid_motion.streams.playing import FORWARD, Fading, Playing
-from rigid_motion.streams.vmc import VmcReceiver, write
+from rigid_motion.streams.vmc import write
 
 DELAY, RATE = 0.1, 60.0
 
@@ -54,7 +55,7 @@ def test_what_was_shown_too_far_ahead_waits_and_does_not_go_back(speed: float, f
 
 @pytest.mark.parametrize("looks", [0.35, 1.0, 1.3])
 def test_a_performer_is_where_it_was_at_the_moment_that_is_shown(looks: float) -> None:
-    receiver, sent = VmcReceiver(DELAY), 0
+    receiver, sent = Receiver(DELAY), 0
     shown = []
     for now in np.arange(0.0, 15.0, looks).tolist():
         while sent / RATE <= now:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.streams import Body, Receiver, Sender
-from rigid_motion.streams.receiver import MOST_JOINT_KNOTS
+from rigid_motion.streams.playing import MOST_JOINT_KNOTS
 from tests.thoroughness import tried
 
 from .links import body, dance, run

@@ -8,6 +8,8 @@ import pytest
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import turned
 from rigid_motion.streams import Body, Receiver, Sender
+from rigid_motion.streams.paths import Path
+from rigid_motion.streams.wire import read
 from tests.thoroughness import tried
 
 from .links import backs_of, body, dance, run
@@ -80,6 +82,25 @@ def test_a_sample_that_is_overdue_is_not_waited_for() -> None:
     outcome = run(own, times[kept], poses[:, kept])
     assert np.diff(times[kept]).max() > 0.06
     assert outcome.errors.max() <= 0.005 * SLACK
+
+
+def test_samples_from_before_what_was_sent_without_them_are_said_all_the_same() -> None:
+    own, times, poses = swing(60.0)
+    sender, receiver, truth, polled, largest = Sender([own]), Receiver(), Path(times, poses), 0, 0.0
+    for row, time in enumerate(times.tolist()):
+        # What is overdue is sent, and then the sample comes, late.
+        datagrams = sender.poll(time + 0.005) if sender.next < time + 0.005 else []
+        polled += len(datagrams)
+        for datagram in [*datagrams, *sender.add(time, poses[:, row])]:
+            receiver.take(datagram, time + 0.005)
+        for _, answer in receiver.answers():
+            sender.hear(answer, time)
+            assert not read(answer).needs
+        for shown in receiver.show(time + 0.005).values():
+            off = own.errors(shown.poses["hand"][:, None], truth.at(np.array([shown.moment])))
+            largest = max(largest, float(off.max()))
+    assert polled > 5
+    assert largest < 0.02
 
 
 def test_a_body_at_rest_costs_keepalives() -> None:

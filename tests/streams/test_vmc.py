@@ -13,14 +13,13 @@ from rigid_motion.live.driving import Retargeting, matched
 from rigid_motion.motion import Poses, Skeleton, shell_error
 from rigid_motion.motion.humanoid import HUMANOID, humanoid_bones
 from rigid_motion.motion.quaternions import multiply, rotate
-from rigid_motion.streams import Body, osc
+from rigid_motion.streams import Body, Receiver, osc
+from rigid_motion.streams.receiver import MOST_STREAMS
 from rigid_motion.streams.vmc import (
     JOINTS,
     MOST_DEVICES,
-    MOST_SOURCES,
     ROOT,
     Performer,
-    VmcReceiver,
     from_unity,
     to_unity,
     write,
@@ -61,8 +60,8 @@ def frame(seed: int) -> dict[str, Poses]:
     return {name: Poses(PLACES[row], turns[row]) for row, name in enumerate(NAMES)}
 
 
-def heard(datagrams: list[bytes], arrival: float = 0.0, receiver: VmcReceiver | None = None) -> VmcReceiver:
-    receiver = receiver or VmcReceiver()
+def heard(datagrams: list[bytes], arrival: float = 0.0, receiver: Receiver | None = None) -> Receiver:
+    receiver = receiver or Receiver()
     for datagram in datagrams:
         receiver.take(datagram, arrival)
     return receiver
@@ -103,7 +102,7 @@ def test_what_another_program_sends_in_single_messages_is_shown():
             builder.add_arg(argument)
         return builder.build().dgram
 
-    receiver = VmcReceiver(delay=0.0)
+    receiver = Receiver(delay=0.0)
     for second in range(3):
         datagrams = [
             message("/VMC/Ext/OK", 1, 3, 0, 1),
@@ -152,7 +151,7 @@ def test_bytes_written_after_the_documentation_are_shown(available, root, pack):
         "a frame in a bundle": [bundled(*messages)],
         "a bundle for each": [bundled(each) for each in messages],
     }[pack]
-    receiver = heard(datagrams, 1.0, VmcReceiver(delay=0.0))
+    receiver = heard(datagrams, 1.0, Receiver(delay=0.0))
     (shown,) = receiver.show(1.0).values()
     assert shown.moment == pytest.approx(10.0)
     assert shown.bodies[0].joints == (ROOT, "Hips")
@@ -162,7 +161,7 @@ def test_bytes_written_after_the_documentation_are_shown(available, root, pack):
 
 
 def test_without_times_a_bone_that_comes_again_begins_a_frame():
-    receiver = VmcReceiver(delay=0.0)
+    receiver = Receiver(delay=0.0)
     for row in range(4):
         hips = ("Hips", 0.0, 1.0, float(row), 0.0, 0.0, 0.0, 1.0)
         heard([osc.write_message("/VMC/Ext/Bone/Pos", *hips)], 0.1 * row, receiver)
@@ -172,7 +171,7 @@ def test_without_times_a_bone_that_comes_again_begins_a_frame():
 
 
 def test_what_is_written_is_what_is_shown():
-    receiver = VmcReceiver(delay=0.05)
+    receiver = Receiver(delay=0.05)
     for row in range(20):
         heard(write(row / 60, frame(row)), 5.0 + row / 60, receiver)
     (keys,) = receiver.keys()
@@ -195,7 +194,7 @@ HEADSET = b"/VMC/Ext/Hmd/Pos\0\0\0\0,sfffffff\0\0\0LHR-3\0\0\0" + POSE_7
 @pytest.mark.parametrize("messages", [[TRACKER, CONTROLLER, HEADSET], [ROOT_7, HIPS, TRACKER, CONTROLLER, HEADSET]])
 def test_devices_are_rigid_bodies_beside_the_performer(messages):
     """After the documentation: a serial number and a pose in the world."""
-    receiver = heard([*messages, TIME], 1.0, VmcReceiver(delay=0.0))
+    receiver = heard([*messages, TIME], 1.0, Receiver(delay=0.0))
     (shown,) = receiver.show(1.0).values()
     bodies = shown.bodies
     assert [body.name for body in bodies] == ["VMC"] * (HIPS in messages) + ["LHR-1", "LHR-2", "LHR-3"]
@@ -206,7 +205,7 @@ def test_devices_are_rigid_bodies_beside_the_performer(messages):
 
 
 def test_a_tracker_that_joins_leaves_the_other_bodies_as_they_are():
-    receiver = heard([ROOT_7, HIPS, TRACKER, TIME], 1.0, VmcReceiver(delay=0.0))
+    receiver = heard([ROOT_7, HIPS, TRACKER, TIME], 1.0, Receiver(delay=0.0))
     (shown,) = receiver.show(1.0).values()
     before = shown.bodies
     heard([ROOT_7, HIPS, TRACKER, CONTROLLER, TIME.replace(b"\x41\x20", b"\x41\x28")], 1.5, receiver)
@@ -217,7 +216,7 @@ def test_a_tracker_that_joins_leaves_the_other_bodies_as_they_are():
 
 
 def test_trackers_that_are_written_are_shown_without_times():
-    receiver, rng = VmcReceiver(delay=0.0), np.random.default_rng(2)
+    receiver, rng = Receiver(delay=0.0), np.random.default_rng(2)
     places = rng.normal(size=(4, MOST_DEVICES + 5, 3))
     for row in range(4):
         turns = random_turns(MOST_DEVICES + 5, row)
@@ -280,7 +279,7 @@ def test_bones_are_found_by_their_usual_names(joints, bones):
 def test_any_datagram_does_no_harm():
     rng = np.random.default_rng(4)
     genuine = [datagram for row in range(5) for datagram in write(row / 60, frame(row))]
-    receiver = VmcReceiver()
+    receiver = Receiver()
     for row in range(len(sample(range(8000)))):
         data = bytearray(genuine[rng.integers(len(genuine))])
         for _ in range(int(rng.integers(0, 5))):
@@ -288,7 +287,7 @@ def test_any_datagram_does_no_harm():
         receiver.take(bytes(data), row / 600, int(rng.integers(30)))
         if row % 100 == 0:
             shown = receiver.show(row / 600)
-            assert len(shown) <= MOST_SOURCES
+            assert len(shown) <= MOST_STREAMS
             for what in shown.values():
                 assert np.isfinite(what.poses["VMC"].positions).all()
                 assert np.linalg.norm(what.poses["VMC"].quaternions, axis=1) == pytest.approx(1.0)

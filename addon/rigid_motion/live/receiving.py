@@ -18,9 +18,8 @@ from bpy.app.handlers import persistent
 
 from ..motion import Poses
 from ..streams import Body, Keys, Receiver
-from ..streams.osc import is_osc
-from ..streams.receiver import Stream
-from ..streams.vmc import VmcReceiver
+from ..streams.playing import Stream
+from ..streams.vmc import VMC
 from .driving import Driver, ObjectDriver, RigDriver, object_of
 from .recording import Take
 from .sockets import Port, check_access
@@ -96,7 +95,7 @@ class Listening:
         self._settings, self._pairs = settings, pairs
         check_access(host)
         self._port = Port(host, port)
-        self._codec, self._vmc = Receiver(), VmcReceiver(settings().delay)
+        self._receiver = Receiver(settings().delay)
         self._heard: dict[Which, _Heard] = {}
         self._recording: _Recording | None = None
 
@@ -112,19 +111,18 @@ class Listening:
     def tick(self, now: float) -> None:
         """Take what came, and show what is due."""
         for datagram, address in self._port.received():
-            (self._vmc if is_osc(datagram) else self._codec).take(datagram, now, address)
-        for address, answer in self._codec.answers():
+            self._receiver.take(datagram, now, address)
+        for address, answer in self._receiver.answers():
             self._port.send(answer, address)
-        # Those of the codec take up room until they are asked for; VMC keeps the newest.
-        came = self._codec.keys() + (self._vmc.keys() if self._recording else [])
+        # They take up room until they are asked for.
+        came = self._receiver.keys()
         shown = {
-            (stream, body.name): (receiver, body, what)
-            for receiver in (self._codec, self._vmc)
-            for stream, what in receiver.show(now).items()
+            (stream, body.name): (body, what)
+            for stream, what in self._receiver.show(now).items()
             for body in what.bodies
         }
-        for which, (receiver, body, what) in shown.items():
-            heard = self._heard_of(which, body, shown, receiver is self._vmc)
+        for which, (body, what) in shown.items():
+            heard = self._heard_of(which, body, shown)
             heard.moment, heard.poses = what.moment, what.poses[body.name]
             self._show(heard)
             if self._recording and heard.driver is not None:
@@ -133,7 +131,7 @@ class Listening:
             self._keep(keys)
         self._heard = {which: it for which, it in self._heard.items() if which in shown or it.take}
 
-    def _heard_of(self, which: Which, body: Body, present: Container[Which], is_vmc: bool) -> _Heard:
+    def _heard_of(self, which: Which, body: Body, present: Container[Which]) -> _Heard:
         """Return what is known of a body. It has a label of its own;
         a sender that begins again goes on with its old one.
         """
@@ -146,7 +144,7 @@ class Listening:
                 if (label := body.name if number == 1 else f"{body.name} {number}") not in labels
             )
             before = next((other for other, it in self._heard.items() if it.label == label), None)
-            heard = self._heard[which] = self._heard.pop(before, None) or _Heard(label, body, is_vmc)
+            heard = self._heard[which] = self._heard.pop(before, None) or _Heard(label, body, which[0].identity == VMC)
             heard.origin = None
         if heard.body is not body:
             heard.body, heard.driver = body, None

@@ -13,7 +13,7 @@ A sender knows what its receivers show, a delay behind, and says something only 
     sender.join()                                 # names, parents and rest for somebody who joins, by a reliable way
     sender.finish()                               # what is still needed where no more samples are to come
 
-A receiver takes any bytes, from anybody, without ever raising an exception:
+A receiver takes any bytes, from anybody, without ever raising an exception, and other programs' VMC as well:
 
     receiver = Receiver()
     receiver.take(datagram, arrival, source)      # `arrival` by a clock of this machine; `source` an address or key
@@ -31,7 +31,8 @@ seconds, Blender's axes, quaternions w, x, y, z. docs/wire.md has every byte.
 """
 
 from .bodies import Body
-from .receiver import Keys, Receiver, Shown
+from .playing import Keys, Shown
+from .receiver import Receiver
 from .sender import Sender
 
 __all__ = ["Body", "Keys", "Receiver", "Sender", "Shown"]

@@ -88,12 +88,12 @@ class Forest:
     """All bodies of a sender, as one array of joints."""
 
     def __init__(self, bodies: Sequence[Body]) -> None:
-        if not bodies or len({body.name for body in bodies}) < len(bodies):
+        self.bodies, self.names = tuple(bodies), {body.name for body in bodies}
+        if not bodies or len(self.names) < len(bodies):
             raise ValueError("a sender needs bodies, each with a name of its own")
         counts = [len(body.joints) for body in bodies]
         if len(bodies) > MOST_BODIES or sum(counts) > MOST_JOINTS:
             raise ValueError(f"more than {MOST_BODIES} bodies or {MOST_JOINTS} joints are too many for one sender")
-        self.bodies = tuple(bodies)
         self._ends = np.cumsum(counts)
         parents = np.concatenate([body.parents for body in bodies])
         self.parents = np.where(parents < 0, -1, parents + np.repeat(self._ends - counts, counts))
@@ -116,11 +116,9 @@ class Forest:
         }
 
     def errors(self, shown: Poses, truth: Poses) -> np.ndarray:
-        """Return how far off any point of each joint's ball is at most, in metres, shape (joints, n).
-
-        `shown` are poses (joints, n) in their parents' spaces, `truth` those in the root's.
-        """
-        return shell_error(self.skeleton.in_root_space(shown), truth, self.radii[:, None])
+        """Return the same as `Body.errors` of all joints."""
+        in_root_space = self.skeleton.in_root_space
+        return shell_error(in_root_space(shown), in_root_space(truth), self.radii[:, None])
 
     @cached_property
     def groups(self) -> list[tuple[int, int, int]]:

@@ -9,7 +9,7 @@ import struct
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from itertools import islice
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 BUNDLE = b"#bundle\0"
 
@@ -19,9 +19,8 @@ IMMEDIATELY = struct.pack(">Q", 1)
 DEEPEST, MOST_MESSAGES = 4, 2048
 """Bundles in one another, and messages of a datagram."""
 
-FORMATS = {"i": ">i", "f": ">f", "h": ">q", "d": ">d", "t": ">Q"}
-CONSTANTS = {"T": True, "F": False, "N": None}
-"""Types of OSC beside texts and blobs, as `struct` has them; and those that are all said by their type."""
+FORMATS = {"i": ">i", "f": ">f", "h": ">q", "d": ">d"}
+"""Types of numbers, as `struct` has them. Beside them are strings: of other types VMC has none."""
 
 
 class Message(NamedTuple):
@@ -52,10 +51,11 @@ def is_osc(datagram: bytes) -> bool:
 
 
 def read(datagram: bytes) -> list[Message]:
-    """All messages of a datagram, until the first thing that is none."""
+    """All messages of a datagram, but for those that are damaged or have arguments of other types."""
     result: list[Message] = []
-    with suppress(ValueError, struct.error):  # as if it ended there
-        result.extend(islice(_messages(datagram, DEEPEST), MOST_MESSAGES))
+    for part in islice(_parts(datagram, DEEPEST), MOST_MESSAGES):
+        with suppress(KeyError, ValueError, struct.error):
+            result.append(_message(part))
     return result
 
 
@@ -64,40 +64,35 @@ def _padded(text: str) -> bytes:
     return data + bytes(4 - len(data) % 4)
 
 
-def _messages(data: bytes, depth: int) -> Iterator[Message]:
+def _parts(data: bytes, depth: int) -> Iterator[bytes]:
+    """Yield the messages of all bundles in one another."""
     if not data.startswith(BUNDLE):
-        address, at = _argument("s", data, 0)
-        tags, at = _argument("s", data, at)
-        if address[:1] != "/" or tags[:1] != ",":
-            raise ValueError("a message has an address and types")
-        arguments = []
-        for tag in tags[1:]:
-            argument, at = _argument(tag, data, at)
-            arguments.append(argument)
-        yield Message(address, tuple(arguments))
-        return
-    at = len(BUNDLE) + len(IMMEDIATELY)
-    while at < len(data):
-        part, at = _argument("b", data, at)
-        if not depth:
-            raise ValueError("too many bundles in one another")
-        yield from _messages(part, depth - 1)
+        yield data
+    elif depth:
+        at = len(BUNDLE) + len(IMMEDIATELY) + 4
+        while at <= len(data):
+            end = at + int.from_bytes(data[at - 4 : at], "big")
+            yield from _parts(data[at:end], depth - 1)
+            at = end + 4
 
 
-def _argument(tag: str, data: bytes, at: int) -> tuple[Any, int]:
-    """Return what is at a place, of some type, and where what follows begins."""
-    if tag == "s":
-        end = data.index(b"\0", at)
-        return data[at:end].decode(), end + 4 - end % 4
-    if tag == "b":
-        (size,) = struct.unpack_from(">I", data, at)
-        end = at + 4 + size
-        if end > len(data):
-            raise ValueError("it is cut off")
-        return data[at + 4 : end], end + -size % 4
-    if tag in CONSTANTS:
-        return CONSTANTS[tag], at
-    if tag not in FORMATS:
-        raise ValueError("there is no such type")
-    (number,) = struct.unpack_from(FORMATS[tag], data, at)
-    return number, at + struct.calcsize(FORMATS[tag])
+def _message(data: bytes) -> Message:
+    address, at = _text(data, 0)
+    tags, at = _text(data, at)
+    if address[:1] != "/" or tags[:1] != ",":
+        raise ValueError("a message has an address and types")
+    arguments: list[object] = []
+    for tag in tags[1:]:
+        if tag == "s":
+            text, at = _text(data, at)
+            arguments.append(text)
+        else:
+            arguments += struct.unpack_from(FORMATS[tag], data, at)
+            at += struct.calcsize(FORMATS[tag])
+    return Message(address, tuple(arguments))
+
+
+def _text(data: bytes, at: int) -> tuple[str, int]:
+    """Return the string at a place, and where what follows begins."""
+    end = data.index(b"\0", at)
+    return data[at:end].decode(), end + 4 - end % 4

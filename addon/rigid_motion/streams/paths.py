@@ -69,6 +69,14 @@ class Path:
         """Return this path with another knot behind the others, of poses (joints,)."""
         return Path(np.append(self.moments, moment), joined((self.poses, poses[:, None]), axis=1))
 
+    def going_on(self) -> Path:
+        """Return the same, with the motion going on beyond the last knot as it went since the one before."""
+        if len(self.moments) < 2:
+            return self
+        before, last, span = self.poses[:, -2], self.poses[:, -1], self.moments[-1] - self.moments[-2]
+        spins = turns_between(before.quaternions, last.quaternions) / span
+        return Path(self.moments, self.poses, (last.positions - before.positions) / span, spins)
+
     def since(self, moment: float) -> Path:
         """Return the same without knots that nothing from this moment on depends on."""
         kept = max(int(np.searchsorted(self.moments, moment, side="right")) - 1, 0)

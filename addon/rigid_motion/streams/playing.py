@@ -9,11 +9,15 @@ sender's, so it is right up to what the clocks are apart.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Hashable
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..motion import Poses
 from ..motion.quaternions import SMALLEST, normalise, turned, turns_between
+from .bodies import Body, Forest
+from .paths import Path
 
 LOOK_BACK, MOST_TRANSITS = 3.0, 512
 """Seconds of which the longest transit counts, and of how many datagrams at most."""
@@ -36,6 +40,12 @@ of the motion that a difference may take away: what was shown too far ahead wait
 RESTS, NOTHING = 0.05, 1e-5
 """Metres or radians a second: a motion that is slower is at rest, and differences along it fade as all others. And
 metres or radians: differences that are smaller are over."""
+
+SILENT = 10.0
+"""Seconds of silence after which a stream is forgotten."""
+
+MOST_KNOTS, MOST_JOINT_KNOTS = 256, 1 << 14
+"""Knots of a stream that wait for `keys`, or as many more as a body of few joints has in so many poses of joints."""
 
 
 class Playing:
@@ -72,10 +82,6 @@ class Playing:
             known.extend(sorted((when, took) for left, when, took in by_sent if left >= begun))
         self.longest = max(took for _, took in known)
         self._heard, self._unsure = arrival, False
-
-    def due(self, moment: float) -> float:
-        """When a moment is to be shown; never, where nothing came yet."""
-        return np.inf if self.longest is None else moment + self.longest + self.delay
 
     def moment(self, now: float) -> float | None:
         """Return the moment to be shown now; None before anything came."""
@@ -142,3 +148,74 @@ class Fading:
 def _between(first: Poses, second: Poses) -> np.ndarray:
     turns = turns_between(first.quaternions, second.quaternions)
     return np.stack((second.positions - first.positions, turns))
+
+
+class Stream(NamedTuple):
+    """What tells streams apart."""
+
+    source: Hashable
+    identity: bytes
+
+
+class Shown(NamedTuple):
+    """What a stream shows: the moment in seconds by the sender's clock, and of each body by its name poses (joints,),
+    each joint in its parent's space.
+    """
+
+    stream: Stream
+    moment: float
+    bodies: tuple[Body, ...]
+    poses: dict[str, Poses]
+
+
+class Keys(NamedTuple):
+    """What was sent, to be recorded: rising moments (k,) in seconds by the sender's clock, and poses (joints, k)."""
+
+    stream: Stream
+    bodies: tuple[Body, ...]
+    moments: np.ndarray
+    poses: dict[str, Poses]
+
+
+class Playback:
+    """A stream that is shown: its bodies, the path of what came, and the moment of that which is due.
+
+    `heard` is when something new came, `begins` the first moment that can be shown, and `settled` that until which the
+    path is not going to change any more.
+    """
+
+    silent = SILENT
+
+    def __init__(self, stream: Stream, delay: float, heard: float, forest: Forest | None = None) -> None:
+        self.stream, self.heard, self.playing = stream, heard, Playing(delay)
+        self.forest: Any = forest
+        """The Forest of all bodies, None for as long as nothing is known of them."""
+        self.path: Path | None = None
+        self.begins, self.settled = -np.inf, np.inf
+        self.fading = Fading()
+        self.moment: float | None = None
+        self.kept = -np.inf
+        """Until this moment keys were handed out."""
+
+    def put(self, path: Path) -> None:
+        """Show a path from now on, of which the knots remain that are to be shown or handed out."""
+        count = min(max(MOST_JOINT_KNOTS // len(self.forest), MOST_KNOTS), len(path.moments))
+        shown = path.moments[0] if self.moment is None else self.moment
+        self.path = path.since(max(min(self.kept, shown) - 1e-6, path.moments[-count]))
+
+    def show(self, now: float) -> Shown | None:
+        """Return what is shown now."""
+        self.moment = self.playing.moment(now)
+        if self.moment is None or self.path is None or self.moment < self.begins:
+            return None
+        poses = self.fading.show(self.path.pose(self.moment), now)
+        return Shown(self.stream, self.moment, self.forest.bodies, self.forest.parted(poses))
+
+    def keys(self) -> Keys | None:
+        """Return the knots that are settled and were not handed out yet."""
+        moments = self.path.moments if self.path else np.empty(0)
+        rows = np.flatnonzero((moments > self.kept) & (moments <= self.settled))
+        if self.path is None or not len(rows):
+            return None
+        self.kept = float(moments[rows[-1]])
+        return Keys(self.stream, self.forest.bodies, moments[rows], self.forest.parted(self.path.poses[:, rows]))

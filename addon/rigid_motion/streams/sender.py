@@ -21,7 +21,7 @@ from ..motion.quaternions import normalise
 from . import wire
 from .bodies import Body, Forest
 from .fitting import Fitting, closely
-from .messages import MOST_BACK, Codec, Said, State
+from .messages import MOST_BACK, Codec, Message
 from .paths import Path
 from .wire import NEEDS_DESCRIPTION, NEEDS_REFRESH, TICKS, Answer, Description, Motion, Terms
 
@@ -29,9 +29,8 @@ KEEPALIVE, REFRESH = 0.5, 1.0
 """Seconds of silence after which something is said in any case; and, where nobody answers, between messages that build
 on nothing."""
 
-AGAIN, PATIENCE = 0.03, 0.15
-"""Seconds after which a refresh is sent a second time, so that one loss does not lose both; and that it has to arrive,
-before another is sent to somebody who asks for one."""
+PATIENCE = 0.15
+"""Seconds that a refresh has to arrive, before another is sent to somebody who asks for one."""
 
 SILENT, MOST_RECEIVERS = 2.0, 256
 """Seconds after which somebody who does not answer any more is not waited for; and for so many at most."""
@@ -46,8 +45,8 @@ that are waited for a sample, instead of sending without it."""
 LAST = 0xFFFF
 """The largest sequence number: behind it the sender begins again, with another identity."""
 
-STEP, AT_ONCE = 1.0, 32
-"""Seconds between two samples that are no pause, but a clock that was set; and samples that are let go together."""
+STEP = 1.0
+"""Seconds between two samples that are no pause, but a clock that was set."""
 
 ALMOST, CALMER = 0.99, 0.9
 """Part of an interval that it surely takes; what is left of the longest with every sample that came sooner."""
@@ -93,7 +92,7 @@ class Sender:
                 raise ValueError(f"a {name} of {value} is not a positive number")
         even = TICKS / rate if rate else GRID
         grid = round(even) if abs(even - round(even)) < 0.01 and even >= 1.0 else GRID
-        terms, self._keepalive = Terms(math.floor(tolerance * 1e6), round(delay * TICKS), grid), keepalive
+        terms, self._keepalive = Terms(tolerance, round(delay * TICKS), grid), keepalive
         self._delay = terms.delay / TICKS
         self._packed = wire.describe(Forest(bodies), terms)
         # The bodies as receivers read them, in so many digits.
@@ -113,7 +112,7 @@ class Sender:
     def _begin(self) -> None:
         """Begin with a new identity."""
         self.identity = secrets.token_bytes(3)
-        self._states: dict[int, State] = {}
+        self._messages: dict[int, Message] = {}
         """Of messages that others may build on, by their sequence numbers."""
         self._sequence = 0
         self._path: Path | None = None
@@ -125,14 +124,15 @@ class Sender:
         self._receivers: dict[bytes, tuple[Answer, float]] = {}
         """What those who answer have, and when they said so."""
         self._refreshed = self._sent = -math.inf
-        self._again: tuple[float, int, bytes] | None = None
-        """When a refresh is due again, its number and datagram."""
+        """The ends of the last refresh and of the last message."""
+        self._copies: list[bytes] = []
+        """A refresh that is to be sent a second time, with the next sample: one loss does not lose both."""
         self._base: int | None = None
-        """The last refresh that was sent twice."""
+        """The last refresh."""
         self._desired = False
         """Whether somebody cannot read what is sent."""
-        self._lossy, self._missed = False, -math.inf
-        """Whether so much is lost that all is sent twice, and when somebody said so last."""
+        self._missed = -math.inf
+        """When somebody said last that so much is lost that all is to be sent twice."""
 
     def add(self, time: float, poses: Poses | Mapping[str, Poses]) -> list[bytes]:
         """Take a sample, and return what is to be sent now.
@@ -159,10 +159,8 @@ class Sender:
             now = time + self._slip
         if len(times):
             self._interval = max(now - float(times[-1]), CALMER * self._interval)
-        self._samples = self._samples.extended(now, Poses(poses.positions, normalise(poses.quaternions)))
-        past = now - self._delay - STEP
-        if np.searchsorted(self._samples.moments, past) > AT_ONCE:
-            self._samples = self._samples.since(past)
+        samples = self._samples.extended(now, Poses(poses.positions, normalise(poses.quaternions)))
+        self._samples = samples.since(now - self._delay - STEP)
         if self._sequence > LAST:
             self._begin()
         return self._due(now, self._interval)
@@ -181,9 +179,8 @@ class Sender:
 
     def finish(self) -> list[bytes]:
         """Return what is still needed where no more samples are to come."""
-        if self._path is None or self._is_shown_until(now := float(self._samples.moments[-1])) is None:
-            return []
-        return [self._message(now)]
+        times = self._samples.moments
+        return self._due(float(times[-1]), math.inf) if len(times) else []
 
     def describe(self) -> list[bytes]:
         """Names, parents and rest poses, for those who join."""
@@ -206,19 +203,15 @@ class Sender:
             heard = float(times[-1])
         self._receivers[answer.receiver] = answer, heard
         missing = answer.before.bit_length() - answer.before.bit_count()
-        self._missed = heard if missing >= LOSSY or (self._lossy and missing) else self._missed
-        self._lossy = heard - self._missed < CALM
+        self._missed = heard if missing >= (1 if self._is_lossy(heard) else LOSSY) else self._missed
         self._desired |= bool(answer.needs & NEEDS_REFRESH) and heard - self._refreshed > PATIENCE
         return self.describe() if answer.needs & NEEDS_DESCRIPTION else []
 
     def _due(self, now: float, interval: float) -> list[bytes]:
         """Return what is to be sent now, where nobody asks again before the interval is over."""
-        due, self._next = [], math.inf
-        if self._again and now >= self._again[0]:
-            _, self._base, datagram = self._again
-            self._again = None
-            if not (self._answered(now) and self._have(self._base)):
-                due.append(datagram)
+        due, self._copies, self._next = self._copies, [], math.inf
+        if self._answered(now) and self._base is not None and self._have(self._base):
+            due = []
         if not self._answered(now) and now - self._refreshed >= REFRESH:
             due += [*self.describe(), self._message(now, refresh=True)]
         elif self._desired:
@@ -230,22 +223,24 @@ class Sender:
                 due.append(self._message(now))
             else:
                 self._next = good + self._delay + OVERDUE
-        return due * (1 + self._lossy)
+        return due * (2 if self._is_lossy(now) else 1)
 
     def _is_shown_until(self, now: float) -> float | None:
-        """Return moment before one that is shown further off than the tolerance; None where there is none until now."""
+        """Return the moment before one that is shown further off than the tolerance; None where there is none yet."""
         times = self._samples.moments
         if self._good is None and self._path is not None and self._shown < times[-1]:
-            first = max(int(np.searchsorted(times, self._shown, side="right")) - 1, 0)
-            moments = closely(times[first:])
+            moments = closely(times[max(int(np.searchsorted(times, self._shown, side="right")) - 1, 0) :])
             moments = moments[moments > max(self._shown, now - self._delay)]
-            truth = self._forest.skeleton.in_root_space(self._samples.at(moments))
-            off = self._forest.errors(self._path.at(moments), truth).max(axis=0) > self.codec.tolerance
+            errors = self._forest.errors(self._path.at(moments), self._samples.at(moments))
+            off = errors.max(axis=0) > self.codec.tolerance
             if off.any():
-                self._good = self._shown = float(np.append(self._shown, moments)[np.argmax(off)])
-            else:
-                self._shown = float(times[-1])
+                self._good = float(np.append(self._shown, moments)[np.argmax(off)])
+            self._shown = float(times[-1])
         return self._good
+
+    def _is_lossy(self, now: float) -> bool:
+        """Return whether so much was lost lately that all is sent twice."""
+        return now - self._missed < CALM
 
     def _answered(self, now: float) -> bool:
         """Whether anybody answers; those who do not any more are forgotten."""
@@ -260,32 +255,31 @@ class Sender:
         """Return the message to build on, or None."""
         number = self._base
         if self._answered(now):
-            known = sorted(self._states, reverse=True)
-            number = next((it for it in known if it >= self._sequence - ANSWERED and self._have(it)), self._base)
+            number = next((it for it in sorted(self._messages, reverse=True) if self._have(it)), self._base)
         if number is None or self._sequence - number > MOST_BACK:
             return None
-        return number if now - self._states[number].end / TICKS < OLDEST else None
+        return number if now - self._messages[number].end / TICKS < OLDEST else None
 
     def _message(self, now: float, refresh: bool = False) -> bytes:
-        """Say the window until the last sample."""
-        end = math.floor(self._samples.moments[-1] * TICKS + ROUNDING)
+        """Say the window until now. Where no sample is there yet, the motion is taken to go on as it went."""
+        samples, last, now = self._samples, float(self._samples.moments[-1]), max(now, self._sent)
+        if now - last > SOON:
+            samples = samples.extended(now, samples.going_on().pose(now))
+        end = math.floor(now * TICKS + ROUNDING)
         number = None if refresh else self._usable(now)
-        base = self.codec.rest if number is None else self._states[number]
-        is_late = now - self._samples.moments[-1] > SOON
-        late = 1 + min(math.floor(now * TICKS) - end, self.codec.terms.delay - 1) if is_late else 0
-        head = Said(0 if number is None else self._sequence - number, end, late)
-        said, is_within = Fitting(self.codec, self._path, base, head, self._samples).said()
-        data, state = self.codec.write(said, base)
-        self._states[self._sequence] = state
+        base = self.codec.rest if number is None else self._messages[number]
+        back = 0 if number is None else self._sequence - number
+        message, is_within = Fitting(self.codec, self._path, base, back, end, samples).message()
+        datagram = wire.write(Motion(self.identity, self._sequence, self.codec.write(message, base)))
+        self._messages[self._sequence] = message
         kept = {*range(self._sequence - ANSWERED, self._sequence + 1), self._base}
-        self._states = {number: old for number, old in self._states.items() if number in kept}
-        start = float(state.path.moments[0])
-        self._path = state.path if self._path is None else self._path.followed(state.path).since(start - 0.05)
-        self._shown, self._good = end / TICKS if is_within else start, None
-        self._sent = now
+        self._messages = {number: old for number, old in self._messages.items() if number in kept}
+        start = float(message.path.moments[0])
+        self._path = message.path if self._path is None else self._path.followed(message.path).since(start - 0.05)
+        self._shown, self._good = min(end / TICKS, last) if is_within else start, None
+        self._sent = end / TICKS
         if number is None:
             self._refreshed, self._desired = now, False
-            again, _ = self.codec.write(said._replace(late=max(late, 1)), base)
-            self._again = (now + AGAIN, self._sequence, wire.write(Motion(self.identity, self._sequence, again)))
+            self._base, self._copies = self._sequence, [datagram]
         self._sequence += 1
-        return wire.write(Motion(self.identity, self._sequence - 1, data))
+        return datagram

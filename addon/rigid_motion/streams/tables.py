@@ -1,4 +1,4 @@
-"""Cumulative frequencies of the coder's symbols, in the order of `residuals`: made by stream_tables.py."""
+"""Cumulative frequencies of the coder's symbols, in the order of `coding`: made by stream_tables.py."""
 
 # fmt: off
 # ruff: noqa: E501
@@ -1241,5 +1241,4 @@ TABLES: tuple[tuple[int, ...], ...] = (
     (0, 60, 3563, 4081, 4096),
     (0, 415, 2166, 4096),
     (0, 2234, 4096),
-    (0, 3887, 4095, 4096),
 )

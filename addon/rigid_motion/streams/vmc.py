@@ -9,9 +9,7 @@ Source: https://protocol.vmc.info/marionette-spec
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Mapping, Sequence
-from itertools import groupby
-from operator import itemgetter
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,14 +21,13 @@ from ..motion.quaternions import conjugate, multiply
 from .bodies import LONGEST_NAME, Body, Forest
 from .osc import Message, read, write_bundle, write_message
 from .paths import Path
-from .playing import SET
-from .receiver import Playback, Stream, Streams
+from .playing import SET, Playback, Stream
 
 PORT = 39539
 """That programs which show a performer listen on."""
 
-ROOT, PERFORMER = "Root", "VMC"
-"""The joint that the hips hang on; and the name of a performer's body."""
+VMC, ROOT, PERFORMER = b"/VMC", "Root", "VMC"
+"""The identity of all streams; the joint that the hips hang on; and the name of a performer's body."""
 
 JOINTS = (ROOT, *HUMANOID)
 PARENTS = {ROOT: "", **{bone: above or ROOT for bone, above in HUMANOID.items()}}
@@ -41,12 +38,9 @@ Joint = tuple[str, str]
 DEVICES = {f"/VMC/Ext/{kind}/Pos" for kind in ("Tra", "Con", "Hmd")}
 """Trackers, controllers and headsets: rigid bodies in the world, by their serial numbers."""
 
-MOST_SOURCES, MOST_DEVICES = 16, 32
-"""Programs, and devices of each."""
-
-SILENT, FURTHEST, AT_ONCE = 2.0, 1e5, 12
-"""Seconds after which a performer, who is sent on every frame, has gone; metres beyond which there is only damage; and
-bones of a datagram, which stays below what networks carry in one piece."""
+MOST_DEVICES, FURTHEST, AT_ONCE = 32, 1e5, 12
+"""Devices of a program; metres beyond which there is only damage; and bones of a datagram, which stays below what
+networks carry in one piece."""
 
 _TO_BLENDER = np.array(((-1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)))
 """Unity's axes as Blender's: a mirror."""
@@ -113,29 +107,13 @@ def _parents(names: Sequence[str]) -> list[int]:
     return result
 
 
-class VmcReceiver(Streams):
-    """Shows performers and their devices a delay later: what `Receiver` is for the codec. Its keys are all samples."""
+class Performance(Playback):
+    """What one program sends: a performer, devices, or both. Its keys are all samples."""
 
-    def __init__(self, delay: float = 0.1) -> None:
-        super().__init__(SILENT)
-        self.delay = delay
+    silent = 2.0
 
-    def take(self, datagram: bytes, arrival: float, source: Hashable = None) -> None:
-        """Take a datagram that came at a time, by the clock of `show`, from somewhere."""
-        stream = Stream(source, b"VMC")
-        for message in read(datagram):
-            if message.address.startswith("/VMC/Ext/"):
-                if stream not in self._streams and len(self._streams) < MOST_SOURCES:
-                    self._streams[stream] = _Source(stream, self.delay)
-                if stream in self._streams:
-                    self._streams[stream].hear(message, arrival)
-
-
-class _Source(Playback):
-    """What one program sends: a performer, devices, or both."""
-
-    def __init__(self, stream: Stream, delay: float) -> None:
-        super().__init__(stream, delay)
+    def __init__(self, stream: Stream, delay: float, heard: float) -> None:
+        super().__init__(stream, delay, heard)
         self._newest: dict[Joint, list[float]] = {(PERFORMER, ROOT): [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]}
         """Place and turn of all that was ever said, in Unity's axes."""
         self._joints: list[Joint] = []
@@ -145,8 +123,12 @@ class _Source(Playback):
         self._begun = 0.0
         self._has_time = False
 
-    def hear(self, message: Message, arrival: float) -> None:
-        """Take one message."""
+    def take(self, datagram: bytes, arrival: float) -> None:
+        """Take a datagram."""
+        for message in read(datagram):
+            self._hear(message, arrival)
+
+    def _hear(self, message: Message, arrival: float) -> None:
         address, (name, *numbers) = message.address, message.arguments or (None,)
         if address == "/VMC/Ext/Root/Pos":
             self._place((PERFORMER, ROOT), numbers, arrival)
@@ -201,15 +183,12 @@ class _Source(Playback):
     def _describe(self) -> None:
         """Have bodies of all that was ever said; those of which nothing is new stay the same."""
         before = {(body.name, body.joints): body for body in self.forest.bodies} if self.forest else {}
-        bones = [(PERFORMER, bone) for bone in JOINTS if (PERFORMER, bone) in self._newest]
-        self._joints = bones if len(bones) > 1 else []
-        self._joints = self._joints + [joint for joint in self._newest if joint[0] != PERFORMER]
-        bodies = []
-        for name, group in groupby(self._joints, itemgetter(0)):
-            own = list(group)
-            joints = tuple(joint for _, joint in own)
-            rest = Poses(self._poses(own).positions, np.tile((1.0, 0.0, 0.0, 0.0), (len(own), 1)))
-            sliding = np.array([joint in (ROOT, "Hips", name) for joint in joints])
-            new = Body(name, joints, np.array(_parents(joints)), rest, sliding=sliding)
-            bodies.append(before.get((name, joints), new))
-        self.forest = Forest(bodies)
+        bones = [bone for bone in JOINTS if (PERFORMER, bone) in self._newest]
+        bodies = [Body.rigid(name) for name, _ in self._newest if name != PERFORMER]
+        if len(bones) > 1:
+            places = self._poses([(PERFORMER, bone) for bone in bones]).positions
+            rest = Poses(places, np.tile((1.0, 0.0, 0.0, 0.0), (len(bones), 1)))
+            sliding = np.isin(bones, (ROOT, "Hips"))
+            bodies.insert(0, Body(PERFORMER, tuple(bones), np.array(_parents(bones)), rest, sliding=sliding))
+        self._joints = [(body.name, joint) for body in bodies for joint in body.joints]
+        self.forest = Forest([before.get((body.name, body.joints), body) for body in bodies])

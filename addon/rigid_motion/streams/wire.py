@@ -15,7 +15,7 @@ import numpy as np
 from ..motion import Poses
 from .bodies import Body, Forest
 
-VERSION = 3
+VERSION = 4
 
 TICKS = 3600
 """A second, in the unit of all times on the wire: whole numbers of it are the frames of 24, 25, 30, 60, 72, 90, 120."""
@@ -28,22 +28,19 @@ LONGEST = 65_000
 MOST_DESCRIBED = 1 << 17
 """Bytes of a description, unpacked."""
 
-LONGEST_DELAY, MOST = 8 * TICKS, 1 << 32
-"""Ticks of the delay and the grid; and micrometres of radii and the tolerance, which are less."""
-
-LENGTH, UNIT = 1e6, 1e4
-"""Of a description: micrometres of a metre, and what 1 is in the components of quaternions."""
+LONGEST_DELAY, LARGEST = 8 * TICKS, 1e4
+"""Ticks of the delay and the grid; and metres of radii, the tolerance and places at rest, which are less."""
 
 RAW = -15
 """Of zlib: its DEFLATE alone."""
 
 
 class Terms(NamedTuple):
-    """What sender and receivers agree on: the tolerance in micrometres; ticks by which what is shown is behind what is
-    sent; and ticks between the moments at which knots may be, counted back from the end of a window.
+    """What sender and receivers agree on: the tolerance in metres; ticks by which what is shown is behind what is sent;
+    and ticks between the moments at which knots may be, counted back from the end of a window.
     """
 
-    tolerance: int
+    tolerance: float
     delay: int
     grid: int
 
@@ -107,34 +104,31 @@ def describe(forest: Forest, terms: Terms) -> bytes:
     bodies = []
     for body in forest.bodies:
         names = [own.encode(errors="replace").decode() for own in (body.name, *body.joints)]
-        rest = np.concatenate((body.rest.positions * LENGTH, body.rest.quaternions * UNIT), axis=1)
-        columns = (body.parents, np.asarray(body.sliding, dtype=int), np.rint(rest).astype(int))
-        bodies.append((round(body.radius * LENGTH), names, *(column.tolist() for column in columns)))
+        rest = np.concatenate((body.rest.positions.round(6), body.rest.quaternions.round(4)), axis=1)
+        columns = (body.parents, np.asarray(body.sliding, dtype=int), rest)
+        bodies.append((body.radius, names, *(column.tolist() for column in columns)))
     return zlib.compress(json.dumps((*terms, bodies), separators=(",", ":")).encode(), 9, RAW)
 
 
 def read_description(data: bytes) -> tuple[Forest, Terms] | None:
     """Return the bodies and the terms of a description, or None."""
     try:
-        *numbers, bodies = json.loads(zlib.decompressobj(RAW).decompress(data, MOST_DESCRIBED))
-        terms = Terms(*map(int, numbers))
-        forest = Forest([_body(*body) for body in bodies])
-        are_sound = 0 < terms.tolerance < MOST and 0 < terms.delay <= LONGEST_DELAY and 0 < terms.grid <= LONGEST_DELAY
+        tolerance, delay, grid, bodies = json.loads(zlib.decompressobj(RAW).decompress(data, MOST_DESCRIBED))
+        terms, forest = Terms(float(tolerance), int(delay), int(grid)), Forest([_body(*body) for body in bodies])
+        are_sound = 0.0 < terms.tolerance < LARGEST and all(0 < ticks <= LONGEST_DELAY for ticks in terms[1:])
         return (forest, terms) if are_sound else None
     except (zlib.error, ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError):
         return None
 
 
-def _body(radius: int, names: list[str], parents: object, sliding: object, rest: object) -> Body:
+def _body(radius: float, names: list[str], parents: object, sliding: object, rest: object) -> Body:
     """Return a body that is described. Raises whatever is wrong with it."""
     for name in names:
         name.encode()
     rows = np.array(rest, dtype=np.float64)
-    places, turns = rows[:, :3] / LENGTH, rows[:, 3:] / UNIT
-    lengths = np.linalg.norm(turns, axis=1)
-    are_sound = (np.abs(places) < 1e6).all() and (lengths > 0.5).all() and (lengths < 1e6).all()
-    if not (are_sound and 0 < radius < MOST):
+    lengths = np.linalg.norm(rows[:, 3:], axis=1)
+    if not ((np.abs(rows) < LARGEST).all() and (lengths > 0.5).all() and radius < LARGEST):
         raise ValueError("such a pose at rest is none")
-    poses = Poses(places, turns / lengths[:, None])
+    poses = Poses(rows[:, :3], rows[:, 3:] / lengths[:, None])
     above, slides = np.array(parents, dtype=np.int64), np.array(sliding, dtype=bool)
-    return Body(names[0], tuple(names[1:]), above, poses, radius / LENGTH, slides)
+    return Body(names[0], tuple(names[1:]), above, poses, radius, slides)

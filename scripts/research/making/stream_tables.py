@@ -18,17 +18,9 @@ from research.pages import ROOT
 from research.studies import files_in, report
 from rigid_motion.motion import Poses
 from rigid_motion.streams import Body, Receiver, Sender
-from rigid_motion.streams.coding import TOTAL
-from rigid_motion.streams.messages import Said, State
-from rigid_motion.streams.residuals import (
-    COUNT,
-    FLAGS,
-    HISTORIES,
-    KNOT_COUNTS,
-    NEIGHBOURS,
-    SIZES,
-    symbols_of,
-)
+from rigid_motion.streams.coding import FLAGS, HISTORIES, KNOT_COUNTS, NEIGHBOURS, SIZES, TOTAL
+from rigid_motion.streams.messages import Message
+from rigid_motion.streams.tables import TABLES
 from rigid_motion_batch.cli.stream_measure import body_of, samples_of
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.streaming.sending import even_rate
@@ -41,14 +33,14 @@ BODY_RADIUS, SINGLE_RADIUS = 0.03, 0.1  # of the balls of bodies, and of single 
 PRIOR = 12.0  # what a table without any counts is worth beside them: as the mean over the kinds of knots
 
 TABLE_FILE = ROOT / "addon/rigid_motion/streams/tables.py"
-HEAD = '"""Cumulative frequencies of the coder\'s symbols, in the order of `residuals`: made by stream_tables.py."""'
+HEAD = '"""Cumulative frequencies of the coder\'s symbols, in the order of `coding`: made by stream_tables.py."""'
 
 
 class Counting:
     """A coder that writes nothing, and counts how often each symbol of each table occurs."""
 
     def __init__(self) -> None:
-        self.counts = [np.zeros(symbols_of(table)) for table in range(COUNT)]
+        self.counts = [np.zeros(len(table) - 1) for table in TABLES]
 
     def symbol(self, table: int, value: int = 0) -> int:
         self.counts[table][value] += 1
@@ -73,9 +65,9 @@ def count(coder: Counting, body: Body, times: np.ndarray, poses: Poses, delay: f
     sender, receiver = Sender([body], 0.005, delay, even_rate(times)), Receiver()
     write = sender.codec.write
 
-    def counted(said: Said, base: State) -> tuple[bytes, State]:
-        sender.codec.code(coder, lambda _: base, said)
-        return write(said, base)
+    def counted(message: Message, base: Message) -> bytes:
+        sender.codec.code(coder, lambda _: base, message)
+        return write(message, base)
 
     sender.codec.write = counted
     on_the_way: list[tuple[float, bytes]] = []

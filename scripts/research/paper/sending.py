@@ -17,8 +17,7 @@ from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.analysis.modes import REFERENCE
 from rigid_motion_batch.analysis.needed import OfRigidBody, part_of
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.streaming.measuring import HEADERS, measure
-from rigid_motion_batch.streaming.packed import STAMP
+from rigid_motion_batch.streaming.measuring import HEADERS, STAMP, measure
 from rigid_motion_batch.streaming.sending import body_of, samples_of
 
 from .table import RADIUS, UPDATES, has_samples_for
@@ -37,8 +36,8 @@ def sent(clip: Clip, tolerance: float, delay: float) -> tuple[float, float, floa
     """Send a clip over loopback, and return datagrams and bytes a second, and the RMS shell error of what was shown."""
     times, poses = samples_of(clip)
     cost, _ = measure(body_of(clip, poses, RADIUS), times, poses, tolerance, delay)
-    size = cost.bytes_a_second_with_headers
-    return (size - cost.bytes_a_second) / HEADERS, size, 1e-3 * cost.rms_mm
+    size = cost["bytes_a_second_with_headers"]
+    return (size - cost["bytes_a_second"]) / HEADERS, size, 1e-3 * cost["rms_mm"]
 
 
 def costs_of(clip: Clip) -> dict[float, dict[int, tuple[float, float]]]:

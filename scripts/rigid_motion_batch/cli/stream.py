@@ -71,7 +71,10 @@ def send(options: argparse.Namespace, stopped: list[int]) -> None:
         send_performer(options, stopped)
         return
     clips = _read(options.recordings, options)
-    bodies, moments, poses = together(clips, options.rate)
+    rate = options.rate
+    if options.to_vmc and not rate and clips[0].samples_a_second > vmc.RATE:
+        rate = vmc.RATE
+    bodies, moments, poses = together(clips, rate)
     if options.to_vmc:
         with Progress() as progress, progress.stage("Playing", float(moments[-1] - moments[0])) as stage:
             _say(f"datagrams: {vmc.play(bodies[0], moments, poses, options.to_vmc, stopped, stage.reach)}")

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import json
-from dataclasses import asdict
 from pathlib import Path
 from typing import cast
 
@@ -26,8 +25,7 @@ from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.bvh_writing import write_bvh
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.streaming.measuring import Cost, Link, measure
-from rigid_motion_batch.streaming.packed import packed
+from rigid_motion_batch.streaming.measuring import measure, packed
 from rigid_motion_batch.streaming.sending import body_of, samples_of
 
 EPILOG = """
@@ -43,7 +41,6 @@ shown at the recording's moments, in its units and axes.
 
 
 _delay = bounded("number of seconds", 0.0, 4.0, above=True)
-_seconds = bounded("number of seconds", 0.0, 4.0)
 _share = bounded("part of all", 0.0, 0.99)
 
 
@@ -55,11 +52,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--delay", type=_delay, default=0.1, metavar="S", help="seconds of delay (%(default)s)")
     parser.add_argument("--radius", type=_delay, default=RADIUS, metavar="M", help="of each joint's ball (%(default)s)")
     parser.add_argument("--loss", type=_share, default=0.0, metavar="P", help="part of the datagrams to lose: 0.01")
-    parser.add_argument("--latency", type=_seconds, default=0.0, metavar="S", help="seconds that a datagram takes")
-    parser.add_argument(
-        "--jitter", type=_seconds, default=0.0, metavar="S", help="seconds that one takes more, at most"
-    )
-    parser.add_argument("--no-answers", action="store_true", help="a receiver that says nothing, as in a multicast")
     parser.add_argument("--output", "-o", type=Path, metavar="FILE", help="write what was shown, as .bvh or .csv")
     parser.add_argument("--json", action="store_true", help="print numbers as JSON")
 
@@ -74,13 +66,12 @@ def run(options: argparse.Namespace) -> None:
     body = body_of(clip, poses, options.radius)
     if options.output and (options.output.suffix.lower() == ".bvh") != (clip.rest_body is not None):
         raise ValueError(f"{options.output}: a body is written as .bvh, a single rigid body as .csv")
-    link = Link(options.latency, options.jitter, options.loss)
-    cost, shown = measure(body, times, poses, tolerance, options.delay, link, not options.no_answers)
+    cost, shown = measure(body, times, poses, tolerance, options.delay, options.loss)
     beside = packed(body, times, poses)
     if options.output:
         write(options.output, clip, body, times, shown)
     if options.json:
-        print(json.dumps({"recording": clip.name, **asdict(cost), "beside": beside}, indent=2))
+        print(json.dumps({"recording": clip.name, **cost, "beside": beside}, indent=2))
         return
     for line in lines(cost, beside, tolerance):
         print(line)
@@ -99,19 +90,17 @@ def write(path: Path, clip: Clip, body: Body, times: np.ndarray, shown: Poses) -
             write_bvh(file, clip.rest_body, cast(np.ndarray, body.sliding), times, there)
 
 
-def lines(cost: Cost, beside: dict[str, dict[str, float]], tolerance: float) -> list[str]:
+def lines(cost: dict[str, float], beside: dict[str, dict[str, float]], tolerance: float) -> list[str]:
     """Return the numbers as text."""
     rows = [
-        f"datagrams: {cost.datagrams}, of which {cost.lost} were lost, in {cost.seconds:.2f} s",
-        f"to join: {cost.joining_bytes} bytes",
-        f"answers: {cost.answers_a_second:.0f} bytes a second",
-        f"shown: {1000.0 * cost.delay_s:.0f} ms later, within {1000.0 * tolerance:g} mm for "
-        f"{100.0 * cost.share_within_tolerance:.2f} % of the samples",
+        f"datagrams: {cost['datagrams']}, of which {cost['lost']} were lost, in {cost['seconds']:.2f} s",
+        f"to join: {cost['joining_bytes']} bytes",
+        f"answers: {cost['answers_a_second']:.0f} bytes a second",
+        f"shown within {1000.0 * tolerance:g} mm for {100.0 * cost['share_within_tolerance']:.2f} % of the samples",
         "",
         f"{'':36}{'bytes/s':>10}{'with headers':>14}{'RMS mm':>9}{'largest mm':>12}",
     ]
-    own = {"sent when needed": asdict(cost)}
-    for label, row in {**own, **beside}.items():
+    for label, row in {"sent when needed": cost, **beside}.items():
         alone, whole = row["bytes_a_second"], row["bytes_a_second_with_headers"]
         rows.append(f"{label:36}{alone:10.0f}{whole:14.0f}{row['rms_mm']:9.2f}{row['largest_mm']:12.2f}")
     return rows

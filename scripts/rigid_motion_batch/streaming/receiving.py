@@ -9,7 +9,8 @@ from collections.abc import Callable, Iterable, Sequence
 
 from rigid_motion.live.sockets import Address, Outlet
 from rigid_motion.streams import Receiver, Shown
-from rigid_motion.streams.receiver import MOST_STREAMS, SILENT
+from rigid_motion.streams.playing import SILENT
+from rigid_motion.streams.receiver import MOST_STREAMS
 
 from .rooms import ANSWERS, Came, Room
 
@@ -37,15 +38,14 @@ class Receiving:
         self._outlets: dict[str, Outlet] = {}
         self._heard: dict[str, float] = {}
         """The moments when users who are sending were heard last."""
-        self._silent = math.inf
-        """Since when nobody is sending, after somebody was."""
-        self._answer_at = -math.inf
+        self._last = self._answer_at = -math.inf
+        """When something came last, and when the next answers are due."""
         room.listen(user)
 
     def hear(self, until: float, stopped: Sequence[int]) -> None:
         """Show what comes until a moment of `time.monotonic`, or until all who sent have gone."""
         began, frame = time.monotonic(), 0
-        while not stopped and (now := time.monotonic()) < until and now - self._silent < LINGER:
+        while not stopped and (now := time.monotonic()) < until and not self._is_over(now):
             due = began + frame / self._fps
             for came in self._room.come(min(due, until) - now):
                 self._take(came, time.monotonic())
@@ -54,12 +54,15 @@ class Receiving:
                 self._show(now)
                 frame = math.floor((now - began) * self._fps) + 1
 
+    def _is_over(self, now: float) -> bool:
+        return self._last > -math.inf and not self._heard and now - self._last > LINGER
+
     def _take(self, came: Came, now: float) -> None:
-        user, datagram = came.user, came.datagram
+        user, datagram, self._last = came.user, came.datagram, now
         if datagram is None:
             self._leave(user)
         elif user in self._heard or len(self._heard) < MOST_STREAMS:
-            self._heard[user], self._silent = now, math.inf
+            self._heard[user] = now
             self.datagrams[user] += 1
             self.bytes[user] += len(datagram)
             self.receiver.take(datagram, now + self._margin, user)
@@ -83,8 +86,6 @@ class Receiving:
             act(shown)
         for user in [user for user, heard in self._heard.items() if now - heard > SILENT]:
             self._leave(user)
-        if self.datagrams and not self._heard and self._silent == math.inf:
-            self._silent = now
 
     def _leave(self, user: str) -> None:
         self._heard.pop(user, None)

@@ -10,8 +10,8 @@ import numpy as np
 
 from rigid_motion.live.sockets import Address, Outlet, Port
 from rigid_motion.motion import Poses
-from rigid_motion.streams import Body, Keys, Shown
-from rigid_motion.streams.vmc import Performer, VmcReceiver, write, write_trackers
+from rigid_motion.streams import Body, Keys, Receiver, Shown
+from rigid_motion.streams.vmc import Performer, write, write_trackers
 
 RATE = 90.0
 """Frames a second at most: programs draw no faster."""
@@ -65,19 +65,17 @@ def play(
     `stopped` ends it as soon as something is in it; `reach` is given the seconds that were played.
     Raises OSError where `to` is no address, and ValueError where no bone of a body is a person's.
     """
-    moments = moments - moments[0]
-    _, rows = np.unique(np.floor(moments * RATE + 0.01), return_index=True)
     with ToVmc(to) as outlet:
         if len(body.joints) > 1 and not performer_of(body):
             raise ValueError(f"{body.name}: none of its joints is named as the hips of a person, which VMC begins with")
         began = time.monotonic()
-        for row in np.union1d(rows, len(moments) - 1).tolist():
-            while not stopped and (wait := began + moments[row] - time.monotonic()) > 0.0:
+        for row, moment in enumerate((moments - moments[0]).tolist()):
+            while not stopped and (wait := began + moment - time.monotonic()) > 0.0:
                 time.sleep(min(wait, 0.1))
             if stopped:
                 break
-            outlet.say_frame(moments[row], [(body, poses[:, row])])
-            reach(moments[row])
+            outlet.say_frame(moment, [(body, poses[:, row])])
+            reach(moment)
         return outlet.datagrams
 
 
@@ -89,7 +87,7 @@ class Performers(Port):
 
     def __init__(self, port: int) -> None:
         super().__init__(port=port)
-        self._receiver = VmcReceiver()
+        self._receiver = Receiver()
 
     def samples(self) -> list[Keys]:
         """Return what came since the last call. Bodies are others as soon as bones or devices come that are new."""

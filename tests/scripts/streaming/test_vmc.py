@@ -12,7 +12,7 @@ import pytest
 
 from rigid_motion.motion import Poses, Skeleton
 from rigid_motion.streams import Body, Receiver, Sender
-from rigid_motion.streams.vmc import VmcReceiver, write_trackers
+from rigid_motion.streams.vmc import write_trackers
 from rigid_motion_batch.cli import stream
 from rigid_motion_batch.places import CHECKOUT
 from rigid_motion_batch.streaming.sending import together
@@ -100,7 +100,7 @@ def test_the_command_plays_a_body_in_real_time(walk, listener):
     assert done.returncode == 0, done.stderr
     datagrams = received(listener)
     assert f"datagrams: {len(datagrams)}" in done.stdout
-    receiver = VmcReceiver(0.0)
+    receiver = Receiver(0.0)
     for row, datagram in enumerate(datagrams):
         receiver.take(datagram, 0.01 * row)
     (keys,) = receiver.keys()
@@ -176,7 +176,7 @@ def test_what_a_receiver_shows_goes_to_another_program(listener):
     to_vmc.close()
     datagrams = received(listener)
     assert any(b"/VMC/Ext/Tra/Pos" in datagram for datagram in datagrams)
-    performer = VmcReceiver(0.0)
+    performer = Receiver(0.0)
     for row, datagram in enumerate(datagrams):
         performer.take(datagram, 0.001 * row)
     (keys,) = performer.keys()
@@ -210,7 +210,7 @@ def test_a_performer_goes_through_a_room_to_another_program(listener):
         running("receive", *room, "--user", "bob", "--to-vmc", to),
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as program,
     ):
-        performer, ends = VmcReceiver(0.0), time.monotonic() + PATIENCE
+        performer, ends = Receiver(0.0), time.monotonic() + PATIENCE
         frames = frames_of_vmc(np.arange(int(60 * PATIENCE)) / 60.0)
         for datagrams in frames:
             for datagram in datagrams:
