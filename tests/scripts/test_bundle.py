@@ -46,7 +46,7 @@ def test_a_job_on_a_farm_makes_the_same_as_a_run_on_one_machine(tmp_path: Path) 
 
 
 def test_stages_follow_one_another_and_their_parts_are_a_parameter(tmp_path: Path) -> None:
-    write_bundle(tmp_path, ["a.csv"], tmp_path, tmp_path / "out", {"read": 4, "measure": 2000, "report": 1})
+    write_bundle(tmp_path, ["a.csv"], tmp_path, tmp_path / "out", {"read": 4, "measure": 1024, "report": 1})
     template = json.loads((tmp_path / "template.json").read_text())
     assert template["name"] == "out"
     assert template["jobEnvironments"][0]["variables"][FARM] == "openjd"
