@@ -316,9 +316,10 @@ def test_a_stop_between_bodies_tells_of_the_files_that_are_complete(tmp_path, ca
     (tmp_path / "log.csv").write_text("\n".join([*lines, ""]), encoding="utf-8")
     real = recordings.write_poses
 
-    def write_and_press(*arguments: object, **options: object) -> None:
-        real(*arguments, **options)
-        signal.raise_signal(signal.SIGINT)
+    def write_and_press(beside: Path, *poses: object) -> None:
+        if (tmp_path / "log-left-keys.csv").exists():
+            signal.raise_signal(signal.SIGINT)
+        real(beside, *poses)
 
     monkeypatch.setattr(recordings, "write_poses", write_and_press)
     assert run(f"{tmp_path / 'log.csv'}:*") == 130
