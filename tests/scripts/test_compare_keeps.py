@@ -149,7 +149,7 @@ def test_what_would_be_done_is_explained_and_nothing_is_done(folder: Path, capsy
     before = files(folder)
     assert run("toss.csv", "--output", "out", "--explain", "--radius", "0.2") == 0
     said = capsys.readouterr().out.splitlines()
-    assert "measure toss/5: parameters changed (radii.rigid: 0.1 -> 0.2, radii.joint: 0.03 -> 0.2)" in said
+    assert "measure toss/5: parameters changed" in said
     assert said[-1].startswith("report.html: ")
     assert files(folder) == before
     assert run("toss.csv", "--output", "out") == 0

@@ -1,6 +1,7 @@
 """reduce.py on .blend files, as people run it: what it plays, what it leaves alone, what it says."""
 
 import re
+import signal
 from pathlib import Path
 
 import bpy
@@ -289,3 +290,22 @@ def test_a_file_that_was_saved_meanwhile_is_not_replaced_in_place(tmp_path, caps
     assert run(path, "--in-place") == 1
     assert f"{path}: it was changed while this program was at it" in capsys.readouterr().err
     assert [(item.name, item.read_bytes()) for item in tmp_path.iterdir()] == [(path.name, b"saved by an animator")]
+
+
+def test_a_stop_between_bodies_tells_of_the_files_that_are_complete(tmp_path, capsys, monkeypatch):
+    write_csv(tmp_path / "log.csv")
+    rows = (tmp_path / "log.csv").read_text(encoding="utf-8").splitlines()
+    lines = [f"device,{rows[0]}", *(f"{name},{row}" for name in ("left", "right") for row in rows[1:])]
+    (tmp_path / "log.csv").write_text("\n".join([*lines, ""]), encoding="utf-8")
+    real = recordings.write_poses
+
+    def write_and_press(beside: Path, *poses: object) -> None:
+        if (tmp_path / "log-left-keys.csv").exists():
+            signal.raise_signal(signal.SIGINT)
+        real(beside, *poses)
+
+    monkeypatch.setattr(recordings, "write_poses", write_and_press)
+    assert run(f"{tmp_path / 'log.csv'}:*") == 130
+    said = capsys.readouterr()
+    assert said.out == f"{tmp_path / 'log-left-keys.csv'}\n"
+    assert said.err.splitlines()[-1] == "Stopped. 1 object reduced; 1 file: 1 written, 0 not reached."

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from rigid_motion_batch.keying import exporting
 from rigid_motion_batch.recordings import importing
 from tests.scripts.baking import one_object_file
 from tests.scripts.reducing import listed, object_file, write_csv
@@ -121,13 +122,17 @@ def test_no_child_outlives_a_command_that_is_killed(tmp_path):
     assert not any(map(alive, processes))
 
 
-def test_ctrl_c_within_an_importer_is_no_fault_of_the_file(tmp_path):
+def test_ctrl_c_within_an_importer_or_exporter_is_no_fault_of_the_file(tmp_path):
+    # As bpy.ops puts it.
+    interrupted = RuntimeError("Error: Python: Traceback (most recent call last):\n  File ...\nKeyboardInterrupt\n")
+
     def importer() -> None:
-        # As bpy.ops puts it.
-        raise RuntimeError("Error: Python: Traceback (most recent call last):\n  File ...\nKeyboardInterrupt\n")
+        raise interrupted
 
     with pytest.raises(KeyboardInterrupt):
         importing._import(tmp_path / "walk.fbx", importer)
+    with pytest.raises(KeyboardInterrupt):
+        exporting._reason(interrupted)
 
 
 def test_a_signal_to_all_processes_at_once_ends_a_receiver(tmp_path):

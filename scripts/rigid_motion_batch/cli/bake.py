@@ -139,9 +139,6 @@ class Bake(Work):
     last: float | None
     interpolation: str
 
-    def needs_blender(self, job: Job) -> bool:
-        return True
-
     def do(self, doing: Doing) -> None:
         do_blend(doing, baking(self.step, self.first, self.last, self.interpolation))
 
@@ -150,9 +147,6 @@ class Unbake(Work):
     """Taking that back."""
 
     doing, done = "Un-baking", "un-baked"
-
-    def needs_blender(self, job: Job) -> bool:
-        return True
 
     def do(self, doing: Doing) -> None:
         do_blend(doing, unbaking())

@@ -293,8 +293,8 @@ class _Comparing:
         self.store.note(RECORD, dict(zip(_places([*digests], self.store.output), digests.values(), strict=True)))
         # What an earlier run found is no finding of this.
         self.store.withdraw(TABLES.keys() - self.plan.tables)
-        stage, tasks = self.plan.comparison.stage, self.plan.tasks
-        if stage and any(frames for _, frames in survey(tasks, self.store)[0].values()):
+        films = (task.name for task in self.plan.tasks() if isinstance(task.step, steps.Encode))
+        if self.plan.comparison.stage and not survey(self.plan.tasks, self.store)[0].keys().isdisjoint(films):
             # The numbers take seconds, and films minutes: nobody has to wait for the one to see the other.
             self._do("Measuring", lambda: self.plan.tasks(films=False))
             if self.work.interrupted or self.work.problem:

@@ -84,8 +84,7 @@ def write_bundle(
     template = json.loads(Path(__file__).with_name("job_template.json").read_text(encoding="utf-8"))
     template["name"] = output.name
     template["jobEnvironments"][0]["variables"][VERSION] = version_here()
-    for before, stage in pairwise(["", *(stage for stage in STAGES if stage in parts)]):
-        count = min(max(parts[stage], 1), MOST_PARTS)
+    for before, (stage, count) in zip(["", *parts], parts.items(), strict=False):
         share = "--output", "{{Param.Output}}", "--only", stage, "--part", f"{{{{Task.Param.Part}}}}/{count}"
         command = ["-m", "rigid_motion_batch", "compare", *arguments, *share]
         step = {
@@ -94,8 +93,7 @@ def write_bundle(
             "script": {"actions": {"onRun": {"command": "{{Param.Python}}", "args": command}}},
         }
         template["steps"].append(step | ({"dependencies": [{"dependsOn": before.capitalize()}]} if before else {}))
-    places = {"Program": PACKAGE.parent, "Python": sys.executable, "Inputs": inputs, "Output": output.absolute()}
-    values = {parameter: str(place) for parameter, place in places.items()}
+    values = {"Program": str(PACKAGE.parent), "Python": sys.executable, "Inputs": str(inputs), "Output": str(output)}
     given = {"parameterValues": [{"name": parameter, "value": value} for parameter, value in values.items()]}
     for file, content in (("parameter_values.json", given), ("template.json", template)):
         write_text(folder / file, json.dumps(content, indent=2, ensure_ascii=False) + "\n")

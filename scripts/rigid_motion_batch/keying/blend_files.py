@@ -15,7 +15,6 @@ from rigid_motion_batch.silencing import silenced
 
 from .output_files import FileProblem, Unreadable, changed_at, not_written
 from .records import Record
-from .sessions import stop_if_asked
 
 HERE = bpy.app.version[:2]
 """The Blender that this runs in."""
@@ -148,7 +147,6 @@ def write_file(output: Path, record: Record | None, opened: int | None = None) -
                 filepath=str(beside.absolute()), copy=True, check_existing=False, relative_remap=True
             )
             refuse_cut_off(beside)
-            stop_if_asked()
             if not record:
                 if changed_at(output) != opened:
                     raise FileProblem("it was changed while this program was at it, and stays so: do it again")

@@ -20,7 +20,6 @@ from .blend_files import missing_data, open_file
 from .gltf_files import do_gltf
 from .output_files import FileProblem, Unreadable
 from .reductions import Reductions
-from .sessions import stop_if_asked
 from .work import Doing
 
 GLTF_ADDON = "io_scene_gltf2"
@@ -63,7 +62,6 @@ def export_file(doing: Doing, how: Reductions) -> None:
                 doing.say(library)
             doing.outcome.incomplete = missing.hides_objects
         doing.outcome.read = list(map(Path, bpy.utils.blend_paths(absolute=True)))
-        stop_if_asked()
         export_glb(path)
 
     do_gltf(doing, how, export)
@@ -88,4 +86,6 @@ def _import_fbx(path: Path) -> None:
 
 def _reason(error: RuntimeError) -> str:
     """Return the last line of what an operator said, which names the problem."""
+    if "KeyboardInterrupt" in str(error):  # Blender makes an error of it.
+        raise KeyboardInterrupt from None
     return (str(error).strip().splitlines() or [""])[-1].removeprefix("Error: ")

@@ -13,7 +13,6 @@ from rigid_motion_batch.command_line import printable
 from .output_files import Unreadable
 from .planning import place_of
 from .reductions import Reductions, doubt, fewer, off
-from .sessions import stop_if_asked
 from .side_by_side import side_by_side
 from .work import Doing
 
@@ -37,7 +36,7 @@ def reduce_gltf(
     """
     job, outcome = doing.job, doing.outcome
     try:
-        document = _read(job.file) if export is None else _exported(export)
+        document = read_document(job.file) if export is None else _exported(export)
         if job.is_found and not document.json.get("animations"):
             doing.say("no animations; left alone")
             return
@@ -46,9 +45,8 @@ def reduce_gltf(
             report = reduced(document, Options(tolerance, how.radius, how.shared, how.count, how.vertices, run))
     except GltfError as error:
         raise Unreadable(str(error)) from None
-    except OSError as error:  # It is read while it is worked on.
-        raise _unreadable(error) from None
-    stop_if_asked()
+    except OSError as error:  # Also while it is worked on.
+        raise Unreadable(f"this cannot be read ({error.strerror}): see to its path, and who may read it") from None
     length = how.tolerance or Tolerance(f"{MILLIMETRES * report.tolerance:.6f}mm")
     for clip in report.clips:
         summary = _summary(clip, length, per_unit, doing.would, by_number=how.count is not None)
@@ -78,19 +76,8 @@ def _write(doing: Doing, output: Path, document: Document, report: Report) -> No
             if _holds(place, content):
                 continue  # Several files may share an image.
             doing.record.refuse_to_replace(place)
-        with doing.writing(place) as beside:
+        with doing.record.writing(place) as beside:
             beside.write_bytes(content)
-
-
-def _read(path: Path) -> Document:
-    try:
-        return read_document(path)
-    except OSError as error:
-        raise _unreadable(error) from None
-
-
-def _unreadable(error: OSError) -> Unreadable:
-    return Unreadable(f"this cannot be read ({error.strerror}): see to its path, and who may read it")
 
 
 def _holds(path: Path, content: bytes) -> bool:

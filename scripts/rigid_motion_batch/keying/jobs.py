@@ -18,7 +18,6 @@ from rigid_motion_batch.keying.blend_files import (
     write_file,
 )
 from rigid_motion_batch.keying.output_files import changed_at, refuse_long_name, refuse_read_only
-from rigid_motion_batch.keying.sessions import stop_if_asked
 from rigid_motion_batch.keying.targets import Action, groups_of, matching, matching_missing, title_of
 from rigid_motion_batch.keying.work import Doing, Outcome
 
@@ -41,7 +40,6 @@ def _do_file(doing: Doing, action: Action) -> None:
     changed = changed_at(job.file)
     open_file(job.file)
     outcome.read = [Path(bpy.path.abspath(library.filepath)) for library in bpy.data.libraries]
-    stop_if_asked()
     missing = missing_data()
     for library in missing.libraries:
         doing.say(library)
@@ -73,7 +71,6 @@ def _do_objects(doing: Doing, action: Action, missing: dict[bpy.types.Object, st
             if concerned := action.concerned([target for target, names in fit.items() if names]):
                 _begin(doing, set().union(*(fit[target] for target in concerned)))
                 _do_targets(doing, action, concerned)
-                stop_if_asked()
 
 
 def _begin(doing: Doing, fitting: set[str]) -> None:

@@ -23,7 +23,7 @@ from rigid_motion_batch.keying.keyed_files import key_body, key_densely, key_obj
 from rigid_motion_batch.keying.output_files import FileProblem, Unreadable
 from rigid_motion_batch.keying.planning import ALL
 from rigid_motion_batch.keying.reductions import GLB_SUFFIX, SUFFIX, TOLERANCE, Reductions, fewer, name_of, off
-from rigid_motion_batch.keying.sessions import counted, stop_if_asked
+from rigid_motion_batch.keying.sessions import counted
 from rigid_motion_batch.keying.work import Doing
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import folder_names, read_source
@@ -50,7 +50,6 @@ def do_recording(doing: Doing, how: Reductions) -> None:
     for clip, name in zip(clips, _names(job.file, clips), strict=True):
         suffix = GLB_SUFFIX if how.glb else SUFFIX
         doing.title = job.source if len(clips) == 1 else f"{job.source} ({clip.name})"
-        stop_if_asked()
         with doing.failing():
             _Clip(doing, how, clip, name).do(job.folder / f"{name}{suffix}" if job.source.endswith(ALL) else job.output)
 
@@ -101,13 +100,12 @@ class _Clip:
             keys = reduce_keys(clip.times, clip.poses, mode, radius=self.radius / clip.metres_per_unit, budget=budget)
         made = Reconstruction(clip, tolerance, {mode: (keys,)}, np.array([self.radius]))
         largest = float(made.shell(mode).max())
-        stop_if_asked()
         if frames is not None:
             key_object(clip, keys, frames, mode, self.name)
         error = off(tolerance, largest, clip.metres_per_unit, by_number=count is not None)
         self.doing.say(f"{self.doing.would}reduced{fewer(len(clip.times), len(keys))}{error}")
         if not self.doing.work.dry_run:
-            with self.doing.writing(table) as beside:
+            with self.doing.record.writing(table) as beside:
                 write_poses(beside, clip.times[keys], clip.poses[keys])
         self.doing.outcome.objects += 1
         self.doing.tell_written(table)
@@ -118,7 +116,6 @@ class _Clip:
         doing = self.doing
         doing.require_free(scene)
         result = key_body(self.clip, self._new_file(), self.how, self.name)
-        stop_if_asked()
         for bones, reason, count in result.refusals():
             doing.refuse(bones, reason, count)
         if result.left:
@@ -135,7 +132,6 @@ class _Clip:
     def _glb(self, path: Path) -> None:
         self.doing.require_free(path)
         key_densely(self.clip, self._new_file(), self.name)
-        stop_if_asked()
         how = self.how if self.clip.rest_body else replace(self.how, radius=self.radius)
         reduce_gltf(self.doing, how, path, export_glb, self.clip.metres_per_unit)
 

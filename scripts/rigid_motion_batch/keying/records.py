@@ -17,7 +17,7 @@ from typing import Any
 from rigid_motion_batch.files import append_lines, lines_of, written_beside
 from rigid_motion_batch.pipeline.steps import OWN, sha256_in, sha256_of
 
-from .output_files import FileProblem, refuse_long_name
+from .output_files import FileProblem, not_written, refuse_long_name
 
 NAME = "keyed.jsonl"
 
@@ -52,11 +52,7 @@ class Record:
     def writing(self, path: Path) -> Iterator[Path]:
         """Yield a path for a file that takes its place at `path` when the block ends well: see `written_beside`.
 
-        Raises
-        ------
-        FileProblem
-            Where another run has put something there meanwhile.
-        OSError
+        Raises `FileProblem` where it cannot be written, or another run has put something there meanwhile.
         """
         try:
             with written_beside(path, overwrite=self._may_replace(path)) as beside:
@@ -64,12 +60,11 @@ class Record:
                 # Killed from here on, what was moved is known to be the program's own.
                 line = {"file": _from(self.folder, path), "sha256": sha256_of(beside), "source": self._source}
                 append_lines(self._file, [line])
-        except FileExistsError as error:
-            if error.filename != str(path):
-                raise
-            raise FileProblem(
-                f"{path} has come there meanwhile, from another run perhaps: add --overwrite, or another --output"
-            ) from None
+        except OSError as error:
+            if isinstance(error, FileExistsError) and error.filename == str(path):
+                problem = "has come there meanwhile, from another run perhaps: add --overwrite, or another --output"
+                raise FileProblem(f"{path} {problem}") from None
+            raise not_written(path, error.strerror or error) from None
 
     def keep(
         self, key: str, written: Sequence[Path], beside: Iterable[Path], read: Iterable[Path], facts: Mapping[str, Any]

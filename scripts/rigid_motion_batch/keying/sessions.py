@@ -1,22 +1,19 @@
 """A session: inputs done one after another or side by side, each wholly or not at all, and summed up in a line.
 
 What an input needs is done by an executor of the pipeline, here or in a worker process. What was made of the same
-input before, by the same version and with the same options, is not made again. Ctrl-C ends a session between two
-steps: what was written by then is whole, and nothing else was touched. `supervising` has what is between them ended,
-from outside.
+input before, by the same version and with the same options, is not made again. Ctrl-C ends a session: what was written
+by then is whole, and nothing else was touched. Where Blender does not listen, `supervising` ends it from outside.
 """
 
 from __future__ import annotations
 
 import os
-import signal
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import cast
 
@@ -24,17 +21,12 @@ from rigid_motion_batch.command_line import complain, few, path_line, printable
 from rigid_motion_batch.files import append_lines, lines_of
 from rigid_motion_batch.pipeline import steps
 from rigid_motion_batch.pipeline.executors import Executor, Made, ProcessExecutor, loss, processors
+from rigid_motion_batch.places import EXTENSION
 from rigid_motion_batch.progress import Progress, Stage
-from rigid_motion_batch.supervising import blender_program, report, stop_signals, written_of
+from rigid_motion_batch.supervising import blender_program, report, written_of
 
 from .planning import Job
 from .work import Doing, Outcome, Work
-
-EXTENSION = "rigid_motion"
-"""The id in blender_manifest.toml, which the name of the installed module ends with."""
-
-LOOK = 0.2
-"""Seconds between two looks at whether a session is to end."""
 
 NAMED = 5
 """The number of failed inputs that are named again at the end, where there are more inputs than that."""
@@ -49,9 +41,6 @@ ROOMS = (
     "scenes/armature.py",
 )
 """The packages that the files that are written depend on."""
-
-NOTES = "notes"
-"""The file of what is said of an input while it is done."""
 
 
 class Keyed(steps.Step, rooms=ROOMS):
@@ -77,13 +66,12 @@ class Keyed(steps.Step, rooms=ROOMS):
             import bpy  # noqa: F401  It brings addon_utils.
 
             blender = _extension()
-        doing = Doing(self.work, given, partial(_keep_note, job.place))
+        doing = Doing(self.work, given, lambda text: append_lines(job.place / "notes", [{"note": text}]))
         try:
             with blender:
                 self.work.do(doing)
-        except Stopped as stopped:
-            stopped.partly = doing.outcome
-            raise
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(doing.outcome) from None
         return {"outcome": doing.outcome}
 
 
@@ -99,7 +87,7 @@ def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = 
     workers : int, optional
         Processes; 0 for this one. One for each processor, and this one for a single input, where None.
     """
-    stopped, unmatched = None, set()
+    stopped, unmatched = False, set()
     try:
         executor = _executor(workers, len(jobs))
     except steps.RunError as error:
@@ -111,16 +99,15 @@ def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = 
         Progress() as progress,
         executor,
         tempfile.TemporaryDirectory(prefix="rigid-motion-") as scratch,
-        _stopped_between_steps(),
     ):
         session = _Session(jobs, work, executor, progress, Path(scratch))
         try:
             with progress.stage(work.doing, len(jobs)) as stage:
                 session.run(stage)
-        except Stopped as signalled:
-            stopped = signalled.args[0]
+        except KeyboardInterrupt as interrupt:
+            stopped = True
             executor.stop()
-            session.take_partly(signalled)
+            session.take_partly(*interrupt.args)
         else:
             unmatched = session.unmatched()
             for name in sorted(unmatched):
@@ -135,9 +122,9 @@ def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = 
     failed = [outcome.source for outcome in outcomes if outcome.failed]
     if failed and len(jobs) > NAMED:  # What was said of them is far above.
         print(f"Failed: {printable(few(failed, NAMED))}", file=sys.stderr)
-    print(_summary(outcomes, len(jobs), work, interrupted=stopped is not None), file=sys.stderr, flush=True)
-    if stopped is not None:
-        return 128 + stopped
+    print(_summary(outcomes, len(jobs), work, interrupted=stopped), file=sys.stderr, flush=True)
+    if stopped:
+        return 130
     if all(outcome.unreadable for outcome in outcomes):
         return 2
     return int(bool(unmatched) or any(outcome.refused or outcome.failed or outcome.incomplete for outcome in outcomes))
@@ -160,25 +147,25 @@ class _Session:
         return [outcome for _, outcome in sorted(self._outcomes.items())]
 
     def run(self, stage: Stage) -> None:
-        waiting = iter(enumerate(self._jobs))
-        more = True
-        while more or self._at_work:
-            stop_if_asked()
-            while more and len(self._at_work) < self._executor.capacity:
-                place, job = next(waiting, (0, None))
-                if more := job is not None:
-                    self._begin(place, job, stage)
-                    stop_if_asked()
-            ended, _ = wait(self._futures, LOOK, FIRST_COMPLETED)
-            for future in ended:
-                self._end(future, *self._futures.pop(future))
-            self._show(stage)
+        for place, job in enumerate(self._jobs):
+            while len(self._at_work) >= self._executor.capacity:
+                self._wait(stage)
+            self._begin(place, job, stage)
+        while self._at_work:
+            self._wait(stage)
+        self._show(stage)
 
-    def take_partly(self, stopped: Stopped) -> None:
+    def _wait(self, stage: Stage) -> None:
+        ended, _ = wait(self._futures, steps.INTERVAL, FIRST_COMPLETED)
+        for future in ended:
+            self._end(future, *self._futures.pop(future))
+        self._show(stage)
+
+    def take_partly(self, partly: Outcome | None = None) -> None:
         """Count what is complete of inputs that were stopped in this process, or in workers."""
         for place in self._at_work:
             source = self._jobs[place].source
-            outcome = stopped.partly or Outcome(source, written=list(map(Path, written_of(source))))
+            outcome = partly or Outcome(source, written=list(map(Path, written_of(source))))
             if outcome.written:
                 self._outcomes[place] = outcome
 
@@ -213,13 +200,12 @@ class _Session:
         request = steps.Job(replace(task, step=step), self._scratch / str(place), job.folder)
         self._at_work[place] = key
         self._show(stage)
-        stop_if_asked()
         self._futures[self._executor.submit(request)] = place, request
 
     def _end(self, future: Future[Made], place: int, request: steps.Job) -> None:
         """Take what came of an input."""
         job, key = self._jobs[place], self._at_work.pop(place)
-        for line in lines_of(request.place / NOTES):  # Also of one that was killed.
+        for line in lines_of(request.place / "notes"):  # Also of one that was killed.
             self._note(str(line.get("note")))
         outcome = Outcome(job.source, failed=True)
         try:
@@ -244,17 +230,10 @@ def _task(work: Work, job: Job) -> steps.Task:
         blender = bpy.app.version_string
     options = replace(work, overwrite=False, dry_run=False, processes=1)
     body = job.source.removeprefix(os.fspath(job.file))
-    return steps.Task(Keyed(options, body, job.output.name, blender), job.title, inputs=_inputs(job))
-
-
-def _keep_note(place: Path, text: str) -> None:
-    append_lines(place / NOTES, [{"note": text}])
-
-
-def _inputs(job: Job) -> dict[str, str]:
-    """Return the file of an input as it is now; none where that is no file, or is to be replaced."""
+    # An input that is to be replaced, or is no file, has no digest.
     digest = "" if job.in_place else steps.sha256_in(job.file)
-    return {os.fspath(job.file): digest} if digest else {}
+    inputs = {os.fspath(job.file): digest} if digest else {}
+    return steps.Task(Keyed(options, body, job.output.name, blender), job.title, inputs=inputs)
 
 
 def _executor(workers: int | None, count: int) -> Executor:
@@ -308,7 +287,7 @@ def _extension() -> Iterator[None]:
     from rigid_motion import animation
 
     enabled = [addon.module for addon in cast(bpy.types.Preferences, bpy.context.preferences).addons]
-    installed = [name for name in enabled if name.rpartition(".")[2] == EXTENSION]
+    installed = [name for name in enabled if name.rpartition(".")[2] == EXTENSION.name]
     for name in installed:
         addon_utils.disable(name)
     animation.register()
@@ -318,37 +297,3 @@ def _extension() -> Iterator[None]:
         animation.unregister()
         for name in installed:
             addon_utils.enable(name)
-
-
-class Stopped(KeyboardInterrupt):
-    """By Ctrl-C or SIGTERM. `args` are the number of the signal."""
-
-    partly: Outcome | None = None
-    """The outcome of the input that it came in."""
-
-
-_received: list[int] = []
-"""Signals that are to stop this process."""
-
-
-def stop_if_asked() -> None:
-    """Raise `Stopped` after Ctrl-C or SIGTERM. Blender swallows what is raised while it works.
-
-    A step that takes too long, or is done in a worker, is ended from outside.
-    """
-    if _received:
-        raise Stopped(_received[0])
-
-
-@contextmanager
-def _stopped_between_steps() -> Iterator[None]:
-    """Have the signals that stop a command wait for `stop_if_asked`."""
-    _received.clear()
-    before = {item: signal.signal(item, lambda number, _: _received.append(number)) for item in stop_signals()}
-    try:
-        yield
-    finally:
-        _received.clear()
-        for one, handler in before.items():
-            # None stands for the Blender program's own, which Python cannot put back.
-            signal.signal(one, signal.SIG_DFL if handler is None else handler)

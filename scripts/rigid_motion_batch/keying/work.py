@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Self
 
 from rigid_motion_batch.supervising import report
 
-from .output_files import FileProblem, Unreadable, not_written, refuse_read_only
+from .output_files import FileProblem, Unreadable, refuse_read_only
 from .planning import Job
 from .records import Record
 
@@ -51,8 +51,8 @@ class Work(ABC):
         """Return what is known of what was made of an input."""
         return Record(job.folder, job.source, overwrite=self.overwrite)
 
-    @abstractmethod
-    def needs_blender(self, job: Job) -> bool: ...
+    def needs_blender(self, job: Job) -> bool:  # noqa: ARG002 - some do
+        return True
 
     @abstractmethod
     def do(self, doing: Doing) -> None:
@@ -145,15 +145,6 @@ class Doing:
         """Raise FileProblem where a file must not or cannot be written: better said before hours go into it."""
         self.record.refuse_to_replace(path)
         refuse_read_only(path)
-
-    @contextmanager
-    def writing(self, path: Path) -> Iterator[Path]:
-        """Yield a path for a file that takes its place when the block ends well. Raises FileProblem where it cannot."""
-        try:
-            with self.record.writing(path) as beside:
-                yield beside
-        except OSError as error:
-            raise not_written(path, error.strerror or error) from None
 
     def tell_written(self, path: Path) -> None:
         self.say(f"{self.would}written to {path}")

@@ -31,7 +31,7 @@ from rigid_motion_batch.scenes.timeline import Timeline
 from . import comparison_steps as steps
 from . import values
 from .comparison_steps import ClipOf, Page, Part
-from .steps import RunError, Task
+from .steps import Task
 from .store import Store
 
 METRICS, JOINT_METRICS, KEYS_NEEDED = "metrics.csv", "metrics_joints.csv", "keys_needed.csv"
@@ -170,21 +170,7 @@ class ComparisonPlan:
         return Task(step, f"read {source}", inputs=inputs, seconds=0.3)
 
     def look_into(self) -> list[str]:
-        """See what clips there are in the recordings that were read, and return what the user should know of them.
-
-        Raises
-        ------
-        RunError
-            Where what was read is damaged.
-        """
-        try:
-            return self._look_into()
-        except Exception:
-            if self.store.discard_damaged(task.key for task in self.reading()):
-                raise RunError("what was read is damaged; the same command reads it again") from None
-            raise
-
-    def _look_into(self) -> list[str]:
+        """See what clips there are in the recordings that were read, and return what the user should know of them."""
         comparison = self.comparison
         keys = [task.key for task in self._readers if self.store.index_of(task.key)]
         read = {
@@ -339,9 +325,8 @@ class ComparisonPlan:
         firsts = [1 + count * number // pieces for number in range(pieces + 1)]
         rendering: list[Task] = []
         for first, following in itertools.pairwise(firsts):
-            frames, step = following - first, steps.Render(title, first, following - 1)
-            about: dict[str, Any] = {"seconds": seconds * frames, "frames": frames}
-            rendering.append(Task(step, f"render {folder} from {first}", (building.key,), **about))
+            step, name = steps.Render(title, first, following - 1), f"render {folder} from {first}"
+            rendering.append(Task(step, name, (building.key,), seconds=seconds * (following - first)))
         keys = tuple(task.key for task in rendering)
         encoding = Task(
             steps.Encode(title, 1, count),

@@ -253,9 +253,7 @@ class Encode(Render, stage="encode"):
         scene, *others = job.results
         pieces = [folder / PIECE for folder in others]
         with _told(f"{self.title}: no video"):
-            join_pieces(
-                scene / BLEND, pieces, job.folder / FILM, lambda done, total: job.progress(done, total, "encoding")
-            )
+            join_pieces(scene / BLEND, pieces, job.folder / FILM, job.progress)
 
 
 # -- pages ------------------------------------------------------------------------------------------------------------

@@ -10,12 +10,11 @@ import asyncio
 import logging
 import multiprocessing
 import os
-import time
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import CancelledError, Future, wait
 from contextlib import suppress
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Any, Self, cast
 
@@ -23,16 +22,10 @@ from distributed import Client, Security, get_worker
 from distributed.comm import connect
 
 from .executors import Executor, Made, ProcessExecutor
-from .steps import Job, RunError, version_here
+from .steps import INTERVAL, Job, RunError, version_here
 
 CONNECTING = 5.0
 """Seconds that a scheduler has to answer."""
-
-BUSY = 30.0
-"""Seconds that one may take to answer which is connected: where it is gone, that is seen at once."""
-
-LOOK = 0.5
-"""Seconds between two looks at which workers there are, and at whether a job is still to be done."""
 
 UNREACHABLE = (OSError, RuntimeError, TimeoutError, CancelledError)
 """Errors that Dask raises where its scheduler does not answer."""
@@ -42,7 +35,7 @@ def do(job: Job) -> Made:
     """Do a job on a worker, in a process of its own, which ends with the worker, or where the job is cancelled."""
     worker = get_worker()
     key, future = worker.get_current_task(), _processes(worker.state.nthreads).submit(job)
-    while not wait([future], LOOK).done:
+    while not wait([future], INTERVAL).done:
         task = worker.state.tasks.get(key)
         if (task is None or task.state == "cancelled") and future.cancel():
             break
@@ -56,6 +49,14 @@ def _processes(jobs: int) -> ProcessExecutor:
     return ProcessExecutor(jobs)
 
 
+def reason_against(requested: str, folder: str) -> str:
+    """Return why this worker does not fit a run of this version into a folder; empty where it does."""
+    if not os.path.isdir(folder):
+        return f"it does not see {folder}; choose one on a disk that all share"
+    here = version_here()
+    return "" if here == requested else f"it has {here}, and this run is of {requested}; start it anew with that"
+
+
 class DaskExecutor(Executor):
     """The workers of the Dask scheduler at an address, tcp://HOST:8786, or tls:// with certificates in Dask's settings.
 
@@ -65,60 +66,49 @@ class DaskExecutor(Executor):
 
     def __init__(self, address: str, folder: Path, note: Callable[[str], object]) -> None:
         self._address, self._folder, self._note = address, os.fspath(folder), note
-        self._fit: dict[str, int | None] = {}
-        """Address of a worker to how many threads it has; 0 where it does not fit, None before it has answered."""
+        self._fit: dict[str, int] = {}
+        """Address of a worker to how many threads it has; 0 where it does not fit."""
         self._jobs: dict[Future[Made], str] = {}
         """Jobs at work, and the addresses of their workers."""
-        self._looked_at = 0.0
-        self._client: Client
+        self._waits = False
 
     @property
     def capacity(self) -> int:  # type: ignore[override]  # it is only read
         """The threads of all workers that fit. Raises RunError where there are workers, and none of them fits."""
-        if time.monotonic() - self._looked_at > LOOK:
-            self._look()
-            self._looked_at = time.monotonic()
-        return sum(filter(None, self._fit.values()))
-
-    def submit(self, job: Job) -> Future[Made]:
-        self._jobs = {future: address for future, address in self._jobs.items() if not future.done()}
-        busy = Counter(self._jobs.values())
-        address = max(self._fit, key=lambda address: (self._fit[address] or 0) - busy[address])
-        future: Future[Made] = self._client.get_executor(pure=False, workers=[address]).submit(do, job)
-        self._jobs[future] = address
-        return future
-
-    def _look(self) -> None:
-        """See which workers there are, and ask those that are new."""
-        threads, before = self._threads(), bool(self._fit)
+        threads = self._answer(self._client.nthreads)
         for address in self._fit.keys() - threads.keys():
             if self._fit.pop(address):
                 self._note(f"worker {address} is gone; others go on with its tasks")
             for future in [future for future, place in self._jobs.items() if place == address]:
                 future.cancel()  # Dask itself does not always do so.
-        for address in threads.keys() - self._fit.keys():
-            self._fit[address] = None
-            executor = self._client.get_executor(pure=False, workers=[address])
-            answer = executor.submit(_asker(version_here(), self._folder))
-            answer.add_done_callback(partial(self._hear, address, threads[address]))
+        if new := [*threads.keys() - self._fit.keys()]:
+            asked = reason_against, version_here(), self._folder
+            answers = self._answer(self._client.run, *asked, workers=new, on_error="return")
+            for address, answer in answers.items():
+                if not isinstance(answer, OSError):  # Otherwise it is gone.
+                    self._fit[address] = 0 if answer else threads[address]
+                    if answer:
+                        self._note(f"worker {address}: {answer}; it is left out")
         if {*self._fit.values()} == {0}:
             raise RunError(f"{self._address}: none of its workers is fit")
-        if not threads and (before or not self._looked_at):
+        if not threads and not self._waits:
             self._note(f"{self._address} has no worker; waiting for one: `dask worker {self._address}`")
+        self._waits = not threads
+        return sum(self._fit.values())
 
-    def _hear(self, address: str, threads: int, answer: Future[str]) -> None:
-        """Take the answer of a worker."""
-        if address in self._fit and not answer.cancelled():  # Otherwise it is gone.
-            said = str(answer.exception() or answer.result())
-            self._fit[address] = 0 if said else threads
-            if said:
-                self._note(f"worker {address}: {said}; it is left out")
+    def submit(self, job: Job) -> Future[Made]:
+        self._jobs = {future: address for future, address in self._jobs.items() if not future.done()}
+        busy = Counter(self._jobs.values())
+        address = max(self._fit, key=lambda address: self._fit[address] - busy[address])
+        future: Future[Made] = self._client.get_executor(pure=False, workers=[address]).submit(do, job)
+        self._jobs[future] = address
+        return future
 
-    def _threads(self) -> dict[str, int]:
-        """Return the workers that the scheduler knows, and how many threads each has."""
+    def _answer(self, question: Callable[..., dict[str, Any]], *what: object, **how: object) -> dict[str, Any]:
+        """Return what the scheduler answers, by the addresses of workers."""
         with suppress(*UNREACHABLE):
             if self._client.status == "running":
-                return dict(self._client.sync(self._client.scheduler.ncores, callback_timeout=BUSY))
+                return question(*what, **how)
         raise RunError(f"{self._address}: the Dask scheduler is gone")
 
     def __enter__(self) -> Self:
@@ -126,8 +116,9 @@ class DaskExecutor(Executor):
             # What there is to say of the connection is said here, in one line.
             logging.getLogger(name).setLevel(logging.CRITICAL)
         try:
-            # A client that finds nobody goes on trying for long, even when it has said so.
-            asyncio.run(_knock(self._address))
+            # A client that finds nobody goes on trying for long, and someone else's server may keep it waiting.
+            knocking = connect(self._address, timeout=CONNECTING, **Security().get_connection_args("client"))
+            asyncio.run(asyncio.wait_for(knocking, CONNECTING + 1.0))
             self._client = Client(self._address, timeout=CONNECTING, set_as_default=False, name="rigid-motion")
         except (OSError, ValueError, ImportError, TypeError) as error:  # The last one where tls:// has no certificates.
             raise RunError(
@@ -139,27 +130,3 @@ class DaskExecutor(Executor):
     def __exit__(self, *_: object) -> None:
         with suppress(*UNREACHABLE):
             self._client.close(timeout=2.0)  # Then nobody wants what is at work, and it is cancelled.
-
-
-async def _knock(address: str) -> None:
-    """Raise OSError where nothing answers that speaks Dask's protocol."""
-    async with asyncio.timeout(CONNECTING + 1.0):  # Someone else's server may keep it waiting.
-        comm = await connect(address, timeout=CONNECTING, **Security().get_connection_args("client"))
-    comm.abort()
-
-
-def _asker(requested: str, folder: str) -> Callable[[], str]:
-    """Return a function that answers why a worker does not fit. It is sent whole: one may not have the program."""
-
-    def ask() -> str:
-        if not os.path.isdir(folder):
-            return f"it does not see {folder}; choose one on a disk that all share"
-        try:
-            from rigid_motion_batch.pipeline.steps import version_here
-        except ImportError as error:
-            return str(error)
-        result = version_here()
-        unfit = f"it has {result}, and this run is of {requested}; start it anew with that"
-        return "" if result == requested else unfit
-
-    return ask

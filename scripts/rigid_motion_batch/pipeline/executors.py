@@ -18,7 +18,6 @@ import sys
 import threading
 import time
 import traceback
-import uuid
 from concurrent.futures import CancelledError, Future
 from contextlib import AbstractContextManager, suppress
 from dataclasses import replace
@@ -37,9 +36,6 @@ Made = dict[str, Any]
 
 FULL_OR_FORBIDDEN = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM})
 """Errors at writing that the next task will have as well."""
-
-JOB, ANSWER = "job", "answer"
-"""The files by which a Blender gets its job, and says what came of it."""
 
 PROGRAM = """import sys
 place, *path = sys.argv[sys.argv.index("--") + 1 :]
@@ -114,15 +110,12 @@ def loss(error: BaseException, job: Job) -> str:
     code = getattr(error, "exitcode", None) or getattr(error, "returncode", None)
     how = f"died ({death(code)})" if code else f"failed: {type(error).__name__}: {error}"
     log = job.place / "log"
-    printed = log.read_text(encoding="utf-8", errors="replace").split("\n") if log.exists() else []
-    last_words = [line.strip()[:200] for line in printed if line.strip()][-1:]
-    return ": ".join([f"its process {how}", *last_words])
+    printed = log.read_text(encoding="utf-8", errors="replace").strip() if log.exists() else ""
+    return ": ".join(filter(None, [f"its process {how}", printed.rpartition("\n")[2][:200]]))
 
 
 def perform(job: Job) -> Made:
     """Do a job. Raises TaskError, and CalledProcessError where a Blender died."""
-    # Another who does it at the same time, and was taken for dead, is not in the way.
-    job.folder = job.place / uuid.uuid4().hex[:8]
     if job.blender and job.task.step.blender:
         return _made_by_blender(job)
     try:
@@ -138,9 +131,6 @@ def perform(job: Job) -> Made:
 def _make(job: Job) -> Made:
     """Have the files of a job written."""
     started, task = time.perf_counter(), job.task
-    for path in task.inputs:
-        if os.path.exists(path) and not os.path.isfile(path):
-            raise TaskError(f"{path}: this is no file, but a folder, pipe or device; give a file")
     job.folder.mkdir(parents=True)
     facts = task.step.make(job)
     for path, digest in task.inputs.items():
@@ -211,7 +201,7 @@ def _print_to(path: str | Path) -> None:
 def _made_by_blender(job: Job) -> Made:
     """Have a job done by a Blender of its own."""
     job.place.mkdir(parents=True, exist_ok=True)
-    (job.place / JOB).write_bytes(pickle.dumps(replace(job, blender="")))
+    (job.place / "job").write_bytes(pickle.dumps(replace(job, blender="")))
     module = sys.modules[type(job.task.step).__module__]  # It may be outside this package.
     root = Path(cast(str, module.__file__)).resolve().parents[module.__name__.count(".")]
     command = [job.blender, "--background", "--factory-startup", "--python-exit-code", "1", "--python-expr", PROGRAM]
@@ -220,7 +210,7 @@ def _made_by_blender(job: Job) -> Made:
         parent = subprocess.PIPE  # Whose end tells it that nobody waits any more.
         before = end_with_parent if sys.platform == "linux" else None
         subprocess.check_call(command, stdin=parent, stdout=log, stderr=log, preexec_fn=before)
-    answer = pickle.loads((job.place / ANSWER).read_bytes())
+    answer = pickle.loads((job.place / "answer").read_bytes())
     if isinstance(answer, Exception):
         raise answer
     return cast(Made, answer)
@@ -229,7 +219,7 @@ def _made_by_blender(job: Job) -> Made:
 def perform_in_blender(place: str) -> None:
     """Do the job that lies in a folder, in a Blender that was started for it."""
     threading.Thread(target=lambda: (sys.stdin.buffer.read(), os._exit(1)), daemon=True).start()
-    done = Executor().submit(pickle.loads(Path(place, JOB).read_bytes()))
-    Path(place, ANSWER).write_bytes(pickle.dumps(done.exception() or done.result()))
+    done = Executor().submit(pickle.loads(Path(place, "job").read_bytes()))
+    Path(place, "answer").write_bytes(pickle.dumps(done.exception() or done.result()))
     # Not sys.exit: Blender can wait for long while it is taken down.
     os._exit(0)

@@ -31,9 +31,8 @@ Plan = Callable[[], Iterable[Task]]
 ATTEMPTS = 3
 """Number of times that a task is begun whose process dies."""
 
-DONE, UP_TO_DATE, FAILED, SKIPPED = "done", "up to date", "failed", "skipped"
-STOPPED = "not begun or stopped"
-STATES = (DONE, UP_TO_DATE, FAILED, SKIPPED, STOPPED)
+STATES = "done", "up to date", "failed", "skipped", "not begun or stopped"
+DONE, UP_TO_DATE, FAILED, SKIPPED, STOPPED = STATES
 """States of a task, for people. It is skipped where a task before it failed."""
 
 
@@ -49,13 +48,12 @@ def share_of(plan: Plan, stage: str = "", number: int = 1, of: int = 1) -> Itera
                 yield task
 
 
-def survey(plan: Plan, store: Store) -> tuple[dict[str, tuple[float, int]], int]:
-    """Return the tasks of a plan that are to be done, by name, with their seconds and frames, and how many are done.
+def survey(plan: Plan, store: Store) -> tuple[dict[str, float], int]:
+    """Return the names of the tasks of a plan that are to be done, with their seconds, and how many are done.
 
     Raises RunError where something would be replaced that must not be.
     """
-    costs: dict[str, tuple[float, int]] = {}
-    foreign: list[str] = []
+    left: dict[str, float] = {}
     done = 0
     for task in plan():
         index = store.index_of(task.key)
@@ -63,10 +61,30 @@ def survey(plan: Plan, store: Store) -> tuple[dict[str, tuple[float, int]], int]
         if index and not unpublished:
             done += 1
         else:
-            costs[task.name] = task.seconds, task.frames
-            foreign += [path for _, path in unpublished if not store.is_own(path)]
-    store.refuse(foreign)
-    return costs, done
+            left[task.name] = task.seconds
+            store.refuse(unpublished)
+    return left, done
+
+
+def explain(plan: Plan, store: Store) -> Iterator[tuple[Task, str]]:
+    """Yield the tasks of a plan that a run would do, and why. Nothing is written."""
+    latest = store.latest()
+    for task in plan():
+        if index := store.index_of(task.key):
+            if missing := store.unpublished(task, index):
+                yield task, f"{few(path for _, path in missing)} missing, edited or of something else"
+        elif (store.results / task.key).exists():
+            yield task, "its result is damaged"
+        else:
+            earlier = store.index_of(latest.get(task.name, ""))
+            yield task, _difference(earlier["made_of"], task) if earlier else "never done"
+
+
+def _difference(before: Mapping[str, Any], task: Task) -> str:
+    """Return in what a task differs from what its last result was made of."""
+    now = json.loads(json.dumps(task.made_of, default=plain))
+    changed = [part for part in now if before.get(part) != now[part]]
+    return f"{', '.join(changed)} changed" if changed else "an earlier task failed the last time"
 
 
 @dataclass(eq=False)
@@ -101,10 +119,11 @@ class Run:
         self._waiting: list[Task] = []
         self._at_work: dict[Future[Made], tuple[Task, Job]] = {}
         self._losses: Counter[str] = Counter()
+        self._done = 0.0
+        """Seconds of tasks that have come to their end."""
         with self.progress.stage(title, 1.0) as self._stage:
             self._left, up_to_date = survey(plan, self.store)
-            self._stage.total = self._seconds = sum(seconds for seconds, _ in self._left.values())
-            self._all_frames = self._frames = sum(frames for _, frames in self._left.values())
+            self._stage.total = sum(self._left.values())
             # What an earlier plan did is found up to date by this one.
             self.counts = Counter({DONE: (done := self.counts[DONE]), UP_TO_DATE: up_to_date - done})
             try:
@@ -123,20 +142,18 @@ class Run:
 
     def _work(self, rest: Iterator[Task]) -> None:
         """Do tasks, each when those before it are settled. Raises RunError where nothing more can be done."""
-        more = True
-        while more or self._waiting or self._at_work:
+        while True:
             capacity = self.executor.capacity
             ready = [task for task in self._waiting if self._open.isdisjoint(task.after)]
-            while more and len(ready) < capacity:
-                task = next(rest, None)
-                if task is None:
-                    more = False
-                elif task.name in self._left:
+            while len(ready) < max(1, capacity) and (task := next(rest, None)):
+                if task.name in self._left:
                     ready += [task] if self._open.isdisjoint(task.after) else []
                     self._open.add(task.key)
                     self._waiting.append(task)
                 else:
                     self._settled[task.key] = task.key
+            if not (self._waiting or self._at_work):
+                break
             for task in ready[: max(0, capacity - len(self._at_work))]:
                 self._waiting.remove(task)
                 self._begin(task)
@@ -146,9 +163,8 @@ class Run:
             ended = [future for future in self._at_work if future.done()]  # Also those that an executor cancels.
             for future in ended:
                 self._end(future, *self._at_work.pop(future))
-            for task, job in () if ended else self._at_work.values():
-                job.look()
-                self._show(task, job.reached[1])
+            if self._at_work and not ended:
+                self._show(next(iter(self._at_work.values()))[0])
         if self.store.alone and not self.failures:
             self.store.sweep({*self._settled.values()})
 
@@ -210,8 +226,6 @@ class Run:
             self._close(task, DONE if is_new else UP_TO_DATE, key)
 
     def _fail(self, task: Task, said: str, details: str = "", *, fatal: bool = False) -> None:
-        if not fatal and self.store.discard_damaged(filter(None, self._before(task))):
-            said = f"{task.name}: what it reads was damaged; run the same command again"
         self.failures[task.name], self.noted[task.name] = said, {"message": said, "details": details}
         self.progress.error(said)
         self._close(task, FAILED)
@@ -223,61 +237,12 @@ class Run:
         self._open.discard(task.key)
         self._settled[task.key] = key
         self.counts[state] += 1
-        seconds, frames = self._left.pop(task.name)
-        self._seconds -= seconds
-        self._frames -= frames
+        self._done += self._left.pop(task.name)
         if key is None:
             self.store.withdraw(task.publish.values())  # What is there under its name was made of something else.
         self._show(task)
 
-    def _show(self, task: Task, doing: str = "") -> None:
+    def _show(self, task: Task) -> None:
         """Report how far the whole is, and a task."""
-        parts = [(job.reached[0], one) for one, job in self._at_work.values()]
-        frames = self._all_frames - self._frames + sum(share * one.frames for share, one in parts)
-        counted = f"frame {int(frames)} of {self._all_frames}" if self._all_frames else ""
-        words = ", ".join(filter(None, (": ".join(filter(None, (task.name, doing))), counted)))
-        self._stage.reach(self._stage.total - self._seconds + sum(share * one.seconds for share, one in parts), words)
-
-
-# -- why --------------------------------------------------------------------------------------------------------------
-
-
-def explain(plan: Plan, store: Store) -> Iterator[tuple[Task, str]]:
-    """Yield the tasks of a plan that a run would do, and why. Nothing is written."""
-    latest, changed = store.latest(), dict[str, str]()
-    for task in plan():
-        index = store.index_of(task.key)
-        if missing := store.unpublished(task, index) if index else []:
-            yield task, f"{few(path for _, path in missing)} missing, edited or of something else"
-        elif not index:
-            changed[task.key] = task.name
-            earlier = store.index_of(latest.get(task.name, "")) or {}
-            is_damaged = (store.results / task.key).exists()
-            yield task, "its result is damaged" if is_damaged else _difference(earlier.get("made_of"), task, changed)
-
-
-def _difference(before: Mapping[str, Any] | None, task: Task, changed: Mapping[str, str]) -> str:
-    """Return in what a task differs from what its last result was made of; `changed` has keys, and names, of tasks."""
-    if before is None:
-        return "never done"
-    reasons, now = [], json.loads(json.dumps(task.made_of, default=plain))
-    for title, part in (("program", "versions"), ("parameters", "parameters"), ("input file", "inputs")):
-        old, new = dict(_leaves(before.get(part))), dict(_leaves(now[part]))
-        names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
-        if part == "parameters":
-            both = {name: f"{name}: {old.get(name)} -> {new.get(name)}" for name in names}
-            names = [said if len(said) < 80 else name for name, said in both.items()]
-        reasons += [f"{title} changed ({few(names)})"] if names else []
-    if before.get("after") != now["after"]:
-        anew = [changed[key] for key in task.after if key in changed]
-        reasons.append(f"an earlier step changed ({few(anew)})" if anew else "earlier steps are others")
-    return "; ".join(reasons) or "its step is another"
-
-
-def _leaves(content: Any, name: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the values of nested mappings, each under the names that lead to it: "radii.rigid"."""
-    if isinstance(content, Mapping):
-        for key, inner in content.items():
-            yield from _leaves(inner, f"{name}.{key}" if name else key)
-    elif not name.endswith("$"):
-        yield name, content
+        at_work = sum(job.reached() * begun.seconds for begun, job in self._at_work.values())
+        self._stage.reach(self._done + at_work, task.name)

@@ -12,7 +12,6 @@ import importlib.metadata
 import inspect
 import json
 import os
-import time
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -31,7 +30,7 @@ VERSION = "RIGID_MOTION_VERSION"
 """A variable of the environment: the version that this program is to have, of those at work at one plan."""
 
 INTERVAL = 0.2
-"""Seconds between two messages about how far a task is, and between two looks at them."""
+"""Seconds between two looks at tasks that are being done."""
 
 
 class RunError(Exception):
@@ -81,7 +80,7 @@ class Task:
     results it reads, given by their keys, and reads `inputs`, files with their digests when the work was planned (empty
     for one that cannot be read). It `spends` those results that are for it alone: they are deleted when it is done.
     `publish` has files of the result and where they go in the output folder, with slashes; "FOLDER/" stands for all
-    files below. It takes `seconds`, roughly, and renders so many `frames` of films, which are counted over all tasks.
+    files below. It takes `seconds`, roughly.
     """
 
     step: Step
@@ -91,14 +90,13 @@ class Task:
     spends: tuple[str, ...] = ()
     publish: Mapping[str, str] = field(default_factory=dict)
     seconds: float = 1.0
-    frames: int = 0
 
     @property
     def made_of(self) -> dict[str, Any]:
-        """What its result depends on, for people; `explain` compares it."""
+        """What its result depends on, under words for people; `explain` compares it."""
         kind: Any = type(self.step)
-        parts = {"versions": versions_of(kind), "parameters": self.step}
-        return {**parts, "inputs": dict(self.inputs), "after": list(self.after)}
+        parts = {"program": versions_of(kind), "parameters": self.step}
+        return {**parts, "inputs": dict(self.inputs), "earlier tasks": list(self.after)}
 
     @cached_property
     def key(self) -> str:
@@ -108,7 +106,7 @@ class Task:
     def key_after(self, after: Iterable[str | None]) -> str:
         """Return its key where the tasks before it had these keys; None for one that failed."""
         # 128 bits, and short enough for the paths of Windows.
-        return _digest({**self.made_of, "inputs": [*self.inputs.values()], "after": list(after)})[:32]
+        return _digest({**self.made_of, "inputs": [*self.inputs.values()], "earlier tasks": list(after)})[:32]
 
 
 @dataclass
@@ -118,7 +116,7 @@ class Job:
     All that is written meanwhile is below `place`, which may be missing; the result's files go into `folder`, which is
     there, and empty, while it is done. `before` are the folders of the results of the tasks before it, None for those
     that failed, in partial steps alone. A step that needs Blender is done by the program `blender`, if that is not to
-    be this one. Relative paths start `here`. At the last look it had `reached` a share, and was doing something.
+    be this one. Relative paths start `here`.
     """
 
     task: Task
@@ -127,28 +125,26 @@ class Job:
     before: Sequence[Path | None] = ()
     blender: str = ""
     here: str = field(default_factory=os.getcwd)
-    folder: Path = field(init=False)
-    reached: tuple[float, str] = (0.0, "")
-    _said_at: float = 0.0
+
+    @property
+    def folder(self) -> Path:
+        return self.place / "result"
 
     @property
     def results(self) -> list[Path]:
         """The folders of the results before it that there are, which are all but in partial steps."""
         return [folder for folder in self.before if folder]
 
-    def progress(self, done: float, total: float = 1.0, doing: str = "") -> None:
-        """Say how far it is, and what is being done. Cheap enough to be called often."""
-        if time.monotonic() - self._said_at >= INTERVAL:
-            self._said_at = time.monotonic()
-            with suppress(OSError):
-                said = json.dumps([min(done / total, 1.0) if total else 1.0, doing])
-                (self.place / "progress").write_text(said, encoding="utf-8")
+    def progress(self, done: float, total: float) -> None:
+        """Say how far it is."""
+        with suppress(OSError):
+            (self.place / "progress").write_text(f"{done / total}", encoding="utf-8")
 
-    def look(self) -> None:
-        """See how far it is, wherever it is done."""
-        with suppress(OSError, ValueError):
-            share, doing = json.loads((self.place / "progress").read_bytes())
-            self.reached = share, doing
+    def reached(self) -> float:
+        """Return how far it is, wherever it is done, from 0 to 1."""
+        with suppress(OSError, ValueError):  # It has said nothing yet.
+            return float((self.place / "progress").read_text(encoding="utf-8"))
+        return 0.0
 
 
 @cache

@@ -56,8 +56,7 @@ class Store:
     def __init__(self, output: Path, *, alone: bool = True, overwrite: bool = False) -> None:
         self.output, self.alone, self.overwrite = output.absolute(), alone, overwrite
         self.own = self.output / OWN
-        self._folders = [self.own / name for name in ("results", "published", "scratch")]
-        self.results, self._published, self._scratches = self._folders
+        self.results, self._published, self._scratches = map(self.own.joinpath, ("results", "published", "scratch"))
         self._lock = FileLock(self.own / "lock", blocking=False)
         self._missing = [folder for folder in (self.output, *self.output.parents) if not folder.exists()]
         self._digests = self.noted("inputs.json")
@@ -69,8 +68,7 @@ class Store:
     # -- opening and closing ------------------------------------------------------------------------------------------
 
     def __enter__(self) -> Self:
-        for folder in self._folders:
-            folder.mkdir(parents=True, exist_ok=True)
+        self.results.mkdir(parents=True, exist_ok=True)
         try:
             if self.alone:
                 self._lock.acquire()
@@ -80,7 +78,7 @@ class Store:
             ) from None
         for session in (self._scratch, *_old(self._scratches)):
             shutil.rmtree(session, ignore_errors=True)
-        self._scratch.mkdir()
+        self._scratch.mkdir(parents=True)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -88,10 +86,9 @@ class Store:
         with suppress(OSError):
             self.note("inputs.json", self._digests)
         if self.alone and not any(self.own.glob("*/*")):
-            for name in ("inputs.json", "failures.json", "lock"):
-                (self.own / name).unlink(missing_ok=True)
+            shutil.rmtree(self.own, ignore_errors=True)
         self._lock.release()
-        for folder in (*self._folders, self.own, *self._missing):
+        for folder in self._missing:
             with suppress(OSError):  # There is something in it.
                 folder.rmdir()
 
@@ -100,11 +97,8 @@ class Store:
         return self._scratch / uuid.uuid4().hex[:8]
 
     def note(self, name: str, content: Mapping[str, Any]) -> None:
-        """Write a file of the store's own, of JSON; of nothing there is none."""
-        if content:
-            write_text(self.own / name, json.dumps(content, indent=1))
-        else:
-            (self.own / name).unlink(missing_ok=True)
+        """Write a file of the store's own, of JSON."""
+        write_text(self.own / name, json.dumps(content, indent=1))
 
     def noted(self, name: str) -> dict[str, Any]:
         """Return what is in a file of the store's own; empty where it is missing or damaged."""
@@ -129,8 +123,6 @@ class Store:
         inside = os.path.realpath(path).removeprefix(os.path.realpath(self.output) + os.sep).replace(os.sep, "/")
         if inside.startswith(f"{OWN}/") or self._digests_at(inside):
             raise RunError(f"{path}: this input was written by a run into this folder; choose another --output")
-        if not stat.S_ISREG(status.st_mode):
-            return ""
         place, seen = os.path.abspath(path), [status.st_size, status.st_mtime_ns, status.st_ctime_ns]
         self._inputs |= dict.fromkeys([(status.st_dev, status.st_ino), (link.st_dev, link.st_ino)], place)
         known = self._digests.get(place)
@@ -140,17 +132,14 @@ class Store:
 
     # -- results ------------------------------------------------------------------------------------------------------
 
-    def index_of(self, key: str, *, thoroughly: bool = False) -> Mapping[str, Any] | None:
-        """Return the index of the result of a key; None where it is not there, or damaged.
-
-        With `thoroughly` the content of all files is looked at, otherwise of those that changed since they were made.
-        """
+    def index_of(self, key: str) -> Mapping[str, Any] | None:
+        """Return the index of the result of a key; None where it is not there, or a file of it was changed."""
         try:
             index = json.loads((self.results / key / INDEX).read_bytes())
             for name, (size, mtime, digest) in index["files"].items():
                 path = f"{self.results}/{key}/{name}"
                 seen = _seen(path)
-                if seen[0] != size or ((seen[1] != mtime or thoroughly) and sha256_of(path) != digest):
+                if seen[0] != size or (seen[1] != mtime and sha256_of(path) != digest):
                     return None
         except UNREADABLE:
             return None
@@ -166,19 +155,11 @@ class Store:
         except OSError:
             if not self.index_of(key):  # Otherwise another worker was quicker.
                 self.discard(key)
-                self.results.mkdir(exist_ok=True)  # A worker that made nothing may have taken it away.
                 folder.rename(self.results / key)
 
     def discard(self, key: str) -> None:
         """Delete a result."""
         shutil.rmtree(self.results / key, ignore_errors=True)
-
-    def discard_damaged(self, keys: Iterable[str]) -> bool:
-        """Delete those of these results that are damaged, and return whether there are any."""
-        damaged = [key for key in keys if (self.results / key).exists() and not self.index_of(key, thoroughly=True)]
-        for key in damaged:
-            self.discard(key)
-        return bool(damaged)
 
     def sweep(self, requested: Container[str | None]) -> None:
         """Delete results that are not among these, and older than a week."""
@@ -204,8 +185,9 @@ class Store:
                     result.append((file, place))
         return result
 
-    def refuse(self, foreign: list[str]) -> None:
-        """Raise RunError where there are paths that are not the program's own, unless they may be replaced."""
+    def refuse(self, unpublished: Iterable[tuple[str, str]]) -> None:
+        """Raise RunError where such files would replace what is not the program's own, unless that may be replaced."""
+        foreign = [path for _, path in unpublished if not self.is_own(path)]
         if foreign and not self.overwrite:
             named = few(os.fspath(self.output / path) for path in foreign)
             raise RunError(
@@ -220,7 +202,7 @@ class Store:
         """
         index = self.index_of(key) or {}
         missing = self.unpublished(task, index)
-        self.refuse([path for _, path in missing if not self.is_own(path)])
+        self.refuse(missing)
         for name, path in missing:
             target, beside = self.output / path, self.new_scratch()
             if not Path(os.path.realpath(target.parent)).is_relative_to(os.path.realpath(self.output)):
@@ -279,7 +261,7 @@ def _seen(path: str) -> list[int]:
 
 def _old(folder: Path) -> list[Path]:
     """Return what was made in a folder before so long a time that it is kept no more."""
-    return [path for path in folder.iterdir() if time.time() - _changed_at(path) > KEPT]
+    return [path for path in folder.glob("*") if time.time() - _changed_at(path) > KEPT]
 
 
 def _changed_at(path: Path) -> float:

@@ -70,13 +70,10 @@ def _value(content: Any, arrays: Mapping[str, Any]) -> Any:
     if content.keys() == {ARRAY}:
         return arrays[content[ARRAY]]
     content = {name: _value(inner, arrays) for name, inner in content.items()}
-    return _class_named(content.pop(CLASS))(**content) if CLASS in content else content
-
-
-def _class_named(name: str) -> type:
-    """Return a class by its module and name. What asks for a value has loaded its class: a file loads nothing."""
-    module, _, kind = name.partition(":")
-    result = getattr(sys.modules.get(module), kind, None)
-    if not (isinstance(result, type) and is_dataclass(result)):
-        raise ValueError(f"{name} is no class of values")
-    return result
+    if CLASS not in content:
+        return content
+    module, _, name = content.pop(CLASS).partition(":")
+    kind = getattr(sys.modules.get(module), name, None)  # A file loads no module: who reads has loaded it.
+    if not (isinstance(kind, type) and is_dataclass(kind)):
+        raise ValueError(f"{module}:{name} is no class of values")
+    return kind(**content)

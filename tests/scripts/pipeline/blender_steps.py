@@ -21,7 +21,7 @@ class Save(Step, blender=True):
         import bpy
 
         print("Fra:1 Mem:1M")
-        job.progress(1, 2, "half way")
+        job.progress(1, 2)
         match self.fate:
             case "foreseen":
                 raise TaskError("no such scene; make another")

@@ -92,3 +92,8 @@ def contents(output: Path) -> dict[str, str]:
         for path in output.rglob("*")
         if path.is_file() and OWN not in path.relative_to(output).parts
     }
+
+
+def half_written(output: Path) -> list[Path]:
+    """What is being made, or was when it was killed."""
+    return [*(output / OWN / "scratch").glob("*")]

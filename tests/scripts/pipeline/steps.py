@@ -141,7 +141,7 @@ class Chatter(Step):
     def make(self, job: Job) -> None:
         print("Saved: 'x.png'", flush=True)
         os.write(1, b"Fra:1 Mem:1M\n")
-        job.progress(1, 2, "half way")
+        job.progress(1, 2)
         time.sleep(0.5)
         (job.folder / FILE).write_text("spoken")
 
@@ -151,17 +151,6 @@ class Parse(Step):
 
     def make(self, job: Job) -> None:
         (job.folder / FILE).write_text(",".join(map(str, json.loads((job.before[0] / FILE).read_text()).values())))
-
-
-class Count(Step):
-    """Say how far it is, one by one."""
-
-    to: int
-
-    def make(self, job: Job) -> None:
-        for number in range(self.to):
-            job.progress(number + 1, self.to)
-        (job.folder / FILE).write_text("counted")
 
 
 def _note(log: str, text: str) -> None:

@@ -35,10 +35,16 @@ def test_what_was_never_done_is_said_to_be_and_nothing_is_written(output: Path) 
 
 def test_what_changed_is_named(output: Path) -> None:
     run_in(output, *two())
-    assert explained(output, *two("2")) == {
-        "a": "parameters changed (text: 1 -> 2)",
-        "b": "an earlier step changed (a)",
-    }
+    assert explained(output, *two("2")) == {"a": "parameters changed", "b": "earlier tasks changed"}
+    first = writing("a", "2")
+    assert explained(output, first, task("b", Write("3"), first))["b"] == "parameters, earlier tasks changed"
+
+
+def test_what_was_made_without_a_task_that_had_failed_is_said_to_be(output: Path) -> None:
+    good, failing = writing("a"), task("b", steps.Fail())
+    tasks = good, failing, task("c", steps.Report(), good, failing)
+    run_in(output, *tasks)
+    assert explained(output, *tasks) == {"b": "never done", "c": "an earlier task failed the last time"}
 
 
 def test_a_changed_file_is_named(output: Path, tmp_path: Path) -> None:
@@ -52,7 +58,7 @@ def test_a_changed_file_is_named(output: Path, tmp_path: Path) -> None:
         run(lambda: [copying(store)], store, Executor())
     source.write_text("2")
     store = Store(output)
-    assert [reason for _, reason in explain(lambda: [copying(store)], store)] == [f"input file changed ({source})"]
+    assert [reason for _, reason in explain(lambda: [copying(store)], store)] == ["inputs changed"]
 
 
 def test_files_that_are_missing_or_edited_are_named(output: Path) -> None:
@@ -100,7 +106,7 @@ def test_a_change_in_a_room_redoes_the_steps_that_use_it_and_no_others(room: Pat
     (room / "measuring" / "__pycache__").mkdir()
     assert in_rooms("measuring").key != before.key
     assert in_rooms("drawing").key == other.key
-    assert explained(output, in_rooms("measuring")) == {"a": "program changed (measuring)"}
+    assert explained(output, in_rooms("measuring")) == {"a": "program changed"}
     (room / "measuring" / "__pycache__" / "one.pyc").write_text("")
     inner.write_text("1")
     assert in_rooms("measuring").key == before.key

@@ -236,22 +236,6 @@ def rewritten(path: Path, content: str) -> None:
     os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
 
 
-def parsing(log: object = "") -> list[Task]:
-    part = task("part", Write('{"a": 1}', str(log)), publish={})
-    return [part, task("whole", steps.Parse(), part)]
-
-
-def test_what_a_failed_task_reads_is_made_again_where_it_is_damaged(output: Path) -> None:
-    part, reader = parsing()
-    run_in(output, part)
-    (path,) = (output / OWN).glob("results/*/out.txt")
-    rewritten(path, '{"a": 1[')
-    said = "whole: what it reads was damaged; run the same command again"
-    assert run_in(output, part, reader).failures == {"whole": said}
-    assert states(run_in(output, part, reader)) == {"done": 2}
-    assert contents(output) == {"whole.txt": "1"}
-
-
 def test_a_task_that_fails_for_its_own_reasons_is_tried_once(output: Path) -> None:
     part = writing("part", "no JSON")
     outcome = run_in(output, part, task("whole", steps.Parse(), part))
@@ -281,6 +265,20 @@ def test_two_runs_in_one_folder_are_refused(output: Path) -> None:
 def test_workers_with_a_part_are_not_refused(output: Path) -> None:
     with Store(output):
         assert states(run_in(output, writing("a"), alone=False)) == {"done": 1}
+
+
+@needs_pipes
+@pytest.mark.parametrize("kind", ["pipe", "device", "folder", "NUL"])
+def test_an_input_that_is_no_file_has_no_digest_and_is_not_waited_for(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "in"
+    {
+        "pipe": lambda: os.mkfifo(path),
+        "device": lambda: path.symlink_to("/dev/zero"),
+        "folder": path.mkdir,
+        "NUL": lambda: None,
+    }[kind]()
+    source = f"{path}\0" if kind == "NUL" else str(path)
+    assert Store(tmp_path / "out").inputs(source) == {source: ""}
 
 
 # -- many clips -------------------------------------------------------------------------------------------------------
