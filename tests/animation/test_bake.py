@@ -6,8 +6,8 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import bake, bake_poses, read_poses, set_mode, unbake, write_channel
-from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
+from rigid_motion.animation import bake, bake_poses, read_poses, set_mode, unbake
+from rigid_motion.motion import Poses, interpolate
 from rigid_motion.motion.eulers import ORDERS
 from rigid_motion.motion.quaternions import angle_between
 from tests.animation.keyed import curves_of, snapshot
@@ -43,30 +43,6 @@ def assert_read_back(obj: bpy.types.Object, frames: np.ndarray, poses: Poses) ->
         assert np.abs(read.scales / poses.scales - 1.0).max() < 1e-5
 
 
-@pytest.mark.parametrize("mode", KEYFRAME_MODES)
-@pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])
-def test_every_mode_arrives_in_the_evaluated_scene_on_every_frame(empty, mode, scaled):
-    random = np.random.default_rng(3)
-    keys = Poses(
-        random.normal(size=(6, 3)), random.normal(size=(6, 4)), np.exp(random.normal(size=6)) if scaled else None
-    )
-    frames = np.arange(1.0, 102.0)
-    poses = interpolate(np.linspace(1.0, 101.0, 6), keys, frames, mode)
-    bake_poses(empty, frames, poses)
-    assert_read_back(empty, frames, poses)
-
-
-def test_baking_again_replaces_the_keys_and_leaves_other_channels(empty):
-    frames, poses = motion()
-    write_channel(empty, "hide_render", frames[:2], np.array([0.0, 1.0]), interpolation="CONSTANT")
-    bake_poses(empty, frames, poses)
-    bake_poses(empty, frames[:30], poses[:30])
-    curves = curves_of(empty)
-    assert len(curves["location", 0].keyframe_points) == 30
-    assert len(curves["hide_render", 0].keyframe_points) == 2
-    assert len(curves) == 8
-
-
 def test_a_shared_action_keeps_what_others_have_in_it(empty):
     frames, poses = motion()
     bake_poses(empty, frames, poses)
@@ -82,10 +58,10 @@ def test_a_shared_action_keeps_what_others_have_in_it(empty):
 
 @pytest.mark.parametrize("order", ORDERS)
 def test_euler_objects_of_every_order_take_the_same_poses(empty, order):
-    frames, poses = motion(200)
+    frames, poses = motion(200, scaled=True)
     empty.rotation_mode = order
     bake_poses(empty, frames, poses)
-    assert {path for path, _ in curves_of(empty)} == {"location", "rotation_euler"}
+    assert {path for path, _ in curves_of(empty)} == {"location", "rotation_euler", "scale"}
     assert_read_back(empty, frames, poses)
 
 
@@ -108,17 +84,6 @@ def test_a_part_is_baked_where_its_angles_are_not_all_keyed_outside_of_it(live_f
         expected = expected_worlds(obj, frames)
         assert bake(obj, first=frames[0], last=frames[-1]) == (frames[0], frames[-1])
         assert np.abs(shown_worlds([obj], frames)[0] - expected).max() < 1e-5 * np.abs(expected).max()
-
-
-def test_each_axis_of_a_scale_that_is_left_to_blender_is_baked_by_itself(live_file):
-    obj = key(new_object(), scale="even")
-    curves_of(obj)["scale", 1].keyframe_points[1].interpolation = "CONSTANT"
-    set_mode(obj, "dq_sclerp", FRAMES[:1])
-    frames = np.arange(FRAMES[0], FRAMES[-1] + 1.0)
-    expected = expected_worlds(obj, frames)
-    assert_shown([obj], frames)
-    bake(obj)
-    assert np.abs(shown_worlds([obj], frames)[0] - expected).max() < 1e-5 * np.abs(expected).max()
 
 
 @pytest.mark.parametrize("order", ["QUATERNION", "XYZ"])

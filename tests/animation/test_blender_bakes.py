@@ -12,7 +12,7 @@ from tests.animation.bones.rig_editing import own_constraints
 from tests.animation.bones.rigs import key_all, new_rig, pose_mode, select_only
 from tests.animation.keyed import curves_of
 from tests.animation.oracle import shown_worlds
-from tests.animation.scenes import give_own_deltas, key, new_object, push_down, tweak
+from tests.animation.scenes import give_own_deltas, key, new_object, push_down
 
 PLAYED = np.arange(1.0, 41.0)
 ORDERS = ("QUATERNION", "XYZ")
@@ -71,15 +71,6 @@ def test_an_object_baked_above_its_strip_moves_as_before(live_file, order, own):
     assert_as_before(obj, before)
 
 
-def test_an_object_baked_in_a_strip_that_is_edited_moves_as_before(live_file):
-    obj = moving()
-    tweak(obj, push_down(obj, 1))
-    before = shown_worlds([obj], PLAYED)[0]
-    bake_object(obj, use_current_action=True)
-    obj.animation_data.use_tweak_mode = False
-    assert_as_before(obj, before)
-
-
 def test_a_bake_with_a_step_has_the_poses_that_were_seen(live_file):
     obj = moving()
     frames = np.arange(1.0, 41.0, 3.0)
@@ -120,14 +111,6 @@ def test_a_baked_rig_moves_as_before(live_file, order, settings):
     assert_posed_as_before(rig, before)
     if not settings:
         assert not any(own_constraints(bone) for bone in rig.pose.bones)
-
-
-def test_a_rig_baked_above_its_strip_moves_as_before(live_file):
-    rig = moving_rig()
-    push_down(rig, 1)
-    before = shown_poses([rig], PLAYED)[0]
-    bake_rig(rig)
-    assert_posed_as_before(rig, before)
 
 
 def test_of_a_rig_the_selected_bones_are_baked(live_file):

@@ -9,7 +9,7 @@ from mathutils import Matrix, Quaternion
 
 from rigid_motion.animation import Breakdowns, Refused, breakdown, set_mode, set_turns, write_channel
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
-from tests.animation.bones.rigs import in_turn, new_rig
+from tests.animation.bones.rigs import in_turn
 from tests.animation.keyed import curves_of, key_frames, snapshot
 from tests.animation.oracle import Own, as_quaternion, assert_shown, matrices, shown_worlds, unit
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, random_values
@@ -170,36 +170,6 @@ def bpy_quaternion(matrix: np.ndarray) -> np.ndarray:
     return np.array(Matrix(matrix.tolist()).to_quaternion())
 
 
-def test_bones_of_a_rig_each_go_between_their_own_keys(live_file):
-    rig = new_rig()
-    upper, hand = rig.pose.bones["Upper"], rig.pose.bones["Hand"]
-    frames = {"Upper": (1.0, 11.0, 24.0, 40.0), "Hand": (5.0, 15.0, 35.0)}
-    places = {}
-    for bone in (upper, hand):
-        random, count = np.random.default_rng(len(bone.name)), len(frames[bone.name])
-        places[bone.name] = Poses(random.normal(size=(count, 3)), [unit(q) for q in random.normal(size=(count, 4))])
-        for path, values in zip(
-            ("location", "rotation_quaternion"),
-            (places[bone.name].positions, places[bone.name].quaternions),
-            strict=True,
-        ):
-            write_channel(rig, f'pose.bones["{bone.name}"].{path}', np.array(frames[bone.name]), values)
-        set_mode(bone, "dq_sclerp")
-    bpy.context.scene.frame_set(int(NOW))
-    breakdown([upper, hand], 0.4)
-    bpy.context.view_layer.update()
-    for bone in (upper, hand):
-        expected = interpolate((0.0, 1.0), places[bone.name][1:3], np.array([0.4]), "dq_sclerp")
-        np.testing.assert_allclose(bone.location, expected.positions[0], atol=1e-5)
-        turned = np.array(bone.rotation_quaternion.normalized())
-        np.testing.assert_allclose(
-            turned * np.sign(turned @ expected.quaternions[0]), expected.quaternions[0], atol=1e-5
-        )
-    # The constraint adds nothing on a key.
-    for bone in (upper, hand):
-        assert bone.constraints[0].name == "Rigid Motion"
-
-
 def axis_and_angle(obj: bpy.types.Object) -> None:
     obj.rotation_mode = "AXIS_ANGLE"
 
@@ -211,18 +181,6 @@ def test_without_keys_on_both_sides_it_is_refused(live_file, frame):
     bpy.context.scene.frame_set(frame)
     before = snapshot(obj)
     with pytest.raises(Refused, match=f"^Tool needs a key before and a key after frame {frame}:"):
-        breakdown(obj)
-    assert snapshot(obj) == before
-
-
-def test_copies_of_keys_in_cycles_are_not_keyed_between(live_file):
-    obj = key(new_object())
-    for fcurve in curves_of(obj).values():
-        fcurve.modifiers.new("CYCLES")
-    set_mode(obj, "dq_sclerp")
-    bpy.context.scene.frame_set(52)
-    before = snapshot(obj)
-    with pytest.raises(Refused, match=r"^Tool needs a key before and a key after frame 52:"):
         breakdown(obj)
     assert snapshot(obj) == before
 
@@ -281,21 +239,6 @@ def test_a_breakdown_leaves_the_path_and_changes_when_the_body_is_there(live_fil
     nearest = np.abs(shown[:, None] - path).max(axis=(2, 3)).min(axis=1)
     assert nearest.max() < 2e-3 * np.abs(path).max()
     np.testing.assert_allclose(shown_worlds([obj], [*range(1, 11), *range(25, 41)])[0], beside, atol=2e-5)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("mode", ["motor_spline", "pga_lerp"])
-@pytest.mark.parametrize("gone", [BEFORE, AFTER])
-def test_a_path_with_a_breakdown_leads_through_keys_that_not_all_channels_have(live_file, mode, gone):
-    obj = key(new_object(rotation_mode="QUATERNION"), seed=5)
-    set_mode(obj, mode)
-    bpy.context.scene.frame_set(int(NOW))
-    breakdown(obj, 0.8)
-    for path in ("location", "rotation_quaternion"):
-        points = curves_of(obj)[path, 0].keyframe_points
-        points.remove(next(point for point in points if point.co[0] == gone))
-    bpy.context.view_layer.update()
-    assert_shown([obj], np.arange(-2.0, 44.0))
 
 
 @pytest.mark.parametrize(("growth", "there"), [(0.0, (1.3, 1.3, 1.3)), (0.01, (1.1, 1.2, 1.3))])

@@ -11,7 +11,7 @@ import pytest
 from rigid_motion.animation import set_mode, write_channel
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
 from tests.animation.bones.rigs import in_turn
-from tests.animation.keyed import curves_of, key_frames, mode_at, snapshot
+from tests.animation.keyed import curves_of, key_frames, snapshot
 from tests.animation.oracle import expected_bases, matrices, shown_worlds
 from tests.animation.scenes import key, new_object, random_values
 
@@ -136,20 +136,6 @@ def test_a_smooth_mode_flows_on_from_round_to_round(live_file, kind):
     expected = interpolate(times, Poses(positions, quaternions), AROUND, "motor_spline")
     placed = matrices(expected.positions, expected.quaternions, np.ones((len(AROUND), 3)))
     assert np.abs(shown - placed).max() < 1e-5 * np.abs(placed).max()
-
-
-@pytest.mark.parametrize("kind", CYCLES[1:])
-def test_each_copy_of_a_segment_has_its_mode(live_file, kind):
-    obj = cyclic("QUATERNION", mode_before=kind, mode_after=kind)
-    set_mode(obj, "dq_sclerp", [35.0])
-    assert [mode_at(obj, frame) for frame in (31.0, 35.0)] == ["BLENDER", "dq_sclerp"]
-    shown, own = shown_worlds([obj], AROUND)[0], native(obj)
-    rounds, place = np.divmod(AROUND - 31.0, 11.0)
-    if kind == "MIRROR":
-        place = np.where(rounds % 2, 11.0 - place, place)
-    filled = (place > 4.0) & (place < 11.0)
-    assert np.abs(shown - own)[~filled].max() < 1e-5
-    assert np.abs(shown - own)[filled].max(axis=(1, 2)).min() > 1e-2
 
 
 def test_channels_with_cycles_of_different_lengths_share_the_copies_of_all_keys(live_file):

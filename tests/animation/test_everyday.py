@@ -7,21 +7,14 @@ import numpy as np
 import pytest
 
 from rigid_motion import animation
-from rigid_motion.animation import key_frames, modes_of, problem_of, read_poses, refresh, set_mode
+from rigid_motion.animation import key_frames, modes_of, problem_of, read_poses, set_mode
 from tests.animation.keyed import curves_of
 from tests.animation.oracle import Own, assert_shown
-from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own_deltas
+from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object
 
 PLAYED = np.arange(-2.0, 44.0)
 BETWEEN = 17
 """A frame between keys."""
-
-ORDERS = ("QUATERNION", "ZXY")
-
-
-@pytest.fixture(params=[False, True], ids=["plain", "own deltas"])
-def with_own(request) -> bool:
-    return request.param
 
 
 def tool(order: str = "QUATERNION", own: bool = False, name: str = "Tool", seed: int = 0) -> bpy.types.Object:
@@ -42,85 +35,6 @@ def link(obj: bpy.types.Object, action: bpy.types.Action | None, slot: bpy.types
     if slot is not None:
         data.action_slot = slot
     bpy.context.view_layer.update()
-
-
-def assert_has_its_own(obj: bpy.types.Object, own: Own) -> None:
-    """Nothing of any in-between is left in its delta transforms."""
-    assert own_deltas(obj) == own
-    assert not any(obj.rigid_motion.filled)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_an_action_that_is_exchanged_for_one_that_moves_less_gives_the_rest_back(live_file, order, with_own):
-    first, second = new_object("First", order), new_object("Second", order)
-    own = give_own_deltas(first) if with_own else own_deltas(first)
-    key(first, seed=1, scale="even")
-    key(second, seed=2)
-    set_mode([first, second], "pga_lerp")
-    live_file.scene.frame_set(BETWEEN)
-    assert all(first.rigid_motion.filled[10:])
-    action, slot = second.animation_data.action, second.animation_data.action_slot
-    link(second, None)
-    link(first, action, slot)
-    assert not any(first.rigid_motion.filled[10:])
-    assert tuple(first.delta_scale) == own.scale
-    assert_shown([first], PLAYED, {first.name: own})
-
-
-@pytest.mark.parametrize(
-    "goes",
-    [
-        lambda obj: obj.animation_data_clear(),
-        lambda obj: bpy.data.actions.remove(obj.animation_data.action),
-        lambda obj: setattr(obj.animation_data, "action", None),
-        lambda obj: setattr(obj.animation_data, "action_slot", None),
-        lambda obj: obj.animation_data.action.slots.remove(obj.animation_data.action_slot),
-        lambda obj: animation.channelbag_of(obj).fcurves.clear(),
-    ],
-    ids=["data cleared", "Action deleted", "Action unlinked", "slot unlinked", "slot deleted", "F-curves gone"],
-)
-@pytest.mark.parametrize("order", ORDERS)
-def test_however_an_action_goes_the_own_delta_transforms_come_back(live_file, goes, order):
-    obj = new_object("Tool", order)
-    own = give_own_deltas(obj)
-    key(obj, scale="even")
-    set_mode(obj, "cga_slerp")
-    live_file.scene.frame_set(BETWEEN)
-    assert own_deltas(obj) != own
-    goes(obj)
-    bpy.context.view_layer.update()
-    assert_has_its_own(obj, own)
-
-
-@pytest.mark.parametrize("by_name", [False, True], ids=["slot chosen", "slot found by Blender"])
-def test_an_action_on_a_fresh_object_brings_its_mode_along(live_file, by_name):
-    obj = tool()
-    fresh = new_object("Tool" if by_name else "Fresh")
-    own = give_own_deltas(fresh) if not by_name else own_deltas(fresh)
-    action, slot = obj.animation_data.action, obj.animation_data.action_slot
-    if by_name:
-        bpy.data.objects.remove(obj)
-    link(fresh, action, slot)
-    assert fresh.rigid_motion.mode == "dq_sclerp"
-    if by_name:
-        assert_shown([fresh], PLAYED)
-    link(fresh, None)
-    assert_has_its_own(fresh, own)
-
-
-def test_a_linked_copy_that_gets_another_rotation_mode_leaves_the_original_its_mode(live_file):
-    obj = tool()
-    copy = obj.copy()
-    live_file.collection.objects.link(copy)
-    bpy.context.view_layer.update()
-    copy.rotation_mode = "XYZ"
-    bpy.context.view_layer.update()
-    assert_shown([obj], PLAYED)
-    assert "another rotation mode" in problem_of(copy)
-    assert problem_of(obj) == ""
-    bpy.data.objects.remove(obj)
-    refresh()
-    assert problem_of(copy) == ""
 
 
 @pytest.mark.parametrize("interpolation", ["LINEAR", "BEZIER"])
@@ -178,22 +92,6 @@ def test_a_mode_that_was_chosen_before_there_were_keys_waits_for_them(live_file)
         key(waiting, seed=3)
         bpy.context.view_layer.update()
         assert modes_of(waiting, np.array(FRAMES[:1])) == ["BLENDER"], "it was for the first Action"
-
-
-def test_a_slot_that_moves_to_another_action_takes_its_mode_along(live_file):
-    obj = tool()
-    obj.select_set(True)
-    live_file.view_layer.objects.active = obj
-    before = obj.animation_data.action
-    other = key(new_object("Other"), seed=5)
-    other.select_set(True)
-    live_file.view_layer.objects.active = other
-    bpy.ops.anim.merge_animation()
-    bpy.context.view_layer.update()
-    assert obj.animation_data.action == other.animation_data.action != before
-    assert obj.rigid_motion.mode == "dq_sclerp"
-    assert other.rigid_motion.mode == "BLENDER"
-    assert_shown([obj, other], PLAYED)
 
 
 def test_many_objects_get_a_mode_at_once_and_what_refuses_is_named(live_file):

@@ -136,35 +136,6 @@ def test_what_is_exact_between_frames_is_exported_as_it_is_seen(exporter, tmp_pa
     assert len(clips) == len(objects), "none of differences"
 
 
-def test_an_action_in_a_strip_is_exported_with_its_in_betweens(exporter, tmp_path):
-    obj = key(new_object())
-    set_mode(obj, "dq_sclerp")
-    expected = expected_worlds(obj, PLAYED)
-    data = obj.animation_data
-    strip = data.nla_tracks.new().strips.new("Move", int(FRAMES[0]), data.action)
-    strip.action_slot = data.action_slot
-    data.action = None
-    bpy.context.view_layer.update()
-    assert_near(worlds_in(export(tmp_path / "shot.gltf", export_animation_mode="NLA_TRACKS"), "Tool"), expected)
-
-
-def test_what_is_exported_and_imported_again_moves_alike_without_a_mode(exporter, tmp_path):
-    objects = [key(new_object("Quaternion"), seed=1), key(new_object("Euler", "XZY"), seed=2)]
-    for obj in objects:
-        set_mode(obj, "pga_slerp")
-    assert_shown(objects, PLAYED)
-    expected = shown_worlds(objects, PLAYED)
-    # One animation for both: the importer plays the first that it finds.
-    options = {"export_animation_mode": "SCENE", "export_anim_scene_split_object": False}
-    path = export(tmp_path / "shot.gltf", **options)
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    bpy.ops.import_scene.gltf(filepath=str(path))
-    result = [bpy.data.objects[name] for name in ("Quaternion", "Euler")]
-    assert {obj.rigid_motion.mode for obj in result} == {"BLENDER"}
-    for worlds, own in zip(shown_worlds(result, PLAYED), expected, strict=True):
-        assert_near(worlds, own)
-
-
 @pytest.mark.parametrize("kind", ["alembic", "usd"])
 def test_what_is_exported_to_a_cache_and_imported_again_moves_alike(exporter, tmp_path, kind):
     triangle = bpy.data.meshes.new("Triangle")

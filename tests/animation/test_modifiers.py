@@ -15,7 +15,6 @@ from mathutils import Euler, Matrix, Quaternion
 
 from rigid_motion.animation import Refused, bake, problem_of, reduce_keys_of, refresh, set_mode, unbake
 from rigid_motion.animation.curves.keys import Stepped, held
-from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
 from tests.animation.bones.rigs import key_bone, new_rig
 from tests.animation.keyed import Carrier, curves_of, key_frames, rotation_path, snapshot
@@ -77,18 +76,6 @@ def test_the_frames_that_are_held_are_blenders(empty_file, settings):
     np.testing.assert_allclose(held([modifier], frames), led_to([settings], frames), atol=1e-3)
 
 
-@pytest.mark.parametrize("mode", KEYFRAME_MODES)
-def test_the_poses_of_every_mode_are_held(live_file, mode):
-    obj = new_object()
-    own = give_own_deltas(obj, 1)
-    key(obj, seed=2, scale="even")
-    set_mode(obj, mode)
-    modify(channels(obj), "STEPPED", **STEPS["threes, from zero"])
-    reference = expected(obj, led_to([STEPS["threes, from zero"]], PLAYED), own)
-    assert problem_of(obj) == ""
-    assert_same(shown_worlds([obj], PLAYED)[0], reference)
-
-
 @pytest.mark.parametrize("order", ["QUATERNION", "ZXY"])
 @pytest.mark.parametrize("frames", [(1.0, 11.0, 24.0, 40.0), (-7.0, 3.0, 12.5, 31.0)], ids=["after zero", "before"])
 @pytest.mark.parametrize("settings", STEPS.values(), ids=STEPS)
@@ -122,28 +109,6 @@ def test_bones_hold_their_poses(live_file, settings):
     at = led_to([settings], frames)
     bases = {bone.name: expected(bone, at if number else frames) for number, bone in enumerate(rig.pose.bones)}
     assert_same_poses(rig, frames, *shown_poses([rig], frames), expected_poses(rig, frames, bases))
-
-
-@pytest.mark.parametrize("cycles", [False, True], ids=["once", "round and round"])
-def test_bones_hold_their_poses_before_zero_and_in_cycles(live_file, cycles):
-    rig = new_rig()
-    bone = key_bone(rig.pose.bones["Body"], (-21.0, -11.0, -1.0), seed=2)
-    if cycles:
-        for fcurve in channels(bone):
-            fcurve.modifiers.new("CYCLES")
-    modify(channels(bone), "STEPPED", frame_step=3.0)
-    set_mode(bone, "dq_sclerp")
-    frames = np.arange(-30.0, 25.0)
-    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 0, 24
-    bpy.context.view_layer.update()
-    at = led_to([{"frame_step": 3.0}], frames)
-    if cycles:
-        # A frame on a seam is the end of a round behind the keys, and the beginning of one before them.
-        behind, before = -1.0 - (-1.0 - at) % 20.0, -21.0 + (at + 21.0) % 20.0
-        at = np.where(at > -1.0, behind, np.where(at < -21.0, before, at))
-    assert_same_poses(
-        rig, frames, *shown_poses([rig], frames), expected_poses(rig, frames, {"Body": expected(bone, at)}), ["Body"]
-    )
 
 
 @pytest.mark.parametrize("kind", ["object", "bone"])
@@ -183,21 +148,6 @@ def test_one_behind_another_and_a_channel_with_a_single_key(live_file):
     set_mode(obj, "cga_lerp")
     at = led_to([{"frame_step": 2.0}], led_to([{"frame_step": 5.0, "frame_offset": 1.0}], PLAYED))
     assert_same(shown_worlds([obj], PLAYED)[0], expected(obj, at))
-
-
-def test_cycles_are_held_too(live_file):
-    obj = key(new_object(), (1.0, 11.0, 21.0), seed=4)
-    for fcurve in channels(obj):
-        fcurve.modifiers.new("CYCLES")
-    modify(channels(obj), "STEPPED", frame_step=3.0)
-    set_mode(obj, "dq_sclerp")
-    bpy.context.scene.frame_end = 60
-    bpy.context.view_layer.update()
-    frames = np.arange(1.0, 60.0)
-    at = led_to([{"frame_step": 3.0}], frames)
-    # A frame on a seam is the end of a round, as Blender has it.
-    at = 21.0 - (21.0 - at) % 20.0
-    assert_same(shown_worlds([obj], frames)[0], expected(obj, at))
 
 
 NOISE = {"strength": 1.5, "scale": 4.0, "phase": 3.0}

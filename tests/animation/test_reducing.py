@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -26,29 +25,11 @@ from rigid_motion.animation import (
     unbake,
     write_channel,
 )
-from rigid_motion.animation.baking import fewer_keys
-from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate, interpolate_by_segments, shell_error, twists
-from rigid_motion.motion.quaternions import multiply
-from tests.animation.bones.rigs import in_turn
+from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate, interpolate_by_segments, shell_error
 from tests.animation.keyed import curves_of, rotation_path, snapshot
 from tests.animation.oracle import shown_worlds
 from tests.animation.reduced import RADIUS, TOLERANCE, keys_of, motion, off, recorded
 from tests.animation.scenes import give_own_deltas, key, new_object
-
-
-@pytest.mark.parametrize(
-    ("name", "rotation_mode"), in_turn(["reach", "pivot", "throw", "screw"], ["QUATERNION", "XYZ", "ZXY"])
-)
-def test_few_keys_show_the_recording_within_the_tolerance_on_every_frame(live_file, name, rotation_mode):
-    obj = recorded(name, rotation_mode)
-    frames = key_frames(obj)
-    truth = read_poses(obj, frames)
-    reduction = reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
-    error = off(obj, frames, truth)
-    assert error <= TOLERANCE * (1.0 + 1e-5)
-    assert reduction.largest_error == pytest.approx(error, abs=1e-6)
-    assert (reduction.before, reduction.after) == (len(frames), len(key_frames(obj)))
-    assert reduction.after < 0.5 * reduction.before
 
 
 @pytest.mark.parametrize("count", [2, 5, 12])
@@ -115,49 +96,6 @@ def test_the_best_mode_of_each_segment_is_keyed_and_blender_shows_it(live_file, 
                 assert np.sqrt(np.mean(error[inside] ** 2)) <= least + 5e-6, (first, chosen, other)
 
 
-def test_a_screw_and_a_straight_flight_get_their_own_modes(live_file):
-    frames = np.arange(1.0, 202.0)
-    turning, flying = np.minimum(frames - 1.0, 100.0), np.maximum(frames - 101.0, 0.0)
-    turn, place = twists.exponential(np.outer((0.01, 0.03, -0.01, 0.02, 0.01, 0.02), turning))
-    spin, _ = twists.exponential(np.outer((0.03, 0.0, 0.02, 0.0, 0.0, 0.0), flying))
-    poses = Poses(place.T + np.outer(flying, (0.05, 0.02, 0.01)), multiply(spin.T, turn.T))
-    obj = new_object()
-    bake_poses(obj, frames, poses)
-    kept, modes = best_of(obj, "pga_lerp", 0.02)
-    assert len(kept) > 4
-    for first, last, mode in zip(kept[:-1], kept[1:], modes, strict=True):
-        if last <= 101.0:
-            assert mode == "dq_sclerp"
-        if first >= 101.0:
-            assert mode == "lerp_slerp"
-
-
-def test_one_mode_stays_where_several_would_go_elsewhere_outside_of_the_keys(live_file, monkeypatch):
-    # Seen with no motion yet; only cycles of different lengths could come to it.
-    monkeypatch.setattr(fewer_keys, "with_best_modes", lambda _, source, *__: replace(source, mode=1))
-    obj = recorded()
-    frames = key_frames(obj)
-    truth = read_poses(obj, frames)
-    assert best_of(obj)[1][0] == "motor_spline"
-    assert off(obj, frames, truth) <= TOLERANCE * (1.0 + 1e-5)
-
-
-def test_all_channels_have_keys_on_the_same_frames_with_what_was_recorded_there(live_file):
-    obj = recorded()
-    frames, poses = motion()
-    reduce_keys_of(obj, tolerance=TOLERANCE, radius=RADIUS)
-    kept = key_frames(obj)
-    assert np.isin(kept, frames).all()
-    assert kept[[0, -1]].tolist() == frames[[0, -1]].tolist()
-    for (path, index), fcurve in curves_of(obj).items():
-        if not path.startswith("delta_"):
-            assert keys_of(obj, path, index) == kept.tolist()
-        if path in ("location", "rotation_quaternion"):
-            assert {point.interpolation for point in fcurve.keyframe_points} == {"LINEAR"}
-    at_keys = read_poses(obj, kept)
-    assert np.abs(at_keys.positions - poses.positions[np.isin(frames, kept)]).max() < 1e-6
-
-
 @pytest.mark.parametrize("rotation_mode", ["QUATERNION", "YZX"])
 def test_delta_transforms_of_its_own_stay_in_force_and_come_back(live_file, rotation_mode):
     obj = new_object(rotation_mode=rotation_mode)
@@ -214,31 +152,6 @@ def test_all_that_was_there_comes_back_to_the_last_handle(live_file, rotation_mo
     assert snapshot(obj) == before
     assert list(bpy.data.actions) == [action]
     assert off(obj, frames, truth) < 1e-6
-
-
-def test_other_channels_keep_their_keys(live_file):
-    obj = recorded()
-    obj["weight"] = 1.0
-    write_channel(obj, '["weight"]', np.arange(1.0, 60.0), np.arange(59.0), interpolation="BOUNCE")
-    write_channel(obj, "hide_render", np.arange(1.0, 60.0, 7.0), np.arange(9.0) % 2, interpolation="CONSTANT")
-    write_channel(obj, "color", np.arange(1.0, 60.0), np.ones((59, 4)))
-    others = {name: value for name, value in snapshot(obj).items() if name[0] in ('["weight"]', "hide_render", "color")}
-    reduce_keys_of(obj, tolerance=TOLERANCE, radius=RADIUS)
-    assert len(others) == 6
-    assert others.items() <= snapshot(obj).items()
-
-
-def test_channels_that_are_keyed_on_different_frames_are_read_as_they_play(live_file):
-    obj = new_object()
-    frames, poses = motion("pivot")
-    bake_poses(obj, frames, poses)
-    write_channel(obj, "location", frames[::2] + 0.25, poses.positions[::2], interpolation="BEZIER")
-    write_channel(obj, "rotation_quaternion", frames[5:-9:3], poses.quaternions[5:-9:3])
-    truth = read_poses(obj, frames)
-    reduction = reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
-    assert off(obj, frames, truth) <= TOLERANCE * (1.0 + 1e-5)
-    assert reduction.before == len(np.union1d(frames[::2] + 0.25, frames[5:-9:3]))
-    assert keys_of(obj, "location") == keys_of(obj, "rotation_quaternion")
 
 
 @pytest.mark.parametrize("keyed", ["location", "rotation"])

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from rigid_motion import animation
-from rigid_motion.animation import is_baked, modes_of, problem_of, refresh, set_enabled, set_mode
+from rigid_motion.animation import is_baked, modes_of, problem_of, refresh, set_mode
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones import rigs
 from tests.animation.bones.poses import assert_posed, assert_same_poses, expected_poses, names_of, shown_poses
@@ -146,24 +146,6 @@ bpy.data.armatures[0].bones["Lower"].name = "Fore"
     assert np.abs(shown_worlds([obj], PLAYED)[0] - before).max() > 1.0
     assert modes_of(rig.pose.bones["Fore"], np.array(FRAMES[:1])) == ["dq_sclerp"]
     assert_posed(rig, PLAYED)
-
-
-def test_what_was_not_followed_before_saving_is_caught_up_with_after_loading(live_file, tmp_path):
-    obj = key(new_object())
-    set_mode(obj, "dq_sclerp")
-    set_enabled(False)
-    try:
-        key(obj, seed=5)
-        before = shown_worlds([obj], PLAYED)[0]
-        path = save(tmp_path / "shot.blend")
-        bpy.ops.wm.open_mainfile(filepath=str(path))
-        assert_same(shown_worlds([bpy.data.objects["Tool"]], PLAYED), [before])
-    finally:
-        set_enabled(True)
-    bpy.ops.wm.open_mainfile(filepath=str(path))
-    obj = bpy.data.objects["Tool"]
-    assert_shown([obj], PLAYED)
-    assert np.abs(shown_worlds([obj], PLAYED)[0] - before).max() > 0.1
 
 
 def test_what_is_baked_plays_alike_on_a_farm_and_can_be_un_baked_after_it_saved_the_file(live_file, tmp_path):

@@ -108,15 +108,6 @@ class Hand:
             yield from self.hover(place)
         yield from self.press(button, **modifiers)
 
-    def drag(self, start: Place, end: Place, button: str = "LEFTMOUSE") -> Steps[None]:
-        """Press a button at one place, and let go of it at another."""
-        yield from self.hover(start)
-        self._event(button, "PRESS")
-        yield
-        yield from self.glide(end)
-        self._event(button, "RELEASE")
-        yield
-
     # What a keyboard does
 
     def press(self, key: str, **modifiers: bool) -> Steps[None]:

@@ -13,7 +13,6 @@ from rigid_motion.streams.vmc import write_trackers
 from tests.live.performing import (
     BODY,
     JOINTS,
-    REST,
     Sent,
     dance,
     frames_of_vmc,
@@ -44,16 +43,6 @@ def test_a_performer_moves_the_bones_of_a_rig_of_any_size_rest_and_naming(live, 
         if row:
             assert heads_of(rig) == pytest.approx(larger * world[:, row], abs=larger * SINGLE)
     assert [item.bone for item in live.bones] == ["", *(prefix + item.name for item in list(live.bones)[1:])]
-
-
-@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XYZ", "ZYX"])
-def test_bones_turn_in_whatever_way_they_do(live, sent, rotation_mode):
-    live.armature = rig = new_rig()
-    for bone in rig.pose.bones:
-        bone.rotation_mode = rotation_mode
-    for row, datagrams in enumerate(frames_of_vmc(TIMES)[:10]):
-        sent.send(datagrams, 50.0 + TIMES[row])
-    assert heads_of(rig) == pytest.approx(in_world(dance(TIMES)).positions[:, 9], abs=SINGLE)
 
 
 def test_a_rig_is_where_its_object_and_its_parent_put_it(live, sent):
@@ -240,14 +229,3 @@ def test_any_datagram_does_no_harm(live, sent):
                 data[rng.integers(len(data))] ^= 1 << int(rng.integers(8))
             wrong.append(bytes(data))
         sent.send(wrong, 50.0 + turn / 60)
-
-
-def test_at_rest_nothing_of_a_rig_is_turned(live, sent):
-    live.armature = rig = new_rig("", 1.2, 0.5)
-    still = dance(np.zeros(1))
-    assert still.shape == (len(JOINTS), 1)
-    sender = Sender([BODY], 0.001, 0.1, rate=60.0)
-    for row in range(30):
-        sent.send((sender.describe() if row == 0 else []) + sender.add(row / 60, REST), 50.0 + row / 60)
-    for bone in rig.pose.bones:
-        assert np.array(bone.matrix_basis) == pytest.approx(np.eye(4), abs=1e-4)

@@ -80,16 +80,6 @@ def test_what_had_come_and_was_not_shown_when_a_recording_began_is_in_it(live, s
     assert off_by(rig, 0.3) < 1.05 * TOLERANCE
 
 
-def test_reduce_keys_works_on_what_was_recorded(live, sent, clock):
-    live.armature, live.mode, live.tolerance = (rig := new_rig()), "lerp_slerp", TOLERANCE
-    record(sent, clock, frames_of_vmc(TIMES))
-    before = sum(counts(rig))
-    rig.select_set(True)
-    assert bpy.ops.rigid_motion.reduce_keys(tolerance=0.02, mode="lerp_slerp") == {"FINISHED"}
-    assert sum(counts(rig)) < 0.7 * before
-    assert off_by(rig) < 0.02 + TOLERANCE
-
-
 def test_what_comes_by_the_codec_has_keys_at_the_moments_that_were_sent(live, sent, clock):
     live.armature, live.mode = (rig := new_rig()), "lerp_slerp"
     sender, poses, ball = Sender([BODY, Body.rigid("ball")], 0.005, 0.1, rate=60.0), dance(TIMES), []

@@ -20,7 +20,7 @@ from rigid_motion.ui.targets import (
     scope_for,
     targets_of,
 )
-from rigid_motion.ui.wording import BLENDED, NO_KEYS, NO_SEGMENT, TROUBLES
+from rigid_motion.ui.wording import BLENDED, TROUBLES
 from tests.animation.bones.poses import seen
 from tests.animation.scenes import editor
 from tests.rigs.recorded import FRAMES as RECORDED
@@ -159,19 +159,6 @@ def test_key_poses_begin_with_a_larger_tolerance_for_as_long_as_nobody_sets_one(
     assert len(animation.key_frames(body.pose.bones["Root"])) == few
 
 
-def test_so_many_key_poses_can_be_asked_for(body, capfd):
-    assert operators.reduce_keys(by="NUMBER", count=12) == {"FINISHED"}
-    assert {len(animation.key_frames(bone)) for bone in body.pose.bones} == {12}
-    assert ", keys on 12 frames" in capfd.readouterr().out
-
-
-def test_in_pose_mode_it_is_the_selected_bones_alone(body):
-    bpy.ops.object.mode_set(mode="POSE")
-    select(body, ("Arm.L", "Hand.L"))
-    assert operators.reduce_keys(tolerance=0.02) == {"FINISHED"}
-    assert [bone.name for bone in body.pose.bones if animation.is_reduced(bone)] == ["Arm.L", "Hand.L"]
-
-
 def test_the_menu_of_poses_ticks_the_mode_of_the_active_bone_and_has_a_pie(rig):
     set_mode(bone(rig, "Arm"), "pga_lerp")
     set_mode(bone(rig), SCREW)
@@ -185,16 +172,6 @@ def notes_on(target, frame=5.0):
     bpy.context.scene.frame_set(int(frame))
     segment, notes = facts_and_notes(target, frame)
     return notes, segment and segment.mode
-
-
-def test_of_a_bone_the_facts_of_its_segment_are_shown(rig):
-    assert notes_on(bone(rig)) == ([], "BLENDER")
-    set_mode(bone(rig), SCREW)
-    assert notes_on(bone(rig)) == ([], SCREW)
-    segment, _ = facts_and_notes(bone(rig), 15.0)
-    assert (segment.first, segment.last) == (11.0, 21.0)
-    assert notes_on(bone(rig), 50.0) == ([("INFO", NO_SEGMENT)], None)
-    assert notes_on(new_rig("Unkeyed").pose.bones["Arm"]) == ([("INFO", NO_KEYS)], None)
 
 
 @pytest.mark.parametrize("order", ["QUATERNION", "XYZ"])
@@ -309,18 +286,6 @@ def test_what_has_no_in_betweens_has_no_trouble_and_cannot_be_mended(rig):
     assert constraint_trouble(tool) == constraint_trouble(bone(rig)) == ""
     with pytest.raises(Refused, match="choose a mode"):
         restore_constraints(bone(rig))
-
-
-def test_a_mended_constraint_is_one_step_of_undo(rig):
-    set_mode([bone(rig), bone(rig, "Arm")], SCREW)
-    _remove(bone(rig))
-    _mute(bone(rig, "Arm"))
-    bpy.context.view_layer.update()
-    bpy.ops.ed.undo_push(message="Before")
-    operators.mend("EXEC_DEFAULT", True)
-    bpy.ops.ed.undo()
-    rig = bpy.data.objects["Rig"]
-    assert (constraint_trouble(bone(rig)), constraint_trouble(bone(rig, "Arm"))) == (REMOVED, MUTED)
 
 
 def test_strips_that_are_blended_are_noted(rig):

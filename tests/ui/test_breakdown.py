@@ -43,18 +43,6 @@ def test_a_new_key_has_the_type_that_the_scene_is_set_to(tool):
         assert [key[11] for key in fields[-1]] == ["KEYFRAME", "KEYFRAME", "BREAKDOWN", "KEYFRAME", "KEYFRAME"]
 
 
-def test_push_and_relax_undo_each_other(tool):
-    animation.set_mode(tool, "dq_sclerp")
-    bpy.context.scene.frame_set(11)
-    before = np.array(tool.location)
-    operators.push(factor=1.0)
-    pushed = np.array(tool.location)
-    assert np.linalg.norm(pushed - before) > 0.1
-    bpy.context.view_layer.update()
-    operators.relax(factor=0.5)
-    np.testing.assert_allclose(tool.location, before, atol=1e-5)
-
-
 @pytest.mark.parametrize("cls", CLASSES)
 def test_without_a_mode_it_is_greyed_out(tool, cls):
     assert not cls.poll(bpy.context)

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import MODE_IDS, bake_poses, is_baked, key_frames, modes_of, read_poses, reduction_of
+from rigid_motion.animation import bake_poses, is_baked, key_frames, modes_of, read_poses, reduction_of
 from rigid_motion.motion import MODES, Poses, interpolate, shell_error
 from rigid_motion.ui import CLASSES, gltf_export, live, pose_operators
 from tests.animation.keyed import curves_of
@@ -32,12 +32,6 @@ def values(obj):
         for fcurve in fcurves
         if fcurve.keyframe_points
     }
-
-
-@pytest.mark.parametrize("mode", MODE_IDS)
-def test_every_mode_can_be_set(tool, mode):
-    assert operators.set_mode(mode=mode) == {"FINISHED"}
-    assert modes(tool) == [mode] * 3
 
 
 def turns(obj):
@@ -70,12 +64,6 @@ def test_turns_of_selected_keys_keep_the_axis_unless_there_is_another(tool):
     assert record.turns_axis == "X"
 
 
-def test_blenders_own_in_betweens_refuse_turns(tool):
-    with pytest.raises(RuntimeError, match="choose a mode first"):
-        operators.set_turns(turns=1)
-    assert turns(tool) == {}
-
-
 def test_a_mode_key_is_selected_with_its_pose_and_the_one_that_ends_it_is_not(tool):
     select_keys(tool, 11.0)
     operators.set_mode(mode="dq_sclerp", on="SELECTED")
@@ -99,14 +87,6 @@ def test_without_selected_keys_nothing_changes(tool):
     with pytest.raises(RuntimeError, match="Select keys of location, rotation or scale"):
         operators.set_mode(mode="dq_sclerp", on="SELECTED")
     assert modes(tool) == ["BLENDER"] * 3
-
-
-def test_setting_a_mode_for_the_whole_object_replaces_those_of_its_segments(tool):
-    select_keys(tool, 11.0)
-    operators.set_mode(mode="dq_sclerp", on="SELECTED")
-    operators.set_mode(mode="lerp_slerp", on="WHOLE")
-    assert modes(tool) == ["lerp_slerp"] * 3
-    assert ("rigid_motion.mode", 0) not in values(tool)
 
 
 def test_one_that_refuses_is_named_and_the_others_are_done(tool, capfd):
@@ -135,31 +115,6 @@ def test_without_any_object_an_operator_says_why_not(extension, name):
         operator()
 
 
-def test_undo_and_redo_take_a_mode_back_and_bring_it_again(tool):
-    bpy.ops.ed.undo_push(message="before")
-    operators.set_mode(mode="dq_sclerp")
-    bpy.ops.ed.undo_push(message="mode")
-    bpy.ops.ed.undo()
-    assert bpy.data.objects["Tool"].rigid_motion.mode == "BLENDER"
-    bpy.context.scene.frame_set(6)
-    assert tuple(bpy.data.objects["Tool"].delta_location) == (0.0, 0.0, 0.0)
-    bpy.ops.ed.redo()
-    assert bpy.data.objects["Tool"].rigid_motion.mode == "dq_sclerp"
-    bpy.context.scene.frame_set(6)
-    assert np.linalg.norm(bpy.data.objects["Tool"].delta_location) > 0.1
-
-
-def test_a_baked_object_gets_its_keys_back(tool):
-    operators.set_mode(mode="dq_sclerp")
-    before = values(tool)
-    assert operators.bake() == {"FINISHED"}
-    assert is_baked(tool)
-    assert np.array_equal(key_frames(tool), np.arange(1.0, 42.0))
-    assert operators.unbake() == {"FINISHED"}
-    assert values(tool) == before
-    assert modes(tool) == ["dq_sclerp"] * 3
-
-
 @pytest.mark.parametrize(
     ("options", "frames"),
     [
@@ -181,19 +136,6 @@ def test_a_range_that_ends_before_its_start_is_refused(tool):
     with pytest.raises(RuntimeError, match="before its start"):
         operators.bake(frames="CUSTOM", first=20.0, last=10.0)
     assert not is_baked(tool)
-
-
-def test_selected_keys_that_differ_from_object_to_object_are_each_ones_own(tool):
-    other, third = keyed("Other"), keyed("Third")
-    for obj, frame in ((tool, 1.0), (other, 11.0), (third, 11.0)):
-        select_keys(obj, frame)
-    operators.set_mode(mode="dq_sclerp", on="SELECTED")
-    assert modes(tool) == ["dq_sclerp", "BLENDER", "BLENDER"]
-    assert modes(other) == modes(third) == ["BLENDER", "dq_sclerp", "BLENDER"]
-    bpy.context.scene.frame_set(6)
-    assert np.linalg.norm(tool.delta_location) > 0.1
-    bpy.context.scene.frame_set(16)
-    assert np.linalg.norm(other.delta_location) > 0.1
 
 
 def refusal_of(name: str) -> str:

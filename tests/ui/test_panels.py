@@ -106,21 +106,6 @@ def test_euler_angles_on_screen_are_those_next_to_the_keyed_ones(extension):
     )
 
 
-def test_the_transform_on_screen_is_that_of_strips_too(extension):
-    obj = key(new_object())
-    bpy.context.view_layer.objects.active = obj
-    give_own_deltas(obj)
-    set_mode(obj, "dq_sclerp")
-    bpy.context.scene.frame_set(17)
-    shown = bpy.context.window_manager.rigid_motion_shown
-    expected = (*shown.location, *shown.rotation_quaternion)
-    action = obj.animation_data.action
-    obj.animation_data.action = None
-    obj.animation_data.nla_tracks.new().strips.new("Strip", 11, action)
-    bpy.context.scene.frame_set(27)
-    assert (*shown.location, *shown.rotation_quaternion) == pytest.approx(expected, abs=1e-5)
-
-
 @pytest.mark.parametrize("order", ["QUATERNION", "AXIS_ANGLE"])
 def test_without_in_betweens_there_is_nothing_to_show_and_no_error(extension, caplog, order):
     obj = keyed("Tool")

@@ -102,19 +102,6 @@ def test_a_pose_pasted_where_a_channel_is_muted_stays_until_the_frame_changes(ri
     assert refresh() == 0  # In-betweens go by the value of the muted channel.
 
 
-def test_a_muted_channel_is_shown_and_has_its_value_back_on_another_frame(rig, extension):
-    bone, path = mute_a_channel(rig)
-    for frame in (BETWEEN, OTHER, BETWEEN):
-        extension.scene.frame_set(frame)
-        before, expected = getattr(bone, path)[1], seen(rig, "Hand.L")
-        show_seen_in_channels([transform_of(bone)])
-        assert abs(getattr(bone, path)[1] - before) > 1e-3
-        assert np.abs(seen(rig, "Hand.L") - expected).max() < 1e-5
-        extension.scene.frame_set(frame)
-        assert getattr(bone, path)[1] == before
-        assert np.abs(seen(rig, "Hand.L") - expected).max() < 1e-5
-
-
 @pytest.mark.parametrize("name", ["copy_pose", "create_pose_asset"])
 def test_on_a_key_and_without_a_mode_blender_s_own_operator_acts(rig, extension, name):
     operator = getattr(bpy.ops.rigid_motion, name)

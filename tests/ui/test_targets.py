@@ -16,7 +16,6 @@ from rigid_motion.ui.targets import (
     modes_meant,
     scope_for,
     targets_of,
-    with_bones_of_rigs,
 )
 from rigid_motion.ui.wording import KEYED_BONES
 from tests.animation.scenes import editor
@@ -51,14 +50,6 @@ def test_in_a_key_editor_modes_are_for_the_selected_keys_of_all_objects_shown(to
     assert modes_of(left_out, FRAMES[:-1]) == ["BLENDER"] * 3
 
 
-def test_elsewhere_the_selected_objects_are_meant_as_a_whole(tool):
-    other = keyed("Other")
-    keyed("Left Out").select_set(False)
-    with editor("VIEW_3D"):
-        assert scope_for(bpy.context) == WHOLE
-        assert set(targets_of(bpy.context)) == {transform_of(tool), transform_of(other)}
-
-
 @pytest.mark.parametrize("kind", ["VIEW_3D", *KEY_EDITORS])
 def test_a_rig_in_object_mode_is_reduced_and_restored_in_every_editor(extension, kind):
     rig = recorded_rig()
@@ -75,17 +66,6 @@ def test_a_rig_in_object_mode_is_reduced_and_restored_in_every_editor(extension,
         assert all(is_reduced(rig.pose.bones[name]) for name in NAMES)
         assert keys.restore_keys() == {"FINISHED"}
         assert not any(is_reduced(rig.pose.bones[name]) for name in NAMES)
-
-
-def test_in_pose_mode_a_key_editor_means_the_bones_that_it_shows_and_no_whole_rig(extension):
-    rig = recorded_rig()
-    rig.select_set(True)
-    bpy.ops.object.mode_set(mode="POSE")
-    select(rig, ["Head"])
-    with editor("DOPESHEET_EDITOR") as space:
-        space.dopesheet.show_only_selected = True
-        meant = list(with_bones_of_rigs(bpy.context, targets_of(bpy.context)))
-    assert meant == [transform_of(rig.pose.bones["Head"])]
 
 
 def test_the_modes_meant_are_those_of_the_scope(tool):

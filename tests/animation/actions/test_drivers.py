@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import bake, problem_of, set_mode
-from tests.animation.bones.rigs import key_all, new_rig
 from tests.animation.keyed import curves_of, snapshot
 from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import key, new_object
@@ -70,32 +69,6 @@ def test_a_driven_angle_or_scale_takes_all_of_it_to_blender_and_the_rest_keeps_i
     assert problem_of(obj) == ""
 
 
-def test_a_driver_on_one_channel_of_a_bone_leaves_the_others_their_mode(live_file):
-    rig, other = key_all(new_rig()), key_all(new_rig("Other"))
-    hand, same = rig.pose.bones["Hand"], other.pose.bones["Hand"]
-    set_mode([hand, same], "dq_sclerp")
-    drive(hand, "location", 1)
-    assert problem_of(hand) == ""
-    raw = curves_of(hand)["location", 1].evaluate(17.0)
-    bpy.context.scene.frame_set(17)
-    assert hand.location[1] == pytest.approx(1.7) != raw
-    still = curves_of(same)["location", 1]
-    for point in still.keyframe_points:
-        point.co_ui.y = 1.7
-    still.update()
-    bpy.context.scene.frame_set(16)
-    bpy.context.scene.frame_set(17)
-    (above, driven), (_, compared) = (
-        [np.array(bone.matrix) for bone in (posed["Hand"].parent, posed["Hand"])]
-        for posed in (obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones for obj in (rig, other))
-    )
-    assert np.abs(driven[:3, :3] - compared[:3, :3]).max() < 1e-5
-    rest = np.linalg.inv(np.array(hand.parent.bone.matrix_local)) @ np.array(hand.bone.matrix_local)
-    off = np.linalg.inv((above @ rest)[:3, :3]) @ (driven - compared)[:3, 3]
-    assert np.abs(off[[0, 2]]).max() < 1e-5, "along the driven axis alone the mode has no say"
-    assert abs(off[1]) > 1e-3
-
-
 def test_its_motion_is_baked_and_the_driver_stays(live_file):
     obj = key(new_object())
     drive(obj, "location", 2)
@@ -105,29 +78,3 @@ def test_its_motion_is_baked_and_the_driver_stays(live_file):
     assert snapshot(obj)["location", 2] == keyed
     assert np.abs(shown(obj) - before).max() < 1e-5
     assert len(obj.animation_data.drivers) == 1
-
-
-def test_a_muted_driver_is_none(live_file):
-    obj, other = key(new_object()), key(new_object("Other"))
-    drive(obj, "location", 2)
-    obj.animation_data.drivers[0].mute = True
-    set_mode([obj, other], "dq_sclerp")
-    assert np.abs(shown(obj) - shown(other)).max() < 1e-6
-
-
-def test_noise_on_top_of_an_action_with_a_mode_is_no_problem_of_it(live_file):
-    obj = key(new_object())
-    set_mode(obj, "dq_sclerp")
-    before = shown(obj)
-    noise = key(new_object("Shake"), seed=3).animation_data.action
-    for fcurve in noise.layers[0].strips[0].channelbags[0].fcurves:
-        fcurve.modifiers.new("NOISE")
-    strip = obj.animation_data.nla_tracks.new().strips.new("Shake", 1, noise)
-    strip.blend_type, strip.action_slot = "ADD", noise.slots[0]
-    bpy.context.view_layer.update()
-    assert problem_of(obj) == ""
-    strip.mute = True
-    bpy.context.view_layer.update()
-    assert np.abs(shown(obj) - before).max() < 1e-5
-    set_mode(obj, "motor_spline")
-    assert problem_of(obj) == ""

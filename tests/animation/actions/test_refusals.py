@@ -149,15 +149,6 @@ def test_what_comes_in_the_way_later_gives_blenders_own_motion_and_a_reason(live
     assert_shown([other], PLAYED)
 
 
-@pytest.mark.parametrize("kind", ["NOISE", "LIMITS", "STEPPED"])
-def test_a_muted_modifier_is_no_hindrance(live_file, kind):
-    obj = key(new_object())
-    modifier(kind, mute=True)(obj)
-    set_mode(obj, "dq_sclerp")
-    assert problem_of(obj) == ""
-    assert_shown([obj], PLAYED)
-
-
 def turn_by_eulers(obj: bpy.types.Object) -> None:
     obj.rotation_mode = "XYZ"
 
@@ -244,13 +235,6 @@ def test_an_object_whose_action_is_linked_is_refused(library):
     assert_refused_unchanged(obj, "^DoorAction is linked from another file: make it local first")
     refresh()
     assert_as_in_the_library(obj, library)
-
-
-def test_a_shot_with_linked_objects_shows_their_in_betweens_when_it_is_opened_again(library, tmp_path):
-    linked(library, "Door")
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
-    assert_as_in_the_library(bpy.data.objects["Door"], library)
 
 
 @pytest.mark.parametrize("name", ["Door", "Lid"])

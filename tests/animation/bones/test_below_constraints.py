@@ -152,31 +152,6 @@ def test_other_constraints_follow_the_mode_as_they_follow_real_keys(live_file, n
     assert_same_poses(rig, PLAYED, shown, expected)
 
 
-def test_a_stack_of_many_is_followed(live_file):
-    def all_of_them(rig: bpy.types.Object, target: bpy.types.Object) -> None:
-        for name in ("Copy Rotation before", "Limit Location", "Child Of", "Damped Track", "an Action", "Limit Scale"):
-            CONSTRAINTS[name](rig, target)
-
-    rig, twin = two_alike("QUATERNION", all_of_them, "dq_sclerp")
-    shown, expected = shown_poses([rig, twin], PLAYED)
-    assert_same_poses(rig, PLAYED, shown, expected)
-
-
-@pytest.mark.parametrize("later", ["Copy Rotation before", "Child Of", "IK"])
-def test_a_constraint_that_comes_later_is_followed_too(live_file, later):
-    target = far_target()
-    rig = key_all(new_rig(), amount=0.1 if later == "IK" else 1.0)
-    set_mode(list(rig.pose.bones), "dq_sclerp")
-    CONSTRAINTS[later](rig, target)
-    if later == "IK":
-        within_reach(target)
-    bpy.context.view_layer.update()
-    twin = twin_of(rig)
-    key_desired(twin, rig, PLAYED)
-    shown, expected = shown_poses([rig, twin], PLAYED)
-    assert_same_poses(rig, PLAYED, shown, expected)
-
-
 def test_a_rig_that_is_scaled_unevenly_and_moves_has_its_constraints_follow(live_file):
     target = far_target()
     rig = key_all(new_rig())

@@ -53,13 +53,6 @@ def assert_right_between_frames(rig: bpy.types.Object, *hit: float) -> None:
 OFF_WHOLE_FRAMES = (1.3, 10.5, 10.85, 16.4, 40.0)
 
 
-@pytest.mark.parametrize(("mode", "order"), in_turn(KEYFRAME_MODES, ORDERS))
-def test_keys_off_whole_frames_are_hit(live_file, mode, order):
-    rig = key_all(new_rig(rotation_mode=order), OFF_WHOLE_FRAMES)
-    set_mode(list(rig.pose.bones), mode)
-    assert_right_between_frames(rig, *OFF_WHOLE_FRAMES)
-
-
 @pytest.mark.parametrize("order", ["QUATERNION", "XYZ"])
 @pytest.mark.parametrize("part", range(len(OFF_WHOLE_FRAMES) - 1))
 def test_a_single_segment_with_a_mode_may_begin_and_end_off_whole_frames(live_file, part, order):
@@ -76,18 +69,6 @@ def test_a_key_edited_far_from_a_mode_that_ends_off_whole_frames_is_followed(liv
     curves_of(rig.pose.bones["Hand"])["location", 0].keyframe_points[-1].co_ui.y += 0.1
     assert_right_between_frames(rig)
     assert refresh() == 0
-
-
-def test_more_samples_make_neither_the_action_longer_nor_a_strip(live_file):
-    rig = moving_rig()
-    bpy.context.view_layer.update()
-    action, slot = rig.animation_data.action, rig.animation_data.action_slot
-    assert max(record.rate for record in action.rigid_motion.slots) > 1
-    assert tuple(action.frame_range) == (1.0, 40.0)
-    rig.animation_data.action = None
-    strip = rig.animation_data.nla_tracks.new().strips.new("Strip", 1, action)
-    strip.action_slot = slot
-    assert (strip.action_frame_start, strip.action_frame_end) == (1.0, 40.0)
 
 
 def test_a_manual_frame_range_of_the_animators_stays_and_one_that_is_unticked_comes_back(live_file):

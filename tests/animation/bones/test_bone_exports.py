@@ -15,7 +15,7 @@ import rigid_motion
 from rigid_motion.animation import bake, reduce_keys_of, refresh, set_mode
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
-from tests.animation.bones.rigs import ARM, FRAMES, PLAYED, Rest, expected_basis_matrices, key_all, key_desired, new_rig
+from tests.animation.bones.rigs import ARM, FRAMES, PLAYED, Rest, key_all, new_rig
 from tests.animation.keyed import snapshot
 from tests.animation.scenes import enabled, push_down
 
@@ -88,22 +88,6 @@ def test_an_export_has_every_mode_in_one_animation_of_the_actions_own_range(expo
     assert_same_poses(result, EXPORTED, moved(result), expected)
 
 
-@pytest.mark.parametrize("order", ["QUATERNION", "ZXY"])
-def test_an_fbx_export_that_leaves_keys_out_is_that_of_real_keys(exporter, tmp_path, order):
-    rig = every_mode(order)
-    expected = expected_basis_matrices(rig, EXPORTED)
-    shown = moved(imported("fbx", export("fbx", tmp_path / "mode.fbx")))
-    ranges = [tuple(action.curve_frame_range) for action in bpy.data.actions]
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    bpy.context.scene.frame_start, bpy.context.scene.frame_end = int(PLAYED[0]), int(PLAYED[-1])
-    twin = every_mode(order)
-    set_mode(list(twin.pose.bones), "BLENDER")
-    key_desired(twin, twin, EXPORTED, expected)
-    result = imported("fbx", export("fbx", tmp_path / "keys.fbx"))
-    assert ranges == [tuple(action.curve_frame_range) for action in bpy.data.actions]
-    assert_same_poses(result, EXPORTED, shown, moved(result))
-
-
 @pytest.mark.parametrize("kind", EXACT)
 def test_an_action_in_a_strip_is_exported_with_its_modes(exporter, tmp_path, kind):
     rig = key_all(new_rig())
@@ -112,20 +96,6 @@ def test_an_action_in_a_strip_is_exported_with_its_modes(exporter, tmp_path, kin
     push_down(rig, int(FRAMES[0]))
     result = imported(kind, export(kind, tmp_path / f"rig.{kind}", **EXACT[kind]))
     assert_same_poses(result, EXPORTED, moved(result), expected)
-
-
-@pytest.mark.parametrize("kind", ["glb", "fbx"])
-def test_a_mode_changes_nothing_else_that_an_export_says(exporter, tmp_path, kind):
-    rig = key_all(new_rig())
-    set_mode(list(rig.pose.bones), "dq_sclerp")
-    set_mode(list(rig.pose.bones), "BLENDER")
-    plain = imported(kind, export(kind, tmp_path / f"plain.{kind}"))
-    names = {action.name for action in bpy.data.actions}, {bone.name for bone in plain.pose.bones}
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    rig = key_all(new_rig())
-    set_mode(list(rig.pose.bones), "dq_sclerp")
-    result = imported(kind, export(kind, tmp_path / f"mode.{kind}"))
-    assert ({action.name for action in bpy.data.actions}, {bone.name for bone in result.pose.bones}) == names
 
 
 # -- clips ------------------------------------------------------------------------------------------------------------

@@ -66,11 +66,6 @@ def test_a_linked_rig_shows_the_modes_of_its_library(library, tmp_path):
     assert_posed(reopened(save(tmp_path / "shot.blend")), PLAYED)
 
 
-def test_a_rig_without_an_action_that_is_linked_is_refused(library):
-    with pytest.raises(ValueError, match="linked from another file"):
-        set_mode(linked(library, "Puppet").pose.bones["Hand"], "dq_sclerp")
-
-
 def test_an_overridden_rig_whose_action_is_linked_is_refused_by_its_name(library):
     rig = overridden(library, "Rig")
     with pytest.raises(ValueError, match="linked from another file"):
@@ -148,24 +143,3 @@ def test_what_an_overridden_rig_keeps_on_bones_is_read_again_from_a_library_that
     assert is_baked(rig.pose.bones["Hand"])
     unbake(rig.pose.bones["Hand"])
     assert modes_of(rig.pose.bones["Hand"], np.array(FRAMES[:1])) == ["dq_sclerp"]
-
-
-def test_an_overridden_rig_gives_its_modes_up_again(library, tmp_path):
-    rig = key_all(overridden(library, "Puppet"))
-    set_mode(list(rig.pose.bones), "dq_sclerp")
-    rig = reopened(save(tmp_path / "shot.blend"), "Puppet")
-    set_mode(list(rig.pose.bones), "BLENDER")
-    rig = reopened(save(tmp_path / "shot.blend"), "Puppet")
-    assert [c.name for c in rig.pose.bones["Hand"].constraints] == ["The library's own"]
-    assert_posed(rig, PLAYED)
-
-
-def test_a_rig_is_appended_with_its_modes(library):
-    with bpy.data.libraries.load(str(library), link=False) as (_, expected):
-        expected.objects = ["Rig"]
-    rig = bpy.data.objects["Rig"]
-    bpy.context.scene.collection.objects.link(rig)
-    bpy.context.view_layer.update()
-    assert_posed(rig, PLAYED)
-    set_mode(rig.pose.bones["Hand"], "pga_lerp")
-    assert_posed(rig, PLAYED)

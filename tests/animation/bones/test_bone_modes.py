@@ -24,8 +24,8 @@ from tests.animation.bones.rigs import (
     twin_of,
     with_edit_bones,
 )
-from tests.animation.keyed import curves_of, key_frames, snapshot
-from tests.animation.oracle import assert_shown, shown_worlds
+from tests.animation.keyed import curves_of, snapshot
+from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import key, new_object
 from tests.thoroughness import sample
 
@@ -89,45 +89,6 @@ def test_below_parents_that_are_scaled_unevenly_bones_move_as_with_real_keys(liv
     assert_same_poses(rig, PLAYED, shown, expected)
 
 
-def test_what_is_only_drawn_or_locked_makes_no_difference(live_file):
-    rig = key_all(new_rig(), scale="even")
-    shape = new_object("Shape", data=bpy.data.meshes.new("Shape"))
-    hand = rig.pose.bones["Hand"]
-    hand.custom_shape, hand.custom_shape_transform = shape, rig.pose.bones["Upper"]
-    for name in ("use_transform_at_custom_shape", "use_transform_around_custom_shape"):
-        if hasattr(hand, name):
-            setattr(hand, name, True)
-    lower = rig.pose.bones["Lower"]
-    lower.lock_location, lower.lock_rotation, lower.lock_scale = [(True, False, True)] * 3
-    lower.lock_rotation_w, lower.lock_rotations_4d = True, True
-    rig.data.display_type = "BBONE"
-    set_mode(list(rig.pose.bones), "dq_sclerp")
-    assert {problem_of(pose_bone) for pose_bone in rig.pose.bones} == {""}
-    assert_posed(rig, PLAYED)
-
-
-@pytest.mark.parametrize(
-    ("interpolation", "mode"), in_turn(["BEZIER", "LINEAR", "CONSTANT", "SINE", "BOUNCE", "ELASTIC", "BACK"], MODES)
-)
-def test_easings_time_the_motion_of_bones(live_file, mode, interpolation):
-    assert_posed(moving_rig(mode, interpolation=interpolation, scale="even"), PLAYED)
-
-
-@pytest.mark.parametrize(("mode", "order"), in_turn(MODES, ORDERS))
-def test_keys_may_be_anywhere(live_file, mode, order):
-    frames = (-31.0, -30.0, -12.25, -0.5, 0.75, 1.5, 22.0, 22.125, 61.9)
-    rig = moving_rig(mode, order, frames=frames)
-    hand = rig.pose.bones["Hand"]
-    curve = curves_of(hand)["location", 1]
-    for point in list(curve.keyframe_points)[2:5]:
-        point.co_ui.x += 0.4
-    curve.update()
-    bpy.context.view_layer.update()
-    played = np.arange(-36.0, 70.0)
-    assert len(key_frames(hand)) == len(frames) + 3
-    assert_posed(rig, played)
-
-
 KEYED = {
     "no location": lambda path, index: path != "location",
     "no rotation": lambda path, index: not path.startswith("rotation"),
@@ -150,16 +111,6 @@ def test_channels_without_keys_count_as_they_are(live_file, mode, kept, order):
                 rig.animation_data.action.layers[0].strips[0].channelbags[0].fcurves.remove(fcurve)
     set_mode(list(rig.pose.bones), mode)
     assert_posed(rig, PLAYED)
-
-
-@pytest.mark.parametrize("mode", MODES)
-def test_linear_extrapolation_goes_on(live_file, mode):
-    rig = key_all(new_rig(), (21.0, 31.0, 44.0, 60.0), interpolation="LINEAR")
-    for fcurve in curves_of(rig).values():
-        fcurve.extrapolation = "LINEAR"
-    live_file.scene.frame_start, live_file.scene.frame_end = 0, 80
-    set_mode(list(rig.pose.bones), mode)
-    assert_posed(rig, np.arange(81.0))
 
 
 def cyclic(order: str, kind: str, interpolation: str) -> bpy.types.Object:
@@ -205,17 +156,6 @@ def test_bones_are_as_exact_where_the_armature_is_scaled_unevenly_moved_and_pare
     set_mode(rig, "dq_sclerp")
     assert_posed(rig, PLAYED)
     assert problem_of(rig) == ""
-
-
-def test_objects_and_bones_of_several_rigs_take_a_mode_at_once(live_file):
-    rigs, obj = (
-        [key_all(new_rig(name, rotation_mode=order)) for name, order in zip("AB", ORDERS[:2], strict=True)],
-        key(new_object()),
-    )
-    set_mode([obj, *(bone for rig in rigs for bone in rig.pose.bones)], "dq_sclerp")
-    for rig in rigs:
-        assert_posed(rig, PLAYED)
-    assert_shown([obj], PLAYED)
 
 
 def test_bone_names_may_hold_any_sign(live_file):

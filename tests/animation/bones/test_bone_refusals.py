@@ -57,22 +57,6 @@ def test_a_mode_that_cannot_work_is_refused_by_name_and_nothing_changes(live_fil
 
 
 @pytest.mark.parametrize("hindrance", HINDRANCES)
-def test_of_several_bones_the_others_take_the_mode(live_file, hindrance):
-    rig = key_all(new_rig(), scale="even")
-    hinder, message = HINDRANCES[hindrance]
-    hinder(rig.pose.bones["Lower"])
-    bpy.context.view_layer.update()
-    refused = []
-    set_mode(list(rig.pose.bones), "dq_sclerp", refused=refused)
-    assert len(refused) == 1
-    assert re.match(f"Rig.*Lower.*{message}", str(refused[0]))
-    for name in ("Body", "Upper", "Hand"):
-        assert rig.pose.bones[name].rigid_motion.mode == "dq_sclerp"
-        assert problem_of(rig.pose.bones[name]) == ""
-    assert_posed(rig, PLAYED, ["Body", "Upper"])
-
-
-@pytest.mark.parametrize("hindrance", HINDRANCES)
 def test_what_comes_in_the_way_later_gives_blenders_own_motion_and_a_reason(live_file, hindrance):
     rig = moving_rig(scale="even")
     lower = rig.pose.bones["Lower"]
@@ -106,16 +90,6 @@ def test_in_betweens_are_back_as_soon_as_nothing_is_in_the_way_any_more(live_fil
     lower.rotation_mode = "QUATERNION"
     bpy.context.view_layer.update()
     assert problem_of(lower) == ""
-    assert_posed(rig, PLAYED)
-
-
-def test_a_bone_without_keys_takes_a_mode_that_waits_for_them(live_file):
-    rig = new_rig()
-    set_mode(list(rig.pose.bones), "dq_sclerp")
-    assert_posed(rig, PLAYED)
-    key_all(rig)
-    bpy.context.view_layer.update()
-    assert {bone.rigid_motion.mode for bone in rig.pose.bones} == {"dq_sclerp"}
     assert_posed(rig, PLAYED)
 
 

@@ -8,12 +8,10 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion import animation
 from rigid_motion.animation import set_mode, set_turns
 from rigid_motion.motion import KEYFRAME_MODES
-from tests.animation.bones.poses import assert_posed, shown_poses
+from tests.animation.bones.poses import assert_posed
 from tests.animation.bones.rigs import FRAMES, PLAYED, in_turn, key_all, moving_rig, new_rig, write_bone
-from tests.animation.keyed import curve_of
 
 MODES = tuple(KEYFRAME_MODES)
 
@@ -34,24 +32,6 @@ def test_bones_turn_as_far_as_their_angles_say(live_file, mode, order):
         write_bone(bone, "rotation_euler", np.array(FRAMES), angles)
     set_mode(list(rig.pose.bones), mode)
     assert_posed(rig, PLAYED)
-
-
-def test_a_key_in_between_and_a_bake_keep_the_turns_of_a_bone(live_file):
-    rig = new_rig()
-    hand = rig.pose.bones["Hand"]
-    write_bone(hand, "rotation_quaternion", np.array((1.0, 25.0)), np.array(((1, 0, 0, 0), (0.8, 0, 0.6, 0))))
-    set_mode(hand, "dq_sclerp")
-    set_turns(hand, 3, [1.0])
-    frames = np.arange(1.0, 26.0)
-    before = shown_poses([rig], frames)[0]["Hand"]
-    bpy.context.scene.frame_set(10)
-    rig.pose.bones["Hand"].keyframe_insert("rotation_quaternion")
-    bpy.context.view_layer.update()
-    assert np.abs(shown_poses([rig], frames)[0]["Hand"] - before).max() < 1e-4
-    turns = curve_of(rig.pose.bones["Hand"], "rigid_motion.turns")
-    assert sum(abs(key.co[1]) for key in turns.keyframe_points) in (2.0, 3.0)
-    animation.bake(rig.pose.bones["Hand"])
-    assert np.abs(shown_poses([rig], frames)[0]["Hand"] - before).max() < 1e-4
 
 
 def test_a_renamed_bone_keeps_its_turns(live_file):

@@ -6,11 +6,11 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import problem_of, set_mode
+from rigid_motion.animation import set_mode
 from tests.animation.bones.poses import assert_posed
 from tests.animation.bones.rigs import ARM, PLAYED, key_bone, moving_rig, new_rig, own_constraints, write_bone
 from tests.animation.keyed import curves_of
-from tests.animation.scenes import new_object, push_down
+from tests.animation.scenes import push_down
 
 
 def frame_range(bone: bpy.types.PoseBone) -> tuple[float, float]:
@@ -28,21 +28,6 @@ def test_the_frame_range_of_an_action_is_that_of_its_keys_when_those_that_sample
         fcurve.keyframe_points.remove(fcurve.keyframe_points[-1])
     bpy.context.view_layer.update()
     assert frame_range(body) == (-19.0, 17.0)
-
-
-@pytest.mark.parametrize("carrier", ["object", "bone"])
-def test_a_mode_that_is_keyed_before_anything_else_changes_nothing(live_file, carrier):
-    owner = new_object() if carrier == "object" else new_rig("Rig", ARM[:1])
-    moved = owner if carrier == "object" else owner.pose.bones[0]
-    path = f"{moved.path_from_id()}." if carrier == "bone" else ""
-    moved.rigid_motion.mode = "dq_sclerp"
-    owner.keyframe_insert(f"{path}rigid_motion.mode", frame=1)
-    bpy.context.view_layer.update()
-    assert problem_of(moved) == ""
-    moved.keyframe_insert("location", frame=1)
-    moved.keyframe_insert("rotation_euler", frame=1)
-    bpy.context.view_layer.update()
-    assert problem_of(moved) == ""
 
 
 def slide(bone: bpy.types.PoseBone) -> None:

@@ -84,15 +84,6 @@ def test_its_screw_is_about_one_axis_in_the_armature(pair):
     assert np.linalg.norm(off - np.outer(off @ axis, axis), axis=1).max() < 1e-5
 
 
-def test_baked_it_stays_where_it_is(pair):
-    pose(pair)
-    animation.set_mode([pair[1]], "dq_sclerp")
-    (before,) = shown((pair[1],))
-    animation.bake([pair[1]])
-    (after,) = shown((pair[1],))
-    np.testing.assert_allclose(after, before, atol=1e-5)
-
-
 def toggle(rig: bpy.types.Object) -> None:
     rig.data.bones["B"].use_local_location = True
 

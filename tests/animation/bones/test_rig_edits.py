@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import modes_of, problem_of, refresh, set_enabled, set_mode
-from tests.animation.bones.poses import assert_posed, assert_same_poses, names_of, shown_poses
+from rigid_motion.animation import modes_of, refresh, set_mode
+from tests.animation.bones.poses import assert_posed
 from tests.animation.bones.rigs import (
     ARM,
     CONSTRAINT,
@@ -19,14 +17,10 @@ from tests.animation.bones.rigs import (
     key_all,
     moving_rig,
     new_rig,
-    own_constraints,
     select_only,
     with_edit_bones,
 )
-from tests.animation.keyed import curves_of
 from tests.animation.scenes import push_down
-
-Edit = Callable[[bpy.types.Object], None]
 
 
 def assert_nothing_stale(*actions: bpy.types.Action) -> None:
@@ -46,45 +40,10 @@ def make_lower_fore(rig: bpy.types.Object) -> None:
     rig.data.bones["Lower"].name = "Fore"
 
 
-def make_lower_fore_in_edit_mode(rig: bpy.types.Object) -> None:
-    with_edit_bones(rig, lambda edit_bones: setattr(edit_bones["Lower"], "name", "Fore"))
-
-
 def swap_two(rig: bpy.types.Object) -> None:
     rig.data.bones["Lower"].name = "Spare"
     rig.data.bones["Upper"].name = "Lower"
     rig.data.bones["Spare"].name = "Upper"
-
-
-def swap_two_in_edit_mode(rig: bpy.types.Object) -> None:
-    def swap(edit_bones: bpy.types.ArmatureEditBones) -> None:
-        # The first update in Edit Mode is when constraints are laid aside.
-        bpy.context.view_layer.update()
-        edit_bones["Lower"].name = "Spare"
-        edit_bones["Upper"].name = "Lower"
-        edit_bones["Spare"].name = "Upper"
-
-    with_edit_bones(rig, swap)
-
-
-def pass_names_on(rig: bpy.types.Object) -> None:
-    rig.data.bones["Hand"].name = "Finger"
-    rig.data.bones["Lower"].name = "Hand"
-    rig.data.bones["Upper"].name = "Lower"
-
-
-def into_odd_signs(rig: bpy.types.Object) -> None:
-    rig.data.bones["Lower"].name = 'Lower "left" \\ 2'
-
-
-RENAMINGS = {
-    "in Pose Mode": make_lower_fore,
-    "in Edit Mode": make_lower_fore_in_edit_mode,
-    "of two, swapped": swap_two,
-    "of two, swapped in Edit Mode": swap_two_in_edit_mode,
-    "one after the other": pass_names_on,
-    "with odd signs": into_odd_signs,
-}
 
 
 def whole_mode(pose_bone: bpy.types.PoseBone) -> str:
@@ -92,47 +51,6 @@ def whole_mode(pose_bone: bpy.types.PoseBone) -> str:
     (mode,) = modes_of(pose_bone, np.array(FRAMES[:1]))
     assert pose_bone.rigid_motion.mode == mode
     return mode
-
-
-@pytest.mark.parametrize("rename", RENAMINGS.values(), ids=RENAMINGS)
-def test_a_bone_that_is_renamed_keeps_its_mode(live_file, rename: Edit):
-    rig = moving_rig("dq_sclerp")
-    set_mode(rig.pose.bones["Lower"], "pga_lerp", [FRAMES[0]])
-    set_mode(rig.pose.bones["Upper"], "cga_slerp")
-    set_mode(rig.pose.bones["Hand"], "BLENDER")
-    before, order = shown_poses([rig], PLAYED)[0], names_of(rig)
-    rename(rig)
-    bpy.context.view_layer.update()
-    renamed = dict(zip(order, names_of(rig), strict=True))
-    expected = {renamed[name]: matrices for name, matrices in before.items()}
-    assert_same_poses(rig, PLAYED, shown_poses([rig], PLAYED)[0], expected)
-    assert_posed(rig, PLAYED)
-    held = own_constraints(rig)
-    assert {name: len(held[renamed[name]]) for name in order} == {"Body": 1, "Upper": 1, "Lower": 1, "Hand": 0}
-    assert_nothing_stale()
-    bone = rig.pose.bones[renamed["Lower"]]
-    assert modes_of(bone, np.array(FRAMES[:2])) == ["pga_lerp", "dq_sclerp"]
-    assert whole_mode(rig.pose.bones[renamed["Upper"]]) == "cga_slerp"
-    assert whole_mode(rig.pose.bones[renamed["Hand"]]) == "BLENDER"
-    curves_of(bone)["location", 0].keyframe_points[1].co_ui.y += 1.0
-    bpy.context.view_layer.update()
-    assert_posed(rig, PLAYED)
-    set_mode(list(rig.pose.bones), "BLENDER")
-    assert_posed(rig, PLAYED)
-    assert not any(own_constraints(rig).values())
-
-
-def test_a_bone_that_is_renamed_while_nothing_is_followed_is_caught_up_with(live_file):
-    rig = moving_rig()
-    set_enabled(False)
-    try:
-        make_lower_fore(rig)
-        bpy.context.view_layer.update()
-    finally:
-        set_enabled(True)
-    refresh()
-    assert_posed(rig, PLAYED)
-    assert_nothing_stale()
 
 
 def rig_of_two_modes(**settings: object) -> bpy.types.Object:
@@ -148,16 +66,6 @@ def modes_in(rig: bpy.types.Object) -> dict[str, str]:
     """The bones of a rig that have a mode other than Blender's."""
     modes = {pose_bone.name: whole_mode(pose_bone) for pose_bone in rig.pose.bones}
     return {name: mode for name, mode in modes.items() if mode != "BLENDER"}
-
-
-def test_bones_that_have_a_mode_and_nothing_to_fill_in_swap_it_with_their_names(live_file):
-    rig = rig_of_two_modes(frames=FRAMES[:1])
-    swap_two(rig)
-    bpy.context.view_layer.update()
-    assert modes_in(rig) == {"Lower": "dq_sclerp", "Upper": "pga_lerp"}
-    key_all(rig)
-    bpy.context.view_layer.update()
-    assert_posed(rig, PLAYED)
 
 
 def test_a_mode_that_is_set_right_after_names_were_swapped_leaves_the_other_bone_its_own(live_file):
@@ -226,20 +134,6 @@ def test_names_swapped_are_swapped_in_strips_and_not_in_actions_that_the_rig_doe
         assert_posed(rig, PLAYED)
 
 
-def test_names_swapped_while_an_action_is_not_used_leave_its_modes_with_its_keys(live_file):
-    rig = rig_of_two_modes()
-    action = rig.animation_data.action
-    action.use_fake_user = True
-    rig.animation_data.action = None
-    bpy.context.view_layer.update()
-    swap_two(rig)
-    bpy.context.view_layer.update()
-    rig.animation_data.action, rig.animation_data.action_slot = action, action.slots[0]
-    bpy.context.view_layer.update()
-    assert modes_in(rig) == {"Upper": "dq_sclerp", "Lower": "pga_lerp"}
-    assert_posed(rig, PLAYED)
-
-
 def test_a_bone_that_takes_the_name_of_one_deleted_just_now_keeps_its_mode(live_file):
     rig = rig_of_two_modes(location=False)
 
@@ -264,22 +158,6 @@ def test_rigs_of_a_version_that_kept_no_names_of_bones_have_the_modes_they_had(l
     assert_posed(rig, PLAYED)
 
 
-def test_a_bone_that_is_made_anew_under_the_name_of_a_deleted_one_moves_by_its_keys(live_file):
-    rig = moving_rig()
-    with_edit_bones(rig, lambda edit_bones: edit_bones.remove(edit_bones["Hand"]))
-
-    def make(edit_bones: bpy.types.ArmatureEditBones) -> None:
-        edit_bones.new("Hand").tail = (0.2, 0.3, 0.4)
-
-    with_edit_bones(rig, make)
-    rig.pose.bones["Hand"].rotation_mode = "QUATERNION"
-    bpy.context.view_layer.update()
-    refresh()
-    # Keys that are left of a bone are Blender's to keep, and so the mode in their slot.
-    assert problem_of(rig.pose.bones["Hand"]) == ""
-    assert_posed(rig, PLAYED)
-
-
 @pytest.mark.parametrize("second", ["dq_sclerp", "BLENDER"])
 def test_armatures_that_are_joined_move_on(live_file, second):
     rig = moving_rig("pga_lerp")
@@ -294,18 +172,3 @@ def test_armatures_that_are_joined_move_on(live_file, second):
     assert_posed(rig, PLAYED, [rest.name for rest in ARM])
     # Blender leaves the keys of what is joined behind: those bones rest, without in-betweens.
     assert_posed(rig, PLAYED)
-
-
-def test_another_slot_of_the_same_action_shows_its_own_modes(live_file):
-    rig = moving_rig("dq_sclerp")
-    data = rig.animation_data
-    action, first = data.action, data.action_slot
-    data.action_slot = second = action.slots.new("OBJECT", "Second")
-    key_all(rig, seed=7)
-    set_mode(list(rig.pose.bones), "pga_lerp")
-    assert_posed(rig, PLAYED)
-    for slot, mode in ((first, "dq_sclerp"), (second, "pga_lerp")):
-        data.action_slot = slot
-        bpy.context.view_layer.update()
-        assert modes_of(rig.pose.bones["Hand"], np.array(FRAMES[:1])) == [mode]
-        assert_posed(rig, PLAYED)

@@ -8,7 +8,7 @@ import pytest
 from mathutils import Vector
 
 from rigid_motion import animation
-from rigid_motion.animation import is_reduced, reduce_keys_of, reduction_of, total_reduction, write_channel
+from rigid_motion.animation import is_reduced, reduce_keys_of, total_reduction, write_channel
 from rigid_motion.animation.baking.motions import not_promised
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion.animation.transforms.sizes import first_tolerance, reach_of, rig_size
@@ -47,13 +47,6 @@ def test_a_constraint_that_is_switched_off_counts_for_nothing_until_that_is_anim
     assert not_promised(rig).followers == ("Arm.L",)
 
 
-def test_constraints_that_show_in_betweens_count_for_nothing(live_file):
-    rig = recorded_rig()
-    reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS)
-    assert all(len(bone.constraints) for bone in bones(rig))
-    assert not not_promised(rig)
-
-
 @pytest.mark.parametrize(("count", "moved"), [(2, ("Arm.L", "Hand.L")), (0, ("Root", "Spine", "Arm.L", "Hand.L"))])
 def test_inverse_kinematics_move_all_bones_of_their_chain(live_file, count, moved):
     rig = recorded_rig()
@@ -70,14 +63,6 @@ def test_a_driven_bone_is_named_unless_its_driver_is_muted(live_file):
 
 
 # What is reported
-
-
-def test_the_largest_error_counts_reduced_bones_that_hang_on_a_constraint(live_file):
-    rig = recorded_rig(still=("Root",))
-    rig.pose.bones["Spine"].constraints.new("DAMPED_TRACK")
-    reduce_keys_of(bones(rig, *NAMES[1:]), "motor_spline", TOLERANCE, RADIUS)
-    largest = max(reduction_of(bone).largest_error for bone in bones(rig, *NAMES[1:]))
-    assert total_reduction(bones(rig)).largest_error == largest > 0.0
 
 
 def test_the_largest_error_is_that_of_a_bone_without_keys_where_that_is_off_the_most(live_file):
@@ -167,13 +152,3 @@ def test_made_up_lengths_of_the_last_bones_are_no_part_of_the_size_of_a_rig(live
     assert reach_of(rig.pose.bones["HeadTop"]) == pytest.approx(0.8)
     assert animation.radius_of(rig.pose.bones["HeadTop"]) == pytest.approx(1.6)
     assert animation.radius_of(rig) == pytest.approx(2.0 * (1.6 + 0.8))
-
-
-def test_a_rig_of_one_bone_is_as_large_as_that(live_file):
-    rig = new_object("Rig", data=bpy.data.armatures.new("Rig"))
-    bpy.context.view_layer.objects.active = rig
-    bpy.ops.object.mode_set(mode="EDIT")
-    bone = rig.data.edit_bones.new("Lid")
-    bone.head, bone.tail = (0.0, 0.0, 0.0), (0.0, 0.4, 0.0)
-    bpy.ops.object.mode_set(mode="OBJECT")
-    assert rig_size(rig) == pytest.approx(0.4)

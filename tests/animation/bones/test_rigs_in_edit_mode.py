@@ -6,17 +6,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import bpy
-import numpy as np
 import pytest
 
 from rigid_motion import animation
-from rigid_motion.animation import constraint_trouble, modes_of, refresh, set_enabled, set_mode
+from rigid_motion.animation import constraint_trouble, refresh, set_enabled, set_mode
 from tests.animation.bones.poses import assert_posed, assert_same_poses, expected_poses
-from tests.animation.bones.rigs import FRAMES, PLAYED, Rest, key_all, moving_rig, new_rig, own_constraints, select_only
-from tests.animation.bones.test_bone_files import posed_on_a_farm, reopened, save
+from tests.animation.bones.rigs import PLAYED, Rest, key_all, moving_rig, new_rig, own_constraints, select_only
+from tests.animation.bones.test_bone_files import posed_on_a_farm, save
 from tests.animation.bones.test_rig_edits import assert_nothing_stale
 from tests.animation.farm import SAVE, on_a_farm
-from tests.animation.keyed import curves_of
 
 HANDS = (
     Rest("Body", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
@@ -84,19 +82,6 @@ def test_a_bone_that_symmetrize_makes_rests_and_has_no_constraint_of_the_first(l
     assert_posed(rig, PLAYED)
 
 
-def test_a_bone_that_symmetrize_makes_under_the_name_of_a_deleted_one_has_its_keys_and_its_mode(live_file):
-    rig = rig_with_hands()
-    set_mode(rig.pose.bones["Hand.R"], "pga_lerp")
-    with edit_mode(rig) as edit_bones:
-        edit_bones.remove(edit_bones["Hand.R"])
-        symmetrize(edit_bones)
-    refresh()
-    assert shown_slots(rig) == ALL_SHOWN
-    assert modes_of(rig.pose.bones["Hand.R"], np.array(FRAMES[:1])) == ["pga_lerp"]
-    assert_posed(rig, PLAYED)
-    assert_nothing_stale()
-
-
 def test_in_edit_mode_constraints_show_nothing_and_nobody_takes_them_for_removed(live_file):
     rig = rig_with_hands()
     with edit_mode(rig):
@@ -111,20 +96,6 @@ def test_in_edit_mode_constraints_show_nothing_and_nobody_takes_them_for_removed
     assert_posed(rig, PLAYED)
 
 
-def test_what_is_edited_and_chosen_in_edit_mode_is_seen_after_it(live_file):
-    rig = rig_with_hands()
-    with edit_mode(rig):
-        curves_of(rig.pose.bones["Hand.L"])["location", 0].keyframe_points[1].co_ui.y += 1.0
-        bpy.context.view_layer.update()
-        set_mode(rig.pose.bones["Hand.R"], "pga_lerp")
-        set_mode(rig.pose.bones["Body"], "BLENDER")
-        bpy.context.view_layer.update()
-        assert shown_slots(rig) == NONE_SHOWN
-    assert shown_slots(rig) == ALL_SHOWN | {"Body": ()}
-    assert_posed(rig, PLAYED)
-    assert_nothing_stale()
-
-
 def test_a_constraint_that_was_deleted_is_not_brought_back_by_edit_mode(live_file):
     rig = rig_with_hands()
     hand = rig.pose.bones["Hand.L"]
@@ -133,18 +104,6 @@ def test_a_constraint_that_was_deleted_is_not_brought_back_by_edit_mode(live_fil
         pass
     assert own_constraints(rig)["Hand.L"] == []
     assert constraint_trouble(rig.pose.bones["Hand.L"]) == "REMOVED"
-
-
-def test_another_rig_with_the_same_action_moves_on_while_one_is_in_edit_mode(live_file):
-    rig = rig_with_hands()
-    other = new_rig("Other", HANDS)
-    other.animation_data_create().action = rig.animation_data.action
-    other.animation_data.action_slot = rig.animation_data.action_slot
-    bpy.context.view_layer.update()
-    with edit_mode(rig):
-        assert shown_slots(other) == ALL_SHOWN
-        assert_posed(other, PLAYED)
-    assert_posed(rig, PLAYED)
 
 
 def test_each_of_several_actions_in_the_nla_is_shown_again_after_edit_mode(live_file):
@@ -178,20 +137,6 @@ def test_a_file_that_is_saved_in_edit_mode_plays_in_a_blender_without_the_extens
     on_a_farm("bpy.ops.object.mode_set(mode='OBJECT')\n" + SAVE, path, path)
     played = posed_on_a_farm(path, rig)
     assert_same_poses(rig, PLAYED, played, expected)
-
-
-def test_a_file_that_is_saved_in_edit_mode_is_opened_in_it(live_file, tmp_path):
-    with edit_mode(rig_with_hands()):
-        path = save(tmp_path / "shot.blend")
-    rig = reopened(path)
-    if rig.mode != "EDIT":
-        select_only(rig)
-        bpy.ops.object.mode_set(mode="EDIT")
-    assert shown_slots(rig) == NONE_SHOWN
-    symmetrize(rig.data.edit_bones)
-    bpy.ops.object.mode_set(mode="OBJECT")
-    assert shown_slots(rig) == ALL_SHOWN
-    assert_posed(rig, PLAYED)
 
 
 def test_undo_and_redo_go_into_edit_mode_and_out_of_it(live_file):

@@ -7,12 +7,8 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import modes_of, refresh, set_mode
-from rigid_motion.animation.actions.records import recorded_mode
-from rigid_motion.animation.actions.slots import bindings_for
-from rigid_motion.animation.compute.components import MODE_NAMES
-from rigid_motion.animation.transforms import transform_of
 from tests.animation.bones.poses import assert_posed
-from tests.animation.bones.rigs import ARM, FRAMES, PLAYED, Rest, key_all, moving_rig, new_rig, own_constraints
+from tests.animation.bones.rigs import FRAMES, PLAYED, Rest, key_all, moving_rig, new_rig, own_constraints
 from tests.animation.keyed import curves_of
 from tests.animation.oracle import assert_shown
 from tests.animation.scenes import key, new_object
@@ -27,12 +23,6 @@ SIDES = (
 def mode_of(carrier: bpy.types.Object | bpy.types.PoseBone) -> str:
     (mode,) = modes_of(carrier, np.array(FRAMES[:1]))
     return mode
-
-
-def modes_in(rig: bpy.types.Object, slot: bpy.types.ActionSlot) -> list[str]:
-    """The modes that bones have throughout in one of the slots that move them."""
-    places = (place for bone in rig.pose.bones for place in bindings_for(transform_of(bone)))
-    return [MODE_NAMES[recorded_mode(place)] for place in places if place.slot.handle == slot.handle]
 
 
 def with_duplicate(obj: bpy.types.Object, original: bpy.types.Object) -> bpy.types.Object:
@@ -53,13 +43,6 @@ def moved(live_file) -> bpy.types.Object:
     return obj
 
 
-def test_an_object_that_gets_a_duplicate_of_a_slot_gets_its_mode(moved):
-    other = with_duplicate(new_object("Other"), moved)
-    assert mode_of(other) == other.rigid_motion.mode == "dq_sclerp"
-    assert_shown([moved, other], PLAYED)
-    assert refresh() == 0
-
-
 def test_a_duplicate_of_a_slot_goes_its_own_way(moved):
     other = with_duplicate(new_object("Other"), moved)
     set_mode(moved, "pga_lerp")
@@ -77,17 +60,6 @@ def test_a_duplicate_of_a_slot_has_the_mode_that_was_duplicated_and_not_that_of_
     set_mode(other, "pga_lerp")
     bpy.context.view_layer.update()
     assert mode_of(with_duplicate(other, moved)) == "dq_sclerp"
-    assert_shown([moved, other], PLAYED)
-
-
-def test_a_slot_with_the_same_keys_that_is_no_duplicate_has_no_mode(moved):
-    other = new_object("Other")
-    action = moved.animation_data.action
-    other.animation_data_create().action = action
-    other.animation_data.action_slot = action.slots.new("OBJECT", "Other")
-    key(other)
-    bpy.context.view_layer.update()
-    assert mode_of(other) == "BLENDER"
     assert_shown([moved, other], PLAYED)
 
 
@@ -113,24 +85,6 @@ def test_a_rig_that_gets_a_duplicate_of_a_slot_gets_the_modes_of_all_bones(live_
     }
     assert_posed(rig, PLAYED)
     assert_posed(other, PLAYED)
-    assert refresh() == 0
-
-
-@pytest.mark.parametrize("mode", ["dq_sclerp", "BLENDER"])
-def test_a_duplicate_beside_its_original_in_strips_has_the_mode_that_it_had(live_file, mode):
-    rig = moving_rig("dq_sclerp")
-    bpy.context.view_layer.update()
-    data = rig.animation_data
-    action, original = data.action, data.action_slot
-    duplicate = with_duplicate(rig, rig).animation_data.action_slot
-    set_mode(list(rig.pose.bones), mode)
-    data.action = None
-    for start, slot in ((1, original), (101, duplicate)):
-        data.nla_tracks.new().strips.new("Strip", start, action).action_slot = slot
-    bpy.context.view_layer.update()
-    refresh()
-    assert modes_in(rig, original) == ["dq_sclerp"] * len(ARM)
-    assert modes_in(rig, duplicate) == [mode] * len(ARM)
     assert refresh() == 0
 
 

@@ -84,36 +84,6 @@ def test_rigs_with_the_same_bones_whose_slots_are_separated_get_each_its_own_key
         assert_posed(rig, PLAYED)
 
 
-def test_rigs_that_share_a_slot_share_it_when_it_is_separated(live_file):
-    rig, other = moving_rig(), new_rig("Other")
-    tool = key(new_object("Tool"))
-    other.animation_data_create().action = rig.animation_data.action
-    other.animation_data.action_slot = rig.animation_data.action_slot
-    bpy.context.view_layer.update()
-    merge_into(rig, tool)
-    separate_slots_of(rig)
-    assert other.animation_data.action == rig.animation_data.action
-    assert_only_its_own(rig)
-    assert_posed(rig, PLAYED)
-    assert_posed(other, PLAYED)
-
-
-def test_separated_slots_are_undone_and_redone(live_file):
-    rig = moving_rig()
-    merge_into(rig, key(new_object("Tool")))
-    keys = snapshot(rig)
-    bpy.ops.ed.undo_push(message="merged")
-    separate_slots_of(rig)
-    bpy.ops.ed.undo_push(message="separated")
-    for step, slots in ((bpy.ops.ed.undo, 3), (bpy.ops.ed.redo, 2)):
-        step()
-        rig = bpy.data.objects["Rig"]
-        bpy.context.view_layer.update()
-        assert len(rig.animation_data.action.slots) == slots
-        assert snapshot(rig) == keys
-        assert_posed(rig, PLAYED)
-
-
 def test_a_rig_whose_slot_moves_to_another_action_takes_its_modes_along(live_file):
     rig, tool = moving_rig(), key(new_object("Tool"))
     set_mode(rig.pose.bones["Hand"], "pga_lerp", [FRAMES[1]])
@@ -209,25 +179,6 @@ def test_a_strip_is_given_no_slot_where_there_are_two_with_keys(live_file):
     hero, tool, villain = moving_rig(name="Hero"), key(new_object("Tool")), new_rig("Villain")
     merge_into(hero, tool)
     assert strip_of(villain, hero.animation_data.action).action_slot is None
-
-
-def test_a_strip_without_a_slot_stays_so_where_the_only_one_has_no_differences(live_file):
-    plain, villain = key_all(new_rig("Plain")), new_rig("Villain")
-    strip = strip_of(villain, plain.animation_data.action)
-    strip.action_slot = None
-    bpy.context.view_layer.update()
-    assert strip.action_slot is None
-
-
-def test_rigs_with_the_same_keys_that_are_merged_keep_modes_of_their_own(live_file):
-    modes = {"A": "dq_sclerp", "B": "pga_lerp", "C": "motor_spline"}
-    rigs = [moving_rig(mode, name=name) for name, mode in modes.items()]
-    before = shown_poses(rigs, PLAYED)
-    merge_into(*rigs)
-    assert len({rig.animation_data.action for rig in rigs}) == 1
-    for rig, expected, shown in zip(rigs, before, shown_poses(rigs, PLAYED), strict=True):
-        assert_same_poses(rig, PLAYED, shown, expected)
-        assert_posed(rig, PLAYED)
 
 
 def test_a_rig_whose_slot_was_removed_keeps_nobody_from_following_edits(live_file, caplog):

@@ -8,7 +8,6 @@ from collections.abc import Callable
 import bpy
 import numpy as np
 import pytest
-from mathutils import Matrix
 
 from rigid_motion.animation import key_frames, set_mode
 from tests.animation.bones.poses import placed
@@ -73,14 +72,6 @@ def test_the_visual_transform_below_another_constraint_is_kept_when_that_is_remo
     assert np.abs(placed(rig) - seen).max() < 2e-5
 
 
-def test_a_matrix_is_where_a_script_has_put_it_and_is_keyed_there_later(rig):
-    matrix = Matrix.LocRotScale((0.3, 0.2, 0.9), None, None) @ rig.pose.bones["Body"].matrix.to_3x3().to_4x4()
-    rig.pose.bones["Body"].matrix = matrix
-    assert np.abs(placed(rig)[0] - np.array(matrix)).max() < 2e-5
-    insert_keys(rig)
-    assert np.abs(placed(rig)[0] - np.array(matrix)).max() < 2e-5
-
-
 def test_a_bone_that_is_moved_on_by_hand_is_keyed_where_it_is(rig):
     apply_visual_transform(rig)
     placed(rig)
@@ -119,18 +110,6 @@ def test_rigify_keeps_a_transform_where_it_is_seen_when_a_parent_is_switched(rig
     assert np.abs(placed(rig)[3] - seen[3]).max() < 2e-5
 
 
-def test_a_pose_that_is_pasted_is_seen_as_it_was_copied(rig, live_file):
-    live_file.scene.frame_set(24)
-    copied = placed(rig)
-    as_an_animator(bpy.ops.pose.copy)
-    live_file.scene.frame_set(BETWEEN)
-    as_an_animator(bpy.ops.pose.paste)
-    assert np.abs(placed(rig) - copied).max() < 2e-5
-    insert_keys(rig)
-    assert np.abs(placed(rig) - copied).max() < 2e-5
-    assert len(curves_of(rig.pose.bones["Hand"])["location", 0].keyframe_points) == 5
-
-
 def test_where_one_property_of_a_whole_pose_is_keyed_so_is_the_rest(rig):
     seen = placed(rig)
     apply_visual_transform(rig)
@@ -158,20 +137,3 @@ def test_undo_brings_back_a_whole_pose_as_it_was_seen(rig, live_file):
     assert np.abs(placed(rig) - copied).max() < 2e-5
     insert_keys(rig)
     assert np.abs(placed(rig) - copied).max() < 2e-5
-
-
-@pytest.mark.parametrize("then", ["looked at", "keyed", "another frame"])
-def test_undo_brings_back_the_in_between_that_was_seen_before_a_whole_pose(rig, live_file, then):
-    bpy.ops.ed.undo_push(message="Begin")
-    seen = placed(rig)
-    as_an_animator(bpy.ops.pose.visual_transform_apply)
-    with bpy.context.temp_override(mode="OBJECT"):
-        assert bpy.ops.ed.undo() == {"FINISHED"}
-    rig = bpy.data.objects["Rig"]
-    if then == "another frame":
-        live_file.scene.frame_set(BETWEEN + 1)
-        live_file.scene.frame_set(BETWEEN)
-    assert np.abs(placed(rig) - seen).max() < 1e-6
-    if then == "keyed":
-        insert_keys(rig)
-        assert np.abs(placed(rig) - seen).max() < 2e-5

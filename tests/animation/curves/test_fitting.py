@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation.curves.solvers import fit_together
+from tests.thoroughness import tried
 
 TIMES = np.linspace(0.0, 1.0, 41)
 
@@ -53,7 +54,7 @@ def test_one_segment_is_recovered(handles):
 def test_what_no_single_segment_is_can_be_the_mean_of_several():
     random = np.random.default_rng(1)
     errors = []
-    for _ in range(20):
+    for _ in range(tried(20)):
         x = np.sort(random.uniform(0.05, 0.95, size=(4, 2)), axis=1)
         handles = np.stack((x, random.normal(0.5, 0.5, size=(4, 2))), axis=2)
         old, new = random.dirichlet((2.0,) * 4, size=2)

@@ -50,35 +50,6 @@ def test_curves_keyed_together_have_the_values_that_each_has_alone(drawn, cycles
         np.testing.assert_allclose(own, expected, rtol=1e-9, atol=1e-6 * size)
 
 
-def test_many_curves_on_many_frames_have_the_values_that_each_has_alone():
-    """More than are worked on at once."""
-    random = np.random.default_rng(8)
-    points = random.normal(size=(40, 6))
-    together = [
-        keys_of(
-            np.arange(0, 120, 20) + i % 3,
-            row,
-            "BEZIER",
-            left=np.column_stack((np.arange(0, 120, 20) + i % 3 - 7, row)),
-            right=np.column_stack((np.arange(0, 120, 20) + i % 3 + 5, row + 1.0)),
-        )
-        for i, row in enumerate(points)
-    ]
-    frames = np.linspace(-5.0, 110.0, 6000)
-    for keys, (own,) in zip(together, evaluate(together, [frames] * 40), strict=True):
-        np.testing.assert_allclose(own, evaluate_one(keys, frames), rtol=0.0, atol=1e-9)
-
-
-@settings(max_examples=tried(50))
-@given(curves(), st.none() | all_cycles)
-def test_the_order_of_frames_does_not_matter(keys, cycles):
-    keys = dataclasses.replace(keys, cycles=cycles)
-    frames = frames_about(keys)
-    order = np.random.default_rng(1).permutation(len(frames))
-    rising, mixed = evaluate_one(keys, frames), evaluate_one(keys, frames[order])
-    np.testing.assert_array_equal(mixed, rising[order])
-
-
 @pytest.mark.parametrize("easing", EASINGS)
 def test_the_elastic_timing_of_channels_is_their_own_or_that_of_a_curve_from_0_to_1(easing):
     ways = (8.0, -3.0, 1.0)

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import bpy
-import numpy as np
 import pytest
 
-from rigid_motion.animation.curves.evaluation import evaluate
 from rigid_motion.animation.curves.keys import EASINGS, INTERPOLATIONS
-from tests.animation.curves.examples import as_fcurve, evaluate_one, joined, keys_of, read_one
+from tests.animation.curves.examples import as_fcurve, keys_of, read_one
 
 EDITS: dict[str, Callable[[bpy.types.FCurve], None]] = {
     "frame": lambda fcurve: setattr(fcurve.keyframe_points[1].co, "x", 6.0),
@@ -36,15 +34,6 @@ def test_every_edit_shows_in_the_raw_bytes(edit):
         assert read_one(fcurve).raw == before
         EDITS[edit](fcurve)
         assert read_one(fcurve).raw != before
-
-
-def test_the_keys_of_some_channels_have_the_values_that_those_had():
-    easing = {"easing": np.zeros(2, np.int32), "easing_settings": ((1.7, 1.7), (0, 0), (0, 0))}
-    channels = [keys_of((1, 9), (row, row + 2), kind, **easing) for row, kind in enumerate(("BACK", "LINEAR", "SINE"))]
-    frames = np.arange(12.0)
-    for rows in ([0], [2, 0], [1, 2]):
-        (result,) = evaluate([joined(channels).only(rows)], [frames])
-        np.testing.assert_array_equal(result, [evaluate_one(channels[row], frames) for row in rows])
 
 
 @pytest.mark.parametrize(("name", "codes"), [("interpolation", INTERPOLATIONS), ("easing", EASINGS)])

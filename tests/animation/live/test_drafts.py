@@ -144,23 +144,9 @@ def test_strips_are_exact(rig):
     assert max(rates_in(action)) > 1
 
 
-def test_time_that_is_stretched_is_exact(rig):
-    bpy.context.scene.render.frame_map_new = 200
-    edit(rig)
-    assert not is_draft(rig)
-    assert max(rates(rig)) > 1
-
-
 def test_nothing_is_left_in_draft_where_edits_are_not_followed(rig):
     edit(rig)
     animation.set_enabled(False)
-    assert is_exact_by_itself(rig)
-
-
-def test_nothing_is_left_in_draft_where_the_extension_is_switched_off(rig):
-    edit(rig)
-    animation.unregister()
-    animation.register()
     assert is_exact_by_itself(rig)
 
 
@@ -191,14 +177,6 @@ def test_small_rigs_are_exact_at_once(window, monkeypatch):
     edit(rig)
     assert not is_draft(rig)
     assert is_exact_by_itself(rig)
-
-
-def test_nothing_is_in_draft_without_a_window(live_file, monkeypatch):
-    monkeypatch.setattr(filling, "LARGE", 0)
-    assert bpy.app.background
-    rig = moving_rig()
-    edit(rig)
-    assert not is_draft(rig)
 
 
 def test_a_render_waits_for_the_main_thread_but_not_for_ever(monkeypatch):

@@ -13,11 +13,10 @@ from rigid_motion.animation.actions.reading import keyed_in
 from rigid_motion.animation.actions.slots import bindings_of
 from rigid_motion.animation.compute.differences import in_betweens
 from rigid_motion.animation.transforms import transform_of
-from tests.animation.bones.poses import shown_poses
-from tests.animation.bones.rigs import in_turn, new_rig
+from tests.animation.bones.rigs import in_turn
 from tests.animation.keyed import MODE_IDS, curves_of, snapshot
 from tests.animation.oracle import matrices, shown_worlds
-from tests.animation.scenes import new_object, push_down, tweak
+from tests.animation.scenes import new_object
 
 FRAMES = (1.0, 17.0, 25.0, 49.0, 60.0)
 POSES = [
@@ -156,18 +155,6 @@ def test_a_key_in_between_leaves_the_motion_as_it_was(live_file, mode, handles):
         assert largest(between(obj), motion) < MILLIMETRE, f"key on {frame}"
 
 
-@pytest.mark.parametrize("mode", ["cga_lerp", "cga_slerp", "motor_spline"])
-@pytest.mark.parametrize("order", ["QUATERNION", "XYZ"])
-def test_so_it_does_where_it_grows_and_turns_by_any_channels(live_file, mode, order):
-    obj = keyed(new_object("Tool", order), scale=True)
-    set_mode(obj, mode)
-    seen, motion = shown(obj), between(obj)
-    for frame in (20, 40):
-        key_on(obj, frame)
-    assert largest(shown(obj), seen) < MILLIMETRE
-    assert largest(between(obj), motion) < MILLIMETRE
-
-
 def test_the_handles_beside_it_are_kept(live_file):
     obj = keyed(new_object())
     set_mode(obj, "dq_sclerp")
@@ -178,47 +165,6 @@ def test_the_handles_beside_it_are_kept(live_file):
         assert points[2][2:4] == then[2][2:4], "before the key in front of it"
         assert points[4][4:6] == then[3][4:6], "behind the key after it"
         np.testing.assert_allclose([points[i][:6] for i in (0, 1, 5)], [then[i][:6] for i in (0, 1, 4)], atol=1e-5)
-
-
-def test_so_it_does_for_bones(live_file):
-    rig = new_rig()
-    hand = keyed(rig.pose.bones["Hand"])
-    set_mode(hand, "motor_spline")
-
-    def poses() -> np.ndarray:
-        return (shown_poses([rig], PLAYED)[0]["Hand"] @ POINTS)[:, :3]
-
-    before = poses()
-    for frame in (31, 34):
-        key_on(hand, frame)
-    assert largest(poses(), before) < MILLIMETRE
-
-
-@pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline"])
-def test_so_it_does_in_a_strip_that_is_edited(live_file, mode):
-    obj = keyed(new_object())
-    set_mode(obj, mode)
-    strip = push_down(obj, 11)
-    before = shown_worlds([obj], PLAYED + 10.0)[0] @ POINTS
-    tweak(obj, strip)
-    key_on(obj, 40)
-    obj.animation_data.use_tweak_mode = False
-    bpy.context.view_layer.update()
-    after = shown_worlds([obj], PLAYED + 10.0)[0] @ POINTS
-    assert 30.0 in {point.co[0] for point in strip.action.layers[0].strips[0].channelbags[0].fcurves[0].keyframe_points}
-    assert largest(after[:, :3], before[:, :3]) < MILLIMETRE
-
-
-def test_a_pose_by_hand_is_an_ordinary_key(live_file):
-    obj = keyed(new_object())
-    set_mode(obj, "motor_spline")
-    bpy.context.scene.frame_set(31)
-    obj.location.z += 1.0
-    bpy.context.view_layer.update()
-    insert(obj)
-    bpy.context.view_layer.update()
-    assert {point.type for point in keys_of(obj)} == {"KEYFRAME"}
-    assert {point.handle_left_type for point in keys_of(obj)} == {"AUTO_CLAMPED"}
 
 
 # -- breakdowns -------------------------------------------------------------------------------------------------------

@@ -59,6 +59,8 @@ ENDS: dict[str, Callable[[bpy.types.Object], None]] = {
     "animation data cleared": clear_animation_data,
     "keyframes cleared": clear_keyframes,
     "channels deleted": delete_channels,
+    "slot unlinked": lambda obj: setattr(obj.animation_data, "action_slot", None),
+    "slot deleted": lambda obj: obj.animation_data.action.slots.remove(obj.animation_data.action_slot),
 }
 
 
@@ -79,6 +81,19 @@ def test_an_object_stays_where_it_is_seen(live_file, end, order, own, exact):
         assert np.abs(world() - seen).max() < 1e-5
     assert not any(obj.rigid_motion.filled)
     assert own_deltas(obj) == before
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_where_its_action_is_deleted_an_object_has_its_own_delta_transforms_again(live_file, order):
+    obj = new_object("Tool", order)
+    own = give_own_deltas(obj)
+    key(obj, scale="even")
+    set_mode(obj, "cga_slerp")
+    live_file.scene.frame_set(BETWEEN)
+    bpy.data.actions.remove(obj.animation_data.action)
+    bpy.context.view_layer.update()
+    assert own_deltas(obj) == own
+    assert not any(obj.rigid_motion.filled)
 
 
 @pytest.mark.parametrize(("end", "order"), in_turn(ENDS, ORDERS))
@@ -149,18 +164,6 @@ def test_a_matrix_that_is_set_in_the_same_go_is_where_it_lands(live_file):
     obj.animation_data_clear()
     obj.matrix_world = matrix
     assert np.abs(world() - np.array(matrix)).max() < 1e-5
-
-
-def test_a_bone_that_is_reset_in_the_same_go_is_at_rest(live_file):
-    rig = key_all(new_rig())
-    set_mode(list(rig.pose.bones), "dq_sclerp")
-    live_file.scene.frame_set(BETWEEN)
-    placed(rig)
-    rig.animation_data_clear()
-    for bone in rig.pose.bones:
-        bone.matrix_basis = Matrix.Identity(4)
-    now = placed(rig)
-    assert np.abs(now - np.array([bone.bone.matrix_local for bone in rig.pose.bones])).max() < 1e-6
 
 
 def test_where_edits_are_followed_later_it_is_left_as_it_is_seen_then(live_file):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import set_mode
-from tests.animation.bones.rigs import key_all, new_rig, select_only
+from tests.animation.bones.rigs import select_only
 from tests.animation.keyed import curves_of
 from tests.animation.oracle import expected_bases
 from tests.animation.scenes import FRAMES, key, new_object
@@ -54,19 +54,3 @@ def test_keys_that_a_script_sets_are_followed(live_file, to):
         shown = np.array(one.evaluated_get(live_file.evaluated_depsgraph_get()).matrix_world)
         assert np.abs(shown - expected_bases(one, [float(frame)])[0]).max() < 2e-5
     assert np.abs(expected_bases(single, [float(frame)]) - expected_bases(obj, [float(frame)])).max() > 0.5
-
-
-def test_keys_of_a_rig_that_a_script_sets_are_followed(live_file):
-    rig = key_all(new_rig(), FRAMES)
-    set_mode(list(rig.pose.bones), "dq_sclerp")
-    single = copy_of(rig)
-    live_file.scene.frame_set(BETWEEN)
-    make_single_user(single)
-    raise_keys(single.pose.bones["Body"])
-    live_file.view_layer.update()
-    bone = single.evaluated_get(live_file.evaluated_depsgraph_get()).pose.bones["Body"]
-    expected = (
-        np.array(single.data.bones["Body"].matrix_local)
-        @ expected_bases(single.pose.bones["Body"], [float(BETWEEN)])[0]
-    )
-    assert np.abs(np.array(bone.matrix) - expected).max() < 5e-5

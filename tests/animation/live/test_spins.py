@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import pi, tau
+from math import tau
 
 import bpy
 import numpy as np
@@ -48,32 +48,11 @@ def rotations(angles, axis: int) -> np.ndarray:
     return result
 
 
-@pytest.mark.parametrize("sense", [1.0, -1.0])
-@pytest.mark.parametrize("mode", KEYFRAME_MODES)
-def test_keys_at_every_half_turn_turn_three_times_one_way(live_file, mode, sense):
-    obj = wheel(sense * pi * np.arange(7), mode)
-    lerp = mode in ("pga_lerp", "cga_lerp")
-    result, even = turned(obj), rotations(sense * tau * 3.0 * (EACH - 1.0) / 72.0, 1)
-    if lerp:
-        # Slower at the keys, but the same on keys and half-way.
-        result, even = result[::6], even[::6]
-    assert np.abs(result - even).max() < 1e-5
-    steps = np.einsum("mij,mij->m", turned(obj)[1:], turned(obj)[:-1])
-    assert np.all(np.arccos(np.clip((steps - 1.0) / 2.0, -1.0, 1.0)) > 0.02)
-
-
 @pytest.mark.parametrize(("mode", "order"), in_turn(KEYFRAME_MODES, ORDERS))
 @pytest.mark.parametrize("axis", range(3))
 def test_three_turns_between_two_keys_are_the_angle_over_time(live_file, mode, order, axis):
     obj = wheel((0.0, -3.0 * tau), mode, order=order, axis=axis, frames=(1.0, 73.0))
     assert np.abs(turned(obj) - rotations(-3.0 * tau * (EACH - 1.0) / 72.0, axis)).max() < 1e-5
-
-
-@pytest.mark.parametrize("interpolation", ["BEZIER", "SINE", "BACK"])
-def test_a_spin_is_eased_as_its_angle(live_file, interpolation):
-    obj = wheel((0.3, 0.3 + 5.0 * tau), "dq_sclerp", interpolation=interpolation, frames=(1.0, 73.0))
-    angles = np.array([curve_of(obj, "rotation_euler", 1).evaluate(frame) for frame in EACH])
-    assert np.abs(turned(obj) - rotations(angles, 1)).max() < 1e-5
 
 
 def propeller(mode: str, *, interpolation: str = "LINEAR", frames=(1.0, 25.0, 49.0), moves: bool = True, angle=0.7):
@@ -123,19 +102,6 @@ def insert(obj: bpy.types.Object, frame: int) -> None:
     bpy.context.view_layer.update()
 
 
-@pytest.mark.parametrize("frame", [3, 13])
-@pytest.mark.parametrize(("mode", "turns"), in_turn(KEYFRAME_MODES, [1, 3, -2]))
-def test_a_key_in_between_shares_the_turns_out(live_file, mode, turns, frame):
-    obj = propeller(mode, moves=False)
-    set_turns(obj, turns, [1.0])
-    before = turned(obj, EACH[:49])
-    insert(obj, frame)
-    after = turned(obj, EACH[:49])
-    assert np.abs(after[[0, frame - 1, 24, 48]] - before[[0, frame - 1, 24, 48]]).max() < 1e-5
-    if mode not in ("pga_lerp", "cga_lerp", "motor_spline"):
-        assert np.abs(after - before).max() < 1e-4
-
-
 @pytest.mark.parametrize("interpolation", ["LINEAR", "BEZIER"])
 @pytest.mark.parametrize(("mode", "order"), in_turn(KEYFRAME_MODES, ORDERS))
 def test_any_angles_turn_as_the_oracle_has_it(live_file, mode, order, interpolation):
@@ -147,41 +113,6 @@ def test_any_angles_turn_as_the_oracle_has_it(live_file, mode, order, interpolat
     set_mode(obj, mode)
     set_turns(obj, 2, [17.0])
     assert_shown([obj], EACH[:49], {obj.name: own})
-
-
-@pytest.mark.parametrize("interpolation", ["LINEAR", "BEZIER"])
-@pytest.mark.parametrize("mode", KEYFRAME_MODES)
-def test_turns_of_quaternions_are_as_the_oracle_has_them(live_file, mode, interpolation):
-    obj = propeller(mode, frames=(1.0, 17.0, 25.0, 49.0), interpolation=interpolation)
-    set_turns(obj, 3, [1.0])
-    set_turns(obj, -1, [25.0])
-    assert_shown([obj], EACH[:49])
-
-
-def test_a_wheel_at_constant_speed_keeps_it_through_keys_of_turns(live_file):
-    """Smooth Screw: keys 40 degrees and two turns apart, at times in proportion."""
-    obj = new_object()
-    frames = np.array((1.0, 13.0, 37.0, 49.0))
-    halves = np.radians(20.0 + 360.0) * (frames - 1.0) / 12.0
-    quaternions = np.column_stack((np.cos(halves), np.zeros(4), np.sin(halves), np.zeros(4)))
-    write_channel(obj, "rotation_quaternion", frames, quaternions, interpolation="LINEAR")
-    set_mode(obj, "motor_spline")
-    set_turns(obj, 2, [1.0, 37.0])
-    set_turns(obj, 4, [13.0])
-    even = rotations(2.0 * np.radians(380.0) * np.arange(49) / 12.0, 1)
-    assert np.abs(turned(obj, EACH[:49]) - even).max() < 1e-5
-
-
-@pytest.mark.parametrize(("mode", "interpolation"), in_turn(KEYFRAME_MODES, ["BEZIER", "ELASTIC", "CONSTANT"]))
-def test_what_stays_between_its_keys_spins_by_the_interpolation_of_its_rotation(live_file, mode, interpolation):
-    obj, frames = new_object(), np.array((1.0, 13.0, 25.0, 49.0))
-    for path, values in (("location", (0.0, 1.0, -2.0)), ("rotation_quaternion", (0.8, 0.0, 0.6, 0.0))):
-        rows = np.tile(values, (4, 1))
-        rows[3] = np.roll(values, 1)
-        write_channel(obj, path, frames, rows, interpolation="LINEAR" if path == "location" else interpolation)
-    set_mode(obj, mode)
-    set_turns(obj, 2, [13.0])
-    assert_shown([obj], EACH[:49])
 
 
 @pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline"])
@@ -211,23 +142,6 @@ def test_fewer_keys_of_what_spins_keep_to_the_tolerance(live_file, order):
     for corner in 0.5 * np.vstack((np.zeros(3), np.eye(3), -np.eye(3))):
         moved = after[:, :3, :3] @ corner + after[:, :3, 3] - before[:, :3, :3] @ corner - before[:, :3, 3]
         assert np.linalg.norm(moved, axis=1).max() < 0.002 + 1e-5
-
-
-def test_turns_are_in_the_file_and_a_muted_channel_has_none(live_file, tmp_path):
-    obj = propeller("dq_sclerp")
-    without = turned(obj, EACH[:49])
-    set_turns(obj, 2, [1.0], axis="Y")
-    before = turned(obj, EACH[:49])
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "turns.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "turns.blend"))
-    obj = bpy.data.objects["Tool"]
-    assert np.abs(turned(obj, EACH[:49]) - before).max() < 1e-6
-    curve_of(obj, "rigid_motion.turns").mute = True
-    bpy.context.view_layer.update()
-    assert np.abs(turned(obj, EACH[:49]) - without).max() < 1e-5
-    curve_of(obj, "rigid_motion.turns").mute = False
-    bpy.context.view_layer.update()
-    assert np.abs(turned(obj, EACH[:49]) - before).max() < 1e-6
 
 
 @pytest.mark.parametrize("after", ["REPEAT", "REPEAT_OFFSET", "MIRROR"])
@@ -280,18 +194,6 @@ def test_keys_in_between_keep_the_path_of_what_moves(live_file, mode, turns, axi
     for frame in frames:
         insert(obj, frame)
     assert np.abs(shown_worlds([obj], EACH[:49])[0] - before).max() < 1e-4
-
-
-@pytest.mark.parametrize("order", ["XYZ", "YZX", "ZYX"])
-@pytest.mark.parametrize("frames", [(9, 20)])
-@pytest.mark.parametrize("mode", ["lerp_slerp", "dq_sclerp", "pga_slerp", "cga_slerp"])
-def test_keys_in_between_keep_the_path_of_a_wheel_that_rolls_by_angles(live_file, mode, frames, order):
-    obj = wheel((0.0, 3.0 * tau + 1.0), mode, order=order, frames=(1.0, 25.0))
-    write_channel(obj, "location", np.array((1.0, 25.0)), np.array(((0, 0, 0), (4, 1, 0))), interpolation="LINEAR")
-    before = shown_worlds([obj], EACH[:25])[0]
-    for frame in frames:
-        insert(obj, frame)
-    assert np.abs(shown_worlds([obj], EACH[:25])[0] - before).max() < 1e-4
 
 
 @pytest.mark.parametrize("mode", ["lerp_slerp", "dq_sclerp", "motor_spline"])
@@ -360,15 +262,3 @@ def test_too_many_turns_of_the_channel_are_told(live_file):
     curve_of(obj, "rigid_motion.turns").keyframe_points[0].co_ui.y = 1e6
     bpy.context.view_layer.update()
     assert "key 1 of the channel Turns" in animation.problem_of(obj)
-
-
-def test_a_bake_of_euler_angles_needs_no_channel_of_turns(live_file):
-    obj = wheel((0.0, 3.0 * tau + 1.0), "dq_sclerp", frames=(1.0, 25.0))
-    write_channel(obj, "location", np.array((1.0, 25.0)), np.array(((0, 0, 0), (4, 1, 0))), interpolation="LINEAR")
-    before = shown_worlds([obj], EACH[:25])[0]
-    animation.bake(obj)
-    assert curve_of(obj, "rigid_motion.turns") is None
-    assert np.abs(shown_worlds([obj], EACH[:25])[0] - before).max() < 1e-5
-    animation.unbake(obj)
-    animation.bake(obj, step=2, first=5, last=15)
-    assert np.abs(shown_worlds([obj], EACH[:25:2])[0] - before[::2]).max() < 1e-5

@@ -54,12 +54,6 @@ def test_there_is_no_segment_outside_of_the_keys_nor_with_a_single_one(live_file
     assert at(turned((0,), frames=FRAMES[:1]), 1) is None
 
 
-def test_a_segment_has_the_mode_of_the_key_it_begins_with(live_file):
-    obj = turned((0, 90, 120))
-    set_mode(obj, "dq_sclerp", [11.0])
-    assert [at(obj, frame).mode for frame in (5, 20)] == ["BLENDER", "dq_sclerp"]
-
-
 def test_euler_keys_turn_as_far_as_their_angles_say(live_file):
     obj = turned((0, 350, 380), "XYZ")
     assert not at(obj, 5).long_way
@@ -87,13 +81,6 @@ def test_turns_of_the_channel_are_told(live_file):
 def test_quaternions_of_opposite_signs_go_the_long_way_in_blender(live_file):
     assert at(turned((0, 90, 120), sign=-1.0), 5).long_way
     assert not at(turned((0, 0, 0), sign=-1.0), 5).long_way, "a full turn through nothing is no way at all"
-
-
-def test_half_a_turn_goes_neither_way(live_file):
-    for rotation_mode in ("QUATERNION", "XYZ"):
-        segment = at(turned((0, 180, 0), rotation_mode), 5)
-        assert np.degrees(segment.turn) == pytest.approx(180.0, abs=1e-3)
-        assert not segment.long_way
 
 
 def test_a_scale_that_differs_from_axis_to_axis_is_told_where_it_changes(live_file):

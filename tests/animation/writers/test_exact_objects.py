@@ -149,20 +149,6 @@ def test_delta_transforms_hit_keys_off_whole_frames_too(live_file, mode, order):
     assert refresh() == 0
 
 
-@pytest.mark.parametrize("is_exact", [False, True])
-def test_a_key_inserted_between_frames_keeps_the_pose(live_file, is_exact):
-    obj = set_up("Tool")
-    set_exact(obj, is_exact)
-    bpy.context.scene.frame_set(10, subframe=0.5)
-    bpy.context.view_layer.update()
-    (before,) = shown_worlds([obj], [10.5])
-    for path in ("location", "rotation_quaternion"):
-        obj.keyframe_insert(path, frame=10.5)
-    bpy.context.view_layer.update()
-    (after,) = shown_worlds([obj], [10.5])
-    assert np.abs(after - before).max() < 1e-5
-
-
 def test_a_driver_of_the_rotation_may_come_and_go(live_file):
     obj = key(new_object("Tool"))
     set_mode(obj, "cga_slerp")

@@ -8,11 +8,10 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import problem_of, refresh, set_mode
+from rigid_motion.animation import refresh, set_mode
 from tests.animation.bones.poses import assert_posed
-from tests.animation.bones.rigs import Rest, key_all, moving_rig, new_rig
+from tests.animation.bones.rigs import moving_rig
 from tests.animation.keyed import curves_of
-from tests.animation.oracle import assert_shown
 from tests.animation.scenes import give_own_deltas, key, new_object, own_deltas
 
 PLAYED = np.arange(-3.0, 46.0)
@@ -41,20 +40,6 @@ DEEDS = pytest.mark.parametrize("deed", [group, ungroup], ids=lambda deed: deed.
 
 
 @DEEDS
-@pytest.mark.parametrize("order", ["QUATERNION", "XYZ"])
-def test_an_object_is_followed_whatever_group_its_channels_are_in(live_file, deed: Callable, order):
-    obj = new_object("Tool", order)
-    own = give_own_deltas(obj)
-    set_mode(key(obj), "dq_sclerp")
-    deed(obj.animation_data.action)
-    curves_of(obj)["location", 0].keyframe_points[1].co_ui.y += 1.0
-    bpy.context.view_layer.update()
-    assert problem_of(obj) == ""
-    assert_shown([obj], PLAYED, {obj.name: own})
-    assert refresh() == 0
-
-
-@DEEDS
 def test_blenders_in_betweens_take_away_what_is_in_other_groups(live_file, deed: Callable):
     obj = new_object("Tool", "QUATERNION")
     own = give_own_deltas(obj)
@@ -74,14 +59,6 @@ def test_bones_are_followed_whatever_group_their_channels_are_in(live_file, deed
     bpy.context.view_layer.update()
     assert_posed(rig, PLAYED)
     set_mode(rig.pose.bones["Hand"], "pga_lerp")
-    bpy.context.view_layer.update()
-    assert_posed(rig, PLAYED)
-    assert refresh() == 0
-
-
-def test_a_bone_may_be_called_as_the_group_of_in_betweens_is(live_file):
-    rig = key_all(new_rig("Rig", (Rest("Rigid Motion", (0, 0, 0), (0, 0, 1)),)))
-    set_mode(list(rig.pose.bones), "dq_sclerp")
     bpy.context.view_layer.update()
     assert_posed(rig, PLAYED)
     assert refresh() == 0

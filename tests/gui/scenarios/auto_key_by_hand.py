@@ -1,7 +1,4 @@
-"""Auto Key on frames between keys, and an Action that goes and comes: what lands where, in a window.
-
-What is put somewhere (snapped, grabbed) stays there once it is keyed, and nothing of an in-between stays on the cube.
-"""
+"""Auto Key on frames between keys: what is put somewhere (snapped, grabbed, typed) stays there once it is keyed."""
 
 from __future__ import annotations
 
@@ -9,10 +6,9 @@ import bpy
 import numpy as np
 
 from tests.animation.keyed import curves_of, key_frames
-from tests.animation.oracle import assert_shown
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
-from tests.gui.scenarios.edits_by_hand import ALIKE, FRAMES, SCREW, WHOLE, assert_on_the_screw, cube, key_the_cube
+from tests.gui.scenarios.edits_by_hand import ALIKE, FRAMES, assert_on_the_screw, cube, key_the_cube
 
 CURSOR = (1.0, 2.0, 0.5)
 
@@ -24,7 +20,7 @@ def place() -> np.ndarray:
 
 
 def scenario(hand: Hand) -> Steps[None]:
-    """An animator works with Auto Key between the keys of a screw, and exchanges its Action."""
+    """An animator works with Auto Key between the keys of a screw."""
     yield from hand.open_animation_workspace()
     view = hand.area("VIEW_3D")
     key_the_cube()
@@ -35,7 +31,6 @@ def scenario(hand: Hand) -> Steps[None]:
     yield from snapped(hand, view)
     yield from grabbed(hand, view)
     yield from typed(hand)
-    yield from unlinked(hand)
 
 
 def snapped(hand: Hand, view: bpy.types.Area) -> Steps[None]:
@@ -79,21 +74,3 @@ def typed(hand: Hand) -> Steps[None]:
     assert curves_of(cube())["location", 0].evaluate(35) == 5.0
     assert abs(place()[0, 3] - 5.0) < ALIKE
     yield from hand.picture("typed")
-
-
-def unlinked(hand: Hand) -> Steps[None]:
-    """The Action is unlinked in the Action Editor on a frame between keys, and chosen again."""
-    sheet = hand.area("DOPESHEET_EDITOR")
-    sheet.spaces.active.mode = "ACTION"
-    bpy.context.scene.frame_set(15)
-    action, slot = cube().animation_data.action, cube().animation_data.action_slot
-    action.use_fake_user = True
-    with bpy.context.temp_override(window=hand.window, area=sheet, region=places.region(sheet)):
-        bpy.ops.action.unlink()
-    yield from hand.wait_until(lambda: cube().animation_data.action is None, "the Action is unlinked")
-    yield from hand.wait_until(lambda: not any(cube().rigid_motion.filled), "the cube has its own delta transforms")
-    assert tuple(cube().delta_location) == (0.0, 0.0, 0.0)
-    cube().animation_data.action, cube().animation_data.action_slot = action, slot
-    yield from hand.wait_until(lambda: cube().rigid_motion.mode == SCREW, "the mode is back with the Action")
-    assert_shown([cube()], WHOLE)
-    yield from hand.picture("chosen-again")

@@ -7,10 +7,9 @@ import numpy as np
 
 from rigid_motion.motion import Poses, interpolate
 from tests.animation.keyed import snapshot
-from tests.animation.oracle import as_quaternion
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
-from tests.gui.scenarios.bones_by_hand import ALIKE, SCREW, hand_bone, key_frames, now, pose_the_rig, rig
+from tests.gui.scenarios.bones_by_hand import ALIKE, SCREW, hand_bone, key_frames, now, pose_the_rig
 
 FRAME, WAY = 8, 300
 
@@ -25,7 +24,6 @@ def scenario(hand: Hand) -> Steps[None]:
     yield from typed_and_beyond(hand, view)
     yield from pushed(hand, view)
     yield from in_the_dope_sheet(hand, hand.area("DOPESHEET_EDITOR"))
-    yield from an_object(hand, view)
 
 
 def keys() -> Poses:
@@ -122,29 +120,6 @@ def in_the_dope_sheet(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
     assert key_frames() == [1, FRAME, 20, 40]
     yield from hand.press("Z", ctrl=True)
     assert snapshot(hand_bone()) == before
-
-
-def an_object(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """By F3 in Object Mode."""
-    yield from hand.hover(places.centre(places.region(view)))
-    yield from hand.press("TAB", ctrl=True)
-    obj = rig()
-    for frame, x in ((1, 0.0), (20, 2.0)):
-        obj.location, obj.rotation_euler = (x, 0.0, 0.0), (0.0, 0.0, x)
-        obj.keyframe_insert("location", frame=frame)
-        obj.keyframe_insert("rotation_euler", frame=frame)
-    bpy.ops.rigid_motion.set_mode(mode=SCREW)
-    bpy.context.scene.frame_set(FRAME)
-    bpy.ops.ed.undo_push(message="Object")
-    yield from hand.hover(places.centre(places.region(view)))
-    yield from hand.search("Breakdown along Mode")
-    yield 0.2
-    yield from hand.type("25")
-    yield from hand.picture("object")
-    yield from hand.press("RET")
-    ends = Poses([(0.0, 0.0, 0.0), (2.0, 0.0, 0.0)], [as_quaternion((0.0, 0.0, x), "XYZ") for x in (0.0, 2.0)])
-    expected = interpolate((0.0, 1.0), ends, np.array([0.25]), SCREW)
-    np.testing.assert_allclose(rig().matrix_basis.translation, expected.positions[0], atol=ALIKE)
 
 
 def undo_steps() -> int:

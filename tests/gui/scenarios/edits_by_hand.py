@@ -1,4 +1,4 @@
-"""A screw that is edited by hand: keys moved and inserted, undone, played, baked and un-baked, every pose checked.
+"""A screw that is edited by hand: keys moved and inserted, undone, played, every pose checked.
 
 What is on the screen is held against `tests.animation.oracle` on every frame, after every edit.
 """
@@ -57,7 +57,7 @@ def assert_on_the_screw(*frames: float) -> None:
 
 
 def scenario(hand: Hand) -> Steps[None]:
-    """An animator chooses the screw for the cube, edits its keys, watches it, and bakes it."""
+    """An animator chooses the screw for the cube, edits its keys, and watches it."""
     yield from hand.open_animation_workspace()
     view, sheet = hand.area("VIEW_3D"), hand.area("DOPESHEET_EDITOR")
     key_the_cube()
@@ -71,7 +71,6 @@ def scenario(hand: Hand) -> Steps[None]:
     yield from moved(hand, sheet)
     yield from inserted(hand, view, sheet)
     yield from played(hand, view)
-    yield from baked(hand, sheet)
 
 
 def moved(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
@@ -132,23 +131,3 @@ def played(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     assert not bpy.context.screen.is_animation_playing
     for frame, matrix in seen.items():
         np.testing.assert_allclose(matrix, expected[frame - 1], atol=ALIKE, err_msg=f"frame {frame}")
-
-
-def baked(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
-    """From the Key menu of the Dope Sheet, and back: the same poses all the while."""
-    keys, before = snapshot(cube()), shown()
-    yield from hand.open_menu(sheet, "DOPESHEET_MT_key")
-    yield from hand.choose("Bake to Keys")
-    yield from hand.press("RET")
-    assert key_frames(cube()).tolist() == list(range(1, 41)), key_frames(cube())
-    types = [key.type for key in curves_of(cube())["location", 0].keyframe_points]
-    assert [frame for frame, kind in enumerate(types, 1) if kind != "GENERATED"] == [1, 28, 40]
-    assert not any(path.startswith("delta_") for path, _ in curves_of(cube()))
-    np.testing.assert_allclose(shown(), before, atol=ALIKE)
-    yield from hand.picture("baked")
-
-    yield from hand.open_menu(sheet, "DOPESHEET_MT_key")
-    yield from hand.choose("Un-Bake")
-    assert_on_the_screw(1, 28, 40)
-    assert snapshot(cube()) == keys
-    np.testing.assert_allclose(shown(), before, atol=ALIKE)

@@ -9,7 +9,6 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from tests.animation.keyed import curve_of
 from tests.animation.oracle import assert_shown, shown_worlds
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
@@ -61,7 +60,6 @@ def scenario(hand: Hand) -> Steps[None]:
     centre = places.centre(places.region(view))
     yield from by_angles(hand, view, centre)
     yield from by_turns(hand, view, centre)
-    yield from pictures(hand, view, "both")
 
 
 def by_angles(hand: Hand, view: bpy.types.Area, centre: places.Place) -> Steps[None]:
@@ -116,29 +114,3 @@ def by_turns(hand: Hand, view: bpy.types.Area, centre: places.Place) -> Steps[No
     last = bpy.context.window_manager.operators[-1]
     assert (last.bl_idname, last.turns) == ("RIGID_MOTION_OT_set_turns", 3), "it begins with the turns that there are"
     assert wheel("Quaternions").rigid_motion.turns == 3
-    yield from key_in_between(hand, centre)
-
-
-def key_in_between(hand: Hand, centre: places.Place) -> Steps[None]:
-    """I on an in-between shares the turns out, and nothing moves."""
-    before = shown_worlds([wheel("Quaternions")], EACH)[0]
-    bpy.context.scene.frame_set(30)
-    yield from hand.hover(centre)
-    yield from hand.press("I")
-    keys = curve_of(wheel("Quaternions"), "rigid_motion.turns").keyframe_points
-    assert [round(key.co.x) for key in keys] == [1, 30, 73], [tuple(key.co) for key in keys]
-    moved = shown_worlds([wheel("Quaternions")], EACH)[0]
-    assert_shown([wheel("Quaternions")], EACH)
-    assert np.abs(moved[29] - before[29]).max() < 1e-5, "the pose that was seen"
-    angles = turned("Quaternions")
-    np.testing.assert_allclose(angles[-1], 6.5 * math.pi, atol=1e-4)
-    yield from hand.press("Z", ctrl=True)
-    np.testing.assert_allclose(shown_worlds([wheel("Quaternions")], EACH)[0], before, atol=1e-5)
-
-
-def pictures(hand: Hand, view: bpy.types.Area, name: str) -> Steps[None]:
-    """The wheels on some frames, with their paths."""
-    bpy.context.scene.rigid_motion_overlay.show_paths = True
-    for frame in (1, 6, 11, 16, 21):
-        bpy.context.scene.frame_set(frame)
-        yield from hand.picture(f"{name}-{frame:02}", places.box(places.region(view)))

@@ -9,9 +9,9 @@ import pytest
 from rigid_motion.animation import set_mode
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion.ui.overlay import drawing
-from rigid_motion.ui.overlay.cache import notice_selection, paths_of
+from rigid_motion.ui.overlay.cache import paths_of
 from rigid_motion.ui.overlay.kinds import space_of_bone
-from tests.ui.rigs import FRAMES, key_bone, keyed_rig, new_rig, select, select_keys
+from tests.ui.rigs import FRAMES, key_bone, keyed_rig, new_rig, select
 
 WHOLE = np.arange(FRAMES[0], FRAMES[-1] + 1.0)
 SCREW = "dq_sclerp"
@@ -79,17 +79,6 @@ def test_axes_of_a_bone_are_as_it_is_turned(scene):
         assert ends[:, 0] == pytest.approx(np.tile(matrix[:3, 3], (3, 1)), abs=1e-5)
         strokes = (ends[:, 1] - ends[:, 0]) / (0.5 * bone.bone.length)
         assert strokes == pytest.approx(matrix[:3, :3].T, abs=1e-5)
-
-
-def test_selecting_keys_of_a_bone_is_noticed(scene):
-    rig = keyed_rig()
-    bones = [rig.pose.bones["Arm"], rig.pose.bones["Hand"]]
-    for bone in bones:
-        path_and_place(bone)
-    select_keys(rig.pose.bones["Hand"], 11.0)
-    assert notice_selection(bones)
-    path, _ = path_and_place(rig.pose.bones["Hand"])
-    assert path.selected.tolist() == [False, True, False, False]
 
 
 def test_the_overlay_is_for_the_selected_bones_and_not_for_the_rig(scene):

@@ -72,17 +72,6 @@ def test_ghosts_of_a_bone_are_where_it_is_shown(ghostly, setting, under, paths):
     assert_as_shown(path, lambda: space_of_bone(hand, graph)[0], lambda: rig.matrix_world @ hand.matrix)
 
 
-def test_ghosts_are_in_the_mode_that_is_looked_at(ghostly):
-    obj = key(new_object(), FRAMES)
-    keyed = path_of(obj, ghostly).ghosts.matrices
-    ghostly.rigid_motion_overlay.mode = "lerp_slerp"
-    looked_at = path_of(obj, ghostly).ghosts.matrices
-    assert np.abs(looked_at - keyed).max() > 0.1
-    set_mode(obj, "lerp_slerp")
-    ghostly.rigid_motion_overlay.mode = "CHOSEN"
-    assert path_of(obj, ghostly).ghosts.matrices == pytest.approx(looked_at, abs=1e-9)
-
-
 def test_of_a_long_motion_there_are_no_more_than_can_be_drawn():
     assert ghost_frames(1, 41, 5).tolist() == [5, 10, 15, 20, 25, 30, 35, 40]
     assert len(ghost_frames(0, 100000, 1)) <= MOST_GHOSTS + 1

@@ -53,14 +53,6 @@ def table(scene) -> bpy.types.Object:
     return table
 
 
-def test_an_object_under_objects_that_move(scene, table):
-    obj = key(new_object(), FRAMES)
-    obj.parent = table
-    obj.matrix_parent_inverse = table.matrix_world.inverted()
-    set_mode(obj, "motor_spline")
-    assert_in_world(path_of(obj, scene), shown(obj))
-
-
 @pytest.mark.parametrize("connected", [False, True])
 def test_an_object_on_a_bone_that_moves(scene, table, connected):
     rig = new_rig()
@@ -108,15 +100,6 @@ def test_a_bone_under_bones_that_move(scene, setting, moves):
     set_mode(hand, "motor_spline")
     point = (0.0, 0.0, 0.0) if moves else (0.0, hand.bone.length, 0.0)
     assert_in_world(path_under(hand), shown(hand, point))
-
-
-def test_a_bone_of_a_rig_that_moves(scene, table):
-    rig = new_rig()
-    key(rig, FRAMES)
-    rig.parent = table
-    hip = key_bone(rig.pose.bones["Hip"])
-    set_mode([rig, hip], "dq_sclerp")
-    assert_in_world(path_under(hip), shown(hip))
 
 
 def constrained(table):

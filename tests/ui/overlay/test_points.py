@@ -26,7 +26,7 @@ from rigid_motion.ui.overlay.points import (
     tick_frames,
 )
 from tests.animation.oracle import shown_worlds
-from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object
+from tests.animation.scenes import FRAMES, key, new_object
 
 WHOLE = np.arange(FRAMES[0], FRAMES[-1] + 1)
 ORDERS = ("QUATERNION", "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
@@ -90,17 +90,6 @@ def test_a_modes_path_shows_beforehand_where_the_object_will_be(scene, mode, ord
     assert on(before, before.native, WHOLE) == pytest.approx(native, abs=1e-5)
 
 
-def test_looking_at_a_mode_changes_nothing(scene):
-    obj = key(new_object())
-    digest, shown = source_of(obj).digest, shown_origins(obj, WHOLE)
-    for mode in KEYFRAME_MODES:
-        scene.rigid_motion_overlay.mode = mode
-        assert path_of(obj, scene).desired is not None
-    assert obj.rigid_motion.mode == "BLENDER"
-    assert source_of(obj).digest == digest
-    assert (shown_origins(obj, WHOLE) == shown).all()
-
-
 def test_each_segment_runs_in_its_own_mode(scene):
     obj = key(new_object())
     set_mode(obj, "lerp_slerp", [FRAMES[1]])
@@ -130,16 +119,6 @@ def test_the_world_is_where_the_parent_takes_the_path(scene, parenting):
     set_mode(obj, "dq_sclerp")
     path = path_of(obj, scene)
     assert in_world(obj, on(path, path.desired, WHOLE)) == pytest.approx(shown_origins(obj, WHOLE), abs=2e-5)
-
-
-def test_own_delta_transforms_are_part_of_the_path(scene):
-    obj = key(new_object())
-    give_own_deltas(obj)
-    path = path_of(obj, scene)
-    assert on(path, path.native, WHOLE) == pytest.approx(shown_origins(obj, WHOLE), abs=1e-5)
-    set_mode(obj, "dq_sclerp")
-    path = path_of(obj, scene)
-    assert on(path, path.desired, WHOLE) == pytest.approx(shown_origins(obj, WHOLE), abs=1e-5)
 
 
 def test_keys_off_whole_frames_are_on_the_path(scene):
@@ -205,20 +184,6 @@ def test_samples_run_evenly_from_end_to_end_over_whole_frames(length):
     assert len(frames) <= 2 * MOST
     if length <= MOST:
         assert np.isin(np.arange(-7, -7 + length + 1), frames).all()
-
-
-def test_a_cycle_goes_on_to_the_end_of_the_scene_with_the_keys_of_its_first_round(scene):
-    obj = key(new_object(), frames=(1, 11, 21))
-    for fcurve in obj.animation_data.action.layers[0].strips[0].channelbags[0].fcurves:
-        fcurve.modifiers.new("CYCLES")
-    scene.frame_end = 100
-    set_mode(obj, "dq_sclerp")
-    path = path_of(obj, scene)
-    assert len(path.keys) == 3
-    frames = np.arange(1.0, 101.0)
-    # On the seam a cycle has both ends.
-    frames = frames[frames % 20 != 1]
-    assert on(path, path.desired, frames) == pytest.approx(shown_origins(obj, frames), abs=1e-5)
 
 
 def test_without_a_second_key_there_is_no_path(scene):
