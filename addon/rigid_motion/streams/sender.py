@@ -29,8 +29,9 @@ KEEPALIVE, REFRESH = 0.5, 1.0
 """Seconds of silence after which something is said in any case; and, where nobody answers, between messages that build
 on nothing."""
 
-PATIENCE = 0.15
-"""Seconds that a refresh has to arrive, before another is sent to somebody who asks for one."""
+AGAIN, PATIENCE = 0.03, 0.15
+"""Seconds after which a refresh is sent a second time, so that one loss does not lose both; and that it has to arrive,
+before another is sent to somebody who asks for one."""
 
 SILENT, MOST_RECEIVERS = 2.0, 256
 """Seconds after which somebody who does not answer any more is not waited for; and for so many at most."""
@@ -126,7 +127,7 @@ class Sender:
         self._refreshed = self._sent = -math.inf
         """The ends of the last refresh and of the last message."""
         self._copies: list[bytes] = []
-        """A refresh that is to be sent a second time, with the next sample: one loss does not lose both."""
+        """A refresh that is to be sent a second time."""
         self._base: int | None = None
         """The last refresh."""
         self._desired = False
@@ -209,9 +210,10 @@ class Sender:
 
     def _due(self, now: float, interval: float) -> list[bytes]:
         """Return what is to be sent now, where nobody asks again before the interval is over."""
-        due, self._copies, self._next = self._copies, [], math.inf
-        if self._answered(now) and self._base is not None and self._have(self._base):
-            due = []
+        due, self._next = [], math.inf
+        if self._copies and now - self._refreshed >= AGAIN:
+            is_there = self._answered(now) and self._base is not None and self._have(self._base)
+            due, self._copies = [] if is_there else self._copies, []
         if not self._answered(now) and now - self._refreshed >= REFRESH:
             due += [*self.describe(), self._message(now, refresh=True)]
         elif self._desired:
@@ -255,7 +257,7 @@ class Sender:
         """Return the message to build on, or None."""
         number = self._base
         if self._answered(now):
-            number = next((it for it in sorted(self._messages, reverse=True) if self._have(it)), self._base)
+            number = next((it for it in sorted(self._messages, reverse=True) if self._have(it)), None)
         if number is None or self._sequence - number > MOST_BACK:
             return None
         return number if now - self._messages[number].end / TICKS < OLDEST else None
