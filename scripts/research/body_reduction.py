@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from research.decimating import VARIES, DecimatedBody, figures_of
+from research.decimating import VARIES, DecimatedBody
 from research.studies import interleaved_seconds, report
 from rigid_motion.motion import Poses, shell_error
 from rigid_motion_batch.analysis.body_metrics import key_samples, measure_modes
@@ -129,7 +129,7 @@ def beside(body: Clip, way: str) -> list[dict[str, Any]]:
     return [
         {"body": body.name, "how": way, **own, "error_mm": 1e3 * measured.max_shell_m}
         | {"slide_mm": slide, "recorded_slide_mm": recorded},
-        {"body": body.name, "how": "Decimate", **figures_of(left)},
+        {"body": body.name, "how": "Decimate", **left.figures()},
     ]
 
 

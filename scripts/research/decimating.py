@@ -36,10 +36,9 @@ class Left:
     numbers: int
     largest: float
 
-
-def figures_of(left: Left) -> dict[str, float]:
-    """Return the figures of what is left."""
-    return {"frames": left.frames, "key_count": left.keys, "numbers": left.numbers, "error_mm": 1e3 * left.largest}
+    def figures(self) -> dict[str, float]:
+        """Return them as they are published."""
+        return {"frames": self.frames, "key_count": self.keys, "numbers": self.numbers, "error_mm": 1e3 * self.largest}
 
 
 def decimate(obj: bpy.types.Object, **options: object) -> None:

@@ -18,7 +18,7 @@ import bpy
 import numpy as np
 
 from research import body_reduction
-from research.decimating import FREE, Decimations, Left, figures_of
+from research.decimating import FREE, Decimations, Left
 from research.studies import EXTENSIONS, files_in, publish, study_parser
 from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate, shell_error
@@ -86,7 +86,7 @@ def measure(clip: Clip, rotation_mode: str, tolerance: float, radius: float) -> 
     obj = import_clip(clip, rotation_mode)
     as_good = Decimations(obj, lambda: outcome(obj, clip, radius), TRIALS).within(reduced.largest)
     about = {"name": clip.name, "frames": len(clip.times)}
-    return {**about, "reduced": figures_of(reduced), "decimate": as_good and figures_of(as_good)}
+    return {**about, "reduced": reduced.figures(), "decimate": as_good and as_good.figures()}
 
 
 def means(rows: list[dict[str, Any]]) -> dict[str, float]:

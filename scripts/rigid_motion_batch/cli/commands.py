@@ -32,7 +32,6 @@ class Command:
 RESEARCH = {
     "paper": "paper.parts",
     "benchmark": "benchmark",
-    "benchmark_batch": "benchmark_batch",
     "benchmark_live": "benchmark_live",
     "live_costs": "live_costs",
     "reduction": "reduction",

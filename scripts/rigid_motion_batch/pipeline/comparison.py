@@ -294,8 +294,8 @@ class ComparisonPlan:
             )
         if comparison.count_keys:
             fit = comparison.fit and not joints
-            step, seconds = steps.CountKeys(clip, comparison.modes, comparison.radii, fit), 0.03 if fit else 0.008
-            yield Part("count_keys", clip), Task(step, f"count keys {name}", after, seconds=seconds * size)
+            count, seconds = steps.CountKeys(clip, comparison.modes, comparison.radii, fit), 0.03 if fit else 0.008
+            yield Part("count_keys", clip), Task(count, f"count keys {name}", after, seconds=seconds * size)
 
     def _model(self, study: Study, choice: Choice, measured: str) -> Task:
         comparison, folder = self.comparison, f"{study.name}/{choice.name}"
