@@ -46,7 +46,8 @@ def _counted(obj: Carrier, first: float, last: float, frames: np.ndarray) -> np.
             made.handle_left, made.handle_right = (key.handle_left[0], number), (key.handle_right[0], number)
         begin, end, *values = (fcurve.evaluate(frame) for frame in (first, last, *frames))
     if begin == end:
-        return (frames - first) / (last - first)
+        share = (frames - first) / (last - first)
+        return share if like.extrapolation == "LINEAR" else np.clip(share, 0.0, 1.0)
     return (np.array(values) - begin) / (end - begin)
 
 

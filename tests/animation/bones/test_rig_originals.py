@@ -65,17 +65,18 @@ def test_an_original_that_another_rig_plays_keeps_its_names(live_file):
     assert_same_poses(other, PLAYED, shown_poses([other], PLAYED)[0], expected)
 
 
-def test_another_rig_that_plays_changed_keys_keeps_them(changed):
-    rig, change, go_back = changed
+@pytest.mark.parametrize("count", [2, 4], ids=["some bones baked", "all bones baked"])
+def test_another_rig_that_plays_baked_keys_keeps_them(live_file, count):
+    rig = moving_rig()
     own, before = rig.animation_data.action, [snapshot(bone) for bone in rig.pose.bones]
-    change()
+    bake(list(rig.pose.bones)[:count])
     shared = rig.animation_data.action
     other = new_rig("Other")
     other.animation_data_create().action = shared
     other.animation_data.action_slot = shared.slots[0]
     refresh()
     keys, expected = [snapshot(bone) for bone in other.pose.bones], shown_poses([other], PLAYED)[0]
-    go_back([bone for bone in rig.pose.bones if len(bone.rigid_motion.bakes)])
+    unbake(list(rig.pose.bones)[:count])
     refresh()
     assert (rig.animation_data.action, other.animation_data.action) == (own, shared)
     assert [snapshot(bone) for bone in rig.pose.bones] == before

@@ -14,7 +14,7 @@ from rigid_motion.animation import set_mode, set_turns, write_channel
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion.motion.eulers import ORDERS
 from tests.animation.bones.rigs import in_turn
-from tests.animation.keyed import curve_of, rotation_path
+from tests.animation.keyed import curve_of, rotation_path, snapshot
 from tests.animation.oracle import assert_shown, shown_worlds
 from tests.animation.scenes import give_own_deltas, new_object
 
@@ -262,3 +262,17 @@ def test_too_many_turns_of_the_channel_are_told(live_file):
     curve_of(obj, "rigid_motion.turns").keyframe_points[0].co_ui.y = 1e6
     bpy.context.view_layer.update()
     assert "key 1 of the channel Turns" in animation.problem_of(obj)
+
+
+def test_keys_that_were_inserted_while_nothing_was_followed_leave_turns_alone(live_file):
+    obj = propeller("dq_sclerp")
+    set_turns(obj, 3, [1.0])
+    animation.unregister()
+    for path, count in (("location", 3), ("rotation_quaternion", 4)):
+        for index in range(count):
+            curve_of(obj, path, index).keyframe_points.insert(9.0, 0.25 * index)
+    before = snapshot(obj)
+    animation.register()
+    bpy.context.view_layer.update()
+    live_file.scene.frame_set(17)
+    assert snapshot(obj) == before

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
+from dataclasses import fields
 
 import numpy as np
 
@@ -52,7 +53,8 @@ def clear() -> None:
 
 def size_of(source: Source) -> int:
     """Return about how many bytes a source has."""
-    arrays = (array for keys in source.curves for array in vars(keys).values())
+    # What is worked out of keys later comes and goes.
+    arrays = (getattr(keys, field.name) for keys in source.curves for field in fields(keys))
     return sum(array.nbytes for array in arrays if isinstance(array, np.ndarray))
 
 

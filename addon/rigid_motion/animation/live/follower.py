@@ -416,3 +416,5 @@ def unregister() -> None:
         bpy.app.timers.unregister(first_look)
     remove_handlers(follower.handlers)
     follower.finish_drafts()
+    # What is edited from now on is no edit that is followed later.
+    source_cache.clear()
