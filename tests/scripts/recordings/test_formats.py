@@ -214,6 +214,7 @@ WRONG = {
         (motive() + "3,0.025" + ",1" * 99 + "\n", 11, "101 columns where 31 have a name"),
         (motive().replace("Head, left", "x" * 200_000), 4, "this line is no header"),
     ],
+    "data.csv": [(f"{EUROC_HEADER}\x1c{EUROC_HEADER}\n{EUROC_ROWS}", 1, "two columns mean x")],
     "walk.tum": [
         ("", None, "the file is empty"),
         (TUM_COMMENTS, None, "'walk' has 0 samples"),
