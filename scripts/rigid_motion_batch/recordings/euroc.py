@@ -11,7 +11,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from . import named_csv
-from .columns import ColumnProblem, layout_of
 from .options import AS_THE_FILE_SAYS
 from .recordings import Selection, Trajectory
 from .tables import header_lines
@@ -33,11 +32,7 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
     """Read the one body of the file, which has the file's name."""
     header, options = next(header_lines(path)), replace(AS_THE_FILE_SAYS, time_unit="ns")
     header = replace(header, cells=_names(header.cells))
-    try:
-        layout = layout_of(header.cells, options)
-    except ColumnProblem as problem:  # in a long line the start alone is EuRoC's header
-        raise problem.at(path, header.number) from None
-    return named_csv.read_below(path, selection, options, header, layout, "write a file for each")
+    return named_csv.read_below(path, selection, options, header, "write a file for each")
 
 
 def _names(cells: Iterable[str]) -> list[str]:

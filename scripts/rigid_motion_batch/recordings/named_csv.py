@@ -60,16 +60,17 @@ class _Body:
 
 def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
     """Read the requested bodies. One without a name of its own has the file's."""
-    header, layout = _find_header(path, options)
+    header = _find_header(path, options)
     way_out = f"name the column that tells them apart, --columns device=NAME (found {columns_found(header.cells)})"
-    return read_below(path, selection, options, header, layout, f"{way_out}, or split the file")
+    return read_below(path, selection, options, header, f"{way_out}, or split the file")
 
 
 def read_below(
-    path: Path, selection: Selection, options: ReadingOptions, header: HeaderLine, layout: Layout, way_out: str
+    path: Path, selection: Selection, options: ReadingOptions, header: HeaderLine, way_out: str
 ) -> list[Trajectory]:
     """Read the requested bodies of the rows below a header; `way_out` is what to do with devices that are mixed."""
     with _told(path, header.number):
+        layout = layout_of(header.cells, options)
         bodies = _bodies(path, header, layout, "device" in dict(options.columns))
         taken = set(selection.of([body.name for body in bodies]))
         requested = [body for body in bodies if body.name in taken]
@@ -111,18 +112,19 @@ def _told(path: Path, line: int) -> Iterator[None]:
         raise problem.at(path, line) from None
 
 
-def _find_header(path: Path, options: ReadingOptions) -> tuple[HeaderLine, Layout]:
+def _find_header(path: Path, options: ReadingOptions) -> HeaderLine:
     """Find the line that names all that is needed: one of the first, or the only one further down that numbers follow.
 
     Where none does, TrajectoryError says what the nearest lacks.
     """
-    result: list[tuple[HeaderLine, Layout]] = []
+    result: list[HeaderLine] = []
     problems: list[tuple[ColumnProblem, int]] = []
     first = (line.of_rows(path) for line in header_lines(path))
     for is_first, lines in ((True, first), (False, lines_above_numbers(path))):
         for line in lines:
             try:
-                result.append((line, layout_of(line.cells, options)))
+                layout_of(line.cells, options)
+                result.append(line)
             except ColumnProblem as error:
                 problems.append((error, line.number))
             if result and is_first:
@@ -130,11 +132,9 @@ def _find_header(path: Path, options: ReadingOptions) -> tuple[HeaderLine, Layou
     if len(result) == 1:
         return result[0]
     if result:
-        numbers = " and ".join(str(line.number) for line, _ in result[:2])
+        numbers = " and ".join(str(line.number) for line in result[:2])
         problem = f"lines {numbers} both name columns, with others before them"
-        raise TrajectoryError(
-            path, problem, "make a file of each table, without what is before it", result[0][0].number
-        )
+        raise TrajectoryError(path, problem, "make a file of each table, without what is before it", result[0].number)
     nearest, number = max(problems, key=lambda known: known[0].known)
     if not nearest.known:
         nearest, number = problems[-1]

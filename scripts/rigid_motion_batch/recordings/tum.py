@@ -35,9 +35,7 @@ def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Traj
     if len(row.split()) == 4:
         problem = "positions only, and rotations are needed"
         raise TrajectoryError(path, problem, "write t x y z qx qy qz qw in every line", line)
-    return named_csv.read_below(
-        path, selection, options, header, layout_of(header.cells, options), "write a file for each"
-    )
+    return named_csv.read_below(path, selection, options, header, "write a file for each")
 
 
 def _header(path: Path, options: ReadingOptions) -> HeaderLine:
