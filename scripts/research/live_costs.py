@@ -5,7 +5,7 @@
 Whole bodies and single hands are sent by the codec of [the wire](wire.md) over UDP on loopback; a receiver in another
 process shows them, and goes by the recording's clock, however busy the machine is. Bytes are those of datagrams with
 the 28 bytes of UDP and IPv4 around each, without the description that a receiver gets when it joins. Errors are the
-largest of any joint's ball of 3 cm, in the root's space, at every sample.
+largest of any joint's ball of 3 cm, in the root's space, at the moments that are shown.
 """
 
 from __future__ import annotations
@@ -18,10 +18,11 @@ import numpy as np
 
 from research.live_streams import room
 from research.live_streams.engines import ENGINES, FPS, RATE, Way, by_codec, by_engine, seen, truth_of
+from research.live_streams.packings import packed
 from research.studies import files_in, publish, report, study_parser
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.streaming.measuring import HEADERS, measure, packed
+from rigid_motion_batch.streaming.measuring import HEADERS, measure
 from rigid_motion_batch.streaming.sending import body_of, samples_of
 
 RADIUS, TOLERANCE = 0.03, 0.005

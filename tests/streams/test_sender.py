@@ -8,6 +8,7 @@ import pytest
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import turned
 from rigid_motion.streams import Body, Receiver, Sender
+from rigid_motion.streams.bodies import Forest
 from rigid_motion.streams.paths import Path
 from rigid_motion.streams.wire import read
 from tests.thoroughness import tried
@@ -97,7 +98,7 @@ def test_samples_from_before_what_was_sent_without_them_are_said_all_the_same() 
             sender.hear(answer, time)
             assert not read(answer).needs
         for shown in receiver.show(time + 0.005).values():
-            off = own.errors(shown.poses["hand"][:, None], truth.at(np.array([shown.moment])))
+            off = Forest([own]).errors(shown.poses["hand"][:, None], truth.at(np.array([shown.moment])))
             largest = max(largest, float(off.max()))
     assert polled > 5
     assert largest < 0.02

@@ -12,7 +12,7 @@ from pythonosc.osc_message_builder import OscMessageBuilder
 from rigid_motion.live.driving import Retargeting, matched
 from rigid_motion.motion import Poses, Skeleton, shell_error
 from rigid_motion.motion.humanoid import HUMANOID, humanoid_bones
-from rigid_motion.motion.quaternions import multiply, rotate
+from rigid_motion.motion.quaternions import multiply
 from rigid_motion.streams import Body, Receiver, osc
 from rigid_motion.streams.receiver import MOST_STREAMS
 from rigid_motion.streams.vmc import (
@@ -20,8 +20,6 @@ from rigid_motion.streams.vmc import (
     MOST_DEVICES,
     ROOT,
     Performer,
-    from_unity,
-    to_unity,
     write,
     write_trackers,
 )
@@ -65,18 +63,6 @@ def heard(datagrams: list[bytes], arrival: float = 0.0, receiver: Receiver | Non
     for datagram in datagrams:
         receiver.take(datagram, arrival)
     return receiver
-
-
-def test_unity_is_left_handed_with_y_up_and_performers_look_along_minus_y_in_blender():
-    unity = Poses([[0, 0, 1], [0, 1, 0], [1, 0, 0]], [[1, 0, 0, 0]] * 3)
-    assert from_unity(unity).positions.tolist() == [[0, -1, 0], [0, 0, 1], [-1, 0, 0]]
-    # Left-handed: a positive turn about y takes z to x, which is a performer's right.
-    turned = from_unity(Poses([[0.0, 0.0, 0.0]], [[math.cos(0.5), 0.0, math.sin(0.5), 0.0]])).quaternions[0]
-    looks = rotate(turned, np.array([0.0, -1.0, 0.0]))
-    assert looks == pytest.approx([-math.sin(1.0), -math.cos(1.0), 0.0])
-    there = Poses(np.random.default_rng(1).normal(size=(9, 3)), random_turns(9))
-    assert to_unity(from_unity(there)).positions == pytest.approx(there.positions)
-    assert to_unity(from_unity(there)).quaternions == pytest.approx(there.quaternions)
 
 
 def test_a_frame_is_what_the_documentation_says_it_is():

@@ -72,12 +72,6 @@ class Body:
         """Return poses (joints,) of the joints, each in its parent's space, as they are in that of the roots."""
         return self.skeleton.in_root_space(poses[:, None])[:, 0]
 
-    def errors(self, shown: Poses, truth: Poses) -> np.ndarray:
-        """Return how far off any point of each joint's ball is at most, in metres, of poses (joints, n) in their
-        parents' spaces, shape (joints, n).
-        """
-        return shell_error(self.skeleton.in_root_space(shown), self.skeleton.in_root_space(truth), self.radius)
-
     @classmethod
     def rigid(cls, name: str, pose: Poses | None = None, radius: float = RADIUS) -> Body:
         """Return a single rigid body, at rest at `pose` (1,), or in the middle of everything."""
@@ -116,7 +110,9 @@ class Forest:
         }
 
     def errors(self, shown: Poses, truth: Poses) -> np.ndarray:
-        """Return the same as `Body.errors` of all joints."""
+        """Return how far off any point of each joint's ball is at most, in metres, of poses (joints, n) in their
+        parents' spaces, shape (joints, n).
+        """
         in_root_space = self.skeleton.in_root_space
         return shell_error(in_root_space(shown), in_root_space(truth), self.radii[:, None])
 

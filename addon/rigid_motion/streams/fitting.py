@@ -91,7 +91,7 @@ class Fitting:
     def _near(self, cells: list[int], finer: int) -> tuple[Message, float]:
         """Return the numbers nearest to the truth, with knots and, where that is not enough, with more of them."""
         tolerance, most_knots = self._codec.tolerance, min(MOST_KNOTS, max(MOST_GROUPS // len(self._forest.groups), 1))
-        message = self._begun(finer)
+        message = Message(self._codec, self._base, self._back, self._ticks, finer)
         for cell in cells:
             message.say(cell, samples=self._samples)
         while True:
@@ -105,9 +105,6 @@ class Fitting:
             if good and np.abs(message.path.moments[1:] - worst).min() < away.min():
                 return message, error
             message.say(int(self._cells[np.argmin(away)]), samples=self._samples)
-
-    def _begun(self, finer: int) -> Message:
-        return Message(self._codec, self._base, self._back, self._ticks, finer)
 
     def _look(self, message: Message) -> tuple[Poses, np.ndarray]:
         """Return what is shown with a message in the root's space (joints, n), and the largest error of each moment."""
@@ -146,7 +143,7 @@ class Fitting:
                     arms = (places[:, hung] - places[:, [joint]])[:, None]
                     does = np.stack([cross(about, arms), about * radii[hung]])
                 _reduce(values, errors, hung, does, most)
-        smaller = self._begun(message.finer)
+        smaller = Message(self._codec, self._base, self._back, self._ticks, message.finer)
         for cell, own in zip(message.cells, numbers, strict=True):
             smaller.say(cell, own)
         return smaller, float(self._look(smaller)[1].max())

@@ -46,16 +46,6 @@ _TO_BLENDER = np.array(((-1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)))
 """Unity's axes as Blender's: a mirror."""
 
 
-def from_unity(poses: Poses) -> Poses:
-    """Poses in Unity's axes as poses in Blender's."""
-    return in_other_axes(poses, _TO_BLENDER)
-
-
-def to_unity(poses: Poses) -> Poses:
-    """Poses in Blender's axes as poses in Unity's."""
-    return in_other_axes(poses, _TO_BLENDER.T)
-
-
 def write(time: float, poses: Mapping[str, Poses]) -> list[bytes]:
     """Return the datagrams of a frame: the pose () of each bone in its parent's space, with that of `ROOT`."""
     root = [_pose("/VMC/Ext/Root/Pos", "root", poses[ROOT])] if ROOT in poses else []
@@ -69,7 +59,7 @@ def write_trackers(poses: Mapping[str, Poses]) -> list[bytes]:
 
 
 def _pose(address: str, name: str, pose: Poses) -> bytes:
-    unity = to_unity(pose)
+    unity = in_other_axes(pose, _TO_BLENDER.T)
     w, *xyz = unity.quaternions.tolist()
     return write_message(address, name, *unity.positions.tolist(), *xyz, w)
 
@@ -178,7 +168,7 @@ class Performance(Playback):
 
     def _poses(self, joints: list[Joint]) -> Poses:
         rows = np.array([self._newest[joint] for joint in joints])
-        return from_unity(Poses(rows[:, :3], rows[:, 3:]))
+        return in_other_axes(Poses(rows[:, :3], rows[:, 3:]), _TO_BLENDER)
 
     def _describe(self) -> None:
         """Have bodies of all that was ever said; those of which nothing is new stay the same."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 WEBSITE = "https://example.org/rigid-motion"
-"""The home of the project, in the manifest too. To be set before a release: `research check_release` looks at it."""
+"""The home of the project, in the manifest too. To be set before a release."""
 
 DOCS = f"{WEBSITE}/blob/main/docs/"
 """The pages of the version that is worked on."""

@@ -1,1 +1,1 @@
-"""What `live_costs` measures beside the bytes of the codec: game engines on a bad link, and a room of many."""
+"""What `live_costs` measures beside the codec: packed poses, game engines on a bad link, and a room of many."""

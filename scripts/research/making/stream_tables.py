@@ -21,9 +21,8 @@ from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.coding import FLAGS, HISTORIES, KNOT_COUNTS, NEIGHBOURS, SIZES, TOTAL
 from rigid_motion.streams.messages import Message
 from rigid_motion.streams.tables import TABLES
-from rigid_motion_batch.cli.stream_measure import body_of, samples_of
 from rigid_motion_batch.recordings.clip_reading import read_clips
-from rigid_motion_batch.streaming.sending import even_rate
+from rigid_motion_batch.streaming.sending import body_of, even_rate, samples_of
 
 SETTINGS = ((0.1, 0.0), (0.2, 0.0), (0.1, 0.06), (0.1, 0.15), (0.2, 0.15), (0.1, None))
 """Delays, and seconds that a datagram takes; None where no receiver answers."""

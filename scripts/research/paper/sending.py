@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from research.live_streams.packings import STAMP
 from rigid_motion.motion import decimate
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.analysis.modes import REFERENCE
 from rigid_motion_batch.analysis.needed import OfRigidBody, part_of
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.streaming.measuring import HEADERS, STAMP, measure
+from rigid_motion_batch.streaming.measuring import HEADERS, measure
 from rigid_motion_batch.streaming.sending import body_of, samples_of
 
 from .table import RADIUS, UPDATES, has_samples_for

@@ -38,7 +38,6 @@ RESEARCH = {
     "subframes": "subframes",
     "glb_sizes": "glb_sizes",
     "stream_tables": "making.stream_tables",
-    "check_release": "check_release",
     "pages": "pages",
 }
 """The programs that `python scripts/research NAME` runs of a checkout: the module of the package `research`."""

@@ -8,8 +8,10 @@ import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 
+from rigid_motion.live.sockets import Port
 from rigid_motion.motion import rms
-from rigid_motion.streams import Body, Sender
+from rigid_motion.streams import Body, Receiver, Sender
+from rigid_motion.streams.bodies import Forest
 from rigid_motion.streams.paths import Path
 from rigid_motion.streams.sender import KEEPALIVE
 from rigid_motion_batch.command_line import complain, path_line
@@ -25,7 +27,6 @@ from rigid_motion_batch.streaming.rooms import (
     HERE,
     MOTION,
     Room,
-    RoomError,
     opened,
 )
 from rigid_motion_batch.streaming.sending import Sending, even_rate, samples_of, together
@@ -108,11 +109,12 @@ def send_performer(options: argparse.Namespace, stopped: list[int]) -> None:
     """Send what another program performs until that is to end. Raises what says why it could not be."""
     tolerance, delay = options.tolerance.metres(1.0), options.delay or DELAY
     sending: Sending | None = None
+    receiver = Receiver()
     sent: tuple[Body, ...] = ()
-    with _room(options) as room, vmc.Performers(options.from_vmc) as performers:
-        _say(f"{options.user} listens to port {performers.number} and sends to {options.room}")
+    with _room(options) as room, Port(port=options.from_vmc) as port:
+        _say(f"{options.user} listens to port {port.number} and sends to {options.room}")
         while not stopped:
-            for keys in performers.samples():
+            for keys in vmc.performed(port, receiver):
                 ahead = float(keys.moments[-1]) - time.monotonic()
                 if sending is None:
                     sending = Sending(room, options.user, Sender(keys.bodies, tolerance, delay), ahead)
@@ -128,7 +130,7 @@ def send_performer(options: argparse.Namespace, stopped: list[int]) -> None:
             else:
                 time.sleep(FRAME)
         if sending is None:
-            raise RoomError(f"nothing came by VMC at port {performers.number}; give the other program this port")
+            raise ValueError(f"nothing came by VMC at port {port.number}; give the other program this port")
         room.send(options.user, MOTION, None)
         _say(f"datagrams: {sending.datagrams}", f"bytes: {sending.bytes}")
 
@@ -143,7 +145,10 @@ def receive(options: argparse.Namespace, stopped: list[int]) -> None:
         closing(Receiving(room, options.user, options.fps, options.margin, options.to_blender)) as receiving,
     ):
         if options.to_vmc:
-            receiving.on_frame.append(vmc.ToVmc(options.to_vmc).show)
+            to_vmc = vmc.ToVmc(options.to_vmc)
+            receiving.on_frame.append(
+                lambda shown: to_vmc.show((body, what.poses[body.name]) for what in shown for body in what.bodies)
+            )
         if options.mode:
             receiving.on_frame.append(lambda _: tracks.add_keys(receiving.receiver.keys()))
         elif options.output or truth:
@@ -161,7 +166,7 @@ def receive(options: argparse.Namespace, stopped: list[int]) -> None:
     motions, is_kept = tracks.motions(), options.mode or options.output or truth
     if not (motions if is_kept else receiving.datagrams):
         came = "nothing that could be shown came" if receiving.datagrams else f"nobody sent anything in {options.room}"
-        raise RoomError(f"{came}, so nothing is written; see --room and --at of the sender")
+        raise ValueError(f"{came}, so nothing is written; see --room and --at of the sender")
     if options.mode:
         motions = [motion.even(options.mode, options.fps) for motion in motions]
     for motion in motions:
@@ -230,7 +235,7 @@ def _error(motion: Motion, truth: Clip | None) -> str:
     within = (motion.times >= times[0]) & (motion.times <= times[-1])
     if len(motion.body.joints) != len(poses) or not within.any():
         return ", which are not those of --truth"
-    off = motion.body.errors(motion.poses[:, within], Path(times, poses).at(motion.times[within])).max(axis=0)
+    off = Forest([motion.body]).errors(motion.poses[:, within], Path(times, poses).at(motion.times[within])).max(axis=0)
     return f", error {1000.0 * rms(off):.2f} mm RMS, {1000.0 * float(off.max()):.2f} mm at most"
 
 

@@ -1,7 +1,7 @@
 """Measure what a recording costs as a stream, and how well it is shown: `stream measure`.
 
 The recording is sent over UDP on loopback, by the codec of docs/wire.md; another process shows it. Both go by the clock
-of the recording, however busy the machine is. Beside it stand even streams of packed joints.
+of the recording, however busy the machine is.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.bvh_writing import write_bvh
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.streaming.measuring import measure, packed
+from rigid_motion_batch.streaming.measuring import measure
 from rigid_motion_batch.streaming.sending import body_of, samples_of
 
 EPILOG = """
@@ -67,13 +67,12 @@ def run(options: argparse.Namespace) -> None:
     if options.output and (options.output.suffix.lower() == ".bvh") != (clip.rest_body is not None):
         raise ValueError(f"{options.output}: a body is written as .bvh, a single rigid body as .csv")
     cost, shown = measure(body, times, poses, tolerance, options.delay, options.loss)
-    beside = packed(body, times, poses)
     if options.output:
         write(options.output, clip, body, times, shown)
     if options.json:
-        print(json.dumps({"recording": clip.name, **cost, "beside": beside}, indent=2))
+        print(json.dumps({"recording": clip.name, **cost}, indent=2))
         return
-    for line in lines(cost, beside, tolerance):
+    for line in lines(cost, tolerance):
         print(line)
     if options.output:
         print(path_line(options.output))
@@ -90,17 +89,13 @@ def write(path: Path, clip: Clip, body: Body, times: np.ndarray, shown: Poses) -
             write_bvh(file, clip.rest_body, cast(np.ndarray, body.sliding), times, there)
 
 
-def lines(cost: dict[str, float], beside: dict[str, dict[str, float]], tolerance: float) -> list[str]:
+def lines(cost: dict[str, float], tolerance: float) -> list[str]:
     """Return the numbers as text."""
-    rows = [
-        f"datagrams: {cost['datagrams']}, of which {cost['lost']} were lost, in {cost['seconds']:.2f} s",
-        f"to join: {cost['joining_bytes']} bytes",
-        f"answers: {cost['answers_a_second']:.0f} bytes a second",
+    alone, whole = cost["bytes_a_second"], cost["bytes_a_second_with_headers"]
+    return [
+        f"{whole:.0f} bytes a second with headers, {alone:.0f} without",
+        f"error: {cost['rms_mm']:.2f} mm RMS, {cost['largest_mm']:.2f} mm at most",
         f"shown within {1000.0 * tolerance:g} mm for {100.0 * cost['share_within_tolerance']:.2f} % of the samples",
-        "",
-        f"{'':36}{'bytes/s':>10}{'with headers':>14}{'RMS mm':>9}{'largest mm':>12}",
+        f"datagrams: {cost['datagrams']}, of which {cost['lost']} were lost, in {cost['seconds']:.2f} s",
+        f"to join: {cost['joining_bytes']} bytes; answers: {cost['answers_a_second']:.0f} bytes a second",
     ]
-    for label, row in {"sent when needed": cost, **beside}.items():
-        alone, whole = row["bytes_a_second"], row["bytes_a_second_with_headers"]
-        rows.append(f"{label:36}{alone:10.0f}{whole:14.0f}{row['rms_mm']:9.2f}{row['largest_mm']:12.2f}")
-    return rows

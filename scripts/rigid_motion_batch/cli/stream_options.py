@@ -21,7 +21,7 @@ from . import stream_measure
 DELAY = 0.1
 """Seconds, unless they are given."""
 
-ENDINGS = (".csv", ".bvh", ".tum")
+ENDINGS = (".csv", ".bvh")
 
 DESCRIPTION = """Motion over a network, live: bodies in rooms, each within a tolerance, for as few bytes as that takes.
 
@@ -65,8 +65,8 @@ examples:
   python scripts/stream.py receive --room studio --to-vmc 127.0.0.1:39540
 
 It ends when all who sent have gone, after --seconds, or at Ctrl-C. A .csv file has all bodies, in metres and Blender's
-axes: device,t,x,y,z,qw,qx,qy,qz, where t is the moment of the sender's motion. Of .bvh and .tum there is one for each
-body, in metres.
+axes: device,t,x,y,z,qw,qx,qy,qz, where t is the moment of the sender's motion. A .bvh file is written
+for each body, in metres.
 """
 
 ROUTER_EPILOG = """
@@ -103,7 +103,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         "receive", help="show what comes", epilog=as_called(RECEIVE_EPILOG, SCRIPT), **style
     )
     _add_room(receiving, "to listen")
-    receiving.add_argument("--output", "-o", type=_file, metavar="FILE", help="what was shown, as .csv, .bvh or .tum")
+    receiving.add_argument("--output", "-o", type=_file, metavar="FILE", help="what was shown, as .csv or .bvh")
     help = "write the keys that came with the in-betweens of this mode instead"
     receiving.add_argument("--mode", choices=MODES, metavar="MODE", help=help)
     help = "hand everything on to the panel Live of Blender, by UDP"

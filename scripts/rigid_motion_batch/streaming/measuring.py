@@ -4,9 +4,8 @@ The receiver has a socket, and knows nothing of the recording but when its displ
 after it. Both processes go by the clock of the recording, which stands still while they work: what is measured does not
 depend on how busy the machine is.
 
-Beside it stands what else one would send of a body: every joint, at an even rate, as floats or as the smallest three
-components. A receiver goes straight from one to the next. Errors are the largest displacement of any point of the
-joints' balls, at every sample; bytes a second are those of the motion, without what joining takes.
+Errors are the largest displacement of any point of the joints' balls, at the moments that are shown; bytes a second are
+those of the motion, without what joining takes.
 """
 
 from __future__ import annotations
@@ -22,6 +21,7 @@ from rigid_motion.motion import Poses, rms
 from rigid_motion.motion.poses import joined
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion.streams import Body, Receiver, Sender
+from rigid_motion.streams.bodies import Forest
 from rigid_motion.streams.paths import Path
 from rigid_motion.streams.wire import Description, read
 
@@ -37,20 +37,6 @@ PATIENCE = 30.0
 
 ARRIVAL = Struct("<d")
 """In front of every datagram: by the clock of the recording."""
-
-WAYS: dict[str, tuple[float, int | None]] = {
-    "float32 at 30 Hz": (30.0, None),
-    "smallest three (32 bits) at 20 Hz": (20.0, 10),
-    "29 bits at 30 Hz": (30.0, 9),
-    "29 bits at 12 Hz": (12.0, 9),
-}
-"""How often all joints are sent, and the bits of each component of a quaternion; None for floats."""
-
-STAMP = 5
-"""Bytes of a datagram that say whose it is, and when: as few as will do."""
-
-PLACE_BITS, CUBE = 16, 8.0
-"""The bits of each coordinate of a place that is packed, over a cube of so many metres."""
 
 
 def measure(
@@ -100,9 +86,8 @@ def measure(
         raise RuntimeError("nothing was shown: no datagram came through")
     moments, first = np.unique([moment for moment, _ in frames], return_index=True)
     drawn = joined([frames[row][1][:, None] for row in first.tolist()], axis=1)
-    shown = Path(moments, Poses(drawn.positions, normalise(drawn.quaternions))).at(times)
-    compared = times >= moments[0] - 1e-6
-    off = body.errors(shown[:, compared], poses[:, compared]).max(axis=0)
+    shown = Path(moments, Poses(drawn.positions, normalise(drawn.quaternions)))
+    off = Forest([body]).errors(shown.poses, Path(times, poses).at(moments)).max(axis=0)
     seconds = float(times[-1] - times[0])
     joining = [datagram for datagram in sent if isinstance(read(datagram), Description)]
     joining_bytes, motions = sum(map(len, joining)), len(sent) - len(joining)
@@ -114,12 +99,12 @@ def measure(
         "answers_a_second": (sum(map(len, answers)) + HEADERS * len(answers)) / seconds,
         "share_within_tolerance": float(np.mean(off <= tolerance)),
         "share_within_20_mm": float(np.mean(off <= 0.02)),
-        **_cost((sum(map(len, sent)) - joining_bytes) / seconds, HEADERS * motions / seconds, off),
-    }, shown
+        **cost((sum(map(len, sent)) - joining_bytes) / seconds, HEADERS * motions / seconds, off),
+    }, shown.at(times)
 
 
-def _cost(size: float, headers: float, off: np.ndarray) -> dict[str, float]:
-    """Return what all ways have, of bytes a second, those of headers, and errors (n,) in metres."""
+def cost(size: float, headers: float, off: np.ndarray) -> dict[str, float]:
+    """Return what is said of any way to send, of bytes a second, those of headers, and errors (n,) in metres."""
     return {
         "bytes_a_second": size,
         "bytes_a_second_with_headers": size + headers,
@@ -149,32 +134,3 @@ def _receive(to: int, times: np.ndarray, delay: float) -> list[tuple[float, Pose
             receiver.take(data[ARRIVAL.size :], arrival, to)
             outlet.say(b"".join(answer for _, answer in receiver.answers()))
     return frames
-
-
-def packed(body: Body, times: np.ndarray, poses: Poses) -> dict[str, dict[str, float]]:
-    """Return what each way costs of samples (n,) of poses (joints, n), and how far off they are."""
-    result, sliding, step = {}, np.asarray(body.sliding), CUBE / (2**PLACE_BITS - 1)
-    for label, (rate, bits) in WAYS.items():
-        moments = np.arange(times[0], times[-1] + 1.0 / rate, 1.0 / rate)
-        # Floats are as good as exact.
-        sent, turn, place = Path(times, poses).at(np.minimum(moments, times[-1])), 4 * 32, 3 * 32
-        if bits:
-            turn, place = 2 + 3 * bits, 3 * PLACE_BITS
-            rounded = np.where(sliding[:, None, None], np.rint(sent.positions / step) * step, sent.positions)
-            sent = Poses(rounded, smallest_three(sent.quaternions, bits))
-        size = -(-(len(body.joints) * turn + np.count_nonzero(sliding) * place) // 8)
-        off = body.errors(Path(moments, sent).at(times), poses).max(axis=0)
-        result[label] = _cost(rate * size, rate * (STAMP + HEADERS), off)
-    return result
-
-
-def smallest_three(quaternions: np.ndarray, bits: int) -> np.ndarray:
-    """Return unit quaternions (..., 4) as they come back from three components of so many bits each."""
-    largest = np.argmax(np.abs(quaternions), axis=-1)[..., None]
-    step = np.sqrt(2.0) / (2**bits - 2)
-    rounded = np.rint(quaternions / step) * step
-    np.put_along_axis(rounded, largest, 0.0, axis=-1)
-    rest = np.sqrt(np.maximum(1.0 - np.sum(rounded**2, axis=-1, keepdims=True), 0.0))
-    rest = np.copysign(rest, np.take_along_axis(quaternions, largest, axis=-1))
-    np.put_along_axis(rounded, largest, rest, axis=-1)
-    return rounded

@@ -45,7 +45,9 @@ class Receiving:
     def hear(self, until: float, stopped: Sequence[int]) -> None:
         """Show what comes until a moment of `time.monotonic`, or until all who sent have gone."""
         began, frame = time.monotonic(), 0
-        while not stopped and (now := time.monotonic()) < until and not self._is_over(now):
+        while not stopped and (now := time.monotonic()) < until:
+            if self._last > -math.inf and not self._heard and now - self._last > LINGER:
+                break
             due = began + frame / self._fps
             for came in self._room.come(min(due, until) - now):
                 self._take(came, time.monotonic())
@@ -53,9 +55,6 @@ class Receiving:
             if now >= due:
                 self._show(now)
                 frame = math.floor((now - began) * self._fps) + 1
-
-    def _is_over(self, now: float) -> bool:
-        return self._last > -math.inf and not self._heard and now - self._last > LINGER
 
     def _take(self, came: Came, now: float) -> None:
         user, datagram, self._last = came.user, came.datagram, now

@@ -42,10 +42,6 @@ LIMITS = {
 """Of Zenoh: the pauses between attempts to connect, and bytes of what is taken from others at once."""
 
 
-class RoomError(ValueError):
-    """What ends a command, with the way out."""
-
-
 class Came(NamedTuple):
     """What came."""
 
@@ -90,14 +86,14 @@ def opened(role: str, at: str | None = None, network: bool = False, config: Path
 
     Raises
     ------
-    RoomError
+    ValueError
         Without Zenoh, for a file that it cannot read, and where no one can be reached.
     """
     try:
         import zenoh
     except ImportError:
         way = "python scripts/bootstrap.py stream" if CHECKOUT else "pip install 'rigid-motion[stream]'"
-        raise RoomError(f"rooms need Zenoh, which is not installed; `{way}` brings it") from None
+        raise ValueError(f"rooms need Zenoh, which is not installed; `{way}` brings it") from None
     chosen = settings(role, at, network)
     try:
         text = zenoh.Config.from_file(config) if config else zenoh.Config()
@@ -108,14 +104,14 @@ def opened(role: str, at: str | None = None, network: bool = False, config: Path
         for key, value in chosen.items():
             text.insert_json5(key, json.dumps(value))
     except (zenoh.ZError, OSError) as error:
-        raise RoomError(f"{config or at}: Zenoh does not take this: {_first_line(error)}") from None
+        raise ValueError(f"{config or at}: Zenoh does not take this: {_first_line(error)}") from None
     try:
         return zenoh.open(text)
     except zenoh.ZError as error:
         way = "is its router running, as stream router --network on that machine?"
         if role == "router":
             way = "another program may have this port, or a file is missing"
-        raise RoomError(f"{at or config or HERE}: there is no way to it ({_first_line(error)}); {way}") from None
+        raise ValueError(f"{at or config or HERE}: there is no way to it ({_first_line(error)}); {way}") from None
 
 
 def _first_line(error: Exception) -> str:

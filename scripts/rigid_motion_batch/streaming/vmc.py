@@ -10,7 +10,7 @@ import numpy as np
 
 from rigid_motion.live.sockets import Address, Outlet, Port
 from rigid_motion.motion import Poses
-from rigid_motion.streams import Body, Keys, Receiver, Shown
+from rigid_motion.streams import Body, Keys, Receiver
 from rigid_motion.streams.vmc import Performer, write, write_trackers
 
 RATE = 90.0
@@ -34,14 +34,10 @@ class ToVmc(Outlet):
         self.datagrams = 0
         self._began = time.monotonic()
 
-    def show(self, shown: Iterable[Shown]) -> None:
-        """Show what streams show now."""
-        bodies = [(body, what.poses[body.name]) for what in shown for body in what.bodies]
-        self.say_frame(time.monotonic() - self._began, bodies)
-
-    def say_frame(self, moment: float, bodies: Iterable[tuple[Body, Poses]]) -> None:
-        """Say the poses (joints,) of bodies, each joint in its parent's space, at a moment."""
+    def show(self, bodies: Iterable[tuple[Body, Poses]], moment: float | None = None) -> None:
+        """Show bodies at poses (joints,), each joint in its parent's space, at a moment, or else now."""
         trackers, datagrams = {}, list[bytes]()
+        moment = time.monotonic() - self._began if moment is None else moment
         for body, poses in bodies:
             if len(body.joints) == 1:
                 trackers[body.name] = poses[0]
@@ -74,26 +70,18 @@ def play(
                 time.sleep(min(wait, 0.1))
             if stopped:
                 break
-            outlet.say_frame(moment, [(body, poses[:, row])])
+            outlet.show([(body, poses[:, row])], moment)
             reach(moment)
         return outlet.datagrams
 
 
-class Performers(Port):
-    """What another program performs to a port of this machine. Raises OSError where it is taken.
-
-    Of several programs that is the first, until it has gone.
+def performed(port: Port, receiver: Receiver) -> list[Keys]:
+    """Return what another program performed to a port since the last call. Of several that is the first, until it has
+    gone. Bodies are others as soon as bones or devices come that are new.
     """
-
-    def __init__(self, port: int) -> None:
-        super().__init__(port=port)
-        self._receiver = Receiver()
-
-    def samples(self) -> list[Keys]:
-        """Return what came since the last call. Bodies are others as soon as bones or devices come that are new."""
-        now = time.monotonic()
-        for datagram, source in self.received():
-            self._receiver.take(datagram, now, source)
-        self._receiver.show(now)
-        came, first = self._receiver.keys(), self._receiver.streams[:1]
-        return [keys for keys in came if keys.stream in first]
+    now = time.monotonic()
+    for datagram, source in port.received():
+        receiver.take(datagram, now, source)
+    receiver.show(now)
+    came, first = receiver.keys(), receiver.streams[:1]
+    return [keys for keys in came if keys.stream in first]

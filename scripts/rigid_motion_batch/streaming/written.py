@@ -1,4 +1,4 @@
-"""What was shown as files: CSV, TUM and BVH."""
+"""What was shown as files: CSV and BVH."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from rigid_motion.motion import Poses, interpolate
 from rigid_motion.motion.poses import joined
 from rigid_motion.streams import Body, Keys, Shown
-from rigid_motion_batch.analysis.metrics import lines_of_poses, write_poses
+from rigid_motion_batch.analysis.metrics import lines_of_poses
 from rigid_motion_batch.axes import from_blender
 from rigid_motion_batch.files import replacing
 from rigid_motion_batch.recordings.bvh_writing import write_bvh
@@ -61,22 +61,17 @@ class Tracks(dict[tuple[str, Body], list[tuple[np.ndarray, Poses]]]):
 
 
 def write_motions(path: Path, motions: Sequence[Motion], fps: float) -> list[Path]:
-    """Write a table of all, `.csv`, or a file for each, `.bvh` or `.tum`, and return what was written.
+    """Write a table of all, `.csv`, or a `.bvh` for each, and return what was written.
 
-    In tables joints are where they are in the world, and TUM takes rigid bodies alone. BVH is y up, as it is elsewhere.
+    In tables joints are where they are in the world. BVH is y up, as it is elsewhere.
     """
-    ending = path.suffix.lower()
-    if ending == ".csv":
+    if path.suffix.lower() == ".csv":
         with replacing(path) as file:
             _write_table(file, motions)
         return [path]
-    motions = [motion for motion in motions if ending == ".bvh" or len(motion.body.joints) == 1]
     names = folder_names(f"{path.stem}-{motion.name}" if len(motions) > 1 else path.stem for motion in motions)
-    paths = [path.with_name(f"{name}{ending}") for name in names]
+    paths = [path.with_name(f"{name}.bvh") for name in names]
     for place, motion in zip(paths, motions, strict=True):
-        if ending == ".tum":
-            write_poses(place, motion.times, motion.poses[0])
-            continue
         body, even = motion.body, motion.even("lerp_slerp", fps)
         # A bone ends as far behind its joint as that is behind its parent.
         rest_body = RestBody(body.joints, body.parents, body.rest, from_blender(body.rest, "opengl").positions)

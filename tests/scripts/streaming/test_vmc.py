@@ -10,13 +10,14 @@ import time
 import numpy as np
 import pytest
 
+from rigid_motion.live.sockets import Port
 from rigid_motion.motion import Poses, Skeleton
 from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.vmc import write_trackers
 from rigid_motion_batch.cli import stream
 from rigid_motion_batch.places import CHECKOUT
 from rigid_motion_batch.streaming.sending import together
-from rigid_motion_batch.streaming.vmc import Performers, ToVmc, play
+from rigid_motion_batch.streaming.vmc import ToVmc, performed, play
 from tests.live.performing import BODY, JOINTS, TIMES_OF_A_SECOND, dance, frames_of_vmc, in_world
 from tests.scripts.streaming.test_rooms import HERE, PATIENCE, free_port, running
 
@@ -133,13 +134,14 @@ def test_playing_ends_when_it_is_stopped(walk, listener):
 
 
 def test_performers_are_bodies_with_samples():
-    with Performers(0) as performers, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+    receiver = Receiver()
+    with Port() as port, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         for datagrams in frames_of_vmc(TIMES_OF_A_SECOND):
             for datagram in datagrams:
-                other.sendto(datagram, ("127.0.0.1", performers.number))
+                other.sendto(datagram, ("127.0.0.1", port.number))
         time.sleep(0.01)
-        (keys,) = performers.samples()
-        assert performers.samples() == []
+        (keys,) = performed(port, receiver)
+        assert performed(port, receiver) == []
     (body,), poses = keys.bodies, keys.poses["VMC"]
     assert keys.moments == pytest.approx(TIMES_OF_A_SECOND, abs=1e-6)
     shown = dict(zip(body.joints, Skeleton(body.parents).in_root_space(poses).positions, strict=True))
@@ -150,13 +152,14 @@ def test_performers_are_bodies_with_samples():
 
 
 def test_trackers_beside_a_performer_are_bodies_with_samples():
-    with Performers(0) as performers, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+    receiver = Receiver()
+    with Port() as port, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         for moment, datagrams in zip(TIMES_OF_A_SECOND, frames_of_vmc(TIMES_OF_A_SECOND), strict=True):
             ball = {"ball": Poses([moment, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0])}
             for datagram in [*write_trackers(ball), *datagrams]:
-                other.sendto(datagram, ("127.0.0.1", performers.number))
+                other.sendto(datagram, ("127.0.0.1", port.number))
         time.sleep(0.01)
-        (keys,) = performers.samples()
+        (keys,) = performed(port, receiver)
     assert [body.name for body in keys.bodies] == ["VMC", "ball"]
     assert keys.poses["ball"].positions[0, :, 0] == pytest.approx(keys.moments, abs=1e-6)
     assert Sender(keys.bodies).add(float(keys.moments[0]), {name: poses[:, 0] for name, poses in keys.poses.items()})
@@ -172,7 +175,8 @@ def test_what_a_receiver_shows_goes_to_another_program(listener):
         there = {"ball": Poses([[moment, 0.0, 0.0]], [[1.0, 0.0, 0.0, 0.0]]), "dancer": poses[:, row]}
         for datagram in sender.add(moment, there):
             receiver.take(datagram, moment)
-        to_vmc.show(receiver.show(moment).values())
+        for shown in receiver.show(moment).values():
+            to_vmc.show((body, shown.poses[body.name]) for body in shown.bodies)
     to_vmc.close()
     datagrams = received(listener)
     assert any(b"/VMC/Ext/Tra/Pos" in datagram for datagram in datagrams)
