@@ -37,7 +37,7 @@ from rigid_motion_batch.analysis.body_metrics import measure_modes
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.analysis.modes import BEST_OF, REFERENCE
-from rigid_motion_batch.analysis.needed import TABLE_RATES, KeysNeeded, OfRigidBody, keys_needed, overall
+from rigid_motion_batch.analysis.needed import TABLE_RATES, KeysNeeded, Ways, keys_needed, overall
 from rigid_motion_batch.analysis.reconstructions import reconstruct
 from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings.clip_reading import read_clips
@@ -167,7 +167,7 @@ def _errors_of_clips(clips: Sequence[Clip], part: float) -> dict[str, float]:
     for rate in RATES:
         ratios = []
         for clip in clips:
-            ways, keys = OfRigidBody(clip, RADIUS), decimate(clip.times, float(rate))
+            ways, keys = Ways(clip, RADIUS), decimate(clip.times, float(rate))
             stretch = ways.between(int(keys[0]), int(keys[-1]))
             with mock.patch.object(curves, "_bent", with_part):
                 error = stretch.error(keys, "motor_spline_causal")
@@ -184,9 +184,9 @@ def _needed(clips: Sequence[Clip], modes: Sequence[str], *, fit: bool) -> dict[s
     result = []
     for clip in clips:
         _say(f"keys needed, {clip.name} ...")
-        result.append(_apart(keys_needed(OfRigidBody(clip, RADIUS, fit), modes)))
+        result.append(_apart(keys_needed(Ways(clip, RADIUS, fit), modes)))
     means = overall(result)
-    decimations = OfRigidBody(clips[0], RADIUS, fit).decimations
+    decimations = Ways(clips[0], RADIUS, fit).decimations
     shares = {group[0]: means.shares[row] for row, group in enumerate(means.groups)}
     return {
         mode: {

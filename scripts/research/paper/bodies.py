@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from rigid_motion_batch.analysis.body_metrics import measure_modes
-from rigid_motion_batch.analysis.body_needed import OfBody
+from rigid_motion_batch.analysis.needed import Ways
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.analysis.modes import REFERENCE
@@ -62,7 +62,7 @@ def needed_of(clip: Clip) -> dict[str, dict[str, list[float]]]:
     """Return the key poses that every mode needs, by mode and decimation: `shares_of` the reference's at `RATES`."""
     radii = np.full(len(clip.rest_body.joints), JOINT)
     searched = part_of(clip, 0, int(np.searchsorted(clip.times, clip.times[0] + SEARCHED, side="right")) - 1)
-    return shares_of(clip, keys_needed(OfBody(searched, radii), MODES))
+    return shares_of(clip, keys_needed(Ways(searched, radii), MODES))
 
 
 def errors_of(clip: Clip) -> dict[str, dict[int, tuple[float, float]]]:

@@ -150,12 +150,12 @@ class CountKeys(Step, rooms=ANALYSIS, stage="measure"):
 
     def make(self, job: Job) -> None:
         from rigid_motion_batch.analysis import needed
-        from rigid_motion_batch.analysis.body_needed import ways_of
         from rigid_motion_batch.analysis.modes import single_modes
         from rigid_motion_batch.rows import write_rows
 
         done = iter(range(1, len(needed.RATES) + 1))
-        ways = ways_of(self.clip.read(job.results[0]), self.radii, fit=self.fit)
+        clip = self.clip.read(job.results[0])
+        ways = needed.Ways(clip, self.radii.of(clip), self.fit)
         modes = single_modes(self.modes)
         result = needed.keys_needed(ways, modes, advance=lambda: job.progress(next(done), len(needed.RATES)))
         write_rows(job.folder / ROWS, needed.NeededRow, needed.rows_of(result))
