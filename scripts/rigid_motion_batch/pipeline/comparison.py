@@ -16,7 +16,7 @@ from typing import Any, cast
 import numpy as np
 
 from rigid_motion_batch.analysis.choices import Choice, fewest_keys
-from rigid_motion_batch.analysis.metrics import body_table_names, table_names
+from rigid_motion_batch.analysis.metrics import table_names
 from rigid_motion_batch.analysis.modes import name_of_other, single_modes
 from rigid_motion_batch.analysis.radii import EVERYWHERE, Radii
 from rigid_motion_batch.recordings import TrajectoryError
@@ -284,8 +284,8 @@ class ComparisonPlan:
         modes = single_modes(comparison.modes) if joints else comparison.modes
         for choice in study.choices:
             folder = f"{name}/{choice.name}"
-            names = table_names(choice, modes, comparison.form, study.facts.against)
-            publish = {table: f"{folder}/{table}" for table in (body_table_names(choice, modes) if joints else names)}
+            names = table_names(choice, modes, comparison.form, study.facts.against, body=bool(joints))
+            publish = {table: f"{folder}/{table}" for table in names}
             seconds = 0.02 + 6e-6 * size * len(modes) * (1.0 if choice.decimation == "uniform" else 45.0)
             step = steps.Measure(clip, choice, tuple(modes), comparison.radii, comparison.shared, comparison.form)
             yield (

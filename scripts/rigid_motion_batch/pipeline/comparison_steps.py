@@ -124,18 +124,19 @@ class Measure(Step, rooms=ANALYSIS, stage="measure"):
     """The form of the tables of poses."""
 
     def make(self, job: Job) -> None:
-        from rigid_motion_batch.analysis import body_metrics, metrics, results
+        from rigid_motion_batch.analysis import metrics, results
+        from rigid_motion_batch.analysis.reconstructions import reconstruct
         from rigid_motion_batch.rows import write_rows
 
-        clip, radii = self.clip.read(job.results[0]), self.radii
-        made = results.made_of(clip, self.choice, self.modes, radii, shared=self.shared)
+        clip = self.clip.read(job.results[0])
+        made = reconstruct(clip, self.choice, self.modes, self.radii.of(clip), shared=self.shared)
         if made is None:
             raise TaskError(f"{clip.name}: too short for two keys {self.choice.phrase}")
         result = results.measured(made)
-        results.write_tables(job.folder, made, self.form)
+        metrics.write_tables(job.folder, made, self.form)
         write_rows(job.folder / ROWS, metrics.Metrics, result.rows)
         if result.joints:
-            write_rows(job.folder / JOINT_ROWS, body_metrics.JointMetrics, result.joints)
+            write_rows(job.folder / JOINT_ROWS, metrics.JointMetrics, result.joints)
         values.write(job.folder / "result", result)
         values.write(job.folder / "numbers", result.numbers)
 
@@ -190,7 +191,7 @@ class Tabulate(Step, rooms=("analysis", "files.py"), stage="report", partial=Tru
     """The name of the part of the table in every result."""
 
     def make(self, job: Job) -> None:
-        from rigid_motion_batch.analysis.body_metrics import join_tables
+        from rigid_motion_batch.analysis.metrics import join_tables
 
         join_tables(job.folder / "table.csv", [folder / self.rows for folder in job.results])
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate, shell_error
-from rigid_motion_batch.analysis.body_metrics import key_samples
+from rigid_motion_batch.analysis.metrics import key_samples
 from rigid_motion_batch.analysis.reconstructions import Reconstruction, identical_modes
 from rigid_motion_batch.palette import error_hex, full_colour
 from rigid_motion_batch.recordings.rest_bodies import short_names

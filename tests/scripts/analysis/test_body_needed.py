@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import Poses
-from rigid_motion_batch.analysis.needed import Ways
-from rigid_motion_batch.analysis.needed import RATES, KeysNeeded, keys_needed
+from rigid_motion_batch.analysis.needed import RATES, KeysNeeded, Ways, keys_needed
 from tests.motion.bodies import body_errors
 from tests.scripts.clips.bodies import JOINTS, PARENTS, swinging_body
 

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import Poses
-from rigid_motion_batch.analysis import results
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.radii import EVERYWHERE
-from rigid_motion_batch.analysis.reconstructions import Reconstruction
+from rigid_motion_batch.analysis.reconstructions import Reconstruction, reconstruct
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.palette import colour_of, linear
 from rigid_motion_batch.recordings.clip_reading import read_source
@@ -30,7 +29,7 @@ SINGLE = 5e-6
 
 def made_of(source: Path, axes: str | None = None) -> Reconstruction:
     ((clip,), _) = read_source(str(source), axes)
-    made = results.made_of(clip, Uniform("5"), MODES, EVERYWHERE, shared=False)
+    made = reconstruct(clip, Uniform("5"), MODES, EVERYWHERE.of(clip))
     assert made is not None
     return made
 
