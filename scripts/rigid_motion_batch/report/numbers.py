@@ -152,9 +152,3 @@ def digits(value: float | None, places: int = 3) -> str:
 def percent(share: float) -> str:
     """Return a share as prose has it: "64 %"."""
     return f"{100 * share:.0f}\u00a0%"
-
-
-def listed(words: Iterable[str]) -> str:
-    """Words as prose lists them: "5, 10 and 15"."""
-    words = list(words)
-    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))

@@ -207,9 +207,7 @@ class _Clips:
         self.needed: list[KeysNeeded] = []
         self.choices: list[tuple[str, tuple[Choice, ...]]] = []
         self.metrics: list[Metrics] = []
-        self.rows: list[Any] = []
         self.joints: list[Joints] = []
-        self.segments: list[tuple[str, str, str]] = []
         self.films: list[tuple[int, str, str | None]] = []
         self.models: list[tuple[int, str, str | None]] = []
         self.places: list[dict[str, Any]] = []
@@ -226,7 +224,6 @@ class _Clips:
         numbers.add(clip.facts.name, [result.numbers for result in clip.choices])
         own = numbers.numbers()
         self.choices.append((name, tuple(result.choice for result in clip.choices)))
-        self.rows += tables.every_row(clip)
         self._warned.append((name, clip.facts.warnings, float(clip.times[0])))
         if clip.needed:
             self.needed.append(clip.needed)
@@ -238,8 +235,6 @@ class _Clips:
                 self.models.append((place, result.choice.name, self._link(self._models[name, result.choice.name])))
             if joints := joints_of(place, clip, result, own):
                 self.joints.append(joints)
-            if said := tables.segments_of(result, own):
-                self.segments.append((name, result.choice.title, said))
         self.places.append({"name": name, "data": ""})
         self.inside.append(json_in_page(clip_data(clip, own.label, self._mesh)))
         if self.files or sum(map(len, self.inside)) > IN_THE_PAGE:
@@ -358,7 +353,6 @@ def _templates() -> jinja2.Environment:
     environment.globals |= {
         "chart": charts.chart,
         "address": _address,
-        "every_head": tables.EVERY_HEAD,
         "needed_rows": tables.needed_rows,
         "csv": _csv,
         "label_of": label_of,

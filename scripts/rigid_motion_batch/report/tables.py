@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
-from rigid_motion_batch.analysis.modes import BEST_OF
 from rigid_motion_batch.analysis.needed import DECIMATIONS, KeysNeeded, overall
-from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult
 
-from .numbers import MEASURES, MINUS, NONE, Numbers, digits, listed, percent
+from .numbers import MEASURES, MINUS, NONE, Numbers, digits, percent
 
 SPACINGS = dict(zip(DECIMATIONS, ("evenly spaced", "where needed", "where needed, and fitted"), strict=True))
 
@@ -110,36 +106,6 @@ def _change(value: float, reference: int | None, row: np.ndarray, group: Sequenc
     return "same" if shown == "0.0" else f"{'+' if change > 0 else MINUS}{shown}\u00a0%"
 
 
-def every_row(clip: ClipResult) -> list[tuple[str, str, tuple[str, ...], tuple[Cell, ...]]]:
-    """Clip, choice, modes and numbers: a row for each motion under each choice."""
-    found = []
-    for result in clip.choices:
-        lines = [
-            [str(row.keys or NONE), digits(row.keys_per_s)] + [digits(measure.of(row)) for measure in COUNTED]
-            for motion in result.motions
-            for row in motion.metrics[:1]
-        ]
-        least = [_least(column) for column in zip(*lines, strict=True)]
-        found += [
-            (
-                clip.facts.name,
-                result.choice.title,
-                motion.modes,
-                tuple(Cell(text, best=text == best) for text, best in zip(line, least, strict=True)),
-            )
-            for motion, line in zip(result.motions, lines, strict=True)
-        ]
-    return found
-
-
-COUNTED = tuple(measure for measure in MEASURES if measure.metric != "keys_per_s")
-EVERY_HEAD = (
-    ("Keys", ""),
-    ("Keys", "/s"),
-    *((measure.title.replace(" error", ""), measure.unit) for measure in COUNTED),
-)
-
-
 def needed_rows(needed: Sequence[KeysNeeded]) -> tuple[list[str], list[tuple[tuple[str, ...], str, list[Cell]]]]:
     """Heads, and for each motion and way to space keys the keys that are as good as the reference's at each rate."""
     together = overall(needed)
@@ -165,21 +131,3 @@ def needed_rows(needed: Sequence[KeysNeeded]) -> tuple[list[str], list[tuple[tup
                 cells.append(Cell(number, percent(share) + partly, best, float(share)))
             rows.append((modes, SPACINGS[DECIMATIONS[way]], cells))
     return [f"{together.rates[at]}/s" for at in asked], rows
-
-
-def segments_of(result: ChoiceResult, numbers: Numbers) -> str:
-    """Which modes were best in how many segments, in a sentence; empty without `best_of`."""
-    segments = result.mode_of_segments
-    if not segments:
-        return ""
-    rows = {row.mode: row for motion in result.motions for row in motion.metrics}
-    modes = listed(f"{numbers.label(mode)} in {count}" for mode, count in Counter(segments).most_common())
-    changes = sum(mode != following for mode, following in pairwise(segments))
-    said = f"Of {len(segments)} segments {modes}; the mode changes at {changes} keys."
-    known = [row for row in rows.values() if row.keys and row.mode != BEST_OF]
-    best = min(known, key=lambda row: (row.keys or 0, row.rms_shell_m))
-    if best.rms_shell_m > 0.0:
-        less = 1.0 - rows[BEST_OF].rms_shell_m / best.rms_shell_m
-        said += f" RMS shell error beside {numbers.label(best.mode)}, the best single mode: {percent(abs(less))} "
-        said += "lower." if less > 0 else "higher."
-    return said
