@@ -8,6 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from rigid_motion_batch.places import ASSETS
+
 CREASE = np.cos(np.radians(35.0))
 """Faces that meet at a sharper angle keep an edge between them, in the shading and in the wireframe."""
 
@@ -89,43 +91,5 @@ class Mesh:
 
 @cache
 def drill() -> Mesh:
-    """Return a drill: lofts through rounded sections; the origin is in the hand, the tip at (0, 0.16, 0.062)."""
-    vertices: list[np.ndarray] = []
-    triangles: list[np.ndarray] = []
-    tints: list[np.ndarray] = []
-
-    def loft(tint: float, corners: int, sections: list[tuple[np.ndarray, np.ndarray, np.ndarray, float]]) -> None:
-        angles = 2.0 * np.pi * (np.arange(corners) + 0.5) / corners
-        rings = []
-        for centre, u, v, power in sections:
-            x, y = (np.sign(some) * np.abs(some) ** (2.0 / power) for some in (np.cos(angles), np.sin(angles)))
-            rings.append(centre + x[:, None] * u + y[:, None] * v)
-        start = sum(map(len, vertices))
-        vertices.append(np.concatenate([*rings, [sections[0][0], sections[-1][0]]]))
-        at = start + corners * np.arange(len(rings))[:, None] + np.arange(corners)
-        following = np.roll(at, -1, axis=1)
-        low, high = at[:-1], at[1:]
-        sides = [(low, following[:-1], following[1:]), (low, following[1:], high)]
-        bottom, top = start + corners * len(rings) + np.arange(2)
-        faces = [np.stack(side, axis=-1).reshape(-1, 3) for side in sides]
-        faces.append(np.stack((following[0], at[0], np.full(corners, bottom)), axis=-1))
-        faces.append(np.stack((at[-1], following[-1], np.full(corners, top)), axis=-1))
-        triangles.extend(faces)
-        tints.append(np.full(sum(map(len, faces)), tint))
-
-    def along(y: float, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-        return np.array((0, y, 0.062)), np.array((0, 0, radius)), np.array((radius, 0, 0)), 2.0
-
-    def up(
-        y: float, z: float, width: float, depth: float, power: float = 5.0
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-        return np.array((0, y, z)), np.array((width, 0, 0)), np.array((0, depth, 0)), power
-
-    body = ((-0.056, 0.015), (-0.05, 0.022), (-0.046, 0.0245), (0.052, 0.0245), (0.06, 0.022), (0.082, 0.0135))
-    loft(1.0, 28, [along(*item) for item in body])
-    loft(0.0, 20, [along(*item) for item in ((0.082, 0.0115), (0.103, 0.0105), (0.112, 0.006))])
-    loft(0.0, 10, [along(*item) for item in ((0.112, 0.0032), (0.15, 0.0032), (0.16, 0.0002))])
-    loft(0.25, 20, [up(-0.016, -0.05, 0.0145, 0.021), up(-0.006, 0.0, 0.0135, 0.0185), up(0.002, 0.042, 0.015, 0.024)])
-    loft(1.0, 20, [up(-0.014, -0.074, 0.019, 0.034, 7.0), up(-0.014, -0.05, 0.019, 0.034, 7.0)])
-    loft(0.0, 12, [up(0.022, 0.013, 0.006, 0.006, 4.0), up(0.026, 0.032, 0.006, 0.007, 4.0)])
-    return Mesh(np.concatenate(vertices), np.concatenate(triangles), np.concatenate(tints))
+    """Return the drill that films have, of few triangles."""
+    return Mesh(**np.load(ASSETS / "drill.npz"))

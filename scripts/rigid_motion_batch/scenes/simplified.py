@@ -14,11 +14,11 @@ MOST_TRIANGLES = 4000
 TRIES = 6
 
 
-def simplified(requested: str) -> dict[str, np.ndarray]:
+def simplified(requested: str, most: int = MOST_TRIANGLES) -> dict[str, np.ndarray]:
     """Return the surface of an object in its own axes, in metres: `vertices` (v, 3), `triangles` (t, 3), `tints` (t,).
 
-    Tints are 1 where a triangle has the colour of its mode, and 0 elsewhere. `requested` is as in `load_subject`,
-    whose errors it raises.
+    It has so many triangles at most. Tints are 1 where a triangle has the colour of its mode, and 0 elsewhere.
+    `requested` is as in `load_subject`, whose errors it raises.
     """
     bpy.ops.wm.read_factory_settings(use_empty=True)
     mesh = load_subject(requested)
@@ -28,11 +28,11 @@ def simplified(requested: str) -> dict[str, np.ndarray]:
     modifier.use_collapse_triangulate = True
     for _ in range(TRIES):
         result = _surface(obj)
-        if len(result["triangles"]) <= MOST_TRIANGLES:
+        if len(result["triangles"]) <= most:
             return result
         # It may leave more than it is asked to, where much hangs on nothing.
-        modifier.ratio *= 0.95 * MOST_TRIANGLES / len(result["triangles"])
-    raise SubjectError(f"{requested}: Blender cannot simplify it to {MOST_TRIANGLES} triangles")
+        modifier.ratio *= 0.95 * most / len(result["triangles"])
+    raise SubjectError(f"{requested}: Blender cannot simplify it to {most} triangles")
 
 
 def _surface(obj: bpy.types.Object) -> dict[str, np.ndarray]:
