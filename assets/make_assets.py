@@ -66,7 +66,7 @@ def main(arguments: list[str] | None = None) -> None:
         print(f"models.blend is left as it is: older versions cannot open what {bpy.app.version_string} writes")
         return
     from research.making.models import write_models
-    from rigid_motion_batch.scenes.simplified import simplified
+    from rigid_motion_batch.scenes.subject import simplified
 
     write(output / "models.blend", write_models)
     write(output / "drill.npz", lambda path: np.savez_compressed(path, **simplified("drill", DRILL_TRIANGLES)))

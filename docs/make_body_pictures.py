@@ -22,8 +22,7 @@ sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")
 from examples import figure
 from examples.dancer import dance
 from rigid_motion import animation
-from rigid_motion_batch.analysis.choices import Uniform
-from rigid_motion_batch.analysis.radii import EVERYWHERE
+from rigid_motion_batch.analysis.choices import EVERYWHERE, Uniform
 from rigid_motion_batch.analysis.results import ChoiceResult, compare_clip
 from rigid_motion_batch.cli import compare
 from rigid_motion_batch.palette import ERROR_COLOURS, full_colour

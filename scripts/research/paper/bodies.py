@@ -13,11 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from rigid_motion_batch.analysis.choices import Uniform
+from rigid_motion_batch.analysis.choices import JOINT, Uniform
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.analysis.modes import REFERENCE
 from rigid_motion_batch.analysis.needed import DECIMATIONS, RATES, Ways, keys_needed, part_of
-from rigid_motion_batch.analysis.radii import JOINT
 from rigid_motion_batch.analysis.reconstructions import moving, reconstruct
 from rigid_motion_batch.analysis.results import measured
 from rigid_motion_batch.recordings import TrajectoryError

@@ -16,9 +16,8 @@ import numpy as np
 
 from rigid_motion.motion import Errors, Poses
 from rigid_motion.motion.measures import rms
-from rigid_motion_batch.files import replacing
+from rigid_motion_batch.files import line_of, replacing
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.rows import line_of
 
 from .choices import Choice, Keys
 from .errors import Ground, MotionErrors

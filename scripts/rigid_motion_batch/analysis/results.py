@@ -14,11 +14,10 @@ import numpy as np
 from rigid_motion.motion import Poses
 from rigid_motion_batch.recordings.clips import Clip, ClipFacts
 
-from .choices import Choice, Keys
+from .choices import Choice, Keys, Radii
 from .errors import Ground, MotionErrors, errors_of
 from .metrics import JointMetrics, Metrics, key_samples, row_of, rows_of_joints
 from .needed import KeysNeeded
-from .radii import Radii
 from .reconstructions import Reconstruction, identical_modes
 
 

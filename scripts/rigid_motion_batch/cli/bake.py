@@ -20,8 +20,14 @@ require_blender(SCRIPT)
 
 from rigid_motion_batch.keying.baking import BAKED, UNBAKED, baking, unbaking
 from rigid_motion_batch.keying.jobs import do_blend
-from rigid_motion_batch.keying.options import add_file_options, add_target_options, refuse_odd_places
-from rigid_motion_batch.keying.planning import Job, named_file, planned
+from rigid_motion_batch.keying.planning import (
+    Job,
+    add_file_options,
+    add_target_options,
+    named_file,
+    planned,
+    refuse_odd_places,
+)
 from rigid_motion_batch.keying.records import is_made
 from rigid_motion_batch.keying.sessions import do_all
 from rigid_motion_batch.keying.work import Doing, Work

@@ -20,11 +20,17 @@ PROGRAM = program_of(SCRIPT)
 
 from rigid_motion.gltf.sizes import OF_A_BODY, OF_KEY_POSES
 from rigid_motion.motion import KEYFRAME_MODES
-from rigid_motion_batch.analysis.choices import Tolerance
-from rigid_motion_batch.analysis.radii import RIGID, radius_in_metres
+from rigid_motion_batch.analysis.choices import RIGID, Tolerance, radius_in_metres
 from rigid_motion_batch.keying.gltf_files import do_gltf
-from rigid_motion_batch.keying.options import add_file_options, add_target_options, refuse_odd_places
-from rigid_motion_batch.keying.planning import Job, file_and_body, named_file, planned
+from rigid_motion_batch.keying.planning import (
+    Job,
+    add_file_options,
+    add_target_options,
+    file_and_body,
+    named_file,
+    planned,
+    refuse_odd_places,
+)
 from rigid_motion_batch.keying.records import is_made
 from rigid_motion_batch.keying.reductions import ENDINGS, GLB_SUFFIX, RATES, SUFFIX, TOLERANCE, Reductions, name_of
 from rigid_motion_batch.keying.sessions import do_all

@@ -13,8 +13,7 @@ import bpy
 from rigid_motion_batch.files import written_beside
 from rigid_motion_batch.silencing import silenced
 
-from .output_files import FileProblem, Unreadable, changed_at, not_written
-from .records import Record
+from .records import FileProblem, Record, Unreadable, changed_at, not_written
 
 HERE = bpy.app.version[:2]
 """The Blender that this runs in."""

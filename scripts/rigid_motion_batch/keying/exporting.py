@@ -12,13 +12,13 @@ import bpy
 import rigid_motion
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.fbx import ADDON as FBX_ADDON
-from rigid_motion_batch.recordings.fbx_records import refuse_damaged
+from rigid_motion_batch.recordings.fbx import refuse_damaged
 from rigid_motion_batch.recordings.importing import enabled, refuse_too_large
 from rigid_motion_batch.silencing import silenced
 
 from .blend_files import missing_data, open_file
 from .gltf_files import do_gltf
-from .output_files import FileProblem, Unreadable
+from .records import FileProblem, Unreadable
 from .reductions import Reductions
 from .work import Doing
 

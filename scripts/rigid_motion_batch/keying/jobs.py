@@ -17,7 +17,7 @@ from rigid_motion_batch.keying.blend_files import (
     open_file,
     write_file,
 )
-from rigid_motion_batch.keying.output_files import changed_at, refuse_long_name, refuse_read_only
+from rigid_motion_batch.keying.records import changed_at, refuse_long_name, refuse_read_only
 from rigid_motion_batch.keying.targets import Action, groups_of, matching, matching_missing, title_of
 from rigid_motion_batch.keying.work import Doing, Outcome
 

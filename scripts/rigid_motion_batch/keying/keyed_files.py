@@ -13,7 +13,7 @@ import numpy as np
 
 from rigid_motion import animation
 from rigid_motion.animation.transforms import transform_of
-from rigid_motion_batch.keying.output_files import FileProblem
+from rigid_motion_batch.keying.records import FileProblem
 from rigid_motion_batch.keying.reducing import reduced
 from rigid_motion_batch.keying.reductions import RATES, Reductions
 from rigid_motion_batch.keying.targets import Result

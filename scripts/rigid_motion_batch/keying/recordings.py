@@ -13,15 +13,15 @@ from pathlib import Path
 import numpy as np
 
 from rigid_motion.motion import reduce_keys
+from rigid_motion_batch.analysis.choices import RIGID
 from rigid_motion_batch.analysis.metrics import write_poses
-from rigid_motion_batch.analysis.radii import RIGID
 from rigid_motion_batch.analysis.reconstructions import Reconstruction
 from rigid_motion_batch.keying.blend_files import write_file
 from rigid_motion_batch.keying.exporting import export_glb
 from rigid_motion_batch.keying.gltf_files import reduce_gltf
 from rigid_motion_batch.keying.keyed_files import key_body, key_densely, key_object, new_file
-from rigid_motion_batch.keying.output_files import FileProblem, Unreadable
 from rigid_motion_batch.keying.planning import ALL
+from rigid_motion_batch.keying.records import FileProblem, Unreadable
 from rigid_motion_batch.keying.reductions import GLB_SUFFIX, SUFFIX, TOLERANCE, Reductions, fewer, name_of, off
 from rigid_motion_batch.keying.sessions import counted
 from rigid_motion_batch.keying.work import Doing

@@ -15,10 +15,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from rigid_motion_batch.analysis.choices import Choice, fewest_keys
+from rigid_motion_batch.analysis.choices import EVERYWHERE, Choice, Radii, fewest_keys
 from rigid_motion_batch.analysis.metrics import table_names
 from rigid_motion_batch.analysis.modes import name_of_other, single_modes
-from rigid_motion_batch.analysis.radii import EVERYWHERE, Radii
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import clip_names
 from rigid_motion_batch.recordings.clips import ClipFacts

@@ -13,8 +13,7 @@ from itertools import groupby, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from rigid_motion_batch.analysis.choices import Choice
-from rigid_motion_batch.analysis.radii import Radii
+from rigid_motion_batch.analysis.choices import Choice, Radii
 from rigid_motion_batch.recordings.clips import Clip, ClipFacts
 from rigid_motion_batch.recordings.options import ReadingOptions
 from rigid_motion_batch.report.settings import Settings
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
 STAGES = ("read", "measure", "build", "render", "encode", "report")
 """Stages of a comparison; each begins when all before it have ended."""
 
-RECORDINGS = ("rigid_motion/motion", "recordings", "axes.py", "command_line.py", "files.py", "rows.py")
+RECORDINGS = ("rigid_motion/motion", "recordings", "axes.py", "command_line.py", "files.py")
 ANALYSIS = (*RECORDINGS, "analysis")
 SCENES = (*ANALYSIS, "rigid_motion/animation", "scenes", "palette.py", "silencing.py")
 REPORT = (*ANALYSIS, "report", "palette.py")
@@ -73,7 +72,7 @@ class Read(Step, rooms=RECORDINGS, stage="read"):
     def make(self, job: Job) -> None:
         import numpy as np
 
-        from rigid_motion_batch.recordings import TrajectoryError, against, clip_reading
+        from rigid_motion_batch.recordings import TrajectoryError, clip_reading
 
         how = self.axes, self.options
         try:
@@ -81,7 +80,7 @@ class Read(Step, rooms=RECORDINGS, stage="read"):
             if self.against:
                 if len(clips) > 1:
                     raise TrajectoryError(self.source, f"{len(clips)} bodies", "name the one that --against is of")
-                clip, more = against.with_against(clips[0], self.against, self.called, *how)
+                clip, more = clip_reading.with_against(clips[0], self.against, self.called, *how)
                 clips, note = [clip], "; ".join(filter(None, (note, more)))
         except TrajectoryError as error:
             raise TaskError(str(error)) from None
@@ -126,7 +125,7 @@ class Measure(Step, rooms=ANALYSIS, stage="measure"):
     def make(self, job: Job) -> None:
         from rigid_motion_batch.analysis import metrics, results
         from rigid_motion_batch.analysis.reconstructions import reconstruct
-        from rigid_motion_batch.rows import write_rows
+        from rigid_motion_batch.files import write_rows
 
         clip = self.clip.read(job.results[0])
         made = reconstruct(clip, self.choice, self.modes, self.radii.of(clip), shared=self.shared)
@@ -152,7 +151,7 @@ class CountKeys(Step, rooms=ANALYSIS, stage="measure"):
     def make(self, job: Job) -> None:
         from rigid_motion_batch.analysis import needed
         from rigid_motion_batch.analysis.modes import single_modes
-        from rigid_motion_batch.rows import write_rows
+        from rigid_motion_batch.files import write_rows
 
         done = iter(range(1, len(needed.RATES) + 1))
         clip = self.clip.read(job.results[0])
@@ -270,7 +269,7 @@ class Subject(Step, rooms=SCENES, stage="report", blender=True):
     def make(self, job: Job) -> None:
         import numpy as np
 
-        from rigid_motion_batch.scenes.simplified import simplified
+        from rigid_motion_batch.scenes.subject import simplified
 
         with _told("the report shows a drill"):
             np.savez(job.folder / MESH, **cast(dict[str, Any], simplified(self.requested)))

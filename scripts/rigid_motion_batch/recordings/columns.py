@@ -13,7 +13,7 @@ from pathlib import Path
 from .column_names import DEVICES, METRES, TURNS, ColumnName, column_name, unit_in
 from .options import TICKS, ReadingOptions
 from .recordings import NoMotion, TrajectoryError, listed, shown
-from .vector_cells import is_number
+from .tables import is_number
 
 POSITION = ("x", "y", "z")
 QUATERNION = ("qx", "qy", "qz", "qw")

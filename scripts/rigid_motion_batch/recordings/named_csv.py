@@ -21,13 +21,12 @@ from rigid_motion.motion import Poses
 
 from .clips import ClipWarning
 from .columns import EULER, POSITION, ColumnProblem, Layout, columns_found, layout_of, metres_of, require_time_unit
-from .dates import kind_of_times, seconds_of_dates
 from .euler import quaternions_from_intrinsic_eulers
 from .options import ReadingOptions
 from .recordings import Selection, Trajectory, TrajectoryError, unique
 from .sense import require_one_body
 from .tables import HeaderLine, Table, header_lines, lines_above_numbers
-from .times import require_seconds, seconds_of
+from .times import kind_of_times, require_seconds, seconds_of, seconds_of_dates
 
 MOST_LABELS = 0.5
 """The share of the rows up to which different texts in a column can be names of devices. Running numbers are not."""

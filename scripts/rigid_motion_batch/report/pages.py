@@ -27,17 +27,16 @@ from rigid_motion_batch.analysis.metrics import Metrics
 from rigid_motion_batch.analysis.modes import description_of, label_of
 from rigid_motion_batch.analysis.needed import KeysNeeded
 from rigid_motion_batch.analysis.results import ClipResult
-from rigid_motion_batch.files import replacing, write_text
+from rigid_motion_batch.files import line_of, replacing, write_text
 from rigid_motion_batch.palette import ERROR_COLOURS, colours_on_pages
 from rigid_motion_batch.recordings.clips import ClipFacts
-from rigid_motion_batch.rows import line_of
 
 from . import charts, tables
 from .data import clip_data, json_in_page, mesh_data
-from .joints import Joints, joints_of
 from .mesh import Mesh, drill
 from .numbers import KINDS, LARGEST, MEASURES, MINUS, Gathering, Numbers, digits, percent
 from .settings import Settings
+from .tables import Joints, joints_of
 from .verdict import verdict
 
 HERE = Path(__file__).parent

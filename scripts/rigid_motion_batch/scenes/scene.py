@@ -19,9 +19,9 @@ from rigid_motion_batch.analysis.reconstructions import Groups, Reconstruction, 
 from rigid_motion_batch.palette import DARK, linear
 
 from . import captions, layout
-from .deviations import largest_deviation, magnification, magnified
 from .framing import SMOOTHING, Framing, Solid
 from .lanes import Cast, Lane, Lanes
+from .layout import largest_deviation, magnification, magnified
 from .settings import MODELS, SceneSettings
 from .solids import Solids
 from .subject import load_subject, vertices_of

@@ -16,8 +16,8 @@ from rigid_motion_batch.analysis.needed import (
     overall,
     rows_of,
 )
+from rigid_motion_batch.files import write_rows
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.rows import write_rows
 from tests.scripts.analysis.test_choices import shell_errors
 from tests.scripts.clips.recordings import swinging_clip
 

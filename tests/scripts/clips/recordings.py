@@ -5,8 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rigid_motion.motion import KEYFRAME_MODES, Poses, decimate
-from rigid_motion_batch.analysis.choices import Choice, Uniform
-from rigid_motion_batch.analysis.radii import Radii
+from rigid_motion_batch.analysis.choices import Choice, Radii, Uniform
 from rigid_motion_batch.analysis.reconstructions import Reconstruction
 from rigid_motion_batch.analysis.reconstructions import reconstruct as reconstruct_modes
 from rigid_motion_batch.analysis.results import ChoiceResult, measured

@@ -17,7 +17,7 @@ from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.quaternions import rotate
 from rigid_motion_batch.recordings import Trajectory, gltf, importing, read_trajectories, rigs
 from rigid_motion_batch.recordings.clip_reading import make_clip
-from rigid_motion_batch.recordings.fbx_records import FIRST
+from rigid_motion_batch.recordings.fbx import FIRST
 from rigid_motion_batch.scenes.armature import Rest
 from rigid_motion_batch.scenes.physique import body_size
 from rigid_motion_batch.silencing import silenced

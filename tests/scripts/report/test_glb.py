@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import Poses
-from rigid_motion_batch.analysis.choices import Uniform
-from rigid_motion_batch.analysis.radii import EVERYWHERE
+from rigid_motion_batch.analysis.choices import EVERYWHERE, Uniform
 from rigid_motion_batch.analysis.reconstructions import Reconstruction, reconstruct
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.palette import colour_of, linear

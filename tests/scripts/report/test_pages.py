@@ -180,7 +180,7 @@ def test_the_lowest_number_is_underlined_with_all_its_ties_but_not_where_all_are
 
 
 def test_a_picture_of_joints_has_a_row_for_each_and_the_worst_is_red() -> None:
-    from rigid_motion_batch.report.joints import heat_map, png
+    from rigid_motion_batch.report.tables import heat_map, png
 
     errors = np.zeros((3, 1000))
     errors[1, 500] = 7.0
