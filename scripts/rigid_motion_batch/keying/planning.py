@@ -5,13 +5,11 @@ No Blender is needed here.
 
 from __future__ import annotations
 
-import argparse
 import os
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rigid_motion_batch.command_line import folder_path, whole
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.reading import split_source
 
@@ -177,49 +175,3 @@ def _outputs(job: Job) -> list[Path]:
     """Return the files that may be written, as far as one can say before a recording is read."""
     some = not job.source.endswith(ALL)
     return [job.output.with_name(f"{job.output.name}{ending}") for ending in job.endings if some]
-
-
-def add_target_options(parser: argparse.ArgumentParser, which: str) -> None:
-    """Add --objects, which says of "all" bones which those are, and --dry-run."""
-    parser.add_argument(
-        "--objects",
-        type=_names,
-        metavar="NAME,...",
-        help="only these objects, and of rigs all of their bones; Rig/Hand is one bone; * and ? stand for any letters, "
-        f"as in 'Tool*' and 'Rig/*' (all with {which})",
-    )
-    parser.add_argument("--dry-run", action="store_true", help="do everything but write, and say what would be written")
-
-
-def add_file_options(parser: argparse.ArgumentParser) -> None:
-    """Add a group of options that say where to write."""
-    places = parser.add_argument_group("files")
-    places.add_argument(
-        "--output",
-        type=folder_path,
-        metavar="FOLDER",
-        help="where to write (beside each file); for a single input also the name of a file",
-    )
-    places.add_argument(
-        "--overwrite", action="store_true", help="replace files that are of others, or were edited since"
-    )
-    places.add_argument("--in-place", action="store_true", help="save the .blend files themselves")
-    places.add_argument(
-        "--jobs",
-        type=whole("number of processes", 0, 999),
-        metavar="N",
-        help="worker processes for several inputs; 0 to work in this one (one for each processor)",
-    )
-
-
-def refuse_odd_places(options: argparse.Namespace) -> None:
-    """Raise ValueError where the options of that group do not go together."""
-    if options.in_place and options.output:
-        raise ValueError("--in-place saves the files themselves, --output writes others: give one of them")
-
-
-def _names(text: str) -> list[str]:
-    names = [name.strip() for name in text.split(",") if name.strip()]
-    if not names:
-        raise ValueError("name an object, or several as in Camera,'Tool*','Rig/*'")
-    return names
