@@ -20,9 +20,8 @@ from rigid_motion_batch.files import line_of, replacing
 from rigid_motion_batch.recordings.clips import Clip
 
 from .choices import Choice, Keys
-from .errors import Ground, MotionErrors
 from .modes import BEST_OF, single_modes
-from .reconstructions import Reconstruction
+from .reconstructions import Ground, MotionErrors, Reconstruction
 
 BYTES_PER_KEY = 7 * 8
 """A position and a quaternion, as doubles: what the paper sends for an update."""

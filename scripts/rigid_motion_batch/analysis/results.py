@@ -15,10 +15,9 @@ from rigid_motion.motion import Poses
 from rigid_motion_batch.recordings.clips import Clip, ClipFacts
 
 from .choices import Choice, Keys, Radii
-from .errors import Ground, MotionErrors, errors_of
 from .metrics import JointMetrics, Metrics, key_samples, row_of, rows_of_joints
 from .needed import KeysNeeded
-from .reconstructions import Reconstruction, identical_modes
+from .reconstructions import Ground, MotionErrors, Reconstruction, errors_of, identical_modes
 
 
 @dataclass(frozen=True, eq=False)

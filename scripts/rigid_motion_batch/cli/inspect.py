@@ -12,12 +12,11 @@ import textwrap
 from collections.abc import Iterator
 from dataclasses import asdict
 
-from rigid_motion_batch.command_line import INSTALLED, Parser, complain, not_empty, printable
+from rigid_motion_batch.command_line import INSTALLED, Parser, complain, listed, not_empty, printable
 from rigid_motion_batch.places import CHECKOUT
 from rigid_motion_batch.recordings import TrajectoryError, files_of
 from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
 from rigid_motion_batch.recordings.inspecting import Contents, Inspection, inspect
-from rigid_motion_batch.recordings.recordings import listed
 
 PROGRAM = f"{'python scripts/bootstrap.py' if CHECKOUT else INSTALLED} inspect"
 

@@ -32,7 +32,7 @@ RECORDINGS = ("rigid_motion/motion", "recordings", "axes.py", "command_line.py",
 ANALYSIS = (*RECORDINGS, "analysis")
 SCENES = (*ANALYSIS, "rigid_motion/animation", "scenes", "palette.py", "silencing.py")
 REPORT = (*ANALYSIS, "report", "palette.py")
-MODEL = (*ANALYSIS, "rigid_motion/gltf", "report/glb.py", "report/mesh.py", "palette.py")
+MODEL = (*ANALYSIS, "rigid_motion/gltf", "report/glb.py", "report/data.py", "palette.py")
 
 ROWS, JOINT_ROWS, FILM, BLEND, PAGE = "rows.csv", "joints.csv", "comparison.mp4", "comparison.blend", "report.html"
 PIECE, MESH, GLB = "piece.mkv", "mesh.npz", "comparison.glb"
@@ -310,7 +310,7 @@ class Page(Step, rooms=REPORT, stage="report", partial=True):
     def make(self, job: Job) -> None:
         import numpy as np
 
-        from rigid_motion_batch.report.mesh import Mesh
+        from rigid_motion_batch.report.data import Mesh
         from rigid_motion_batch.report.pages import write_report
 
         films: dict[tuple[str, str], Path | None] = {}

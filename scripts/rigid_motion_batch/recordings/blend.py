@@ -11,17 +11,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
-from difflib import SequenceMatcher
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from rigid_motion.motion import Poses
+from rigid_motion_batch.command_line import listed
 
 from .key_moments import BONE_CHANNEL, curves_that_move, fcurves_of, moments_of
 from .options import AS_THE_FILE_SAYS, ReadingOptions
-from .recordings import ALL, Selection, Trajectory, TrajectoryError, listed, shown
+from .recordings import ALL, Selection, Trajectory, TrajectoryError, shown
 from .rigs import LAST_FRAME, armature_of, in_blender, probe, whole_body
 from .sampling import LEAD, OF_OBJECTS, Moments, merged, sampled
 
@@ -122,7 +123,9 @@ def _bone_called(path: Path, requested: str, objects: dict[str, bpy.types.Object
     if rigs:
         rig, missing = rigs[0].obj, rigs[0].bone or ""
         problem, bones = f"{shown(rig.name)} has no bone {shown(missing)}", armature_of(rig).bones.keys()
-        way_out = f"of its {len(bones)} bones the nearest by name: {listed(_nearest(missing, bones))}"
+        folded = {bone.casefold(): bone for bone in bones}
+        near = [folded[name] for name in get_close_matches(missing.casefold(), folded, FEW, cutoff=0.0)]
+        way_out = f"of its {len(bones)} bones the nearest by name: {listed(near)}"
         raise TrajectoryError(path, problem, way_out if bones else "it has none at all")
     if split:
         obj = split[0].obj
@@ -138,17 +141,6 @@ def _bone_called(path: Path, requested: str, objects: dict[str, bpy.types.Object
         problem = f"no body named {shown(requested)}, only a bone of {listed(alone, FEW)}"
         raise TrajectoryError(path, problem, f"name it with {path}:{alone[0]}/{requested}")
     return None
-
-
-def _nearest(requested: str, names: list[str]) -> list[str]:
-    """Return a few of the names: those that are most like the one that was requested, whatever their case."""
-    likeness = SequenceMatcher(b=requested.casefold(), autojunk=False)
-
-    def unlike(name: str) -> float:
-        likeness.set_seq1(name.casefold())
-        return -likeness.ratio()
-
-    return sorted(names, key=unlike)[:FEW]
 
 
 def _sample(path: Path, body: Body, scenes: list[bpy.types.Scene], scale: float | None) -> Trajectory:

@@ -16,12 +16,12 @@ import numpy as np
 
 from rigid_motion.motion import Poses, repair
 from rigid_motion_batch.axes import from_blender
-from rigid_motion_batch.command_line import printable
+from rigid_motion_batch.command_line import listed, printable
 
 from .clips import Clip, ClipWarning, OtherMotion
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .reading import format_of, read_trajectories, split_source
-from .recordings import Trajectory, TrajectoryError, listed, shown
+from .recordings import Trajectory, TrajectoryError, shown
 from .rest_bodies import in_parents, repaired
 from .sense import breaks, calibration_pose
 

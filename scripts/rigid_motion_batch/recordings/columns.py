@@ -10,9 +10,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from rigid_motion_batch.command_line import listed
+
 from .column_names import DEVICES, METRES, TURNS, ColumnName, column_name, unit_in
 from .options import TICKS, ReadingOptions
-from .recordings import NoMotion, TrajectoryError, listed, shown
+from .recordings import NoMotion, TrajectoryError, shown
 from .tables import is_number
 
 POSITION = ("x", "y", "z")

@@ -19,10 +19,11 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from rigid_motion_batch.command_line import listed
 from rigid_motion_batch.silencing import silenced
 
 from .key_moments import BONE_CHANNEL, curves_that_move, fcurves_of, keys_of, moments_of, with_parents
-from .recordings import ALL, NoMotion, Selection, Trajectory, TrajectoryError, listed
+from .recordings import ALL, NoMotion, Selection, Trajectory, TrajectoryError
 from .rigs import LAST_FRAME, armature_of, in_blender, joints_of, refuse_too_many, single_joints, whole_body
 from .sampling import LEAD, SAME, Moments, away, merged
 from .tables import LARGEST_FILE

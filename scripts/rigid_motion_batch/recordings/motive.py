@@ -19,9 +19,10 @@ from pathlib import Path
 import numpy as np
 
 from rigid_motion.motion import Poses
+from rigid_motion_batch.command_line import listed
 
 from .euler import quaternions_from_intrinsic_eulers
-from .recordings import Selection, Trajectory, TrajectoryError, listed, shown, unique
+from .recordings import Selection, Trajectory, TrajectoryError, shown, unique
 from .tables import cells_of, lines_of, parse_rows
 
 METRES = {"meters": 1.0, "centimeters": 0.01, "millimeters": 0.001, "inches": 0.0254, "feet": 0.3048}

@@ -24,7 +24,7 @@ from rigid_motion_batch.analysis.reconstructions import Reconstruction
 from rigid_motion_batch.palette import DARK, colour_of, linear
 from rigid_motion_batch.recordings.clips import Clip
 
-from .mesh import Mesh, drill
+from .data import Mesh, drill
 
 TOLERANCE = 1e-4
 """Metres: no point of what moves is off by more."""

@@ -32,8 +32,7 @@ from rigid_motion_batch.palette import ERROR_COLOURS, colours_on_pages
 from rigid_motion_batch.recordings.clips import ClipFacts
 
 from . import charts, tables
-from .data import clip_data, json_in_page, mesh_data
-from .mesh import Mesh, drill
+from .data import Mesh, clip_data, drill, json_in_page, mesh_data
 from .numbers import KINDS, LARGEST, MEASURES, MINUS, Gathering, Numbers, digits, percent
 from .settings import Settings
 from .tables import Joints, joints_of

@@ -12,6 +12,8 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from rigid_motion_batch.command_line import listed
+
 from .settings import SubjectError, place_of_subject
 
 TINTED = "Mode"
@@ -63,7 +65,8 @@ def _read_mesh(file: Path, name: str) -> bpy.types.Mesh:
     try:
         with bpy.data.libraries.load(str(file), link=False) as (source, target):
             if name not in source.objects:
-                raise SubjectError(f"{file}: has no object {name!r}; it has {_listed(source.objects)}")
+                others = listed(sorted(source.objects), 12) or "none"
+                raise SubjectError(f"{file}: has no object {name!r}; it has {others}")
             target.objects = [name]
         mesh = _evaluated_copy(target.objects[0])
         names = _own_materials(mesh) if mesh else {}
@@ -79,10 +82,6 @@ def _read_mesh(file: Path, name: str) -> bpy.types.Mesh:
     if not mesh.materials:
         mesh.materials.append(None)
     return mesh
-
-
-def _listed(names: list[str]) -> str:
-    return (", ".join(sorted(names)[:12]) + (", ..." if len(names) > 12 else "")) or "none"
 
 
 def _evaluated_copy(loaded: bpy.types.Object) -> bpy.types.Mesh | None:

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from rigid_motion_batch.analysis.choices import Choice, Tolerance, Uniform
-from rigid_motion_batch.analysis.errors import Ground, errors_of
 from rigid_motion_batch.analysis.metrics import JointMetrics, join_tables, table_names, write_tables
-from rigid_motion_batch.analysis.reconstructions import Reconstruction, reconstruct
+from rigid_motion_batch.analysis.reconstructions import Ground, Reconstruction, errors_of, reconstruct
 from rigid_motion_batch.analysis.results import measured
 from rigid_motion_batch.files import escaped, write_rows
 from tests.scripts.clips.bodies import JOINTS, swinging_body
