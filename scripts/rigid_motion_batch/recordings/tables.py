@@ -16,7 +16,7 @@ import io
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from operator import itemgetter
 from pathlib import Path
@@ -56,41 +56,31 @@ MOST_METADATA = 50
 class Table:
     """The rows of a file, unparsed, and where its columns are."""
 
-    path: Path
-    separator: str | None
-    """Separator of the cells; None means white space."""
+    header: HeaderLine
+    """The line before the first row."""
 
     columns: dict[str, int]
     """Meaning of a column to its index."""
 
-    width: int
-    """Number of columns that have a name."""
-
-    header: int
-    """The line before the first row."""
-
-    vectors: bool = False
-    """True if cells hold vectors, which count as several columns."""
-
     def parse(self, columns: Sequence[str]) -> np.ndarray:
         """Return the numbers in these columns, shape (rows, columns). Empty cells are NaN."""
         chosen = {name: self.columns[name] for name in columns}
-        needed = max(self.columns.values()) + 1
-        return parse_rows(self.path, self.rows(), self.separator, chosen, self.width, needed=needed)
+        needed, header = max(self.columns.values()) + 1, self.header
+        return parse_rows(header.path, self.rows(), header.separator, chosen, len(header.cells), needed=needed)
 
     def cells(self, column: str) -> Iterator[tuple[int, str]]:
         """Yield the cells of a column, without quotes, with their lines; empty where a row is too short."""
         index = self.columns[column]
         for number, line in self.rows():
-            cells = split_row(line, self.separator)
+            cells = split_row(line, self.header.separator)
             yield number, cells[index].strip() if index < len(cells) else ""
 
     def rows(self) -> Iterator[tuple[int, str]]:
         """Yield the lines of the rows with their numbers, without blank ones and comments."""
-        for number, line in lines_of(self.path, after=self.header):
+        for number, line in lines_of(self.header.path, after=self.header.number):
             line = line.strip(" ")
             if line and not line.isspace() and line[0] != "#":
-                yield number, flattened(line, self.separator) if self.vectors else line
+                yield number, flattened(line, self.header.separator) if self.header.vectors else line
 
 
 def encoding_of(head: bytes) -> str:
@@ -174,8 +164,11 @@ def cells_of(path: Path, number: int, line: str, separator: str | None) -> list[
 class HeaderLine:
     """A line that may name the columns."""
 
+    path: Path
     number: int
     separator: str | None
+    """Separator of the cells; None means white space."""
+
     cells: list[str]
 
     vectors: bool = False
@@ -186,18 +179,18 @@ class HeaderLine:
         """Return the cells of a line, which may be a comment."""
         text = text.lstrip("# \t")
         separator = max(SEPARATORS, key=text.count) if any(mark in text for mark in SEPARATORS) else None
-        return cls(number, separator, cells_of(path, number, text, separator))
+        return cls(path, number, separator, cells_of(path, number, text, separator))
 
-    def table(self, path: Path, columns: dict[str, int]) -> Table:
-        """Return the rows below with some of the columns."""
-        return Table(path, self.separator, columns, len(self.cells), self.number, self.vectors)
+    def error(self, problem: str, way_out: str) -> TrajectoryError:
+        """Return an error of this line."""
+        return TrajectoryError(self.path, problem, way_out, self.number)
 
-    def of_rows(self, path: Path) -> HeaderLine:
+    def of_rows(self) -> HeaderLine:
         """Return the header as the first row below it has it."""
-        below = (line.strip() for _, line in islice(lines_of(path, after=self.number), MOST_COMMENTS))
+        below = (line.strip() for _, line in islice(lines_of(self.path, after=self.number), MOST_COMMENTS))
         row = next((line for line in below if line and not line.startswith("#")), "")
         names = expanded(self.cells, row, self.separator)
-        return self if names is None else HeaderLine(self.number, self.separator, names, vectors=True)
+        return self if names is None else replace(self, cells=names, vectors=True)
 
 
 def header_lines(path: Path) -> Iterator[HeaderLine]:
@@ -216,7 +209,7 @@ def header_lines(path: Path) -> Iterator[HeaderLine]:
                 return
     if not comments:
         raise TrajectoryError(path, "the file is empty", "it needs a line that names its columns, and rows")
-    yield HeaderLine(number, None, [])
+    yield HeaderLine(path, number, None, [])
 
 
 def lines_above_numbers(path: Path) -> Iterator[HeaderLine]:

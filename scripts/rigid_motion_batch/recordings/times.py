@@ -116,9 +116,9 @@ def require_seconds(table: Table, times: np.ndarray, time_unit: str) -> None:
     if likely:
         unit, rate = likely[0], TICKS[likely[0]] / interval
         way_out = f"these look like {LONG_NAMES[unit]} ({rate:.3g} samples a second): --time-unit {unit}"
-        raise TrajectoryError(table.path, problem, f"{way_out}, or --time-unit s if they are seconds", table.header)
+        raise table.header.error(problem, f"{way_out}, or --time-unit s if they are seconds")
     way_out = f"say what it counts: --time-unit {', '.join(TICKS)}"
-    raise TrajectoryError(table.path, problem, way_out, table.header or None)
+    raise table.header.error(problem, way_out)
 
 
 MOMENT = re.compile(
@@ -164,7 +164,9 @@ def kind_of_times(table: Table) -> str | None:
         return _kind(match)
     if LIKE_A_DATE.search(cell) and not is_number(cell):
         problem = f"t is {shown(cell, LONGEST_SHOWN)}, neither a number nor a date that can be read"
-        raise TrajectoryError(table.path, problem, "write 2026-11-22T10:00:00.123, 10:00:00.123 or seconds", number)
+        raise TrajectoryError(
+            table.header.path, problem, "write 2026-11-22T10:00:00.123, 10:00:00.123 or seconds", number
+        )
     return None
 
 
@@ -219,10 +221,10 @@ def _moments(table: Table, kind: str) -> Iterator[tuple[int, int]]:
                 raise ValueError(second)
         except ValueError:
             problem = f"t is {shown(cell, LONGEST_SHOWN)}, not {kind.partition(' with')[0]}"
-            raise TrajectoryError(table.path, problem, way_out, number) from None
+            raise TrajectoryError(table.header.path, problem, way_out, number) from None
         if _kind(match) != kind:
             problem = f"t is {shown(cell, LONGEST_SHOWN)}, not {kind} as before"
-            raise TrajectoryError(table.path, problem, way_out, number)
+            raise TrajectoryError(table.header.path, problem, way_out, number)
         yield seconds, int((fraction or "").ljust(9, "0"))
 
 
