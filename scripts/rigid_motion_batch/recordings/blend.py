@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
-from difflib import get_close_matches
+from difflib import SequenceMatcher
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -123,8 +123,8 @@ def _bone_called(path: Path, requested: str, objects: dict[str, bpy.types.Object
     if rigs:
         rig, missing = rigs[0].obj, rigs[0].bone or ""
         problem, bones = f"{shown(rig.name)} has no bone {shown(missing)}", armature_of(rig).bones.keys()
-        folded = {bone.casefold(): bone for bone in bones}
-        near = [folded[name] for name in get_close_matches(missing.casefold(), folded, FEW, cutoff=0.0)]
+        wanted = missing.casefold()
+        near = sorted(bones, key=lambda bone: -SequenceMatcher(None, bone.casefold(), wanted, False).ratio())[:FEW]
         way_out = f"of its {len(bones)} bones the nearest by name: {listed(near)}"
         raise TrajectoryError(path, problem, way_out if bones else "it has none at all")
     if split:

@@ -209,7 +209,7 @@ def _what_is_no_file(path: str) -> tuple[str, str] | None:
     """Return what is at a path that is no file, and the way out; None for nothing. It is looked at, and not opened."""
     if os.path.isdir(path):
         return "this is a folder without recordings", "name a file, or a folder that has some"
-    if os.path.exists(path):
+    if os.path.exists(path) and not os.path.isfile(path):
         return "this is a pipe or a device, not a file", "write what comes out of it to a file, and name that"
     if os.path.islink(path):
         return f"this is a symbolic link to {shown(os.readlink(path))}, where nothing is", "name the file itself"

@@ -164,9 +164,8 @@ def kind_of_times(table: Table) -> str | None:
         return _kind(match)
     if LIKE_A_DATE.search(cell) and not is_number(cell):
         problem = f"t is {shown(cell, LONGEST_SHOWN)}, neither a number nor a date that can be read"
-        raise TrajectoryError(
-            table.header.path, problem, "write 2026-11-22T10:00:00.123, 10:00:00.123 or seconds", number
-        )
+        way_out = "write 2026-11-22T10:00:00.123, 10:00:00.123 or seconds"
+        raise TrajectoryError(table.header.path, problem, way_out, number)
     return None
 
 
