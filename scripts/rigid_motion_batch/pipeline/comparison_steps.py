@@ -32,10 +32,9 @@ RECORDINGS = ("rigid_motion/motion", "recordings", "axes.py", "command_line.py",
 ANALYSIS = (*RECORDINGS, "analysis")
 SCENES = (*ANALYSIS, "rigid_motion/animation", "scenes", "palette.py", "silencing.py")
 REPORT = (*ANALYSIS, "report", "palette.py")
-MODEL = (*ANALYSIS, "rigid_motion/gltf", "report/glb.py", "report/data.py", "palette.py")
 
 ROWS, JOINT_ROWS, FILM, BLEND, PAGE = "rows.csv", "joints.csv", "comparison.mp4", "comparison.blend", "report.html"
-PIECE, MESH, GLB = "piece.mkv", "mesh.npz", "comparison.glb"
+PIECE, MESH = "piece.mkv", "mesh.npz"
 PAGE_DATA = "report_data/"
 """The folder of what is too large for a page."""
 
@@ -162,27 +161,6 @@ class CountKeys(Step, rooms=ANALYSIS, stage="measure"):
         values.write(job.folder / "needed", result)
 
 
-class Model(Step, rooms=MODEL, stage="report"):
-    """Write all motions side by side, for any viewer. Before: the recording, and what was measured."""
-
-    clip: ClipOf
-    radii: Radii
-    shared: bool
-
-    def make(self, job: Job) -> None:
-        from rigid_motion.gltf import GltfError
-        from rigid_motion_batch.analysis.results import made_again
-        from rigid_motion_batch.report.glb import comparison_glb
-
-        clip, result = self.clip.read(job.results[0]), result_in(job.results[1])
-        made = made_again(clip, result, self.radii, shared=self.shared)
-        try:
-            content = comparison_glb(made, [motion.modes for motion in result.motions])
-        except GltfError as error:
-            raise TaskError(f"{clip.name} {result.choice.phrase}: no {GLB}: {error}") from None
-        (job.folder / GLB).write_bytes(content)
-
-
 class Tabulate(Step, rooms=("analysis", "files.py"), stage="report", partial=True):
     """Write the table of all clips. Before: its parts."""
 
@@ -280,7 +258,7 @@ class Part:
     """The result of a task before a page."""
 
     what: str
-    """What it is: "read", "measure", "count_keys", "model", "encode" or "subject"."""
+    """What it is: "read", "measure", "count_keys", "encode" or "subject"."""
 
     clip: ClipOf = ClipOf("")
     choice: str = ""
@@ -314,14 +292,11 @@ class Page(Step, rooms=REPORT, stage="report", partial=True):
         from rigid_motion_batch.report.pages import write_report
 
         films: dict[tuple[str, str], Path | None] = {}
-        models: dict[tuple[str, str], Path] = {}
         mesh = None
         for part, folder in zip_longest(self.parts, job.before):
             if part.what == "encode":
                 there = folder or self.coming
                 films[part.clip.name, part.choice] = Path(part.clip.name, part.choice, FILM) if there else None
-            elif part.what == "model" and folder:
-                models[part.clip.name, part.choice] = Path(part.clip.name, part.choice, GLB)
             elif part.what == "subject" and folder:
                 mesh = Mesh(**np.load(folder / MESH))
         write_report(
@@ -329,7 +304,6 @@ class Page(Step, rooms=REPORT, stage="report", partial=True):
             self._results(job),
             self.settings,
             films,
-            models,
             folder=Path(self.folder),
             mesh=mesh,
             overview=self.overview,

@@ -73,7 +73,6 @@ def write_report(
     clips: Iterable[ClipResult],
     settings: Settings,
     films: Films | None = None,
-    models: Mapping[tuple[str, str], Path] | None = None,
     *,
     folder: Path | None = None,
     mesh: Mesh | None = None,
@@ -91,8 +90,6 @@ def write_report(
     settings : Settings
     films : mapping, optional
         Nothing where the run does without films.
-    models : mapping, optional
-        (clip name, name of the choice) to a GLB file of all motions.
     folder : Path, optional
         Where the page will be in the end: what links are relative to. That of `path` unless given.
     mesh : Mesh, optional
@@ -114,7 +111,7 @@ def write_report(
     """
     folder = folder or path.parent
     films, mesh = films or {}, mesh or drill()
-    gathering, page = Gathering(), _Clips(path, films, models or {}, folder, mesh)
+    gathering, page = Gathering(), _Clips(path, films, folder, mesh)
     for clip in clips:
         page.facts.append(clip.facts)
         if clip.choices:
@@ -198,23 +195,20 @@ def write_overview(
 class _Clips:
     """What a page has of its clips, gathered one after the other."""
 
-    def __init__(
-        self, path: Path, films: Films, models: Mapping[tuple[str, str], Path], folder: Path, mesh: Mesh
-    ) -> None:
+    def __init__(self, path: Path, films: Films, folder: Path, mesh: Mesh) -> None:
         self.facts: list[ClipFacts] = []
         self.needed: list[KeysNeeded] = []
         self.choices: list[tuple[str, tuple[Choice, ...]]] = []
         self.metrics: list[Metrics] = []
         self.joints: list[Joints] = []
         self.films: list[tuple[int, str, str | None]] = []
-        self.models: list[tuple[int, str, str | None]] = []
         self.places: list[dict[str, Any]] = []
         """What the script finds them by."""
         self.inside: list[str] = []
         """Their data, as JSON."""
         self.files: list[Path] = []
         self._warned: list[tuple[str, tuple[Any, ...], float]] = []
-        self._path, self._films, self._models, self._folder, self._mesh = path, films, models, folder, mesh
+        self._path, self._films, self._folder, self._mesh = path, films, folder, mesh
 
     def add(self, clip: ClipResult) -> None:
         name, place = clip.facts.name, len(self.places)
@@ -229,8 +223,6 @@ class _Clips:
             self.metrics += [row for motion in result.motions for row in motion.metrics]
             if (name, result.choice.name) in self._films:
                 self.films.append((place, result.choice.name, self._link(self._films[name, result.choice.name])))
-            if (name, result.choice.name) in self._models:
-                self.models.append((place, result.choice.name, self._link(self._models[name, result.choice.name])))
             if joints := joints_of(place, clip, result, own):
                 self.joints.append(joints)
         self.places.append({"name": name, "data": ""})
