@@ -190,8 +190,8 @@ class Tolerance(Choice):
         number, unit = self._parts()
         return float(number) * (METRES[unit] if unit else per_unit)
 
-    def require_within(self, clip: Clip, radius: float) -> None:
-        """Raise ValueError with the way out where a clip does not move as far as the tolerance: "5" for "5mm".
+    def problem_with(self, clip: Clip, radius: float) -> str:
+        """Return what is wrong where a clip does not move as far as the tolerance, "5" for "5mm"; else nothing.
 
         The radius of the shell is in metres; of a body the places of its joints count.
         """
@@ -202,14 +202,13 @@ class Tolerance(Choice):
             places = clip.in_metres(clip.rest_body.skeleton.in_root_space(clip.poses)).positions
             size = float(np.linalg.norm(places - places[:, :1], axis=-1).max())
         allowed = self.tolerance(clip)
-        if 0.0 < size < allowed:
-            written, unit = self._parts()
-            way_out = "give a smaller one" if unit else f"give it with its unit, as in {written}mm"
-            here = "" if unit == "m" else f", {allowed:.3g} m"
-            raise ValueError(
-                f"a tolerance of {self.amount}{here}, is more than the whole motion, which is {size:.3g} m large: "
-                f"{way_out}"
-            )
+        if not 0.0 < size < allowed:
+            return ""
+        written, unit = self._parts()
+        way_out = "give a smaller one" if unit else f"give it with its unit, as in {written}mm"
+        here = "" if unit == "m" else f", {allowed:.3g} m"
+        more = f"is more than the whole motion, which is {size:.3g} m large: {way_out}"
+        return f"a tolerance of {self.amount}{here}, {more}"
 
     @property
     def is_length(self) -> bool:

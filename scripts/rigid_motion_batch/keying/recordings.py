@@ -69,11 +69,8 @@ class _Clip:
         clip, ending = self.clip, self.doing.job.ending
         for repair in clip.repairs:
             self.doing.say(repair)
-        if self.given and self.how.count is None:
-            try:
-                self.given.require_within(clip, self.radius)
-            except ValueError as error:
-                raise Unreadable(str(error)) from None
+        if self.given and self.how.count is None and (problem := self.given.problem_with(clip, self.radius)):
+            raise Unreadable(problem)
         table, scene, glb = (output.with_name(f"{output.name}{end}") for end in (ending or ".csv", ".blend", ".glb"))
         if self.how.glb:
             self._glb(glb)

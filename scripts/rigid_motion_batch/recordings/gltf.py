@@ -22,11 +22,12 @@ import numpy as np
 
 from rigid_motion.gltf.accessors import GrowingView, numbers
 from rigid_motion.gltf.documents import Document, FileBytes, GltfError, Json, objects, read_document
+from rigid_motion.gltf.nodes import Nodes
 from rigid_motion.gltf.tracks import CUBICSPLINE, LINEAR, ROTATION, STEP, TRANSLATION, WIDTHS, Track
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion.motion.repair import LARGEST
 
-from .bvh import DEEPEST, MOST_JOINTS, MOST_POSES
+from .bvh import MOST_JOINTS, MOST_POSES
 from .importing import read_imported, refuse_too_large
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .recordings import Selection, Trajectory, TrajectoryError
@@ -63,6 +64,7 @@ def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE
         beside = {buffer.path for buffer in document.buffers if isinstance(buffer, FileBytes)} - {path}
         refuse_too_large(path, *beside)
         _refuse_too_many(path, document.json)
+        Nodes(document)  # Refuses those that hang on themselves, or too many on one another.
         parts = {name: _stripped(part) for name, part in document.json.items() if name in PARTS}
         copy, made = straightened(replace(document, json=parts))
         name = f"copy{'.gltf' if copy.chunks is None else '.glb'}"
@@ -103,24 +105,6 @@ def _refuse_too_many(path: Path, json: Json) -> None:
     ):
         if count > most:
             raise TrajectoryError(path, f"{count} {kind} are more than the {most} that are read", way_out)
-    if _depth(nodes) > DEEPEST:
-        problem = f"more than {DEEPEST} nodes hang on one another"
-        raise TrajectoryError(path, problem, "export a shorter chain")
-
-
-def _depth(nodes: list[Json]) -> int:
-    """Return how many nodes hang on one another at most; `DEEPEST` and one more where they hang on themselves."""
-    children = [node.get("children") for node in nodes]
-    below = [
-        [child for child in own if isinstance(child, int) and child in range(len(nodes))]
-        if isinstance(own, list)
-        else []
-        for own in children
-    ]
-    level, depth = set(range(len(nodes))), 0
-    while level and depth <= DEEPEST:
-        level, depth = {child for node in level for child in below[node]}, depth + 1
-    return depth
 
 
 def _stripped(part: Any) -> Any:

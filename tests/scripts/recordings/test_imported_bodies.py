@@ -272,7 +272,9 @@ def test_more_nodes_joints_and_channels_than_blender_takes_in_seconds_are_refuse
     count = len(json.loads(path.read_text())["nodes"])
     started = time.perf_counter()
     chain = [{"children": [count + number + 1]} for number in range(5000)]
-    assert refusal(with_more(path, nodes=[*chain, {}]))[1].startswith("more than 500 nodes hang on one another; export")
+    assert refusal(with_more(path, nodes=[*chain, {}]))[1].startswith(
+        "more than 1000 nodes hang on one another; export"
+    )
     assert refusal(with_more(path, nodes=[{}] * 200_000))[1].startswith(
         f"{count + 205_001} nodes are more than the 10000"
     )
