@@ -228,10 +228,8 @@ def _refuse_odd(options: argparse.Namespace) -> None:
     gltf = [job for job in jobs if not job.is_recording and _is_gltf(job.file)]
     if options.count is not None and options.tolerance is not None:
         raise ValueError("--keys and --tolerance exclude one another: each decides how many keys there are")
-    if options.in_place and recorded:
-        raise ValueError(f"--in-place is for .blend files, and {recorded[0].source} is a recording: leave one out")
-    if options.in_place and gltf:
-        raise ValueError(f"--in-place is for .blend files, and {gltf[0].source} is none: leave one out")
+    if options.in_place and (others := recorded + gltf):
+        raise ValueError(f"--in-place is for .blend files, and {others[0].source} is none: leave one out")
     if options.glb:
         _refuse_beside_glb(options, jobs)
     if gltf and options.mode:
@@ -245,11 +243,7 @@ def _refuse_odd(options: argparse.Namespace) -> None:
 
 def _refuse_beside_glb(options: argparse.Namespace, jobs: list[Job]) -> None:
     """Raise ValueError for options that say nothing of GLB files."""
-    if options.mode:
-        raise ValueError(
-            "--mode is for .blend files and tables, and GLB knows lines and even turns alone: leave it out"
-        )
-    for name in ("blend", "in_place", "objects", "discard"):
+    for name in ("mode", "blend", "in_place", "objects", "discard"):
         if getattr(options, name):
             option = f"--{name.replace('_', '-')}"
             raise ValueError(f"{option} is for .blend files, and --glb writes others: leave one of them out")

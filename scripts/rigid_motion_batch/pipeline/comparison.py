@@ -255,11 +255,9 @@ class ComparisonPlan:
 
     def filmed(self, study: Study) -> list[Choice]:
         """Return the choices that there are films of."""
-        stage = self.comparison.stage
-        return [choice for choice in self._shown(study) if stage and study.frames(choice, stage) <= study.most_frames]
-
-    def _shown(self, study: Study) -> list[Choice]:
-        return list(study.choices) if self.comparison.every_film else fewest_keys(study.choices)
+        stage, every = self.comparison.stage, self.comparison.every_film
+        choices = study.choices if every else fewest_keys(study.choices)
+        return [choice for choice in choices if stage and study.frames(choice, stage) <= study.most_frames]
 
     def _numbers(self, study: Study) -> Iterator[tuple[Part, Task]]:
         """Yield the tasks of a clip's numbers, and what they are to pages."""

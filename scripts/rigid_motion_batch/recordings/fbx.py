@@ -31,12 +31,7 @@ def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE
     """Read the whole skeleton; or bones that are named, or all."""
     refuse_too_large(path)
     refuse_damaged(path)
-    return read_imported(path, selection, lambda: _import(path), ADDON, _rate, options.scale)
-
-
-def _rate(fps: float, keys: float | None) -> float:
-    """Return the rate of the file, unless there are more keys than frames."""
-    return max(fps, keys or 0.0)
+    return read_imported(path, selection, lambda: _import(path), ADDON, options.scale)
 
 
 def _import(path: Path) -> None:

@@ -76,11 +76,8 @@ def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE
         for file, content in files.items():
             (Path(folder) / file).write_bytes(content)
         importer = Path(folder) / name
-        return read_imported(path, selection, lambda: _import(importer), ADDON, _rate, options.scale, FPS, made * FPS)
-
-
-def _rate(_: float, keys: float | None) -> float:
-    return keys or WITHOUT_A_RATE
+        how: dict[str, Any] = {"fps": FPS, "usual": WITHOUT_A_RATE, "made": made * FPS}
+        return read_imported(path, selection, lambda: _import(importer), ADDON, options.scale, **how)
 
 
 def _refuse_too_many(path: Path, json: Json) -> None:

@@ -89,7 +89,7 @@ def begin(made: Reconstruction, settings: SceneSettings) -> Timeline:
     """Empty the file, name its scene after what is compared, and return the timeline."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.scene.name = f"{made.clip.name} {made.choice.name}"
-    return Timeline.of(made, settings.fps, settings.slow_motion)
+    return Timeline.between(float(made.times[0]), float(made.times[-1]), settings.fps, settings.slow_motion)
 
 
 def assemble_scene(
