@@ -46,9 +46,6 @@ class Choice(ABC):
     decimation: ClassVar[str]
     """What metrics.csv calls it: "uniform" or "adaptive"."""
 
-    at: ClassVar[str] = "at"
-    """The word that leads to the amount in a sentence."""
-
     unit: ClassVar[str] = "keys/s"
     """What follows the amounts, if anything."""
 
@@ -81,7 +78,7 @@ class Choice(ABC):
     @property
     def phrase(self) -> str:
         """The same in a sentence: "at 10 keys/s"."""
-        return f"{self.at} {self.title}"
+        return f"at {self.title}"
 
     @property
     def rate(self) -> str:
@@ -149,7 +146,6 @@ class Tolerance(Choice):
     """The fewest keys with which the shell error of a mode stays within a length at every sample."""
 
     decimation = "adaptive"
-    at = "within"
     unit = ""
 
     def __post_init__(self) -> None:

@@ -26,7 +26,7 @@ from rigid_motion_batch.palette import THEMES
 from rigid_motion_batch.pipeline.comparison_steps import STAGES
 from rigid_motion_batch.places import ASSETS, from_here
 from rigid_motion_batch.recordings import files_of
-from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
+from rigid_motion_batch.recordings.options import add_reading_options, reading_options
 from rigid_motion_batch.scenes.settings import ANTIALIASING, ENGINES, SceneSettings
 
 DESCRIPTION = """Compare interpolation modes on recorded trajectories.

@@ -28,7 +28,7 @@ from rigid_motion_batch.keying.records import is_made
 from rigid_motion_batch.keying.reductions import ENDINGS, GLB_SUFFIX, RATES, SUFFIX, TOLERANCE, Reductions, name_of
 from rigid_motion_batch.keying.sessions import do_all
 from rigid_motion_batch.keying.work import Doing, Work
-from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
+from rigid_motion_batch.recordings.options import add_reading_options, reading_options
 
 IN_FOLDERS = (".blend", ".bvh", ".csv", ".fbx", ".glb", ".gltf", ".tsv", ".tum")
 """Endings of the files that are taken of a folder. What else it reads may be anything: .json, .txt."""

@@ -20,7 +20,7 @@ from rigid_motion_batch.supervising import end_with_parent
 
 from .planning import place_of
 from .records import Unreadable
-from .reductions import Reductions, doubt, fewer, off
+from .reductions import Reductions, doubt, off
 from .work import Doing
 
 MILLIMETRES = 1e3
@@ -106,13 +106,14 @@ def _summary(clip: ReducedClip, tolerance: Tolerance, per_unit: float, would: st
     """Return what became of a clip."""
     if clip.tracks is None:
         return f"stays as it was, {clip.before.keys} keys in {clip.before.size} bytes: {clip.reason}"
-    summary = f"{would}reduced{fewer(clip.before.keys, clip.after.keys)}, {clip.before.size} -> {clip.after.size} bytes"
+    before, after = clip.before, clip.after
+    summary = f"{would}reduced, {before.keys} -> {after.keys} keys, {before.size} -> {after.size} bytes"
     summary += off(tolerance, clip.error, per_unit, by_number=by_number)
     if clip.vertices is not None:
         summary += f"; vertices {tolerance.alike(clip.vertices, per_unit)} at most"
     if clip.slides[0] > 0.0:
-        before, after = (tolerance.alike(slide, per_unit) for slide in clip.slides)
-        summary += f"; feet slide {after}, and {before} before"
+        slid, slides = (tolerance.alike(slide, per_unit) for slide in clip.slides)
+        summary += f"; feet slide {slides}, and {slid} before"
     return summary
 
 

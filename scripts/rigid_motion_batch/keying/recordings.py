@@ -22,7 +22,7 @@ from rigid_motion_batch.keying.gltf_files import reduce_gltf
 from rigid_motion_batch.keying.keyed_files import key_body, key_densely, key_object, new_file
 from rigid_motion_batch.keying.planning import ALL
 from rigid_motion_batch.keying.records import FileProblem, Unreadable
-from rigid_motion_batch.keying.reductions import GLB_SUFFIX, SUFFIX, TOLERANCE, Reductions, fewer, name_of, off
+from rigid_motion_batch.keying.reductions import GLB_SUFFIX, SUFFIX, TOLERANCE, Reductions, name_of, off
 from rigid_motion_batch.keying.sessions import counted
 from rigid_motion_batch.keying.work import Doing
 from rigid_motion_batch.recordings import TrajectoryError
@@ -100,7 +100,7 @@ class _Clip:
         if frames is not None:
             key_object(clip, keys, frames, mode, self.name)
         error = off(tolerance, largest, clip.metres_per_unit, by_number=count is not None)
-        self.doing.say(f"{self.doing.would}reduced{fewer(len(clip.times), len(keys))}{error}")
+        self.doing.say(f"{self.doing.would}reduced, {len(clip.times)} -> {len(keys)} keys{error}")
         if not self.doing.work.dry_run:
             with self.doing.record.writing(table) as beside:
                 write_poses(beside, clip.times[keys], clip.poses[keys])

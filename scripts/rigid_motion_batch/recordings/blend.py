@@ -127,16 +127,9 @@ def _bone_called(path: Path, requested: str, objects: dict[str, bpy.types.Object
         near = sorted(bones, key=lambda bone: -SequenceMatcher(None, bone.casefold(), wanted, False).ratio())[:FEW]
         way_out = f"of its {len(bones)} bones the nearest by name: {listed(near)}"
         raise TrajectoryError(path, problem, way_out if bones else "it has none at all")
-    if split:
-        obj = split[0].obj
-        if obj.is_missing:
-            library = cast("bpy.types.Library", obj.library)
-            problem = f"{shown(obj.name)} is missing from {library.filepath}"
-            raise TrajectoryError(path, problem, "bring that file back, or tell Blender where it is now")
-        types = cast("bpy.types.EnumProperty", obj.bl_rna.properties["type"])
-        kind = types.enum_items[obj.type].name
-        problem = f"{shown(obj.name)} has no bones, for it is no armature (its type is {kind})"
-        raise TrajectoryError(path, problem, f"name the object alone with {path}:{obj.name}")
+    if split and (obj := split[0].obj).is_missing:
+        problem = f"{shown(obj.name)} is missing from {cast('bpy.types.Library', obj.library).filepath}"
+        raise TrajectoryError(path, problem, "bring that file back, or tell Blender where it is now")
     if alone := [rig for rig, obj in objects.items() if obj.type == "ARMATURE" and requested in armature_of(obj).bones]:
         problem = f"no body named {shown(requested)}, only a bone of {listed(alone, FEW)}"
         raise TrajectoryError(path, problem, f"name it with {path}:{alone[0]}/{requested}")

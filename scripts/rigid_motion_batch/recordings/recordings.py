@@ -54,11 +54,6 @@ class Trajectory:
     rate: float | None = None
     """Samples a second, where there may be more between these."""
 
-    @property
-    def rigid(self) -> Poses:
-        """A single rigid body of it, shape (n,): of a whole body its first root."""
-        return self.poses if self.rest_body is None else self.poses[0]
-
 
 @dataclass(frozen=True, eq=False)
 class Recording:

@@ -101,7 +101,8 @@ def doubts(trajectory: Trajectory, *, time_unit: bool = False) -> tuple[ClipWarn
 def _usable(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
     """Return times and positions, in seconds and metres, of samples with no damage in both; of a body its root's."""
     rows = np.abs(trajectory.times) < LARGEST
-    positions = trajectory.rigid.positions
+    poses = trajectory.poses if trajectory.rest_body is None else trajectory.poses[0]
+    positions = poses.positions
     rows &= (np.abs(positions) < LARGEST).all(axis=-1)
     return trajectory.times[rows], positions[rows] * trajectory.metres_per_unit
 

@@ -11,7 +11,7 @@ import hashlib
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple, fields
 from datetime import datetime
 from functools import cache
 from pathlib import Path
@@ -56,16 +56,6 @@ MOST_WARNINGS = 3
 
 Films = Mapping[tuple[str, str], Path | None]
 """(clip name, name of the choice) to its film, which may not be there yet; None where it could not be made."""
-
-
-@dataclass(frozen=True)
-class Warned:
-    """A warning, and the address of its moment on the page."""
-
-    clip: str
-    text: str
-    way_out: str
-    address: str
 
 
 def write_report(
@@ -244,15 +234,15 @@ class _Clips:
     def _link(self, film: Path | None) -> str | None:
         return None if film is None else quote(Path(os.path.relpath(film, self._folder)).as_posix())
 
-    def warnings(self, choice: str) -> list[Warned]:
+    def warnings(self, choice: str) -> list[dict[str, str]]:
         """All warnings, with the addresses of their moments under a choice."""
         return [
-            Warned(
-                name,
-                item.text,
-                item.way_out,
-                _address(name, choice, None if item.start_s is None else item.start_s - begin),
-            )
+            {
+                "clip": name,
+                "text": item.text,
+                "way_out": item.way_out,
+                "address": _address(name, choice, None if item.start_s is None else item.start_s - begin),
+            }
             for name, warned, begin in self._warned
             for item in warned
         ]
