@@ -1,6 +1,6 @@
 """Options for reading a recording: names of columns, units, the order of Euler angles, and which part to take.
 
-Everything is plain data, so that it travels with a task as JSON.
+Everything is plain data, so that it travels with a task as JSON. Command lines say it by a group of options.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The tables of the report, as rows of text for the templates: lower is better in all of them."""
+"""The tables of the report, as rows of text for the templates: lower is better in all of them.
+
+Of whole bodies also joint by joint: errors over time, as pictures with a row for each joint, and in numbers.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,8 @@
 Two spaces. The *stage* is Blender's world, in metres, z up; the camera looks along +y and down by `ELEVATION`, through
 parallel rays, so every lane is seen from the same side. The *frame* is what it sees: x right, y up, 0 in the middle,
 in units of the picture's height. `Layout.metres` leads from one to the other.
+
+Deviations are by how much what is shown is off from the recording, and are drawn larger where they are small.
 """
 
 from __future__ import annotations
