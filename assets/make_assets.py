@@ -1,4 +1,6 @@
-"""Makes what is in this folder: the clips (*.csv) and the models (models.blend). Every run makes the same.
+"""Makes what is in this folder: the clips (*.csv), the models (models.blend) and a drill of few triangles (drill.npz).
+
+Every run makes the same.
 
 The clips need NumPy. The models need Blender's Python module besides, of the oldest version that the program supports,
 because an older Blender cannot open what a newer one has written; with another version, or none, they stay as they are.
@@ -23,6 +25,7 @@ from research.making.tracking import table, tick, track
 
 SEED = 2021
 MODELS_BLENDER = (4, 5)
+DRILL_TRIANGLES = 1500
 
 
 def clip(name: str) -> str:
@@ -63,8 +66,10 @@ def main(arguments: list[str] | None = None) -> None:
         print(f"models.blend is left as it is: older versions cannot open what {bpy.app.version_string} writes")
         return
     from research.making.models import write_models
+    from rigid_motion_batch.scenes.subject import simplified
 
     write(output / "models.blend", write_models)
+    write(output / "drill.npz", lambda path: np.savez_compressed(path, **simplified("drill", DRILL_TRIANGLES)))
 
 
 if __name__ == "__main__":

@@ -21,16 +21,15 @@ sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")
 
 from examples import figure
 from examples.dancer import dance
+from research.making.stills import render_still
 from rigid_motion import animation
-from rigid_motion_batch.analysis.choices import Uniform
-from rigid_motion_batch.analysis.radii import EVERYWHERE
+from rigid_motion_batch.analysis.choices import EVERYWHERE, Uniform
 from rigid_motion_batch.analysis.results import ChoiceResult, compare_clip
 from rigid_motion_batch.cli import compare
 from rigid_motion_batch.palette import ERROR_COLOURS, full_colour
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.rest_bodies import short_names
-from rigid_motion_batch.scenes.film import render_still
 from rigid_motion_batch.scenes.materials import surface
 
 RATE, MODES = "4", ("lerp_slerp", "dq_sclerp", "motor_spline")

@@ -21,11 +21,12 @@ sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")
 
 from examples import figure
 from examples.dancer import dance
+from research.making.stills import render_still
 from rigid_motion import animation
 from rigid_motion.animation import write_channel
 from rigid_motion_batch import palette
 from rigid_motion_batch.scenes import captions
-from rigid_motion_batch.scenes.film import render_film, render_still
+from rigid_motion_batch.scenes.film import render_film
 from rigid_motion_batch.scenes.materials import ink, surface
 from rigid_motion_batch.scenes.scene import make_lights, set_up_render
 from rigid_motion_batch.scenes.settings import SceneSettings

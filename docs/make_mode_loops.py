@@ -21,6 +21,7 @@ DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
 from examples import figure
+from research.making.stills import render_still
 from rigid_motion import animation
 from rigid_motion.animation.compute.differences import in_betweens
 from rigid_motion.animation.queries.keyed import source_of
@@ -28,7 +29,7 @@ from rigid_motion.motion import MODES, Poses, interpolate
 from rigid_motion.motion.quaternions import align_signs, rotate
 from rigid_motion_batch import palette
 from rigid_motion_batch.scenes import captions
-from rigid_motion_batch.scenes.film import render_film, render_still
+from rigid_motion_batch.scenes.film import render_film
 from rigid_motion_batch.scenes.materials import ink, surface
 from rigid_motion_batch.scenes.scene import make_lights, set_up_render
 from rigid_motion_batch.scenes.settings import SceneSettings

@@ -33,12 +33,12 @@ from research.paper.table import RADIUS, SAMPLES_AN_UPDATE
 from research.studies import files_in
 from rigid_motion.motion import KEYFRAME_MODES, curves, decimate
 from rigid_motion.motion.segments import Curves, Segments
-from rigid_motion_batch.analysis.body_metrics import measure_modes
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.analysis.modes import BEST_OF, REFERENCE
-from rigid_motion_batch.analysis.needed import TABLE_RATES, KeysNeeded, OfRigidBody, keys_needed, overall
+from rigid_motion_batch.analysis.needed import TABLE_RATES, KeysNeeded, Ways, keys_needed, overall
 from rigid_motion_batch.analysis.reconstructions import reconstruct
+from rigid_motion_batch.analysis.results import measured
 from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
@@ -138,7 +138,7 @@ def _assets() -> dict[str, object]:
 def _asset_errors(asset: str, rate: str, modes: Sequence[str]) -> dict[str, float]:
     """By mode, the RMS shell error of an asset that is kept at so many keys a second, in metres."""
     (clip,), _ = read_clips([str(ASSETS / f"{asset}.csv")], "blender")
-    return {row.mode: row.rms_shell_m for row in measure_modes(reconstruct(clip, Uniform(rate), modes, RADIUS)).rows}
+    return {row.mode: row.rms_shell_m for row in measured(reconstruct(clip, Uniform(rate), modes, RADIUS)).rows}
 
 
 # -- errors of evenly spaced keys --------------------------------------------------------------------------------------
@@ -167,7 +167,7 @@ def _errors_of_clips(clips: Sequence[Clip], part: float) -> dict[str, float]:
     for rate in RATES:
         ratios = []
         for clip in clips:
-            ways, keys = OfRigidBody(clip, RADIUS), decimate(clip.times, float(rate))
+            ways, keys = Ways(clip, RADIUS), decimate(clip.times, float(rate))
             stretch = ways.between(int(keys[0]), int(keys[-1]))
             with mock.patch.object(curves, "_bent", with_part):
                 error = stretch.error(keys, "motor_spline_causal")
@@ -184,9 +184,9 @@ def _needed(clips: Sequence[Clip], modes: Sequence[str], *, fit: bool) -> dict[s
     result = []
     for clip in clips:
         _say(f"keys needed, {clip.name} ...")
-        result.append(_apart(keys_needed(OfRigidBody(clip, RADIUS, fit), modes)))
+        result.append(_apart(keys_needed(Ways(clip, RADIUS, fit), modes)))
     means = overall(result)
-    decimations = OfRigidBody(clips[0], RADIUS, fit).decimations
+    decimations = Ways(clips[0], RADIUS, fit).decimations
     shares = {group[0]: means.shares[row] for row, group in enumerate(means.groups)}
     return {
         mode: {

@@ -17,10 +17,11 @@ import numpy as np
 from mathutils import Euler, Matrix, Vector
 
 from examples import figure
+from research.making.stills import render_still
 from rigid_motion import animation
 from rigid_motion_batch import palette
 from rigid_motion_batch.scenes import captions
-from rigid_motion_batch.scenes.film import render_still, save_blend
+from rigid_motion_batch.scenes.film import save_blend
 from rigid_motion_batch.scenes.materials import ink
 from rigid_motion_batch.scenes.scene import make_lights, set_up_render
 from rigid_motion_batch.scenes.settings import SceneSettings

@@ -134,7 +134,7 @@ def test_every_mode_has_its_film_its_picture_its_formula_and_what_the_table_says
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_says_its_options(command, site, pages):
     page = pages[site / "commands.html"]
-    module = COMMANDS[command].module.removesuffix(".__main__").lstrip(".")
+    module = COMMANDS[command][0].removesuffix(".__main__").lstrip(".")
     assert f"{module}-help" in page.anchors
 
 

@@ -18,11 +18,11 @@ sys.path[:0] = [str(ROOT), str(ROOT / "addon"), str(ROOT / "scripts")]
 
 from examples import staging
 from research.making.motions import MOTIONS
+from research.making.stills import render_still
 from research.making.tracking import table, tick, track
 from rigid_motion_batch import palette
 from rigid_motion_batch.cli import job_bundle
 from rigid_motion_batch.scenes import captions
-from rigid_motion_batch.scenes.film import render_still
 from rigid_motion_batch.scenes.materials import ink, surface
 
 TAKES = {"drill": "screw", "probe": "pivot", "toss": "throw"}

@@ -13,12 +13,12 @@ sys.path[:0] = [str(ROOT), str(ROOT / "addon"), str(ROOT / "scripts")]
 
 from examples import staging
 from research.making.motions import MOTIONS
+from research.making.stills import render_still
 from research.making.tracking import tick, track
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.reconstructions import reconstruct
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.clip_reading import read_clips
-from rigid_motion_batch.scenes.film import render_still
 from rigid_motion_batch.scenes.scene import SceneSettings, build_scene
 
 SEED = 7

@@ -13,11 +13,11 @@ import numpy as np
 from research.decimating import VARIES, DecimatedBody
 from research.studies import interleaved_seconds, report
 from rigid_motion.motion import Poses, shell_error
-from rigid_motion_batch.analysis.body_metrics import key_samples, measure_modes
 from rigid_motion_batch.analysis.choices import Tolerance
-from rigid_motion_batch.analysis.metrics import geometric_mean
+from rigid_motion_batch.analysis.metrics import geometric_mean, key_samples
 from rigid_motion_batch.analysis.needed import part_of
 from rigid_motion_batch.analysis.reconstructions import Reconstruction, moving, reconstruct
+from rigid_motion_batch.analysis.results import measured
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 
@@ -121,13 +121,13 @@ def beside(body: Clip, way: str) -> list[dict[str, Any]]:
     """Return what is left by keys of each joint or by key poses, and by Decimate within the error that these have."""
     report(f"{body.name}, {way}")
     made = reduced(body, shared=WAYS[way])
-    (measured,) = measure_modes(made).rows
-    slides = measured.foot_slide_m, measured.recorded_slide_m
+    (row,) = measured(made).rows
+    slides = row.foot_slide_m, measured.recorded_slide_m
     slide, recorded = (None if metres is None else 1e3 * metres for metres in slides)
-    own = {"frames": measured.key_frames, "key_count": measured.keys, "numbers": numbers_of(made)}
-    left = DecimatedBody(made).within(measured.max_shell_m)
+    own = {"frames": row.key_frames, "key_count": measured.keys, "numbers": numbers_of(made)}
+    left = DecimatedBody(made).within(row.max_shell_m)
     return [
-        {"body": body.name, "how": way, **own, "error_mm": 1e3 * measured.max_shell_m}
+        {"body": body.name, "how": way, **own, "error_mm": 1e3 * row.max_shell_m}
         | {"slide_mm": slide, "recorded_slide_mm": recorded},
         {"body": body.name, "how": "Decimate", **left.figures()},
     ]

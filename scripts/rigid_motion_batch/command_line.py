@@ -190,7 +190,8 @@ def path_line(path: str | os.PathLike[str]) -> str:
     return json.dumps(text) if odd else text
 
 
-def few(names: Iterable[str], most: int = 3) -> str:
-    """Return the first of several names, and how many more there are."""
+def listed(names: Iterable[str], limit: int = 30, more: int = 0) -> str:
+    """Return the names with commas, cut off where they become too many to read; `more` are not among them."""
     names = [*names]
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+    left = max(len(names) - limit, 0) + more
+    return ", ".join(names[:limit]) + (f" and {left} more" if left else "")

@@ -1,21 +1,28 @@
 """Files that are whole or not there: written beside their place, under a name of their own, and moved into it.
 
-Text is UTF-8 with LF line ends on every system, so that two runs can be compared byte by byte.
+Text is UTF-8 with LF line ends on every system, so that two runs can be compared byte by byte. A table
+has rows of one kind, a dataclass whose fields are the columns; `float` reads back what was computed.
 """
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import os
 import secrets
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import astuple, fields
 from io import TextIOWrapper
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rigid_motion_batch.supervising import report
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 LONGEST_SUFFIX = 8
 """Bytes of a suffix that is kept."""
@@ -124,3 +131,32 @@ def lines_of(path: Path) -> Iterator[dict[str, Any]]:
         with suppress(ValueError, RecursionError):
             if isinstance(content := json.loads(line), dict):
                 yield content
+
+
+Row = TypeVar("Row", bound="DataclassInstance")
+
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""Characters that spreadsheets take for the beginning of a formula, if a text begins with it: names come from
+strangers' files."""
+
+
+def escaped(text: str) -> str:
+    """Return a text that no spreadsheet takes for a formula: with an apostrophe before it, where it would be one."""
+    return f"'{text}" if text.lstrip("'").startswith(FORMULA) else text
+
+
+def line_of(cells: Iterable[object]) -> str:
+    """Return cells as a line of CSV, which ends with LF; texts are `escaped`."""
+    line = io.StringIO()
+    cells = [escaped(cell) if isinstance(cell, str) else cell for cell in cells]
+    # Before Python 3.13, csv quotes no ends of lines but those it writes itself. A joint's name may have any.
+    csv.writer(line, lineterminator="\r\n").writerow(cells)
+    return f"{line.getvalue()[:-2]}\n"
+
+
+def write_rows(path: Path, kind: type[Row], rows: Iterable[Row]) -> None:
+    """Write a header and the rows; None is an empty cell."""
+    with replacing(path) as stream:
+        stream.write(line_of(field.name for field in fields(kind)))
+        for row in rows:
+            stream.write(line_of(astuple(row)))

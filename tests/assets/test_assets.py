@@ -131,6 +131,14 @@ def test_the_file_of_the_models_is_small():
     assert (ASSETS / "models.blend").stat().st_size < 300_000
 
 
+def test_the_simple_drill_is_as_large_as_the_drill(models):
+    drill = np.load(ASSETS / "drill.npz")
+    vertices = vertices_of(models["Drill"][0])
+    for edge in (np.min, np.max):
+        np.testing.assert_allclose(edge(drill["vertices"], axis=0), edge(vertices, axis=0), atol=1e-3)
+    assert len(drill["triangles"]) <= 1500
+
+
 @each_model
 def test_the_script_makes_the_kept_model_again(models, name):
     kept, made = models[name]

@@ -129,7 +129,7 @@ def test_the_video_its_blend_and_the_report_are_written_and_nothing_else(short_c
     files = [path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file()]
     written = {str(path) for path in files if path.parts[0] != OWN}
     tables = {f"toss/10/{name}.csv" for name in ("keys", *KEYFRAME_MODES)}
-    shown = {f"toss/10/comparison.{ending}" for ending in ("mp4", "blend", "glb")}
+    shown = {f"toss/10/comparison.{ending}" for ending in ("mp4", "blend")}
     assert written == tables | shown | {"metrics.csv", "report.html"}
     assert capsys.readouterr().out.splitlines()[-1] == str((tmp_path / "report.html").resolve())
 
@@ -221,12 +221,12 @@ def test_workers_write_what_one_process_writes_to_the_byte(short_clip, adaptive,
 def test_a_second_run_does_nothing_and_another_rate_only_what_it_asks_for(short_clip, tmp_path, capsys):
     asked = (short_clip, "--no-video", "--output", tmp_path, "--json")
     assert run(*asked, "--rates", "10") == 0
-    assert tasks_of(capsys) == {"done": 5}
+    assert tasks_of(capsys) == {"done": 4}
     assert run(*asked, "--rates", "10") == 0
-    assert tasks_of(capsys) == {"up to date": 5}
+    assert tasks_of(capsys) == {"up to date": 4}
     written = (tmp_path / "toss" / "10" / "keys.csv").stat().st_mtime_ns
     assert run(*asked, "--rates", "10,20") == 0
-    assert tasks_of(capsys) == {"done": 3, "up to date": 3}
+    assert tasks_of(capsys) == {"done": 3, "up to date": 2}
     assert (tmp_path / "toss" / "10" / "keys.csv").stat().st_mtime_ns == written
     assert {row["rate_hz"] for row in rows_of(tmp_path / "metrics.csv")} == {"10", "20"}
 
@@ -240,7 +240,7 @@ def test_one_bad_recording_is_said_and_the_others_go_on(short_clip, tmp_path, ca
     complaints = [line.split(": ")[1] for line in said.err.splitlines() if line.startswith("compare.py:")]
     assert complaints == [f"{bad}:1", str(tmp_path / "nowhere.csv"), "2 failed, as said above"]
     result = json.loads(said.out)
-    assert result["tasks"] == {"done": 5, "failed": 2}
+    assert result["tasks"] == {"done": 4, "failed": 2}
     assert result["report"] == str(tmp_path / "out" / "report.html")
     assert [*result["failures"]] == [f"read {bad}", f"read {tmp_path / 'nowhere.csv'}"]
     assert result["exit_code"] == 1

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigid_motion_batch.rows import escaped, line_of, write_rows
+from rigid_motion_batch.files import escaped, line_of, write_rows
 
 
 @dataclass

@@ -6,7 +6,6 @@ the specification has it (glTF 2.0, sections 3.6 and 3.11): -1 to 1, or 0 to 1.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -207,13 +206,3 @@ class GrowingView:
         offset = len(self.data)
         self.data += content
         return {"bufferView": self.number} | ({"byteOffset": offset} if offset else {})
-
-
-def in_one_buffer(views: Iterable[GrowingView]) -> bytes:
-    """Return the bytes of views one after the other, which know their places in them from then on."""
-    data = bytearray()
-    for view in views:
-        data += bytes(-len(data) % ALIGNED)
-        view.json |= {"byteOffset": len(data), "byteLength": len(view.data)}
-        data += view.data
-    return bytes(data)

@@ -13,14 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from rigid_motion_batch.analysis.body_metrics import measure_modes
-from rigid_motion_batch.analysis.body_needed import OfBody
-from rigid_motion_batch.analysis.choices import Uniform
+from rigid_motion_batch.analysis.choices import JOINT, Uniform
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.analysis.modes import REFERENCE
-from rigid_motion_batch.analysis.needed import DECIMATIONS, RATES, keys_needed, part_of
-from rigid_motion_batch.analysis.radii import JOINT
+from rigid_motion_batch.analysis.needed import DECIMATIONS, RATES, Ways, keys_needed, part_of
 from rigid_motion_batch.analysis.reconstructions import moving, reconstruct
+from rigid_motion_batch.analysis.results import measured
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
@@ -62,7 +60,7 @@ def needed_of(clip: Clip) -> dict[str, dict[str, list[float]]]:
     """Return the key poses that every mode needs, by mode and decimation: `shares_of` the reference's at `RATES`."""
     radii = np.full(len(clip.rest_body.joints), JOINT)
     searched = part_of(clip, 0, int(np.searchsorted(clip.times, clip.times[0] + SEARCHED, side="right")) - 1)
-    return shares_of(clip, keys_needed(OfBody(searched, radii), MODES))
+    return shares_of(clip, keys_needed(Ways(searched, radii), MODES))
 
 
 def errors_of(clip: Clip) -> dict[str, dict[int, tuple[float, float]]]:
@@ -73,7 +71,7 @@ def errors_of(clip: Clip) -> dict[str, dict[int, tuple[float, float]]]:
     result = {mode: dict.fromkeys(ERROR_RATES, (np.nan, np.nan)) for mode in MODES}
     for rate in ERROR_RATES:
         made = reconstruct(clip, Uniform(str(rate)), MODES, JOINT) if has_samples_for(clip, rate) else None
-        for row in measure_modes(made).rows if made else ():
+        for row in measured(made).rows if made else ():
             result[row.mode][rate] = row.rms_shell_m, row.rms_velocity_m_s
     return result
 

@@ -16,7 +16,7 @@ from research.live_streams.packings import STAMP
 from rigid_motion.motion import decimate
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.analysis.modes import REFERENCE
-from rigid_motion_batch.analysis.needed import OfRigidBody, part_of
+from rigid_motion_batch.analysis.needed import Ways, part_of
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.streaming.measuring import HEADERS, measure
 from rigid_motion_batch.streaming.sending import body_of, samples_of
@@ -44,7 +44,7 @@ def sent(clip: Clip, tolerance: float, delay: float) -> tuple[float, float, floa
 def costs_of(clip: Clip) -> dict[float, dict[int, tuple[float, float]]]:
     """Return by delay and rate of the state of the art the datagrams and the bytes a second that are as good."""
     clip = part_of(clip, 0, int(np.searchsorted(clip.times, clip.times[0] + SECONDS, side="right")) - 1)
-    ways = OfRigidBody(clip, RADIUS)
+    ways = Ways(clip, RADIUS)
     requested = {
         rate: ways.error(decimate(clip.times, rate), REFERENCE) for rate in UPDATES if has_samples_for(clip, rate)
     }

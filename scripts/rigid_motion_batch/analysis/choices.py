@@ -2,11 +2,12 @@
 
 A clip under a choice is a `Reconstruction`, whatever the choice: that names the folder, and says itself in captions,
 in the report and in `metrics.csv`. Amounts stay as the user wrote them. Tolerances are lengths with a unit, or in the
-unit of the recording.
+unit of the recording. Radii are of the balls in which no point is off by more than the shell error.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
@@ -45,9 +46,6 @@ class Choice(ABC):
     decimation: ClassVar[str]
     """What metrics.csv calls it: "uniform" or "adaptive"."""
 
-    at: ClassVar[str] = "at"
-    """The word that leads to the amount in a sentence."""
-
     unit: ClassVar[str] = "keys/s"
     """What follows the amounts, if anything."""
 
@@ -80,7 +78,7 @@ class Choice(ABC):
     @property
     def phrase(self) -> str:
         """The same in a sentence: "at 10 keys/s"."""
-        return f"{self.at} {self.title}"
+        return f"at {self.title}"
 
     @property
     def rate(self) -> str:
@@ -148,7 +146,6 @@ class Tolerance(Choice):
     """The fewest keys with which the shell error of a mode stays within a length at every sample."""
 
     decimation = "adaptive"
-    at = "within"
     unit = ""
 
     def __post_init__(self) -> None:
@@ -189,8 +186,8 @@ class Tolerance(Choice):
         number, unit = self._parts()
         return float(number) * (METRES[unit] if unit else per_unit)
 
-    def require_within(self, clip: Clip, radius: float) -> None:
-        """Raise ValueError with the way out where a clip does not move as far as the tolerance: "5" for "5mm".
+    def problem_with(self, clip: Clip, radius: float) -> str:
+        """Return what is wrong where a clip does not move as far as the tolerance, "5" for "5mm"; else nothing.
 
         The radius of the shell is in metres; of a body the places of its joints count.
         """
@@ -201,14 +198,13 @@ class Tolerance(Choice):
             places = clip.in_metres(clip.rest_body.skeleton.in_root_space(clip.poses)).positions
             size = float(np.linalg.norm(places - places[:, :1], axis=-1).max())
         allowed = self.tolerance(clip)
-        if 0.0 < size < allowed:
-            written, unit = self._parts()
-            way_out = "give a smaller one" if unit else f"give it with its unit, as in {written}mm"
-            here = "" if unit == "m" else f", {allowed:.3g} m"
-            raise ValueError(
-                f"a tolerance of {self.amount}{here}, is more than the whole motion, which is {size:.3g} m large: "
-                f"{way_out}"
-            )
+        if not 0.0 < size < allowed:
+            return ""
+        written, unit = self._parts()
+        way_out = "give a smaller one" if unit else f"give it with its unit, as in {written}mm"
+        here = "" if unit == "m" else f", {allowed:.3g} m"
+        more = f"is more than the whole motion, which is {size:.3g} m large: {way_out}"
+        return f"a tolerance of {self.amount}{here}, {more}"
 
     @property
     def is_length(self) -> bool:
@@ -266,3 +262,45 @@ def distinct(choices: Iterable[Choice]) -> list[Choice]:
     for choice in choices:
         first.setdefault(choice.requested, choice)
     return list(first.values())
+
+
+RIGID, JOINT = 0.1, 0.03
+"""Of what a hand holds, and of what is around a joint of a body."""
+
+
+@dataclass(frozen=True)
+class Radii:
+    """Plain data, as parameters of tasks."""
+
+    rigid: float = RIGID
+    """Of a single rigid body."""
+
+    joint: float = JOINT
+    """Of every joint of a whole body."""
+
+    def of(self, clip: Clip) -> np.ndarray:
+        """Return the radii of the joints of a clip, shape (joints,); a rigid body has one."""
+        return np.full(clip.joints, self.joint if clip.rest_body else self.rigid)
+
+
+EVERYWHERE = Radii()
+
+
+def read_radii(text: str) -> Radii:
+    """Return a radius for everything. Raises ValueError where it is none."""
+    radius = radius_in_metres(text)
+    return Radii(radius, radius)
+
+
+def radius_in_metres(text: str) -> float:
+    """Return a radius as it is written: 3cm, 30mm, 0.03m, or 0.03. Raises ValueError where it is none above 0."""
+    parts = re.fullmatch(rf"(.*?)\s*({'|'.join(METRES)})?\s*", text, re.DOTALL)
+    assert parts is not None  # which any text fits
+    number, unit = parts.groups()
+    try:
+        radius = float(number) * METRES[unit or "m"]
+    except ValueError:
+        radius = math.nan
+    if not 0.0 < radius < math.inf:
+        raise ValueError(f"{text!r} is not a length above 0, such as 3cm or 0.03")
+    return radius

@@ -1,11 +1,12 @@
-"""What a comparison found, in numbers: the rows of `metrics.csv`, and the poses behind them as tables.
+"""What a comparison found, in numbers: the rows of `metrics.csv` and `metrics_joints.csv`, and the poses behind them.
 
-Errors are in metres; the poses in the tables keep the unit of their recording. The numbers are written so that `float`
-reads back exactly what was computed.
+Errors are in metres, of whole bodies in the root's space; the poses in the tables keep the unit of their recording.
+The numbers are written so that `float` reads back exactly what was computed.
 """
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,13 +16,12 @@ import numpy as np
 
 from rigid_motion.motion import Errors, Poses
 from rigid_motion.motion.measures import rms
-from rigid_motion_batch.files import replacing
+from rigid_motion_batch.files import line_of, replacing
 from rigid_motion_batch.recordings.clips import Clip
 
-from .choices import Choice
-from .errors import MotionErrors
+from .choices import Choice, Keys
 from .modes import BEST_OF, single_modes
-from .reconstructions import Reconstruction
+from .reconstructions import Ground, MotionErrors, Reconstruction
 
 BYTES_PER_KEY = 7 * 8
 """A position and a quaternion, as doubles: what the paper sends for an update."""
@@ -59,7 +59,7 @@ class Metrics:
     """From the first key to the last."""
 
     bytes_per_s: float | None
-    """Of the keys that were really kept, not of the rate that was asked for: see `measure_modes`."""
+    """Of the keys that were really kept, not of the rate that was asked for: see `row_of`."""
 
     rms_shell_m: float
     p95_shell_m: float
@@ -93,6 +93,35 @@ class Metrics:
     """The same in the recording itself."""
 
 
+@dataclass(frozen=True)
+class JointMetrics:
+    """One joint of a clip with one choice of keys under one mode: the columns of `metrics_joints.csv`."""
+
+    clip: str
+    joint: str
+    mode: str
+
+    rate_hz: str
+    """As the user wrote it; empty where a tolerance decides."""
+
+    keys: int | None
+    """1 of a joint that stays as it is in its parent's space."""
+
+    samples: int
+    rms_shell_m: float
+    p95_shell_m: float
+    max_shell_m: float
+
+    worst_s: float
+    """When that is, in seconds from the first key on."""
+
+    rms_position_m: float
+    rms_rotation_deg: float
+    rms_velocity_m_s: float
+    decimation: str
+    tolerance_m: float | None
+
+
 def of_errors(clip: Clip, choice: Choice, errors: Errors | MotionErrors) -> dict[str, Any]:
     """Return the fields of a row that any motion has, of errors in metres and radians."""
     return {
@@ -108,6 +137,58 @@ def of_errors(clip: Clip, choice: Choice, errors: Errors | MotionErrors) -> dict
         "decimation": choice.decimation,
         "tolerance_m": choice.tolerance(clip),
     }
+
+
+def row_of(made: Reconstruction, mode: str, errors: MotionErrors, ground: Ground) -> Metrics:
+    """Return the row of a mode.
+
+    Notes
+    -----
+    `bytes_per_s` is (keys - 1) / duration times 56 bytes, or 57 under `best_of`, whose keys say the mode. A recording
+    that is thinned to 10 keys a second keeps fewer where it has gaps or is slow itself, and it is what would be sent
+    that counts. The first key is not counted, since a stretch of the motion costs the key at its end: keys exactly a
+    tenth of a second apart are 560 bytes a second for any length of the clip.
+    """
+    clip, keys = made.clip, made.keys[mode]
+    duration = float(made.times[-1] - made.times[0])
+    # A joint that stays as it is has its key once, and sends nothing.
+    count = sum(map(len, keys))
+    sent = count - len(keys)
+    moving_joints = sum(len(own) > 1 for own in keys)
+    whole = bool(clip.rest_body)
+    return Metrics(
+        mode=mode,
+        keys=count or None,
+        duration_s=duration,
+        bytes_per_s=sent / duration * (BYTES_PER_KEY + BYTES_PER_MODE * (mode == BEST_OF)) if count else None,
+        keys_per_s=sent / max(moving_joints, 1) / duration if count else None,
+        joints=len(keys) if whole else None,
+        key_frames=len(key_samples(keys)) or None if whole else None,
+        worst_joint=clip.whole_body.joints[errors.worst[0]] if whole else None,
+        foot_slide_m=errors.slide if len(ground.joints) else None,
+        recorded_slide_m=ground.slide if len(ground.joints) else None,
+        **of_errors(clip, made.choice, errors),
+    )
+
+
+def rows_of_joints(made: Reconstruction, mode: str, errors: MotionErrors) -> Iterator[JointMetrics]:
+    """Yield the rows of a mode, a joint of a whole body each."""
+    clip, times = made.clip, made.times
+    of_joints = map(Errors, errors.shell, errors.position, errors.rotation, errors.velocity)
+    for name, keys, own in zip(clip.whole_body.joints, made.keys[mode], of_joints, strict=True):
+        yield JointMetrics(
+            joint=name,
+            mode=mode,
+            keys=len(keys) or None,
+            worst_s=float(times[np.argmax(own.shell)] - times[0]),
+            **of_errors(clip, made.choice, own),
+        )
+
+
+def key_samples(keys: Keys) -> np.ndarray:
+    """Return the samples that are a key of any joint that moves."""
+    moving_ones = [own for own in keys if len(own) > 1]
+    return np.unique(np.concatenate(moving_ones)) if moving_ones else keys[0]
 
 
 def geometric_mean(values: np.ndarray) -> np.ndarray:
@@ -168,34 +249,60 @@ def lines_of_poses(columns: Sequence[np.ndarray]) -> Iterator[tuple[int, list[st
         yield first, [",".join(map(repr, row)) for row in rows]
 
 
-def table_names(choice: Choice, modes: Iterable[str], form: str = "csv", other: str = "") -> list[str]:
-    """Return the files that `write_reconstruction` writes for a choice; `other` is a motion whose keys are unknown."""
-    modes = tuple(modes)
-    single = [] if choice.decimation == "uniform" else [f"{mode}.keys.{form}" for mode in single_modes(modes)]
+def table_names(
+    choice: Choice, modes: Iterable[str], form: str = "csv", other: str = "", *, body: bool = False
+) -> list[str]:
+    """Return the files that `write_tables` writes for a choice; `other` is a motion whose keys are unknown.
+
+    Of a whole body those are its keys: one for all modes where they have the same.
+    """
+    modes, form = tuple(modes), "csv" if body else form
+    keyed = [f"{mode}.keys.{form}" for mode in single_modes(modes)]
+    keys = [f"keys.{form}"] if choice.decimation == "uniform" else keyed
     best = [f"{BEST_OF}.keys.csv"] if BEST_OF in modes else []
-    return [*(f"{mode}.{form}" for mode in (*modes, other) if mode), *(single or [f"keys.{form}"]), *best]
+    return keys if body else [*(f"{mode}.{form}" for mode in (*modes, other) if mode), *keys, *best]
 
 
-def body_table_names(choice: Choice, modes: Iterable[str]) -> list[str]:
-    """Return the files of the keys of a whole body: one for all modes where they have the same."""
-    return ["keys.csv"] if choice.decimation == "uniform" else [f"{mode}.keys.csv" for mode in modes]
-
-
-def write_reconstruction(folder: Path, reconstruction: Reconstruction, form: str = "csv") -> None:
-    """Write a `MODE.csv`, or another of `FORMS`, for every mode into `folder`, and the keys.
+def write_tables(folder: Path, made: Reconstruction, form: str = "csv") -> None:
+    """Write the keys, and of a rigid body a `MODE.csv`, or another of `FORMS`, for every mode into `folder`.
 
     Keys that were chosen evenly are those of all modes, in `keys.csv`; others are in a `MODE.keys.csv` for each. Those
-    of `best_of` are in a table of their own in any case, with the mode of each segment.
+    of `best_of` are in a table of their own in any case, with the mode of each segment. Of a whole body a row is a
+    joint's pose in its parent's space, in the unit of the recording: `joint,t,x,y,z,qw,qx,qy,qz`.
     """
-    clip, times = reconstruction.clip, reconstruction.times
-    for mode in reconstruction.keys:
-        write_poses(folder / f"{mode}.{form}", times, reconstruction.filled_in(mode, times))
-    known = {mode: keys for mode, (keys,) in reconstruction.keys.items() if len(keys)}
-    tables = {f"{mode}.keys.{form}": keys for mode, keys in known.items() if mode != BEST_OF}
-    if reconstruction.choice.decimation == "uniform":
+    clip, times, body = made.clip, made.times, made.clip.rest_body is not None
+    form = "csv" if body else form
+    for mode in () if body else made.keys:
+        write_poses(folder / f"{mode}.{form}", times, made.filled_in(mode, times))
+    tables = {f"{mode}.keys.{form}": made.keys[mode] for mode in single_modes(made.keys) if len(made.keys[mode][0])}
+    if made.choice.decimation == "uniform":
         tables = {f"keys.{form}": next(iter(tables.values()))}
     for name, keys in tables.items():
-        write_poses(folder / name, clip.times[keys], clip.poses[keys])
-    if BEST_OF in reconstruction.keys:
-        (keys,), modes = reconstruction.keys[BEST_OF], reconstruction.segment_modes
-        write_poses(folder / f"{BEST_OF}.keys.csv", clip.times[keys], clip.poses[keys], modes)
+        if body:
+            _write_key_poses(folder / name, clip, keys)
+        else:
+            write_poses(folder / name, clip.times[keys[0]], clip.poses[keys[0]])
+    if BEST_OF in made.keys:
+        (best,) = made.keys[BEST_OF]
+        write_poses(folder / f"{BEST_OF}.keys.csv", clip.times[best], clip.poses[best], made.segment_modes)
+
+
+def _write_key_poses(path: Path, clip: Clip, keys: Keys) -> None:
+    with replacing(path) as stream:
+        stream.write("joint,t,x,y,z,qw,qx,qy,qz\n")
+        for joint, own in enumerate(keys):
+            name = line_of([clip.whole_body.joints[joint]])[:-1]
+            poses = clip.poses[joint][own]
+            for _, lines in lines_of_poses([clip.times[own], *poses.positions.T, *poses.quaternions.T]):
+                stream.writelines(f"{name},{line}\n" for line in lines)
+
+
+def join_tables(path: Path, parts: Iterable[Path]) -> None:
+    """Write the rows of tables that have the same header, at least one, under a single one."""
+    with replacing(path) as stream:
+        for number, part in enumerate(parts):
+            with part.open(encoding="utf-8", newline="") as source:
+                header = source.readline()
+                if number == 0:
+                    stream.write(header)
+                shutil.copyfileobj(source, stream)

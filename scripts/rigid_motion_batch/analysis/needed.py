@@ -8,17 +8,18 @@ the points of the curve of error over keys a second. Errors are in metres.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from functools import cache
+from operator import itemgetter
+from typing import Any, Self, cast
 
 import numpy as np
 
-from rigid_motion.motion import decimate, fit_keys, interpolate, reduce_keys, rms, shell_error
+from rigid_motion.motion import decimate, fit_keys, interpolate, reduce_keys, reduce_skeleton_keys, rms, shell_error
 from rigid_motion_batch.recordings.clips import Clip
 
-from .choices import Uniform
+from .choices import Keys, Uniform
 from .metrics import NOTHING, geometric_mean
 from .modes import REFERENCE
 from .reconstructions import Reconstruction, same_motions
@@ -34,6 +35,9 @@ DECIMATIONS = ("uniform", "adaptive", "fitted")
 
 TRIES = 3
 """How often fewer keys are fitted, to find how few will do."""
+
+NEAR = 0.02
+"""The search for key poses ends where one knows their number to so much of it: every step reduces keys anew."""
 
 
 @dataclass(frozen=True)
@@ -101,25 +105,35 @@ class KeysNeeded:
         return (self.keys - 1.0) / self.durations
 
 
-@dataclass(frozen=True)
-class Ways(ABC):
-    """The ways to have fewer keys of a clip, and how good they are. All errors are RMS shell errors in metres."""
+@dataclass(frozen=True, eq=False)
+class Ways:
+    """The ways to have fewer keys of a clip, and how good they are. All errors are RMS shell errors in metres.
+
+    Keys of a single rigid body are where the motion needs them, or moved to where they fit best. Those of a whole body
+    are key poses, the same samples for all joints: the best of so many that `reduce_skeleton_keys` finds, which keep
+    the largest error small, or evenly spaced ones where these are better; how many is searched for.
+    """
 
     clip: Clip
 
+    radius: float | np.ndarray
+    """Of the shell of a rigid body, or of the balls at the joints, in metres, one or shape (joints,)."""
+
+    fit: bool = False
+    """Whether to find fitted keys of a rigid body too, which takes two to three times as long."""
+
     @property
-    @abstractmethod
     def decimations(self) -> tuple[str, ...]:
         """Those of `DECIMATIONS` that are tried."""
+        return DECIMATIONS if self.fit else DECIMATIONS[:2]
 
-    @property
-    @abstractmethod
-    def shells(self) -> np.ndarray:
-        """The radii of the balls at the joints, or of the shell of a rigid body, in metres, shape (joints,)."""
-
-    @abstractmethod
     def by_motion(self, mode: str, target: float, evenly: int) -> list[tuple[np.ndarray, float]]:
         """Return keys, and their error, in each of the ways but for evenly spaced ones, of which it takes so many."""
+        if self.clip.rest_body:
+            return [self._key_poses(mode, target, evenly)]
+        adaptive = self._reduced(mode, target)
+        result = [(adaptive, self.error(adaptive, mode))]
+        return [*result, self._fewest_fitted(mode, target, *result[0])] if self.fit else result
 
     def between(self, first: int, last: int) -> Self:
         """Return the same for the part of the clip from one sample to another."""
@@ -127,8 +141,54 @@ class Ways(ABC):
 
     def error(self, keys: np.ndarray, mode: str) -> float:
         """Return that of a mode that has these samples for keys of all joints."""
-        made = Reconstruction(self.clip, Uniform("1"), {mode: (keys,) * len(self.shells)}, self.shells, shared=True)
+        radii = np.broadcast_to(np.asarray(self.radius, dtype=float), (self.clip.joints,))
+        made = Reconstruction(self.clip, Uniform("1"), {mode: (keys,) * len(radii)}, radii, shared=True)
         return rms(made.shell(mode))
+
+    def _key_poses(self, mode: str, target: float, evenly: int) -> tuple[np.ndarray, float]:
+        """Return as many key poses as evenly spaced ones at most, if those of the motion are any better."""
+        samples = len(self.clip.times)
+        best_of = cache(lambda budget: self._best_of(budget, mode))
+        start = min(evenly, samples)
+        return best_of(fewest(lambda budget: best_of(budget)[1] <= target, start, samples, too_few=1, near=NEAR))
+
+    def _best_of(self, budget: int, mode: str) -> tuple[np.ndarray, float]:
+        """Return so many key poses at most, and their error."""
+        clip, budget = self.clip, max(budget, 2)
+        if budget >= len(clip.times):
+            every = np.arange(len(clip.times))
+            return every, self.error(every, mode)
+        radius, parents = self.radius / clip.metres_per_unit, clip.whole_body.parents
+        result = reduce_skeleton_keys(clip.times, clip.poses, parents, mode, radius=radius, budget=budget, shared=True)
+        keys = max(cast(Keys, result), key=len)
+        # Keys with the smallest largest error may have a larger RMS error than evenly spaced ones.
+        evenly = evenly_spaced(clip, budget - 1)
+        return min(((some, self.error(some, mode)) for some in (keys, evenly)), key=itemgetter(1))
+
+    def _reduced(self, mode: str, target: float) -> np.ndarray:
+        clip, scale = self.clip, self.clip.metres_per_unit
+        return reduce_keys(clip.times, clip.poses, mode, target / scale, float(np.max(self.radius)) / scale, rms=True)
+
+    def _fewest_fitted(
+        self, mode: str, target: float, adaptive: np.ndarray, reached: float
+    ) -> tuple[np.ndarray, float]:
+        """Return the fewest keys, and their error, that are within the target when fitted.
+
+        They are searched from the adaptive ones on, which have reached this error without.
+        """
+        clip, best, keys, aim = self.clip, adaptive, adaptive, target
+        for number in range(TRIES):
+            if number:
+                keys = self._reduced(mode, aim)
+            fitted = fit_keys(clip.times, clip.poses, keys, mode, float(np.max(self.radius)) / clip.metres_per_unit)
+            filled = interpolate(clip.times[keys], fitted, clip.times, mode)
+            error = rms(shell_error(clip.in_metres(filled), clip.in_metres(clip.poses), self.radius))
+            if error <= target and len(keys) <= len(best):
+                best, reached = keys, error
+            if error <= NOTHING:
+                break
+            aim *= target / error
+        return best, reached
 
 
 def keys_needed(ways: Ways, modes: Iterable[str], *, advance: Callable[[], object] = lambda: None) -> KeysNeeded:
@@ -206,55 +266,6 @@ def part_of(clip: Clip, first: int, last: int) -> Clip:
     """Return a clip from one sample to another."""
     part = slice(first, last + 1)
     return replace(clip, times=clip.times[part], poses=clip.poses[..., part])
-
-
-@dataclass(frozen=True)
-class OfRigidBody(Ways):
-    """Keys of a single rigid body: where the motion needs them, and moved to where they fit best."""
-
-    radius: float
-    """Of the shell, in metres."""
-
-    fit: bool = False
-    """Whether to find fitted keys too, which takes two to three times as long."""
-
-    @property
-    def decimations(self) -> tuple[str, ...]:
-        return DECIMATIONS if self.fit else DECIMATIONS[:2]
-
-    @property
-    def shells(self) -> np.ndarray:
-        return np.array([self.radius])
-
-    def by_motion(self, mode: str, target: float, evenly: int) -> list[tuple[np.ndarray, float]]:
-        adaptive = self._reduced(mode, target)
-        result = [(adaptive, self.error(adaptive, mode))]
-        return [*result, self._fewest_fitted(mode, target, *result[0])] if self.fit else result
-
-    def _reduced(self, mode: str, target: float) -> np.ndarray:
-        clip, scale = self.clip, self.clip.metres_per_unit
-        return reduce_keys(clip.times, clip.poses, mode, target / scale, self.radius / scale, rms=True)
-
-    def _fewest_fitted(
-        self, mode: str, target: float, adaptive: np.ndarray, reached: float
-    ) -> tuple[np.ndarray, float]:
-        """Return the fewest keys, and their error, that are within the target when fitted.
-
-        They are searched from the adaptive ones on, which have reached this error without.
-        """
-        clip, best, keys, aim = self.clip, adaptive, adaptive, target
-        for number in range(TRIES):
-            if number:
-                keys = self._reduced(mode, aim)
-            fitted = fit_keys(clip.times, clip.poses, keys, mode, self.radius / clip.metres_per_unit)
-            filled = interpolate(clip.times[keys], fitted, clip.times, mode)
-            error = rms(shell_error(clip.in_metres(filled), clip.in_metres(clip.poses), self.radius))
-            if error <= target and len(keys) <= len(best):
-                best, reached = keys, error
-            if error <= NOTHING:
-                break
-            aim *= target / error
-        return best, reached
 
 
 # -- over all clips ---------------------------------------------------------------------------------------------------

@@ -8,19 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from rigid_motion.motion import Poses
 from rigid_motion_batch.recordings.clips import Clip, ClipFacts
 
-from .body_metrics import JointMetrics, key_samples, measure_modes, write_key_tables
-from .choices import Choice, Keys
-from .metrics import Metrics, write_reconstruction
+from .choices import Choice, Keys, Radii
+from .metrics import JointMetrics, Metrics, key_samples, row_of, rows_of_joints
 from .needed import KeysNeeded
-from .radii import Radii
-from .reconstructions import Reconstruction, reconstruct
+from .reconstructions import Ground, MotionErrors, Reconstruction, errors_of, identical_modes
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,11 +107,6 @@ class ClipResult:
     """The keys that are needed, where that was looked for."""
 
 
-def made_of(clip: Clip, choice: Choice, modes: Sequence[str], radii: Radii, *, shared: bool) -> Reconstruction | None:
-    """Return what modes make of a clip, with radii of the shells; as `reconstruct`."""
-    return reconstruct(clip, choice, modes, radii.of(clip), shared=shared)
-
-
 def made_again(clip: Clip, result: ChoiceResult, radii: Radii, *, shared: bool) -> Reconstruction:
     """Return the same by the keys that were chosen before."""
     keys, modes = dict(result.keys), result.mode_of_segments
@@ -122,11 +114,20 @@ def made_again(clip: Clip, result: ChoiceResult, radii: Radii, *, shared: bool) 
 
 
 def measured(made: Reconstruction) -> ChoiceResult:
-    """Measure what was made."""
-    clip, result = made.clip, measure_modes(made)
-    rows = {row.mode: row for row in result.rows}
+    """Measure what was made. Of modes that are one motion what is as long as the recording is kept for the first."""
+    clip, ground, groups = made.clip, Ground.of(made), identical_modes(made)
+    rows: dict[str, Metrics] = {}
+    joints: list[JointMetrics] = []
+    kept: dict[str, MotionErrors] = {}
+    for mode in made.keys:
+        errors = errors_of(made, mode, ground)
+        rows[mode] = row_of(made, mode, errors, ground)
+        joints += rows_of_joints(made, mode, errors) if clip.rest_body else ()
+        if any(mode == group[0] for group in groups):
+            kept[mode] = errors
     motions = []
-    for group, errors in zip(result.groups, result.errors.values(), strict=True):
+    for group in groups:
+        errors = kept[group[0]]
         poses = _places(errors.places) if clip.rest_body else clip.in_blender(made.filled_in(group[0], made.times))
         motions.append(
             Motion(
@@ -138,15 +139,7 @@ def measured(made: Reconstruction) -> ChoiceResult:
                 errors.shell if clip.rest_body else None,
             )
         )
-    return ChoiceResult(made.choice, made.samples.start, tuple(motions), made.keys, made.segment_modes, result.joints)
-
-
-def write_tables(folder: Path, made: Reconstruction, form: str) -> None:
-    """Write the keys, and of a rigid body the poses, as `table_names` says."""
-    if made.clip.rest_body:
-        write_key_tables(folder, made)
-    else:
-        write_reconstruction(folder, made, form)
+    return ChoiceResult(made.choice, made.samples.start, tuple(motions), made.keys, made.segment_modes, tuple(joints))
 
 
 def clip_result(clip: Clip, choices: Sequence[ChoiceResult], needed: KeysNeeded | None = None) -> ClipResult:

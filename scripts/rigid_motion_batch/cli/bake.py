@@ -20,7 +20,7 @@ require_blender(SCRIPT)
 
 from rigid_motion_batch.keying.baking import BAKED, UNBAKED, baking, unbaking
 from rigid_motion_batch.keying.jobs import do_blend
-from rigid_motion_batch.keying.options import add_file_options, add_target_options, refuse_odd_places
+from rigid_motion_batch.keying.options import EXIT_CODES, add_file_options, add_target_options, refuse_odd_places
 from rigid_motion_batch.keying.planning import Job, named_file, planned
 from rigid_motion_batch.keying.records import is_made
 from rigid_motion_batch.keying.sessions import do_all
@@ -35,10 +35,8 @@ LAST_FRAME = 1048574
 EPILOG = """
 examples:
   python scripts/bake.py shot.blend
-  python scripts/bake.py shots/*.blend --output farm
   python scripts/bake.py shots --output farm --jobs 4
-  python scripts/bake.py shot.blend --objects 'Camera,Tool*' --step 0.25
-  python scripts/bake.py shot.blend --objects 'Rig/Hand*,Rig/Foot*'
+  python scripts/bake.py shot.blend --objects 'Camera,Tool*,Rig/Hand*' --step 0.25
   python scripts/bake.py shot.blend --dry-run
   python scripts/bake.py farm/shot-baked.blend --unbake
   blender --background --python scripts/bake.py -- shot.blend
@@ -48,38 +46,22 @@ what is written:
   the file; nothing where there is nothing to do. A file that was edited since, or that is not the program's own, is
   replaced only with --overwrite. With --in-place the program replaces the file itself, and keeps the one before as
   NAME.blend1. The paths of the results are printed on standard output, one a line; everything else goes to standard
-  error. Textures and libraries are found from the new place, too; a relative output path of the render, and disk caches
-  of simulations (blendcache_NAME), depend on the place and the name of the file, as after Save As.
-
-folders and many files:
-  A folder stands for the .blend files in it and in the folders below, but for results of this program; --unbake takes
-  *-baked.blend alone. The results lie below --output as these do. --jobs processes do several at once. The same command
-  again does what is new or has changed: the folder .rigid-motion beside the results has the record of them.
+  error. A relative output path of the render, and disk caches of simulations, depend on the place and the name of the
+  file, as after Save As. A folder stands for the .blend files in it and below, but for results of this program. The
+  same command again does what is new or has changed: the folder .rigid-motion beside the results has the record of
+  them.
 
 what is run:
   Nothing in the files: scripts and Python expressions stay in them, switched off. If a farm should run them, let it
-  render with `blender --enable-autoexec`.
-
-missing libraries:
-  Each is named, with what is missing from it. An object counts as not done if it is missing, if it overrides a missing
-  one or moves by a missing Action, and so does a file that lacks a collection or a scene, unless --objects says which
-  ones you mean. Missing meshes, materials, textures and the like do not matter for baking.
-
-exit code:
-  0    all done, or nothing to do, so that a second command may follow:
-       python scripts/bake.py shot.blend --output farm && blender --background farm/shot-baked.blend --render-anim
-  1    some objects, bones or files could not be done, and are named with the reason: a driven channel, an infinite
-       key, a missing library, one damaged file of many, a full disk, an --objects NAME that nothing has. The others
-       are done. With a single input or --jobs 0: or Blender crashed at a file, which is named; those before are done.
-  2    a wrong option, or none of the files could be read: nothing was done
-  130  stopped by Ctrl-C, and 143 by SIGTERM, within 2 s: the files written by then are complete, nothing else was
-       changed
+  render with `blender --enable-autoexec`. Of missing libraries it is said what is missing; an object counts as not done
+  if it is missing, overrides a missing one or moves by a missing Action, and so does a file that lacks a collection or
+  a scene, unless --objects says which ones you mean.
 """
 
 
 def parse(arguments: list[str]) -> argparse.Namespace:
     """Return the options; a wrong one ends the program with code 2 and a line that says what is wrong."""
-    parser = parser_of(SCRIPT, __doc__, EPILOG)
+    parser = parser_of(SCRIPT, __doc__, EPILOG + EXIT_CODES)
     parser.add_argument("files", nargs="+", type=not_empty, metavar="FILE.blend", help="files to bake, folders")
     parser.add_argument("--unbake", action="store_true", help="give baked objects and bones their own keys back")
     add_target_options(parser, "modes")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import signal
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import cast
@@ -17,17 +16,6 @@ from rigid_motion_batch.supervising import begin_child, blender_program, ended_a
 from rigid_motion_batch.system_libraries import way_out
 
 from .in_blender import NoEnvironment, become, elsewhere
-
-
-@dataclass(frozen=True)
-class Command:
-    """A command of the program."""
-
-    module: str
-    """In this package; it has `main(arguments)`, which returns the exit code. Its script has the same name."""
-
-    about: str
-
 
 RESEARCH = {
     "paper": "paper.parts",
@@ -43,17 +31,19 @@ RESEARCH = {
 """The programs that `python scripts/research NAME` runs of a checkout: the module of the package `research`."""
 
 COMMANDS = {
-    "compare": Command("compare", "compare interpolation modes on recordings: numbers, charts, videos"),
-    "inspect": Command("inspect", "look into recordings: bodies, units, axes, rate, and what looks wrong"),
-    "reduce": Command("reduce", "keep the few keys that a motion needs, in .blend files and of recordings"),
-    "bake": Command("bake", "turn the in-betweens of .blend files into real keys, or back"),
-    "stream": Command("stream", "send a motion over a network in real time, or show what arrives"),
-    "bundle": Command("job_bundle", "write a comparison as a job for render farms"),
-    "tasks": Command("tasks", "list what a comparison did, and what failed"),
-    "examples": Command("examples", "make small complete cases to begin with (in a checkout)"),
-    "build": Command("build_extension", "build the zip that Blender installs"),
-    "completion": Command("completion", "have a shell complete commands and options"),
+    "compare": ("compare", "compare interpolation modes on recordings: numbers, charts, videos"),
+    "inspect": ("inspect", "look into recordings: bodies, units, axes, rate, and what looks wrong"),
+    "reduce": ("reduce", "keep the few keys that a motion needs, in .blend files and of recordings"),
+    "bake": ("bake", "turn the in-betweens of .blend files into real keys, or back"),
+    "stream": ("stream", "send a motion over a network in real time, or show what arrives"),
+    "bundle": ("job_bundle", "write a comparison as a job for render farms"),
+    "tasks": ("tasks", "list what a comparison did, and what failed"),
+    "examples": ("examples", "make small complete cases to begin with (in a checkout)"),
+    "build": ("build_extension", "build the zip that Blender installs"),
+    "completion": ("completion", "have a shell complete commands and options"),
 }
+"""The module of each in this package, with `main(arguments)`, which returns the exit code, and what it is about. Its
+script has the same name."""
 
 
 ON_LIBRARIES = ("compare.py", "job_bundle.py")
@@ -113,7 +103,7 @@ def _main(arguments: list[str]) -> int:
         return 2
     sys.argv = [f"{INSTALLED} {name}", *rest]
     try:
-        return _run(f".{COMMANDS[name].module}", rest)
+        return _run(f".{COMMANDS[name][0]}", rest)
     except ModuleNotFoundError as error:
         if not error.name or error.name.partition(".")[0] in (EXTENSION.name, PACKAGE.name, "research"):
             raise
@@ -150,7 +140,7 @@ def _run(module: str, arguments: Sequence[str]) -> int:
 
 def _help() -> str:
     width = max(map(len, COMMANDS)) + 2
-    listed = "\n".join(f"  {name:{width}}{command.about}" for name, command in COMMANDS.items())
+    listed = "\n".join(f"  {name:{width}}{about}" for name, (_, about) in COMMANDS.items())
     return f"""usage: {INSTALLED} COMMAND ...
 
 Rigid-motion interpolation for keyframes, measured, baked, streamed and rendered.

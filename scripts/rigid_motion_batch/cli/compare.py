@@ -336,20 +336,12 @@ class _Comparing:
 
     def _require_tolerances(self) -> None:
         """Raise RunError where a tolerance is larger than the motion of every clip."""
+        radius = self.plan.comparison.radii.rigid
         for choice in self.plan.comparison.choices:
-            if isinstance(choice, Tolerance) and (problem := self._too_large(choice)):
+            clips = (study.clip.read(self.store.results / study.reader) for study in self.plan.studies)
+            problem = ""
+            if isinstance(choice, Tolerance) and all(problem := choice.problem_with(clip, radius) for clip in clips):
                 raise RunError(problem)
-
-    def _too_large(self, choice: Tolerance) -> str:
-        problem = ""
-        for study in self.plan.studies:
-            clip = study.clip.read(self.store.results / study.reader)
-            try:
-                choice.require_within(clip, self.plan.comparison.radii.rigid)
-                return ""
-            except ValueError as error:
-                problem = str(error)
-        return problem
 
     # -- saying it ----------------------------------------------------------------------------------------------------
 

@@ -8,16 +8,25 @@ from collections.abc import Callable
 from dataclasses import fields
 
 from rigid_motion.motion import KEYFRAME_MODES, MODES
-from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform, distinct
+from rigid_motion_batch.analysis.choices import (
+    EVERYWHERE,
+    JOINT,
+    RIGID,
+    Budget,
+    Choice,
+    Tolerance,
+    Uniform,
+    distinct,
+    read_radii,
+)
 from rigid_motion_batch.analysis.metrics import FORMS
 from rigid_motion_batch.analysis.modes import BEST_OF, single_modes
-from rigid_motion_batch.analysis.radii import EVERYWHERE, JOINT, RIGID, read_radii
 from rigid_motion_batch.command_line import bounded, did_you_mean, folder_path, not_empty, parser_of, whole
 from rigid_motion_batch.palette import THEMES
 from rigid_motion_batch.pipeline.comparison_steps import STAGES
 from rigid_motion_batch.places import ASSETS, from_here
 from rigid_motion_batch.recordings import files_of
-from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
+from rigid_motion_batch.recordings.options import add_reading_options, reading_options
 from rigid_motion_batch.scenes.settings import ANTIALIASING, ENGINES, SceneSettings
 
 DESCRIPTION = """Compare interpolation modes on recorded trajectories.

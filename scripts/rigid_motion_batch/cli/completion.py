@@ -41,9 +41,9 @@ def whole_parser() -> argparse.ArgumentParser:
     """Return a parser with all commands. Those that need packages that are not here take files alone."""
     whole = argparse.ArgumentParser(INSTALLED)
     commands = whole.add_subparsers()
-    for name, command in COMMANDS.items():
-        result = parser_of_module(command.module)
-        parser = commands.add_parser(name, help=command.about, parents=[result] if result else [], add_help=False)
+    for name, (module, about) in COMMANDS.items():
+        result = parser_of_module(module)
+        parser = commands.add_parser(name, help=about, parents=[result] if result else [], add_help=False)
         if not result:
             parser.add_argument("files", nargs="*")
         for action in parser._actions:

@@ -77,16 +77,13 @@ def _python_in(folder: Path) -> Path:
 def _lacks(python: Path) -> str:
     """Return what a Python lacks of all that is needed, as it says itself; empty where it lacks nothing."""
     code = f"import sys, {', '.join(LIBRARIES)}; sys.exit(sys.version_info < (3, 11) and 'Python 3.11 or newer')"
+    # Without what would have it look for modules in this one.
+    environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONHOME", "PYTHONPATH")}
     try:
-        tried = subprocess.run([python, "-c", code], capture_output=True, text=True, env=_environment())
+        tried = subprocess.run([python, "-c", code], capture_output=True, text=True, env=environment)
     except OSError as error:
         return str(error)
     return (tried.stderr.strip() or "it does not start").splitlines()[-1] if tried.returncode else ""
-
-
-def _environment() -> dict[str, str]:
-    """Return the environment without what would have the other Python look for modules in this one."""
-    return {name: value for name, value in os.environ.items() if name not in ("PYTHONHOME", "PYTHONPATH")}
 
 
 def _checked(folder: Path) -> Path:
@@ -109,12 +106,9 @@ def _made() -> Path:
     bootstrap = cast(Path, CHECKOUT) / "scripts" / "bootstrap.py"
     made = subprocess.run([sys.executable, bootstrap, "environment"], stdout=subprocess.PIPE, text=True)
     if made.returncode:
+        missing = ", ".join(name for name in LIBRARIES if not find_spec(name))
         raise NoEnvironment(
-            f"this Blender's Python has no {_missing()}, and could not make an environment that has. With Python 3.11 "
+            f"this Blender's Python has no {missing}, and could not make an environment that has. With Python 3.11 "
             f"or newer and a network run\n  python3 {bootstrap} environment DIR\nand give it with {OPTION} DIR"
         )
     return _python_in(Path(made.stdout.splitlines()[-1]))
-
-
-def _missing() -> str:
-    return ", ".join(name for name in LIBRARIES if not find_spec(name))

@@ -12,12 +12,11 @@ import textwrap
 from collections.abc import Iterator
 from dataclasses import asdict
 
-from rigid_motion_batch.command_line import INSTALLED, Parser, complain, not_empty, printable
+from rigid_motion_batch.command_line import INSTALLED, Parser, complain, listed, not_empty, printable
 from rigid_motion_batch.places import CHECKOUT
 from rigid_motion_batch.recordings import TrajectoryError, files_of
-from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
 from rigid_motion_batch.recordings.inspecting import Contents, Inspection, inspect
-from rigid_motion_batch.recordings.recordings import listed
+from rigid_motion_batch.recordings.options import add_reading_options, reading_options
 
 PROGRAM = f"{'python scripts/bootstrap.py' if CHECKOUT else INSTALLED} inspect"
 
@@ -61,12 +60,8 @@ def main(arguments: list[str]) -> int:
 
 
 def _parse(arguments: list[str]) -> argparse.Namespace:
-    parser = Parser(
-        prog=PROGRAM,
-        description=__doc__,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    formatter = argparse.RawDescriptionHelpFormatter
+    parser = Parser(prog=PROGRAM, description=__doc__, epilog=EPILOG, formatter_class=formatter)
     parser.add_argument(
         "inputs", nargs="+", type=not_empty, metavar="INPUT", help="recordings, bodies of them (FILE:BODY), or folders"
     )

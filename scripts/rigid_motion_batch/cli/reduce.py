@@ -20,16 +20,15 @@ PROGRAM = program_of(SCRIPT)
 
 from rigid_motion.gltf.sizes import OF_A_BODY, OF_KEY_POSES
 from rigid_motion.motion import KEYFRAME_MODES
-from rigid_motion_batch.analysis.choices import Tolerance
-from rigid_motion_batch.analysis.radii import RIGID, radius_in_metres
+from rigid_motion_batch.analysis.choices import RIGID, Tolerance, radius_in_metres
 from rigid_motion_batch.keying.gltf_files import do_gltf
-from rigid_motion_batch.keying.options import add_file_options, add_target_options, refuse_odd_places
+from rigid_motion_batch.keying.options import EXIT_CODES, add_file_options, add_target_options, refuse_odd_places
 from rigid_motion_batch.keying.planning import Job, file_and_body, named_file, planned
 from rigid_motion_batch.keying.records import is_made
 from rigid_motion_batch.keying.reductions import ENDINGS, GLB_SUFFIX, RATES, SUFFIX, TOLERANCE, Reductions, name_of
 from rigid_motion_batch.keying.sessions import do_all
 from rigid_motion_batch.keying.work import Doing, Work
-from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
+from rigid_motion_batch.recordings.options import add_reading_options, reading_options
 
 IN_FOLDERS = (".blend", ".bvh", ".csv", ".fbx", ".glb", ".gltf", ".tsv", ".tum")
 """Endings of the files that are taken of a folder. What else it reads may be anything: .json, .txt."""
@@ -41,20 +40,13 @@ MOST = 1000000
 
 EPILOG = """
 examples:
-  python scripts/reduce.py shot.blend
   python scripts/reduce.py shots/*.blend --tolerance 2mm --output reduced
   python scripts/reduce.py shot.blend --objects 'Camera,Rig/*' --shared
   python scripts/reduce.py shot.blend --keys 12
-  python scripts/reduce.py shot.blend --dry-run
-  python scripts/reduce.py hand.csv --axes unity --tolerance 5mm
-  python scripts/reduce.py hand.csv --axes unity --blend --fps 30
-  python scripts/reduce.py walk.bvh dance.fbx --tolerance 1cm --output keyed
-  python scripts/reduce.py walk.glb --tolerance 2mm
-  python scripts/reduce.py walk.glb --key-poses 12
+  python scripts/reduce.py hand.csv --axes unity --tolerance 5mm --blend --fps 30
+  python scripts/reduce.py walk.glb --output small/walk.glb --tolerance 2mm
   python scripts/reduce.py walk.fbx dance.bvh shot.blend --glb --tolerance 2mm
-  python scripts/reduce.py walk.glb --output small/walk.glb
-  python scripts/reduce.py mocap --output small --glb --tolerance 2mm
-  python scripts/reduce.py mocap --output small --jobs 4
+  python scripts/reduce.py mocap --output small --jobs 4 --dry-run
   blender --background --python scripts/reduce.py -- shot.blend
 
 .blend files:
@@ -72,38 +64,25 @@ glTF files:
   every frame as they are shown, for glTF knows lines and even turns alone.
 
 recordings:
-  The program reads what compare.py reads; FILE:BODY takes one body of several, FILE:* all. For a rigid motion it writes
-  a table of the keys, t,x,y,z,qw,qx,qy,qz, in the axes and units of the recording, and with --blend a .blend file in
-  which an empty moves by these keys; for a whole body a .blend file with a rig. These are in metres and Blender's axes,
-  and play in any Blender, with or without the extension. The first sample is on frame 1.
-
-folders and many files:
-  A folder stands for the .blend, glTF, FBX, BVH, CSV (.csv, .tsv) and .tum files in it and in the folders below, but
-  for results of this program; the results lie below --output as the files lie in the folder. --jobs processes do
-  several at once. The same command again does what is new or has changed: the folder .rigid-motion beside the results
-  has the record of them.
+  The program reads what compare.py reads; FILE:BODY takes one body of several, FILE:* all. A rigid motion becomes
+  NAME-keys.csv, t,x,y,z,qw,qx,qy,qz in the axes and units of the recording, and with --blend also NAME-keys.blend with
+  an empty; a whole body becomes NAME-keys.blend with a rig. These are in metres and Blender's axes, and play in any
+  Blender, with or without the extension. The first sample is on frame 1.
 
 what is written:
-  NAME-reduced.blend for a .blend file, NAME-reduced.glb for a .glb file and with --glb for each, NAME-keys.csv and
-  NAME-keys.blend for a recording, beside it or in --output, which for a single input may be the name of the file. A
-  file that was edited since, or that is not the program's own, is replaced only with --overwrite. With --in-place the
-  program replaces a .blend file itself, and keeps the one before as NAME.blend1. The paths of the results are printed
-  on standard output, one a line; everything else goes to standard error. Scripts and Python expressions in files do not
-  run.
-
-exit code:
-  0    all done, or nothing to do
-  1    some objects, bones or files could not be done, and are named with the reason. The others are done. With a
-       single input or --jobs 0: or Blender crashed at a file, which is named; the files before it are done.
-  2    a wrong option, or none of the files could be read: nothing was done
-  130  stopped by Ctrl-C, and 143 by SIGTERM, within 2 s: the files written by then are complete, nothing else was
-       changed
+  New files beside the inputs or in --output, which for a single input may be the name of the file. A file that was
+  edited since, or that is not the program's own, is replaced only with --overwrite. With --in-place the program
+  replaces a .blend file itself, and keeps the one before as NAME.blend1. The paths of the results are printed on
+  standard output, one a line; everything else goes to standard error. Scripts and Python expressions in files do not
+  run. A folder stands for the .blend, glTF, FBX, BVH, CSV (.csv, .tsv) and .tum files in it and below, but for results
+  of this program. The same command again does what is new or has changed: the folder .rigid-motion beside the results
+  has the record of them.
 """
 
 
 def parse(arguments: list[str]) -> argparse.Namespace:
     """Return the options; a wrong one ends the program with code 2 and a line that says what is wrong."""
-    parser = parser_of(SCRIPT, __doc__, EPILOG)
+    parser = parser_of(SCRIPT, __doc__, EPILOG + EXIT_CODES)
     parser.add_argument(
         "inputs",
         nargs="+",
@@ -249,10 +228,8 @@ def _refuse_odd(options: argparse.Namespace) -> None:
     gltf = [job for job in jobs if not job.is_recording and _is_gltf(job.file)]
     if options.count is not None and options.tolerance is not None:
         raise ValueError("--keys and --tolerance exclude one another: each decides how many keys there are")
-    if options.in_place and recorded:
-        raise ValueError(f"--in-place is for .blend files, and {recorded[0].source} is a recording: leave one out")
-    if options.in_place and gltf:
-        raise ValueError(f"--in-place is for .blend files, and {gltf[0].source} is none: leave one out")
+    if options.in_place and (others := recorded + gltf):
+        raise ValueError(f"--in-place is for .blend files, and {others[0].source} is none: leave one out")
     if options.glb:
         _refuse_beside_glb(options, jobs)
     if gltf and options.mode:
@@ -266,11 +243,7 @@ def _refuse_odd(options: argparse.Namespace) -> None:
 
 def _refuse_beside_glb(options: argparse.Namespace, jobs: list[Job]) -> None:
     """Raise ValueError for options that say nothing of GLB files."""
-    if options.mode:
-        raise ValueError(
-            "--mode is for .blend files and tables, and GLB knows lines and even turns alone: leave it out"
-        )
-    for name in ("blend", "in_place", "objects", "discard"):
+    for name in ("mode", "blend", "in_place", "objects", "discard"):
         if getattr(options, name):
             option = f"--{name.replace('_', '-')}"
             raise ValueError(f"{option} is for .blend files, and --glb writes others: leave one of them out")

@@ -13,7 +13,7 @@ from rigid_motion.live.sockets import is_loopback
 from rigid_motion.motion import MODES
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.command_line import Parser, as_called, bounded, program_of
-from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
+from rigid_motion_batch.recordings.options import add_reading_options, reading_options
 from rigid_motion_batch.streaming.rooms import HERE, PORT, ROOM, USER
 
 from . import stream_measure

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
 from rigid_motion_batch.command_line import complain, parser_of, printable, program_of
@@ -24,7 +23,12 @@ Exit code: 0 all tasks are done, 1 some failed, 2 there is no comparison.
 
 def main(arguments: list[str]) -> int:
     """List tasks, and return the exit code."""
-    options = _parse(arguments)
+    parser = parser_of(SCRIPT, __doc__, EPILOG)
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    listing = commands.add_parser("list", help="the tasks, and which are done")
+    listing.add_argument("output", type=Path, metavar="OUTPUT", help="the output folder")
+    listing.add_argument("--failed", action="store_true", help="only those that failed, with what Python said")
+    options = parser.parse_args(arguments)
     if not (options.output / OWN).is_dir():
         complain(program_of(SCRIPT), f"{options.output}: no comparison was made in this folder")
         return 2
@@ -39,12 +43,3 @@ def main(arguments: list[str]) -> int:
         if options.failed and failure.get("details"):
             print(failure["details"])
     return int(bool(failures))
-
-
-def _parse(arguments: list[str]) -> argparse.Namespace:
-    parser = parser_of(SCRIPT, __doc__, EPILOG)
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    listing = commands.add_parser("list", help="the tasks, and which are done")
-    listing.add_argument("output", type=Path, metavar="OUTPUT", help="the output folder")
-    listing.add_argument("--failed", action="store_true", help="only those that failed, with what Python said")
-    return parser.parse_args(arguments)

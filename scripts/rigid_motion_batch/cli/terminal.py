@@ -8,7 +8,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TextIO
 
 import numpy as np
 from rich import box
@@ -103,9 +102,9 @@ def table_of(lines: Sequence[Line], clips: int) -> Table:
     return table
 
 
-def show(*what: Table | str, stream: TextIO | None = None) -> None:
+def show(*what: Table | str) -> None:
     """Print tables and lines; without colours where the stream is no terminal, or NO_COLOR is set."""
-    stream = stream or sys.stdout
+    stream = sys.stdout
     console = Console(file=stream, highlight=False, width=None if stream.isatty() else WIDE)
     with console.capture() as captured:
         for item in what:

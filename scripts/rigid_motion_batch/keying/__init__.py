@@ -1,10 +1,10 @@
 """Keys in files, without a window: what bake.py and reduce.py do to .blend files and recordings.
 
-planning     which inputs there are, and where results go           records     what was made of what, beside it
+planning     which inputs there are, and where results go           records     what was made of what; may it be written
 sessions     inputs side by side, each wholly or not at all         work        an input, and what comes of it
-jobs         what is done to a .blend file                          reductions  how few keys, of what, and how written
-targets      which objects and bones of it are meant                baking      keys instead of modes, and back
-reducing     few keys instead of many                               recordings  few keys of a recording
+jobs         what is done to a .blend file, and to what of it       reductions  how few keys, of what, and how written
+baking       keys instead of modes, and back                        reducing    few keys instead of many
+options      those that both commands have                          recordings  few keys of a recording
 blend_files  opening files safely, saving them whole                keyed_files recordings as files of their own
 gltf_files   glTF files with fewer keys                             exporting   .blend and FBX files as GLB files
 """

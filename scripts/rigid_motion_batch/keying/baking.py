@@ -15,7 +15,7 @@ from rigid_motion.animation.compute.sources import Source
 from rigid_motion.animation.queries.keyed import segment_modes
 from rigid_motion.animation.transforms import Transform
 from rigid_motion.motion import KEYFRAME_MODES
-from rigid_motion_batch.keying.targets import Action, Result
+from rigid_motion_batch.keying.jobs import Action, Result
 
 BAKED, UNBAKED = "-baked", "-unbaked"
 """Endings of the names of files that are written."""

@@ -10,11 +10,11 @@ from typing import Any, cast
 
 import bpy
 
+from rigid_motion_batch.command_line import listed
 from rigid_motion_batch.files import written_beside
 from rigid_motion_batch.silencing import silenced
 
-from .output_files import FileProblem, Unreadable, changed_at, not_written
-from .records import Record
+from .records import FileProblem, Record, Unreadable, changed_at, not_written
 
 HERE = bpy.app.version[:2]
 """The Blender that this runs in."""
@@ -83,11 +83,10 @@ def missing_data() -> Missing:
             continue
         path = os.path.normpath(bpy.path.abspath(library.filepath))
         is_there = os.path.exists(path)
-        missing = ", ".join(f"{cast(bpy.types.Struct, block.bl_rna).name} {block.name}" for block in blocks[:NAMED])
-        more = f" and {len(blocks) - NAMED} more" if len(blocks) > NAMED else ""
+        missing = listed((f"{cast(bpy.types.Struct, block.bl_rna).name} {block.name}" for block in blocks), NAMED)
         result.libraries.append(
             f"library {path} {'cannot be read, or lacks something' if is_there else 'was not found'} "
-            f"({missing}{more}): "
+            f"({missing}): "
             f"bring {'that' if is_there else 'it'} back, or tell the file where it is now (Outliner, Blender File, "
             "right-click: Relocate)"
         )

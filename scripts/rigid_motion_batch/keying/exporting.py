@@ -12,13 +12,13 @@ import bpy
 import rigid_motion
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.fbx import ADDON as FBX_ADDON
-from rigid_motion_batch.recordings.fbx_records import refuse_damaged
-from rigid_motion_batch.recordings.importing import enabled, refuse_too_large
+from rigid_motion_batch.recordings.fbx import refuse_damaged
+from rigid_motion_batch.recordings.importing import enabled, refuse_too_large, told
 from rigid_motion_batch.silencing import silenced
 
 from .blend_files import missing_data, open_file
 from .gltf_files import do_gltf
-from .output_files import FileProblem, Unreadable
+from .records import FileProblem, Unreadable
 from .reductions import Reductions
 from .work import Doing
 
@@ -28,12 +28,10 @@ GLTF_ADDON = "io_scene_gltf2"
 def export_glb(path: Path) -> None:
     """Write the open file as GLB, every animation sampled on every frame, a clip for an Action. Raises FileProblem."""
     try:
-        with enabled(path, GLTF_ADDON), _asking_extension(), silenced():
-            bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB")
+        with enabled(path, GLTF_ADDON), _asking_extension():
+            told(path, "export", lambda: bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB"))
     except TrajectoryError as error:
         raise FileProblem(error.problem) from None
-    except RuntimeError as error:
-        raise FileProblem(f"Blender cannot export this ({_reason(error)}): see whether it does in a window") from None
 
 
 @contextmanager
@@ -74,18 +72,9 @@ def _import_fbx(path: Path) -> None:
         refuse_damaged(path)
         with silenced():
             bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-            with enabled(path, FBX_ADDON):
-                bpy.ops.import_scene.fbx(filepath=str(path.absolute()))
+        with enabled(path, FBX_ADDON):
+            told(path, "import", lambda: bpy.ops.import_scene.fbx(filepath=str(path.absolute())))
     except TrajectoryError as error:
         raise Unreadable(error.problem) from None
     except OSError as error:
         raise Unreadable(f"this cannot be read ({error.strerror}): see to its path, and who may read it") from None
-    except RuntimeError as error:
-        raise Unreadable(f"Blender cannot import this ({_reason(error)}): export it again as binary FBX") from None
-
-
-def _reason(error: RuntimeError) -> str:
-    """Return the last line of what an operator said, which names the problem."""
-    if "KeyboardInterrupt" in str(error):  # Blender makes an error of it.
-        raise KeyboardInterrupt from None
-    return (str(error).strip().splitlines() or [""])[-1].removeprefix("Error: ")

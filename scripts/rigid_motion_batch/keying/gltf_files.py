@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import signal
 import tempfile
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from rigid_motion.gltf import Document, GltfError, Options, ReducedClip, Report, read_document, reduced
+from rigid_motion.motion.skeleton_stretches import Run
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.command_line import printable
+from rigid_motion_batch.supervising import end_with_parent
 
-from .output_files import Unreadable
 from .planning import place_of
-from .reductions import Reductions, doubt, fewer, off
-from .side_by_side import side_by_side
+from .records import Unreadable
+from .reductions import Reductions, doubt, off
 from .work import Doing
 
 MILLIMETRES = 1e3
@@ -99,11 +106,41 @@ def _summary(clip: ReducedClip, tolerance: Tolerance, per_unit: float, would: st
     """Return what became of a clip."""
     if clip.tracks is None:
         return f"stays as it was, {clip.before.keys} keys in {clip.before.size} bytes: {clip.reason}"
-    summary = f"{would}reduced{fewer(clip.before.keys, clip.after.keys)}, {clip.before.size} -> {clip.after.size} bytes"
+    before, after = clip.before, clip.after
+    summary = f"{would}reduced, {before.keys} -> {after.keys} keys, {before.size} -> {after.size} bytes"
     summary += off(tolerance, clip.error, per_unit, by_number=by_number)
     if clip.vertices is not None:
         summary += f"; vertices {tolerance.alike(clip.vertices, per_unit)} at most"
     if clip.slides[0] > 0.0:
-        before, after = (tolerance.alike(slide, per_unit) for slide in clip.slides)
-        summary += f"; feet slide {after}, and {before} before"
+        slid, slides = (tolerance.alike(slide, per_unit) for slide in clip.slides)
+        summary += f"; feet slide {slides}, and {slid} before"
     return summary
+
+
+@contextmanager
+def side_by_side(processes: int) -> Iterator[Run]:
+    """Give what is called as `map` is. Processes are started with its first call, arguments made as they are needed."""
+    pool: ProcessPoolExecutor | None = None
+
+    def run(function: Callable[[Any], Any], arguments: Iterable[Any]) -> Iterator[Any]:
+        nonlocal pool
+        pool = pool or ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _begin)
+        waiting: deque[Future[Any]] = deque()
+        for argument in arguments:
+            waiting.append(pool.submit(function, argument))
+            if len(waiting) > processes:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+
+    try:
+        yield run if processes > 1 else map
+    finally:
+        if pool:
+            pool.shutdown(cancel_futures=True)
+
+
+def _begin() -> None:
+    """Leave Ctrl-C to the parent, and end with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()

@@ -13,10 +13,10 @@ import numpy as np
 
 from rigid_motion import animation
 from rigid_motion.animation.transforms import transform_of
-from rigid_motion_batch.keying.output_files import FileProblem
+from rigid_motion_batch.keying.jobs import Result
+from rigid_motion_batch.keying.records import FileProblem
 from rigid_motion_batch.keying.reducing import reduced
 from rigid_motion_batch.keying.reductions import RATES, Reductions
-from rigid_motion_batch.keying.targets import Result
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.rigs import LAST_FRAME
 from rigid_motion_batch.scenes.armature import Rest, Rig

@@ -6,6 +6,13 @@ import argparse
 
 from rigid_motion_batch.command_line import folder_path, whole
 
+EXIT_CODES = """
+Exit code: 0 all done, or nothing to do, 1 some objects, bones or files could not be done, and are named with the reason
+(the others are done), 2 a wrong option, or no file could be read, 130 stopped by Ctrl-C, and 143 by SIGTERM, within
+2 s: the files written by then are complete, nothing else was changed.
+"""
+"""What the help of these commands ends with."""
+
 
 def add_target_options(parser: argparse.ArgumentParser, which: str) -> None:
     """Add --objects, which says of "all" bones which those are, and --dry-run."""

@@ -13,16 +13,16 @@ from pathlib import Path
 import numpy as np
 
 from rigid_motion.motion import reduce_keys
+from rigid_motion_batch.analysis.choices import RIGID
 from rigid_motion_batch.analysis.metrics import write_poses
-from rigid_motion_batch.analysis.radii import RIGID
 from rigid_motion_batch.analysis.reconstructions import Reconstruction
 from rigid_motion_batch.keying.blend_files import write_file
 from rigid_motion_batch.keying.exporting import export_glb
 from rigid_motion_batch.keying.gltf_files import reduce_gltf
 from rigid_motion_batch.keying.keyed_files import key_body, key_densely, key_object, new_file
-from rigid_motion_batch.keying.output_files import FileProblem, Unreadable
 from rigid_motion_batch.keying.planning import ALL
-from rigid_motion_batch.keying.reductions import GLB_SUFFIX, SUFFIX, TOLERANCE, Reductions, fewer, name_of, off
+from rigid_motion_batch.keying.records import FileProblem, Unreadable
+from rigid_motion_batch.keying.reductions import GLB_SUFFIX, SUFFIX, TOLERANCE, Reductions, name_of, off
 from rigid_motion_batch.keying.sessions import counted
 from rigid_motion_batch.keying.work import Doing
 from rigid_motion_batch.recordings import TrajectoryError
@@ -69,11 +69,8 @@ class _Clip:
         clip, ending = self.clip, self.doing.job.ending
         for repair in clip.repairs:
             self.doing.say(repair)
-        if self.given and self.how.count is None:
-            try:
-                self.given.require_within(clip, self.radius)
-            except ValueError as error:
-                raise Unreadable(str(error)) from None
+        if self.given and self.how.count is None and (problem := self.given.problem_with(clip, self.radius)):
+            raise Unreadable(problem)
         table, scene, glb = (output.with_name(f"{output.name}{end}") for end in (ending or ".csv", ".blend", ".glb"))
         if self.how.glb:
             self._glb(glb)
@@ -103,7 +100,7 @@ class _Clip:
         if frames is not None:
             key_object(clip, keys, frames, mode, self.name)
         error = off(tolerance, largest, clip.metres_per_unit, by_number=count is not None)
-        self.doing.say(f"{self.doing.would}reduced{fewer(len(clip.times), len(keys))}{error}")
+        self.doing.say(f"{self.doing.would}reduced, {len(clip.times)} -> {len(keys)} keys{error}")
         if not self.doing.work.dry_run:
             with self.doing.record.writing(table) as beside:
                 write_poses(beside, clip.times[keys], clip.poses[keys])

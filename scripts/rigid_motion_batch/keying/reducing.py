@@ -13,9 +13,9 @@ from rigid_motion.animation.queries.polls import with_more_keys_than
 from rigid_motion.animation.transforms import Transform
 from rigid_motion.animation.transforms.sizes import first_tolerance, metres_per_unit, rig_size
 from rigid_motion_batch.analysis.choices import Tolerance
-from rigid_motion_batch.keying.reductions import Reductions, doubt, fewer, off
+from rigid_motion_batch.keying.jobs import Action, Result
+from rigid_motion_batch.keying.reductions import Reductions, doubt, off
 from rigid_motion_batch.keying.sessions import counted
-from rigid_motion_batch.keying.targets import Action, Result
 
 FEWEST = 2
 """So many keys are as few as a motion has."""
@@ -80,7 +80,7 @@ def _described(reduction: Reduction, tolerance: Tolerance, unit: float, *, by_nu
     lengths of the reduction are of `unit` metres.
     """
     rig = reduction.rig
-    summary = fewer(reduction.before, reduction.after)
+    summary = f", {reduction.before} -> {reduction.after} keys"
     summary += f" on {counted(rig.frames, 'frame')}" if rig else ""
     summary += off(tolerance, reduction.largest_error * unit, unit, by_number=by_number)
     before, after = reduction.channel_keys

@@ -78,11 +78,6 @@ def doubt(size: float, tolerance: Tolerance | None, per_unit: float) -> str:
     return f"; it is {size:.3g} m large in this file: if these are {name}, give --tolerance {meant:.6g}"
 
 
-def fewer(before: int, after: int) -> str:
-    """Return how many keys became how many."""
-    return f", {before} -> {after} keys"
-
-
 def off(tolerance: Tolerance, metres: float, per_unit: float, *, by_number: bool) -> str:
     """Return how far off that is, in the unit of the tolerance, which is of so many metres where it says none."""
     if by_number:

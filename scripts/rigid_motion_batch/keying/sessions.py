@@ -17,7 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
-from rigid_motion_batch.command_line import complain, few, path_line, printable
+from rigid_motion_batch.command_line import complain, listed, path_line, printable
 from rigid_motion_batch.files import append_lines, lines_of
 from rigid_motion_batch.pipeline import steps
 from rigid_motion_batch.pipeline.executors import Executor, Made, ProcessExecutor, loss, processors
@@ -121,7 +121,7 @@ def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = 
             print(path_line(path), flush=True)
     failed = [outcome.source for outcome in outcomes if outcome.failed]
     if failed and len(jobs) > NAMED:  # What was said of them is far above.
-        print(f"Failed: {printable(few(failed, NAMED))}", file=sys.stderr)
+        print(f"Failed: {printable(listed(failed, NAMED))}", file=sys.stderr)
     print(_summary(outcomes, len(jobs), work, interrupted=stopped), file=sys.stderr, flush=True)
     if stopped:
         return 130

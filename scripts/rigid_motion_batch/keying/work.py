@@ -14,9 +14,8 @@ from typing import Any, ClassVar, Self
 
 from rigid_motion_batch.supervising import report
 
-from .output_files import FileProblem, Unreadable, refuse_read_only
 from .planning import Job
-from .records import Record
+from .records import FileProblem, Record, Unreadable, refuse_read_only
 
 Note = Callable[[str], None]
 """Writes a line for the user."""

@@ -15,10 +15,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from rigid_motion_batch.analysis.choices import Choice, fewest_keys
-from rigid_motion_batch.analysis.metrics import body_table_names, table_names
+from rigid_motion_batch.analysis.choices import EVERYWHERE, Choice, Radii, fewest_keys
+from rigid_motion_batch.analysis.metrics import table_names
 from rigid_motion_batch.analysis.modes import name_of_other, single_modes
-from rigid_motion_batch.analysis.radii import EVERYWHERE, Radii
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import clip_names
 from rigid_motion_batch.recordings.clips import ClipFacts
@@ -51,9 +50,6 @@ MOST_POSES = 600_000
 
 RATE_MARGIN = 0.01
 """Share by which a rate may be above that of a recording: 90 Hz are often 89.9 in truth."""
-
-MOST_MODELLED = 100_000
-"""Samples times joints of a body that is written as GLB: a minute for a choice of keys."""
 
 TABLES = {
     METRICS: ("measure", steps.ROWS),
@@ -205,18 +201,13 @@ class ComparisonPlan:
 
     def _left_out(self, study: Study) -> Iterator[str]:
         """Yield what is not made of a clip because it is too much, for the user."""
-        stage, joints, samples = self.comparison.stage, study.facts.joints, study.facts.samples
+        stage = self.comparison.stage
         if stage and (frames := max(study.frames(choice, stage) for choice in study.choices)) > study.most_frames:
             start, end = next(iter(study.choices.values()))
             yield (
                 f"{study.name}: no video: its {end - start:.6g} s make {frames:.6g} frames, more than "
                 f"{study.most_frames}; see whether its times are in seconds, cut it, or give a lower --fps or "
                 "--slow-motion"
-            )
-        if not self.modelled(study):
-            yield (
-                f"{study.name}: no {steps.GLB}: {max(joints, 1)} joints with {samples} samples would take too long; "
-                f"cut it to {MOST_MODELLED // max(joints, 1)}"
             )
 
     # -- comparing ----------------------------------------------------------------------------------------------------
@@ -235,9 +226,6 @@ class ComparisonPlan:
             for part, task in self._numbers(study):
                 yield task
                 keys[part] = task.key
-            for choice in self.modelled(study):
-                yield (task := self._model(study, choice, keys[Part("measure", study.clip, choice.name)]))
-                keys[Part("model", study.clip, choice.name)] = task.key
         for table in self.tables:
             what, rows = TABLES[table]
             clips = {study.clip for study in self.studies if study.facts.joints or table != JOINT_METRICS}
@@ -267,15 +255,9 @@ class ComparisonPlan:
 
     def filmed(self, study: Study) -> list[Choice]:
         """Return the choices that there are films of."""
-        stage = self.comparison.stage
-        return [choice for choice in self._shown(study) if stage and study.frames(choice, stage) <= study.most_frames]
-
-    def modelled(self, study: Study) -> list[Choice]:
-        """Return the choices that there are GLB files of."""
-        return self._shown(study) if study.facts.samples * max(study.facts.joints, 1) <= MOST_MODELLED else []
-
-    def _shown(self, study: Study) -> list[Choice]:
-        return list(study.choices) if self.comparison.every_film else fewest_keys(study.choices)
+        stage, every = self.comparison.stage, self.comparison.every_film
+        choices = study.choices if every else fewest_keys(study.choices)
+        return [choice for choice in choices if stage and study.frames(choice, stage) <= study.most_frames]
 
     def _numbers(self, study: Study) -> Iterator[tuple[Part, Task]]:
         """Yield the tasks of a clip's numbers, and what they are to pages."""
@@ -284,8 +266,8 @@ class ComparisonPlan:
         modes = single_modes(comparison.modes) if joints else comparison.modes
         for choice in study.choices:
             folder = f"{name}/{choice.name}"
-            names = table_names(choice, modes, comparison.form, study.facts.against)
-            publish = {table: f"{folder}/{table}" for table in (body_table_names(choice, modes) if joints else names)}
+            names = table_names(choice, modes, comparison.form, study.facts.against, body=bool(joints))
+            publish = {table: f"{folder}/{table}" for table in names}
             seconds = 0.02 + 6e-6 * size * len(modes) * (1.0 if choice.decimation == "uniform" else 45.0)
             step = steps.Measure(clip, choice, tuple(modes), comparison.radii, comparison.shared, comparison.form)
             yield (
@@ -296,16 +278,6 @@ class ComparisonPlan:
             fit = comparison.fit and not joints
             count, seconds = steps.CountKeys(clip, comparison.modes, comparison.radii, fit), 0.03 if fit else 0.008
             yield Part("count_keys", clip), Task(count, f"count keys {name}", after, seconds=seconds * size)
-
-    def _model(self, study: Study, choice: Choice, measured: str) -> Task:
-        comparison, folder = self.comparison, f"{study.name}/{choice.name}"
-        return Task(
-            steps.Model(study.clip, comparison.radii, comparison.shared),
-            f"model {folder}",
-            after=(study.reader, measured),
-            publish={steps.GLB: f"{folder}/{steps.GLB}"},
-            seconds=0.1 + 5e-4 * study.facts.samples * max(study.facts.joints, 1),
-        )
 
     def _film(self, study: Study, choice: Choice, measured: str) -> Iterator[Task]:
         """Yield the tasks of a film; the last one makes it."""

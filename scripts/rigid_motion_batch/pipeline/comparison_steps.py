@@ -13,8 +13,7 @@ from itertools import groupby, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from rigid_motion_batch.analysis.choices import Choice
-from rigid_motion_batch.analysis.radii import Radii
+from rigid_motion_batch.analysis.choices import Choice, Radii
 from rigid_motion_batch.recordings.clips import Clip, ClipFacts
 from rigid_motion_batch.recordings.options import ReadingOptions
 from rigid_motion_batch.report.settings import Settings
@@ -29,14 +28,13 @@ if TYPE_CHECKING:
 STAGES = ("read", "measure", "build", "render", "encode", "report")
 """Stages of a comparison; each begins when all before it have ended."""
 
-RECORDINGS = ("rigid_motion/motion", "recordings", "axes.py", "command_line.py", "files.py", "rows.py")
+RECORDINGS = ("rigid_motion/motion", "recordings", "axes.py", "command_line.py", "files.py")
 ANALYSIS = (*RECORDINGS, "analysis")
 SCENES = (*ANALYSIS, "rigid_motion/animation", "scenes", "palette.py", "silencing.py")
 REPORT = (*ANALYSIS, "report", "palette.py")
-MODEL = (*ANALYSIS, "rigid_motion/gltf", "report/glb.py", "report/mesh.py", "palette.py")
 
 ROWS, JOINT_ROWS, FILM, BLEND, PAGE = "rows.csv", "joints.csv", "comparison.mp4", "comparison.blend", "report.html"
-PIECE, MESH, GLB = "piece.mkv", "mesh.npz", "comparison.glb"
+PIECE, MESH = "piece.mkv", "mesh.npz"
 PAGE_DATA = "report_data/"
 """The folder of what is too large for a page."""
 
@@ -73,7 +71,7 @@ class Read(Step, rooms=RECORDINGS, stage="read"):
     def make(self, job: Job) -> None:
         import numpy as np
 
-        from rigid_motion_batch.recordings import TrajectoryError, against, clip_reading
+        from rigid_motion_batch.recordings import TrajectoryError, clip_reading
 
         how = self.axes, self.options
         try:
@@ -81,7 +79,7 @@ class Read(Step, rooms=RECORDINGS, stage="read"):
             if self.against:
                 if len(clips) > 1:
                     raise TrajectoryError(self.source, f"{len(clips)} bodies", "name the one that --against is of")
-                clip, more = against.with_against(clips[0], self.against, self.called, *how)
+                clip, more = clip_reading.with_against(clips[0], self.against, self.called, *how)
                 clips, note = [clip], "; ".join(filter(None, (note, more)))
         except TrajectoryError as error:
             raise TaskError(str(error)) from None
@@ -124,18 +122,19 @@ class Measure(Step, rooms=ANALYSIS, stage="measure"):
     """The form of the tables of poses."""
 
     def make(self, job: Job) -> None:
-        from rigid_motion_batch.analysis import body_metrics, metrics, results
-        from rigid_motion_batch.rows import write_rows
+        from rigid_motion_batch.analysis import metrics, results
+        from rigid_motion_batch.analysis.reconstructions import reconstruct
+        from rigid_motion_batch.files import write_rows
 
-        clip, radii = self.clip.read(job.results[0]), self.radii
-        made = results.made_of(clip, self.choice, self.modes, radii, shared=self.shared)
+        clip = self.clip.read(job.results[0])
+        made = reconstruct(clip, self.choice, self.modes, self.radii.of(clip), shared=self.shared)
         if made is None:
             raise TaskError(f"{clip.name}: too short for two keys {self.choice.phrase}")
         result = results.measured(made)
-        results.write_tables(job.folder, made, self.form)
+        metrics.write_tables(job.folder, made, self.form)
         write_rows(job.folder / ROWS, metrics.Metrics, result.rows)
         if result.joints:
-            write_rows(job.folder / JOINT_ROWS, body_metrics.JointMetrics, result.joints)
+            write_rows(job.folder / JOINT_ROWS, metrics.JointMetrics, result.joints)
         values.write(job.folder / "result", result)
         values.write(job.folder / "numbers", result.numbers)
 
@@ -150,37 +149,16 @@ class CountKeys(Step, rooms=ANALYSIS, stage="measure"):
 
     def make(self, job: Job) -> None:
         from rigid_motion_batch.analysis import needed
-        from rigid_motion_batch.analysis.body_needed import ways_of
         from rigid_motion_batch.analysis.modes import single_modes
-        from rigid_motion_batch.rows import write_rows
+        from rigid_motion_batch.files import write_rows
 
         done = iter(range(1, len(needed.RATES) + 1))
-        ways = ways_of(self.clip.read(job.results[0]), self.radii, fit=self.fit)
+        clip = self.clip.read(job.results[0])
+        ways = needed.Ways(clip, self.radii.of(clip), self.fit)
         modes = single_modes(self.modes)
         result = needed.keys_needed(ways, modes, advance=lambda: job.progress(next(done), len(needed.RATES)))
         write_rows(job.folder / ROWS, needed.NeededRow, needed.rows_of(result))
         values.write(job.folder / "needed", result)
-
-
-class Model(Step, rooms=MODEL, stage="report"):
-    """Write all motions side by side, for any viewer. Before: the recording, and what was measured."""
-
-    clip: ClipOf
-    radii: Radii
-    shared: bool
-
-    def make(self, job: Job) -> None:
-        from rigid_motion.gltf import GltfError
-        from rigid_motion_batch.analysis.results import made_again
-        from rigid_motion_batch.report.glb import comparison_glb
-
-        clip, result = self.clip.read(job.results[0]), result_in(job.results[1])
-        made = made_again(clip, result, self.radii, shared=self.shared)
-        try:
-            content = comparison_glb(made, [motion.modes for motion in result.motions])
-        except GltfError as error:
-            raise TaskError(f"{clip.name} {result.choice.phrase}: no {GLB}: {error}") from None
-        (job.folder / GLB).write_bytes(content)
 
 
 class Tabulate(Step, rooms=("analysis", "files.py"), stage="report", partial=True):
@@ -190,7 +168,7 @@ class Tabulate(Step, rooms=("analysis", "files.py"), stage="report", partial=Tru
     """The name of the part of the table in every result."""
 
     def make(self, job: Job) -> None:
-        from rigid_motion_batch.analysis.body_metrics import join_tables
+        from rigid_motion_batch.analysis.metrics import join_tables
 
         join_tables(job.folder / "table.csv", [folder / self.rows for folder in job.results])
 
@@ -269,7 +247,7 @@ class Subject(Step, rooms=SCENES, stage="report", blender=True):
     def make(self, job: Job) -> None:
         import numpy as np
 
-        from rigid_motion_batch.scenes.simplified import simplified
+        from rigid_motion_batch.scenes.subject import simplified
 
         with _told("the report shows a drill"):
             np.savez(job.folder / MESH, **cast(dict[str, Any], simplified(self.requested)))
@@ -280,7 +258,7 @@ class Part:
     """The result of a task before a page."""
 
     what: str
-    """What it is: "read", "measure", "count_keys", "model", "encode" or "subject"."""
+    """What it is: "read", "measure", "count_keys", "encode" or "subject"."""
 
     clip: ClipOf = ClipOf("")
     choice: str = ""
@@ -310,18 +288,15 @@ class Page(Step, rooms=REPORT, stage="report", partial=True):
     def make(self, job: Job) -> None:
         import numpy as np
 
-        from rigid_motion_batch.report.mesh import Mesh
+        from rigid_motion_batch.report.data import Mesh
         from rigid_motion_batch.report.pages import write_report
 
         films: dict[tuple[str, str], Path | None] = {}
-        models: dict[tuple[str, str], Path] = {}
         mesh = None
         for part, folder in zip_longest(self.parts, job.before):
             if part.what == "encode":
                 there = folder or self.coming
                 films[part.clip.name, part.choice] = Path(part.clip.name, part.choice, FILM) if there else None
-            elif part.what == "model" and folder:
-                models[part.clip.name, part.choice] = Path(part.clip.name, part.choice, GLB)
             elif part.what == "subject" and folder:
                 mesh = Mesh(**np.load(folder / MESH))
         write_report(
@@ -329,7 +304,6 @@ class Page(Step, rooms=REPORT, stage="report", partial=True):
             self._results(job),
             self.settings,
             films,
-            models,
             folder=Path(self.folder),
             mesh=mesh,
             overview=self.overview,

@@ -18,7 +18,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
-from rigid_motion_batch.command_line import few
+from rigid_motion_batch.command_line import listed
 from rigid_motion_batch.progress import Progress
 
 from .executors import FULL_OR_FORBIDDEN, Executor, Made, loss
@@ -72,7 +72,7 @@ def explain(plan: Plan, store: Store) -> Iterator[tuple[Task, str]]:
     for task in plan():
         if index := store.index_of(task.key):
             if missing := store.unpublished(task, index):
-                yield task, f"{few(path for _, path in missing)} missing, edited or of something else"
+                yield task, f"{listed((path for _, path in missing), 3)} missing, edited or of something else"
         elif (store.results / task.key).exists():
             yield task, "its result is damaged"
         else:

@@ -28,7 +28,7 @@ from typing import Any, Self
 
 from filelock import FileLock, Timeout
 
-from rigid_motion_batch.command_line import few
+from rigid_motion_batch.command_line import listed
 from rigid_motion_batch.files import append_lines, lines_of, write_text
 
 from .executors import Made
@@ -189,7 +189,7 @@ class Store:
         """Raise RunError where such files would replace what is not the program's own, unless that may be replaced."""
         foreign = [path for _, path in unpublished if not self.is_own(path)]
         if foreign and not self.overwrite:
-            named = few(os.fspath(self.output / path) for path in foreign)
+            named = listed((os.fspath(self.output / path) for path in foreign), 3)
             raise RunError(
                 f"{named} {'was' if len(foreign) == 1 else 'were'} not written by this program, or edited since; "
                 "choose another folder with --output, or replace that with --overwrite"

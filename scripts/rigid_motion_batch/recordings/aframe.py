@@ -72,31 +72,13 @@ def _trajectory(path: Path, name: str, samples: list) -> Trajectory:
 
 def _numbers(path: Path, device: str, samples: list, fields: list[tuple]) -> np.ndarray:
     """Return the numbers in these fields of all samples, shape (samples, fields). null is JavaScript's NaN."""
-    try:
-        return _gather(samples, fields)
-    except _MALFORMED:
-        pass
+    numbers = np.empty((len(samples), len(fields)))
     for index, sample in enumerate(samples):
-        for field in fields:
+        for column, (key, *rest) in enumerate(fields):
             try:
-                _gather([sample], [field])
-            except _MALFORMED:
-                label = ".".join(str(part) for part in field)
-                raise TrajectoryError(
-                    path, f"pose {index} of {shown(device)} has no number {label}", "delete that pose"
-                ) from None
-    raise TrajectoryError(path, f"the poses of {shown(device)} are not alike", "save the recording again")
-
-
-_MALFORMED = (KeyError, IndexError, TypeError, ValueError, OverflowError)
-
-
-def _gather(samples: list, fields: list[tuple]) -> np.ndarray:
-    columns = []
-    for key, *rest in fields:
-        values = [sample[key][rest[0]] for sample in samples] if rest else [sample[key] for sample in samples]
-        columns.append(np.array(values, dtype=np.float64))
-    numbers = np.array(columns).T
-    if numbers.shape != (len(samples), len(fields)):
-        raise ValueError("a field is no single number")
+                value = sample[key][rest[0]] if rest else sample[key]
+                numbers[index, column] = np.nan if value is None else value
+            except (KeyError, IndexError, TypeError, ValueError, OverflowError):
+                problem = f"pose {index} of {shown(device)} has no number {'.'.join(map(str, (key, *rest)))}"
+                raise TrajectoryError(path, problem, "delete that pose") from None
     return numbers

@@ -18,10 +18,11 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from rigid_motion.motion import Poses
+from rigid_motion_batch.command_line import listed
 
 from .key_moments import BONE_CHANNEL, curves_that_move, fcurves_of, moments_of
 from .options import AS_THE_FILE_SAYS, ReadingOptions
-from .recordings import ALL, Selection, Trajectory, TrajectoryError, listed, shown
+from .recordings import ALL, Selection, Trajectory, TrajectoryError, shown
 from .rigs import LAST_FRAME, armature_of, in_blender, probe, whole_body
 from .sampling import LEAD, OF_OBJECTS, Moments, merged, sampled
 
@@ -122,33 +123,17 @@ def _bone_called(path: Path, requested: str, objects: dict[str, bpy.types.Object
     if rigs:
         rig, missing = rigs[0].obj, rigs[0].bone or ""
         problem, bones = f"{shown(rig.name)} has no bone {shown(missing)}", armature_of(rig).bones.keys()
-        way_out = f"of its {len(bones)} bones the nearest by name: {listed(_nearest(missing, bones))}"
+        wanted = missing.casefold()
+        near = sorted(bones, key=lambda bone: -SequenceMatcher(None, bone.casefold(), wanted, False).ratio())[:FEW]
+        way_out = f"of its {len(bones)} bones the nearest by name: {listed(near)}"
         raise TrajectoryError(path, problem, way_out if bones else "it has none at all")
-    if split:
-        obj = split[0].obj
-        if obj.is_missing:
-            library = cast("bpy.types.Library", obj.library)
-            problem = f"{shown(obj.name)} is missing from {library.filepath}"
-            raise TrajectoryError(path, problem, "bring that file back, or tell Blender where it is now")
-        types = cast("bpy.types.EnumProperty", obj.bl_rna.properties["type"])
-        kind = types.enum_items[obj.type].name
-        problem = f"{shown(obj.name)} has no bones, for it is no armature (its type is {kind})"
-        raise TrajectoryError(path, problem, f"name the object alone with {path}:{obj.name}")
+    if split and (obj := split[0].obj).is_missing:
+        problem = f"{shown(obj.name)} is missing from {cast('bpy.types.Library', obj.library).filepath}"
+        raise TrajectoryError(path, problem, "bring that file back, or tell Blender where it is now")
     if alone := [rig for rig, obj in objects.items() if obj.type == "ARMATURE" and requested in armature_of(obj).bones]:
         problem = f"no body named {shown(requested)}, only a bone of {listed(alone, FEW)}"
         raise TrajectoryError(path, problem, f"name it with {path}:{alone[0]}/{requested}")
     return None
-
-
-def _nearest(requested: str, names: list[str]) -> list[str]:
-    """Return a few of the names: those that are most like the one that was requested, whatever their case."""
-    likeness = SequenceMatcher(b=requested.casefold(), autojunk=False)
-
-    def unlike(name: str) -> float:
-        likeness.set_seq1(name.casefold())
-        return -likeness.ratio()
-
-    return sorted(names, key=unlike)[:FEW]
 
 
 def _sample(path: Path, body: Body, scenes: list[bpy.types.Scene], scale: float | None) -> Trajectory:

@@ -26,8 +26,7 @@ from .clips import ClipWarning
 from .euler import quaternions_from_intrinsic_eulers
 from .recordings import Selection, Trajectory, TrajectoryError, shown, unique
 from .rest_bodies import RestBody
-from .tables import lines_of, parse_rows
-from .vector_cells import is_number
+from .tables import is_number, lines_of, parse_rows
 
 CHANNELS = {f"{axis}{kind}": (axis.upper(), kind) for kind in ("position", "rotation") for axis in "xyz"}
 

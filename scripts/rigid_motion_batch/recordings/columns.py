@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+
+from rigid_motion_batch.command_line import listed
 
 from .column_names import DEVICES, METRES, TURNS, ColumnName, column_name, unit_in
 from .options import TICKS, ReadingOptions
-from .recordings import NoMotion, TrajectoryError, listed, shown
-from .vector_cells import is_number
+from .recordings import NoMotion, TrajectoryError, shown
+from .tables import HeaderLine, is_number
 
 POSITION = ("x", "y", "z")
 QUATERNION = ("qx", "qy", "qz", "qw")
@@ -24,19 +25,6 @@ KNOWN = "t, time, timestamp_ms; x, px, pos_x, position.x; qw, rot_w, rotation.w"
 
 MOST_FOUND = 12
 """Columns that an error names."""
-
-
-class ColumnProblem(ValueError):
-    """Error that says why a header does not do."""
-
-    def __init__(self, problem: str, way_out: str, known: int, kind: type[TrajectoryError] = TrajectoryError) -> None:
-        self.problem, self.way_out, self.kind = problem, way_out, kind
-        self.known = known
-        """Columns that mean something: of the lines that could be the header, the one with the most is taken."""
-
-    def at(self, path: Path, line: int) -> TrajectoryError:
-        """Return the error for a line of a file, for the user."""
-        return self.kind(path, self.problem, self.way_out, line)
 
 
 @dataclass(frozen=True)
@@ -63,17 +51,17 @@ Found = dict[str, list[int]]
 """Meanings in a body, each to all columns that could be it, by their names."""
 
 
-def layout_of(cells: Sequence[str], options: ReadingOptions) -> Layout:
+def layout_of(header: HeaderLine, options: ReadingOptions) -> Layout:
     """Return what the columns of a header are.
 
     Raises
     ------
-    ColumnProblem
+    TrajectoryError
         Where columns are missing, or more than one could be meant.
     """
+    cells = header.cells
     names = [column_name(cell) for cell in cells]
-    known = sum(name is not None for name in names)
-    explicit = _explicit(cells, options, known)
+    explicit = _explicit(header, options)
     of_kind = {
         kind: [
             index for index, name in enumerate(names) if name and name.kind == kind and index not in explicit.values()
@@ -92,16 +80,16 @@ def layout_of(cells: Sequence[str], options: ReadingOptions) -> Layout:
     times = [explicit["t"]] if "t" in explicit else times
     if whole and of_kind["frame"] and not times:
         problem = f"no column of time, only one that counts frames ({shown(cells[of_kind['frame'][0]])})"
-        raise ColumnProblem(problem, "say how many frames a second it has: --frame-rate 90", known)
+        raise header.error(problem, "say how many frames a second it has: --frame-rate 90")
     if not times or not whole:
-        raise _missing(cells, names, bodies, bool(times), needed, explicit, known)
+        raise _missing(header, names, bodies, bool(times), needed, explicit)
 
     def only(meaning: str, indices: Sequence[int]) -> int:
         if len(indices) == 1:
             return indices[0]
         both = listed(list(dict.fromkeys(shown(cells[index]) for index in indices)), limit=3)
         way_out = f"say which with --columns {meaning}=NAME, or rename or delete one of them"
-        raise ColumnProblem(f"two columns mean {meaning} ({both})", way_out, known)
+        raise header.error(f"two columns mean {meaning} ({both})", way_out)
 
     where = {}
     for label, result in whole.items():
@@ -115,18 +103,15 @@ def layout_of(cells: Sequence[str], options: ReadingOptions) -> Layout:
     return Layout(time, options.time_unit or units.get(time, ""), where, units, tuple(devices))
 
 
-def _explicit(cells: Sequence[str], options: ReadingOptions, known: int) -> dict[str, int]:
+def _explicit(header: HeaderLine, options: ReadingOptions) -> dict[str, int]:
     """Return the columns that the user named."""
-    written = [cell.lower() for cell in cells]
+    written = [cell.lower() for cell in header.cells]
     explicit = {}
     for meaning, column in options.columns:
         requested = column.strip().lower()
         if requested not in written:
-            raise ColumnProblem(
-                f"no column is named {shown(column)}",
-                f"--columns {meaning}=NAME takes one of {columns_found(cells)}",
-                known,
-            )
+            way_out = f"--columns {meaning}=NAME takes one of {columns_found(header.cells)}"
+            raise header.error(f"no column is named {shown(column)}", way_out)
         explicit[meaning] = written.index(requested)
     return explicit
 
@@ -148,16 +133,21 @@ def _bodies(names: Sequence[ColumnName | None], explicit: set[int]) -> dict[str,
     return bodies
 
 
+def known_in(header: HeaderLine) -> int:
+    """Return how many columns mean something: of the lines that could be the header, the one with the most is taken."""
+    return sum(column_name(cell) is not None for cell in header.cells)
+
+
 def _missing(
-    cells: Sequence[str],
+    header: HeaderLine,
     names: Sequence[ColumnName | None],
     bodies: Mapping[str, Found],
     timed: bool,
     needed: Sequence[str],
     explicit: Mapping[str, int],
-    known: int,
-) -> ColumnProblem:
+) -> TrajectoryError:
     """Return what is missing to a header of which no body is whole: of the body that lacks the least."""
+    cells = header.cells
     label, nearest = max(bodies.items(), key=lambda body: sum(item in body[1] for item in needed))
     if not nearest.keys() >= set(POSITION):
         # Something by chance ends like an axis.
@@ -170,33 +160,28 @@ def _missing(
     if timed and positions_only and set(missing) == set(needed) - set(POSITION):
         problem = f"positions only, and rotations are needed (found {columns_found(cells)})"
         named = ",".join(f"{item}=NAME" for item in missing)
-        return ColumnProblem(problem, f"record them as qx, qy, qz, qw, or name them: --columns {named}", known)
+        return header.error(problem, f"record them as qx, qy, qz, qw, or name them: --columns {named}")
     angles = [item for item in (*EULER, *TURNS) if item in nearest]
     if set(QUATERNION) <= set(missing) and set(needed) - set(missing) >= set(POSITION) and angles:
         shown_angles = ", ".join(cells[nearest[angle][0]] for angle in angles[:3])
-        return ColumnProblem(
+        return header.error(
             f"rotations are Euler angles here ({shown_angles}), and their order is not said",
             "say it: --euler ORDER, with --degrees if they are (Unity: --euler YXZ --degrees; docs/csv.md has others)",
-            known,
         )
     if set(EULER) & set(missing) and set(TURNS) & set(angles):
-        return ColumnProblem(
+        return header.error(
             f"roll, pitch and yaw are about other axes in other programs, and {', '.join(missing)} are not named",
             "say which is which: --columns rx=roll,ry=pitch,rz=yaw in ROS, rx=pitch,ry=yaw,rz=roll in Unity",
-            known,
         )
     others = ",".join(f"{item}=NAME" for item in missing[:3]) + ",..." * (len(missing) > 3)
     way_out = f"known are {KNOWN}; or --columns {others}"
     if not any(names) and not explicit:
-        kind: type[TrajectoryError] = NoMotion
+        problem = f"no column has a known name (found {columns_found(cells)})"
         if all(map(is_number, cells)):
-            kind = TrajectoryError
-            way_out = f"write a first line of names: {','.join(('t', *needed))}"
-        return ColumnProblem(f"no column has a known name (found {columns_found(cells)})", way_out, 0, kind)
+            return header.error(problem, f"write a first line of names: {','.join(('t', *needed))}")
+        return NoMotion(header.path, problem, way_out, header.number)
     lacking = f" for {shown(label)}" if label else ""
-    return ColumnProblem(
-        f"no column named {', '.join(missing)}{lacking} (found {columns_found(cells)})", way_out, known
-    )
+    return header.error(f"no column named {', '.join(missing)}{lacking} (found {columns_found(cells)})", way_out)
 
 
 def columns_found(cells: Sequence[str]) -> str:
@@ -205,26 +190,22 @@ def columns_found(cells: Sequence[str]) -> str:
     return listed(names, limit=MOST_FOUND) or "none"
 
 
-def require_time_unit(layout: Layout) -> None:
-    """Raise ColumnProblem where the unit of time is none that is known. Of dates it is no matter: `t [hh:mm:ss]`."""
-    if layout.time_unit and layout.time_unit not in TICKS:
-        problem = f"{shown(layout.time_unit)} is no unit of time that is known"
-        raise ColumnProblem(problem, f"--time-unit {', '.join(TICKS)}", len(layout.units))
+def require_time_unit(header: HeaderLine, unit: str) -> None:
+    """Raise TrajectoryError where the unit of time is none that is known. Of dates it is no matter: `t [hh:mm:ss]`."""
+    if unit and unit not in TICKS:
+        raise header.error(f"{shown(unit)} is no unit of time that is known", f"--time-unit {', '.join(TICKS)}")
 
 
-def metres_of(layout: Layout, columns: Mapping[str, int], options: ReadingOptions) -> list[float]:
+def metres_of(header: HeaderLine, layout: Layout, columns: Mapping[str, int], options: ReadingOptions) -> list[float]:
     """Return the metres of a unit in each of the columns x, y and z, of which those are metres that say nothing.
 
-    Raises ColumnProblem for a unit of length that is not known.
+    Raises TrajectoryError for a unit of length that is not known.
     """
     if options.scale is not None:
         return [options.scale] * 3
     units = [layout.units.get(columns[axis], "m") for axis in POSITION]
     unknown = [unit for unit in units if unit not in METRES]
     if unknown:
-        raise ColumnProblem(
-            f"{shown(unknown[0])} is no unit of length that is known",
-            "say how many metres it has: --scale 0.001 for millimetres",
-            len(columns),
-        )
+        problem = f"{shown(unknown[0])} is no unit of length that is known"
+        raise header.error(problem, "say how many metres it has: --scale 0.001 for millimetres")
     return [METRES[unit] for unit in units]

@@ -32,7 +32,7 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
     """Read the one body of the file, which has the file's name."""
     header, options = next(header_lines(path)), replace(AS_THE_FILE_SAYS, time_unit="ns")
     header = replace(header, cells=_names(header.cells))
-    return named_csv.read_below(path, selection, options, header, "write a file for each")
+    return named_csv.read_below(selection, options, header, "write a file for each")
 
 
 def _names(cells: Iterable[str]) -> list[str]:

@@ -19,10 +19,11 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from rigid_motion_batch.command_line import listed
 from rigid_motion_batch.silencing import silenced
 
 from .key_moments import BONE_CHANNEL, curves_that_move, fcurves_of, keys_of, moments_of, with_parents
-from .recordings import ALL, NoMotion, Selection, Trajectory, TrajectoryError, listed
+from .recordings import ALL, NoMotion, Selection, Trajectory, TrajectoryError
 from .rigs import LAST_FRAME, armature_of, in_blender, joints_of, refuse_too_many, single_joints, whole_body
 from .sampling import LEAD, SAME, Moments, away, merged
 from .tables import LARGEST_FILE
@@ -71,11 +72,12 @@ def refuse_too_large(path: Path, *others: Path) -> None:
 def read_imported(
     path: Path,
     selection: Selection,
-    importer: Callable[[], None],
+    importer: Callable[[], object],
     addon: str,
-    rate_of: Callable[[float, float | None], float],
     scale: float | None,
+    *,
     fps: int = 24,
+    usual: float = 0.0,
     made: np.ndarray = NONE,
 ) -> list[Trajectory]:
     """Read the whole skeleton of a file; or bones that are named, or all.
@@ -88,13 +90,12 @@ def read_imported(
         Imports the file into the current scene.
     addon : str
         The add-on of Blender that it is in.
-    rate_of : callable
-        Given the frames a second of the scene, and how many keys there are in one where that is plausible: the
-        rate to sample at.
     scale : float or None
         Metres of a unit, where the user says them.
     fps : int
         Frames a second of the scene to import into.
+    usual : float
+        Frames a second where keys tell no rate that is plausible; 0 for those of the scene, which are the fewest then.
     made : array, shape (n,)
         Frames, rising, at which curves have keys that the file has not.
 
@@ -105,47 +106,36 @@ def read_imported(
     """
     with in_blender(path, "export it again"), _imported(path, importer, addon, fps) as (scene, names):
         rigs = {name: obj for obj, name in names.items() if obj.type == "ARMATURE" and obj.pose}
-        return _read(path, selection, rigs, scene, rate_of, scale, made)
-
-
-def _read(
-    path: Path,
-    selection: Selection,
-    rigs: dict[str, bpy.types.Object],
-    scene: bpy.types.Scene,
-    rate_of: Callable[[float, float | None], float],
-    scale: float | None,
-    made: np.ndarray,
-) -> list[Trajectory]:
-    moving = {name: span for name, obj in rigs.items() if (span := _frames_of_keys(obj)) is not None}
-    if not moving:
-        problem = "no skeleton that moves" if rigs else "no skeleton"
-        raise NoMotion(path, f"{problem} in this file", "export the armature together with its animation")
-    bones = {name: armature_of(rig).bones.keys() for name, rig in rigs.items()}
-    selection.match([*rigs, *(bone for own in bones.values() for bone in own)])
-    selection.match(f"{name}/{bone}" for name, own in bones.items() for bone in own)
-    name, bone = _requested(rigs, moving, selection.requested)
-    rig, fps = rigs[name], scene.render.fps / scene.render.fps_base
-    first, last = moving.get(name) or next(iter(moving.values()))
-    rate = rate_of(fps, _rate_of_keys(rig, fps, made))
-    if not (abs(first) <= LAST_FRAME and abs(last) <= LAST_FRAME):
-        refuse_too_many(path, name, 1, np.array([first, last]))
-    moments = _moments(rig, first, last, fps, fps / rate, made)
-    remarks = _remarks(scene, rig, name, list(rigs), several=selection.requested in (None, ALL))
-    if bone is None and selection.requested != ALL:
-        called = path.stem if selection.requested is None else name
-        body = whole_body(path, rig, called, moments, 1.0, scale, made_up=True)
-        return [_with_remarks(body, *remarks)]
-    joints = joints_of(rig)
-    if bone is None:
-        taken = selection.of(joints.names)
-        several = single_joints(path, rig, taken, moments, scale)
-        return [_with_remarks(several[0], joints.remark, *remarks), *several[1:]]
-    known = bone in joints.names or bone in joints.left_out
-    unlisted = [*joints.left_out, *([selection.requested or ""] if known else [])]
-    (requested,) = selection.of(joints.names, unlisted)
-    (motion,) = single_joints(path, rig, [bone], moments, scale)
-    return [_with_remarks(replace(motion, name=requested), *remarks)]
+        moving = {name: span for name, obj in rigs.items() if (span := _frames_of_keys(obj)) is not None}
+        if not moving:
+            problem = "no skeleton that moves" if rigs else "no skeleton"
+            raise NoMotion(path, f"{problem} in this file", "export the armature together with its animation")
+        bones = {name: armature_of(rig).bones.keys() for name, rig in rigs.items()}
+        selection.match([*rigs, *(bone for own in bones.values() for bone in own)])
+        selection.match(f"{name}/{bone}" for name, own in bones.items() for bone in own)
+        name, bone = _requested(rigs, moving, selection.requested)
+        rig, rate = rigs[name], scene.render.fps / scene.render.fps_base
+        first, last = moving.get(name) or next(iter(moving.values()))
+        keys = _rate_of_keys(rig, rate, made)
+        if not (abs(first) <= LAST_FRAME and abs(last) <= LAST_FRAME):
+            refuse_too_many(path, name, 1, np.array([first, last]))
+        step = rate / (keys or usual if usual else max(rate, keys or 0.0))
+        moments = _moments(rig, first, last, rate, step, made)
+        remarks = _remarks(scene, rig, name, list(rigs), several=selection.requested in (None, ALL))
+        if bone is None and selection.requested != ALL:
+            called = path.stem if selection.requested is None else name
+            body = whole_body(path, rig, called, moments, 1.0, scale, made_up=True)
+            return [_with_remarks(body, *remarks)]
+        joints = joints_of(rig)
+        if bone is None:
+            taken = selection.of(joints.names)
+            several = single_joints(path, rig, taken, moments, scale)
+            return [_with_remarks(several[0], joints.remark, *remarks), *several[1:]]
+        known = bone in joints.names or bone in joints.left_out
+        unlisted = [*joints.left_out, *([selection.requested or ""] if known else [])]
+        (requested,) = selection.of(joints.names, unlisted)
+        (motion,) = single_joints(path, rig, [bone], moments, scale)
+        return [_with_remarks(replace(motion, name=requested), *remarks)]
 
 
 def _requested(
@@ -255,7 +245,7 @@ def _other_takes(rig: bpy.types.Object, own: bpy.types.Action, scene: bpy.types.
 
 @contextmanager
 def _imported(
-    path: Path, importer: Callable[[], None], addon: str, fps: int
+    path: Path, importer: Callable[[], object], addon: str, fps: int
 ) -> Iterator[tuple[bpy.types.Scene, dict[bpy.types.Object, str]]]:
     """Yield a scene with what was imported, and its objects with their names; all of it gone afterwards."""
     import bpy
@@ -272,7 +262,7 @@ def _imported(
         # Importers go by what the window shows: an override is not enough for the mode that they edit bones in.
         window.scene = scene
         with enabled(path, addon):
-            _import(path, importer)
+            told(path, "import", importer)
         for obj in scene.objects:
             _only_its_action(obj)
         yield scene, {obj: _own_name(obj.name, taken) for obj in scene.objects}
@@ -282,17 +272,18 @@ def _imported(
         bpy.data.batch_remove(new)
 
 
-def _import(path: Path, importer: Callable[[], None]) -> None:
+def told(path: Path, what: str, do: Callable[[], object]) -> None:
+    """Have Blender "import" or "export" a file. Raises TrajectoryError with what it says where it cannot."""
     try:
         with silenced(), redirect_stderr(io.StringIO()), warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            importer()
+            do()
     except TrajectoryError:
         raise
     except Exception as error:
         if "KeyboardInterrupt" in str(error):  # Blender makes an error of it.
             raise KeyboardInterrupt from None
-        problem = f"Blender cannot import this file ({_reason(path, error)})"
+        problem = f"Blender cannot {what} this file ({_reason(path, error)})"
         raise TrajectoryError(path, problem, "export it again") from None
 
 

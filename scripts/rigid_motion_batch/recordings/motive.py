@@ -19,9 +19,10 @@ from pathlib import Path
 import numpy as np
 
 from rigid_motion.motion import Poses
+from rigid_motion_batch.command_line import listed
 
 from .euler import quaternions_from_intrinsic_eulers
-from .recordings import Selection, Trajectory, TrajectoryError, listed, shown, unique
+from .recordings import Selection, Trajectory, TrajectoryError, shown, unique
 from .tables import cells_of, lines_of, parse_rows
 
 METRES = {"meters": 1.0, "centimeters": 0.01, "millimeters": 0.001, "inches": 0.0254, "feet": 0.3048}
@@ -86,16 +87,13 @@ def _read_header(path: Path) -> _Header:
         last = number
     settings = dict(zip(rows[0][::2], rows[0][1::2], strict=False))
     table = [[cell.lower() for cell in row] for row in rows[1:]]
-    typed = next((index for index, row in enumerate(table) if _mentions_types(row)), None)
+    kinds = ("rigid body", "marker", "bone")
+    typed = next((index for index, row in enumerate(table) if any(cell.startswith(kinds) for cell in row)), None)
     if typed is None or len(table) < typed + 5:
         raise TrajectoryError(
             path, "the rows that say what the columns are end too early", "export with Header Information on", last
         )
     return _Header(settings, table[typed], rows[typed + 2], rows[typed + 3], table[-2], table[-1], last)
-
-
-def _mentions_types(row: Iterable[str]) -> bool:
-    return any(cell.startswith(("rigid body", "marker", "bone")) for cell in row)
 
 
 def _bodies(path: Path, header: _Header, requested: list[tuple[str, str]]) -> dict[str, dict[tuple[str, str], int]]:

@@ -10,9 +10,9 @@ is `Trajectory.metres_per_unit`. Euler angles need their order from the user.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import takewhile
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -20,14 +20,13 @@ import numpy as np
 from rigid_motion.motion import Poses
 
 from .clips import ClipWarning
-from .columns import EULER, POSITION, ColumnProblem, Layout, columns_found, layout_of, metres_of, require_time_unit
-from .dates import kind_of_times, seconds_of_dates
+from .columns import EULER, POSITION, Layout, columns_found, known_in, layout_of, metres_of, require_time_unit
 from .euler import quaternions_from_intrinsic_eulers
 from .options import ReadingOptions
 from .recordings import Selection, Trajectory, TrajectoryError, unique
 from .sense import require_one_body
 from .tables import HeaderLine, Table, header_lines, lines_above_numbers
-from .times import require_seconds, seconds_of
+from .times import kind_of_times, require_seconds, seconds_of, seconds_of_dates
 
 MOST_LABELS = 0.5
 """The share of the rows up to which different texts in a column can be names of devices. Running numbers are not."""
@@ -62,54 +61,42 @@ def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Traj
     """Read the requested bodies. One without a name of its own has the file's."""
     header = _find_header(path, options)
     way_out = f"name the column that tells them apart, --columns device=NAME (found {columns_found(header.cells)})"
-    return read_below(path, selection, options, header, f"{way_out}, or split the file")
+    return read_below(selection, options, header, f"{way_out}, or split the file")
 
 
-def read_below(
-    path: Path, selection: Selection, options: ReadingOptions, header: HeaderLine, way_out: str
-) -> list[Trajectory]:
+def read_below(selection: Selection, options: ReadingOptions, header: HeaderLine, way_out: str) -> list[Trajectory]:
     """Read the requested bodies of the rows below a header; `way_out` is what to do with devices that are mixed."""
-    with _told(path, header.number):
-        layout = layout_of(header.cells, options)
-        bodies = _bodies(path, header, layout, "device" in dict(options.columns))
-        taken = set(selection.of([body.name for body in bodies]))
-        requested = [body for body in bodies if body.name in taken]
-        columns = {"t": layout.time}
+    layout = layout_of(header, options)
+    bodies = _bodies(header, layout, "device" in dict(options.columns))
+    taken = set(selection.of([body.name for body in bodies]))
+    requested = [body for body in bodies if body.name in taken]
+    columns = {"t": layout.time}
+    for body in requested:
+        columns |= {body.label(one): index for one, index in body.columns.items()}
+    table = Table(header, columns)
+    kind = kind_of_times(table)
+    if kind and (options.time_unit or options.frame_rate):
+        given = f"--time-unit {options.time_unit}" if options.time_unit else f"--frame-rate {options.frame_rate:g}"
+        problem = f"{given} is for times that are numbers, and these have {kind}"
+        raise header.error(problem, "leave it out")
+    parsed = [name for name in columns if name != "t" or kind is None]
+    numbers = dict(zip(parsed, table.parse(parsed).T, strict=True))
+    if kind:
+        times = seconds_of_dates(table, kind)
+    elif options.frame_rate:
+        times = numbers["t"] / options.frame_rate
+    else:
+        require_time_unit(header, layout.time_unit)
         for body in requested:
-            columns |= {body.label(one): index for one, index in body.columns.items()}
-        table = header.table(path, columns)
-        kind = kind_of_times(table)
-        if kind and (options.time_unit or options.frame_rate):
-            given = f"--time-unit {options.time_unit}" if options.time_unit else f"--frame-rate {options.frame_rate:g}"
-            problem = f"{given} is for times that are numbers, and these have {kind}"
-            raise TrajectoryError(path, problem, "leave it out", header.number)
-        parsed = [name for name in columns if name != "t" or kind is None]
-        numbers = dict(zip(parsed, table.parse(parsed).T, strict=True))
-        if kind:
-            times = seconds_of_dates(table, kind)
-        elif options.frame_rate:
-            times = numbers["t"] / options.frame_rate
-        else:
-            require_time_unit(layout)
-            for body in requested:
-                require_seconds(table, numbers["t"][body.rows], layout.time_unit)
-            times = seconds_of(table, numbers["t"], layout.time_unit)
-        trajectories = []
-        for body in requested:
-            held = {column: numbers[body.label(column)][body.rows] for column in body.columns}
-            trajectory = replace(_trajectory(body, times[body.rows], held, layout, options), dated=kind is not None)
-            require_one_body(trajectory, path, way_out, header.number)
-            trajectories.append(trajectory)
-        return trajectories
-
-
-@contextmanager
-def _told(path: Path, line: int) -> Iterator[None]:
-    """Raise a problem of columns as one of a line of a file."""
-    try:
-        yield
-    except ColumnProblem as problem:
-        raise problem.at(path, line) from None
+            require_seconds(table, numbers["t"][body.rows], layout.time_unit)
+        times = seconds_of(table, numbers["t"], layout.time_unit)
+    trajectories = []
+    for body in requested:
+        held = {column: numbers[body.label(column)][body.rows] for column in body.columns}
+        trajectory = replace(_trajectory(header, body, times[body.rows], held, layout, options), dated=kind is not None)
+        require_one_body(trajectory, header.path, way_out, header.number)
+        trajectories.append(trajectory)
+    return trajectories
 
 
 def _find_header(path: Path, options: ReadingOptions) -> HeaderLine:
@@ -118,15 +105,15 @@ def _find_header(path: Path, options: ReadingOptions) -> HeaderLine:
     Where none does, TrajectoryError says what the nearest lacks.
     """
     result: list[HeaderLine] = []
-    problems: list[tuple[ColumnProblem, int]] = []
-    first = (line.of_rows(path) for line in header_lines(path))
+    problems: list[tuple[int, TrajectoryError]] = []
+    first = (line.of_rows() for line in header_lines(path))
     for is_first, lines in ((True, first), (False, lines_above_numbers(path))):
         for line in lines:
             try:
-                layout_of(line.cells, options)
+                layout_of(line, options)
                 result.append(line)
-            except ColumnProblem as error:
-                problems.append((error, line.number))
+            except TrajectoryError as error:
+                problems.append((known_in(line), error))
             if result and is_first:
                 return result[0]
     if len(result) == 1:
@@ -134,19 +121,17 @@ def _find_header(path: Path, options: ReadingOptions) -> HeaderLine:
     if result:
         numbers = " and ".join(str(line.number) for line in result[:2])
         problem = f"lines {numbers} both name columns, with others before them"
-        raise TrajectoryError(path, problem, "make a file of each table, without what is before it", result[0].number)
-    nearest, number = max(problems, key=lambda known: known[0].known)
-    if not nearest.known:
-        nearest, number = problems[-1]
-    raise nearest.at(path, number)
+        raise result[0].error(problem, "make a file of each table, without what is before it")
+    known, nearest = max(problems, key=itemgetter(0))
+    raise nearest if known else problems[-1][1]
 
 
-def _bodies(path: Path, header: HeaderLine, layout: Layout, named: bool) -> list[_Body]:
+def _bodies(header: HeaderLine, layout: Layout, named: bool) -> list[_Body]:
     """Return all bodies in the order of columns and rows; `named` is whether the user named their column."""
     columns = {f"device {index}": index for index in layout.devices}
-    groups = _devices(header.table(path, columns), named)
+    groups = _devices(Table(header, columns), named)
     bodies = [
-        (f"{device} {prefix}".strip() or path.stem, prefix, columns, rows)
+        (f"{device} {prefix}".strip() or header.path.stem, prefix, columns, rows)
         for device, rows in groups.items()
         for prefix, columns in layout.bodies.items()
     ]
@@ -161,7 +146,7 @@ def _devices(table: Table, named: bool) -> dict[str, np.ndarray | slice]:
         codes, of_rows = _codes(table.cells(column))
         if len(codes) > MOST_DEVICES and named:
             problem = f"more than {MOST_DEVICES} different values in the column of devices"
-            raise TrajectoryError(table.path, problem, "name another with --columns device=NAME", table.header)
+            raise table.header.error(problem, "name another with --columns device=NAME")
         if len(codes) > min(max(MOST_LABELS * len(of_rows), 1), MOST_DEVICES) and not named:
             continue
         if len(codes) > 1:
@@ -180,16 +165,23 @@ def _codes(cells: Iterator[tuple[int, str]]) -> tuple[dict[str, int], np.ndarray
 
 
 def _trajectory(
-    body: _Body, times: np.ndarray, held: Mapping[str, np.ndarray], layout: Layout, options: ReadingOptions
+    header: HeaderLine,
+    body: _Body,
+    times: np.ndarray,
+    held: Mapping[str, np.ndarray],
+    layout: Layout,
+    options: ReadingOptions,
 ) -> Trajectory:
-    metres = metres_of(layout, body.columns, options)
+    metres = metres_of(header, layout, body.columns, options)
     positions = np.column_stack([held[axis] for axis in POSITION])
     if len(set(metres)) > 1:
         positions, metres = positions * metres, [1.0]
     warnings: tuple[ClipWarning, ...] = ()
     if options.euler:
         angles = np.column_stack([held[f"r{axis.lower()}"] for axis in options.intrinsic_order])
-        angles, warnings = _radians(angles, [layout.units.get(body.columns[item], "") for item in EULER], options)
+        angles, warnings = _radians(
+            header, angles, [layout.units.get(body.columns[item], "") for item in EULER], options
+        )
         quaternions = quaternions_from_intrinsic_eulers(angles, options.intrinsic_order)
     else:
         quaternions = np.column_stack([held[item] for item in ("qw", "qx", "qy", "qz")])
@@ -198,7 +190,7 @@ def _trajectory(
 
 
 def _radians(
-    angles: np.ndarray, units: Sequence[str], options: ReadingOptions
+    header: HeaderLine, angles: np.ndarray, units: Sequence[str], options: ReadingOptions
 ) -> tuple[np.ndarray, tuple[ClipWarning, ...]]:
     """Return angles of shape (n, 3) as radians, and what is hard to believe of them."""
     largest = float(np.nanmax(np.abs(angles), initial=0.0, where=np.isfinite(angles)))
@@ -210,5 +202,5 @@ def _radians(
         return np.radians(angles), warnings
     if "rad" not in units and largest > LARGEST_RADIANS:
         way_out = "say so: --degrees; or name the columns of radians rx_rad, ry_rad, rz_rad"
-        raise ColumnProblem(f"angles go up to {largest:.4g}, which are no radians", way_out, len(EULER))
+        raise header.error(f"angles go up to {largest:.4g}, which are no radians", way_out)
     return angles, ()

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import errno
 import os
-import stat
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -209,24 +207,13 @@ def split_source(source: str) -> tuple[Path, str | None]:
 
 def _what_is_no_file(path: str) -> tuple[str, str] | None:
     """Return what is at a path that is no file, and the way out; None for nothing. It is looked at, and not opened."""
-    try:
-        mode = os.stat(path).st_mode
-    except OSError as error:
-        if error.errno == errno.ELOOP:
-            return "this is a symbolic link that leads in a circle", "name the file itself"
-        if os.path.islink(path):
-            return f"this is a symbolic link to {shown(os.readlink(path))}, where nothing is", "name the file itself"
-        return None
-    except ValueError:
-        return None
-    kinds = {
-        stat.S_ISDIR: ("this is a folder without recordings", "name a file, or a folder that has some"),
-        stat.S_ISFIFO: ("this is a pipe (FIFO), not a file", "write what comes out of it to a file, and name that"),
-        stat.S_ISSOCK: ("this is a socket, not a file", "write what comes out of it to a file, and name that"),
-        stat.S_ISCHR: ("this is a device, not a file", "name a file"),
-        stat.S_ISBLK: ("this is a device, not a file", "name a file"),
-    }
-    return next((answer for is_kind, answer in kinds.items() if is_kind(mode)), None)
+    if os.path.isdir(path):
+        return "this is a folder without recordings", "name a file, or a folder that has some"
+    if os.path.exists(path) and not os.path.isfile(path):
+        return "this is a pipe or a device, not a file", "write what comes out of it to a file, and name that"
+    if os.path.islink(path):
+        return f"this is a symbolic link to {shown(os.readlink(path))}, where nothing is", "name the file itself"
+    return None
 
 
 def format_of(path: Path) -> Format:

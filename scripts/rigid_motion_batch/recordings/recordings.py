@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from rigid_motion.motion import Poses
-from rigid_motion_batch.command_line import printable
+from rigid_motion_batch.command_line import listed, printable
 
 from .clips import ClipWarning
 from .rest_bodies import RestBody
@@ -53,11 +53,6 @@ class Trajectory:
 
     rate: float | None = None
     """Samples a second, where there may be more between these."""
-
-    @property
-    def rigid(self) -> Poses:
-        """A single rigid body of it, shape (n,): of a whole body its first root."""
-        return self.poses if self.rest_body is None else self.poses[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,12 +182,6 @@ def unique(names: Sequence[str]) -> list[str]:
         numbers.setdefault(name, 0)
         result.append(candidate)
     return result
-
-
-def listed(names: Sequence[str], limit: int = 30, more: int = 0) -> str:
-    """Return the names with commas, cut off where they become too many to read; `more` are not among them."""
-    shown_names, left = ", ".join(names[:limit]), max(len(names) - limit, 0) + more
-    return f"{shown_names} and {left} more" if left else shown_names
 
 
 def shown(text: str, limit: int = 24) -> str:

@@ -1,12 +1,13 @@
 """Armatures of the open Blender: their bones as the joints of a body, where Blender shows them.
 
 Matrices of Blender are in single precision, and may scale and shear. Of a joint the position is kept as it is, and of
-its axes the direction of the bone (y); x is made square to it, z square to both, and all of length 1.
+its axes the direction of the bone (y); x is made square to it, z square to both, and all of length 1. The
+surface that an armature carries is that of all of its meshes together, where its bones are at rest.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,9 +20,8 @@ from rigid_motion.motion.quaternions import align_signs, conjugate, from_matrice
 
 from .bvh import MOST_POSES
 from .recordings import Trajectory, TrajectoryError, shown
-from .rest_bodies import RestBody, in_parents, size_of, unit_of
+from .rest_bodies import RestBody, Skin, in_parents, size_of, unit_of
 from .sampling import OF_JOINTS, Moments, sampled
-from .skins import carried_by, skin_of
 
 if TYPE_CHECKING:
     import bpy
@@ -333,3 +333,86 @@ def _shortened(tails: np.ndarray, heads: np.ndarray, parents: np.ndarray, larges
     lengths = np.linalg.norm(tails, axis=-1)
     longer = (reach > 0.0) & (lengths > np.maximum(reach, largest))
     return np.where(longer[:, None], tails * (reach / np.where(longer, lengths, 1.0))[:, None], tails)
+
+
+MOST_VERTICES = 200_000
+"""A body with more is shown without its skin."""
+
+CARRIERS = 4
+"""Joints that carry a vertex; more are left out, the weaker ones."""
+
+
+def carried_by(rig: bpy.types.Object) -> list[bpy.types.Object]:
+    """Return the mesh objects that an armature deforms; none where their vertices are too many."""
+    import bpy
+
+    meshes = [obj for obj in bpy.data.objects if obj.type == "MESH" and obj.data and _deforms(rig, obj)]
+    return meshes if sum(len(_mesh_of(obj).vertices) for obj in meshes) <= MOST_VERTICES else []
+
+
+def _mesh_of(obj: bpy.types.Object) -> bpy.types.Mesh:
+    return cast("bpy.types.Mesh", obj.data)
+
+
+def _deforms(rig: bpy.types.Object, obj: bpy.types.Object) -> bool:
+    by_parent = obj.parent == rig and obj.parent_type == "ARMATURE"
+    deforming = (
+        cast("bpy.types.ArmatureModifier", modifier) for modifier in obj.modifiers if modifier.type == "ARMATURE"
+    )
+    return by_parent or any(item.object == rig for item in deforming)
+
+
+def skin_of(
+    meshes: Sequence[bpy.types.Object], joints: Sequence[str], matrices: Mapping[bpy.types.Object, np.ndarray]
+) -> Skin | None:
+    """Return the skin of some mesh objects, or None where there are no triangles.
+
+    Parameters
+    ----------
+    meshes : sequence of bpy.types.Object
+    joints : sequence of str
+        The bones: what is in no vertex group of theirs is carried by the first.
+    matrices : mapping of bpy.types.Object to array, shape (4, 4)
+        Where each mesh object is in the world.
+    """
+    numbers = {name: number for number, name in enumerate(joints)}
+    vertices, triangles, carriers, weights, before = [], [], [], [], 0
+    for obj in meshes:
+        mesh, there = _mesh_of(obj), matrices[obj]
+        places = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+        mesh.vertices.foreach_get("co", places)
+        mesh.calc_loop_triangles()
+        corners = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
+        mesh.loop_triangles.foreach_get("vertices", corners)
+        vertices.append(places.reshape(-1, 3).astype(np.float64) @ there[:3, :3].T + there[:3, 3])
+        triangles.append(corners.reshape(-1, 3).astype(np.int64) + before)
+        own = _carriers(mesh, [numbers.get(group.name, -1) for group in obj.vertex_groups])
+        carriers.append(own[0])
+        weights.append(own[1])
+        before += len(mesh.vertices)
+    if not sum(map(len, triangles)):
+        return None
+    return Skin(*map(np.concatenate, (vertices, triangles, carriers, weights)))
+
+
+def _carriers(mesh: bpy.types.Mesh, joint_of_group: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the joints (vertices, 4) that carry each vertex most, and by how much of it."""
+    # Blender has no way to hand out all weights at once.
+    entries = [
+        (vertex.index, joint_of_group[group.group], group.weight)
+        for vertex in mesh.vertices
+        for group in vertex.groups
+        if group.group < len(joint_of_group) and joint_of_group[group.group] >= 0 and group.weight > 0.0
+    ]
+    joints, weights = np.zeros((len(mesh.vertices), CARRIERS), dtype=np.int64), np.zeros((len(mesh.vertices), CARRIERS))
+    if entries:
+        owners, carriers, shares = (np.array(column) for column in zip(*entries, strict=True))
+        order = np.lexsort((-shares, owners))
+        owners, carriers, shares = owners[order], carriers[order], shares[order]
+        rank = np.arange(len(owners)) - np.searchsorted(owners, owners)
+        strong = rank < CARRIERS
+        joints[owners[strong], rank[strong]] = carriers[strong]
+        weights[owners[strong], rank[strong]] = shares[strong]
+    alone = weights.sum(axis=1) == 0.0
+    weights[alone, 0] = 1.0
+    return joints, weights / weights.sum(axis=1, keepdims=True)

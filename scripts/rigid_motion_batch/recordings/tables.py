@@ -2,6 +2,10 @@
 
 A file is gone through piece by piece, so that it is the numbers that take memory and not the text, and nothing that
 a file says of itself is trusted before it has been read.
+
+A cell may hold a whole vector or quaternion, as Unity prints them: `(0.1, 0.2, 0.3)`, `"0.1, 0.2, 0.3"`. A row of such
+cells becomes one of numbers, and its header one with a name for each: `Position` becomes `Position.x`, `Position.y` and
+`Position.z`. Four numbers are x, y, z, w. A comma with a blank behind it is no decimal one.
 """
 
 from __future__ import annotations
@@ -9,9 +13,10 @@ from __future__ import annotations
 import codecs
 import csv
 import io
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from operator import itemgetter
 from pathlib import Path
@@ -19,7 +24,6 @@ from pathlib import Path
 import numpy as np
 
 from .recordings import TrajectoryError, shown
-from .vector_cells import expanded, flattened, is_number
 
 SEPARATORS = (",", ";", "\t")
 
@@ -52,41 +56,31 @@ MOST_METADATA = 50
 class Table:
     """The rows of a file, unparsed, and where its columns are."""
 
-    path: Path
-    separator: str | None
-    """Separator of the cells; None means white space."""
+    header: HeaderLine
+    """The line before the first row."""
 
     columns: dict[str, int]
     """Meaning of a column to its index."""
 
-    width: int
-    """Number of columns that have a name."""
-
-    header: int
-    """The line before the first row."""
-
-    vectors: bool = False
-    """True if cells hold vectors, which count as several columns."""
-
     def parse(self, columns: Sequence[str]) -> np.ndarray:
         """Return the numbers in these columns, shape (rows, columns). Empty cells are NaN."""
         chosen = {name: self.columns[name] for name in columns}
-        needed = max(self.columns.values()) + 1
-        return parse_rows(self.path, self.rows(), self.separator, chosen, self.width, needed=needed)
+        needed, header = max(self.columns.values()) + 1, self.header
+        return parse_rows(header.path, self.rows(), header.separator, chosen, len(header.cells), needed=needed)
 
     def cells(self, column: str) -> Iterator[tuple[int, str]]:
         """Yield the cells of a column, without quotes, with their lines; empty where a row is too short."""
         index = self.columns[column]
         for number, line in self.rows():
-            cells = split_row(line, self.separator)
+            cells = split_row(line, self.header.separator)
             yield number, cells[index].strip() if index < len(cells) else ""
 
     def rows(self) -> Iterator[tuple[int, str]]:
         """Yield the lines of the rows with their numbers, without blank ones and comments."""
-        for number, line in lines_of(self.path, after=self.header):
+        for number, line in lines_of(self.header.path, after=self.header.number):
             line = line.strip(" ")
             if line and not line.isspace() and line[0] != "#":
-                yield number, flattened(line, self.separator) if self.vectors else line
+                yield number, flattened(line, self.header.separator) if self.header.vectors else line
 
 
 def encoding_of(head: bytes) -> str:
@@ -170,8 +164,11 @@ def cells_of(path: Path, number: int, line: str, separator: str | None) -> list[
 class HeaderLine:
     """A line that may name the columns."""
 
+    path: Path
     number: int
     separator: str | None
+    """Separator of the cells; None means white space."""
+
     cells: list[str]
 
     vectors: bool = False
@@ -182,18 +179,18 @@ class HeaderLine:
         """Return the cells of a line, which may be a comment."""
         text = text.lstrip("# \t")
         separator = max(SEPARATORS, key=text.count) if any(mark in text for mark in SEPARATORS) else None
-        return cls(number, separator, cells_of(path, number, text, separator))
+        return cls(path, number, separator, cells_of(path, number, text, separator))
 
-    def table(self, path: Path, columns: dict[str, int]) -> Table:
-        """Return the rows below with some of the columns."""
-        return Table(path, self.separator, columns, len(self.cells), self.number, self.vectors)
+    def error(self, problem: str, way_out: str) -> TrajectoryError:
+        """Return an error of this line."""
+        return TrajectoryError(self.path, problem, way_out, self.number)
 
-    def of_rows(self, path: Path) -> HeaderLine:
+    def of_rows(self) -> HeaderLine:
         """Return the header as the first row below it has it."""
-        below = (line.strip() for _, line in islice(lines_of(path, after=self.number), MOST_COMMENTS))
+        below = (line.strip() for _, line in islice(lines_of(self.path, after=self.number), MOST_COMMENTS))
         row = next((line for line in below if line and not line.startswith("#")), "")
         names = expanded(self.cells, row, self.separator)
-        return self if names is None else HeaderLine(self.number, self.separator, names, vectors=True)
+        return self if names is None else replace(self, cells=names, vectors=True)
 
 
 def header_lines(path: Path) -> Iterator[HeaderLine]:
@@ -212,7 +209,7 @@ def header_lines(path: Path) -> Iterator[HeaderLine]:
                 return
     if not comments:
         raise TrajectoryError(path, "the file is empty", "it needs a line that names its columns, and rows")
-    yield HeaderLine(number, None, [])
+    yield HeaderLine(path, number, None, [])
 
 
 def lines_above_numbers(path: Path) -> Iterator[HeaderLine]:
@@ -321,3 +318,61 @@ def _number(path: Path, line: int, name: str, cell: str) -> float:
     except ValueError:
         problem = f"{name} is {shown(cell.strip())}, not a number"
         raise TrajectoryError(path, problem, "correct or delete the line", line) from None
+
+
+CELL = re.compile(r'"?[(\[{]([^()\[\]{}"]*)[)\]}]"?|"([^"]*)"')
+NAMED = re.compile(r"^[xyzw]\s*[=:]\s*", re.IGNORECASE)
+"""Pattern of what is in front of a number, as Unreal writes it: X=0.1 Y=0.2 Z=0.3."""
+
+AXES = "xyzw"
+
+
+def flattened(line: str, separator: str | None) -> str:
+    """Return a row in which every number has a cell of its own, and no other cell a separator inside."""
+    between = separator or " "
+
+    def flat(match: re.Match[str]) -> str:
+        return between.join(_numbers(match)) or match[0].replace('"', "").replace(between, " ")
+
+    return CELL.sub(flat, line)
+
+
+def expanded(names: Sequence[str], line: str, separator: str | None) -> list[str] | None:
+    """Return the names of a row's columns once it is flattened; None where none of its cells holds several numbers."""
+    sizes: list[int] = []
+
+    def mark(match: re.Match[str]) -> str:
+        sizes.append(len(_numbers(match)))
+        return f"<{sizes[-1]}>"
+
+    cells = CELL.sub(mark, line).split(separator)
+    if max(sizes, default=0) < 3 or len(cells) > len(names):
+        return None
+    result = [re.fullmatch(r"\s*<([34])>\s*", cell) for cell in cells] + [None] * (len(names) - len(cells))
+    return [
+        text
+        for name, size in zip(names, result, strict=True)
+        for text in ([f"{name}.{axis}" for axis in AXES[: int(size[1])]] if size else [name])
+    ]
+
+
+def _numbers(match: re.Match[str]) -> list[str]:
+    """Return the number in a cell, or the three or four of them; none where it holds anything else."""
+    text = (match[1] if match[1] is not None else match[2]).strip()
+    if ";" in text:
+        parts = text.split(";")
+    elif re.search(r",\s", text):
+        parts = re.split(r",\s+", text)
+    else:
+        parts = text.split("," if text.count(",") > 1 else None)
+    parts = [NAMED.sub("", part.strip()).replace(",", ".") for part in parts]
+    return parts if len(parts) in (1, 3, 4) and all(map(is_number, parts)) else []
+
+
+def is_number(cell: str) -> bool:
+    """Return whether a cell is a number."""
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True

@@ -9,10 +9,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from . import named_csv
-from .columns import ColumnProblem, layout_of
+from .columns import known_in, layout_of
 from .options import ReadingOptions
 from .recordings import Selection, Trajectory, TrajectoryError
-from .tables import HeaderLine, header_lines
+from .tables import HeaderLine, Table, header_lines
 
 NAMES = ["t", "x", "y", "z", "qx", "qy", "qz", "qw"]
 
@@ -31,21 +31,21 @@ def recognises(head: list[str]) -> bool:
 def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
     """Read the one body of the file, which has the file's name."""
     header = _header(path, options)
-    line, row = next(header.table(path, {}).rows(), (0, ""))
+    line, row = next(Table(header, {}).rows(), (0, ""))
     if len(row.split()) == 4:
         problem = "positions only, and rotations are needed"
         raise TrajectoryError(path, problem, "write t x y z qx qy qz qw in every line", line)
-    return named_csv.read_below(path, selection, options, header, "write a file for each")
+    return named_csv.read_below(selection, options, header, "write a file for each")
 
 
 def _header(path: Path, options: ReadingOptions) -> HeaderLine:
     """Return the line that names the columns, or one before the first row with the usual names."""
     for line in header_lines(path):
         try:
-            layout_of(line.cells, options)
+            layout_of(line, options)
             return line
-        except ColumnProblem as problem:
+        except TrajectoryError as problem:
             last = problem
-    if last.known:
-        raise last.at(path, line.number)
-    return HeaderLine(line.number - 1, None, NAMES)
+    if known_in(line):
+        raise last
+    return HeaderLine(path, line.number - 1, None, NAMES)

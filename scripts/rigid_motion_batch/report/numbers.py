@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import floor, isfinite, log10
-from typing import Any
 
 import numpy as np
 
@@ -107,7 +106,6 @@ class Gathering:
         self._rows: list[tuple[tuple[Choice, ...], tuple[str, ...], np.ndarray]] = []
         """Of each clip its choices, its modes, and its numbers, shape (measures, choices, modes)."""
         self._groupings: list[frozenset[Groups]] = []
-        self._known: dict[Any, Any] = {}
 
     def add(self, clip: str, results: Sequence[ChoiceNumbers]) -> None:
         """Take the numbers of a clip of this name."""
@@ -117,14 +115,9 @@ class Gathering:
         for place, result in enumerate(results):
             for row in result.rows:
                 values[:, place, modes.index(row.mode)] = [measure.of(row) for measure in MEASURES]
-        groupings = frozenset(result.groups for result in results)
         self._clips.append(clip)
-        self._rows.append((self._same(choices), self._same(modes), values))
-        self._groupings.append(self._same(groupings))
-
-    def _same(self, value: Any) -> Any:
-        """Return an equal value that was here before, so that thousands of clips share one."""
-        return self._known.setdefault(value, value)
+        self._rows.append((choices, modes, values))
+        self._groupings.append(frozenset(result.groups for result in results))
 
     def numbers(self) -> Numbers:
         """All of them. Raises ValueError where no clip had a result."""
@@ -152,9 +145,3 @@ def digits(value: float | None, places: int = 3) -> str:
 def percent(share: float) -> str:
     """Return a share as prose has it: "64 %"."""
     return f"{100 * share:.0f}\u00a0%"
-
-
-def listed(words: Iterable[str]) -> str:
-    """Words as prose lists them: "5, 10 and 15"."""
-    words = list(words)
-    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))

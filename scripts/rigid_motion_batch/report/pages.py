@@ -11,7 +11,7 @@ import hashlib
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple, fields
 from datetime import datetime
 from functools import cache
 from pathlib import Path
@@ -27,17 +27,15 @@ from rigid_motion_batch.analysis.metrics import Metrics
 from rigid_motion_batch.analysis.modes import description_of, label_of
 from rigid_motion_batch.analysis.needed import KeysNeeded
 from rigid_motion_batch.analysis.results import ClipResult
-from rigid_motion_batch.files import replacing, write_text
+from rigid_motion_batch.files import line_of, replacing, write_text
 from rigid_motion_batch.palette import ERROR_COLOURS, colours_on_pages
 from rigid_motion_batch.recordings.clips import ClipFacts
-from rigid_motion_batch.rows import line_of
 
 from . import charts, tables
-from .data import clip_data, json_in_page, mesh_data
-from .joints import Joints, joints_of
-from .mesh import Mesh, drill
+from .data import Mesh, clip_data, drill, json_in_page, mesh_data
 from .numbers import KINDS, LARGEST, MEASURES, MINUS, Gathering, Numbers, digits, percent
 from .settings import Settings
+from .tables import Joints, joints_of
 from .verdict import verdict
 
 HERE = Path(__file__).parent
@@ -60,22 +58,11 @@ Films = Mapping[tuple[str, str], Path | None]
 """(clip name, name of the choice) to its film, which may not be there yet; None where it could not be made."""
 
 
-@dataclass(frozen=True)
-class Warned:
-    """A warning, and the address of its moment on the page."""
-
-    clip: str
-    text: str
-    way_out: str
-    address: str
-
-
 def write_report(
     path: Path,
     clips: Iterable[ClipResult],
     settings: Settings,
     films: Films | None = None,
-    models: Mapping[tuple[str, str], Path] | None = None,
     *,
     folder: Path | None = None,
     mesh: Mesh | None = None,
@@ -93,8 +80,6 @@ def write_report(
     settings : Settings
     films : mapping, optional
         Nothing where the run does without films.
-    models : mapping, optional
-        (clip name, name of the choice) to a GLB file of all motions.
     folder : Path, optional
         Where the page will be in the end: what links are relative to. That of `path` unless given.
     mesh : Mesh, optional
@@ -116,7 +101,7 @@ def write_report(
     """
     folder = folder or path.parent
     films, mesh = films or {}, mesh or drill()
-    gathering, page = Gathering(), _Clips(path, films, models or {}, folder, mesh)
+    gathering, page = Gathering(), _Clips(path, films, folder, mesh)
     for clip in clips:
         page.facts.append(clip.facts)
         if clip.choices:
@@ -200,25 +185,20 @@ def write_overview(
 class _Clips:
     """What a page has of its clips, gathered one after the other."""
 
-    def __init__(
-        self, path: Path, films: Films, models: Mapping[tuple[str, str], Path], folder: Path, mesh: Mesh
-    ) -> None:
+    def __init__(self, path: Path, films: Films, folder: Path, mesh: Mesh) -> None:
         self.facts: list[ClipFacts] = []
         self.needed: list[KeysNeeded] = []
         self.choices: list[tuple[str, tuple[Choice, ...]]] = []
         self.metrics: list[Metrics] = []
-        self.rows: list[Any] = []
         self.joints: list[Joints] = []
-        self.segments: list[tuple[str, str, str]] = []
         self.films: list[tuple[int, str, str | None]] = []
-        self.models: list[tuple[int, str, str | None]] = []
         self.places: list[dict[str, Any]] = []
         """What the script finds them by."""
         self.inside: list[str] = []
         """Their data, as JSON."""
         self.files: list[Path] = []
         self._warned: list[tuple[str, tuple[Any, ...], float]] = []
-        self._path, self._films, self._models, self._folder, self._mesh = path, films, models, folder, mesh
+        self._path, self._films, self._folder, self._mesh = path, films, folder, mesh
 
     def add(self, clip: ClipResult) -> None:
         name, place = clip.facts.name, len(self.places)
@@ -226,7 +206,6 @@ class _Clips:
         numbers.add(clip.facts.name, [result.numbers for result in clip.choices])
         own = numbers.numbers()
         self.choices.append((name, tuple(result.choice for result in clip.choices)))
-        self.rows += tables.every_row(clip)
         self._warned.append((name, clip.facts.warnings, float(clip.times[0])))
         if clip.needed:
             self.needed.append(clip.needed)
@@ -234,12 +213,8 @@ class _Clips:
             self.metrics += [row for motion in result.motions for row in motion.metrics]
             if (name, result.choice.name) in self._films:
                 self.films.append((place, result.choice.name, self._link(self._films[name, result.choice.name])))
-            if (name, result.choice.name) in self._models:
-                self.models.append((place, result.choice.name, self._link(self._models[name, result.choice.name])))
             if joints := joints_of(place, clip, result, own):
                 self.joints.append(joints)
-            if said := tables.segments_of(result, own):
-                self.segments.append((name, result.choice.title, said))
         self.places.append({"name": name, "data": ""})
         self.inside.append(json_in_page(clip_data(clip, own.label, self._mesh)))
         if self.files or sum(map(len, self.inside)) > IN_THE_PAGE:
@@ -259,15 +234,15 @@ class _Clips:
     def _link(self, film: Path | None) -> str | None:
         return None if film is None else quote(Path(os.path.relpath(film, self._folder)).as_posix())
 
-    def warnings(self, choice: str) -> list[Warned]:
+    def warnings(self, choice: str) -> list[dict[str, str]]:
         """All warnings, with the addresses of their moments under a choice."""
         return [
-            Warned(
-                name,
-                item.text,
-                item.way_out,
-                _address(name, choice, None if item.start_s is None else item.start_s - begin),
-            )
+            {
+                "clip": name,
+                "text": item.text,
+                "way_out": item.way_out,
+                "address": _address(name, choice, None if item.start_s is None else item.start_s - begin),
+            }
             for name, warned, begin in self._warned
             for item in warned
         ]
@@ -358,7 +333,6 @@ def _templates() -> jinja2.Environment:
     environment.globals |= {
         "chart": charts.chart,
         "address": _address,
-        "every_head": tables.EVERY_HEAD,
         "needed_rows": tables.needed_rows,
         "csv": _csv,
         "label_of": label_of,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from rigid_motion_batch.analysis.radii import JOINT
+from rigid_motion_batch.analysis.choices import JOINT
 
 
 @dataclass(frozen=True)

@@ -1,19 +1,24 @@
-"""The tables of the report, as rows of text for the templates: lower is better in all of them."""
+"""The tables of the report, as rows of text for the templates: lower is better in all of them.
+
+Of whole bodies also joint by joint: errors over time, as pictures with a row for each joint, and in numbers.
+"""
 
 from __future__ import annotations
 
-from collections import Counter
+import base64
+import struct
+import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
-from rigid_motion_batch.analysis.modes import BEST_OF
 from rigid_motion_batch.analysis.needed import DECIMATIONS, KeysNeeded, overall
 from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult
+from rigid_motion_batch.palette import error_hex, full_colour
+from rigid_motion_batch.recordings.rest_bodies import short_names
 
-from .numbers import MEASURES, MINUS, NONE, Numbers, digits, listed, percent
+from .numbers import MEASURES, MINUS, NONE, Numbers, digits, percent
 
 SPACINGS = dict(zip(DECIMATIONS, ("evenly spaced", "where needed", "where needed, and fitted"), strict=True))
 
@@ -110,36 +115,6 @@ def _change(value: float, reference: int | None, row: np.ndarray, group: Sequenc
     return "same" if shown == "0.0" else f"{'+' if change > 0 else MINUS}{shown}\u00a0%"
 
 
-def every_row(clip: ClipResult) -> list[tuple[str, str, tuple[str, ...], tuple[Cell, ...]]]:
-    """Clip, choice, modes and numbers: a row for each motion under each choice."""
-    found = []
-    for result in clip.choices:
-        lines = [
-            [str(row.keys or NONE), digits(row.keys_per_s)] + [digits(measure.of(row)) for measure in COUNTED]
-            for motion in result.motions
-            for row in motion.metrics[:1]
-        ]
-        least = [_least(column) for column in zip(*lines, strict=True)]
-        found += [
-            (
-                clip.facts.name,
-                result.choice.title,
-                motion.modes,
-                tuple(Cell(text, best=text == best) for text, best in zip(line, least, strict=True)),
-            )
-            for motion, line in zip(result.motions, lines, strict=True)
-        ]
-    return found
-
-
-COUNTED = tuple(measure for measure in MEASURES if measure.metric != "keys_per_s")
-EVERY_HEAD = (
-    ("Keys", ""),
-    ("Keys", "/s"),
-    *((measure.title.replace(" error", ""), measure.unit) for measure in COUNTED),
-)
-
-
 def needed_rows(needed: Sequence[KeysNeeded]) -> tuple[list[str], list[tuple[tuple[str, ...], str, list[Cell]]]]:
     """Heads, and for each motion and way to space keys the keys that are as good as the reference's at each rate."""
     together = overall(needed)
@@ -167,19 +142,80 @@ def needed_rows(needed: Sequence[KeysNeeded]) -> tuple[list[str], list[tuple[tup
     return [f"{together.rates[at]}/s" for at in asked], rows
 
 
-def segments_of(result: ChoiceResult, numbers: Numbers) -> str:
-    """Which modes were best in how many segments, in a sentence; empty without `best_of`."""
-    segments = result.mode_of_segments
-    if not segments:
-        return ""
-    rows = {row.mode: row for motion in result.motions for row in motion.metrics}
-    modes = listed(f"{numbers.label(mode)} in {count}" for mode, count in Counter(segments).most_common())
-    changes = sum(mode != following for mode, following in pairwise(segments))
-    said = f"Of {len(segments)} segments {modes}; the mode changes at {changes} keys."
-    known = [row for row in rows.values() if row.keys and row.mode != BEST_OF]
-    best = min(known, key=lambda row: (row.keys or 0, row.rms_shell_m))
-    if best.rms_shell_m > 0.0:
-        less = 1.0 - rows[BEST_OF].rms_shell_m / best.rms_shell_m
-        said += f" RMS shell error beside {numbers.label(best.mode)}, the best single mode: {percent(abs(less))} "
-        said += "lower." if less > 0 else "higher."
-    return said
+COLUMNS = 240
+"""Stretches of time that a picture has."""
+
+SHADES = 24
+
+
+@dataclass(frozen=True)
+class Joints:
+    """The joints of a body under one choice of keys."""
+
+    place: int
+    """Of the clip among those of the page."""
+
+    clip: str
+    choice: str
+    title: str
+    names: list[str]
+    top: str
+    """The error that is the last colour, in mm."""
+
+    pictures: list[tuple[str, str]]
+    """Of each motion its name and its picture, as an address."""
+
+    worst: list[str]
+    """Of each motion the joint with the largest error, and that, in mm."""
+
+    slide: str
+    """How far a joint that stands on the ground slides in the recording itself, in mm; empty where none stands."""
+
+    rows: list[list[str]]
+    """RMS and largest error under each motion, for each joint, in mm."""
+
+
+def joints_of(place: int, clip: ClipResult, result: ChoiceResult, numbers: Numbers) -> Joints | None:
+    """Return the joints of a clip under a choice; None of a single rigid body."""
+    motions = [motion for motion in result.motions if motion.joint_errors is not None]
+    if not motions:
+        return None
+    in_metres = [motion.joint_errors for motion in motions if motion.joint_errors is not None]
+    errors, top = [1e3 * some for some in in_metres], 1e3 * full_colour(in_metres)
+    pictures = [
+        (numbers.joined(motion.modes), heat_map(some, top)) for motion, some in zip(motions, errors, strict=True)
+    ]
+    by_mode = [[row for row in result.joints if row.mode == motion.modes[0]] for motion in motions]
+    rows = [
+        [digits(1e3 * value) for row in of_joint for value in (row.rms_shell_m, row.max_shell_m)]
+        for of_joint in zip(*by_mode, strict=True)
+    ]
+    names = short_names(clip.facts.joint_names)
+    places = [int(np.argmax(some.max(axis=1))) for some in errors]
+    worst = [f"{names[joint]} {digits(some[joint].max())} mm" for joint, some in zip(places, errors, strict=True)]
+    slid = motions[0].metrics[0].recorded_slide_m
+    slide = "" if slid is None else digits(1e3 * slid)
+    facts = clip.facts.name, result.choice.name, result.choice.title
+    return Joints(place, *facts, names, digits(top), pictures, worst, slide, rows)
+
+
+def heat_map(errors: np.ndarray, top: float) -> str:
+    """Return the errors (joints, n) as the address of a picture, a row for each joint, the colours ending at `top`."""
+    count = errors.shape[1]
+    begins = np.unique(np.arange(min(COLUMNS, count)) * count // min(COLUMNS, count))
+    largest = np.maximum.reduceat(errors, begins, axis=1)
+    shades = np.clip(largest / top * SHADES, 0, SHADES - 1).astype(np.uint8)
+    palette = bytes.fromhex("".join(error_hex(shade / (SHADES - 1))[1:] for shade in range(SHADES)))
+    return f"data:image/png;base64,{base64.b64encode(png(shades, palette)).decode('ascii')}"
+
+
+def png(pixels: np.ndarray, palette: bytes) -> bytes:
+    """Return a picture (rows, columns) of numbers of colours, three bytes each."""
+
+    def chunk(kind: bytes, content: bytes) -> bytes:
+        return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
+
+    lines = np.pad(pixels, ((0, 0), (1, 0))).tobytes()
+    header = struct.pack(">IIBBBBB", pixels.shape[1], pixels.shape[0], 8, 3, 0, 0, 0)
+    content = ((b"IHDR", header), (b"PLTE", palette), (b"IDAT", zlib.compress(lines, 9)), (b"IEND", b""))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(*item) for item in content)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import bpy
@@ -16,7 +16,7 @@ import numpy as np
 
 from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate, shell_error
-from rigid_motion_batch.analysis.body_metrics import key_samples
+from rigid_motion_batch.analysis.metrics import key_samples
 from rigid_motion_batch.analysis.reconstructions import Reconstruction, identical_modes
 from rigid_motion_batch.palette import error_hex, full_colour
 from rigid_motion_batch.recordings.rest_bodies import short_names
@@ -82,12 +82,13 @@ def build_body_scene(made: Reconstruction, settings: SceneSettings) -> bpy.types
     )
     full = full_colour(motion.errors.values())
     shape = Physique.of(made.clip, rest)
-    bar = _Bar.of(1e3 * full, cast.largest_error)
+    most = _most(1e3 * full, cast.largest_error)
+    reserved = LEGEND * (captions.width_of(LEAST) + captions.width_of(most)) + BAR + 4.0 * BAR_GAP
     legend = ("grey: recording", "ring: the worst joint", f"dots: {'key poses' if made.shared else 'keys'}")
     with registered():
-        enter, reserved = Bodies(cast, motion, shape, full).enter, bar.width + 2.0 * BAR_GAP
+        enter = Bodies(cast, motion, shape, full).enter
         scene = assemble_scene(made, settings, cast, lanes_of, enter, legend, centre, reserved)
-    bar.put(cast)
+    _put_bar(cast, most)
     return scene
 
 
@@ -150,36 +151,25 @@ def _notes(made: Reconstruction, modes: Iterable[str]) -> dict[str, str]:
     return {} if len(set(counts.values())) == 1 else {mode: f"{count} {kind}" for mode, count in counts.items()}
 
 
-@dataclass(frozen=True)
-class _Bar:
-    """What the colours of bones mean, at the right below the lanes."""
+def _most(full: float, largest: float) -> str:
+    """Return what the bar of colours up to an error ends with; the largest there is, both in millimetres."""
+    top = f"{full:.{captions.decimals_for(full)}f} mm"
+    return f"{top} and more, to {largest:.{captions.decimals_for(largest)}f}" if largest > 1.005 * full else top
 
-    most: str
 
-    @classmethod
-    def of(cls, full: float, largest: float) -> _Bar:
-        """Return the bar of colours up to an error, and the largest there is, both in millimetres."""
-        top = f"{full:.{captions.decimals_for(full)}f} mm"
-        return cls(
-            f"{top} and more, to {largest:.{captions.decimals_for(largest)}f}" if largest > 1.005 * full else top
-        )
+def _put_bar(cast: Cast, most: str) -> None:
+    """Add what the colours of bones mean, at the right below the lanes."""
+    collection, frame = bpy.data.collections["Captions"], bpy.data.objects["Frame"]
+    foot, right = -0.5 + layout.MARGIN + 0.004, -cast.layout.cells[0].left
 
-    @property
-    def width(self) -> float:
-        return LEGEND * (captions.width_of(LEAST) + captions.width_of(self.most)) + BAR + 2.0 * BAR_GAP
-
-    def put(self, cast: Cast) -> None:
-        collection, frame = bpy.data.collections["Captions"], bpy.data.objects["Frame"]
-        foot, right = -0.5 + layout.MARGIN + 0.004, -cast.layout.cells[0].left
-
-        put = partial(captions.put, frame, collection)
-        put(captions.words("Largest shade", self.most, LEGEND, cast.faint, "RIGHT"), right, foot)
-        left = right - captions.width_of(self.most) * LEGEND - BAR_GAP - BAR
-        for step in range(SHADES):
-            colour = ink(f"Shade {step}", error_hex(step / (SHADES - 1)))
-            part = captions.card(f"Shade {step}", BAR / SHADES, 0.7 * LEGEND, colour, corner=0.0)
-            put(bpy.data.objects.new(part.name, part), left + (step + 0.5) * BAR / SHADES, foot + 0.35 * LEGEND)
-        put(captions.words("Least shade", LEAST, LEGEND, cast.faint, "RIGHT"), left - BAR_GAP, foot)
+    put = partial(captions.put, frame, collection)
+    put(captions.words("Largest shade", most, LEGEND, cast.faint, "RIGHT"), right, foot)
+    left = right - captions.width_of(most) * LEGEND - BAR_GAP - BAR
+    for step in range(SHADES):
+        colour = ink(f"Shade {step}", error_hex(step / (SHADES - 1)))
+        part = captions.card(f"Shade {step}", BAR / SHADES, 0.7 * LEGEND, colour, corner=0.0)
+        put(bpy.data.objects.new(part.name, part), left + (step + 0.5) * BAR / SHADES, foot + 0.35 * LEGEND)
+    put(captions.words("Least shade", LEAST, LEGEND, cast.faint, "RIGHT"), left - BAR_GAP, foot)
 
 
 @contextmanager

@@ -126,19 +126,12 @@ def choice_group(name: str, texts: Sequence[str], material: bpy.types.Material) 
     return _lettered(group, group.add("GeometryNodeStringToCurves", chosen.outputs[0], 1.0), material)
 
 
-def choice(
-    name: str, group: bpy.types.NodeTree, size: float, frames: np.ndarray, chosen: np.ndarray
-) -> bpy.types.Object:
-    """Return a text that is number `chosen` of those of the group at `frames`, both of shape (n,)."""
-    return readout(name, group, size, *_changes(frames, chosen), interpolation="CONSTANT")
-
-
 def _lettered(group: Group, curves: Socket, material: bpy.types.Material) -> bpy.types.NodeTree:
     filled = group.add("GeometryNodeFillCurve", curves)
     return group.finish(group.add("GeometryNodeSetMaterial", filled, Material=material))
 
 
-def _changes(frames: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def changes(frames: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return frames and values only where a value is not that before."""
     new = np.append(True, np.diff(values) != 0)
     return frames[new], values[new]

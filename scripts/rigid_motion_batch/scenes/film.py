@@ -118,26 +118,6 @@ def _open(blend: Path) -> bpy.types.Scene:
     return bpy.context.scene
 
 
-def render_still(scene: bpy.types.Scene, path: Path) -> None:
-    """Render the frame that the scene is at to a PNG.
-
-    Raises
-    ------
-    RuntimeError
-        Where Blender cannot render.
-    """
-    image = scene.render.image_settings
-    if hasattr(image, "media_type"):  # Blender 5 asks for the kind of output first.
-        image.media_type = "IMAGE"
-    image.file_format = "PNG"
-    image.compression = 90
-    with written_beside(path) as beside, silenced():
-        scene.render.filepath = str(beside)
-        bpy.ops.render.render(write_still=True, scene=scene.name)
-        if not beside.is_file():
-            raise RuntimeError(f"{path}: Blender rendered no picture; is the disk full?")
-
-
 def save_blend(path: Path) -> None:
     """Save the open file as a compressed .blend. A file that is there is replaced."""
     with written_beside(path) as beside, silenced():

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -40,20 +39,6 @@ LAG = 1.35
 """The most times that what is followed may need the room which it needs with a focus that is not smoothed."""
 
 
-class Moving(Protocol):
-    """What is seen at n moments."""
-
-    @property
-    def middle(self) -> np.ndarray:
-        """The places that may be followed, shape (n, 3)."""
-
-    def around(self, focus: np.ndarray) -> np.ndarray:
-        """Return its outermost points at every moment, from the focus (n, 3) on: shape (k, 3)."""
-
-    def heading(self, focus: np.ndarray) -> float:
-        """Return the yaw in radians from which it is seen well."""
-
-
 @dataclass(frozen=True, eq=False)
 class Solid:
     """A rigid object."""
@@ -66,10 +51,12 @@ class Solid:
 
     @property
     def middle(self) -> np.ndarray:
+        """The places that may be followed, shape (n, 3)."""
         middle = (self.outline.min(axis=0) + self.outline.max(axis=0)) / 2.0
         return layout.swept_points(self.poses, middle[None])
 
     def around(self, focus: np.ndarray) -> np.ndarray:
+        """Return its outermost points at every moment, from the focus (n, 3) on: shape (k, 3)."""
         poses = Poses(self.poses.positions - focus, self.poses.quaternions, self.poses.scales)
         return layout.swept_points(poses, self.outline)
 
@@ -107,6 +94,10 @@ class Jointed:
         if np.linalg.norm(gone) < WALKED * tall:
             return layout.heading(self.around(focus))
         return float(-np.arctan2(gone[1], gone[0]) - THREE_QUARTER)
+
+
+Moving = Solid | Jointed
+"""What is seen at n moments."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -208,7 +208,8 @@ class Lanes:
             self._put(captions.words(f"{mode} max", text, SMALL * unit, cast.faint, "RIGHT"), right, foot)
         else:  # The joint that the number is of.
             size = min(SMALL, COLUMN / max(map(captions.width_of, cast.joints))) * unit
-            joint = captions.choice(f"{mode} joint", self.names, size, cast.timeline.frames, cast.worst[mode])
+            changes = captions.changes(cast.timeline.frames, cast.worst[mode])
+            joint = captions.readout(f"{mode} joint", self.names, size, *changes, interpolation="CONSTANT")
             self._put(joint, column, foot)
 
     def _add_graph(self, mode: str, left: float, foot: float, width: float, height: float) -> None:

@@ -12,6 +12,8 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from rigid_motion_batch.command_line import listed
+
 from .settings import SubjectError, place_of_subject
 
 TINTED = "Mode"
@@ -63,7 +65,8 @@ def _read_mesh(file: Path, name: str) -> bpy.types.Mesh:
     try:
         with bpy.data.libraries.load(str(file), link=False) as (source, target):
             if name not in source.objects:
-                raise SubjectError(f"{file}: has no object {name!r}; it has {_listed(source.objects)}")
+                others = listed(sorted(source.objects), 12) or "none"
+                raise SubjectError(f"{file}: has no object {name!r}; it has {others}")
             target.objects = [name]
         mesh = _evaluated_copy(target.objects[0])
         names = _own_materials(mesh) if mesh else {}
@@ -79,10 +82,6 @@ def _read_mesh(file: Path, name: str) -> bpy.types.Mesh:
     if not mesh.materials:
         mesh.materials.append(None)
     return mesh
-
-
-def _listed(names: list[str]) -> str:
-    return (", ".join(sorted(names)[:12]) + (", ..." if len(names) > 12 else "")) or "none"
 
 
 def _evaluated_copy(loaded: bpy.types.Object) -> bpy.types.Mesh | None:
@@ -132,3 +131,48 @@ def _discard_all_but(mesh: bpy.types.Mesh | None, before: set[bpy.types.ID]) -> 
     while more := {block for block in arrived - kept if users[block] & kept and not isinstance(block, bpy.types.Text)}:
         kept |= more
     bpy.data.batch_remove(arrived - kept)
+
+
+MOST_TRIANGLES = 4000
+"""So many are some 100 kB in a page."""
+
+TRIES = 6
+
+
+def simplified(requested: str, most: int = MOST_TRIANGLES) -> dict[str, np.ndarray]:
+    """Return the surface of an object in its own axes, in metres: `vertices` (v, 3), `triangles` (t, 3), `tints` (t,).
+
+    It has so many triangles at most. Tints are 1 where a triangle has the colour of its mode, and 0 elsewhere.
+    `requested` is as in `load_subject`, whose errors it raises.
+    """
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    mesh = load_subject(requested)
+    obj = bpy.data.objects.new("Subject", mesh)
+    bpy.context.scene.collection.objects.link(obj)
+    modifier = obj.modifiers.new("Fewer", "DECIMATE")
+    modifier.use_collapse_triangulate = True
+    for _ in range(TRIES):
+        result = _surface(obj)
+        if len(result["triangles"]) <= most:
+            return result
+        # It may leave more than it is asked to, where much hangs on nothing.
+        modifier.ratio *= 0.95 * most / len(result["triangles"])
+    raise SubjectError(f"{requested}: Blender cannot simplify it to {most} triangles")
+
+
+def _surface(obj: bpy.types.Object) -> dict[str, np.ndarray]:
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    evaluated = obj.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
+    mesh.calc_loop_triangles()
+    triangles = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
+    slots = np.empty(len(mesh.loop_triangles), dtype=np.int32)
+    mesh.loop_triangles.foreach_get("vertices", triangles)
+    mesh.loop_triangles.foreach_get("material_index", slots)
+    result = {
+        "vertices": vertices_of(mesh),
+        "triangles": triangles.reshape(-1, 3),
+        "tints": np.isin(slots, tinted_slots(mesh)).astype(float),
+    }
+    evaluated.to_mesh_clear()
+    return result

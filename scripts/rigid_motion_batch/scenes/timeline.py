@@ -36,13 +36,8 @@ class Timeline:
     """Fine frames for a frame."""
 
     @classmethod
-    def of(cls, made: Reconstruction, fps: int, slow_motion: float) -> Timeline:
-        """Return all frames from the first key to the last, `slow_motion` times slower than life."""
-        return cls.between(float(made.times[0]), float(made.times[-1]), fps, slow_motion)
-
-    @classmethod
     def between(cls, start: float, end: float, fps: int, slow_motion: float) -> Timeline:
-        """Return all frames between two moments of a clip."""
+        """Return all frames between two moments of a clip, `slow_motion` times slower than life."""
         rate = fps * slow_motion
         count = math.floor((end - start) * rate + 1e-6) + 1
         return cls(start, count, rate, max(1, math.ceil(PATH_RATE / fps)))

@@ -8,18 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigid_motion_batch.analysis.body_metrics import (
-    JointMetrics,
-    Measured,
-    join_tables,
-    measure_modes,
-    write_key_tables,
-)
 from rigid_motion_batch.analysis.choices import Choice, Tolerance, Uniform
-from rigid_motion_batch.analysis.errors import Ground, errors_of
-from rigid_motion_batch.analysis.metrics import body_table_names
-from rigid_motion_batch.analysis.reconstructions import reconstruct
-from rigid_motion_batch.rows import escaped, write_rows
+from rigid_motion_batch.analysis.metrics import JointMetrics, join_tables, table_names, write_tables
+from rigid_motion_batch.analysis.reconstructions import Ground, Reconstruction, errors_of, reconstruct
+from rigid_motion_batch.analysis.results import measured
+from rigid_motion_batch.files import escaped, write_rows
 from tests.scripts.clips.bodies import JOINTS, swinging_body
 
 HEADER = (
@@ -46,11 +39,11 @@ RADII = np.linspace(0.02, 0.12, len(JOINTS))
 CHOICES = [Uniform("5"), Tolerance("2cm")]
 
 
-def measured(
+def made_of(
     choice: Choice = CHOICES[0], modes: tuple[str, ...] = MODES, joints: tuple[str, ...] = JOINTS, **settings: bool
-) -> Measured:
+) -> Reconstruction:
     clip = swinging_body(joints=joints)
-    return measure_modes(reconstruct(clip, choice, modes, RADII, **settings))
+    return reconstruct(clip, choice, modes, RADII, **settings)
 
 
 def cells_of(path: Path) -> list[list[str]]:
@@ -71,8 +64,8 @@ def number(cell: str) -> bool:
 
 @pytest.mark.parametrize("choice", CHOICES, ids=str)
 def test_the_rows_are_statistics_of_all_joints_and_of_each(choice: Choice) -> None:
-    result = measured(choice)
-    made = result.made
+    made = made_of(choice)
+    result = measured(made)
     assert [row.mode for row in result.rows] == list(MODES)
     assert [(row.mode, row.joint) for row in result.joints] == [(mode, joint) for mode in MODES for joint in JOINTS]
     for row in result.rows:
@@ -97,7 +90,7 @@ def test_the_rows_are_statistics_of_all_joints_and_of_each(choice: Choice) -> No
 
 
 def test_a_joint_that_stays_as_it_is_sends_nothing() -> None:
-    (row, *_) = measured().rows
+    (row, *_) = measured(made_of()).rows
     moving = len(JOINTS) - 1
     assert row.keys == 11 * moving + 1
     assert row.keys_per_s == pytest.approx(5.0)
@@ -109,7 +102,7 @@ def test_a_joint_that_stays_as_it_is_sends_nothing() -> None:
 
 
 def test_the_columns_are_those_promised_and_read_back_exactly(tmp_path: Path) -> None:
-    result = measured(CHOICES[1], joints=HOSTILE)
+    result = measured(made_of(CHOICES[1], joints=HOSTILE))
     write_rows(tmp_path / "joints.csv", JointMetrics, result.joints)
     assert (tmp_path / "joints.csv").read_text().splitlines()[0] == HEADER
     header, *rows = cells_of(tmp_path / "joints.csv")
@@ -121,7 +114,7 @@ def test_the_columns_are_those_promised_and_read_back_exactly(tmp_path: Path) ->
 
 
 def test_tables_are_joined_under_one_header_whatever_joints_are_called(tmp_path: Path) -> None:
-    result = measured(joints=HOSTILE)
+    result = measured(made_of(joints=HOSTILE))
     parts = [tmp_path / f"{number}.csv" for number in range(3)]
     for part, rows in zip(parts, (result.joints, (), result.joints[:3]), strict=True):
         write_rows(part, JointMetrics, rows)
@@ -133,15 +126,16 @@ def test_tables_are_joined_under_one_header_whatever_joints_are_called(tmp_path:
 @pytest.mark.parametrize("joints", [JOINTS, HOSTILE], ids=["plain", "hostile"])
 @pytest.mark.parametrize("choice", CHOICES, ids=str)
 def test_keys_are_tables_of_poses_in_parents_space_and_read_back_exactly(tmp_path, choice, joints):
-    made = measured(choice, joints=joints).made
-    write_key_tables(tmp_path, made)
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(body_table_names(choice, MODES))
-    for name in body_table_names(choice, MODES):
+    made = made_of(choice, joints=joints)
+    write_tables(tmp_path, made)
+    names = table_names(choice, MODES, body=True)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
+    for name in names:
         keys = made.keys[MODES[0] if name == "keys.csv" else name.removesuffix(".keys.csv")]
         header, *rows = cells_of(tmp_path / name)
         assert header == ["joint", "t", "x", "y", "z", "qw", "qx", "qy", "qz"]
-        names = [joint for joint, own in zip(joints, keys, strict=True) for _ in own]
-        assert [row[0] for row in rows] == names
+        own = [joint for joint, own in zip(joints, keys, strict=True) for _ in own]
+        assert [row[0] for row in rows] == own
         assert [[float(cell) for cell in row[1:]] for row in rows] == [
             [made.clip.times[key], *made.clip.poses.positions[number, key], *made.clip.poses.quaternions[number, key]]
             for number in range(len(joints))

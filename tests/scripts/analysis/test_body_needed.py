@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import Poses
-from rigid_motion_batch.analysis.body_needed import OfBody
-from rigid_motion_batch.analysis.needed import RATES, KeysNeeded, keys_needed
+from rigid_motion_batch.analysis.needed import RATES, KeysNeeded, Ways, keys_needed
 from tests.motion.bodies import body_errors
 from tests.scripts.clips.bodies import JOINTS, PARENTS, swinging_body
 
@@ -13,10 +12,10 @@ MODES = ("lerp_slerp", "dq_sclerp", "cga_slerp", "motor_spline")
 
 RADII = np.linspace(0.02, 0.12, len(JOINTS))
 
-WAYS = OfBody(swinging_body(seconds=1.3, seed=6), RADII)
+WAYS = Ways(swinging_body(seconds=1.3, seed=6), RADII)
 
 
-def rms(ways: OfBody, keys: np.ndarray, mode: str) -> float:
+def rms(ways: Ways, keys: np.ndarray, mode: str) -> float:
     """By matrices, in metres."""
     clip = ways.clip
     metres = Poses(clip.poses.positions * clip.metres_per_unit, clip.poses.quaternions)

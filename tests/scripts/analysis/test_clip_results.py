@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import shell_error
-from rigid_motion_batch.analysis.choices import Tolerance, Uniform
-from rigid_motion_batch.analysis.radii import Radii
+from rigid_motion_batch.analysis.choices import Radii, Tolerance, Uniform
 from rigid_motion_batch.analysis.results import clip_result
 from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings.clip_reading import read_source

@@ -5,15 +5,15 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import Poses
-from rigid_motion_batch.analysis.body_metrics import measure_modes
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.metrics import (
     table_names,
     write_poses,
-    write_reconstruction,
+    write_tables,
 )
 from rigid_motion_batch.analysis.modes import BEST_OF
 from rigid_motion_batch.analysis.reconstructions import reconstruct as choose
+from rigid_motion_batch.analysis.results import measured
 from rigid_motion_batch.recordings import read_trajectories
 from tests.scripts.clips.recordings import reconstruct, swinging_clip
 
@@ -24,7 +24,7 @@ def read(path: Path) -> list[dict[str, str]]:
 
 
 def test_bytes_are_counted_for_the_keys_that_were_there_and_not_for_the_rate_that_was_asked_for() -> None:
-    row = measure_modes(reconstruct(swinging_clip(rate=30.0), "120")).rows[0]
+    row = measured(reconstruct(swinging_clip(rate=30.0), "120")).rows[0]
     assert row.bytes_per_s == pytest.approx(30 * 56)
 
 
@@ -43,10 +43,10 @@ def test_poses_read_back_exactly(tmp_path: Path) -> None:
 
 def test_a_mode_for_every_segment_costs_a_byte_a_key_and_is_a_column_of_the_keys(tmp_path: Path) -> None:
     made = choose(swinging_clip(), Uniform("10"), ("lerp_slerp", "motor_spline", BEST_OF), 0.1)
-    *single, best = measure_modes(made).rows
+    *single, best = measured(made).rows
     assert best.mode == BEST_OF
     assert [best.bytes_per_s] == pytest.approx([57 / 56 * row.bytes_per_s for row in single[:1]])
-    write_reconstruction(tmp_path, made)
+    write_tables(tmp_path, made)
     keys, all_keys = read(tmp_path / "best_of.keys.csv"), read(tmp_path / "keys.csv")
     assert [row.pop("mode") for row in keys] == [*made.segment_modes, ""]
     assert keys == all_keys
@@ -60,7 +60,7 @@ def test_a_mode_for_every_segment_costs_a_byte_a_key_and_is_a_column_of_the_keys
 
 def test_in_the_format_of_tum_poses_are_read_back_as_they_were(tmp_path: Path) -> None:
     made = reconstruct(swinging_clip())
-    write_reconstruction(tmp_path, made, "tum")
+    write_tables(tmp_path, made, "tum")
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(table_names(made.choice, made.keys, "tum"))
     for mode in made.keys:
         (read,) = read_trajectories(f"{tmp_path / mode}.tum").trajectories

@@ -10,14 +10,14 @@ from rigid_motion_batch.analysis.needed import (
     RATES,
     KeysNeeded,
     NeededRow,
-    OfRigidBody,
+    Ways,
     evenly_spaced,
     keys_needed,
     overall,
     rows_of,
 )
+from rigid_motion_batch.files import write_rows
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.rows import write_rows
 from tests.scripts.analysis.test_choices import shell_errors
 from tests.scripts.clips.recordings import swinging_clip
 
@@ -39,7 +39,7 @@ def swing() -> Clip:
 
 @pytest.fixture(scope="module")
 def result(swing: Clip) -> KeysNeeded:
-    return keys_needed(OfRigidBody(swing, 0.1), KEYFRAME_MODES)
+    return keys_needed(Ways(swing, 0.1), KEYFRAME_MODES)
 
 
 def test_the_error_to_reach_is_that_of_the_reference_at_its_rate(swing: Clip, result: KeysNeeded) -> None:
@@ -83,7 +83,7 @@ def test_evenly_spaced_keys_reach_it_and_one_segment_fewer_do_not(swing: Clip, r
 def test_fitted_keys_reach_it_and_are_fewer(swing: Clip, result: KeysNeeded) -> None:
     shaken = np.random.default_rng(3).normal(size=swing.poses.positions.shape)
     clip = replace(swing, poses=Poses(swing.poses.positions + 1e-3 * shaken, swing.poses.quaternions))
-    with_fitted = keys_needed(OfRigidBody(clip, 0.1, fit=True), ["motor_spline"])
+    with_fitted = keys_needed(Ways(clip, 0.1, fit=True), ["motor_spline"])
     assert with_fitted.keys.shape == (1, 3, len(RATES))
     assert (with_fitted.reached[:, 2] <= with_fitted.targets * (1.0 + 1e-9)).all()
     assert (with_fitted.keys[:, 2] <= with_fitted.keys[:, 1]).all()
@@ -93,10 +93,10 @@ def test_fitted_keys_reach_it_and_are_fewer(swing: Clip, result: KeysNeeded) -> 
 
 
 def test_where_the_reference_has_all_samples_or_no_two_there_is_nothing_to_reach() -> None:
-    slow = keys_needed(OfRigidBody(swinging_clip(seconds=2.0, rate=15.0), 0.1), ["lerp_slerp", "motor_spline"])
+    slow = keys_needed(Ways(swinging_clip(seconds=2.0, rate=15.0), 0.1), ["lerp_slerp", "motor_spline"])
     assert np.isnan(slow.keys[:, :, :3]).all()
     assert np.isfinite(slow.keys[:, :, 3:]).all()
-    short = keys_needed(OfRigidBody(swinging_clip(seconds=0.1), 0.1), ["lerp_slerp"])
+    short = keys_needed(Ways(swinging_clip(seconds=0.1), 0.1), ["lerp_slerp"])
     assert np.isnan(short.keys[:, :, RATES.index("8")]).all()
     assert np.isfinite(short.keys[:, :, RATES.index("30")]).all()
 
@@ -105,7 +105,7 @@ def test_what_takes_every_sample_is_not_reached() -> None:
     random = np.random.default_rng(0)
     clip = swinging_clip(seconds=2.0, rate=30.5)
     shaken = replace(clip, poses=Poses(random.normal(size=(len(clip.times), 3)), clip.poses.quaternions))
-    result = keys_needed(OfRigidBody(shaken, 0.1), ["lerp_slerp", "motor_spline"])
+    result = keys_needed(Ways(shaken, 0.1), ["lerp_slerp", "motor_spline"])
     at = RATES.index("30")
     assert result.targets[at] > 0.1
     assert np.isinf(result.keys[1, 0, at])

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rigid_motion_batch.analysis.radii import Radii, read_radii
+from rigid_motion_batch.analysis.choices import Radii, read_radii
 from tests.scripts.clips.bodies import swinging_body
 from tests.scripts.clips.recordings import swinging_clip
 

@@ -8,9 +8,11 @@ import pytest
 from rigid_motion.motion import KEYFRAME_MODES, Poses, measure, rms
 from rigid_motion_batch.analysis import reconstructions
 from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform
-from rigid_motion_batch.analysis.errors import Ground, MotionErrors, errors_of
 from rigid_motion_batch.analysis.reconstructions import (
+    Ground,
+    MotionErrors,
     Reconstruction,
+    errors_of,
     identical_modes,
     moving,
     reconstruct,

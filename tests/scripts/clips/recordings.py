@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from rigid_motion.motion import KEYFRAME_MODES, Poses, decimate
-from rigid_motion_batch.analysis.choices import Choice, Uniform
-from rigid_motion_batch.analysis.radii import Radii
+from rigid_motion_batch.analysis.choices import Choice, Radii, Uniform
 from rigid_motion_batch.analysis.reconstructions import Reconstruction
-from rigid_motion_batch.analysis.results import ChoiceResult, made_of, measured
+from rigid_motion_batch.analysis.reconstructions import reconstruct as reconstruct_modes
+from rigid_motion_batch.analysis.results import ChoiceResult, measured
 from rigid_motion_batch.recordings.clips import Clip
 
 
@@ -34,5 +34,5 @@ def reconstruct(clip: Clip, rate: str = "10", modes: tuple[str, ...] = tuple(KEY
 
 def compare_clip(clip: Clip, choice: Choice, modes: Sequence[str], radii: Radii) -> ChoiceResult | None:
     """What a comparison finds of a clip, as one step; None where it is too short for two keys."""
-    made = made_of(clip, choice, modes, radii, shared=False)
+    made = reconstruct_modes(clip, choice, modes, radii.of(clip))
     return None if made is None else measured(made)

@@ -8,6 +8,7 @@ import pytest
 from rigid_motion_batch.recordings import ReadingOptions
 from rigid_motion_batch.recordings.column_names import ColumnName, column_name
 from rigid_motion_batch.recordings.columns import layout_of
+from rigid_motion_batch.recordings.tables import HeaderLine
 from tests.scripts.recordings import logs
 
 
@@ -55,5 +56,5 @@ def test_the_names_on_the_page_are_known(row: str, kinds: set[str]) -> None:
 
 def test_the_logger_on_the_page_writes_what_is_read_without_options() -> None:
     (header,) = re.findall(r'log\.WriteLine\("(.+)"\)', PAGE)
-    assert list(layout_of(header.split(","), ReadingOptions()).bodies) == [""]
+    assert list(layout_of(HeaderLine(Path("take.csv"), 1, ",", header.split(",")), ReadingOptions()).bodies) == [""]
     assert len(re.findall(r"\{\d:R\}", PAGE)) == len(header.split(","))

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import KEYFRAME_MODES
-from rigid_motion_batch.analysis.choices import Choice, Uniform
-from rigid_motion_batch.analysis.radii import Radii
+from rigid_motion_batch.analysis.choices import Choice, Radii, Uniform
 from rigid_motion_batch.analysis.results import clip_result
 from rigid_motion_batch.recordings.clip_reading import read_source
 from rigid_motion_batch.recordings.clips import Clip

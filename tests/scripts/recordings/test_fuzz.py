@@ -19,9 +19,9 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import MODES, interpolate, measure, reduce_keys
-from rigid_motion_batch.analysis.body_metrics import measure_modes
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.reconstructions import reconstruct
+from rigid_motion_batch.analysis.results import measured
 from rigid_motion_batch.recordings import TrajectoryError, read_trajectories
 from rigid_motion_batch.recordings.clip_reading import make_clip
 from rigid_motion_batch.recordings.clips import Clip
@@ -70,7 +70,7 @@ def read_and_fill_in(source: str, number: int) -> bool:
         if clip.rest_body is not None:
             made = reconstruct(clip, Uniform("5"), (mode,), 0.03)
             if made is not None:
-                assert np.isfinite(measure_modes(made).rows[0].rms_shell_m)
+                assert np.isfinite(measured(made).rows[0].rms_shell_m)
         elif len(clip.times) < 50:
             assert len(reduce_keys(clip.times, clip.poses, mode, tolerance=0.01)) >= 2
     return True

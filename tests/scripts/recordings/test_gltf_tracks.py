@@ -5,7 +5,7 @@ import pytest
 
 from rigid_motion.gltf.accessors import numbers
 from rigid_motion.gltf.documents import Document
-from rigid_motion_batch.recordings.gltf_tracks import WIDEST, straightened
+from rigid_motion_batch.recordings.gltf import WIDEST, straightened
 from tests.scripts.recordings.glbs import turning
 
 WAYS = {5126: np.float32, 5122: np.int16, 5120: np.int8, 5123: np.uint16}

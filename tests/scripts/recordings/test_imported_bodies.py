@@ -17,7 +17,7 @@ from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.quaternions import rotate
 from rigid_motion_batch.recordings import Trajectory, gltf, importing, read_trajectories, rigs
 from rigid_motion_batch.recordings.clip_reading import make_clip
-from rigid_motion_batch.recordings.fbx_records import FIRST
+from rigid_motion_batch.recordings.fbx import FIRST
 from rigid_motion_batch.scenes.armature import Rest
 from rigid_motion_batch.scenes.physique import body_size
 from rigid_motion_batch.silencing import silenced
@@ -254,9 +254,7 @@ def test_an_fbx_that_claims_more_than_it_holds_is_refused_before_room_is_made_fo
 
     for packed, expected in ((zlib.compress(bytes(1 << 26)), 8), (b"x" * 20, 1 << 20), (zlib.compress(b""), 2**32 - 1)):
         path.write_bytes(record(packed, expected))
-        assert " is not as long as it says" in (said := refusal(str(path))[1]) or "more than" in said
-    path.write_bytes(record(zlib.compress(bytes(1 << 26)), 1 << 23))
-    assert refusal(str(path))[1].startswith("Blender cannot import this file ("), "which is sound, and no skeleton"
+        assert refusal(str(path))[1].startswith("Blender cannot import this file (")
 
 
 def with_more(path: Path, **more: list) -> str:
@@ -274,7 +272,9 @@ def test_more_nodes_joints_and_channels_than_blender_takes_in_seconds_are_refuse
     count = len(json.loads(path.read_text())["nodes"])
     started = time.perf_counter()
     chain = [{"children": [count + number + 1]} for number in range(5000)]
-    assert refusal(with_more(path, nodes=[*chain, {}]))[1].startswith("more than 500 nodes hang on one another; export")
+    assert refusal(with_more(path, nodes=[*chain, {}]))[1].startswith(
+        "more than 1000 nodes hang on one another; export"
+    )
     assert refusal(with_more(path, nodes=[{}] * 200_000))[1].startswith(
         f"{count + 205_001} nodes are more than the 10000"
     )

@@ -7,7 +7,7 @@ import pytest
 
 from rigid_motion_batch.command_line import Parser
 from rigid_motion_batch.recordings import ReadingOptions
-from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
+from rigid_motion_batch.recordings.options import add_reading_options, reading_options
 
 SAID = ["--columns", "t=when, x=a,device=who", "--time-unit", "ms", "--scale", "0.01", "--euler", "zxy", "--degrees"]
 MEANT = ReadingOptions((("t", "when"), ("x", "a"), ("device", "who")), "ms", 0.01, "zxy", True)

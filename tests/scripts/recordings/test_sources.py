@@ -83,10 +83,10 @@ def test_what_is_no_file_is_told_and_never_opened(folder: Path, body: str) -> No
         Path("circle.csv").symlink_to("circle.csv")
         Path("dangling.csv").symlink_to("gone.csv")
         told = {
-            "pipe.csv": r"this is a pipe \(FIFO\), not a file; write what comes out of it to a file, and name that",
-            "socket.csv": "this is a socket, not a file; write what comes out of it",
-            "/dev/zero": "this is a device, not a file; name a file",
-            "circle.csv": "this is a symbolic link that leads in a circle; name the file itself",
+            "pipe.csv": "this is a pipe or a device, not a file; write what comes out of it to a file, and name that",
+            "socket.csv": "this is a pipe or a device, not a file; write what comes out of it",
+            "/dev/zero": "this is a pipe or a device, not a file; write what comes out of it",
+            "circle.csv": "this is a symbolic link to 'circle.csv', where nothing is; name the file itself",
             "dangling.csv": "this is a symbolic link to 'gone.csv', where nothing is; name the file itself",
         }
         for path, problem in told.items():

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from rigid_motion.motion import KEYFRAME_MODES
-from rigid_motion_batch.analysis.choices import Choice, Uniform
-from rigid_motion_batch.analysis.needed import OfRigidBody, keys_needed
-from rigid_motion_batch.analysis.radii import EVERYWHERE, RIGID
+from rigid_motion_batch.analysis.choices import EVERYWHERE, RIGID, Choice, Uniform
+from rigid_motion_batch.analysis.needed import Ways, keys_needed
 from rigid_motion_batch.analysis.results import ClipResult, clip_result
 from rigid_motion_batch.recordings.clips import Clip, ClipWarning
 from tests.scripts.clips.recordings import compare_clip
@@ -25,5 +24,5 @@ def result_of(
 ) -> ClipResult:
     """What the analysis finds of a clip under some choices of keys."""
     result = [compare_clip(clip, choice, modes, EVERYWHERE) for choice in choices]
-    counted = keys_needed(OfRigidBody(clip, RIGID), modes) if needed else None
+    counted = keys_needed(Ways(clip, RIGID), modes) if needed else None
     return clip_result(replace(clip, warnings=(*clip.warnings, *warnings)), [item for item in result if item], counted)

@@ -9,8 +9,7 @@ from rigid_motion.motion.quaternions import rotate
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.results import ClipResult
 from rigid_motion_batch.report import data
-from rigid_motion_batch.report.data import clip_data, json_in_page
-from rigid_motion_batch.report.mesh import MOST_TRIANGLES, Mesh, drill
+from rigid_motion_batch.report.data import MOST_TRIANGLES, Mesh, clip_data, drill, json_in_page
 from tests.scripts.clips.bodies import swinging_body
 from tests.scripts.clips.recordings import swinging_clip
 from tests.scripts.report.javascript import value_of

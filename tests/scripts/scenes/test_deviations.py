@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rigid_motion.motion import Poses
-from rigid_motion_batch.scenes.deviations import largest_deviation, magnification, magnified
+from rigid_motion_batch.scenes.layout import largest_deviation, magnification, magnified
 
 RANDOM = np.random.default_rng(8)
 MIDDLE = np.array((0.03, -0.1, 0.05))

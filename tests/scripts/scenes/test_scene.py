@@ -66,7 +66,7 @@ def test_every_mode_is_played_on_every_frame_as_it_was_computed(axes):
     clip = dataclasses.replace(changed(swinging_clip(seconds=1.0), offset=300.0), axes=axes)
     reconstruction = reconstruct(clip, "5")
     scene = build_scene(reconstruction, SETTINGS)
-    timeline = Timeline.of(reconstruction, SETTINGS.fps, 1.0)
+    timeline = Timeline.between(float(reconstruction.times[0]), float(reconstruction.times[-1]), SETTINGS.fps, 1.0)
     times = timeline.times_of(timeline.frames)
     centre = np.array(scene["recording_centre_m"])
     results_of = poses_on(
@@ -149,7 +149,7 @@ def test_everything_that_is_written_is_within_the_picture():
 def test_the_number_shows_the_error_of_the_frame_and_the_graph_has_passed_so_far():
     reconstruction = reconstruct(swinging_clip(seconds=1.0), "5", TWO)
     scene = build_scene(reconstruction, SETTINGS)
-    timeline = Timeline.of(reconstruction, SETTINGS.fps, 1.0)
+    timeline = Timeline.between(float(reconstruction.times[0]), float(reconstruction.times[-1]), SETTINGS.fps, 1.0)
     times = timeline.times_of(timeline.frames)
     for mode in TWO:
         number, graph = bpy.data.objects[f"{mode} error"], bpy.data.objects[f"{mode} graph"]
@@ -195,7 +195,7 @@ def test_adaptive_keys_are_marked_in_the_lane_of_the_mode_they_are_of_and_counte
     scene = build_scene(reconstruction, SETTINGS)
     assert scene.name == "swing tolerance-5mm"
     assert bpy.data.curves["Choice of keys"].body == "within 5 mm"
-    timeline = Timeline.of(reconstruction, SETTINGS.fps, 1.0)
+    timeline = Timeline.between(float(reconstruction.times[0]), float(reconstruction.times[-1]), SETTINGS.fps, 1.0)
     assert len(reconstruction.keys["motor_spline"][0]) < len(reconstruction.keys["lerp_slerp"][0])
     for mode, (keys,) in reconstruction.keys.items():
         marks = bpy.data.objects[f"{mode} keys"].data

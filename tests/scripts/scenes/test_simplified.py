@@ -4,11 +4,10 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion_batch.report.mesh import MOST_TRIANGLES as MOST_IN_A_PAGE
-from rigid_motion_batch.report.mesh import Mesh
+from rigid_motion_batch.report.data import MOST_TRIANGLES as MOST_IN_A_PAGE
+from rigid_motion_batch.report.data import Mesh
 from rigid_motion_batch.scenes.settings import MODELS
-from rigid_motion_batch.scenes.simplified import MOST_TRIANGLES, simplified
-from rigid_motion_batch.scenes.subject import load_subject, vertices_of
+from rigid_motion_batch.scenes.subject import MOST_TRIANGLES, load_subject, simplified, vertices_of
 
 
 @pytest.mark.parametrize("name", MODELS)
