@@ -3,8 +3,8 @@
 The file tells how many frames it has a second; keys may be closer. Images that it names are not looked for.
 
 Blender's importer makes room for whatever a file says of itself, up to hundreds of gigabytes, so it is looked first
-whether its records fit one another. A record is where it ends, how many properties it has, how many bytes these take,
-its name, these properties, and further records up to one that is all zeros.
+whether its records fit one another. A record is where it ends, how many properties it has, its name, these properties,
+and further records up to one that is all zeros.
 Source: Blender's notes on the format, https://code.blender.org/2013/08/fbx-binary-file-format-specification/.
 """
 
@@ -12,14 +12,16 @@ from __future__ import annotations
 
 import mmap
 import struct
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from .importing import read_imported, refuse_too_large
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .recordings import Selection, Trajectory, TrajectoryError
+from .tables import LARGEST_FILE
 
 if TYPE_CHECKING:
     import bpy
@@ -76,44 +78,106 @@ SINCE_WIDE = 7500
 DEEPEST = 100
 """Records within records; importers go 10 deep."""
 
+SIZES = {b"Z": 1, b"C": 1, b"B": 1, b"Y": 2, b"I": 4, b"F": 4, b"D": 8, b"L": 8}
+"""Bytes of the properties that are one number."""
+
+ITEMS = {b"b": 1, b"c": 1, b"i": 4, b"l": 8, b"f": 4, b"d": 8}
+"""Bytes of a number in those that are many."""
+
+DENSEST = 1032
+"""Bytes that zlib makes of one at most."""
+
+HARMLESS = 1 << 24
+"""Bytes. What cannot become more is not unpacked to see."""
+
+PIECE = 1 << 20
+
 
 def refuse_damaged(path: Path) -> None:
-    """Raise TrajectoryError where a file is no binary FBX, is cut off, or has records that do not fit one another."""
+    """Raise TrajectoryError where a file is no binary FBX, is cut off, or says more than it holds."""
     with path.open("rb") as file:
         head = file.read(FIRST)
         if head.startswith(MAGIC) and len(head) == FIRST:
             with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
-                problem = _damage(content)
-            if problem:
-                problem = f"this FBX is damaged ({problem})"
-                raise TrajectoryError(path, problem, "copy the file again, or export it anew")
+                _Records(path, content).walk()
             return
     if head and all(byte in b"\t\r\n" or 32 <= byte < 127 for byte in head):
         raise TrajectoryError(path, "this is an FBX of text, or none", "export it as binary FBX, which Blender imports")
     raise TrajectoryError(path, "this is no FBX", "export it again")
 
 
-def _damage(content: mmap.mmap) -> str:
-    """Return what is wrong with the records of a file; empty for nothing."""
-    (version,) = struct.unpack_from("<I", content, len(MAGIC))
-    head = struct.Struct("<QQQB" if version >= SINCE_WIDE else "<IIIB")
-    place, ends = FIRST, list[int]()
-    try:
-        while True:
-            if ends and place == ends[-1] - head.size:
-                place = ends.pop()
-                continue
-            end, count, length, name = head.unpack_from(content, place)
-            if end == 0 and not ends:
-                return ""
-            inside = ends[-1] - head.size if ends else len(content)
-            begin = place + head.size + name
-            place = begin + length
-            if not begin <= place <= end <= inside or count > length:
-                return "a part of it is longer than the whole"
-            if place < end:
-                ends.append(end)
-                if len(ends) > DEEPEST or end - place < head.size:
-                    return "its parts are not one in another"
-    except struct.error:
-        return "it ends too soon"
+class _Records:
+    def __init__(self, path: Path, content: mmap.mmap) -> None:
+        self.path, self.content = path, content
+        (version,) = struct.unpack_from("<I", content, len(MAGIC))
+        self.head = struct.Struct("<QQQB" if version >= SINCE_WIDE else "<IIIB")
+        self.unpacked = 0
+
+    def walk(self) -> None:
+        place = FIRST
+        ends: list[int] = []
+        zeros = self.head.size
+        try:
+            while True:
+                if ends and place == ends[-1] - zeros:
+                    place = ends.pop()
+                    continue
+                end, count, _, name = self.head.unpack_from(self.content, place)
+                if end == 0 and not ends:
+                    return
+                inside = ends[-1] - zeros if ends else len(self.content)
+                begin = place + zeros + name
+                if not begin <= end <= inside or count > end - begin:
+                    self.fail("a part of it is longer than the whole")
+                place = self._behind_properties(begin, count)
+                if place > end:
+                    self.fail("a part of it is longer than the whole")
+                if place < end:
+                    ends.append(end)
+                    if len(ends) > DEEPEST or end - place < zeros:
+                        self.fail("its parts are not one in another")
+        except struct.error:
+            self.fail("it ends too soon")
+
+    def _behind_properties(self, place: int, count: int) -> int:
+        for _ in range(count):
+            kind = self.content[place : place + 1]
+            place += 1
+            if kind in SIZES:
+                place += SIZES[kind]
+            elif kind in (b"R", b"S"):
+                (length,) = struct.unpack_from("<I", self.content, place)
+                place += 4 + length
+            elif kind in ITEMS:
+                length, packed, size = struct.unpack_from("<III", self.content, place)
+                place += 12
+                self._refuse_false_size(place, length * ITEMS[kind], size, packed == 1)
+                place += size
+            else:
+                self.fail("there are properties of no known kind" if kind else "it ends too soon")
+        return place
+
+    def _refuse_false_size(self, place: int, requested: int, size: int, packed: bool) -> None:
+        """Refuse numbers at a place that cannot take as many bytes, unpacked if they are packed, as the file says."""
+        self.unpacked += requested
+        if self.unpacked > LARGEST_FILE:
+            problem = f"its numbers are more than {LARGEST_FILE} bytes"
+            raise TrajectoryError(self.path, problem, "export the skeleton without its meshes, or split the recording")
+        if requested > size * DENSEST if packed else requested != size:
+            self.fail("a list of numbers is not as long as it says")
+        if not packed or size * DENSEST <= HARMLESS:
+            return
+        inflater, result, last = zlib.decompressobj(), 0, place + size
+        try:
+            for first in range(place, last, PIECE):
+                data = self.content[first : min(first + PIECE, last)]
+                while data and result <= requested:
+                    result += len(inflater.decompress(data, PIECE))
+                    data = inflater.unconsumed_tail
+        except zlib.error:
+            result = -1
+        if result > requested or result < 0:
+            self.fail("a list of numbers is not as long as it says")
+
+    def fail(self, problem: str) -> NoReturn:
+        raise TrajectoryError(self.path, f"this FBX is damaged ({problem})", "copy the file again, or export it anew")
