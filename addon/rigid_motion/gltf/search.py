@@ -12,8 +12,9 @@ from typing import Any, cast
 import numpy as np
 
 from ..motion import Poses, SeparateKeys, Skeleton, reduce_skeleton_keys
+from ..motion.bodies import Body
 from ..motion.quaternions import align_signs, from_matrices
-from ..motion.skeleton_stretches import LongRecording, Run, keys_in_stretches
+from ..motion.skeleton_stretches import Run, keys_in_stretches
 from .accessors import EVERY
 from .errors import World
 from .tracks import ROTATION, TRANSLATION, Tracks
@@ -45,10 +46,13 @@ class Search:
         if len(world.stretches) == 1:
             keys = self._reduced(EVERY, tolerance=tolerance, separate=True, fixed=self.fixed)
             return cast(tuple[SeparateKeys, ...], keys)
-        weights = np.broadcast_to(1.0, (len(world.moving), len(world.times)))
         skeleton, free = Skeleton(world.parents), ~self.fixed
-        recording = LongRecording(world.times, skeleton, MODE, world.radii, weights, free, self._poses)
-        keys = keys_in_stretches(recording, tolerance, True, world.stretches, self.run)
+
+        def part(some: slice) -> Body:
+            poses = self._poses(some)
+            return Body(world.times[some], poses, skeleton, MODE, world.radii, np.broadcast_to(1.0, poses.shape), free)
+
+        keys = keys_in_stretches(part, tolerance, True, world.stretches, self.run)
         return cast(tuple[SeparateKeys, ...], keys)
 
     def key_poses(self, tolerance: float) -> np.ndarray:

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from . import twists
 from .checks import check_radius, check_recording, key_samples
 from .modes import MODES, interpolate, mode_named
-from .poses import Poses, numbers
-from .quaternions import align_signs, conjugate, multiply, normalise, rotate
+from .poses import Poses, aligned, numbers
+from .quaternions import conjugate, multiply, normalise, rotate
 
 STEP = 1e-5
 """Of differences that stand for derivatives: in radians, and as a part of the radius."""
@@ -86,7 +86,7 @@ def fit_keys(times: ArrayLike, poses: Poses, keys: ArrayLike, mode: str = "motor
     times = numbers(times, "times")
     check_recording(times, poses)
     keys = key_samples(keys, len(times))
-    fitting = _Fitting(times, Poses(poses.positions, align_signs(poses.quaternions), poses.scales), keys, mode, radius)
+    fitting = _Fitting(times, aligned(poses), keys, mode, radius)
     apart = result.behind + result.ahead + 2
     for _ in range(SWEEPS):
         for first in range(min(apart, len(keys))):

@@ -16,7 +16,7 @@ from .key_splines import SplineErrors
 from .measures import shell_error
 from .modes import MODES
 from .piecewise import blocks
-from .poses import PackedPoses, Poses, beyond, reshaped
+from .poses import Poses, beyond, packed, reshaped
 from .segments import prepare_within
 
 WORST = 1e30
@@ -71,7 +71,7 @@ class Recording:
         self.radius, self.tolerance, self.off_at_keys = np.asarray(radius), np.asarray(tolerance), off_at_keys
         self.starts = np.zeros(1, dtype=np.int64) if starts is None else starts
         self.ends = np.append(self.starts[1:], len(times)) - 1
-        self.truth = PackedPoses(poses)
+        self.truth = packed(poses)
         self.poses_each = float(math.prod(poses.shape[:-1]))
         """How many poses are looked at for the error of a sample, on average."""
 

@@ -14,8 +14,7 @@ from .key_budget import BudgetSearch
 from .key_costs import Recording
 from .key_search import Search
 from .modes import mode_named
-from .poses import Poses, numbers
-from .quaternions import align_signs
+from .poses import Poses, aligned, numbers
 
 
 def reduce_keys(
@@ -108,8 +107,7 @@ def reduce_keys(
     check_recording(times, poses)
     if len(times) <= 2:
         return np.arange(len(times))
-    poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
-    recording = Recording(times, poses, mode, radius, tolerance or 1.0)
+    recording = Recording(times, aligned(poses), mode, radius, tolerance or 1.0)
     if budget is None:
         return Search(recording, rms=rms).within(tries)
     return BudgetSearch(recording, budget, rms=rms).least(tries)

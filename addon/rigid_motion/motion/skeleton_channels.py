@@ -7,6 +7,7 @@ finds those of channels. A joint with a channel that never changes stays a singl
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -93,7 +94,8 @@ class Channels:
         radii, free = np.append(whole.radii, np.zeros(len(apart))), np.append(whole.free, np.ones(len(apart), bool))
         weights = np.concatenate((whole.weights, np.zeros(more)))
         nodes = Poses(positions, quaternions, scales)
-        return Body(whole.times, nodes, Skeleton(parents), whole.mode, radii, weights, free, self._truth())
+        parts = {"radii": radii, "weights": weights, "free": free}
+        return replace(whole, poses=nodes, skeleton=Skeleton(parents), desired=self._truth(), **parts)
 
     def _truth(self) -> Poses:
         """Where nodes should be in the root's space: those that only translate are where their joints are."""
