@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from .checks import check_poses, check_radius, check_recording, check_tolerance, key_samples
 from .measures import shell_error
 from .modes import KEYFRAME_MODES, interpolate, mode_named
-from .poses import Poses, numbers
+from .poses import Poses, numbers, of_each
 
 ALIKE = 1e-6
 """Errors that differ by less than this share are the same: those of modes that are one motion do."""
@@ -203,12 +203,8 @@ def interpolate_by_segments(key_times: ArrayLike, keys: Poses, times: ArrayLike,
     if keys.shape != key_times.shape:
         raise ValueError(f"key times of shape {key_times.shape} do not fit keys of shape {keys.shape}")
     modes_at_times = np.array(modes)[np.clip(np.searchsorted(key_times, times, side="right") - 1, 0, len(modes) - 1)]
-    positions, quaternions = np.empty((len(times), 3)), np.empty((len(times), 4))
-    scales = None if keys.scales is None else np.empty(len(times))
+    result = of_each(keys, lambda rows: np.empty((len(times), rows.shape[-1])))
     for mode in dict.fromkeys(modes):
         selected = modes_at_times == mode
-        filled = interpolate(key_times, keys, times[selected], mode)
-        positions[selected], quaternions[selected] = filled.positions, filled.quaternions
-        if scales is not None:
-            scales[selected] = filled.scales
-    return Poses(positions, quaternions, scales)
+        result[selected] = interpolate(key_times, keys, times[selected], mode)
+    return result
