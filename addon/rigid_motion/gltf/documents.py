@@ -10,9 +10,9 @@ from __future__ import annotations
 import base64
 import json
 import math
+import ntpath
 import re
 import struct
-from binascii import Error as NotBase64
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -259,12 +259,7 @@ def is_inside(uri: str) -> bool:
     """Whether a path stays in its folder, on whatever system."""
     if SCHEME.match(uri) or PurePosixPath(uri).is_absolute() or PureWindowsPath(uri).anchor:
         return False
-    depth = 0
-    for part in PureWindowsPath(uri).parts:
-        depth += -1 if part == ".." else 1
-        if depth < 0:
-            return False
-    return True
+    return ntpath.normpath(uri).split("\\")[0] != ".."
 
 
 def file_of(folder: Path, number: int, uri: object) -> Path:
@@ -280,11 +275,7 @@ def file_of(folder: Path, number: int, uri: object) -> Path:
             f"buffer {number} is outside of its folder ({shown(uri)})", "export it as .glb, which is one file"
         )
     path = folder / unquote(uri)
-    try:
-        is_there = path.is_file()
-    except ValueError:
-        is_there = False
-    if not is_there:
+    if not path.is_file():
         raise GltfError(
             f"buffer {number}, {shown(unquote(uri))}, is not there",
             "bring that file along, or export it as .glb, which is one file",
@@ -303,7 +294,7 @@ def _buffer(folder: Path, number: int, buffer: Json, binary: bytes | FileBytes |
     elif is_data(uri):
         try:
             data = bytes_of_uri(uri)
-        except (NotBase64, ValueError):
+        except ValueError:
             raise GltfError(f"buffer {number} is text that is not in base64") from None
     else:
         data = FileBytes.of(file_of(folder, number, uri))

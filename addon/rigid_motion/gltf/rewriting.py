@@ -19,7 +19,7 @@ import numpy as np
 
 from .accessors import GrowingView, denormalised, raw_numbers, stored_size
 from .documents import Document, FileBytes, Json, data_uri, is_data, objects
-from .tracks import LINEAR, PATHS, ROTATION, TO_WXYZ, TO_XYZW, WEIGHTS, WIDTHS, Clip, Track
+from .tracks import LINEAR, ROTATION, TO_WXYZ, TO_XYZW, WEIGHTS, WIDTHS, Clip, Track, moves_node
 
 KNOWN = re.compile(
     "(?:KHR|EXT)_(?:materials|texture|lights|mesh|animation|node|xmp)_.*|.*_meshopt_compression"
@@ -110,7 +110,7 @@ class _Rewriting:
                 sampler |= {"input": times, "output": values}
                 if sampler.get("interpolation", LINEAR) != new[number].interpolation:
                     sampler["interpolation"] = new[number].interpolation
-            elif is_track(channel):
+            elif moves_node(channel["target"]):
                 continue
             samplers.append(sampler)
             channels.append({**channel, "sampler": len(samplers) - 1})
@@ -188,11 +188,6 @@ class _Rewriting:
             if is_data(described.get("uri")):
                 described["uri"] = data_uri(contents[buffer])
         return replace(self.before, json=json, buffers=tuple(contents), changed=self.before.changed | {*ranges, target})
-
-
-def is_track(channel: Json) -> bool:
-    """Whether a channel moves a node in a way that glTF itself knows."""
-    return "node" in channel["target"] and channel["target"].get("path") in PATHS
 
 
 def _sampler_slots(json: Json) -> Iterator[tuple[Json, str]]:
@@ -286,9 +281,6 @@ class EveryKey:
     times: np.ndarray
     integers: bool
 
-    def __len__(self) -> int:
-        return len(self.times)
-
     def __getitem__(self, rows: slice) -> np.ndarray:
         keyed = self.track.keyed(self.times[rows])
         return shown(keyed, stored(keyed, integers=self.integers)).values
@@ -309,16 +301,11 @@ def stored(track: Track, *, integers: bool) -> StoredTrack:
     """Return a track without tangents as it is stored; rotations as 16-bit integers where these are asked for."""
     values = track.values[..., TO_XYZW] if track.path == ROTATION else track.values
     values = values.reshape(-1, 1 if track.path == WEIGHTS else values.shape[-1])
-    if integers and is_integral(track):
+    if integers and track.path == ROTATION and track.interpolation == LINEAR:
         values = np.rint(values * INTEGER).astype(np.int16)
     else:
         values = values.astype(np.float32)
     return StoredTrack(track.channel, track.interpolation, track.times.astype(np.float32), values)
-
-
-def is_integral(track: Track) -> bool:
-    """Whether a track may be stored as integers."""
-    return track.path == ROTATION and track.interpolation == LINEAR
 
 
 def shown(track: Track, stored: StoredTrack) -> Track:
