@@ -78,19 +78,12 @@ class Search:
         shape = (len(world.moving), len(times))
         positions, quaternions = np.empty((*shape, 3)), np.empty((*shape, 4))
         for row, node in enumerate(world.moving.tolist()):
-            positions[row], quaternions[row] = _pose(world, self.tracks, node, times)
+            if node in world.nodes.matrices:
+                matrix = world.nodes.matrices[node]
+                left, _, right = np.linalg.svd(matrix[:3, :3])
+                turn = left @ np.diag((1.0, 1.0, np.linalg.det(left @ right))) @ right
+                positions[row], quaternions[row] = matrix[:3, 3], from_matrices(turn)
+            else:
+                positions[row] = world.nodes.channel(node, TRANSLATION, self.tracks, times)
+                quaternions[row] = world.nodes.channel(node, ROTATION, self.tracks, times)
         return Poses(positions * world.lengths_above(times), align_signs(quaternions))
-
-
-def _pose(world: World, tracks: Tracks, node: int, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the translation and rotation of a node in its parent's space at these times, or where it always is."""
-    if node in world.nodes.matrices:
-        matrix = world.nodes.matrices[node]
-        left, _, right = np.linalg.svd(matrix[:3, :3])
-        turn = left @ np.diag((1.0, 1.0, np.linalg.det(left @ right))) @ right
-        return matrix[:3, 3], from_matrices(turn)
-    translation, rotation = (
-        tracks[node, path].at(times) if (node, path) in tracks else world.nodes.rest[path][node]
-        for path in (TRANSLATION, ROTATION)
-    )
-    return translation, rotation
