@@ -10,7 +10,6 @@ are too close to one another, or to a key, and left out. Distances are in pixels
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -56,7 +55,7 @@ CLEAR = 9.0
 AT_REST = 1.0
 """The least distance from tick to tick that says something of the usual speed."""
 
-STEPS = [digit * power for power in (1, 10, 100, 1000) for digit in (1, 2, 5)]
+STEPS = [digit * 10**power for power in range(7) for digit in (1, 2, 5)]
 
 
 class Followed(NamedTuple):
@@ -250,12 +249,7 @@ def axis_frames(ticks: np.ndarray) -> np.ndarray:
 
 def _round_step(length: int, most: int) -> int:
     """Return the least of 1, 2, 5, 10, 20... that a length has at most this many of."""
-    return next(
-        digit * power
-        for power in (10**n for n in itertools.count())
-        for digit in (1, 2, 5)
-        if length <= most * digit * power
-    )
+    return next(step for step in STEPS if length <= most * step)
 
 
 def _axes(
