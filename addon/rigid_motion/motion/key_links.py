@@ -39,8 +39,8 @@ PAIRED = 200
 BESIDE = {0: 2, 1: 0}
 """The same for keys of a budget, whatever the effort."""
 
-NEAR = {0: (1.0, 1.2), 1: (1.0, 1.2)}
-"""How many times the least error so far a segment may be off by for these, and for a longer one to be looked at."""
+NEAR = 1.2
+"""How many times the least error so far a segment may be off by for a longer one to be looked at, for these."""
 
 JOINED = 300
 """Times that every sample may be looked at, on average, for these."""
@@ -141,8 +141,7 @@ def joined_keys(costs: Costs, result: list[np.ndarray], budget: int) -> np.ndarr
     best, high = within[0], costs.peak(within[0])
     for some in (result, within[:FEWER]):
         candidates = beside(costs, some, BESIDE[costs.reach])
-        good, alive = (high * times for times in NEAR[costs.reach])
-        links = _links(costs, candidates, some, good, alive, JOINED)
+        links = _links(costs, candidates, some, high, NEAR * high, JOINED)
         if links is not None:
             break
     else:
