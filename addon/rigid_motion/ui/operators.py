@@ -35,7 +35,7 @@ from .targets import (
     scope_for,
     targets_of,
 )
-from .wording import DESCRIPTIONS, LABELS, algebra_of, listed, spoken_of
+from .wording import DESCRIPTIONS, LABELS, algebra_of, listed, split, spoken_of
 
 TURN_SCOPES = [
     (WHOLE, "All Segments", "All segments get so many turns"),
@@ -103,9 +103,7 @@ class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
         return context.window_manager.invoke_props_dialog(self, confirm_text="Bake")
 
     def draw(self, _context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = split(self.layout)
         layout.prop(self, "step")
         layout.row().prop(self, "interpolation", expand=True)
         layout.row().prop(self, "frames", expand=True)
@@ -180,9 +178,7 @@ class RIGID_MOTION_OT_set_turns(OnTargets, bpy.types.Operator):
         return context.window_manager.invoke_props_dialog(self, confirm_text="Set Turns")
 
     def draw(self, _context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = split(self.layout)
         for name in ("turns", "axis", "on"):
             layout.prop(self, name)
 

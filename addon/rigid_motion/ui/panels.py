@@ -47,6 +47,7 @@ from .wording import (
     labelled,
     length,
     reduced_to,
+    split,
     turn,
 )
 
@@ -228,9 +229,7 @@ class _Delta(Folded):
         return target is not None and not target.has_difference_slot and any(target.motion.filled)
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout, target = self.layout, active_target(context)
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout, target = split(self.layout), active_target(context)
         is_quaternion = target.carrier.rotation_mode == "QUATERNION"
         rotation = "delta_rotation_quaternion" if is_quaternion else "delta_rotation_euler"
         parts = ("delta_location", iface_("Location")), (rotation, iface_("Rotation")), ("delta_scale", iface_("Scale"))
