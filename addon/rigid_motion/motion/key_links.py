@@ -71,7 +71,7 @@ def linked_keys(costs: Costs, result: list[np.ndarray]) -> np.ndarray:
     ----------
     costs : Costs
         Of one track, for the largest error, under a mode that reaches no further than one key beyond a segment.
-    found : list of array of int
+    result : list of array of int
         Keys that keep to the tolerance, each from the first sample to the last.
     """
     for width in WIDTHS[costs.reach]:
@@ -95,7 +95,7 @@ def traded_keys(costs: Costs, result: list[np.ndarray], *, budget: int | None = 
     ----------
     costs : Costs
         Of one track, for the mean square, under a mode that reaches no further than one key beyond a segment.
-    found : list of array of int
+    result : list of array of int
         Keys from the first sample to the last: some that keep to the tolerance, and then more and fewer.
     budget : int, optional
         The most keys, instead of a tolerance.
@@ -133,7 +133,7 @@ def joined_keys(costs: Costs, result: list[np.ndarray], budget: int) -> np.ndarr
     ----------
     costs : Costs
         Of one track, for the largest error, under a mode that reaches no further than one key beyond a segment.
-    found : list of array of int
+    result : list of array of int
         Keys within the budget, each from the first sample to the last.
     budget : int
     """

@@ -16,6 +16,7 @@ import bpy
 import gpu
 import numpy as np
 from bpy.app.handlers import persistent
+from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix, Vector
 
 from ...animation.handlers import append_handlers, remove_handlers
@@ -154,16 +155,9 @@ _batches: WeakKeyDictionary[Path, _Batches] = WeakKeyDictionary()
 def _batch(kind: str, points: np.ndarray | list) -> Batch:
     if not len(points):
         return None
-    vertices = gpu.types.GPUVertBuf(_vertex_format(), len(points))
-    vertices.attr_fill("pos", np.ascontiguousarray(points, dtype=np.float32))
-    return gpu.types.GPUBatch(type=kind, buf=vertices)
-
-
-@functools.cache
-def _vertex_format() -> gpu.types.GPUVertFormat:
-    form = gpu.types.GPUVertFormat()
-    form.attr_add(id="pos", comp_type="F32", len=3, fetch_mode="FLOAT")
-    return form
+    # Other shaders draw it, too: all take places alone.
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    return batch_for_shader(shader, kind, {"pos": np.ascontiguousarray(points, dtype=np.float32)})
 
 
 class _Pen:
@@ -372,4 +366,3 @@ def unregister() -> None:
     _shapes.clear()
     _batches.clear()
     _dot_shader.cache_clear()
-    _vertex_format.cache_clear()

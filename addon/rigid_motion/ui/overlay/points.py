@@ -131,12 +131,9 @@ class Path:
 
     def at(self, frame: float) -> tuple[np.ndarray, np.ndarray | None]:
         """Return where it is at a frame, natively and in the mode, each of shape (3,). The path holds its ends."""
-        after = min(max(int(self.frames.searchsorted(frame)), 1), len(self.frames) - 1)
-        first, last = self.frames[after - 1], self.frames[after]
-        share = min(max((frame - first) / (last - first), 0.0), 1.0)
 
         def point(line: np.ndarray) -> np.ndarray:
-            return line[after - 1] + share * (line[after] - line[after - 1])
+            return np.array([np.interp(frame, self.frames, column) for column in line.T])
 
         return point(self.native), None if self.desired is None else point(self.desired)
 
