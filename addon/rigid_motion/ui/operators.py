@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
+from functools import partial
 from typing import ClassVar
 
 import bpy
@@ -280,10 +281,8 @@ class RIGID_MOTION_OT_clear(OnTargets, bpy.types.Operator):
     nothing_to_do = n_("These objects have Blender's own in-betweens already")
     with_work = staticmethod(with_modes)
     leaves_others = True
-
-    def do(self, _context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
-        animation.set_mode(targets, "BLENDER", refused=refused)
-        return rpt_("Blender's own in-betweens")
+    verb = staticmethod(partial(animation.set_mode, mode="BLENDER"))
+    summary = n_("Blender's own in-betweens")
 
 
 class RIGID_MOTION_OT_unbake(OnChanged, bpy.types.Operator):
@@ -306,10 +305,8 @@ class RIGID_MOTION_OT_mend(OnTargets, bpy.types.Operator):
     nothing_to_do = n_("None of these objects lacks its constraint")
     with_work = staticmethod(with_troubles)
     leaves_others = True
-
-    def do(self, _context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
-        animation.restore_constraints(targets, refused=refused)
-        return rpt_("constraint restored")
+    verb = staticmethod(animation.restore_constraints)
+    summary = n_("constraint restored")
 
 
 class RIGID_MOTION_OT_refresh(bpy.types.Operator):
