@@ -19,9 +19,8 @@ from numpy.typing import ArrayLike
 
 from .bodies import Body
 from .checks import check_body, check_flag, check_poses, check_wishes, whole_number
-from .key_budget import BudgetSearch
+from .key_budget import fewest_keys
 from .key_costs import Recording
-from .key_search import Search
 from .modes import MODES, mode_named
 from .poses import LIMIT, Poses, aligned, numbers, packed
 from .skeleton_channels import Channels, SeparateKeys, check_separable
@@ -189,7 +188,7 @@ def reduce_skeleton_keys(
         every = np.arange(len(times))
         return (SeparateKeys(every, every),) * len(skeleton) if separate else (every,) * len(skeleton)
     if shared:
-        key_poses, every = _key_poses(body, tolerance, budget, tries), np.arange(len(times))
+        key_poses, every = fewest_keys(_WholeBody(body, tolerance or 1.0), budget, tries), np.arange(len(times))
         return tuple(key_poses if moves else every for moves in free.tolist())
     search = functools.partial(OwnKeys, body) if channels is None else functools.partial(ChannelKeys, channels)
     if tolerance is not None:
@@ -211,13 +210,6 @@ def _check_stretch(stretch: int, mode: str, shared: bool, tolerance: float | Non
             f"{mode} is smooth, so that keys count beyond the segments next to them: leave out stretch, or take one of "
             + ", ".join(name for name, row in MODES.items() if not row.is_smooth)
         )
-
-
-def _key_poses(body: Body, tolerance: float | None, budget: int | None, tries: int) -> np.ndarray:
-    if len(body.times) <= 2:
-        return np.arange(len(body.times))
-    recording = _WholeBody(body, tolerance or 1.0)
-    return Search(recording).within(tries) if budget is None else BudgetSearch(recording, budget).least(tries)
 
 
 def _own_keys_within(search_for: Callable[[float], OwnKeys], budget: int) -> tuple[np.ndarray, ...]:
