@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import copy
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -125,27 +126,19 @@ class _Rewriting:
 
     def _views_without(self, unused: set[int], of_animations: set[int]) -> set[int]:
         """Return the views that animations alone use, and some of which they use no more."""
-        uses = [(container, container[key]) for container, key in _view_slots(self.json)]
-        owned = {view for number in of_animations for view in _views_of(self.accessors[number])}
-        counted = dict.fromkeys(owned, 0)
-        for _, view in uses:
-            if view in counted:
-                counted[view] += 1
-        for number in of_animations:
-            for view in _views_of(self.accessors[number]):
-                counted[view] -= 1
-        free = {view for view, count in counted.items() if count == 0}
+        uses = Counter(container[key] for container, key in _view_slots(self.json))
+        owned = Counter(view for number in of_animations for view in _views_of(self.accessors[number]))
+        free = {view for view, count in owned.items() if count == uses[view]}
         return free & {view for number in unused for view in _views_of(self.accessors[number])}
 
     def _renumber(self, name: str, unused: set[int], slots: list[tuple[Any, Any]], nothing: Json) -> None:
         """Take entries out of a list, the last ones into their places, and say so wherever they are named."""
         listed = self.json[name]
-        numbers = {number: number for number in range(len(listed))}
         if self.keeps_numbers:
             for number in unused:
                 listed[number] = dict(nothing)
             return
-        kept = [number for number in numbers if number not in unused]
+        kept = [number for number in range(len(listed)) if number not in unused]
         numbers = {before: after for after, before in enumerate(kept)}
         listed[:] = [listed[number] for number in kept]
         for container, key in slots:
