@@ -41,7 +41,7 @@ def _draw_breakdowns(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
         self.layout.operator(f"rigid_motion.{name}")
 
 
-def _draw_rest(self: bpy.types.Menu, context: bpy.types.Context, pie: str, *, posing: bool) -> None:
+def _draw_rest(self: bpy.types.Menu, context: bpy.types.Context, pie: str) -> None:
     layout = self.layout
     layout.operator("rigid_motion.set_turns", text="Set Turns...")
     _draw_breakdowns(self, context)
@@ -54,7 +54,7 @@ def _draw_rest(self: bpy.types.Menu, context: bpy.types.Context, pie: str, *, po
     layout.separator()
     layout.operator("rigid_motion.clear")
     layout.operator("rigid_motion.refresh")
-    layout.operator("rigid_motion.mend" if posing else "rigid_motion.exact")
+    layout.operator("rigid_motion.mend" if is_posing(context) else "rigid_motion.exact")
     layout.separator()
     layout.operator("wm.call_menu_pie", text="Pie Menu").name = pie
 
@@ -64,7 +64,6 @@ class _InView:
 
     bl_label = "Rigid Motion"
     pie: str
-    posing: bool
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
@@ -72,19 +71,17 @@ class _InView:
         _draw_modes(context, layout, WHOLE)
         layout.separator()
         layout.menu(RIGID_MOTION_MT_current.__name__)
-        _draw_rest(self, context, self.pie, posing=self.posing)
+        _draw_rest(self, context, self.pie)
 
 
 class RIGID_MOTION_MT_object(_InView, bpy.types.Menu):
     bl_description = "How the selected objects move from key to key"
     pie = "RIGID_MOTION_MT_pie_object"
-    posing = False
 
 
 class RIGID_MOTION_MT_pose(_InView, bpy.types.Menu):
     bl_description = "How the selected bones move from key to key"
     pie = "RIGID_MOTION_MT_pie_pose"
-    posing = True
 
 
 class RIGID_MOTION_MT_keys(bpy.types.Menu):
@@ -96,10 +93,9 @@ class RIGID_MOTION_MT_keys(bpy.types.Menu):
         layout.operator_context = "INVOKE_REGION_WIN"
         _draw_modes(context, layout, SELECTED)
         layout.separator()
-        posing = is_posing(context)
-        text = iface_("Whole Bone") if posing else iface_("Whole Object")
+        text = iface_("Whole Bone") if is_posing(context) else iface_("Whole Object")
         layout.menu(RIGID_MOTION_MT_whole.__name__, text=text, translate=False)
-        _draw_rest(self, context, RIGID_MOTION_MT_pie_keys.__name__, posing=posing)
+        _draw_rest(self, context, RIGID_MOTION_MT_pie_keys.__name__)
 
 
 class RIGID_MOTION_MT_current(bpy.types.Menu):
