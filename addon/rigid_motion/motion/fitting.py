@@ -149,7 +149,7 @@ class _Fitting:
 def _moved(keys: Poses, chosen: np.ndarray, steps: np.ndarray) -> Poses:
     """Return the keys, some of them (c,) moved by twists (6, c) along their own axes."""
     turns, advances = twists.exponential(steps)
-    positions, quaternions = keys.positions.copy(), keys.quaternions.copy()
-    positions[chosen] += rotate(quaternions[chosen], advances.T)
-    quaternions[chosen] = normalise(multiply(quaternions[chosen], turns.T))
-    return Poses(positions, quaternions, keys.scales)
+    moved = keys.copy()
+    moved.positions[chosen] += rotate(keys.quaternions[chosen], advances.T)
+    moved.quaternions[chosen] = normalise(multiply(keys.quaternions[chosen], turns.T))
+    return moved

@@ -111,9 +111,9 @@ def _keys(task: tuple[Body, float, bool, np.ndarray, Poses]) -> list[np.ndarray]
     recorded, tolerance, separate, moves, still = task
     ends = np.array((0, len(recorded.times) - 1))
     turns, advances = moves[:, 0], moves[:, -1]
-    positions, quaternions = recorded.poses.positions.copy(), recorded.poses.quaternions.copy()
-    positions[~advances], quaternions[~turns] = still.positions[~advances, None], still.quaternions[~turns, None]
-    body = replace(recorded, poses=Poses(positions, quaternions, recorded.poses.scales), desired=recorded.truth)
+    body = replace(recorded, poses=recorded.poses.copy(), desired=recorded.truth)
+    body.poses.positions[~advances] = still.positions[~advances, None]
+    body.poses.quaternions[~turns] = still.quaternions[~turns, None]
     if separate:
         channels = Channels(body, turns, advances)
         of_joints = channels.of_joints(ChannelKeys(channels, tolerance, False).found())
