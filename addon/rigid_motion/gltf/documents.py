@@ -117,7 +117,9 @@ class Document:
         text = _as_text(document)
         if self.chunks is None:
             return beside | {name: text}
-        binary = self._binary
+        # What the first buffer holds, where it is the one inside of the GLB.
+        first = objects(self.json, "buffers")[:1]
+        binary = self.buffers[0] if first and "uri" not in first[0] else None
         parts = [_chunk(JSON_CHUNK, text, b" ")]
         for kind, content in self.chunks:
             if kind == BINARY_CHUNK and binary is not None:
@@ -137,12 +139,6 @@ class Document:
         uris = [part.get("uri") for part in (*buffers, *objects(self.json, "images"))]
         names = {unquote(uri) for uri in uris if isinstance(uri, str) and not is_data(uri) and is_inside(unquote(uri))}
         return {name: (folder / name).read_bytes() for name in names if (folder / name).is_file()}
-
-    @property
-    def _binary(self) -> bytes | FileBytes | None:
-        """What the first buffer holds, where it is the one inside of the GLB."""
-        first = objects(self.json, "buffers")[:1]
-        return self.buffers[0] if self.chunks is not None and first and "uri" not in first[0] else None
 
 
 def read_document(path: Path, *, in_memory: bool = False) -> Document:

@@ -49,9 +49,7 @@ class Level(Recording):
         above = body.skeleton.parents[joints]
         on_roots = above < 0
         parents = there[np.where(on_roots, 0, above)]
-        parents.positions[on_roots], parents.quaternions[on_roots] = 0.0, (1.0, 0.0, 0.0, 0.0)
-        if parents.scales is not None:
-            parents.scales[on_roots] = 1.0
+        parents[on_roots] = Poses((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), 1.0)
         self.parents, self.back = (packed(reshaped(poses, -1)) for poses in (parents, inverse(there[joints])))
         self.carried = [
             _Carried(there[hanging], body.truth[hanging], body.radii[hanging], body.weights[hanging])

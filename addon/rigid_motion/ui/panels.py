@@ -54,9 +54,6 @@ from .wording import (
 Notes = list[tuple[str, str]]
 """Texts, each behind its icon."""
 
-CATEGORY = "Animation"
-"""The tab of the sidebar: in the viewport Blender has its own tools for animation there."""
-
 SPACES = ("VIEW_3D", "DOPESHEET_EDITOR", "GRAPH_EDITOR")
 
 PROMISED = 0.0001
@@ -122,7 +119,7 @@ def _read(target: Transform) -> tuple[Source | None, str]:
 
 class InSidebar:
     bl_region_type: Any = "UI"
-    bl_category = CATEGORY
+    bl_category = "Animation"  # in the viewport Blender has its own tools for animation there
 
 
 class Folded(InSidebar):
