@@ -5,7 +5,6 @@ import pytest
 
 from rigid_motion.motion import (
     Poses,
-    SeparateKeys,
     Skeleton,
     best_modes,
     decimate,
@@ -20,7 +19,6 @@ from rigid_motion.motion import (
     repair,
     rms,
     shell_error,
-    skeleton_errors,
     standing,
 )
 from tests.motion.cases import random_quaternions
@@ -127,10 +125,6 @@ def body_reduced(poses=BODY, **options):
     return reduce_skeleton_keys(TIMES, poses, [-1, 0], **{"tolerance": 0.1, **options})
 
 
-def errors_of_body(**options):
-    return skeleton_errors(TIMES, BODY, [-1, 0], **{"keys": [KEYS, KEYS], **options})
-
-
 STRAIGHT = {"mode": "lerp_slerp"}
 BROKEN = POSES.copy()
 BROKEN.positions[7] = np.nan
@@ -189,12 +183,6 @@ BROKEN.positions[7] = np.nan
         (lambda: body_reduced(stretch=5), "motor_spline is smooth, .* take one of lerp_slerp"),
         (lambda: body_reduced(stretch=5, shared=True, **STRAIGHT), "leave out shared and budget"),
         (lambda: body_reduced(stretch=1, **STRAIGHT), "a stretch of 1 samples is too short: give 2 or more"),
-        (lambda: errors_of_body(keys=[KEYS]), "keys of 1 joints do not fit 2 joints"),
-        (lambda: errors_of_body(keys=[[0, 12]] * 2), "key 1 is sample 12"),
-        (lambda: errors_of_body(parts=0), "parts is 0: give 1"),
-        (lambda: errors_of_body(radius=[0.1] * 3), r"radius of shape \(3,\)"),
-        (lambda: errors_of_body(stored=BODY[:, :4]), "stored poses of shape"),
-        (lambda: errors_of_body(keys=[SeparateKeys(KEYS, KEYS)] * 2, mode="dq_sclerp"), "dq_sclerp is none"),
         (lambda: body_reduced(separate=True, poses=GROWING, **STRAIGHT), "the scale of joint [01] changes"),
         (
             lambda: interpolate(TIMES, Poses(POSES.positions, 0.0 * POSES.quaternions), TIMES),

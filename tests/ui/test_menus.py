@@ -36,7 +36,7 @@ class Layout:
 def drawn(menu):
     """What a menu draws for the active object: operator or menu, icon, properties."""
     layout = Layout()
-    own = {name: getattr(menu, name, None) for name in ("scope", "pie", "posing")}
+    own = {name: getattr(menu, name, None) for name in ("scope", "pie")}
     menu.draw(SimpleNamespace(layout=layout, **own), bpy.context)
     return layout.drawn
 

@@ -6,7 +6,7 @@ the specification has it (glTF 2.0, sections 3.6 and 3.11): -1 to 1, or 0 to 1.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,7 +22,6 @@ MOST_NUMBERS = 2**27
 
 COMPRESSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 """What bytes of a view are not what its accessors say."""
-
 
 EVERY = slice(None)
 
@@ -44,11 +43,8 @@ class Rows:
     """How many rows there are, each of as many elements as make it."""
 
     shape: tuple[int, ...]
-    order: list[int] | slice = field(default_factory=lambda: EVERY)
+    order: list[int] | slice
     """Of the columns."""
-
-    def __len__(self) -> int:
-        return self.count
 
     def __getitem__(self, rows: slice) -> np.ndarray:
         first, end, _ = rows.indices(self.count)

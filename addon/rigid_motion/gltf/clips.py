@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..motion import SeparateKeys
+from ..motion import SeparateKeys, Skeleton
 from ..motion.skeleton_stretches import Run
 from .errors import NOWHERE, PARTS, Feet, World
 from .nodes import Nodes, by_target, steadied
@@ -263,9 +263,7 @@ class ClipReduction:
         """Return samples with those around some eighths, for the nodes of these rows and all that they hang on."""
         desired = np.zeros((len(self.world.moving), len(self.world.times)), dtype=bool)
         desired[rows, eighths // PARTS] = desired[rows, -(-eighths // PARTS)] = True
-        for row in range(len(desired) - 1, -1, -1):
-            if (parent := self.world.parents[row]) >= 0:
-                desired[parent] |= desired[row]
+        desired = Skeleton(self.world.parents).most_below(desired)
         if self.options.shared:
             desired[:] = desired.any(axis=0)
         ends = (0, len(self.world.times) - 1)
@@ -278,20 +276,16 @@ class ClipReduction:
     def _stored(self, samples: Sequence[np.ndarray]) -> list[StoredTrack]:
         """All tracks as they are to be stored, the dense ones with keys at these samples."""
         times, tracks = self.world.times, []
-        moving = [number for number, own in enumerate(samples) if len(own) > 1]
-        dense = list(self.dense.values())
-        targets = list(self.dense)
-        widths = [key_size(targets[number][1], integers=targets[number] in self.storing[0]) for number in moving]
-        shared = shared_times([samples[number] for number in moving], widths, len(times))
+        keys = dict(zip(self.dense, samples, strict=True))
+        moving = [target for target, own in keys.items() if len(own) > 1]
+        widths = [key_size(target[1], integers=target in self.storing[0]) for target in moving]
+        shared = shared_times([keys[target] for target in moving], widths, len(times))
         together = dict(zip(moving, shared, strict=True))
-        for number, (track, own) in enumerate(zip(dense, samples, strict=True)):
-            thinned = track.keyed(times[own])
-            if number not in together:
-                thinned = replace(thinned, times=times[:1])
-            else:
-                # Keys for the sake of others change nothing of what is shown.
-                thinned = thinned.keyed(times[together[number]])
-            tracks.append(self._stored_track(thinned))
+        for target, track in self.dense.items():
+            thinned = track.keyed(times[keys[target]])
+            # Keys for the sake of others change nothing of what is shown.
+            more = thinned.keyed(times[together[target]]) if target in together else replace(thinned, times=times[:1])
+            tracks.append(self._stored_track(more))
         return self._spanning(tracks + [self._stored_track(track) for track in self.settled.values()])
 
     def _spanning(self, tracks: list[StoredTrack]) -> list[StoredTrack]:

@@ -10,9 +10,9 @@ from __future__ import annotations
 import base64
 import json
 import math
+import ntpath
 import re
 import struct
-from binascii import Error as NotBase64
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -117,7 +117,9 @@ class Document:
         text = _as_text(document)
         if self.chunks is None:
             return beside | {name: text}
-        binary = self._binary
+        # What the first buffer holds, where it is the one inside of the GLB.
+        first = objects(self.json, "buffers")[:1]
+        binary = self.buffers[0] if first and "uri" not in first[0] else None
         parts = [_chunk(JSON_CHUNK, text, b" ")]
         for kind, content in self.chunks:
             if kind == BINARY_CHUNK and binary is not None:
@@ -137,12 +139,6 @@ class Document:
         uris = [part.get("uri") for part in (*buffers, *objects(self.json, "images"))]
         names = {unquote(uri) for uri in uris if isinstance(uri, str) and not is_data(uri) and is_inside(unquote(uri))}
         return {name: (folder / name).read_bytes() for name in names if (folder / name).is_file()}
-
-    @property
-    def _binary(self) -> bytes | FileBytes | None:
-        """What the first buffer holds, where it is the one inside of the GLB."""
-        first = objects(self.json, "buffers")[:1]
-        return self.buffers[0] if self.chunks is not None and first and "uri" not in first[0] else None
 
 
 def read_document(path: Path, *, in_memory: bool = False) -> Document:
@@ -259,12 +255,7 @@ def is_inside(uri: str) -> bool:
     """Whether a path stays in its folder, on whatever system."""
     if SCHEME.match(uri) or PurePosixPath(uri).is_absolute() or PureWindowsPath(uri).anchor:
         return False
-    depth = 0
-    for part in PureWindowsPath(uri).parts:
-        depth += -1 if part == ".." else 1
-        if depth < 0:
-            return False
-    return True
+    return ntpath.normpath(uri).split("\\")[0] != ".."
 
 
 def file_of(folder: Path, number: int, uri: object) -> Path:
@@ -280,11 +271,7 @@ def file_of(folder: Path, number: int, uri: object) -> Path:
             f"buffer {number} is outside of its folder ({shown(uri)})", "export it as .glb, which is one file"
         )
     path = folder / unquote(uri)
-    try:
-        is_there = path.is_file()
-    except ValueError:
-        is_there = False
-    if not is_there:
+    if not path.is_file():
         raise GltfError(
             f"buffer {number}, {shown(unquote(uri))}, is not there",
             "bring that file along, or export it as .glb, which is one file",
@@ -303,7 +290,7 @@ def _buffer(folder: Path, number: int, buffer: Json, binary: bytes | FileBytes |
     elif is_data(uri):
         try:
             data = bytes_of_uri(uri)
-        except (NotBase64, ValueError):
+        except ValueError:
             raise GltfError(f"buffer {number} is text that is not in base64") from None
     else:
         data = FileBytes.of(file_of(folder, number, uri))

@@ -219,19 +219,15 @@ class World:
                 some = waiting[begin : begin + EXACTLY]
                 if bounds.flat[some[0]] <= min(largest, tolerance):
                     break
-                errors.flat[some] = self._displacements(there, truth, some)
-                largest = max(largest, float(np.max(errors.flat[some])))
+                where = np.unravel_index(some, errors.shape)
+                errors[where] = ball_displacement(there[where], truth[where], self.radii[where[0]])
+                largest = max(largest, float(np.max(errors[where])))
             padded = np.pad(errors, ((0, 0), (1, 1)))
             peaks = (errors > tolerance) & (errors >= padded[:, :-2]) & (errors >= padded[:, 2:])
             row, number = np.nonzero(peaks)
             rows.append(row)
             numbers.append(number + block.first)
         return largest, np.concatenate(rows), np.concatenate(numbers)
-
-    def _displacements(self, there: AffineMaps, truth: AffineMaps, some: np.ndarray) -> np.ndarray:
-        """Those of some of the balls, by their numbers, in the shape of these."""
-        where = np.unravel_index(some, there.origins.shape[:-1])
-        return ball_displacement(there[where], truth[where], self.radii[where[0]])
 
     @cached_property
     def _to_balls(self) -> np.ndarray:

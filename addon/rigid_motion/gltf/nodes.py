@@ -44,9 +44,6 @@ class Nodes:
         }
         """Of nodes that have one instead, (4, 4)."""
 
-    def __len__(self) -> int:
-        return len(self.parents)
-
     @cached_property
     def skeleton(self) -> Skeleton:
         return Skeleton(self.parents)
@@ -61,7 +58,7 @@ class Nodes:
 
     def below(self, moved: np.ndarray) -> np.ndarray:
         """Return the nodes that move where these (m,) do, parents before their children, shape (n,)."""
-        moves = np.zeros(len(self), dtype=bool)
+        moves = np.zeros(len(self.parents), dtype=bool)
         moves[moved] = True
         for nodes in self.skeleton.levels[1:]:
             moves[nodes] |= moves[self.parents[nodes]]
@@ -70,36 +67,32 @@ class Nodes:
     @cached_property
     def resting(self) -> AffineMaps:
         """Where all nodes are without tracks, shape (nodes,)."""
-        result = self.worlds(np.concatenate(self.skeleton.levels), {}, np.zeros(1))
-        order = np.argsort(np.concatenate(self.skeleton.levels))
-        return result[order, 0]
+        nodes = np.concatenate(self.skeleton.levels)
+        return self.worlds(nodes, {}, np.zeros(1))[np.argsort(nodes), 0]
 
     def worlds(self, nodes: np.ndarray, tracks: Tracks, times: np.ndarray) -> AffineMaps:
         """Where nodes are at times (m,) as tracks move them, shape (nodes, m).
 
         `nodes` (n,) has parents before their children; a parent that is not among them rests.
         """
-        result: dict[int, AffineMaps] = {}
-        for node in nodes.tolist():
-            parent, local = int(self.parents[node]), self._local(node, tracks, times)
-            above = result.get(parent)
-            if above is None and parent >= 0:
-                above = self.resting[parent]
-            result[node] = local if above is None else above @ local
-        shape = (len(nodes), len(times))
-        axes, origins = np.empty((*shape, 3, 3)), np.empty((*shape, 3))
+        seen: dict[int, AffineMaps] = {}
+        result = AffineMaps(np.empty((len(nodes), len(times), 3, 3)), np.empty((len(nodes), len(times), 3)))
         for row, node in enumerate(nodes.tolist()):
-            axes[row], origins[row] = result[node].axes, result[node].origins
-        return AffineMaps(axes, origins)
+            parent, local = int(self.parents[node]), self._local(node, tracks, times)
+            above = seen[parent] if parent in seen else self.resting[parent] if parent >= 0 else None
+            result[row] = seen[node] = local if above is None else above @ local
+        return result
+
+    def channel(self, node: int, path: str, tracks: Tracks, times: np.ndarray) -> np.ndarray:
+        """Return what a node has at times (m,) as tracks move it, shape (m, width), or (1, width) where it rests."""
+        return tracks[node, path].at(times) if (node, path) in tracks else self.rest[path][None, node]
 
     def _local(self, node: int, tracks: Tracks, times: np.ndarray) -> AffineMaps:
         """In its parent's space, shape (m,), or (1,) where it rests."""
         if node in self.matrices:
             matrix = self.matrices[node][None]
             return AffineMaps(matrix[:, :3, :3], matrix[:, :3, 3])
-        translation, rotation, scale = (
-            tracks[node, path].at(times) if (node, path) in tracks else self.rest[path][None, node] for path in WIDTHS
-        )
+        translation, rotation, scale = (self.channel(node, path, tracks, times) for path in WIDTHS)
         axes = np.moveaxis(matrices(rotation), -1, 0) * scale[:, None, :]
         return AffineMaps(axes, translation)
 

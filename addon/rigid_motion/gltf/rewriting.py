@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import copy
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -19,7 +20,7 @@ import numpy as np
 
 from .accessors import GrowingView, denormalised, raw_numbers, stored_size
 from .documents import Document, FileBytes, Json, data_uri, is_data, objects
-from .tracks import LINEAR, PATHS, ROTATION, TO_WXYZ, TO_XYZW, WEIGHTS, WIDTHS, Clip, Track
+from .tracks import LINEAR, ROTATION, TO_WXYZ, TO_XYZW, WEIGHTS, WIDTHS, Clip, Track, moves_node
 
 KNOWN = re.compile(
     "(?:KHR|EXT)_(?:materials|texture|lights|mesh|animation|node|xmp)_.*|.*_meshopt_compression"
@@ -110,7 +111,7 @@ class _Rewriting:
                 sampler |= {"input": times, "output": values}
                 if sampler.get("interpolation", LINEAR) != new[number].interpolation:
                     sampler["interpolation"] = new[number].interpolation
-            elif is_track(channel):
+            elif moves_node(channel["target"]):
                 continue
             samplers.append(sampler)
             channels.append({**channel, "sampler": len(samplers) - 1})
@@ -125,27 +126,19 @@ class _Rewriting:
 
     def _views_without(self, unused: set[int], of_animations: set[int]) -> set[int]:
         """Return the views that animations alone use, and some of which they use no more."""
-        uses = [(container, container[key]) for container, key in _view_slots(self.json)]
-        owned = {view for number in of_animations for view in _views_of(self.accessors[number])}
-        counted = dict.fromkeys(owned, 0)
-        for _, view in uses:
-            if view in counted:
-                counted[view] += 1
-        for number in of_animations:
-            for view in _views_of(self.accessors[number]):
-                counted[view] -= 1
-        free = {view for view, count in counted.items() if count == 0}
+        uses = Counter(container[key] for container, key in _view_slots(self.json))
+        owned = Counter(view for number in of_animations for view in _views_of(self.accessors[number]))
+        free = {view for view, count in owned.items() if count == uses[view]}
         return free & {view for number in unused for view in _views_of(self.accessors[number])}
 
     def _renumber(self, name: str, unused: set[int], slots: list[tuple[Any, Any]], nothing: Json) -> None:
         """Take entries out of a list, the last ones into their places, and say so wherever they are named."""
         listed = self.json[name]
-        numbers = {number: number for number in range(len(listed))}
         if self.keeps_numbers:
             for number in unused:
                 listed[number] = dict(nothing)
             return
-        kept = [number for number in numbers if number not in unused]
+        kept = [number for number in range(len(listed)) if number not in unused]
         numbers = {before: after for after, before in enumerate(kept)}
         listed[:] = [listed[number] for number in kept]
         for container, key in slots:
@@ -188,11 +181,6 @@ class _Rewriting:
             if is_data(described.get("uri")):
                 described["uri"] = data_uri(contents[buffer])
         return replace(self.before, json=json, buffers=tuple(contents), changed=self.before.changed | {*ranges, target})
-
-
-def is_track(channel: Json) -> bool:
-    """Whether a channel moves a node in a way that glTF itself knows."""
-    return "node" in channel["target"] and channel["target"].get("path") in PATHS
 
 
 def _sampler_slots(json: Json) -> Iterator[tuple[Json, str]]:
@@ -286,9 +274,6 @@ class EveryKey:
     times: np.ndarray
     integers: bool
 
-    def __len__(self) -> int:
-        return len(self.times)
-
     def __getitem__(self, rows: slice) -> np.ndarray:
         keyed = self.track.keyed(self.times[rows])
         return shown(keyed, stored(keyed, integers=self.integers)).values
@@ -309,16 +294,11 @@ def stored(track: Track, *, integers: bool) -> StoredTrack:
     """Return a track without tangents as it is stored; rotations as 16-bit integers where these are asked for."""
     values = track.values[..., TO_XYZW] if track.path == ROTATION else track.values
     values = values.reshape(-1, 1 if track.path == WEIGHTS else values.shape[-1])
-    if integers and is_integral(track):
+    if integers and track.path == ROTATION and track.interpolation == LINEAR:
         values = np.rint(values * INTEGER).astype(np.int16)
     else:
         values = values.astype(np.float32)
     return StoredTrack(track.channel, track.interpolation, track.times.astype(np.float32), values)
-
-
-def is_integral(track: Track) -> bool:
-    """Whether a track may be stored as integers."""
-    return track.path == ROTATION and track.interpolation == LINEAR
 
 
 def shown(track: Track, stored: StoredTrack) -> Track:

@@ -12,8 +12,9 @@ from typing import Any, cast
 import numpy as np
 
 from ..motion import Poses, SeparateKeys, Skeleton, reduce_skeleton_keys
+from ..motion.bodies import Body
 from ..motion.quaternions import align_signs, from_matrices
-from ..motion.skeleton_stretches import LongRecording, Run, keys_in_stretches
+from ..motion.skeleton_stretches import Run, keys_in_stretches
 from .accessors import EVERY
 from .errors import World
 from .tracks import ROTATION, TRANSLATION, Tracks
@@ -45,10 +46,13 @@ class Search:
         if len(world.stretches) == 1:
             keys = self._reduced(EVERY, tolerance=tolerance, separate=True, fixed=self.fixed)
             return cast(tuple[SeparateKeys, ...], keys)
-        weights = np.broadcast_to(1.0, (len(world.moving), len(world.times)))
         skeleton, free = Skeleton(world.parents), ~self.fixed
-        recording = LongRecording(world.times, skeleton, MODE, world.radii, weights, free, self._poses)
-        keys = keys_in_stretches(recording, tolerance, True, world.stretches, self.run)
+
+        def part(some: slice) -> Body:
+            poses = self._poses(some)
+            return Body(world.times[some], poses, skeleton, MODE, world.radii, np.broadcast_to(1.0, poses.shape), free)
+
+        keys = keys_in_stretches(part, tolerance, True, world.stretches, self.run)
         return cast(tuple[SeparateKeys, ...], keys)
 
     def key_poses(self, tolerance: float) -> np.ndarray:
@@ -74,19 +78,12 @@ class Search:
         shape = (len(world.moving), len(times))
         positions, quaternions = np.empty((*shape, 3)), np.empty((*shape, 4))
         for row, node in enumerate(world.moving.tolist()):
-            positions[row], quaternions[row] = _pose(world, self.tracks, node, times)
+            if node in world.nodes.matrices:
+                matrix = world.nodes.matrices[node]
+                left, _, right = np.linalg.svd(matrix[:3, :3])
+                turn = left @ np.diag((1.0, 1.0, np.linalg.det(left @ right))) @ right
+                positions[row], quaternions[row] = matrix[:3, 3], from_matrices(turn)
+            else:
+                positions[row] = world.nodes.channel(node, TRANSLATION, self.tracks, times)
+                quaternions[row] = world.nodes.channel(node, ROTATION, self.tracks, times)
         return Poses(positions * world.lengths_above(times), align_signs(quaternions))
-
-
-def _pose(world: World, tracks: Tracks, node: int, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the translation and rotation of a node in its parent's space at these times, or where it always is."""
-    if node in world.nodes.matrices:
-        matrix = world.nodes.matrices[node]
-        left, _, right = np.linalg.svd(matrix[:3, :3])
-        turn = left @ np.diag((1.0, 1.0, np.linalg.det(left @ right))) @ right
-        return matrix[:3, 3], from_matrices(turn)
-    translation, rotation = (
-        tracks[node, path].at(times) if (node, path) in tracks else world.nodes.rest[path][node]
-        for path in (TRANSLATION, ROTATION)
-    )
-    return translation, rotation

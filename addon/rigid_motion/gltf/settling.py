@@ -58,11 +58,6 @@ def on_lines(times: np.ndarray, values: np.ndarray, within: float) -> np.ndarray
     return np.array(keys)
 
 
-def without_repeats(values: np.ndarray) -> np.ndarray:
-    """Return the keys of a stepped channel (n, width) that bring another value, and the first; rising, shape (k,)."""
-    return np.flatnonzero(np.append(True, np.any(values[1:] != values[:-1], axis=1)))
-
-
 def shared_times(keys: Sequence[np.ndarray], widths: Sequence[int], samples: int) -> list[np.ndarray]:
     """Keys of channels, with more of them where channels that then have the same need fewer bytes for their times.
 
@@ -163,7 +158,8 @@ def settled(world: World, clip: Clip, tolerance: float) -> dict[tuple[int, str],
         elif settling.is_constant:
             result[target] = replace(track, interpolation=LINEAR, times=world.times[:1], values=settling.values[:1])
         elif track.interpolation == STEP:
-            keys = without_repeats(track.points)
+            # The first, and those that bring another value.
+            keys = np.flatnonzero(np.append(True, np.any(track.points[1:] != track.points[:-1], axis=1)))
             result[target] = replace(track, times=track.times[keys], values=track.points[keys])
         elif track.path in (SCALE, WEIGHTS):
             keys = on_lines(settling.times, settling.values, settling.within)

@@ -153,6 +153,11 @@ def read_clips(document: Document) -> tuple[Clip, ...]:
     return tuple(_clip(document, number) for number in range(len(objects(document.json, "animations"))))
 
 
+def moves_node(target: Json) -> bool:
+    """Whether what a channel is of is a node, moved in a way that glTF itself knows."""
+    return "node" in target and target.get("path") in PATHS
+
+
 def _clip(document: Document, number: int) -> Clip:
     animation = document.json["animations"][number]
     name = animation.get("name")
@@ -163,7 +168,7 @@ def _clip(document: Document, number: int) -> Clip:
         target = channel.get("target")
         if not isinstance(target, dict):
             raise GltfError(f"{shown(name)}: channel {index} has no target")
-        if "node" not in target or target.get("path") not in PATHS:
+        if not moves_node(target):
             continue
         try:
             track = _track(document, animation, index, channel, times)

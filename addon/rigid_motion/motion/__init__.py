@@ -13,7 +13,6 @@ from .poses import Poses
 from .reduction import reduce_keys
 from .repair import Repair, repair
 from .skeleton_channels import SeparateKeys
-from .skeleton_measures import skeleton_errors
 from .skeleton_reduction import reduce_skeleton_keys
 from .skeletons import Skeleton
 
@@ -39,6 +38,5 @@ __all__ = [
     "repair",
     "rms",
     "shell_error",
-    "skeleton_errors",
     "standing",
 ]

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from .checks import check_poses, check_radius, check_recording, check_tolerance, key_samples
 from .measures import shell_error
 from .modes import KEYFRAME_MODES, interpolate, mode_named
-from .poses import Poses, numbers
+from .poses import Poses, numbers, of_each
 
 ALIKE = 1e-6
 """Errors that differ by less than this share are the same: those of modes that are one motion do."""
@@ -84,11 +84,7 @@ def best_modes(
     """
     if isinstance(modes, str):
         raise ValueError(f"modes to choose from need to be several names: of a single one make a list, [{modes!r}]")
-    if not isinstance(modes, Iterable):
-        raise TypeError(f"modes to choose from are {modes!r}: give a list of names")
-    modes = tuple(modes)
-    for mode in modes:
-        mode_named(mode)
+    modes = _named(modes, "modes to choose from")
     if not modes:
         raise ValueError("there is no mode to choose from")
     check_radius(radius)
@@ -105,6 +101,16 @@ def best_modes(
     rounding = ROUNDING * (float(np.abs(truth.positions).max()) + radius)
     allowed = None if tolerance is None else tolerance + rounding
     return tuple(modes[best] for best in least_errors(errors, keys - keys[0], rounding, allowed))
+
+
+def _named(modes: Iterable[str], what: str) -> tuple[str, ...]:
+    """Return names that are all of modes, or an error that says what they are for."""
+    if not isinstance(modes, Iterable):
+        raise TypeError(f"{what} are {modes!r}: give a list of names")
+    modes = tuple(modes)
+    for mode in modes:
+        mode_named(mode)
+    return modes
 
 
 def least_errors(
@@ -193,22 +199,14 @@ def interpolate_by_segments(key_times: ArrayLike, keys: Poses, times: ArrayLike,
         raise ValueError("modes for segments need a row of at least two key times, and a row of times")
     if isinstance(modes, str):
         raise ValueError(f"{modes!r} is a single mode: give one for each segment, or use interpolate")
-    if not isinstance(modes, Iterable):
-        raise TypeError(f"modes are {modes!r}: give a list of names, one for each segment")
-    modes = tuple(modes)
-    for mode in modes:
-        mode_named(mode)
+    modes = _named(modes, "modes of segments")
     if len(modes) != len(key_times) - 1:
         raise ValueError(f"{len(modes)} modes do not fit {len(key_times)} keys")
     if keys.shape != key_times.shape:
         raise ValueError(f"key times of shape {key_times.shape} do not fit keys of shape {keys.shape}")
     modes_at_times = np.array(modes)[np.clip(np.searchsorted(key_times, times, side="right") - 1, 0, len(modes) - 1)]
-    positions, quaternions = np.empty((len(times), 3)), np.empty((len(times), 4))
-    scales = None if keys.scales is None else np.empty(len(times))
+    result = of_each(keys, lambda rows: np.empty((len(times), rows.shape[-1])))
     for mode in dict.fromkeys(modes):
         selected = modes_at_times == mode
-        filled = interpolate(key_times, keys, times[selected], mode)
-        positions[selected], quaternions[selected] = filled.positions, filled.quaternions
-        if scales is not None:
-            scales[selected] = filled.scales
-    return Poses(positions, quaternions, scales)
+        result[selected] = interpolate(key_times, keys, times[selected], mode)
+    return result

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from .checks import check_body
 from .measures import shell_error
 from .modes import interpolate
-from .poses import PackedPoses, Poses
+from .poses import PackedPoses, Poses, of_each, packed
 from .quaternions import components, normalise
 from .skeletons import AT_ONCE, Skeleton
 
@@ -17,35 +18,28 @@ SOME_TURN = 1e-12
 """What a mean of quaternions is turned by, so that it has a length."""
 
 
+@dataclass(frozen=True, eq=False)
 class Body:
-    """The recording of a body, and what it is measured by. Errors are weighted.
+    """The recording of a body, and what it is measured by. Errors are weighted."""
 
-    `truth` is where joints should be in the root's space, unless that is where their poses put them.
-    """
+    times: np.ndarray
+    poses: Poses
+    skeleton: Skeleton
+    mode: str
+    radii: np.ndarray
+    weights: np.ndarray
+    free: np.ndarray
+    desired: Poses | None = None
+    """Where joints should be in the root's space, unless that is where their poses put them."""
 
-    def __init__(
-        self,
-        times: np.ndarray,
-        poses: Poses,
-        skeleton: Skeleton,
-        mode: str,
-        radii: np.ndarray,
-        weights: np.ndarray,
-        free: np.ndarray,
-        truth: Poses | None = None,
-    ) -> None:
-        self.times, self.poses, self.skeleton, self.mode = times, poses, skeleton, mode
-        self.radii, self.weights, self.free = radii, weights, free
-        if truth is None:
-            with np.errstate(over="ignore", invalid="ignore"):
-                truth = skeleton.in_root_space(poses)
-            check_body(times, truth, ", in the root's space")
-        self.truth = truth
-
-    def with_poses(self, poses: Poses) -> Body:
-        """Return the same with others in the place of its poses, that are to be where those put it."""
-        skeleton, radii, weights, free = self.skeleton, self.radii, self.weights, self.free
-        return Body(self.times, poses, skeleton, self.mode, radii, weights, free, self.truth)
+    @cached_property
+    def truth(self) -> Poses:
+        if self.desired is not None:
+            return self.desired
+        with np.errstate(over="ignore", invalid="ignore"):
+            truth = self.skeleton.in_root_space(self.poses)
+        check_body(self.times, truth, ", in the root's space")
+        return truth
 
     def errors(self, shown: Poses, samples: np.ndarray | None = None) -> np.ndarray:
         """Of all joints (joints, m), where these poses (joints, m) in their parents' space are shown, at samples."""
@@ -75,7 +69,7 @@ class Body:
 
     @cached_property
     def packed_truth(self) -> PackedPoses:
-        return PackedPoses(self.truth)
+        return packed(self.truth)
 
     def shown(self, joint: int, keys: np.ndarray) -> Poses:
         """Return what a joint does between keys (k,), shape (n,)."""
@@ -84,12 +78,8 @@ class Body:
     @cached_property
     def middles(self) -> np.ndarray:
         """The sample of each joint that is nearest to its mean pose, shape (joints,)."""
-        scales = self.poses.scales
-        means = Poses(
-            self.poses.positions.mean(axis=1, keepdims=True),
-            normalise(self.poses.quaternions.mean(axis=1, keepdims=True) + SOME_TURN),
-            None if scales is None else scales.mean(axis=1, keepdims=True),
-        )
+        means = of_each(self.poses, lambda rows: rows.mean(axis=1, keepdims=True))
+        means = Poses(means.positions, normalise(means.quaternions + SOME_TURN), means.scales)
         return np.argmin(self.shell_errors(means, self.poses, self.sizes), axis=1)
 
     def at_rest(self) -> Poses:

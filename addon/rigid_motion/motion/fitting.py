@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from . import twists
 from .checks import check_radius, check_recording, key_samples
 from .modes import MODES, interpolate, mode_named
-from .poses import Poses, numbers
-from .quaternions import align_signs, conjugate, multiply, normalise, rotate
+from .poses import Poses, aligned, numbers
+from .quaternions import conjugate, multiply, normalise, rotate
 
 STEP = 1e-5
 """Of differences that stand for derivatives: in radians, and as a part of the radius."""
@@ -86,7 +86,7 @@ def fit_keys(times: ArrayLike, poses: Poses, keys: ArrayLike, mode: str = "motor
     times = numbers(times, "times")
     check_recording(times, poses)
     keys = key_samples(keys, len(times))
-    fitting = _Fitting(times, Poses(poses.positions, align_signs(poses.quaternions), poses.scales), keys, mode, radius)
+    fitting = _Fitting(times, aligned(poses), keys, mode, radius)
     apart = result.behind + result.ahead + 2
     for _ in range(SWEEPS):
         for first in range(min(apart, len(keys))):
@@ -149,7 +149,7 @@ class _Fitting:
 def _moved(keys: Poses, chosen: np.ndarray, steps: np.ndarray) -> Poses:
     """Return the keys, some of them (c,) moved by twists (6, c) along their own axes."""
     turns, advances = twists.exponential(steps)
-    positions, quaternions = keys.positions.copy(), keys.quaternions.copy()
-    positions[chosen] += rotate(quaternions[chosen], advances.T)
-    quaternions[chosen] = normalise(multiply(quaternions[chosen], turns.T))
-    return Poses(positions, quaternions, keys.scales)
+    moved = keys.copy()
+    moved.positions[chosen] += rotate(keys.quaternions[chosen], advances.T)
+    moved.quaternions[chosen] = normalise(multiply(keys.quaternions[chosen], turns.T))
+    return moved

@@ -63,6 +63,15 @@ SWAPPED = 1.15
 """How many times the budget keys may be in between, for the mean square, to find better places."""
 
 
+def fewest_keys(recording: Recording, budget: int | None, tries: int, *, rms: bool = False) -> np.ndarray:
+    """Return fewest samples within the tolerance of a recording, or the best ones within a budget."""
+    if len(recording.times) <= 2:
+        return np.arange(len(recording.times))
+    if budget is None:
+        return Search(recording, rms=rms).within(tries)
+    return BudgetSearch(recording, budget, rms=rms).least(tries)
+
+
 class BudgetSearch(Search):
     """The search for a number of keys, under one mode: for the largest error, or with `rms` for its mean square."""
 

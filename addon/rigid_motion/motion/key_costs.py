@@ -16,7 +16,7 @@ from .key_splines import SplineErrors
 from .measures import shell_error
 from .modes import MODES
 from .piecewise import blocks
-from .poses import PackedPoses, Poses, beyond, reshaped
+from .poses import Poses, beyond, packed, reshaped
 from .segments import prepare_within
 
 WORST = 1e30
@@ -71,15 +71,9 @@ class Recording:
         self.radius, self.tolerance, self.off_at_keys = np.asarray(radius), np.asarray(tolerance), off_at_keys
         self.starts = np.zeros(1, dtype=np.int64) if starts is None else starts
         self.ends = np.append(self.starts[1:], len(times)) - 1
-        self.truth = PackedPoses(poses)
+        self.truth = packed(poses)
         self.poses_each = float(math.prod(poses.shape[:-1]))
         """How many poses are looked at for the error of a sample, on average."""
-
-    @property
-    def is_plain_spline(self) -> bool:
-        """Whether `SplineErrors` has its errors: under `motor_spline`, of one pose for each sample, without scales."""
-        is_plain = type(self) is Recording and not self.off_at_keys
-        return is_plain and self.mode == "motor_spline" and self.poses.scales is None and len(self.poses.shape) == 1
 
     def errors(self, samples: np.ndarray, shown: Poses) -> np.ndarray:
         """How far what is shown (..., m) is off at some samples (m,), in tolerances, shape (m,)."""
@@ -108,10 +102,10 @@ class Costs:
         """How many segments beyond the two next to it a key influences, on either side."""
         self.keys = 2 + 2 * self.reach
         """How many keys have a say in a segment. A segment is a row of them: samples, -1 where there is none."""
-        self.looked = 0.0
-        """How many poses have been looked at so far."""
         self._first = 0 if recording.off_at_keys else 1
-        self._spline = SplineErrors(recording) if recording.is_plain_spline else None
+        is_plain = type(recording) is Recording and not recording.off_at_keys
+        is_plain &= recording.poses.scales is None and len(recording.poses.shape) == 1
+        self._spline = SplineErrors(recording) if is_plain and recording.mode == "motor_spline" else None
         self._memory = Memory(min(REMEMBERED, REMEMBERED_EACH * len(recording.times)), 2)
 
     def of(self, segments: np.ndarray) -> Found:
@@ -152,20 +146,16 @@ class Costs:
     def _work_out(self, rows: np.ndarray) -> np.ndarray:
         """Costs beside peaks, shape (s, 2), of segments (s, keys) with samples in them."""
         out, done = np.empty((len(rows), 2)), 0
-        self.looked += self.effort(rows)
         for batch, counts in self._batches(rows):
             _, errors = self._errors(batch, counts)
             result, begins = out[done : done + len(batch)], np.cumsum(counts) - counts
-            result[:, 0] = np.add.reduceat(self._powers(errors), begins)
             result[:, 1] = np.maximum.reduceat(errors, begins)
+            # Squaring is quicker than a power.
+            for _ in range(self.power.bit_length() - 1):
+                errors = errors * errors
+            result[:, 0] = np.add.reduceat(errors, begins)
             done += len(batch)
         return out
-
-    def _powers(self, errors: np.ndarray) -> np.ndarray:
-        """By squaring, which is quicker than a power."""
-        for _ in range(self.power.bit_length() - 1):
-            errors = errors * errors
-        return errors
 
     def _batches(self, rows: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Segments (s, keys), a batch at a time, and how many samples there are in each, (s,)."""

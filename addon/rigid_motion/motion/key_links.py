@@ -39,8 +39,8 @@ PAIRED = 200
 BESIDE = {0: 2, 1: 0}
 """The same for keys of a budget, whatever the effort."""
 
-NEAR = {0: (1.0, 1.2), 1: (1.0, 1.2)}
-"""How many times the least error so far a segment may be off by for these, and for a longer one to be looked at."""
+NEAR = 1.2
+"""How many times the least error so far a segment may be off by for a longer one to be looked at, for these."""
 
 JOINED = 300
 """Times that every sample may be looked at, on average, for these."""
@@ -71,7 +71,7 @@ def linked_keys(costs: Costs, result: list[np.ndarray]) -> np.ndarray:
     ----------
     costs : Costs
         Of one track, for the largest error, under a mode that reaches no further than one key beyond a segment.
-    found : list of array of int
+    result : list of array of int
         Keys that keep to the tolerance, each from the first sample to the last.
     """
     for width in WIDTHS[costs.reach]:
@@ -95,7 +95,7 @@ def traded_keys(costs: Costs, result: list[np.ndarray], *, budget: int | None = 
     ----------
     costs : Costs
         Of one track, for the mean square, under a mode that reaches no further than one key beyond a segment.
-    found : list of array of int
+    result : list of array of int
         Keys from the first sample to the last: some that keep to the tolerance, and then more and fewer.
     budget : int, optional
         The most keys, instead of a tolerance.
@@ -133,7 +133,7 @@ def joined_keys(costs: Costs, result: list[np.ndarray], budget: int) -> np.ndarr
     ----------
     costs : Costs
         Of one track, for the largest error, under a mode that reaches no further than one key beyond a segment.
-    found : list of array of int
+    result : list of array of int
         Keys within the budget, each from the first sample to the last.
     budget : int
     """
@@ -141,8 +141,7 @@ def joined_keys(costs: Costs, result: list[np.ndarray], budget: int) -> np.ndarr
     best, high = within[0], costs.peak(within[0])
     for some in (result, within[:FEWER]):
         candidates = beside(costs, some, BESIDE[costs.reach])
-        good, alive = (high * times for times in NEAR[costs.reach])
-        links = _links(costs, candidates, some, good, alive, JOINED)
+        links = _links(costs, candidates, some, high, NEAR * high, JOINED)
         if links is not None:
             break
     else:

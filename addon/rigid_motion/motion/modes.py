@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from . import curves
 from .algebras import cga, dual_quaternions, pga, vector_quaternion
 from .checks import check_flag, check_poses
-from .poses import LIMIT, SHORTEST, Poses, numbers
+from .poses import LIMIT, SHORTEST, Poses, numbers, of_each
 from .segments import Curves, Segments, interpolate_along, prepare_within
 
 
@@ -248,11 +248,7 @@ def interpolate(
     rising = np.take_along_axis(times, order, axis=-1)
     poses = interpolate_along(curves_of_mode, key_times, keys, rising, extrapolate)
     inverse = np.broadcast_to(np.argsort(order, axis=-1, kind="stable"), poses.shape)
-    return Poses(
-        np.take_along_axis(poses.positions, inverse[..., None], axis=-2),
-        np.take_along_axis(poses.quaternions, inverse[..., None], axis=-2),
-        None if poses.scales is None else np.take_along_axis(poses.scales, inverse, axis=-1),
-    )
+    return of_each(poses, lambda rows: np.take_along_axis(rows, inverse[..., None], axis=-2))
 
 
 def in_betweens(

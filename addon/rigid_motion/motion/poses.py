@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
 
-from .quaternions import components, conjugate, from_matrices, multiply, rotate, vectors
+from .quaternions import align_signs, components, conjugate, from_matrices, multiply, rotate, vectors
 
 LIMIT = 1e40
 """A number beyond this is damage, not a measurement, and more than Blender can hold. Powers of it are still floats."""
@@ -210,9 +210,7 @@ class Poses:
     def __getitem__(self, index: Any) -> Poses:
         """Return the poses at `index` of the leading axes, as in NumPy: `poses[3]`, `poses[mask]`, `poses[..., 1:]`."""
         whole = (*(index if isinstance(index, tuple) else (index,)), slice(None))
-        return Poses(
-            self.positions[whole], self.quaternions[whole], None if self.scales is None else self.scales[index]
-        )
+        return of_each(self, lambda rows: rows[whole])
 
     def __setitem__(self, index: Any, poses: Poses) -> None:
         """Put others in the place of those at `index`, in the same arrays. Scales only where both have some."""
@@ -223,66 +221,65 @@ class Poses:
 
     def copy(self) -> Poses:
         """Return the same in arrays of their own."""
-        return Poses(
-            self.positions.copy(), self.quaternions.copy(), None if self.scales is None else self.scales.copy()
-        )
+        return of_each(self, np.ndarray.copy)
 
 
+@dataclass(frozen=True, eq=False)
 class PackedPoses:
     """Poses (..., n) whose components are apart in memory, as what is picked from them is: quicker to work on."""
 
-    def __init__(self, poses: Poses) -> None:
-        rows = [components(poses.positions), components(poses.quaternions)]
-        if poses.scales is not None:
-            rows.append(poses.scales[None])
-        self._rows = np.concatenate(rows)
-
-    @property
-    def rows(self) -> np.ndarray:
-        """Positions, quaternions and, where there are some, scales, shape (7 or 8, ..., n)."""
-        return self._rows
-
-    @classmethod
-    def _view(cls, rows: np.ndarray) -> PackedPoses:
-        view = cls.__new__(cls)
-        view._rows = rows
-        return view
+    rows: np.ndarray
+    """Positions, quaternions and, where there are some, scales, shape (7 or 8, ..., n)."""
 
     def __getitem__(self, samples: np.ndarray) -> Poses:
         """Those at some numbers (m,) or (k, m) of the last axis, shape (..., m) or (..., k, m)."""
-        return _of_rows(self._rows.take(samples, axis=-1))
+        return of_rows(self.rows.take(samples, axis=-1))
 
     def of(self, objects: np.ndarray | slice) -> Poses:
         """Those at some numbers (k,) of the first axis, shape (k, ..., n)."""
-        return _of_rows(self._rows[:, objects])
+        return of_rows(self.rows[:, objects])
 
     def blocks(self, most: int) -> Iterator[PackedPoses]:
         """Yield the same poses (k, ..., n) by ranges of their last axis, so many in each. Views: `put` is seen here."""
-        count = self._rows.shape[-1] if self._rows.ndim > 2 else 0
-        step = max(1, most // max(1, math.prod(self._rows.shape[1:-1])))
+        count = self.rows.shape[-1] if self.rows.ndim > 2 else 0
+        step = max(1, most // max(1, math.prod(self.rows.shape[1:-1])))
         for first in range(0, count, step) if count > step else ():
-            yield self._view(self._rows[..., first : first + step])
+            yield PackedPoses(self.rows[..., first : first + step])
         if count <= step:
             yield self
 
     def put(self, objects: np.ndarray, poses: Poses) -> None:
         """Others (k, ..., n) in the place of those."""
-        self._rows[:3, objects], self._rows[3:7, objects] = components(poses.positions), components(poses.quaternions)
+        self.rows[:3, objects], self.rows[3:7, objects] = components(poses.positions), components(poses.quaternions)
         if poses.scales is not None:
-            self._rows[7, objects] = poses.scales
+            self.rows[7, objects] = poses.scales
 
 
-def _of_rows(rows: np.ndarray) -> Poses:
+def packed(poses: Poses) -> PackedPoses:
+    """Return the same poses, components apart."""
+    rows = [components(poses.positions), components(poses.quaternions)]
+    return PackedPoses(np.concatenate(rows if poses.scales is None else [*rows, poses.scales[None]]))
+
+
+def of_rows(rows: np.ndarray) -> Poses:
+    """Return poses (...) of the rows of `PackedPoses`. Views."""
     return Poses(vectors(rows[:3]), vectors(rows[3:7]), rows[7] if len(rows) > 7 else None)
+
+
+def of_each(poses: Poses, change: Callable[[np.ndarray], np.ndarray]) -> Poses:
+    """Return poses of arrays that are changed alike: positions (..., 3), quaternions (..., 4) and scales (..., 1)."""
+    scales = None if poses.scales is None else change(poses.scales[..., None])[..., 0]
+    return Poses(change(poses.positions), change(poses.quaternions), scales)
 
 
 def reshaped(poses: Poses, *shape: int) -> Poses:
     """Return the same in arrays of these leading axes."""
-    return Poses(
-        poses.positions.reshape(*shape, 3),
-        poses.quaternions.reshape(*shape, 4),
-        None if poses.scales is None else poses.scales.reshape(shape),
-    )
+    return of_each(poses, lambda rows: rows.reshape(*shape, rows.shape[-1]))
+
+
+def aligned(poses: Poses) -> Poses:
+    """Return poses (..., n) whose quaternions have successive signs."""
+    return Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
 
 
 def joined(parts: Sequence[Poses], axis: int = 0) -> Poses:

@@ -10,12 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .checks import check_flag, check_radius, check_recording, check_wishes
-from .key_budget import BudgetSearch
+from .key_budget import fewest_keys
 from .key_costs import Recording
-from .key_search import Search
 from .modes import mode_named
-from .poses import Poses, numbers
-from .quaternions import align_signs
+from .poses import Poses, aligned, numbers
 
 
 def reduce_keys(
@@ -106,10 +104,4 @@ def reduce_keys(
     check_radius(radius)
     times = numbers(times, "times")
     check_recording(times, poses)
-    if len(times) <= 2:
-        return np.arange(len(times))
-    poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
-    recording = Recording(times, poses, mode, radius, tolerance or 1.0)
-    if budget is None:
-        return Search(recording, rms=rms).within(tries)
-    return BudgetSearch(recording, budget, rms=rms).least(tries)
+    return fewest_keys(Recording(times, aligned(poses), mode, radius, tolerance or 1.0), budget, tries, rms=rms)

@@ -24,8 +24,8 @@ import numpy as np
 
 from . import series, twists
 from .piecewise import BLOCK, DENSE, blocks, combine, is_dense, multiply_matrices
-from .poses import Poses
-from .quaternions import align_signs, components, cross, multiply, rotate
+from .poses import Poses, aligned, of_rows, reshaped
+from .quaternions import components, cross, multiply, rotate
 
 STILL = 1e-12
 """Turns in radians, and ways compared with the distance from the world's origin, that are rounding errors."""
@@ -203,11 +203,7 @@ def interpolate_along(
     `key_times` and `times` may leave out the leading axes, and all objects share them. Quaternions of keys are unit.
     """
     shape = keys.shape[:-1] + times.shape[-1:]
-    keys = Poses(
-        keys.positions.reshape(-1, *keys.positions.shape[-2:]),
-        keys.quaternions.reshape(-1, *keys.quaternions.shape[-2:]),
-        None if keys.scales is None else keys.scales.reshape(-1, keys.scales.shape[-1]),
-    )
+    keys = reshaped(keys, -1, keys.shape[-1])
     key_times, times = (np.atleast_2d(rows).reshape(-1, rows.shape[-1]) for rows in (key_times, times))
     result = np.empty((ROWS, len(keys), times.shape[-1]))
     batch_size = max(1, BLOCK // (key_times.shape[-1] + times.shape[-1]))
@@ -215,11 +211,12 @@ def interpolate_along(
         batch = slice(first, first + batch_size)
         batch_key_times, batch_times = (rows if len(rows) == 1 else rows[batch] for rows in (key_times, times))
         _fill(curves, batch_key_times, keys[batch], batch_times, extrapolate, result[:, batch])
-    return Poses(
-        np.moveaxis(result[:3], 0, -1).reshape(*shape, 3),
-        np.moveaxis(result[3:7], 0, -1).reshape(*shape, 4),
-        None if keys.scales is None else result[7].reshape(shape),
-    )
+    return reshaped(_poses(result, keys), *shape)
+
+
+def _poses(rows: np.ndarray, keys: Poses) -> Poses:
+    """Return the poses (...) in rows (ROWS, ...), with scales where the keys have some."""
+    return of_rows(rows if keys.scales is not None else rows[:7])
 
 
 def _fill(
@@ -234,7 +231,7 @@ def _fill(
 
     Key times are (objects or 1, n), keys (objects, n), times (objects or 1, m).
     """
-    segments = Segments.between(key_times, Poses(keys.positions, align_signs(keys.quaternions), keys.scales))
+    segments = Segments.between(key_times, aligned(keys))
     samples = np.broadcast_to(times, out.shape[1:]).ravel()
     outside = bool(np.any(times[:, :1] < key_times[:, :1]) or np.any(times[:, -1:] > key_times[:, -1:]))
 
@@ -279,8 +276,7 @@ def prepare_within(
     are counted throughout. Progress is 0 at a segment's first key and 1 at its second, and may pass both. Where
     `is_aligned`, the signs of the quaternions say which way round a segment turns, which matters at half a turn.
     """
-    quaternions = keys.quaternions if is_aligned else align_signs(keys.quaternions)
-    segments = Segments.between(key_times, Poses(keys.positions, quaternions, keys.scales), desired)
+    segments = Segments.between(key_times, keys if is_aligned else aligned(keys), desired)
     mode, no_numbers = curves(segments), np.empty((0, segments.start.size))
 
     def within(counts: np.ndarray, progress: np.ndarray, selected: slice) -> Poses:
@@ -293,7 +289,7 @@ def prepare_within(
 
         bounds = np.concatenate(((0,), np.cumsum(counts)))
         _evaluate(fill_selected, no_numbers[:, selected], bounds, lambda sample: 2.0 * progress[sample] - 1.0, out)
-        return Poses(out[:3].T, out[3:7].T, None if keys.scales is None else out[7])
+        return _poses(out, keys)
 
     return within
 

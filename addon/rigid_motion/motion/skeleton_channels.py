@@ -14,7 +14,7 @@ import numpy as np
 
 from .bodies import Body
 from .modes import MODES
-from .poses import Poses
+from .poses import Poses, joined
 from .skeletons import Skeleton
 
 NO_TURN = np.array((1.0, 0.0, 0.0, 0.0))
@@ -84,29 +84,21 @@ class Channels:
         if not len(apart):
             return whole
         poses, more = whole.poses, (len(apart), len(whole.times))
-        positions = np.concatenate((poses.positions, poses.positions[apart]))
-        positions[apart] = 0.0
-        quaternions = np.concatenate((poses.quaternions, np.broadcast_to(NO_TURN, (*more, 4))))
-        scales = None if poses.scales is None else np.concatenate((poses.scales, np.ones(more)))
+        scales = None if poses.scales is None else np.ones(more)
+        nodes = joined((poses, Poses(poses.positions[apart], np.broadcast_to(NO_TURN, (*more, 4)), scales)))
+        nodes.positions[apart] = 0.0
         parents = np.concatenate((whole.skeleton.parents, whole.skeleton.parents[apart]))
         parents[apart] = len(poses) + np.arange(len(apart))
         radii, free = np.append(whole.radii, np.zeros(len(apart))), np.append(whole.free, np.ones(len(apart), bool))
         weights = np.concatenate((whole.weights, np.zeros(more)))
-        nodes = Poses(positions, quaternions, scales)
         return Body(whole.times, nodes, Skeleton(parents), whole.mode, radii, weights, free, self._truth())
 
     def _truth(self) -> Poses:
         """Where nodes should be in the root's space: those that only translate are where their joints are."""
         truth, above = self.whole.truth, self.whole.skeleton.parents[self.apart]
         more = truth[self.apart]
-        scales = None
-        if truth.scales is not None:
-            scales = np.concatenate((truth.scales, np.where((above >= 0)[:, None], truth.scales[above], 1.0)))
-        return Poses(
-            np.concatenate((truth.positions, more.positions)),
-            np.concatenate((truth.quaternions, more.quaternions)),
-            scales,
-        )
+        scales = None if truth.scales is None else np.where((above >= 0)[:, None], truth.scales[above], 1.0)
+        return joined((truth, Poses(more.positions, more.quaternions, scales)))
 
     def of_nodes(self, keys: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
         """Return the keys of joints as those of nodes."""

@@ -9,7 +9,7 @@ import numpy as np
 from .bodies import Body
 from .key_costs import Recording
 from .measures import largest_displacement
-from .poses import PackedPoses, Poses, inverse, placed, reshaped
+from .poses import Poses, inverse, packed, placed, reshaped
 from .quaternions import components, conjugate, cross, matrices, multiply
 
 AT_ONCE = 2**13
@@ -49,10 +49,8 @@ class Level(Recording):
         above = body.skeleton.parents[joints]
         on_roots = above < 0
         parents = there[np.where(on_roots, 0, above)]
-        parents.positions[on_roots], parents.quaternions[on_roots] = 0.0, (1.0, 0.0, 0.0, 0.0)
-        if parents.scales is not None:
-            parents.scales[on_roots] = 1.0
-        self.parents, self.back = (PackedPoses(reshaped(poses, -1)) for poses in (parents, inverse(there[joints])))
+        parents[on_roots] = Poses((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), 1.0)
+        self.parents, self.back = (packed(reshaped(poses, -1)) for poses in (parents, inverse(there[joints])))
         self.carried = [
             _Carried(there[hanging], body.truth[hanging], body.radii[hanging], body.weights[hanging])
             for hanging in weighty

@@ -19,15 +19,13 @@ from numpy.typing import ArrayLike
 
 from .bodies import Body
 from .checks import check_body, check_flag, check_poses, check_wishes, whole_number
-from .key_budget import BudgetSearch
+from .key_budget import fewest_keys
 from .key_costs import Recording
-from .key_search import Search
 from .modes import MODES, mode_named
-from .poses import LIMIT, PackedPoses, Poses, numbers
-from .quaternions import align_signs
+from .poses import LIMIT, Poses, aligned, numbers, packed
 from .skeleton_channels import Channels, SeparateKeys, check_separable
 from .skeleton_search import TINY, ChannelKeys, OwnKeys, that_move
-from .skeleton_stretches import LongRecording, Run, keys_in_stretches, stretches
+from .skeleton_stretches import Run, keys_in_stretches, stretches
 from .skeletons import Skeleton
 
 BUDGET_STEPS = 9
@@ -174,11 +172,13 @@ def reduce_skeleton_keys(
             f"joint {joint} hangs on {skeleton.depths[joint]} others, and keys of their own are searched for where it "
             f"is {DEEPEST} at most: shared=True finds key poses for longer chains"
         )
+
+    def part(some: slice) -> Body:
+        return Body(times[some], aligned(poses[:, some]), skeleton, mode, radii, weights[:, some], free)
+
     if stretch is not None and tolerance is not None and len(times) > stretch + 1:
-        recording = LongRecording(times, skeleton, mode, radii, weights, free, lambda some: poses[:, some])
-        return keys_in_stretches(recording, tolerance, separate, stretches(len(times), stretch), run)
-    poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
-    body = Body(times, poses, skeleton, mode, radii, weights, free)
+        return keys_in_stretches(part, tolerance, separate, stretches(len(times), stretch), run)
+    body = part(slice(None))
     channels = Channels(body) if separate else None
     if budget is not None and channels:
         budget = channels.budget(budget)
@@ -188,7 +188,7 @@ def reduce_skeleton_keys(
         every = np.arange(len(times))
         return (SeparateKeys(every, every),) * len(skeleton) if separate else (every,) * len(skeleton)
     if shared:
-        key_poses, every = _key_poses(body, tolerance, budget, tries), np.arange(len(times))
+        key_poses, every = fewest_keys(_WholeBody(body, tolerance or 1.0), budget, tries), np.arange(len(times))
         return tuple(key_poses if moves else every for moves in free.tolist())
     search = functools.partial(OwnKeys, body) if channels is None else functools.partial(ChannelKeys, channels)
     if tolerance is not None:
@@ -210,13 +210,6 @@ def _check_stretch(stretch: int, mode: str, shared: bool, tolerance: float | Non
             f"{mode} is smooth, so that keys count beyond the segments next to them: leave out stretch, or take one of "
             + ", ".join(name for name, row in MODES.items() if not row.is_smooth)
         )
-
-
-def _key_poses(body: Body, tolerance: float | None, budget: int | None, tries: int) -> np.ndarray:
-    if len(body.times) <= 2:
-        return np.arange(len(body.times))
-    recording = _WholeBody(body, tolerance or 1.0)
-    return Search(recording).within(tries) if budget is None else BudgetSearch(recording, budget).least(tries)
 
 
 def _own_keys_within(search_for: Callable[[float], OwnKeys], budget: int) -> tuple[np.ndarray, ...]:
@@ -264,7 +257,7 @@ class _WholeBody(Recording):
         moves = that_move(body.poses) & body.free
         moves[0] |= not moves.any()
         super().__init__(body.times, body.poses[moves], body.mode, 0.0, tolerance)
-        self.body, self.moving, self.everything = body, np.flatnonzero(moves), PackedPoses(body.poses)
+        self.body, self.moving, self.everything = body, np.flatnonzero(moves), packed(body.poses)
 
     def errors(self, samples: np.ndarray, shown: Poses) -> np.ndarray:
         everything = self.everything[samples]

@@ -146,8 +146,7 @@ class OwnKeys:
         """Keys at these of all joints' samples (joints * n,), also for what the joints hang on."""
         desired = np.zeros(self.body.poses.shape, dtype=bool)
         desired.flat[numbers] = True
-        for joints in self.body.skeleton.levels[:0:-1]:
-            np.logical_or.at(desired, self.body.skeleton.parents[joints], desired[joints])
+        desired = self.body.skeleton.most_below(desired)
         for joint in np.flatnonzero(desired.any(axis=1) & self.body.free).tolist():
             more = np.concatenate((self._ends, np.flatnonzero(desired[joint])))
             self._show(joint, np.union1d(self.keys[joint], more))

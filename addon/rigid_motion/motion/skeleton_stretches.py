@@ -9,18 +9,16 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 import numpy as np
 
 from .bodies import Body
 from .measures import shell_error
-from .poses import Poses, joined
-from .quaternions import align_signs
+from .poses import Poses, aligned, joined
 from .skeleton_channels import NO_TURN, Channels, SeparateKeys, changes
 from .skeleton_search import TINY, ChannelKeys, OwnKeys
-from .skeletons import Skeleton
 
 AT_REST = 0.5
 """Of the tolerance: how far off all that rests may be together."""
@@ -28,43 +26,8 @@ AT_REST = 0.5
 Run = Callable[[Callable, Iterable], Iterable]
 """Calls a function with each of many arguments and gives the results in their order, as `map` does."""
 
-
-@dataclass(frozen=True, eq=False)
-class LongRecording:
-    """A body as `reduce_skeleton_keys` gets it, but for its poses, which are looked at part by part."""
-
-    times: np.ndarray
-    skeleton: Skeleton
-    mode: str
-    radii: np.ndarray
-    weights: np.ndarray
-    free: np.ndarray
-    poses: Callable[[slice], Poses]
-    """Those of some of the samples, shape (joints, samples)."""
-
-    def part(self, samples: slice) -> Stretch:
-        poses = self.poses(samples)
-        poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
-        return Stretch(
-            self.times[samples], poses, self.weights[:, samples], self.skeleton, self.mode, self.radii, self.free
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Stretch:
-    """A part of a long recording."""
-
-    times: np.ndarray
-    poses: Poses
-    weights: np.ndarray
-    skeleton: Skeleton
-    mode: str
-    radii: np.ndarray
-    free: np.ndarray
-
-    @property
-    def body(self) -> Body:
-        return Body(self.times, self.poses, self.skeleton, self.mode, self.radii, self.weights, self.free)
+Part = Callable[[slice], Body]
+"""Returns some of the samples of a long recording, which is looked at part by part."""
 
 
 def stretches(samples: int, stretch: int) -> list[slice]:
@@ -75,11 +38,11 @@ def stretches(samples: int, stretch: int) -> list[slice]:
 
 
 def keys_in_stretches(
-    recording: LongRecording, tolerance: float, separate: bool, bounds: list[slice], run: Run
+    part: Part, tolerance: float, separate: bool, bounds: list[slice], run: Run
 ) -> tuple[np.ndarray, ...] | tuple[SeparateKeys, ...]:
     """Return the keys of all joints, or of their channels: all that moves has keys where the stretches meet."""
-    rests, still = _rests(recording, bounds, tolerance, separate, run)
-    tasks = ((recording.part(some), tolerance, separate, rests < 0, still) for some in bounds)
+    rests, still = _rests(part, bounds, tolerance, separate, run)
+    tasks = ((part(some), tolerance, separate, rests < 0, still) for some in bounds)
     moved: list[list[np.ndarray]] = [[] for _ in rests.flat]
     for some, result in zip(bounds, run(_keys, tasks), strict=True):
         for channel, keys in zip(moved, result, strict=True):
@@ -91,55 +54,48 @@ def keys_in_stretches(
     return tuple(map(SeparateKeys, joined[::2], joined[1::2])) if separate else tuple(joined)
 
 
-def _rests(
-    recording: LongRecording, bounds: list[slice], tolerance: float, separate: bool, run: Run
-) -> tuple[np.ndarray, Poses]:
+def _rests(part: Part, bounds: list[slice], tolerance: float, separate: bool, run: Run) -> tuple[np.ndarray, Poses]:
     """Return the sample that each joint, or each of its channels, may stay at, and the poses of joints there (joints,).
 
     Samples are of shape (joints, channels), -1 where one has to move. By the triangle inequality all of them together
     are not off by more than their part of the tolerance.
     """
-    skeleton, joints = recording.skeleton, np.arange(len(recording.skeleton))
-    reached, nearest, poses, grows = zip(*run(_survey, map(recording.part, bounds)), strict=True)
+    reached, nearest, weighs, poses, grows = zip(*run(_survey, map(part, bounds)), strict=True)
     # Of the middles of stretches that in the middle.
-    candidates = _joined(poses)
-    middles = replace(recording.part(slice(0, len(bounds))), poses=candidates).body.middles
+    candidates = aligned(joined(poses, axis=1))
+    body = replace(part(slice(0, len(bounds))), poses=candidates)
+    skeleton, middles, joints = body.skeleton, body.middles, np.arange(len(body.skeleton))
     still = candidates[joints, middles]
     reaches = np.max(reached, axis=0)
     samples = np.array([some.start for some in bounds])[middles] + np.array(nearest)[middles, joints]
-    errors = np.max([*run(_farthest, ((recording.part(some), separate, reaches, still) for some in bounds))], axis=0)
-    chains = skeleton.longest_chains(np.count_nonzero(errors > 0.0, axis=1) * recording.free)
-    weights = skeleton.most_below(recording.weights.max(axis=1))
+    errors = np.max([*run(_farthest, ((part(some), separate, reaches, still) for some in bounds))], axis=0)
+    chains = skeleton.longest_chains(np.count_nonzero(errors > 0.0, axis=1) * body.free)
+    weights = skeleton.most_below(np.max(weighs, axis=0))
     allowed = AT_REST * tolerance / np.maximum(chains, 1) / np.maximum(weights, TINY)
     scales = skeleton.in_root_space(still).scales
     if scales is not None and candidates.scales is not None:
         allowed /= np.where(skeleton.parents < 0, 1.0, scales[skeleton.parents])
         allowed *= not (np.any(grows) or changes(candidates.scales).any())
-    allowed[~recording.free] = 0.0 if separate else -1.0
+    allowed[~body.free] = 0.0 if separate else -1.0
     return np.where(errors <= allowed[:, None], samples[:, None], -1), still
 
 
-def _survey(part: Stretch) -> tuple[np.ndarray, np.ndarray, Poses, bool]:
+def _survey(body: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray, Poses, bool]:
     """How far what hangs on each joint gets from it, with the balls around it, in the joint's unit, shape (joints,).
 
-    And the samples in the middle of their poses (joints,), those poses (joints, 1), and whether scales change.
+    And the samples in the middle of their poses (joints,), the largest weights (joints,), the poses there (joints, 1),
+    and whether scales change.
     """
-    body, scales = part.body, part.poses.scales
+    grows = body.poses.scales is not None and bool(changes(body.poses.scales).any())
     sizes = body.sizes if body.truth.scales is None else body.sizes / body.truth.scales
-    return sizes.max(axis=1), body.middles, body.at_rest(), scales is not None and bool(changes(scales).any())
+    return sizes.max(axis=1), body.middles, body.weights.max(axis=1), body.at_rest(), grows
 
 
-def _farthest(task: tuple[Stretch, bool, np.ndarray, Poses]) -> np.ndarray:
+def _farthest(task: tuple[Body, bool, np.ndarray, Poses]) -> np.ndarray:
     """How far channels are off where joints are still (joints,) at most, shape (joints, channels)."""
     part, separate, reaches, still = task
     pairs = zip(_channels(part.poses, separate), _channels(still[:, None], separate), strict=True)
     return np.stack([shell_error(own, held, reaches[:, None]).max(axis=1) for own, held in pairs], axis=1)
-
-
-def _joined(parts: Sequence[Poses]) -> Poses:
-    """Poses (joints, n) one after the other."""
-    poses = joined(parts, axis=1)
-    return Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
 
 
 def _channels(poses: Poses, separate: bool) -> tuple[Poses, ...]:
@@ -150,14 +106,14 @@ def _channels(poses: Poses, separate: bool) -> tuple[Poses, ...]:
     return Poses(nowhere, poses.quaternions, poses.scales), Poses(poses.positions, unturned, poses.scales)
 
 
-def _keys(task: tuple[Stretch, float, bool, np.ndarray, Poses]) -> list[np.ndarray]:
+def _keys(task: tuple[Body, float, bool, np.ndarray, Poses]) -> list[np.ndarray]:
     """Return the keys of each channel of a stretch; some move (joints, channels), others are still (joints,)."""
-    part, tolerance, separate, moves, still = task
-    recorded, ends = part.body, np.array((0, len(part.times) - 1))
+    recorded, tolerance, separate, moves, still = task
+    ends = np.array((0, len(recorded.times) - 1))
     turns, advances = moves[:, 0], moves[:, -1]
-    positions, quaternions = recorded.poses.positions.copy(), recorded.poses.quaternions.copy()
-    positions[~advances], quaternions[~turns] = still.positions[~advances, None], still.quaternions[~turns, None]
-    body = recorded.with_poses(Poses(positions, quaternions, recorded.poses.scales))
+    body = replace(recorded, poses=recorded.poses.copy(), desired=recorded.truth)
+    body.poses.positions[~advances] = still.positions[~advances, None]
+    body.poses.quaternions[~turns] = still.quaternions[~turns, None]
     if separate:
         channels = Channels(body, turns, advances)
         of_joints = channels.of_joints(ChannelKeys(channels, tolerance, False).found())

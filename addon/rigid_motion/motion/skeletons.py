@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .checks import check_poses
-from .poses import PackedPoses, Poses, placed
+from .poses import Poses, packed, placed
 from .quaternions import rotate
 
 AT_ONCE = 2**15
@@ -162,7 +162,7 @@ class Skeleton:
             raise ValueError(f"poses of shape {poses.shape} do not fit {len(self)} joints, which come first")
         if poses.scales is None and poses.quaternions[0].size <= 4 * FEW:
             return self._few_in_root_space(poses)
-        there = PackedPoses(poses)
+        there = packed(poses)
         for part in there.blocks(AT_ONCE):
             for joints in self.levels[1:]:
                 part.put(joints, placed(part.of(self.parents[joints]), part.of(joints)))

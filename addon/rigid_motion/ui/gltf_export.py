@@ -69,7 +69,7 @@ class RIGID_MOTION_OT_export_gltf(bpy.types.Operator, ExportHelper):
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
-        if not _has_exporter():
+        if "gltf" not in dir(bpy.ops.export_scene):
             cls.poll_message_set(tip_("Enable the add-on glTF 2.0 format first"))
             return False
         return True
@@ -91,10 +91,6 @@ class RIGID_MOTION_OT_export_gltf(bpy.types.Operator, ExportHelper):
             return {"CANCELLED"}
         self.report({"INFO"}, _summary(report, output))
         return {"FINISHED"}
-
-
-def _has_exporter() -> bool:
-    return "gltf" in dir(bpy.ops.export_scene)
 
 
 def _last_options(context: bpy.types.Context) -> dict[str, Any]:

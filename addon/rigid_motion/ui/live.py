@@ -125,10 +125,10 @@ class _Registered:
     bl_options: Any = {"REGISTER"}  # noqa: RUF012 - Blender reads it
     report: Any
 
-    def refuse(self, error: OSError | NotAllowed, text: str = "", **facts: object) -> Any:
+    def refuse(self, error: OSError | NotAllowed, text: str, **facts: object) -> Any:
         """Report why a port cannot be opened, and cancel."""
-        why = getattr(error, "strerror", None) or error
-        self.report({"ERROR"}, text.format(**facts, why=why) if text else str(error))
+        is_failed = isinstance(error, OSError)
+        self.report({"ERROR"}, text.format(**facts, why=error.strerror or error) if is_failed else str(error))
         return {"CANCELLED"}
 
 
@@ -145,9 +145,7 @@ class RIGID_MOTION_OT_live_listen(_Registered, bpy.types.Operator):
         live = context.scene.rigid_motion_live
         try:
             receiving.start(live.host, live.port, _settings, _pairs)
-        except NotAllowed as error:
-            return self.refuse(error)
-        except OSError as error:
+        except (NotAllowed, OSError) as error:
             text = rpt_(
                 "Port {port} of {host} cannot be listened to, maybe another program does: choose another ({why})"
             )
@@ -235,9 +233,7 @@ class RIGID_MOTION_OT_live_send(_Registered, bpy.types.Operator):
         live = context.scene.rigid_motion_live
         try:
             sending.start(live.to_host, live.to_port, context.selected_objects)
-        except NotAllowed as error:
-            return self.refuse(error)
-        except OSError as error:
+        except (NotAllowed, OSError) as error:
             return self.refuse(error, rpt_("{host} is no address that can be sent to ({why})"), host=live.to_host)
         return {"FINISHED"}
 

@@ -12,15 +12,10 @@ DOCS = f"{WEBSITE}/blob/main/docs/"
 
 ANIMATORS = "animators.md"
 
-INSTALL = f"{ANIMATORS}#install"
-CHOOSE = f"{ANIMATORS}#choose-a-mode"
 MODES = f"{ANIMATORS}#which-mode-is-good-for-what"
 SEE = f"{ANIMATORS}#see-the-motion"
 EDIT = f"{ANIMATORS}#edit"
 BREAKDOWN = f"{ANIMATORS}#breakdown-push-and-relax"
-BAKE = f"{ANIMATORS}#bake"
-REDUCE = f"{ANIMATORS}#reduce-keys"
-RIGS = f"{ANIMATORS}#rigs"
 IN_THE_FILE = f"{ANIMATORS}#what-is-in-the-file"
 LIMITS = f"{ANIMATORS}#limits"
 LIVE = "live.md"
@@ -29,24 +24,24 @@ PAGES = (
     ("bpy.ops.rigid_motion.set_mode", MODES),
     *((f"bpy.ops.rigid_motion.{name}", EDIT) for name in ("set_turns", "copy_pose", "create_pose_asset")),
     *((f"bpy.ops.rigid_motion.{name}", BREAKDOWN) for name in ("breakdown", "push", "relax")),
-    ("bpy.ops.rigid_motion.*bake", BAKE),
+    ("bpy.ops.rigid_motion.*bake", f"{ANIMATORS}#bake"),
     ("bpy.ops.rigid_motion.reduce_keys", "reduction.md"),
-    ("bpy.ops.rigid_motion.*_keys", REDUCE),
+    ("bpy.ops.rigid_motion.*_keys", f"{ANIMATORS}#reduce-keys"),
     ("bpy.ops.rigid_motion.mend", IN_THE_FILE),
     ("bpy.ops.rigid_motion.exact", LIMITS),
     ("bpy.ops.rigid_motion.refresh", LIMITS),
     ("bpy.ops.rigid_motion.live_*", LIVE),
-    ("bpy.ops.rigid_motion.*", CHOOSE),
+    ("bpy.ops.rigid_motion.*", f"{ANIMATORS}#choose-a-mode"),
     ("bpy.types.livesettings.*", LIVE),
     ("bpy.types.livebone.*", LIVE),
     ("bpy.types.objectmotion.mode", MODES),
     ("bpy.types.objectmotion.own_*", IN_THE_FILE),
     ("bpy.types.objectmotion.*", EDIT),
     ("bpy.types.slotrecord.*", EDIT),
-    ("bpy.types.bonemotion.mode", RIGS),
+    ("bpy.types.bonemotion.mode", f"{ANIMATORS}#rigs"),
     ("bpy.types.bonemotion.*", EDIT),
     ("bpy.types.rigidmotionoverlay.*", SEE),
-    ("bpy.types.rigidmotionpreferences.*", INSTALL),
+    ("bpy.types.rigidmotionpreferences.*", f"{ANIMATORS}#install"),
     ("bpy.types.showntransform.*", SEE),
 )
 """Operators and properties, in lower case as Blender asks for them, and the page of each: the first that fits."""

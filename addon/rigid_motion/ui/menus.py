@@ -35,27 +35,26 @@ def _draw_modes(
         properties.mode, properties.on = mode, scope
 
 
-def _draw_breakdowns(layout: bpy.types.UILayout) -> None:
-    layout.separator()
-    layout.operator("rigid_motion.push")
-    layout.operator("rigid_motion.relax")
-    layout.operator("rigid_motion.breakdown")
+def _draw_breakdowns(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    self.layout.separator()
+    for name in ("push", "relax", "breakdown"):
+        self.layout.operator(f"rigid_motion.{name}")
 
 
-def _draw_rest(layout: bpy.types.UILayout, pie: str, *, posing: bool) -> None:
+def _draw_rest(self: bpy.types.Menu, context: bpy.types.Context, pie: str) -> None:
+    layout = self.layout
     layout.operator("rigid_motion.set_turns", text="Set Turns...")
-    _draw_breakdowns(layout)
+    _draw_breakdowns(self, context)
     layout.separator()
     layout.operator("rigid_motion.bake", text="Bake to Keys...")
     layout.operator("rigid_motion.unbake")
     layout.separator()
-    layout.operator("rigid_motion.reduce_keys")
-    layout.operator("rigid_motion.restore_keys")
-    layout.operator("rigid_motion.discard_dense_keys")
+    for name in ("reduce_keys", "restore_keys", "discard_dense_keys"):
+        layout.operator(f"rigid_motion.{name}")
     layout.separator()
     layout.operator("rigid_motion.clear")
     layout.operator("rigid_motion.refresh")
-    layout.operator("rigid_motion.mend" if posing else "rigid_motion.exact")
+    layout.operator("rigid_motion.mend" if is_posing(context) else "rigid_motion.exact")
     layout.separator()
     layout.operator("wm.call_menu_pie", text="Pie Menu").name = pie
 
@@ -65,7 +64,6 @@ class _InView:
 
     bl_label = "Rigid Motion"
     pie: str
-    posing: bool
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
@@ -73,19 +71,17 @@ class _InView:
         _draw_modes(context, layout, WHOLE)
         layout.separator()
         layout.menu(RIGID_MOTION_MT_current.__name__)
-        _draw_rest(layout, self.pie, posing=self.posing)
+        _draw_rest(self, context, self.pie)
 
 
 class RIGID_MOTION_MT_object(_InView, bpy.types.Menu):
     bl_description = "How the selected objects move from key to key"
     pie = "RIGID_MOTION_MT_pie_object"
-    posing = False
 
 
 class RIGID_MOTION_MT_pose(_InView, bpy.types.Menu):
     bl_description = "How the selected bones move from key to key"
     pie = "RIGID_MOTION_MT_pie_pose"
-    posing = True
 
 
 class RIGID_MOTION_MT_keys(bpy.types.Menu):
@@ -97,10 +93,9 @@ class RIGID_MOTION_MT_keys(bpy.types.Menu):
         layout.operator_context = "INVOKE_REGION_WIN"
         _draw_modes(context, layout, SELECTED)
         layout.separator()
-        posing = is_posing(context)
-        text = iface_("Whole Bone") if posing else iface_("Whole Object")
+        text = iface_("Whole Bone") if is_posing(context) else iface_("Whole Object")
         layout.menu(RIGID_MOTION_MT_whole.__name__, text=text, translate=False)
-        _draw_rest(layout, RIGID_MOTION_MT_pie_keys.__name__, posing=posing)
+        _draw_rest(self, context, RIGID_MOTION_MT_pie_keys.__name__)
 
 
 class RIGID_MOTION_MT_current(bpy.types.Menu):
@@ -182,10 +177,6 @@ def _draw_keys(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
     self.layout.menu(RIGID_MOTION_MT_keys.__name__)
 
 
-def _draw_in_betweens(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
-    _draw_breakdowns(self.layout)
-
-
 def _draw_copy(self: bpy.types.Menu, context: bpy.types.Context) -> None:
     self.layout.separator()
     self.layout.operator(RIGID_MOTION_OT_copy_pose.bl_idname, icon="COPYDOWN")
@@ -211,7 +202,7 @@ ENTRIES = {
     "VIEW3D_MT_object_context_menu": _draw_in_view,
     "VIEW3D_MT_pose": _draw_copy,
     "VIEW3D_MT_pose_context_menu": _draw_copy_and_view,
-    "VIEW3D_MT_pose_slide": _draw_in_betweens,
+    "VIEW3D_MT_pose_slide": _draw_breakdowns,
     "TOPBAR_MT_file_export": _draw_export,
 }
 """Blender's menus, and what is appended to each. That of Object > Animation is the one of Pose > Animation too."""

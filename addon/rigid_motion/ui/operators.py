@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
+from functools import partial
 from typing import ClassVar
 
 import bpy
@@ -35,7 +36,7 @@ from .targets import (
     scope_for,
     targets_of,
 )
-from .wording import DESCRIPTIONS, LABELS, algebra_of, listed, spoken_of
+from .wording import DESCRIPTIONS, LABELS, algebra_of, listed, split, spoken_of
 
 TURN_SCOPES = [
     (WHOLE, "All Segments", "All segments get so many turns"),
@@ -103,9 +104,7 @@ class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
         return context.window_manager.invoke_props_dialog(self, confirm_text="Bake")
 
     def draw(self, _context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = split(self.layout)
         layout.prop(self, "step")
         layout.row().prop(self, "interpolation", expand=True)
         layout.row().prop(self, "frames", expand=True)
@@ -180,9 +179,7 @@ class RIGID_MOTION_OT_set_turns(OnTargets, bpy.types.Operator):
         return context.window_manager.invoke_props_dialog(self, confirm_text="Set Turns")
 
     def draw(self, _context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = split(self.layout)
         for name in ("turns", "axis", "on"):
             layout.prop(self, name)
 
@@ -284,10 +281,8 @@ class RIGID_MOTION_OT_clear(OnTargets, bpy.types.Operator):
     nothing_to_do = n_("These objects have Blender's own in-betweens already")
     with_work = staticmethod(with_modes)
     leaves_others = True
-
-    def do(self, _context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
-        animation.set_mode(targets, "BLENDER", refused=refused)
-        return rpt_("Blender's own in-betweens")
+    verb = staticmethod(partial(animation.set_mode, mode="BLENDER"))
+    summary = n_("Blender's own in-betweens")
 
 
 class RIGID_MOTION_OT_unbake(OnChanged, bpy.types.Operator):
@@ -310,10 +305,8 @@ class RIGID_MOTION_OT_mend(OnTargets, bpy.types.Operator):
     nothing_to_do = n_("None of these objects lacks its constraint")
     with_work = staticmethod(with_troubles)
     leaves_others = True
-
-    def do(self, _context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
-        animation.restore_constraints(targets, refused=refused)
-        return rpt_("constraint restored")
+    verb = staticmethod(animation.restore_constraints)
+    summary = n_("constraint restored")
 
 
 class RIGID_MOTION_OT_refresh(bpy.types.Operator):

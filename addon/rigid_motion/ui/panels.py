@@ -47,14 +47,12 @@ from .wording import (
     labelled,
     length,
     reduced_to,
+    split,
     turn,
 )
 
 Notes = list[tuple[str, str]]
 """Texts, each behind its icon."""
-
-CATEGORY = "Animation"
-"""The tab of the sidebar: in the viewport Blender has its own tools for animation there."""
 
 SPACES = ("VIEW_3D", "DOPESHEET_EDITOR", "GRAPH_EDITOR")
 
@@ -121,7 +119,7 @@ def _read(target: Transform) -> tuple[Source | None, str]:
 
 class InSidebar:
     bl_region_type: Any = "UI"
-    bl_category = CATEGORY
+    bl_category = "Animation"  # in the viewport Blender has its own tools for animation there
 
 
 class Folded(InSidebar):
@@ -228,9 +226,7 @@ class _Delta(Folded):
         return target is not None and not target.has_difference_slot and any(target.motion.filled)
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout, target = self.layout, active_target(context)
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout, target = split(self.layout), active_target(context)
         is_quaternion = target.carrier.rotation_mode == "QUATERNION"
         rotation = "delta_rotation_quaternion" if is_quaternion else "delta_rotation_euler"
         parts = ("delta_location", iface_("Location")), (rotation, iface_("Rotation")), ("delta_scale", iface_("Scale"))

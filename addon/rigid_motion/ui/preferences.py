@@ -14,6 +14,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 from .. import animation
 from ..animation.properties import MODE_ITEMS, OWN_WORDS
 from . import keymap, manual
+from .wording import split
 
 Color = tuple[float, float, float, float]
 
@@ -109,9 +110,7 @@ class RigidMotionPreferences(bpy.types.AddonPreferences):
     )
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = split(self.layout)
         manual.draw(layout)
         layout.separator()
         layout.prop(self, "default_mode")

@@ -18,7 +18,7 @@ from ..animation.queries.polls import with_more_keys_than
 from ..animation.transforms import Transform
 from ..animation.transforms.sizes import first_tolerance
 from .targets import OnChanged, OnTargets, each_target, with_bones_of_rigs
-from .wording import counted_modes, labelled, reduced_to, reduction_rows, reduction_summary
+from .wording import counted_modes, labelled, reduced_to, reduction_rows, reduction_summary, split
 
 MOST_LISTED = 5
 """Targets whose reductions are listed one by one."""
@@ -118,9 +118,7 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
     )
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = split(self.layout)
         targets = list(self.each_target(context))
         rigs = any(target.is_part for target in targets)
         layout.row().prop(self, "by", expand=True)

@@ -7,6 +7,7 @@ values, and the object or bone stands elsewhere.
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 
 import bpy
 from bpy.props import FloatVectorProperty, PointerProperty
@@ -36,20 +37,11 @@ def _components(part: slice) -> list[float]:
 # Blender holds no reference of its own to these: unnamed ones would be gone by the time that it asks.
 
 
-def _location(_: ShownTransform) -> list[float]:
-    return _components(ROWS[LOCATION])
+def _getter(part: slice) -> Callable[[ShownTransform], list[float]]:
+    return lambda _: _components(part)
 
 
-def _quaternion(_: ShownTransform) -> list[float]:
-    return _components(ROWS[ROTATION])
-
-
-def _euler(_: ShownTransform) -> list[float]:
-    return _components(slice(3, 6))
-
-
-def _scale(_: ShownTransform) -> list[float]:
-    return _components(ROWS[SCALE])
+_location, _quaternion, _euler, _scale = map(_getter, (ROWS[LOCATION], ROWS[ROTATION], slice(3, 6), ROWS[SCALE]))
 
 
 class ShownTransform(bpy.types.PropertyGroup):

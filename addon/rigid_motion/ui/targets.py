@@ -224,6 +224,12 @@ class OnTargets:
     leaves_others: ClassVar[bool] = False
     """True if it does nothing to other targets; otherwise these say why nothing could be done."""
 
+    verb: ClassVar[Callable]
+    """What `do` calls with targets, and with a list for `refused`."""
+
+    summary: ClassVar[str]
+    """What was done then."""
+
     @classmethod
     def each_target(cls, context: bpy.types.Context) -> Iterator[Transform]:
         """Return what the operator acts on here, one after the other."""
@@ -255,14 +261,18 @@ class OnTargets:
         return tip_(spoken_of(cls.bl_description, "bones" if is_posing(context) else "objects"))
 
     def execute(self, context: bpy.types.Context) -> Any:
-        targets = list(self.each_target(context))
-        if self.leaves_others:
-            targets = list(self.with_work(targets))
+        targets = self.meant(context)
         return self.act(targets, lambda refused: self.do(context, targets, refused))
 
-    def do(self, context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
+    def meant(self, context: bpy.types.Context) -> list[Transform]:
+        """Return the targets that something is to be done to."""
+        targets = list(self.each_target(context))
+        return list(self.with_work(targets)) if self.leaves_others else targets
+
+    def do(self, _context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
         """Do it to all targets, put refusals into the list, and return in words what was done: a verb of `act`."""
-        raise NotImplementedError
+        type(self).verb(targets, refused=refused)
+        return rpt_(self.summary)
 
     def act(self, targets: Sequence[Transform], verb: Callable[[list[Refused]], str]) -> set[str]:
         """Do something to all targets at once, and report it.
@@ -301,8 +311,6 @@ class OnChanged(OnTargets):
     """Operators on targets whose keys were baked or reduced last, while what they had before is still in the file."""
 
     kind: ClassVar[str]
-    verb: ClassVar[Callable]
-    summary: ClassVar[str]
 
     @classmethod
     def last_changes(cls, targets: Iterable[Transform]) -> dict[Transform, str]:
@@ -326,11 +334,5 @@ class OnChanged(OnTargets):
         cls.poll_message_set(reason)
         return False
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        targets = [target for target, kind in self.last_changes(self.each_target(context)).items() if kind == self.kind]
-
-        def go_back(refused: list[Refused]) -> str:
-            type(self).verb(targets, refused=refused)
-            return rpt_(self.summary)
-
-        return self.act(targets, go_back)
+    def meant(self, context: bpy.types.Context) -> list[Transform]:
+        return [target for target, kind in self.last_changes(self.each_target(context)).items() if kind == self.kind]

@@ -249,6 +249,13 @@ def wrapped(text: str, fits: Callable[[str], bool]) -> list[str]:
     return lines
 
 
+def split(layout: bpy.types.UILayout) -> bpy.types.UILayout:
+    """Return the layout, which then has labels to the left of properties, and no dots to animate them by."""
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    return layout
+
+
 def labelled(layout: bpy.types.UILayout, label: str = "") -> bpy.types.UILayout:
     """Return the right-hand part of a row, with a label on the left, in the user's language."""
     split = layout.split(factor=LABEL)

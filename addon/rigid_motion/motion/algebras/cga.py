@@ -80,12 +80,16 @@ def logarithm(versor: np.ndarray) -> np.ndarray:
     half_angle = np.arctan2(np.linalg.norm(vector, axis=-1, keepdims=True), w)
     turn = 2.0 * vector / sinc(half_angle)
     log_scales = np.log(poses.scales)
-    return _bivector(_swept(poses.positions, turn, log_scales, undo=True), turn, log_scales)
+    t1, t2, t3 = -0.5 * np.moveaxis(_swept(poses.positions, turn, log_scales, undo=True), -1, 0)
+    x, y, z = 0.5 * np.moveaxis(turn, -1, 0)
+    return CGA.multivector(e14=t1, e24=t2, e34=t3, e15=t1, e25=t2, e35=t3, e12=-z, e13=y, e23=-x, e45=-log_scales / 2.0)
 
 
 def exponential(bivector: np.ndarray) -> np.ndarray:
     """Return the versor of a bivector: advance, turn and growth at once, for one unit of time."""
-    velocity, turn, log_scales = _advance(bivector), _turn(bivector), _log_scale(bivector)
+    velocity = -(bivector[..., _T4] + bivector[..., _T5])
+    turn = bivector[..., CGA.indices("e23", "e13", "e12")] * np.array((-2.0, 2.0, -2.0))
+    log_scales = -2.0 * bivector[..., CGA.index("e45")]
     half_turn = turn / 2.0
     h = np.linalg.norm(half_turn, axis=-1, keepdims=True)
     rotor = _rotor(np.concatenate((np.cos(h), sinc(h) * half_turn), axis=-1))
@@ -120,21 +124,3 @@ def _rotor(quaternions: np.ndarray) -> np.ndarray:
 
 def _dilator(log_scales: np.ndarray) -> np.ndarray:
     return CGA.multivector(one=np.cosh(log_scales / 2.0), e45=-np.sinh(log_scales / 2.0))
-
-
-def _bivector(advance: np.ndarray, turn: np.ndarray, log_scales: np.ndarray) -> np.ndarray:
-    t1, t2, t3 = -0.5 * np.moveaxis(advance, -1, 0)
-    x, y, z = 0.5 * np.moveaxis(turn, -1, 0)
-    return CGA.multivector(e14=t1, e24=t2, e34=t3, e15=t1, e25=t2, e35=t3, e12=-z, e13=y, e23=-x, e45=-log_scales / 2.0)
-
-
-def _advance(bivector: np.ndarray) -> np.ndarray:
-    return -(bivector[..., _T4] + bivector[..., _T5])
-
-
-def _turn(bivector: np.ndarray) -> np.ndarray:
-    return bivector[..., CGA.indices("e23", "e13", "e12")] * np.array((-2.0, 2.0, -2.0))
-
-
-def _log_scale(bivector: np.ndarray) -> np.ndarray:
-    return -2.0 * bivector[..., CGA.index("e45")]

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import functools
 import logging
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from weakref import WeakKeyDictionary
 
@@ -17,6 +16,7 @@ import bpy
 import gpu
 import numpy as np
 from bpy.app.handlers import persistent
+from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix, Vector
 
 from ...animation.handlers import append_handlers, remove_handlers
@@ -136,24 +136,16 @@ class _Batches:
             self.views[view] = readable(self.path, projection, pen.size, pen.scale, every_tick=every_tick)
         return self.views[view]
 
-    def ticks(self, name: str, chosen: np.ndarray) -> Batch:
-        """Return some of the ticks that the path has by this name."""
-        (batch,) = self._of_view(name, chosen, lambda: (_batch("POINTS", getattr(self.path, name)[chosen]),))
-        return batch
-
-    def axes(self, chosen: np.ndarray) -> tuple[Batch, ...]:
-        """Return some of the axes: x, y, z."""
-        axes = self.path.axes
-        return self._of_view(
-            "axes", chosen, lambda: tuple(_batch("LINES", axes[chosen, axis].reshape(-1, 3)) for axis in range(3))
-        )
-
-    def _of_view(self, name: str, chosen: np.ndarray, make: Callable[[], tuple[Batch, ...]]) -> tuple[Batch, ...]:
+    def some(self, name: str, chosen: np.ndarray) -> tuple[Batch, ...]:
+        """Return some of the ticks that the path has by this name, or of its axes: x, y, z."""
         key = name, chosen.tobytes()
         if key not in self.chosen:
             if len(self.chosen) >= MOST_VIEWS:
                 self.chosen.clear()
-            self.chosen[key] = make()
+            rows = getattr(self.path, name)[chosen]
+            is_axes = rows.ndim > 2
+            parts = [rows[:, axis].reshape(-1, 3) for axis in range(3)] if is_axes else [rows]
+            self.chosen[key] = tuple(_batch("LINES" if is_axes else "POINTS", part) for part in parts)
         return self.chosen[key]
 
 
@@ -163,16 +155,9 @@ _batches: WeakKeyDictionary[Path, _Batches] = WeakKeyDictionary()
 def _batch(kind: str, points: np.ndarray | list) -> Batch:
     if not len(points):
         return None
-    vertices = gpu.types.GPUVertBuf(_vertex_format(), len(points))
-    vertices.attr_fill("pos", np.ascontiguousarray(points, dtype=np.float32))
-    return gpu.types.GPUBatch(type=kind, buf=vertices)
-
-
-@functools.cache
-def _vertex_format() -> gpu.types.GPUVertFormat:
-    form = gpu.types.GPUVertFormat()
-    form.attr_add(id="pos", comp_type="F32", len=3, fetch_mode="FLOAT")
-    return form
+    # Other shaders draw it, too: all take places alone.
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    return batch_for_shader(shader, kind, {"pos": np.ascontiguousarray(points, dtype=np.float32)})
 
 
 class _Pen:
@@ -322,14 +307,16 @@ def _draw_path(pen: _Pen, path: Path, settings: RigidMotionOverlay) -> None:
     look = pen.look
     chosen = batches.readable(pen, every_tick=settings.tick_step > 0)
     if settings.show_axes:
-        for batch, color in zip(batches.axes(chosen.axes), pen.axis_colors, strict=True):
+        for batch, color in zip(batches.some("axes", chosen.axes), pen.axis_colors, strict=True):
             pen.line(batch, color, 0.75 * look.line_width)
     if settings.show_native or batches.desired is None:
         pen.outlined_line(batches.native, look.native_color, 0.6 * look.line_width)
-        pen.dot(batches.ticks("native_ticks", chosen.native_ticks), OUTLINE, TICK, look.native_color, 1.25)
+        (ticks,) = batches.some("native_ticks", chosen.native_ticks)
+        pen.dot(ticks, OUTLINE, TICK, look.native_color, 1.25)
     if batches.desired is not None:
         pen.outlined_line(batches.desired, look.mode_color, look.line_width)
-        pen.dot(batches.ticks("desired_ticks", chosen.desired_ticks), look.tick_color, TICK)
+        (ticks,) = batches.some("desired_ticks", chosen.desired_ticks)
+        pen.dot(ticks, look.tick_color, TICK)
     diameter = KEY if len(path.keys) <= TICKS else TICK
     pen.dot(batches.keys, WHITE, diameter)
     pen.dot(batches.selected, look.key_color, diameter)
@@ -379,4 +366,3 @@ def unregister() -> None:
     _shapes.clear()
     _batches.clear()
     _dot_shader.cache_clear()
-    _vertex_format.cache_clear()

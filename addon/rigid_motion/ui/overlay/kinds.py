@@ -16,10 +16,8 @@ from mathutils import Matrix, Vector
 from ...animation.compute.components import LOCATION
 from ...animation.compute.sources import Source
 from ...animation.transforms import BoneTransform, ExactObjectTransform, ObjectTransform, Transform
+from .parents import unless_same
 from .points import Followed, axis_length_of, space_of
-
-SAME = 1e-5
-"""Components of directions that differ by less are the same in single precision."""
 
 
 def space_of_bone(bone: bpy.types.PoseBone, depsgraph: bpy.types.Depsgraph) -> tuple[Matrix, np.ndarray | None]:
@@ -49,8 +47,7 @@ def space_of_bone(bone: bpy.types.PoseBone, depsgraph: bpy.types.Depsgraph) -> t
         for row in range(3):
             space[row][column] = along[row]
     turned = space.to_3x3().inverted_safe() @ stands.to_3x3()
-    turned = np.array(turned)
-    return rig.matrix_world @ space, None if np.abs(turned - np.eye(3)).max() < SAME else turned
+    return rig.matrix_world @ space, unless_same(np.array(turned))
 
 
 def followed(bone: bpy.types.PoseBone, source: Source, turned: np.ndarray | None) -> Followed:

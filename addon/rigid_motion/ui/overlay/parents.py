@@ -6,6 +6,7 @@ the overlay takes parents as they are on the current frame. Frames are those of 
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable, Iterator
 
 import bpy
@@ -13,7 +14,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ...animation.actions.slots import Binding
-from ...animation.baking.motions import MOVING, NotPromised, not_promised, shown
+from ...animation.baking.motions import MOVING, not_promised, shown
 from ...animation.compute.sources import Source
 from ...animation.queries.keyed import active_bindings, sources_of
 from ...animation.transforms import Transform, shows_differences, transform_of
@@ -31,8 +32,8 @@ class Carried:
     """Several targets and what they hang on: read once, and worked out once for all looked at on the same frames."""
 
     def __init__(self) -> None:
-        self._followers: dict[bpy.types.Object, NotPromised] = {}
-        self._hierarchies: dict[bpy.types.Object, tuple[Hierarchy, dict[str, int]]] = {}
+        self._not_promised = functools.cache(not_promised)
+        self.hierarchy = functools.cache(_hierarchy)
         self._read: dict[Transform, tuple[Binding | None, Source | None]] = {}
         self._channels: dict[tuple[Transform, bytes], AffineMaps] = {}
         self._posed: dict[tuple[Transform, bytes], AffineMaps] = {}
@@ -48,17 +49,7 @@ class Carried:
 
     def follows(self, bone: Transform) -> bool:
         """Return whether a bone follows constraints or drivers, or hangs on one that does."""
-        rig = bone.animated
-        if rig not in self._followers:
-            self._followers[rig] = not_promised(rig)
-        return bone.carrier.name in self._followers[rig]
-
-    def hierarchy(self, rig: bpy.types.Object) -> tuple[Hierarchy, dict[str, int]]:
-        """Return the bones of a rig, and their numbers by name."""
-        if rig not in self._hierarchies:
-            numbers = {bone.name: number for number, bone in enumerate(rig.pose.bones)}
-            self._hierarchies[rig] = Hierarchy(list(rig.pose.bones)), numbers
-        return self._hierarchies[rig]
+        return bone.carrier.name in self._not_promised(bone.animated)
 
     def channels(self, transform: Transform, frames: np.ndarray) -> AffineMaps:
         """Return what the channels of something say on frames (n,), with its mode."""
@@ -80,6 +71,11 @@ class Carried:
             above = None if bone.parent is None else self.posed(bone.parent, frames)
             self._posed[key] = hierarchy.placed(numbers[bone.name], self.channels(transform, frames), above)
         return self._posed[key]
+
+
+def _hierarchy(rig: bpy.types.Object) -> tuple[Hierarchy, dict[str, int]]:
+    """Return the bones of a rig, and their numbers by name."""
+    return Hierarchy(list(rig.pose.bones)), {bone.name: number for number, bone in enumerate(rig.pose.bones)}
 
 
 class Parents:
@@ -139,7 +135,7 @@ class Parents:
         along = above.axes @ offset.axes if bone.bone.use_local_location else above.axes
         turned = np.linalg.inv(along) @ placed.axes
         maps = self._world(self.target.animated, frames) @ AffineMaps(along, above.at(offset.origins))
-        return maps, None if np.abs(turned - np.eye(3)).max() < SAME else turned
+        return maps, unless_same(turned)
 
     def _world(self, obj: bpy.types.Object, frames: np.ndarray) -> AffineMaps:
         return self._carrying(obj, frames) @ self._carried.channels(transform_of(obj), frames)
@@ -154,6 +150,11 @@ class Parents:
             tail = _maps(Matrix.Translation((0.0, bone.bone.length, 0.0)))
             carried = carried @ self._carried.posed(bone, frames) @ tail
         return carried @ _maps(obj.matrix_parent_inverse)
+
+
+def unless_same(turned: np.ndarray) -> np.ndarray | None:
+    """Return turns (..., 3, 3), or None where all of them are by nothing."""
+    return None if np.abs(turned - np.eye(3)).max() < SAME else turned
 
 
 def _above(target: Transform) -> Iterator[Transform]:

@@ -10,7 +10,6 @@ are too close to one another, or to a key, and left out. Distances are in pixels
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -56,7 +55,7 @@ CLEAR = 9.0
 AT_REST = 1.0
 """The least distance from tick to tick that says something of the usual speed."""
 
-STEPS = [digit * power for power in (1, 10, 100, 1000) for digit in (1, 2, 5)]
+STEPS = [digit * 10**power for power in range(7) for digit in (1, 2, 5)]
 
 
 class Followed(NamedTuple):
@@ -132,12 +131,9 @@ class Path:
 
     def at(self, frame: float) -> tuple[np.ndarray, np.ndarray | None]:
         """Return where it is at a frame, natively and in the mode, each of shape (3,). The path holds its ends."""
-        after = min(max(int(self.frames.searchsorted(frame)), 1), len(self.frames) - 1)
-        first, last = self.frames[after - 1], self.frames[after]
-        share = min(max((frame - first) / (last - first), 0.0), 1.0)
 
         def point(line: np.ndarray) -> np.ndarray:
-            return line[after - 1] + share * (line[after] - line[after - 1])
+            return np.array([np.interp(frame, self.frames, column) for column in line.T])
 
         return point(self.native), None if self.desired is None else point(self.desired)
 
@@ -250,12 +246,7 @@ def axis_frames(ticks: np.ndarray) -> np.ndarray:
 
 def _round_step(length: int, most: int) -> int:
     """Return the least of 1, 2, 5, 10, 20... that a length has at most this many of."""
-    return next(
-        digit * power
-        for power in (10**n for n in itertools.count())
-        for digit in (1, 2, 5)
-        if length <= most * digit * power
-    )
+    return next(step for step in STEPS if length <= most * step)
 
 
 def _axes(
