@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigid_motion.motion import KEYFRAME_MODES, Poses, decimate, reduce_keys
+from rigid_motion.motion import KEYFRAME_MODES, Poses, decimate
 from rigid_motion_batch.analysis.needed import (
     RATES,
     KeysNeeded,
@@ -53,18 +53,6 @@ def test_the_error_to_reach_is_that_of_the_reference_at_its_rate(swing: Clip, re
             error = rms(shell_errors(covered, keys, mode))
             assert result.uniform_errors[row, place] == pytest.approx(error, rel=1e-9)
         assert result.targets[place] == result.uniform_errors[0, place]
-
-
-@pytest.mark.slow
-def test_adaptive_keys_reach_it_over_the_same_samples(swing: Clip, result: KeysNeeded) -> None:
-    for place, rate in enumerate(RATES):
-        covered = between(swing, 0, decimate(swing.times, float(rate))[-1])
-        for row, (mode, *_) in enumerate(GROUPS):
-            keys = reduce_keys(covered.times, covered.poses, mode, result.targets[place], 0.1, rms=True)
-            error = rms(shell_errors(covered, keys, mode))
-            assert error <= result.targets[place] * (1.0 + 1e-9)
-            assert result.keys[row, 1, place] == len(keys)
-            assert result.reached[row, 1, place] == pytest.approx(error, rel=1e-9)
 
 
 def test_evenly_spaced_keys_reach_it_and_one_segment_fewer_do_not(swing: Clip, result: KeysNeeded) -> None:

@@ -1,7 +1,5 @@
 """The page is one file that needs no network, says all numbers without a script too, and trusts no name."""
 
-import csv
-import io
 import json
 import re
 from base64 import b64decode
@@ -13,8 +11,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import Poses
-from rigid_motion_batch.analysis.choices import Tolerance, Uniform
-from rigid_motion_batch.analysis.metrics import Metrics
+from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.results import ClipResult
 from rigid_motion_batch.recordings.clips import ClipWarning
 from rigid_motion_batch.report import pages
@@ -24,7 +21,7 @@ from rigid_motion_batch.report.settings import Settings
 from rigid_motion_batch.report.tables import grids
 from tests.scripts.clips.bodies import swinging_body
 from tests.scripts.clips.recordings import swinging_clip
-from tests.scripts.report.runs import MODES, result_of
+from tests.scripts.report.runs import result_of
 
 SETTINGS = Settings(0.1, "Rigid Motion 1.0", "compare reach.csv")
 TEN = (Uniform("10"),)
@@ -117,17 +114,6 @@ def _same(text: str, value: float) -> bool:
         return False
 
 
-def test_the_table_to_take_along_is_that_of_all_modes(tmp_path: Path) -> None:
-    clip = result_of(swinging_clip())
-    page = written(tmp_path / "report.html", clip)
-    (address,) = [attribute for attribute in page.attributes("a", "href") if attribute.startswith("data:text/csv")]
-    rows = list(csv.DictReader(io.StringIO(b64decode(address.partition(",")[2]).decode())))
-    assert {row["mode"] for row in rows} == set(MODES)
-    assert len(rows) == len(MODES) * len(clip.choices)
-    first: Metrics = clip.choices[0].motions[0].metrics[0]
-    assert float(rows[0]["rms_shell_m"]) == first.rms_shell_m
-
-
 def test_a_warning_is_above_the_verdict_and_leads_to_its_moment(tmp_path: Path) -> None:
     warning = ClipWarning("A gap of 183 ms.", "Record again.", 101.25, 101.5)
     page = written(tmp_path / "report.html", result_of(swinging_clip(), TEN, warnings=[warning]))
@@ -153,15 +139,6 @@ def test_data_that_would_make_the_page_too_large_are_files_beside_it(tmp_path, m
         text = file.read_text(encoding="utf-8")
         assert text.startswith(f"rigidMotionClips[{number}](")
         assert json.loads(text.partition("(")[2].removesuffix(");\n"))["name"] == "abc"[number]
-
-
-def test_joints_and_segments_are_folded_below(tmp_path: Path) -> None:
-    body = result_of(swinging_body(), TEN)
-    swing = result_of(swinging_clip(), (Tolerance("20mm"),), (*MODES, "best_of"))
-    text = all_text(written(tmp_path / "report.html", body, swing))
-    assert "LeftHand" not in text
-    for expected in ("Glove", "Joints of whole bodies", "Of ", "segments"):
-        assert expected in text
 
 
 def test_the_lowest_number_is_underlined_with_all_its_ties_but_not_where_all_are_the_same(tmp_path: Path) -> None:
@@ -207,9 +184,6 @@ def test_nothing_to_report_is_refused(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-# -- many clips -------------------------------------------------------------------------------------------------------
-
-
 def test_the_overview_has_what_matters_first_and_leads_to_every_page(tmp_path: Path) -> None:
     quiet, loud = result_of(swinging_clip("quiet"), TEN), result_of(swinging_clip("loud"), TEN)
     rows = loud.choices[0].motions
@@ -224,6 +198,3 @@ def test_the_overview_has_what_matters_first_and_leads_to_every_page(tmp_path: P
     assert table.index("doubtful") < table.index("loud") < table.index("quiet")
     assert "1 of 3 clips have something to check" in text
     assert {"quiet/page%201.html", "doubtful/report.html"} <= set(page.attributes("a", "href"))
-
-
-# -- sources ----------------------------------------------------------------------------------------------------------
