@@ -8,12 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigid_motion_batch.analysis.body_metrics import (
-    JointMetrics,
-    Measured,
-    measure_modes,
-    write_key_tables,
-)
+from rigid_motion_batch.analysis.body_metrics import JointMetrics, Measured, measure_modes, write_key_tables
 from rigid_motion_batch.analysis.choices import Choice, Tolerance, Uniform
 from rigid_motion_batch.analysis.errors import Ground, errors_of
 from rigid_motion_batch.analysis.metrics import body_table_names

@@ -3,16 +3,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rigid_motion.motion import shell_error
 from rigid_motion_batch.analysis.body_metrics import measure_modes
 from rigid_motion_batch.analysis.choices import Uniform
-from rigid_motion_batch.analysis.metrics import (
-    table_names,
-    write_reconstruction,
-)
+from rigid_motion_batch.analysis.metrics import table_names, write_reconstruction
 from rigid_motion_batch.analysis.modes import BEST_OF
+from rigid_motion_batch.analysis.radii import Radii
 from rigid_motion_batch.analysis.reconstructions import reconstruct as choose
+from rigid_motion_batch.analysis.results import clip_result
+from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings import read_trajectories
-from tests.scripts.clips.recordings import reconstruct, swinging_clip
+from rigid_motion_batch.recordings.clip_reading import read_source
+from tests.scripts.clips.bodies import swinging_body
+from tests.scripts.clips.recordings import compare_clip, reconstruct, swinging_clip
 from tests.scripts.comparing import rows_of
 
 
@@ -47,3 +50,17 @@ def test_in_the_format_of_tum_poses_are_read_back_as_they_were(tmp_path: Path) -
         assert np.array_equal(read.times, made.times)
         assert np.array_equal(read.poses.positions, made.filled_in(mode, made.times).positions)
         assert np.array_equal(read.poses.quaternions, made.filled_in(mode, made.times).quaternions)
+
+
+@pytest.mark.parametrize("body", [False, True])
+def test_errors_are_those_between_what_is_shown(body: bool) -> None:
+    clip = swinging_body() if body else read_source(str(ASSETS / "reach.csv"), "unity")[0][0]
+    result = compare_clip(clip, Uniform("7"), ("lerp_slerp", "motor_spline"), Radii())
+    truth = clip_result(clip, [result]).truth
+    for motion in result.motions:
+        there = truth[..., result.first : result.first + motion.errors.shape[1]]
+        apart = np.linalg.norm(motion.poses.positions - there.positions, axis=-1)
+        np.testing.assert_allclose(motion.errors[1], np.atleast_2d(apart).max(axis=0), atol=1e-6)
+        assert motion.errors[0].max() == pytest.approx(motion.metrics[0].max_shell_m)
+        if not body:
+            np.testing.assert_allclose(motion.errors[0], shell_error(motion.poses, there, 0.1), atol=1e-12)

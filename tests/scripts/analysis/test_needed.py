@@ -65,6 +65,8 @@ def test_evenly_spaced_keys_reach_it_and_one_segment_fewer_do_not(swing: Clip, r
             )
             assert enough <= result.targets[place] * (1.0 + 1e-9) < fewer
             assert result.reached[row, 0, place] == pytest.approx(enough, rel=1e-9)
+            assert result.reached[row, 1, place] <= result.targets[place] * (1.0 + 1e-9)
+            assert result.keys[row, 1, place] <= segments + 1
 
 
 @pytest.mark.slow

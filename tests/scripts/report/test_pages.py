@@ -1,5 +1,7 @@
 """The page is one file that needs no network, says all numbers without a script too, and trusts no name."""
 
+import csv
+import io
 import json
 import re
 from base64 import b64decode
@@ -11,7 +13,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import Poses
-from rigid_motion_batch.analysis.choices import Uniform
+from rigid_motion_batch.analysis.choices import Tolerance, Uniform
 from rigid_motion_batch.analysis.results import ClipResult
 from rigid_motion_batch.recordings.clips import ClipWarning
 from rigid_motion_batch.report import pages
@@ -21,7 +23,7 @@ from rigid_motion_batch.report.settings import Settings
 from rigid_motion_batch.report.tables import grids
 from tests.scripts.clips.bodies import swinging_body
 from tests.scripts.clips.recordings import swinging_clip
-from tests.scripts.report.runs import result_of
+from tests.scripts.report.runs import MODES, result_of
 
 SETTINGS = Settings(0.1, "Rigid Motion 1.0", "compare reach.csv")
 TEN = (Uniform("10"),)
@@ -112,6 +114,24 @@ def _same(text: str, value: float) -> bool:
         return abs(float(text) - value) <= 5e-3 * value
     except ValueError:
         return False
+
+
+def test_the_table_to_take_along_is_that_of_all_modes(tmp_path: Path) -> None:
+    clip = result_of(swinging_clip())
+    page = written(tmp_path / "report.html", clip)
+    (address,) = [attribute for attribute in page.attributes("a", "href") if attribute.startswith("data:text/csv")]
+    rows = list(csv.DictReader(io.StringIO(b64decode(address.partition(",")[2]).decode())))
+    assert {row["mode"] for row in rows} == set(MODES)
+    assert len(rows) == len(MODES) * len(clip.choices)
+    assert float(rows[0]["rms_shell_m"]) == clip.choices[0].motions[0].metrics[0].rms_shell_m
+
+
+def test_joints_and_segments_are_folded_below(tmp_path: Path) -> None:
+    body = result_of(swinging_body(), TEN)
+    swing = result_of(swinging_clip(), (Tolerance("20mm"),), (*MODES, "best_of"))
+    text = all_text(written(tmp_path / "report.html", body, swing))
+    for expected in ("Glove", "Joints of whole bodies", "Of ", "segments"):
+        assert expected in text
 
 
 def test_a_warning_is_above_the_verdict_and_leads_to_its_moment(tmp_path: Path) -> None:

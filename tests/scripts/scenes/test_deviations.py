@@ -1,6 +1,8 @@
+import numpy as np
 import pytest
 
-from rigid_motion_batch.scenes.deviations import magnification
+from rigid_motion.motion import Poses
+from rigid_motion_batch.scenes.deviations import largest_deviation, magnification
 
 
 @pytest.mark.parametrize(
@@ -8,3 +10,9 @@ from rigid_motion_batch.scenes.deviations import magnification
 )
 def test_the_factor_is_a_round_number(deviation, factor):
     assert magnification(deviation, 0.1) == factor
+
+
+def test_the_largest_deviation_is_that_of_the_farthest_point():
+    still = Poses(np.zeros((2, 3)), np.eye(4)[[0, 0]])
+    turned = Poses(np.array([[0.1, 0.0, 0.0], [0.0, 0.0, 0.3]]), np.eye(4)[[0, 3]])
+    assert largest_deviation(turned, still, np.eye(3)) == pytest.approx(np.hypot(2.0, 0.3))
