@@ -22,10 +22,12 @@ import zenoh  # noqa: F401 - without it these tests are skipped
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion.streams import Receiver
 from rigid_motion_batch.cli.stream import main
+from rigid_motion_batch.recordings.bvh_writing import write_bvh
 from rigid_motion_batch.recordings.clip_reading import read_clips
+from rigid_motion_batch.recordings.rest_bodies import RestBody
 from rigid_motion_batch.streaming.receiving import Receiving
 from rigid_motion_batch.streaming.rooms import HERE, Room, RoomError, is_local, locator, opened, settings
-from tests.scripts.bvh_bodies import write_body
+from tests.streams.links import body, dance
 
 pytestmark = pytest.mark.network
 
@@ -127,7 +129,11 @@ def test_a_hand_is_shown_within_the_tolerance(tmp_path, at, hand):
 
 @pytest.mark.slow
 def test_a_body_goes_to_several_receivers_in_the_formats_that_they_ask_for(tmp_path, at):
-    walk = write_body(tmp_path / "walk.bvh")
+    own = body(6)
+    times, poses = dance(own, 2.0, 60.0)
+    walk = tmp_path / "walk.bvh"
+    with walk.open("w", encoding="utf-8") as file:
+        write_bvh(file, RestBody(own.joints, own.parents, own.rest, own.rest.positions), own.sliding, times, poses)
     reading = ("--scale", "1", "--start", "0")
     options = ("--room", "r", "--at", at, "--truth", walk, *reading, *MARGIN)
     with (
@@ -137,9 +143,9 @@ def test_a_body_goes_to_several_receivers_in_the_formats_that_they_ask_for(tmp_p
         run("send", walk, "--room", "r", "--at", at, *reading)
         assert max(largest_mm(done(first)), largest_mm(done(second))) < 5.1
     (clip,), _ = read_clips([str(tmp_path / "a.bvh")])
-    assert clip.rest_body.parents.tolist() == [-1, 0, 0]
+    assert clip.rest_body.parents.tolist() == own.parents.tolist()
     clips, _ = read_clips([f"{tmp_path / 'b.csv'}:*"])
-    assert len(clips) == 3
+    assert len(clips) == 6
     # Frames of a thirtieth, beside those of a seventy-second.
     assert len(clips[0].times) < 0.6 * len(clip.times)
 
