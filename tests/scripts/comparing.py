@@ -63,8 +63,7 @@ def write_toss(path: Path, samples: int = 60) -> Path:
 def outputs(folder: Path) -> dict[str, bytes]:
     """All that is the same each time: a report has its date, and a .blend has addresses of memory in it."""
     return {
-        str(path.relative_to(folder)): path.read_bytes() if path.suffix in (".csv", ".mp4") else b""
+        path.relative_to(folder).as_posix(): path.read_bytes() if path.suffix in (".csv", ".mp4") else b""
         for path in folder.rglob("*")
-        if path.is_file()
-        and path.relative_to(folder).parts[0] not in (".parts", ".workplan", ".rigid-motion", "manifest.json")
+        if path.is_file() and OWN not in path.relative_to(folder).parts
     }

@@ -10,12 +10,14 @@ from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion_batch.cli import reduce
 from rigid_motion_batch.pipeline.steps import OWN
+from rigid_motion_batch.recordings.clips import Clip
 from tests.animation.farm import on_a_farm, played_on_a_farm
 from tests.animation.keyed import curves_of
 from tests.animation.scenes import new_object
 from tests.recordings import RECORDINGS
 from tests.scripts.baking import new_file, save
 from tests.scripts.bvh_bodies import write_body
+from tests.scripts.recordings.blends import rig
 
 WALK = RECORDINGS.parent / "rigs" / "pab_walk.fbx"
 """Other people's."""
@@ -71,20 +73,16 @@ def object_file(path: Path, *names: str) -> Path:
 def rig_file(path: Path) -> Path:
     """A file with a chain of three bones that turn on every frame, and an empty at the end of each: "at BONE"."""
     new_file()
-    data = bpy.data.armatures.new("Rig")
-    rig = new_object("Rig", data=data)
-    bpy.context.view_layer.objects.active = rig
-    bpy.ops.object.mode_set(mode="EDIT")
-    parent = None
-    for number, name in enumerate(("Root", "Arm", "Hand")):
-        bone = data.edit_bones.new(name)
-        bone.head, bone.tail, bone.parent = (0.0, 0.0, 0.3 * number), (0.0, 0.0, 0.3 * number + 0.3), parent
-        parent = bone
-    bpy.ops.object.mode_set(mode="OBJECT")
-    for seed, bone in enumerate(rig.pose.bones):
+    bones = {
+        "Root": ((0.0, 0.0, 0.0), (0.0, 0.0, 0.3), None),
+        "Arm": ((0.0, 0.0, 0.3), (0.0, 0.0, 0.6), "Root"),
+        "Hand": ((0.0, 0.0, 0.6), (0.0, 0.0, 0.9), "Arm"),
+    }
+    made = rig("Rig", bones)
+    for seed, bone in enumerate(made.pose.bones):
         key_densely(bone, swing(len(FRAMES), seed + 20))
         probe = new_object(f"at {bone.name}")
-        probe.parent, probe.parent_type, probe.parent_bone = rig, "BONE", bone.name
+        probe.parent, probe.parent_type, probe.parent_bone = made, "BONE", bone.name
     return save(path)
 
 
@@ -143,36 +141,18 @@ def worlds_of(poses: Poses) -> np.ndarray:
     return worlds
 
 
+def joints_in_metres(clip: Clip) -> np.ndarray:
+    """Where the joints of a whole body are, shape (joints, n, 3), by matrices."""
+    result: list[np.ndarray] = []
+    for joint, parent in enumerate(clip.rest_body.parents):
+        local = worlds_of(clip.poses[joint])
+        result.append(local if parent < 0 else result[parent] @ local)
+    return clip.metres_per_unit * np.array(result)[..., :3, 3]
+
+
 def hand_made(folder: Path) -> Path:
     write_body(folder / "body.bvh")
     return folder / "body.bvh"
-
-
-HEADS = """
-for path, end in ((path, ".npy"), (source, " of source.npy")):
-    if path.endswith(".blend"):
-        bpy.ops.wm.open_mainfile(filepath=path)
-    else:
-        bpy.ops.wm.read_factory_settings(use_empty=True)
-        importer = bpy.ops.import_scene.fbx if path.endswith(".fbx") else bpy.ops.import_anim.bvh
-        importer(filepath=path)
-    scene = bpy.context.scene
-    rig = max((obj for obj in bpy.data.objects if obj.type == "ARMATURE"), key=lambda obj: len(obj.pose.bones))
-    first, last = (round(frame) for frame in rig.animation_data.action.frame_range)
-    rows = []
-    for frame in range(first, last + 1):
-        scene.frame_set(frame)
-        shown = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        heads = {bone.name: shown.matrix_world @ bone.head for bone in shown.pose.bones}
-        rows.append([heads[name] for name in sorted(heads)])
-    np.save(found + end, np.array(rows))
-"""
-
-
-def heads_of(made: Path, source: Path, tmp_path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Where all bones begin (frames, bones, 3): as two files play, or as Blender itself imports one."""
-    on_a_farm(f"source = {str(source)!r}\n{HEADS}", made, tmp_path / "heads")
-    return np.load(tmp_path / "heads.npy"), np.load(tmp_path / "heads of source.npy")
 
 
 HEADS_AT = """

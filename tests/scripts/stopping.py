@@ -4,7 +4,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -78,13 +78,13 @@ def start(folder: Path, command: str, *arguments: object, where: str, act: str =
     return Started(process, temporary, marker)
 
 
-def descendants(process: int) -> Sequence[int]:
+def descendants(process: int) -> list[int]:
     """The processes that a process has started, and that these have."""
-    try:
-        children = Path(f"/proc/{process}/task/{process}/children").read_text().split()
-    except FileNotFoundError:
-        return []
-    return [result for child in map(int, children) for result in (child, *descendants(child))]
+    texts = []
+    with suppress(FileNotFoundError, ProcessLookupError):
+        texts = [path.read_text() for path in Path(f"/proc/{process}/task").glob("*/children")]
+    children = [int(child) for text in texts for child in text.split()]
+    return [result for child in children for result in (child, *descendants(child))]
 
 
 def alive(process: int) -> bool:

@@ -127,9 +127,6 @@ def live_worlds(path: Path, names: tuple[str, ...]) -> tuple[list[np.ndarray], l
         return [np.array(obj.evaluated_get(graph).matrix_world) for obj in objects], shown_worlds(objects, PLAYED)
 
 
-# What comes out
-
-
 def test_a_baked_file_plays_in_any_blender_as_the_live_one_does_with_the_extension(shot, baked):
     moved = (name for name in REFUSED if name != "Huge")  # That one is nowhere, with or without the extension.
     names = (*BAKED, *moved, "Still", "Plain")
@@ -174,9 +171,6 @@ def test_a_name_that_nothing_has_is_said(shot, tmp_path, capsys):
     (tmp_path / "shot-baked.blend").write_bytes(b"mine")
     assert run(shot, "--output", tmp_path, "--objects", "Camra") == 1
     assert "Camra" not in capsys.readouterr().err, "a file that was not looked into may have it"
-
-
-# What it says
 
 
 def test_what_cannot_be_baked_is_named_with_the_way_out_and_the_others_go_on(shot, tmp_path, capsys):
@@ -293,23 +287,6 @@ def test_no_python_of_a_file_is_run_and_all_of_it_stays(tmp_path):
     bpy.ops.wm.open_mainfile(filepath=str(baked_name(path)), use_scripts=False)
     assert bpy.data.texts["run.py"].use_module
     assert len(bpy.data.objects["Tool"].animation_data.drivers) == 1
-
-
-# How it ends
-
-
-def test_a_folder_is_baked_and_what_was_baked_is_no_input(tmp_path, capsys):
-    (tmp_path / "a").mkdir()
-    for name in ("shot", "a/shot"):
-        one_object_file(tmp_path / f"{name}.blend")
-    capsys.readouterr()
-    for times, written in ((1, "2 written"), (2, "0 written, 2 already baked")):
-        assert run(tmp_path, "--output", tmp_path / "out") == 0, times
-        said = capsys.readouterr()
-        assert said.out.splitlines() == [str(tmp_path / "out" / f"{item}shot-baked.blend") for item in ("a/", "")]
-        assert said.err.splitlines()[-1].endswith(f"2 files: {written}.")
-    assert run(tmp_path / "out", "--unbake") == 0
-    assert listed(tmp_path / "out" / "a") == ["shot-baked-unbaked.blend", "shot-baked.blend"]
 
 
 BESIDE_AN_INSTALLED_EXTENSION = """

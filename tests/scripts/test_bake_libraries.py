@@ -46,12 +46,6 @@ def link_action(library: Path) -> None:
     data.action_slot = data.action.slots[0]
 
 
-def link_strip(library: Path) -> None:
-    action = linked(library, "actions")
-    strip = new_object("Local").animation_data_create().nla_tracks.new().strips.new("Strip", 1, action)
-    strip.action_slot = action.slots[0]
-
-
 def link_and_override(library: Path) -> bpy.types.Object:
     obj = link_object(library).override_create(remap_local_usages=True)
     obj.animation_data.action = obj.animation_data.action.copy()
@@ -86,7 +80,6 @@ def shot_with(path: Path, link: Callable[[Path], object], library: Path) -> Path
     [
         (link_object, "Object Prop", "Prop: not baked: it is missing from"),
         (link_action, "Action PropAction", "Local: not baked: its Action PropAction is missing from"),
-        (link_strip, "Action PropAction", "Local: not baked: its Action PropAction is missing from"),
         (link_and_override, "Object Prop", "Prop: not baked: what it overrides is missing from"),
         (link_collection, "Collection Props", "incomplete, for there may be objects to be baked in what is missing"),
     ],

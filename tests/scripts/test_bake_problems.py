@@ -1,9 +1,7 @@
-"""bake.py when something is wrong: broken files, places that cannot be written, keys that are none, an end half-way."""
+"""bake.py when something is wrong: broken files, places that cannot be written, an end half-way."""
 
 import ctypes
-import math
 import os
-import re
 import resource
 import subprocess
 import sys
@@ -14,11 +12,7 @@ from pathlib import Path
 import bpy
 import pytest
 
-from rigid_motion import animation
-from rigid_motion.animation import set_mode
 from rigid_motion_batch import supervising
-from tests.animation.keyed import curves_of
-from tests.animation.scenes import key, new_object
 from tests.scripts.baking import baked_name, frames_of_keys, one_object_file, open_again, run, with_version
 from tests.scripts.reducing import listed
 
@@ -49,9 +43,6 @@ def disk_full_after(size: int) -> Iterator[None]:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
-
-
-# Files that cannot be read
 
 
 def text(path: Path) -> None:
@@ -98,9 +89,6 @@ def test_a_pipe_is_not_waited_for(tmp_path, capsys):
     assert "this is no file on a disk" in capsys.readouterr().err
 
 
-# Places that cannot be written
-
-
 @pytest.mark.parametrize(("dry", "below"), [((), "new/folders"), (("--dry-run",), "")])
 def test_a_read_only_folder_is_named_by_its_own_name_and_before_the_work(tmp_path, dry, below):
     path, folder = one_object_file(tmp_path / "shot.blend"), tmp_path / "read-only"
@@ -113,19 +101,6 @@ def test_a_read_only_folder_is_named_by_its_own_name_and_before_the_work(tmp_pat
     assert problem in done.stderr.splitlines()
     assert (done.returncode, done.stdout, os.listdir(folder)) == (1, "", [])
     assert ": baked" not in done.stderr
-
-
-def test_a_read_only_file_is_not_replaced(tmp_path):
-    path = one_object_file(tmp_path / "shot.blend")
-    before = path.read_bytes()
-    baked_name(path).write_text("precious")
-    baked_name(path).chmod(0o400)
-    path.chmod(0o400)
-    for option, place in (("--overwrite", baked_name(path)), ("--in-place", path)):
-        done = run_without_privileges(path, option)
-        assert (done.returncode, done.stdout) == (1, "")
-        assert f"{path}: {place} cannot be written, for {place} is read-only: allow it" in done.stderr
-    assert (baked_name(path).read_text(), path.read_bytes()) == ("precious", before)
 
 
 @pytest.mark.parametrize("options", [(), ("--in-place",)])
@@ -171,43 +146,6 @@ def test_a_link_is_saved_through_in_place(tmp_path):
     assert len(frames_of_keys(bpy.data.objects["Tool"])) == 40
 
 
-# Keys that are none
-
-
-BAD_KEYS = [
-    (("location", 1), 3, "co", (24.0, math.inf), "key 3 of Location Y has the value 3.4"),
-    (("location", 0), 1, "co", (1.0, -math.inf), "key 1 of Location X has the value -3.4"),
-    (("rotation_quaternion", 0), 2, "co", (11.0, math.nan), "key 2 of Rotation W is not a finite number"),
-    (("location", 2), 4, "co", (math.inf, 0.0), "key 4 of Location Z has the frame 3.4"),
-    (("location", 2), 3, "co", (math.nan, 0.0), "key 3 of Location Z is not a finite number"),
-    (("location", 1), 2, "handle_right", (14.0, math.nan), "right handle of key 2 of Location Y is not a finite n"),
-]
-"""Channel, number of a key, its part, what this is, and what is said of it."""
-
-
-def test_an_infinite_key_is_named_with_its_object_its_channel_and_the_way_out(tmp_path, capsys):
-    def edit(_: bpy.types.Object) -> None:
-        for row, (channel, number, part, value, _) in enumerate(BAD_KEYS):
-            obj = key(new_object(f"Bad{row}"))
-            set_mode(obj, "dq_sclerp")
-            setattr(curves_of(obj)[channel].keyframe_points[number - 1], part, value)
-
-    animation.set_enabled(False)
-    try:
-        path = one_object_file(tmp_path / "shot.blend", edit)
-    finally:
-        animation.set_enabled(True)
-    capsys.readouterr()
-    assert run(path) == 1
-    said = capsys.readouterr().err.splitlines()
-    for row, (*_, told) in enumerate(BAD_KEYS):
-        (line,) = (line for line in said if line.startswith(f"{path}: Bad{row}: not baked: {told}"))
-        assert re.search(
-            "(is not a finite number|, which no motion can be computed from): delete it .Dope Sheet, X.$", line
-        )
-    assert f"{path}: Tool: baked" in "\n".join(said)
-
-
 # Stopped half-way
 
 
@@ -220,9 +158,6 @@ def test_ctrl_c_while_blender_is_loaded_ends_it_at_once(tmp_path):
         [*COMMAND, path], capture_output=True, text=True, timeout=60, env=os.environ | {"PYTHONPATH": str(beside)}
     )
     assert (done.returncode, done.stdout, done.stderr) == (130, "", f"{supervising.STOPPED}\n")
-
-
-# What it says of itself
 
 
 def test_a_file_where_a_folder_should_be_is_named(tmp_path, capsys):

@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import subprocess
 import sys
 import tomllib
@@ -74,16 +73,6 @@ def test_the_files_are_those_of_the_checkout(extension_zip):
         for name in package.namelist():
             source = EXTENSION / name if (EXTENSION / name).is_file() else ROOT / name
             assert package.read(name) == source.read_bytes(), name
-
-
-def test_nothing_in_the_zip_names_the_machine_it_was_built_on(extension_zip):
-    with zipfile.ZipFile(extension_zip) as package:
-        for name in package.namelist():
-            assert not Path(name).is_absolute()
-            assert ".." not in Path(name).parts
-            content = package.read(name).decode("utf-8")
-            assert str(ROOT) not in content, name
-            assert not re.search(r"(?<![\w./])/(home|root|Users|tmp|usr|opt|var|mnt)/|\b[A-Z]:\\", content), name
 
 
 def test_the_name_says_which_version(extension_zip):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
-from rigid_motion_batch.analysis.modes import BEST_OF, name_of_other
+from rigid_motion_batch.analysis.modes import name_of_other
 from tests.balls import largest_displacements
 from tests.scripts.bvh_bodies import PLACES, angles_at, hips_at, write_body
 from tests.scripts.comparing import ROOT, SMALL, poses_of, rows_of, run, table, write_toss
@@ -97,18 +97,12 @@ def test_it_is_in_the_line_of_the_clip_the_table_and_the_page(toss, mine, tmp_pa
     [
         ("mine", "mine"),
         ("my take (2)", "my_take_2"),
-        ("lerp_slerp", "lerp_slerp-2"),
-        ("DQ_ScLERP", "DQ_ScLERP-2"),
-        (BEST_OF, f"{BEST_OF}-2"),
         ("keys", "keys-2"),
         ("lerp_slerp.keys", "lerp_slerp_keys"),
     ],
 )
 def test_it_is_called_as_its_file_but_never_as_a_table_that_is_there(stem, called):
     assert name_of_other(stem) == called
-
-
-# -- whole bodies -----------------------------------------------------------------------------------------------------
 
 
 def test_a_body_is_compared_joint_by_joint_by_name_and_in_metres(tmp_path):
@@ -143,9 +137,6 @@ def test_a_body_is_compared_joint_by_joint_by_name_and_in_metres(tmp_path):
     assert not list(output.rglob("mine*.csv"))
 
 
-# -- films ------------------------------------------------------------------------------------------------------------
-
-
 def test_a_film_has_a_lane_of_it(toss, mine, tmp_path):
     how = ("--rates", "10", "--modes", "lerp_slerp", "--deviation", "1", "--output", tmp_path)
     assert run(toss, "--against", mine, *how, *SMALL) == 0
@@ -162,9 +153,6 @@ def test_a_film_has_a_lane_of_it(toss, mine, tmp_path):
         assert np.abs(np.array(actor.location) - (positions[0] - centre)).max() < 1e-5
         there = Rotation.from_quat(np.array(actor.rotation_quaternion), scalar_first=True)
         assert (there.inv() * turns[0]).magnitude() < 1e-5
-
-
-# -- refusals ---------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """compare.py replaces nothing but what it has written: no input, no file of another program, no other comparison."""
 
 import contextlib
-import os
 import shutil
 from pathlib import Path
 
@@ -54,63 +53,11 @@ def refused(capsys: pytest.CaptureFixture, *arguments: object) -> str:
     return said[0]
 
 
-# -- inputs -----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("place", ["metrics.csv"])
-@pytest.mark.parametrize("force", [(), ("--overwrite",)])
-def test_an_input_that_lies_where_an_output_goes_is_refused(tmp_path, place, force, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    write_toss(tmp_path / place)
-    assert f"{place}: this input lies where" in refused(capsys, place, "--output", ".", *force)
-    assert [*files(tmp_path)] == [place]
-
-
-@pytest.mark.skipif(os.name == "nt", reason="links need permission on Windows")
-def test_an_input_that_leads_to_an_output_is_refused(folder: Path, capsys: pytest.CaptureFixture) -> None:
-    (folder / "linked.csv").symlink_to(folder / "out" / "metrics.csv")
-    assert "linked.csv: this input was written by" in refused(capsys, "toss.csv", "linked.csv", "--output", "out")
-
-
-def test_an_output_of_an_earlier_run_is_no_input_of_the_next(folder: Path, capsys: pytest.CaptureFixture) -> None:
-    said = refused(capsys, "toss.csv", "out/toss/5/lerp_slerp.csv", "--output", "out")
-    assert "out/toss/5/lerp_slerp.csv: this input was written by a run into this folder" in said.replace(os.sep, "/")
-
-
-# -- files of strangers -----------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("place", ["report.html", "metrics.csv", "toss/5/keys.csv"])
-def test_a_file_of_another_program_is_named_and_replaced_only_if_that_is_asked_for(
-    tmp_path: Path, place: str, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    write_toss(tmp_path / "toss.csv")
-    (tmp_path / place).parent.mkdir(parents=True, exist_ok=True)
-    (tmp_path / place).write_text("mine")
-    said = refused(capsys, "toss.csv", "--output", ".")
-    assert f"{tmp_path / place} was not written by this program" in said
-    assert "--output" in said
-    assert "--overwrite" in said
-    assert run("toss.csv", "--output", ".", "--overwrite") == 0
-    assert (tmp_path / place).read_text() != "mine"
-    assert run("toss.csv", "--output", ".") == 0
-
-
 def test_without_its_own_folders_it_knows_no_file_for_its_own(folder: Path, capsys: pytest.CaptureFixture) -> None:
     shutil.rmtree(folder / "out" / OWN)
     said = refused(capsys, "toss.csv", "--output", "out")
     assert "lerp_slerp.csv" in said
     assert "were not written by this program" in said
-
-
-def test_a_file_where_a_folder_goes_is_never_replaced(folder: Path, capsys: pytest.CaptureFixture) -> None:
-    shutil.rmtree(folder / "out" / "toss")
-    (folder / "out" / "toss").write_text("mine")
-    assert "a file where a folder goes" in refused(capsys, "toss.csv", "--output", "out")
-
-
-# -- another comparison -----------------------------------------------------------------------------------------------
 
 
 def test_another_comparison_in_the_folder_is_named_with_the_ways_out(folder, capsys):
@@ -139,12 +86,6 @@ def test_the_same_recordings_and_more_of_them_go_on(folder: Path, arguments: tup
     assert run(*arguments, "--output", "out") == 0
 
 
-# -- damage -----------------------------------------------------------------------------------------------------------
-
-
-# -- what would be done -----------------------------------------------------------------------------------------------
-
-
 def test_what_would_be_done_is_explained_and_nothing_is_done(folder: Path, capsys: pytest.CaptureFixture) -> None:
     before = files(folder)
     assert run("toss.csv", "--output", "out", "--explain", "--radius", "0.2") == 0
@@ -156,9 +97,6 @@ def test_what_would_be_done_is_explained_and_nothing_is_done(folder: Path, capsy
     capsys.readouterr()
     assert run("toss.csv", "--output", "out", "--explain") == 0
     assert capsys.readouterr().out.splitlines() == ["nothing to do"]
-
-
-# -- where it goes ----------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture

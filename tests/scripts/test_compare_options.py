@@ -1,4 +1,4 @@
-"""Files that compare.py refuses, and its help and its examples."""
+"""Options of compare.py, its help and its examples."""
 
 import re
 import shlex
@@ -8,25 +8,6 @@ import pytest
 from rigid_motion.motion import MODES
 from rigid_motion_batch.cli import compare
 from tests.scripts.comparing import ROOT, run
-
-
-@pytest.mark.parametrize(
-    ("content", "complaint"),
-    [
-        ("t,x,y,z\n1,2,3,4\n", "qx"),
-        ("t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,0,zero,0,0,0,0,1\n", ":3:"),
-        ("t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,0\n1,0,0,0,0,0,0,0\n", "0 usable poses"),
-        ("", "line.csv"),
-    ],
-)
-def test_a_wrong_file_ends_with_code_2_and_one_line(tmp_path, capsys, content, complaint):
-    path = tmp_path / "line.csv"
-    path.write_text(content)
-    assert run(path, "--no-video", "--output", tmp_path / "out") == 2
-    said = [line for line in capsys.readouterr().err.splitlines() if "compare.py:" in line]
-    assert len(said) == 1
-    assert complaint in said[0]
-    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(

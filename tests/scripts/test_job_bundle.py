@@ -22,16 +22,6 @@ def clip(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return write_toss(tmp_path / "takes" / "toss.csv")
 
 
-def test_the_command_that_is_printed_runs_the_job(clip: Path, tmp_path: Path, capfd: pytest.CaptureFixture) -> None:
-    given = ["takes/toss.csv", *OPTIONS, "--jobs", "0", "--bundle", "bundle", "--output", "out", "--parts", "2"]
-    assert job_bundle.main(given) == 0
-    command = shlex.split(capfd.readouterr().out.splitlines()[-1])
-    assert command[:3] == ["openjd", "run", str(tmp_path / "bundle" / "template.json")]
-    ran = subprocess.run([sys.executable, "-m", *command], capture_output=True, text=True, timeout=240)
-    assert ran.returncode == 0, ran.stdout + ran.stderr
-    assert {"metrics.csv", "report.html", "toss/5/keys.csv"} <= set(outputs(tmp_path / "out"))
-
-
 def test_one_bad_clip_is_named_and_the_others_get_their_report(clip, tmp_path, capfd):
     clip.with_name("bad.csv").write_text("junk\n", encoding="utf-8")
     given = ["takes/toss.csv", "takes/bad.csv", *OPTIONS, "--jobs", "0", "--parts", "1"]

@@ -2,7 +2,6 @@
 
 import contextlib
 import io
-import re
 import sys
 
 import pytest
@@ -50,19 +49,6 @@ def test_the_line_on_a_terminal_says_how_far_how_long_and_what() -> None:
     assert line.startswith(" 25% ━━━━━━")
     assert "0:30, 1:30 left  Rendering, frame 1 of 4" in line
     assert "━" not in below
-
-
-@pytest.mark.parametrize("error", [None, ValueError])
-def test_no_bar_is_left_where_the_work_has_ended(error: type[Exception] | None) -> None:
-    terminal = Terminal()
-    expected = pytest.raises(error) if error else contextlib.nullcontext()
-    with expected, Progress(terminal) as progress, progress.stage("Rendering", 2) as stage:
-        stage.advance(1, "frame 1")
-        if error:
-            raise error
-    written = terminal.getvalue()
-    assert written.rindex("\x1b[2K") > written.rindex("━")
-    assert written.rindex("\x1b[?25h") > written.rindex("\x1b[?25l")
 
 
 def test_the_time_that_is_left_is_reckoned_from_the_stage_and_not_from_what_came_before() -> None:
@@ -114,17 +100,6 @@ def test_a_console_that_cannot_show_every_letter_gets_ascii() -> None:
         stage.advance()
     assert "Rendering \\u624b\\u8853" in terminal.getvalue()
     terminal.getvalue().encode("cp1252")
-
-
-@pytest.mark.parametrize(("variable", "coloured"), [({}, True), ({"NO_COLOR": "1"}, False), ({"TERM": "dumb"}, False)])
-def test_colour_is_for_terminals_that_did_not_say_no(variable, coloured, monkeypatch):
-    monkeypatch.delenv("NO_COLOR")
-    for name, value in variable.items():
-        monkeypatch.setenv(name, value)
-    terminal = Terminal()
-    with Progress(terminal) as progress, progress.stage("Rendering", 2):
-        pass
-    assert bool(re.search("\x1b\\[[0-9;]+m", terminal.getvalue())) is coloured
 
 
 @pytest.mark.parametrize("columns", [20, 40, 80])

@@ -1,6 +1,5 @@
 """reduce.py on folders and many files: which are done, by how many processes, and what is left when it is run again."""
 
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -11,12 +10,7 @@ import pytest
 from rigid_motion_batch.cli import reduce
 from tests.gltf.making import Making, walk
 from tests.scripts.reducing import hand_made, listed, object_file, run, write_csv
-from tests.scripts.stopping import ROOT, Started, alive, descendants, start
-
-SOON = 5.0
-"""Seconds: on a machine with nothing else to do it is 1.3."""
-
-SLEEP = "import time; time.sleep(99)"
+from tests.scripts.stopping import ROOT, start
 
 KILL = "os.kill(os.getpid(), signal.SIGKILL)"
 
@@ -30,9 +24,6 @@ def glb(path: Path) -> Path:
 
 def last_line(capsys: pytest.CaptureFixture[str]) -> str:
     return capsys.readouterr().err.splitlines()[-1]
-
-
-# Which files
 
 
 def test_a_folder_stands_for_all_that_is_in_it_and_the_results_lie_as_it_does(tmp_path, capsys):
@@ -123,9 +114,6 @@ def test_a_name_that_does_not_fit_the_recording_is_refused(tmp_path, capsys, nam
     assert not (tmp_path / "new").exists()
 
 
-# What is there already
-
-
 def test_what_is_done_is_not_done_again(tmp_path, capsys):
     write_csv(tmp_path / "hand.csv")
     glb(tmp_path / "walk.glb")
@@ -189,13 +177,6 @@ def test_a_damaged_record_does_no_harm(tmp_path):
     assert run(source, "--overwrite") == 0
 
 
-# Several at once
-
-
-def started(folder: Path, *arguments: object, where: str, act: str) -> Started:
-    return start(folder, "reduce.py", *arguments, where=where, act=act)
-
-
 def test_processes_do_the_same_as_one_and_a_bad_file_stops_nobody(tmp_path):
     for name in "abcd":
         glb(tmp_path / "in" / f"{name}.glb")
@@ -235,7 +216,7 @@ def test_a_killed_worker_costs_its_file_alone(tmp_path):
     for name in ("a", "slow", "z"):
         glb(tmp_path / f"{name}.glb")
     # Killed where the result is moved into place: a part of it is there already.
-    run = started(tmp_path, ".", "--jobs", "2", where="slow-reduced.glb", act=KILL)
+    run = start(tmp_path, "reduce.py", ".", "--jobs", "2", where="slow-reduced.glb", act=KILL)
     printed, said, _ = run.end()
     assert run.process.returncode == 1, said
     assert printed.split() == ["a-reduced.glb", "z-reduced.glb"]
@@ -244,24 +225,6 @@ def test_a_killed_worker_costs_its_file_alone(tmp_path):
     names = ["a-reduced.glb", "a.glb", "slow.glb", "stuck", "z-reduced.glb", "z.glb"]
     assert listed(tmp_path) == names
     assert list(run.temporary.iterdir()) == []
-
-
-@ON_LINUX
-def test_a_stopped_folder_ends_soon_and_keeps_what_is_complete(tmp_path):
-    for name in ("a", "slow", "slower"):
-        glb(tmp_path / f"{name}.glb")
-    run = started(tmp_path, "a.glb", "slow.glb", "slower.glb", "--jobs", "1", where="slow-reduced", act=SLEEP)
-    run.wait_until_stuck()
-    processes = descendants(run.process.pid)
-    run.process.send_signal(signal.SIGTERM)
-    printed, said, seconds = run.end()
-    assert (run.process.returncode, printed) == (143, "a-reduced.glb\n"), said
-    assert said.splitlines()[-1] == "Stopped. 1 clip reduced; 3 files: 1 written, 2 not reached."
-    assert "Traceback" not in said
-    assert seconds < SOON
-    assert listed(tmp_path) == ["a-reduced.glb", "a.glb", "slow.glb", "slower.glb", "stuck"]
-    assert len(processes) > 1
-    assert not any(map(alive, processes))
 
 
 def test_a_gltf_is_done_again_where_one_of_its_files_has_changed(tmp_path, capsys):

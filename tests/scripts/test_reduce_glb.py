@@ -8,10 +8,9 @@ import pytest
 
 from rigid_motion_batch.keying import exporting, recordings
 from rigid_motion_batch.recordings.clip_reading import read_source
-from rigid_motion_batch.recordings.clips import Clip
 from tests.animation.farm import played_on_a_farm
 from tests.gltf.oracle import File, off
-from tests.scripts.reducing import FRAMES, WALK, hand_made, rig_file, run, worlds_of, write_csv
+from tests.scripts.reducing import FRAMES, WALK, hand_made, joints_in_metres, rig_file, run, write_csv
 
 MM = 1e-3
 
@@ -37,15 +36,6 @@ def exported(monkeypatch, tmp_path) -> Path:
 def node_of(file: File, name: str) -> int:
     (result,) = (number for number, node in enumerate(file.json["nodes"]) if node.get("name") == name)
     return result
-
-
-def joints_in_metres(clip: Clip) -> np.ndarray:
-    """Where the joints of a whole body are, shape (joints, n, 3), by matrices."""
-    result: list[np.ndarray] = []
-    for joint, parent in enumerate(clip.rest_body.parents):
-        local = worlds_of(clip.poses[joint])
-        result.append(local if parent < 0 else result[parent] @ local)
-    return clip.metres_per_unit * np.array(result)[..., :3, 3]
 
 
 def require_joints(source: Path, made: Path, tolerance: float, *, fps: float) -> None:
@@ -117,13 +107,3 @@ def test_a_rigid_recording_becomes_a_node(tmp_path):
     x, y, z = poses.positions.T
     assert np.linalg.norm(worlds[:, :3, 3] - np.column_stack((x, z, -y)), axis=-1).max() <= 5 * MM + SINGLE
     assert len(file.moments(0)) < len(times)
-
-
-@pytest.mark.parametrize("name", ["none.fbx", "text.fbx", "none.blend", "text.blend"])
-def test_a_file_that_cannot_be_read_is_named_and_nothing_is_written(tmp_path, capsys, name):
-    path = tmp_path / name
-    if name.startswith("text"):
-        path.write_text("no such thing", encoding="utf-8")
-    assert run(path, "--glb") == 2
-    assert f"{path}: " in capsys.readouterr().err
-    assert not list(tmp_path.glob("*.glb"))

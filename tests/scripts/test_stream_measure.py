@@ -8,24 +8,16 @@ import pytest
 
 from research.live_streams.packings import packed, smallest_three
 from rigid_motion_batch.cli.stream import main
-from rigid_motion_batch.recordings.bvh_writing import write_bvh
 from rigid_motion_batch.recordings.clip_reading import read_clips
-from rigid_motion_batch.recordings.rest_bodies import RestBody
 from rigid_motion_batch.streaming.sending import body_of, samples_of
-from tests.streams.links import body, dance
+from tests.scripts.bvh_bodies import write_body
 
 pytestmark = pytest.mark.network
 
 
 @pytest.fixture(scope="module")
 def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    own = body(6)
-    times, poses = dance(own, 1.5, 30.0)
-    path = tmp_path_factory.mktemp("walk") / "walk.bvh"
-    rest_body = RestBody(own.joints, own.parents, own.rest, own.rest.positions)
-    with path.open("w", encoding="utf-8") as file:
-        write_bvh(file, rest_body, own.sliding, times, poses)
-    return path
+    return write_body(tmp_path_factory.mktemp("walk") / "walk.bvh")
 
 
 def test_a_body(walk: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

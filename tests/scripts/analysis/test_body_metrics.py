@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigid_motion_batch.analysis.choices import Choice, Tolerance, Uniform
-from rigid_motion_batch.analysis.metrics import JointMetrics, join_tables, table_names, write_tables
+from rigid_motion_batch.analysis.metrics import JointMetrics, table_names, write_tables
 from rigid_motion_batch.analysis.reconstructions import Ground, Reconstruction, errors_of, reconstruct
 from rigid_motion_batch.analysis.results import measured
 from rigid_motion_batch.files import escaped, write_rows
@@ -59,9 +59,6 @@ def number(cell: str) -> bool:
     return bool(re.fullmatch(r"-?[\d.]+(e[+-]\d+)?", cell))
 
 
-# -- rows -------------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("choice", CHOICES, ids=str)
 def test_the_rows_are_statistics_of_all_joints_and_of_each(choice: Choice) -> None:
     made = made_of(choice)
@@ -98,9 +95,6 @@ def test_a_joint_that_stays_as_it_is_sends_nothing() -> None:
     assert row.key_frames == 11
 
 
-# -- tables -----------------------------------------------------------------------------------------------------------
-
-
 def test_the_columns_are_those_promised_and_read_back_exactly(tmp_path: Path) -> None:
     result = measured(made_of(CHOICES[1], joints=HOSTILE))
     write_rows(tmp_path / "joints.csv", JointMetrics, result.joints)
@@ -111,16 +105,6 @@ def test_the_columns_are_those_promised_and_read_back_exactly(tmp_path: Path) ->
     for row, expected in zip(rows, result.joints, strict=True):
         for cell, value in zip(row, astuple(expected), strict=True):
             assert type(value)(cell) == value
-
-
-def test_tables_are_joined_under_one_header_whatever_joints_are_called(tmp_path: Path) -> None:
-    result = measured(made_of(joints=HOSTILE))
-    parts = [tmp_path / f"{number}.csv" for number in range(3)]
-    for part, rows in zip(parts, (result.joints, (), result.joints[:3]), strict=True):
-        write_rows(part, JointMetrics, rows)
-    join_tables(tmp_path / "all.csv", parts)
-    write_rows(tmp_path / "expected.csv", JointMetrics, [*result.joints, *result.joints[:3]])
-    assert (tmp_path / "all.csv").read_bytes() == (tmp_path / "expected.csv").read_bytes()
 
 
 @pytest.mark.parametrize("joints", [JOINTS, HOSTILE], ids=["plain", "hostile"])

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
+from rigid_motion.motion import KEYFRAME_MODES, interpolate
 from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform
 from rigid_motion_batch.analysis.modes import BEST_OF
 from rigid_motion_batch.analysis.reconstructions import reconstruct
@@ -31,18 +31,6 @@ def test_adaptive_keys_keep_to_the_tolerance(written: str, mode: str) -> None:
     assert shell_errors(clip, keys, mode).max() <= metres * (1.0 + 1e-9)
     assert (keys[0], keys[-1]) == (0, len(clip.times) - 1)
     assert len(keys) < 0.6 * len(clip.times)
-
-
-def test_a_tolerance_with_a_unit_is_the_same_length_in_recordings_of_any_unit() -> None:
-    clip = swinging_clip()
-    poses = Poses(clip.poses.positions * 1e3, clip.poses.quaternions)
-    in_millimetres = replace(clip, poses=poses, metres_per_unit=1e-3)
-    (keys,) = Tolerance("5mm").keys(in_millimetres, "motor_spline", 0.1)
-    assert np.array_equal(keys, *Tolerance("0.5cm").keys(clip, "motor_spline", 0.1))
-    assert np.array_equal(keys, *Tolerance("5").keys(in_millimetres, "motor_spline", 0.1))
-    assert np.array_equal(keys, *Tolerance("0.005").keys(clip, "motor_spline", 0.1))
-    assert shell_errors(in_millimetres, keys, "motor_spline").max() <= 0.005 * (1.0 + 1e-9)
-    assert Tolerance("5").tolerance(in_millimetres) == pytest.approx(0.005)
 
 
 @pytest.mark.parametrize(("seconds", "rate", "count"), [(3.0, "10", 31), (1.0, "7.5", 8), (3.0, "500", 271)])

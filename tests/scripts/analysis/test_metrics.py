@@ -1,44 +1,26 @@
-import csv
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rigid_motion.motion import Poses
+from rigid_motion.motion import shell_error
 from rigid_motion_batch.analysis.choices import Uniform
-from rigid_motion_batch.analysis.metrics import (
-    table_names,
-    write_poses,
-    write_tables,
-)
+from rigid_motion_batch.analysis.metrics import table_names, write_tables
 from rigid_motion_batch.analysis.modes import BEST_OF
+from rigid_motion_batch.analysis.radii import Radii
 from rigid_motion_batch.analysis.reconstructions import reconstruct as choose
-from rigid_motion_batch.analysis.results import measured
+from rigid_motion_batch.analysis.results import clip_result, measured
+from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings import read_trajectories
-from tests.scripts.clips.recordings import reconstruct, swinging_clip
-
-
-def read(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="", encoding="utf-8") as stream:
-        return list(csv.DictReader(stream))
+from rigid_motion_batch.recordings.clip_reading import read_source
+from tests.scripts.clips.bodies import swinging_body
+from tests.scripts.clips.recordings import compare_clip, reconstruct, swinging_clip
+from tests.scripts.comparing import rows_of
 
 
 def test_bytes_are_counted_for_the_keys_that_were_there_and_not_for_the_rate_that_was_asked_for() -> None:
     row = measured(reconstruct(swinging_clip(rate=30.0), "120")).rows[0]
     assert row.bytes_per_s == pytest.approx(30 * 56)
-
-
-def test_poses_read_back_exactly(tmp_path: Path) -> None:
-    random = np.random.default_rng(7)
-    times = 1.7e9 + np.sort(random.random(500))
-    poses = Poses(
-        random.normal(size=(500, 3)) * 10.0 ** random.integers(-12, 5, (500, 1)), random.normal(size=(500, 4))
-    )
-    write_poses(tmp_path / "keys.csv", times, poses)
-    header, *lines = (tmp_path / "keys.csv").read_text().splitlines()
-    assert header == "t,x,y,z,qw,qx,qy,qz"
-    table = np.array([[float(word) for word in line.split(",")] for line in lines])
-    np.testing.assert_array_equal(table, np.column_stack((times, poses.positions, poses.quaternions)))
 
 
 def test_a_mode_for_every_segment_costs_a_byte_a_key_and_is_a_column_of_the_keys(tmp_path: Path) -> None:
@@ -47,10 +29,10 @@ def test_a_mode_for_every_segment_costs_a_byte_a_key_and_is_a_column_of_the_keys
     assert best.mode == BEST_OF
     assert [best.bytes_per_s] == pytest.approx([57 / 56 * row.bytes_per_s for row in single[:1]])
     write_tables(tmp_path, made)
-    keys, all_keys = read(tmp_path / "best_of.keys.csv"), read(tmp_path / "keys.csv")
+    keys, all_keys = rows_of(tmp_path / "best_of.keys.csv"), rows_of(tmp_path / "keys.csv")
     assert [row.pop("mode") for row in keys] == [*made.segment_modes, ""]
     assert keys == all_keys
-    filled = {mode: read(tmp_path / f"{mode}.csv") for mode in made.keys}
+    filled = {mode: rows_of(tmp_path / f"{mode}.csv") for mode in made.keys}
     ends = [float(row["t"]) for row in keys]
     for first, last, mode in zip(ends[:-1], ends[1:], made.segment_modes, strict=True):
         for own, row in zip(filled[mode], filled[BEST_OF], strict=True):
@@ -67,3 +49,17 @@ def test_in_the_format_of_tum_poses_are_read_back_as_they_were(tmp_path: Path) -
         assert np.array_equal(read.times, made.times)
         assert np.array_equal(read.poses.positions, made.filled_in(mode, made.times).positions)
         assert np.array_equal(read.poses.quaternions, made.filled_in(mode, made.times).quaternions)
+
+
+@pytest.mark.parametrize("body", [False, True])
+def test_errors_are_those_between_what_is_shown(body: bool) -> None:
+    clip = swinging_body() if body else read_source(str(ASSETS / "reach.csv"), "unity")[0][0]
+    result = compare_clip(clip, Uniform("7"), ("lerp_slerp", "motor_spline"), Radii())
+    truth = clip_result(clip, [result]).truth
+    for motion in result.motions:
+        there = truth[..., result.first : result.first + motion.errors.shape[1]]
+        apart = np.linalg.norm(motion.poses.positions - there.positions, axis=-1)
+        np.testing.assert_allclose(motion.errors[1], np.atleast_2d(apart).max(axis=0), atol=1e-6)
+        assert motion.errors[0].max() == pytest.approx(motion.metrics[0].max_shell_m)
+        if not body:
+            np.testing.assert_allclose(motion.errors[0], shell_error(motion.poses, there, 0.1), atol=1e-12)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigid_motion.motion import KEYFRAME_MODES, Poses, measure, rms
+from rigid_motion.motion import KEYFRAME_MODES, Poses, rms
 from rigid_motion_batch.analysis import reconstructions
 from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform
 from rigid_motion_batch.analysis.reconstructions import (
@@ -21,7 +21,6 @@ from rigid_motion_batch.analysis.reconstructions import (
 from rigid_motion_batch.recordings.clips import Clip
 from tests.motion.bodies import body_errors
 from tests.scripts.clips.bodies import JOINTS, PARENTS, still_body, swinging_body
-from tests.scripts.clips.recordings import swinging_clip
 
 MODES = ("lerp_slerp", "dq_sclerp", "motor_spline")
 
@@ -44,9 +43,6 @@ def independently(made: Reconstruction, mode: str) -> np.ndarray:
     metres = Poses(clip.poses.positions * clip.metres_per_unit, clip.poses.quaternions)
     keys = tuple(np.resize(own, max(len(own), 1)) for own in made.keys[mode])
     return body_errors(clip.times, metres, PARENTS, keys, mode, RADII)[:, made.samples]
-
-
-# -- keys -------------------------------------------------------------------------------------------------------------
 
 
 def test_a_joint_that_stays_as_it_is_has_one_key_and_the_others_are_key_poses() -> None:
@@ -90,14 +86,6 @@ def test_keys_that_the_motion_chooses_keep_every_joint_within_the_tolerance(mode
     assert all(own[0] == 0 and own[-1] == len(made.clip.times) - 1 for own in moved)
 
 
-@pytest.mark.parametrize("choice", [Uniform("0.3"), Budget("0.3")], ids=str)
-def test_a_body_too_short_for_two_keys_is_not_reconstructed(choice: Choice) -> None:
-    assert reconstruct(swinging_body(), choice, MODES, RADII) is None
-
-
-# -- errors -----------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("mode", KEYFRAME_MODES)
 def test_errors_are_had_again_by_matrices(mode: str) -> None:
     made = evenly(swinging_body(seed=5), "4", (mode,))
@@ -120,30 +108,6 @@ def test_blocks_of_any_size_give_the_same_numbers(block: int, monkeypatch: pytes
     assert rms(made.shell("lerp_slerp")) == pytest.approx(np.sqrt(np.mean(whole.shell**2)), rel=1e-12)
 
 
-@pytest.mark.parametrize("mode", KEYFRAME_MODES)
-def test_a_body_of_one_joint_has_the_errors_of_a_single_rigid_one(mode: str) -> None:
-    single = swinging_clip(seconds=1.0)
-    rest_body = replace(
-        swinging_body().rest_body,
-        joints=("Only",),
-        parents=np.array([-1]),
-        rest=Poses(np.zeros((1, 3)), np.eye(4)[:1]),
-        tails=np.zeros((1, 3)),
-    )
-    poses = Poses(single.poses.positions[None], single.poses.quaternions[None])
-    body = reconstruct(replace(single, poses=poses, rest_body=rest_body), Uniform("6"), (mode,), 0.1)
-    made = reconstruct(single, Uniform("6"), (mode,), 0.1)
-    errors, of_body = measured(made, mode), measured(body, mode)
-    expected = measure(made.times, made.filled_in(mode, made.times), single.poses[made.samples], 0.1)
-    for own in (errors, of_body):
-        np.testing.assert_allclose(own.shell[0], expected.shell, atol=1e-12)
-        assert own.velocity[0] == pytest.approx(np.sqrt(np.mean(expected.velocity**2)))
-        assert own.rotation[0] == pytest.approx(np.sqrt(np.mean(expected.rotation**2)))
-
-
-# -- feet -------------------------------------------------------------------------------------------------------------
-
-
 def test_a_foot_that_stands_is_seen_and_how_far_it_slides_is_the_farthest_from_where_it_began() -> None:
     clip = swinging_body()
     made = evenly(clip, "1.5")
@@ -159,9 +123,6 @@ def test_a_foot_that_stands_is_seen_and_how_far_it_slides_is_the_farthest_from_w
     shown = made.shown("lerp_slerp", made.times).positions[foot, : stands[-1] + 1]
     assert errors.slide == pytest.approx(np.linalg.norm(shown - shown[0], axis=-1).max(), rel=1e-9)
     assert errors.slide > ground.slide
-
-
-# -- modes that are one motion ----------------------------------------------------------------------------------------
 
 
 def test_modes_that_are_one_motion_are_together_and_have_the_same_keys() -> None:

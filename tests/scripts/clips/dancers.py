@@ -18,18 +18,15 @@ TAILS = ((0, 0.05, 0.3), (0, 0, 0.35), (0, 0, 0.2), (0, 0, -0.75), (0, 0, -0.8),
 
 def dancing_clip(
     *,
-    name: str = "dance",
-    seconds: float = 1.2,
     rate: float = 60.0,
     axes: str = "blender",
     metres_per_unit: float = 1.0,
-    joints: Sequence[str] = JOINTS,
     walked: float = 0.0,
     still: Sequence[int] = (),
     skin: bool = False,
 ) -> Clip:
     """A body of six joints that turn every way, and walks so many metres; some joints stay as they are."""
-    times = np.arange(0.0, seconds + 1e-9, 1.0 / rate)
+    times = np.arange(0.0, 1.2 + 1e-9, 1.0 / rate)
     random = np.random.default_rng(7)
     count = len(JOINTS)
     at_rest = normalise(random.normal(size=(count, 4)) * 0.2 + (1.0, 0.0, 0.0, 0.0))
@@ -39,23 +36,21 @@ def dancing_clip(
     turns = normalise(np.concatenate((np.ones((count, 1, len(times))), waves), axis=1).transpose(0, 2, 1))
     places = np.repeat(np.array(OFFSETS, dtype=float)[:, None], len(times), axis=1)
     if 0 not in still:
-        places[0] += np.stack(
-            (walked * times / seconds, 0.1 * np.sin(3.0 * times), 0.05 * np.sin(7.0 * times)), axis=-1
-        )
+        places[0] += np.stack((walked * times / 1.2, 0.1 * np.sin(3.0 * times), 0.05 * np.sin(7.0 * times)), axis=-1)
     local = Poses(np.array(OFFSETS, dtype=float), at_rest)
     rest = Poses(np.zeros((count, 3)), np.zeros((count, 4)))
     for joint, parent in enumerate(PARENTS):
         rest[joint] = local[joint] if parent < 0 else placed(rest[parent], local[joint])
     scale = 1.0 / metres_per_unit
     rest_body = RestBody(
-        tuple(joints),
+        JOINTS,
         np.array(PARENTS),
         Poses(rest.positions * scale, rest.quaternions),
         np.array(TAILS, dtype=float) * scale,
         _skin(rest, scale) if skin else None,
     )
     poses = Poses(places * scale, turns)
-    return Clip(name, f"{name}.bvh", axes, times, poses, (), metres_per_unit, rest_body=rest_body)
+    return Clip("dance", "dance.bvh", axes, times, poses, (), metres_per_unit, rest_body=rest_body)
 
 
 def _skin(rest: Poses, scale: float) -> Skin:

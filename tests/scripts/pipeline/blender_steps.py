@@ -25,8 +25,6 @@ class Save(Step, blender=True):
         match self.fate:
             case "foreseen":
                 raise TaskError("no such scene; make another")
-            case "unforeseen":
-                raise KeyError(self.name)
             case "full":
                 raise OSError(28, "No space left on device", str(job.folder / "scene.blend"))
             case "killed":

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import json
 import os
 import signal
 import time
@@ -144,13 +143,6 @@ class Chatter(Step):
         job.progress(1, 2)
         time.sleep(0.5)
         (job.folder / FILE).write_text("spoken")
-
-
-class Parse(Step):
-    """Write the values that another task has written as JSON."""
-
-    def make(self, job: Job) -> None:
-        (job.folder / FILE).write_text(",".join(map(str, json.loads((job.before[0] / FILE).read_text()).values())))
 
 
 def _note(log: str, text: str) -> None:

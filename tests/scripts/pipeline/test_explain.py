@@ -129,8 +129,3 @@ def test_files_that_come_and_go_change_a_room(room: Path, change: str) -> None:
 def test_a_room_that_does_not_exist_is_an_error() -> None:
     with pytest.raises(FileNotFoundError):
         digest_of(places.place_of("kitchen"))
-
-
-def test_rooms_are_folders_and_files_of_the_program() -> None:
-    names = ("pipeline", "files.py", "rigid_motion/motion", "rigid_motion/animation")
-    assert all(places.place_of(name).exists() for name in names)

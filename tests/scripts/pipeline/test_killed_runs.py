@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.scripts.pipeline.plans import contents, half_written
+from tests.scripts.stopping import alive, descendants
 from tests.thoroughness import THOROUGH
 
 KILLED = """
@@ -43,18 +44,6 @@ def started(folder: Path, output: Path, seconds: float) -> Iterator[subprocess.P
         process.wait()
 
 
-def children(process: int) -> list[int]:
-    result = [path.read_text().split() for path in Path(f"/proc/{process}/task").glob("*/children")]
-    return [int(child) for some in result for child in some]
-
-
-def alive(process: int) -> bool:
-    try:
-        return "State:\tZ" not in Path(f"/proc/{process}/status").read_text()
-    except (ProcessLookupError, FileNotFoundError):
-        return False
-
-
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes where Linux shows them")
 def test_a_run_that_was_killed_again_and_again_ends_like_one_that_was_not(output: Path, tmp_path: Path) -> None:
@@ -70,7 +59,7 @@ def test_a_run_that_was_killed_again_and_again_ends_like_one_that_was_not(output
             ):
                 time.sleep(0.01)
             time.sleep(0.01 * (number % 5))
-            workers = children(process.pid)
+            workers = descendants(process.pid)
             process.kill()
             process.wait()
         result = contents(output)
@@ -84,26 +73,3 @@ def test_a_run_that_was_killed_again_and_again_ends_like_one_that_was_not(output
         assert process.wait(60) == 0
     assert contents(output) == expected
     assert half_written(output) == []
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes where Linux shows them")
-def test_whichever_worker_is_killed_the_files_are_the_same(output: Path, tmp_path: Path) -> None:
-    with started(tmp_path, output, 0.3) as process:
-        killed = 0
-        while process.poll() is None:
-            time.sleep(0.5)
-            workers = [child for child in children(process.pid) if b"spawn_main" in command_of(child)]
-            if workers and killed < 4:
-                os.kill(workers[killed % len(workers)], 9)
-                killed += 1
-        assert process.returncode == 0
-    assert killed
-    assert contents(output)["all.txt"] == "".join(f"{n}" for n in range(20))
-
-
-def command_of(process: int) -> bytes:
-    try:
-        return Path(f"/proc/{process}/cmdline").read_bytes()
-    except OSError:
-        return b""

@@ -14,7 +14,7 @@ TIMES = np.arange(COUNT) / 50.0
 POSITIONS = np.round(np.stack((TIMES, np.sin(9.0 * TIMES), 1.0 - TIMES), axis=-1), 4)
 TURNS = Rotation.from_rotvec(np.stack((4.0 * TIMES, TIMES, -TIMES), axis=-1))
 XYZW = np.round(TURNS.as_quat(), 5)
-DEGREES = np.round(TURNS.as_euler("YXZ", degrees=True), 3)
+DEGREES, ZXY = (np.round(TURNS.as_euler(order, degrees=True), 3) for order in ("YXZ", "ZXY"))
 
 
 def _rows(columns: Iterable[np.ndarray], separator: str = ",") -> str:
@@ -23,7 +23,7 @@ def _rows(columns: Iterable[np.ndarray], separator: str = ",") -> str:
 
 
 def _motive(rotations: np.ndarray, kind: str) -> str:
-    axes = ["X", "Y", "Z", "W"][: rotations.shape[1]]
+    axes = list("XYZW" if kind == "Quaternion" else kind)
     held = ["Rotation"] * len(axes) + ["Position"] * 3
     cells = {"Type": ["Rigid Body"] * 2, "Name": ["Drill", "Head, left"], "ID": ["B1", "B2"]}
     lines = [f"Format Version,1.23,Take Name,Take 3,Rotation Type,{kind},Length Units,Millimeters", ""]
@@ -94,7 +94,7 @@ SEEDS: dict[str, tuple[str, ...]] = {
         + "\n"
         + _rows((1e6 * TIMES, POSITIONS, XYZW, POSITIONS, XYZW), "\t"),
         "Recorder v1.2\nDate: 2026-11-22\n\ntime,x,y,z,qx,qy,qz,qw\n"
-        + "".join(f"2026-11-22T23:59:59.{row:02}+01:00,{line}" for row, line in enumerate(_POSE_ROWS)),
+        + "".join(f"2026-11-22T23:59:59.{2 * row:02}+01:00,{line}" for row, line in enumerate(_POSE_ROWS)),
         '# a comment\n"t"\t"x"\t"y"\t"z"\t"qx"\t"qy"\t"qz"\t"qw"\n' + _rows((TIMES, POSITIONS, XYZW), "\t"),
     ),
     ".tum": (
@@ -104,7 +104,7 @@ SEEDS: dict[str, tuple[str, ...]] = {
     ".euroc.csv": (
         _EUROC
         + "".join(
-            f"{1403636580838555648 + 50_000_001 * row},{line}"
+            f"{1403636580838555648 + 20_000_001 * row},{line}"
             for row, line in enumerate(
                 _rows((POSITIONS, XYZW[:, 3], XYZW[:, :3], POSITIONS[:, 0])).splitlines(keepends=True)
             )
@@ -113,9 +113,9 @@ SEEDS: dict[str, tuple[str, ...]] = {
     ".motive.csv": (_motive(XYZW, "Quaternion"), _motive(DEGREES, "YXZ")),
     ".json": (json.dumps(_aframe(), indent=1), json.dumps(_aframe()["left"]), json.dumps(_aframe_of_2017(), indent=1)),
     ".bvh": (
-        f"{ARM}Frames: {COUNT}\nFrame Time: 0.02\n" + _rows((POSITIONS, DEGREES, DEGREES[::-1]), " "),
+        f"{ARM}Frames: {COUNT}\nFrame Time: 0.02\n" + _rows((POSITIONS, ZXY, ZXY[::-1]), " "),
         f"{ARM}Frames: {COUNT}\nFrame Time: 0.02\n".replace("Elbow", "Shoulder").replace("\n", "\r\n")
-        + _rows((POSITIONS, DEGREES, 0.0 * DEGREES), "\t"),
+        + _rows((POSITIONS, ZXY, 0.0 * ZXY), "\t"),
     ),
 }
 """By how the file's name ends. Each has the same motion in the spellings that its reader knows."""

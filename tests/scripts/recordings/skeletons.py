@@ -3,6 +3,7 @@
 import contextlib
 import io
 import warnings
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -65,10 +66,10 @@ def skinned(obj: bpy.types.Object) -> bpy.types.Object:
     return skin
 
 
-def places_in_blender(obj: bpy.types.Object, bones: tuple[str, ...]) -> np.ndarray:
-    """Where the heads of bones are in the open scene on `FRAMES`, shape (bones, frames, 3)."""
+def places_in_blender(obj: bpy.types.Object, bones: Sequence[str], frames: Iterable[int] = FRAMES) -> np.ndarray:
+    """Where the heads of bones are in the open scene on some frames, shape (bones, frames, 3)."""
     seen = []
-    for frame in FRAMES:
+    for frame in frames:
         bpy.context.scene.frame_set(frame)
         shown = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
         seen.append([(shown.matrix_world @ shown.pose.bones[name].matrix).translation for name in bones])

@@ -79,19 +79,6 @@ def test_a_t_pose_in_front_is_left_out_and_said(rate: float, held: int, metres: 
     assert clip_of(dance, start=0.0).calibration == 0
 
 
-def test_the_pose_at_rest_in_front_is_left_out_although_it_is_no_t() -> None:
-    dance = dancer(held=1)
-    down = np.where(np.isin(np.arange(len(JOINTS)), (3, 5))[:, None], (0.05, -0.6, 0.3), OFFSETS)
-    poses = Poses(np.repeat(down[:, None], len(dance.times), axis=1), dance.poses.quaternions)
-    places = dance.rest_body.rest.positions + np.where((PARENTS > 0)[:, None], down - OFFSETS, 0.0)
-    dance = replace(
-        dance, poses=poses, rest_body=replace(dance.rest_body, rest=Poses(places, dance.rest_body.rest.quaternions))
-    )
-    clip = clip_of(dance)
-    assert clip.calibration == 1
-    assert clip.warnings[0].text.startswith("its first frame is the pose at rest and left out: ")
-
-
 def test_another_pose_in_front_stays_and_is_said() -> None:
     dance = dancer(rate=120.0)
     dance.poses.quaternions[2, 0] = turned(np.array(-2.6), 0)
@@ -123,9 +110,6 @@ def test_who_dances_all_the_time_as_wildly_as_from_a_t_pose_keeps_it() -> None:
     assert clip_of(dance).calibration == 0
 
 
-# -- gaps and jumps ---------------------------------------------------------------------------------------------------
-
-
 def hand(count: int = 300, rate: float = 90.0, begin: float = 0.0) -> Trajectory:
     times = np.arange(count) / rate
     positions = np.stack((0.3 * np.sin(4.0 * times), 1.0 + 0.1 * np.cos(7.0 * times), 0.0 * times), axis=-1)
@@ -149,14 +133,6 @@ def test_a_gap_longer_than_keys_are_apart_is_said_with_its_times(begin: float) -
     assert (first.start_s - begin, first.end_s - begin) == pytest.approx((1.0, 1.3), abs=1e-6)
     assert (second.start_s - begin, second.end_s - begin) == pytest.approx((2.5, 3.1), abs=1e-6)
     assert clip_of(without(hand(begin=begin), (1.001, 1.299)), start=1.299).warnings == ()
-
-
-def test_of_many_gaps_the_longest_five_are_named() -> None:
-    gaps = [(0.4 * number, 0.4 * number + 0.21 + 0.01 * number) for number in range(1, 8)]
-    clip = clip_of(without(hand(), *gaps))
-    assert len(clip.warnings) == 5
-    assert all("(one of 7 gaps)" in warning.text for warning in clip.warnings)
-    assert [warning.start_s for warning in clip.warnings] == sorted(warning.start_s for warning in clip.warnings)
 
 
 def test_who_is_slow_fast_or_jumps_all_the_time_is_not_warned() -> None:
@@ -184,9 +160,6 @@ def test_a_joint_that_jumps_is_said() -> None:
     there, back = clip_of(dance).warnings
     assert there.text.startswith("a jump at 2.49 s (one of 2 jumps)")
     assert (there.end_s, back.start_s) == (dance.times[300], dance.times[300])
-
-
-# -- the part that is taken -------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("begin", [0.0, 12.5, 1.7e9])

@@ -72,13 +72,10 @@ def test_more_or_fewer_rows_than_the_file_says_are_read_with_a_warning(write, co
     ("size", "unit", "metres", "told"),
     [
         (1.7, "", 1.7, ""),
-        (4.0, "", 4.0, ""),
         (170.0, "centimetres", 1.7, "the only usual unit that makes a grown-up of it"),
         (7.0, "feet", 2.13, "the only usual unit that makes a grown-up of it"),
         (17.0, "units of CMU's motion capture", 0.96, "may as well be decimetres (1.7 m)"),
-        (5.5, "feet", 1.68, "the only usual"),
         (0.1, "", 0.1, ""),
-        (60.0, "inches", 1.52, ""),
     ],
 )
 def test_a_guessed_unit_is_told_with_how_sure_it_is(write, size: float, unit: str, metres: float, told: str) -> None:
@@ -166,26 +163,18 @@ def test_the_poses_are_those_of_blenders_importer(write, seed: int) -> None:
     ("text", "line", "problem"),
     [
         ("", 1, "the file ends where HIERARCHY is expected"),
-        ("t,x,y,z\n0,1,2,3\n", 1, "a BVH file begins with HIERARCHY, not with 't,x,y,z'"),
         (ARM.split("MOTION")[0], 16, "the file ends where MOTION is expected"),
         (ARM.replace("}\nMOTION", "MOTION"), 15, "a } is missing before MOTION"),
         (ARM.replace("}\nMOTION", "}\n}\nMOTION"), 16, "'}' is out of place"),
         (ARM.replace("JOINT Elbow", "ROOT Elbow"), 6, "'ROOT' is out of place"),
         (ARM.replace("2.0 0.0 0.0", "2.0 0.0"), 9, "'CHANNELS' where a number of the OFFSET is expected"),
-        (ARM.replace("2.0 0.0 0.0", "2.0 nan 0.0"), 8, "'nan' where a number of the OFFSET is expected"),
-        (ARM.replace("CHANNELS 3", "CHANNELS 1e9"), 9, "1e+09 CHANNELS for a joint"),
         (ARM.replace("CHANNELS 3 Z", "CHANNELS 3 Q"), 9, "'Qrotation' is no channel"),
         (ARM.replace("CHANNELS 3 Z", "CHANNELS 3 X"), 9, "a channel occurs twice in a joint"),
-        (ARM.split("Frame Time")[0], 16, "'' where Frame Time: and a positive number are expected"),
         (ARM.replace("Frames: 2", "Frames: two"), 17, "'Frames: two' where Frames: and a positive number are expected"),
-        (ARM.replace("1 5 0 ", "1 5 "), 20, "8 columns where 9 are needed"),
-        (ARM.replace("1 5 0 ", "1 5 0 0 "), 20, "10 columns where 9 have a name"),
         (ARM.replace("1 5 0  90", "1 5 0  9O").rstrip(), 20, "Shoulder Zrotation is '9O', not a number"),
-        (ARM.replace("Frames: 2", "Frames: 1").replace("1 5 0  90 0 0  -90 0 0\n", ""), None, "'arm' has 1 samples"),
         ("HIERARCHY\nROOT A\n{\nOFFSET 0 0 0\n}\nMOTION\nFrames: 1\nFrame Time: 1\n0\n", 6, "no joint has CHANNELS"),
         ("HIERARCHY\n" + "ROOT A {" + "JOINT B {" * 50_000, 2, "more than 500 joints hang on one another; export a"),
         ("HIERARCHY\n" + "ROOT A {" + "JOINT B {}" * 50_000, 2, "more than 3000 joints; export fewer, such as one bod"),
-        (b"\x00\x01HIERARCHY", 1, "this is not text but binary data"),
     ],
 )
 def test_a_wrong_file_is_told_with_its_line(write, refusal, text: str | bytes, line: int | None, problem: str) -> None:

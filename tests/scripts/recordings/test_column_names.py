@@ -30,8 +30,6 @@ def test_bodies_scales_and_frames_are_known_and_what_says_nothing_is_not_guessed
         assert column_name(name) == meant, name
 
 
-# -- the page on logs -------------------------------------------------------------------------------------------------
-
 PAGE = (Path(__file__).parents[3] / "docs" / "csv.md").read_text(encoding="utf-8")
 
 

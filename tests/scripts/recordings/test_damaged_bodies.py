@@ -3,6 +3,7 @@
 import os
 import struct
 from collections.abc import Callable, Iterator
+from dataclasses import astuple
 from pathlib import Path
 from random import Random
 
@@ -10,10 +11,13 @@ import numpy as np
 import pytest
 
 from rigid_motion_batch.analysis.choices import Uniform
+from rigid_motion_batch.analysis.radii import Radii
+from rigid_motion_batch.analysis.results import clip_result
+from rigid_motion_batch.recordings.clips import Clip
 from tests.blank import blank
+from tests.scripts.clips.recordings import compare_clip
 from tests.scripts.recordings.mutations import in_place, mutated
 from tests.scripts.recordings.skeletons import body, export, skinned
-from tests.scripts.recordings.test_damaged_bvh_bodies import assert_can_be_shown
 from tests.scripts.recordings.test_fuzz import Reader, clips_or_refusal
 from tests.thoroughness import THOROUGH
 
@@ -44,6 +48,18 @@ FBX: tuple[Damage, ...] = (in_place, in_place, in_place, zero_run, change_a_leng
 GLB: tuple[Damage, ...] = (in_place, zero_run, change_a_length, mutated)
 
 
+def assert_can_be_shown(clip: Clip) -> None:
+    """Measured by the program, with numbers that are some, in tables and in all that a page shows."""
+    result = compare_clip(clip, Uniform("5"), ("lerp_slerp",), Radii())
+    if result is not None:
+        for row in (*result.rows, *result.joints):
+            assert all(np.isfinite(cell) for cell in astuple(row) if isinstance(cell, float)), row
+        assert np.isfinite(clip_result(clip, [result]).truth.positions).all()
+        for motion in result.motions:
+            assert np.isfinite(motion.poses.positions).all()
+            assert np.isfinite(motion.errors).all()
+
+
 @pytest.fixture
 def reader() -> Iterator[Reader]:
     one = Reader("test_damaged_bodies", "read_and_place")
@@ -62,7 +78,7 @@ def read_and_place(source: str, _: int) -> bool:
         assert np.isfinite(poses.positions).all()
         assert np.allclose(np.linalg.norm(poses.quaternions, axis=-1), 1.0)
         if clip.rest_body is not None:
-            assert_can_be_shown(clip, Uniform("5"), "lerp_slerp")
+            assert_can_be_shown(clip)
     return True
 
 

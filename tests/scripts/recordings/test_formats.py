@@ -7,8 +7,20 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rigid_motion_batch.recordings import read_trajectories
+from tests.scripts.recordings import seeds
 
-# -- A-Frame ----------------------------------------------------------------------------------------------------------
+
+@pytest.mark.parametrize("ending", seeds.SEEDS)
+def test_every_format_holds_the_motion(write, ending: str) -> None:
+    for seed in seeds.SEEDS[ending]:
+        path = write(f"take{ending}", seed)
+        recording = read_trajectories(f"{path}:*" if "left_px" in seed or ending in (".bvh", ".json") else path)
+        one = recording.trajectories[0]
+        np.testing.assert_allclose(one.times - one.times[0], seeds.TIMES, atol=1e-6)
+        positions = one.poses.positions * (one.metres_per_unit if ending != ".bvh" else 1.0)
+        np.testing.assert_allclose(positions, seeds.POSITIONS, atol=1e-4)
+        turns = Rotation.from_quat(one.poses.quaternions, scalar_first=True)
+        assert (turns.inv() * seeds.TURNS).magnitude().max() < 1e-3
 
 
 def aframe(offset: float = 0.0, **extra: object) -> dict:
@@ -33,31 +45,11 @@ def test_a_recording_of_a_headset_and_controllers_holds_them_by_name(write) -> N
     np.testing.assert_array_equal(left.poses.positions[:, 0], [5.0, 6.0, 7.0])
 
 
-def test_times_are_seconds_and_angles_are_turned_in_the_order_y_x_z(write) -> None:
-    (trajectory,) = read_trajectories(write("hand.json", json.dumps(aframe()))).trajectories
-    assert trajectory.name == "hand"
-    np.testing.assert_allclose(trajectory.times, [306.68613, 306.69713, 306.70813], rtol=1e-15)
-    angles = [[120, 10, -60], [121, 10, -60], [122, 10, -60]]
-    expected = Rotation.from_euler("YXZ", angles, degrees=True).as_quat()[:, [3, 0, 1, 2]]
-    np.testing.assert_allclose(trajectory.poses.quaternions, expected, atol=1e-15)
-
-
-@pytest.mark.parametrize("bare", [True, False])
-def test_the_first_versions_wrote_lists_and_quaternions(write, bare: bool) -> None:
-    poses = [{"rotation": [0.1, 0.2, 0.3, 0.9], "position": [1, 2, 3], "timestamp": 10 * t} for t in range(2)]
-    content = json.dumps(poses if bare else {"poses": poses, "events": []})
-    (trajectory,) = read_trajectories(write("hand.json", content)).trajectories
-    np.testing.assert_array_equal(trajectory.poses.positions, [[1, 2, 3]] * 2)
-    np.testing.assert_array_equal(trajectory.poses.quaternions, [[0.9, 0.1, 0.2, 0.3]] * 2)
-
-
 def broken(**changes: object) -> str:
     content = aframe()
     content["poses"][2].update(changes)
     return json.dumps(content)
 
-
-# -- EuRoC ------------------------------------------------------------------------------------------------------------
 
 EUROC_HEADER = (
     "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], "
@@ -79,8 +71,6 @@ def test_not_a_nanosecond_is_lost(write, header: str) -> None:
     np.testing.assert_array_equal(trajectory.poses.positions[0], [4.688319, -1.786938, 0.783338])
     np.testing.assert_array_equal(trajectory.poses.quaternions[0], [0.534108, -0.153029, -0.827383, -0.082152])
 
-
-# -- Motive, versions 1.21 to 1.25 of the format ----------------------------------------------------------------------
 
 MOTIVE_SETTINGS = (
     "Format Version,1.23,Take Name,Take 3,Capture Frame Rate,120.000000,Export Frame Rate,120.000000,"
@@ -130,30 +120,6 @@ def test_the_rigid_bodies_are_found_among_markers_and_bones(write, labels: bool,
     np.testing.assert_array_equal(head.poses.quaternions[2], [-0.5, 0.5, 0.5, 0.5])
 
 
-@pytest.mark.parametrize("order", ["XYZ", "ZYX", "YZX", ""], ids=str)
-def test_euler_angles_are_turns_about_the_turned_axes(write, order: str) -> None:
-    """Those about X, Y and Z where the settings say nothing, and there is no W."""
-    kind = f"Rotation Type,{order}," if order else ""
-    order = order or "XYZ"
-    text = "\n".join(
-        [
-            MOTIVE_SETTINGS.replace("Rotation Type,Quaternion,", kind),
-            ",Type" + ",Rigid Body" * 6,
-            ",Name" + ",Drill" * 6,
-            ",ID" + ",B1" * 6,
-            "," + ",Rotation" * 3 + ",Position" * 3,
-            "Frame,Time (Seconds)," + ",".join(order) + ",X,Y,Z",
-            "0,0.0,10,20,30,1,2,3",
-            "1,0.1,40,50,60,1,2,3",
-        ]
-    )
-    (drill,) = read_trajectories(write("take.csv", text)).trajectories
-    expected = Rotation.from_euler(order, [[10, 20, 30], [40, 50, 60]], degrees=True).as_quat()[:, [3, 0, 1, 2]]
-    np.testing.assert_allclose(drill.poses.quaternions, expected, atol=1e-15)
-
-
-# -- TUM --------------------------------------------------------------------------------------------------------------
-
 TUM_COMMENTS = "# ground truth trajectory\n# file: 'dataset.bag'\n# timestamp tx ty tz qx qy qz qw\n"
 TUM_ROWS = "1305031098.6659 1.3 0.6 1.6 0.6132 0.5962 -0.3311 -0.3986\n1305031098.6758 1.4 0.7 1.7 0.1 0.2 0.3 0.4\n"
 
@@ -169,33 +135,17 @@ def test_eight_numbers_in_a_line_are_time_position_and_scalar_last_quaternion(wr
     assert trajectory.poses.scales is None
 
 
-def test_a_comment_that_names_another_order_is_believed(write) -> None:
-    text = "# t x y z qw qx qy qz\n0 1 2 3 0.9 0.1 0.2 0.3\n1 1 2 3 0.9 0.1 0.2 0.3\n"
-    (trajectory,) = read_trajectories(write("walk.txt", text)).trajectories
-    np.testing.assert_array_equal(trajectory.poses.quaternions[0], [0.9, 0.1, 0.2, 0.3])
-
-
-# -- refusals ---------------------------------------------------------------------------------------------------------
-
 WRONG = {
     "hand.json": [
         ("", 1, "this is not JSON"),
         ('{"poses":\n[}', 2, "this is not JSON"),
         ('{"poses": [%s]}' % ("9" * 5000), None, "this JSON cannot be a recording"),
         ('{"camera": 1, "left": {"events": []}}', None, "this JSON holds no poses"),
-        ('{"camera": {"poses": []}}', None, "no moving body in this file"),
-        ('{"poses": [1, 2]}', None, "pose 0 of 'hand' has no number timestamp"),
-        (broken(timestamp="noon"), None, "pose 2 of 'hand' has no number timestamp"),
         (broken(position={"x": 1, "y": 2}), None, "pose 2 of 'hand' has no number position.z"),
-        (broken(position={"x": 1, "y": [2], "z": 3}), None, "pose 2 of 'hand' has no number position.y"),
-        (broken(rotation=[0, 0, 0, 1]), None, "pose 2 of 'hand' has no number rotation.y"),
         (broken(timestamp=10**400), None, "pose 2 of 'hand' has no number timestamp"),
-        (b"\x80\x81", 1, "this is not text"),
     ],
     "take.csv": [
         (MOTIVE_SETTINGS, 1, "the rows that say what the columns are end too early"),
-        ("\n".join(motive().split("\n")[:5]), 5, "the rows that say what the columns are end too early"),
-        ("\n".join(motive().split("\n")[:7]), None, "'Drill' has 0 samples"),
         (
             motive().replace("Rigid Body Marker", "Marker").replace("Rigid Body", "Bone"),
             None,
@@ -208,20 +158,13 @@ WRONG = {
             7,
             "'Drill' has no column rotat",
         ),
-        (motive().replace("Time (Seconds),X,Y,Z,X,Y,Z,W", "Time,X,Y,Z,X,Y,Z,V"), 7, "'Drill' has no column rotation W"),
-        (motive().replace("0.1,0.2,0.3,0.9", "0.1,?,0.3,0.9"), 9, "Drill rotation y is '?', not a number"),
-        (motive() + "3,0.025,1\n", 11, "3 columns where"),
         (motive() + "3,0.025" + ",1" * 99 + "\n", 11, "101 columns where 31 have a name"),
         (motive().replace("Head, left", "x" * 200_000), 4, "this line is no header"),
     ],
     "data.csv": [(f"{EUROC_HEADER}\x1c{EUROC_HEADER}\n{EUROC_ROWS}", 1, "two columns mean x")],
     "walk.tum": [
-        ("", None, "the file is empty"),
-        (TUM_COMMENTS, None, "'walk' has 0 samples"),
         (f"{TUM_COMMENTS}0 1 2 3 0 0 0 1\n0.1 1 2\n", 5, "3 columns where 8 are needed"),
         (f"{TUM_COMMENTS}0 1 2 3 0 0 0 1 9\n", 4, "9 columns where 8 have a name"),
-        (f"{TUM_COMMENTS}{TUM_ROWS}0.1 1 2 3 0 0 O 1\n", 6, "qz is 'O', not a number"),
-        ("# t x y z\n0 1 2 3\n0.1 1 2 3\n", 2, "positions only, and rotations are needed"),
         ("0 1 2 3\n0.1 1 2 3\n", 1, "positions only, and rotations are needed; write t x y z qx qy qz qw"),
         (f"{TUM_ROWS}1,2,3\n", 3, "1 columns where 8 are needed"),
     ],

@@ -9,7 +9,6 @@ import os
 import re
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -36,8 +35,8 @@ FIRST = int(os.environ.get("RIGID_MOTION_FUZZ_FROM", "0"))
 FILLED_IN = max(1, CASES // 400)
 """Of so many numbers of cases one is also filled in, which takes longer than to read it."""
 
-PATIENCE = 20.0
-"""Seconds for one small file, on a busy machine."""
+PATIENCE = 20
+"""Seconds of a processor for one small file."""
 
 LONGEST_ERROR = 2000
 """Characters, beside those of the path."""
@@ -103,13 +102,13 @@ def fuzz(folder: Path, ending: str, seeds: tuple[bytes, ...], cases: int) -> int
         chance = Random(f"{ending} {number}")
         path.write_bytes(mutated(chance.choice(seeds), chance))
         source = f"{path}{chance.choice(('', ':*'))}"
-        started = time.perf_counter()
+        started = time.process_time()
         try:
             readable += read_and_fill_in(source, number)
         except Exception as error:
             error.add_note(f"case {number} of {ending}: {path}")
             raise
-        assert time.perf_counter() - started < PATIENCE, f"case {number} of {ending}: {path}"
+        assert time.process_time() - started < PATIENCE, f"case {number} of {ending}: {path}"
     return readable
 
 
@@ -119,18 +118,8 @@ def test_damaged_text_is_refused_in_one_line_or_can_be_filled_in(tmp_path: Path,
     assert 0 < readable < CASES or CASES < 100, "damage that is always or never noticed tells little"
 
 
-@pytest.mark.parametrize("ending", SEEDS)
-def test_what_is_damaged_here_is_sound_before(tmp_path: Path, ending: str) -> None:
-    for number, seed in enumerate(SEEDS[ending]):
-        path = tmp_path / f"take{ending}"
-        path.write_text(seed, encoding="utf-8", newline="")
-        assert read_and_fill_in(f"{path}:*", number) or read_and_fill_in(str(path), number)
-
-
-# -- .blend -----------------------------------------------------------------------------------------------------------
-
 READER = """
-import json, os, sys, warnings
+import json, os, resource, sys, time, warnings
 answers = os.fdopen(os.dup(1), "w")
 os.dup2(2, 1)
 import bpy
@@ -138,6 +127,7 @@ from tests.scripts.recordings.%s import %s as read
 warnings.simplefilter("error", RuntimeWarning)
 for line in sys.stdin:
     number, source = json.loads(line)
+    resource.setrlimit(resource.RLIMIT_CPU, (int(time.process_time()) + %d, resource.RLIM_INFINITY))
     try:
         answer = read(source, number)
     except Exception as error:
@@ -151,7 +141,7 @@ class Reader:
     """A process of its own that reads what Blender opens, begun anew where it crashed on a damaged file."""
 
     def __init__(self, module: str = "test_fuzz", function: str = "read_and_fill_in") -> None:
-        self._code = READER % (module, function)
+        self._code = READER % (module, function, 3 * PATIENCE)
         self._process: subprocess.Popen[str] | None = None
 
     def read(self, source: str, number: int) -> bool | str:
@@ -160,15 +150,11 @@ class Reader:
             command = [sys.executable, "-c", self._code]
             pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
             self._process = subprocess.Popen(command, cwd=ROOT, text=True, **pipes)
-        late = threading.Timer(3.0 * PATIENCE, self._process.kill)
-        late.start()
         try:
             print(json.dumps([number, source]), file=self._process.stdin, flush=True)
             answer = self._process.stdout.readline()
         except BrokenPipeError:
             answer = ""
-        finally:
-            late.cancel()
         if answer:
             return json.loads(answer)
         self.close()

@@ -44,7 +44,7 @@ def test_a_log_is_described(write) -> None:
         ("t,x,y,z", 1.0, {}, 1.0, "metres", "assumed, where the file says nothing else"),
         ("t,x_cm,y_cm,z_cm", 100.0, {}, 0.01, "centimetres", "as the file says"),
         ("t,x,y,z", 39.37, {"scale": 0.0254}, 0.0254, "inches", "as --scale says"),
-        ("t,x,y,z", 2.0, {"scale": 0.5}, 0.5, "units of 0.5 m", "as --scale says"),
+        ("t,x_mm,y_mm,z_mm", 2.0, {"scale": 0.5}, 0.5, "units of 0.5 m", "as --scale says"),
     ],
 )
 def test_the_unit_comes_with_where_it_is_from(write, header, scale, options, metres, name, known_from) -> None:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
 
 from rigid_motion_batch.recordings import ReadingOptions, read_trajectories
 from tests.scripts.recordings import logs
@@ -21,9 +20,6 @@ def read_one(source: str, **options: object) -> object:
     return trajectory
 
 
-# -- what the user says -----------------------------------------------------------------------------------------------
-
-
 def test_columns_may_be_named_one_by_one(write) -> None:
     source = write("take.csv", log(["when", "a", "b", "c", "d", "e", "f", "g"]))
     named = zip(("t", "x", "y", "z", "qx", "qy", "qz", "qw"), ("When", "a", "b", "c", "d", "e", "f", "g"), strict=True)
@@ -34,7 +30,7 @@ def test_columns_may_be_named_one_by_one(write) -> None:
 @pytest.mark.parametrize("unit", logs.TIMES)
 @pytest.mark.parametrize("start", [0, logs.EPOCH], ids=["from 0", "from 1970"])
 def test_a_unit_of_time_may_be_said(write, name: str, unit: str, start: int) -> None:
-    text = log(names("t", "{}", "q{}"), unit, start=start)
+    text = log(names("t [min]" if name.endswith("csv") else "t", "{}", "q{}"), unit, start=start)
     text = text if name.endswith("csv") else "#" + text.replace(",", " ")
     assert_is_the_motion(read_one(write(name, text), time_unit=unit), MOTIONS["left"], start=start, unit=unit)
 
@@ -50,21 +46,6 @@ def test_frames_are_counted_by_their_rate(write, name: str, time: str) -> None:
     )
     text = text if name.endswith("csv") else "#" + text.replace(",", " ")
     np.testing.assert_allclose(read_one(write(name, text), frame_rate=90.0).times, np.array(frames) / 90.0, rtol=1e-15)
-
-
-@pytest.mark.parametrize("time", ["t", "t_s", "t [ns]", "t [min]"])
-def test_a_unit_of_time_that_is_said_goes_before_that_in_the_name(write, time: str) -> None:
-    source = write("take.csv", log(names(time, "{}", "q{}"), "ms"))
-    assert_is_the_motion(read_one(source, time_unit="ms"), MOTIONS["left"], unit="ms")
-
-
-@pytest.mark.parametrize("position", ["{}", "{}_mm", "{} [furlongs]"])
-def test_a_scale_goes_before_the_unit_in_the_name(write, position: str) -> None:
-    text = log(["t", *(position.format(axis) for axis in "xyz"), "qx", "qy", "qz", "qw"], metres=0.01)
-    assert_is_the_motion(read_one(write("take.csv", text), scale=0.01), MOTIONS["left"])
-
-
-# -- Euler angles -----------------------------------------------------------------------------------------------------
 
 
 def euler_log(header: Sequence[str], order: str, degrees: bool) -> str:
@@ -83,18 +64,6 @@ def test_roll_pitch_and_yaw_are_read_where_it_is_said_which_is_which(write, refu
     assert "--columns rx=roll,ry=pitch,rz=yaw in ROS" in message
 
 
-def test_unity_turns_about_z_then_x_then_y_of_the_world(write) -> None:
-    """As its manual says of Transform.eulerAngles."""
-    header, row = "t,x,y,z,eulerAngles.x,eulerAngles.y,eulerAngles.z", "0,0,0,30,45,60"
-    source = write("take.csv", f"{header}\n0,{row}\n.1,{row}\n")
-    turns = [
-        Rotation.from_rotvec(np.radians(angle) * axis) for angle, axis in zip((30, 45, 60), np.eye(3), strict=True)
-    ]
-    expected = (turns[1] * turns[0] * turns[2]).as_quat(scalar_first=True)
-    for order in ("YXZ", "zxy"):
-        np.testing.assert_allclose(read_one(source, euler=order, degrees=True).poses.quaternions[0], expected)
-
-
 def test_quaternions_are_read_beside_euler_angles_unless_these_are_asked_for(write) -> None:
     rows = "0,0,0,0,0,0,0,1,90,0,0\n.1,0,0,0,0,0,0,1,90,0,0\n"
     source = write("take.csv", "t,x,y,z,qx,qy,qz,qw,euler_x,euler_y,euler_z\n" + rows)
@@ -107,9 +76,6 @@ def test_degrees_that_could_be_radians_are_told(write) -> None:
     source = write("take.csv", euler_log(names("t", "{}", "rot_{}", "xyz"), "XYZ", False))
     (warning,) = read_one(source, euler="XYZ", degrees=True).warnings
     assert str(warning).endswith("radians need no --degrees")
-
-
-# -- several bodies ---------------------------------------------------------------------------------------------------
 
 
 def long_log(device: str, header: Sequence[str] = ("t", "x", "y", "z", "qx", "qy", "qz", "qw"), unit: str = "s") -> str:
@@ -138,24 +104,14 @@ def test_a_column_that_is_named_for_devices_and_is_none_is_refused(write, refusa
     assert message.startswith("more than 1000 different values in the column of devices; name another with --columns")
 
 
-# -- refusals ---------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("header", "options", "told"),
     [
         ("when,a,b,c,d,e,f,g", {}, "no column has a known name (found when, a, b, c, d, e, f, g); known are t, time, "),
-        ("0,1,2,3,4,5,6,7", {}, "no column has a known name (found 0, 1, 2, 3, 4, 5, 6, 7); write a first line of nam"),
-        ("t,x,y,z,qx,qy,qz,r", {}, "no column named qw (found t, x, y, z, qx, qy, qz, r); known are t, time, time"),
-        ("frame,button,hp_x", {}, "no column named t, x, y, z, qx, qy, qz, qw (found frame, button, hp_x); known are"),
-        ("when,x,y,z,qx,qy,qz,qw", {}, "no column named t (found when, x,"),
         ("frame,x,y,z,qx,qy,qz,qw", {}, "no column of time, only one that counts frames ('frame'); say how many frame"),
         ("t,left_x,left_y,left_z,button", {}, "positions only, and rotations are needed (found t, left_x, left_y, lef"),
-        ("t,left_x,left_y,left_z,left_qx", {}, "no column named qy, qz, qw for 'left' (found t, left_x,"),
         ("t,time,x,y,z,qx,qy,qz,qw", {}, "two columns mean t ('t', 'time'); say which with --columns t=NAME, or"),
-        ("t,x,px,y,z,qx,qy,qz,qw", {}, "two columns mean x ('x', 'px'); say which with --columns x=NAME, or"),
         ("t,x,y,z,rx,ry,rz", {}, "rotations are Euler angles here (rx, ry, rz), and their order is not said; say it:"),
-        ("t,x,y,z,roll,pitch,yaw", {}, "rotations are Euler angles here (roll, pitch, yaw), and their order is not sa"),
         ("t,x,y,z,qx,qy,qz,qw", {"euler": "XYZ"}, "no column named rx, ry, rz (found t, x, y, z, qx, qy, qz, qw); kn"),
         ("t,x,y,z,qx,qy,qz,qw", {"columns": [("t", "when")]}, "no column is named 'when'; --columns t=NAME takes one "),
         ("t [min],x,y,z,qx,qy,qz,qw", {}, "'min' is no unit of time that is known; --time-unit s, ms, us, ns"),
@@ -184,7 +140,6 @@ def test_angles_that_are_no_radians_are_refused(write, refusal) -> None:
     ("given", "name"),
     [
         ({"columns": [("t", "t")]}, "--columns is for CSV with named columns, and this is TUM"),
-        ({"frame_rate": 90.0, "columns": [("t", "t")]}, "--columns is for CSV with named columns, and this is TUM"),
         ({"euler": "XYZ"}, "--euler is for CSV with named columns, and this is TUM"),
     ],
 )
@@ -193,9 +148,6 @@ def test_an_option_that_means_nothing_to_a_format_is_refused(write, refusal, giv
         refusal(write("take.tum", "0 0 0 0 0 0 0 1\n"), **given)[1]
         == f"{name}; leave it out; its files say that themselves"
     )
-
-
-# -- everything at once -----------------------------------------------------------------------------------------------
 
 
 @st.composite

@@ -36,9 +36,6 @@ def off(trajectory: Trajectory, body: Body, times: np.ndarray) -> float:
     return float(np.linalg.norm(at(trajectory, times)[order] - body.places(times), axis=-1).max())
 
 
-# -- glTF -------------------------------------------------------------------------------------------------------------
-
-
 def test_the_densest_curve_says_the_rate(tmp_path: Path) -> None:
     body = mixed_rates()
     result = read(body.write(tmp_path / "mixed.glb"))
@@ -72,9 +69,6 @@ def test_a_step_is_two_samples_and_is_told(tmp_path: Path) -> None:
     (warning,) = result.warnings
     assert "it jumps" in warning.text
     assert "first at 0.3992 s" in warning.text
-
-
-# -- .blend -----------------------------------------------------------------------------------------------------------
 
 
 def truth(name: str, frames: np.ndarray, bone: str | None = None) -> np.ndarray:

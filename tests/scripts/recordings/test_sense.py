@@ -62,7 +62,6 @@ def test_one_device_is_not_refused(scale: float, rate: float, rounded_to: float)
         (hand(rate=4.0), "only 4 samples a second, fewer than any motion needs"),
         (hand(rate=90e3), "9e+04 samples a second, more than any device has"),
         (replace(hand(), metres_per_unit=100.0), "a twentieth of its speeds are above 179 m/s, and it goes 41.1 m far"),
-        (replace(hand(), metres_per_unit=1000.0), "a twentieth of its speeds are above 1.79e+03 m/s"),
     ],
 )
 def test_what_nobody_records_is_said(trajectory: Trajectory, told: str) -> None:
@@ -98,9 +97,6 @@ def test_one_wild_time_stamp_is_no_reason_for_doubts(row: int, time: float) -> N
     times[row] = time
     assert doubts(replace(one, times=times)) == ()
     assert typical_interval(times) == pytest.approx(1.0 / 90.0, rel=1e-4)
-
-
-# -- units of time ----------------------------------------------------------------------------------------------------
 
 
 def csv_of(times: list[str]) -> str:

@@ -2,7 +2,6 @@
 
 import os
 import socket
-import subprocess
 import sys
 from pathlib import Path
 
@@ -118,21 +117,9 @@ def test_names_that_occur_twice_are_numbered_around_those_there_are() -> None:
     assert unique(["Hand", "Hand", "Hand.001", "Hand"]) == ["Hand", "Hand.002", "Hand.001", "Hand.003"]
 
 
-def test_text_formats_need_no_blender(write) -> None:
-    """Only .blend does: elsewhere reading works where bpy cannot even be imported."""
-    script = (
-        "import sys; sys.modules['bpy'] = None\n"
-        "from rigid_motion_batch.recordings import read_trajectories, TrajectoryError\n"
-        "for source in sys.argv[1:3]: read_trajectories(source)\n"
-        "try: read_trajectories(sys.argv[3])\n"
-        "except TrajectoryError as error: print(error)\n"
-    )
-    sources = [write("take.csv", CSV), write("walk.bvh", BVH), write("scene.blend", b"BLENDER")]
-    root = Path(__file__).parents[3]
-    result = subprocess.run(
-        [sys.executable, "-c", script, *sources], cwd=root, capture_output=True, text=True, check=True
-    )
-    assert result.stdout.strip() == f"{sources[2]}: this needs Blender; run it in Blender, or pip install bpy"
+def test_a_file_of_blender_says_where_there_is_none(write, refusal, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "bpy", None)
+    assert refusal(write("scene.blend", b"BLENDER"))[1] == "this needs Blender; run it in Blender, or pip install bpy"
 
 
 def test_a_folder_stands_for_the_recordings_in_it(tmp_path):

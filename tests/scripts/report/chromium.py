@@ -1,6 +1,5 @@
 """A headless Chromium, driven through its pipe for debugging: pages are opened, looked at and used as by hand."""
 
-import base64
 import json
 import os
 import select
@@ -9,7 +8,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -122,11 +120,6 @@ class Browser:
         for kind in ("keyDown", "keyUp"):
             extra = text if kind == "keyDown" else {}
             self.call("Input.dispatchKeyEvent", type=kind, key=key, modifiers=8 * shift, **extra)
-
-    def picture(self, path: Path, *, whole: bool = False) -> None:
-        """Save what is on the screen, or the whole page."""
-        shot = self.call("Page.captureScreenshot", captureBeyondViewport=whole)
-        path.write_bytes(base64.b64decode(shot["data"]))
 
 
 @contextmanager

@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import Poses
-from rigid_motion_batch.analysis.choices import Uniform
-from rigid_motion_batch.analysis.metrics import Metrics
+from rigid_motion_batch.analysis.choices import Tolerance, Uniform
 from rigid_motion_batch.analysis.results import ClipResult
 from rigid_motion_batch.recordings.clips import ClipWarning
 from rigid_motion_batch.report import pages
@@ -124,8 +123,15 @@ def test_the_table_to_take_along_is_that_of_all_modes(tmp_path: Path) -> None:
     rows = list(csv.DictReader(io.StringIO(b64decode(address.partition(",")[2]).decode())))
     assert {row["mode"] for row in rows} == set(MODES)
     assert len(rows) == len(MODES) * len(clip.choices)
-    first: Metrics = clip.choices[0].motions[0].metrics[0]
-    assert float(rows[0]["rms_shell_m"]) == first.rms_shell_m
+    assert float(rows[0]["rms_shell_m"]) == clip.choices[0].motions[0].metrics[0].rms_shell_m
+
+
+def test_joints_and_segments_are_folded_below(tmp_path: Path) -> None:
+    body = result_of(swinging_body(), TEN)
+    swing = result_of(swinging_clip(), (Tolerance("20mm"),), (*MODES, "best_of"))
+    text = all_text(written(tmp_path / "report.html", body, swing))
+    for expected in ("Glove", "Joints of whole bodies", "Of ", "segments"):
+        assert expected in text
 
 
 def test_a_warning_is_above_the_verdict_and_leads_to_its_moment(tmp_path: Path) -> None:
@@ -153,14 +159,6 @@ def test_data_that_would_make_the_page_too_large_are_files_beside_it(tmp_path, m
         text = file.read_text(encoding="utf-8")
         assert text.startswith(f"rigidMotionClips[{number}](")
         assert json.loads(text.partition("(")[2].removesuffix(");\n"))["name"] == "abc"[number]
-
-
-def test_joints_are_folded_below(tmp_path: Path) -> None:
-    body = result_of(swinging_body(), TEN)
-    text = all_text(written(tmp_path / "report.html", body))
-    assert "LeftHand" not in text
-    for expected in ("Glove", "Joints of whole bodies"):
-        assert expected in text
 
 
 def test_the_lowest_number_is_underlined_with_all_its_ties_but_not_where_all_are_the_same(tmp_path: Path) -> None:
@@ -206,9 +204,6 @@ def test_nothing_to_report_is_refused(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-# -- many clips -------------------------------------------------------------------------------------------------------
-
-
 def test_the_overview_has_what_matters_first_and_leads_to_every_page(tmp_path: Path) -> None:
     quiet, loud = result_of(swinging_clip("quiet"), TEN), result_of(swinging_clip("loud"), TEN)
     rows = loud.choices[0].motions
@@ -223,6 +218,3 @@ def test_the_overview_has_what_matters_first_and_leads_to_every_page(tmp_path: P
     assert table.index("doubtful") < table.index("loud") < table.index("quiet")
     assert "1 of 3 clips have something to check" in text
     assert {"quiet/page%201.html", "doubtful/report.html"} <= set(page.attributes("a", "href"))
-
-
-# -- sources ----------------------------------------------------------------------------------------------------------

@@ -1,58 +1,51 @@
-"""The figures of whole bodies: on a small one, a hip that walks and turns with an arm of two bones."""
+"""The figures of whole bodies, on a small one."""
 
-from pathlib import Path
-
+import bpy
 import numpy as np
 import pytest
 
 from research import body_reduction, reduction
+from research.decimating import DecimatedBody, decimate
+from rigid_motion_batch.analysis.choices import Tolerance
+from rigid_motion_batch.analysis.reconstructions import reconstruct
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
+from tests.balls import largest_displacements
+from tests.scripts.bvh_bodies import write_body
 from tests.scripts.research.keeping import written
 
 # Blender's BVH importer leaves closing the file to Python.
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 
-BVH = """HIERARCHY
-ROOT Hip
-{
-  OFFSET 0 0 0
-  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
-  JOINT Knee
-  {
-    OFFSET 0 -50 0
-    CHANNELS 3 Zrotation Xrotation Yrotation
-    JOINT Foot
-    {
-      OFFSET 0 -50 0
-      CHANNELS 3 Zrotation Xrotation Yrotation
-      End Site
-      {
-        OFFSET 0 0 10
-      }
-    }
-  }
-}
-MOTION
-"""
-
-
-def made_up(folder: Path, frames: int = 24) -> Path:
-    """A BVH file of a leg that stands for a while and then swings."""
-    rows = []
-    for frame in range(frames):
-        swing = max(0.0, frame - frames / 3) / frames
-        turn = 60.0 * np.sin(6.0 * swing)
-        rows.append(f"{80.0 * swing} 100 0 0 {turn:.4f} {0.3 * turn:.4f} 0 {-0.7 * turn:.4f} 0 0 0 0")
-    path = folder / "leg.bvh"
-    path.write_text(f"{BVH}Frames: {frames}\nFrame Time: 0.0333333\n" + "\n".join(rows) + "\n", encoding="utf-8")
-    return path
+TIMES = np.arange(24) / 30.0
 
 
 @pytest.fixture
 def body(tmp_path) -> Clip:
-    clip, *_ = read_clips([str(made_up(tmp_path))])[0]
+    clip, *_ = read_clips([str(write_body(tmp_path / "body.bvh", TIMES))])[0]
     return body_reduction.of_height(clip)
+
+
+def shown(body: DecimatedBody) -> np.ndarray:
+    """Matrices of all bones in the world, frame by frame, shape (n, joints, 4, 4)."""
+    result = []
+    for frame in body.frames:
+        bpy.context.scene.frame_set(round(frame))
+        rig = body.rig.obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        result.append([np.array(rig.matrix_world @ rig.pose.bones[name].matrix) for name in body.rig.bones])
+    return np.array(result)
+
+
+def test_errors_of_decimated_curves_are_those_of_what_blender_shows(body):
+    made = reconstruct(body, Tolerance("1cm"), ["motor_spline"], 0.03)
+    decimated = DecimatedBody(made)
+    assert decimated.errors().max() < 2e-6
+    recorded = shown(decimated)
+    decimate(decimated.rig.obj, mode="ERROR", remove_error_margin=0.05)
+    off = shown(decimated) - recorded
+    errors = [largest_displacements(one[:, :3, 3], 0.03 * one[:, :3, :3]) for one in off.swapaxes(0, 1)]
+    np.testing.assert_allclose(decimated.errors(), errors, atol=5e-6)
+    assert decimated.left().largest > 1e-3
 
 
 def test_greedy_insertion_leaves_no_key_that_can_go(body):
@@ -72,7 +65,7 @@ def test_decimate_is_as_good(body):
 
 
 def test_the_study_writes_what_the_page_reads(tmp_path, monkeypatch):
-    path = made_up(tmp_path)
+    path = write_body(tmp_path / "body.bvh", TIMES)
     recording = reduction.read(reduction.ASSETS / "reach.csv", 15.0)
     monkeypatch.setattr(reduction, "ASSETS", tmp_path)
     (tmp_path / "reach.csv").touch()

@@ -7,7 +7,7 @@ from research import live_costs
 from research.live_streams.engines import ENGINES, FPS, Way, by_engine, seen, truth_of
 from rigid_motion.motion import Poses
 from rigid_motion_batch.places import ASSETS
-from tests.scripts.recordings.test_damaged_bvh_bodies import seed
+from tests.scripts.bvh_bodies import TIMES, write_body
 from tests.scripts.research.keeping import written
 
 
@@ -23,18 +23,8 @@ def test_a_steady_hand_is_shown_steadily(engine: str) -> None:
     assert 0.02 < result["delay"] < 0.3
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_nobody_is_shown_what_has_not_come(engine: str) -> None:
-    times = np.arange(900) / 90.0
-    hand = Poses(np.where(times > 5.0, 1.0, 0.0)[:, None] * (1.0, 0.0, 0.0), np.tile((1.0, 0.0, 0.0, 0.0), (900, 1)))
-    truth, frames = truth_of(times, hand), np.arange(0.5, 9.9, 1.0 / FPS)
-    shown = by_engine(engine, truth, Way(0.25, 0.25, 0.0), frames)[0].positions[:, 0]
-    assert np.abs(shown[frames < 5.25]).max() < 1e-9
-    assert shown[-1] == pytest.approx(1.0, abs=1e-3)
-
-
 def test_the_study_writes_what_the_page_reads(tmp_path, monkeypatch):
-    (tmp_path / "walk.bvh").write_text(seed("ZXY", 20), encoding="utf-8")
+    write_body(tmp_path / "walk.bvh", TIMES[:20])
     monkeypatch.setattr(live_costs, "HAND", "pivot")
     monkeypatch.setattr(live_costs, "WAYS", {"20 ms": live_costs.WAYS["20 ms"]})
     figures = ("bytes", "heard", "expected", "rate", "median_ms", "p99_ms", "router", "listeners")

@@ -3,7 +3,6 @@
 import re
 from pathlib import Path
 
-import jinja2
 import pytest
 
 from research.pages import QUOTE, ROOT, environment, filled, pages, write_figures
@@ -58,10 +57,3 @@ def test_a_page_is_its_template_with_figures(checkout: Path):
     assert filled(checkout / "README.md", templates) == (
         "It is <!--= found.error | digits(2) -->0.012<!-- end -->, <!--= quotes.rows() -->1.2 | 100.0<!-- end -->"
     )
-
-
-def test_what_no_study_found_is_refused(checkout: Path):
-    write_figures("found", {}, "x", checkout)
-    (checkout / "README.md").write_text("<!--= found.nothing -->1<!-- end -->", encoding="utf-8")
-    with pytest.raises(jinja2.UndefinedError, match="nothing"):
-        filled(checkout / "README.md", environment(checkout))

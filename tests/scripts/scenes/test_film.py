@@ -1,32 +1,14 @@
 import os
-import subprocess
-import sys
 
 import bpy
-import numpy as np
 import pytest
 
 from rigid_motion_batch.scenes.film import join_pieces, render_film, render_piece, save_blend
 from rigid_motion_batch.scenes.scene import build_scene
 from rigid_motion_batch.scenes.settings import SceneSettings
 from tests.scripts.clips.recordings import reconstruct, swinging_clip
-from tests.scripts.scenes.stills import pixels_of, render_still
 
 SETTINGS = SceneSettings(resolution=(160, 90), fps=10)
-RENDER_SAVED = """
-import os, sys, bpy
-blend, picture, frame = sys.argv[1:]
-bpy.ops.wm.open_mainfile(filepath=blend)
-scene = bpy.context.scene
-scene.frame_set(int(frame))
-if hasattr(scene.render.image_settings, "media_type"):
-    scene.render.image_settings.media_type = "IMAGE"
-scene.render.image_settings.file_format = "PNG"
-scene.render.filepath = picture
-bpy.ops.render.render(write_still=True)
-sys.stdout.flush()
-os._exit(0)
-"""
 
 
 @pytest.fixture
@@ -77,19 +59,6 @@ def test_a_film_that_cannot_be_rendered_leaves_the_old_one(scene, tmp_path):
         render_film(scene, film)
     assert film.read_bytes() == b"the film of yesterday"
     assert os.listdir(tmp_path) == ["comparison.mp4"]
-
-
-def test_the_saved_file_renders_the_same_picture_in_another_process(scene, tmp_path):
-    render_film(scene, tmp_path / "comparison.mp4")
-    save_blend(tmp_path / "comparison.blend")
-    again = tmp_path / "again.png"
-    command = [sys.executable, "-c", RENDER_SAVED, str(tmp_path / "comparison.blend"), str(again), "6"]
-    subprocess.run(command, check=True, capture_output=True, timeout=120)
-    render_still(scene, tmp_path / "here.png", 6)
-    render_still(scene, tmp_path / "other.png", 3)
-    here, there = pixels_of(tmp_path / "here.png"), pixels_of(again)
-    assert np.abs(here - there).max() < 0.02
-    assert np.abs(here - pixels_of(tmp_path / "other.png")).max() > 0.1
 
 
 def test_a_film_that_was_rendered_in_pieces_is_the_same_to_the_bit(scene, tmp_path):

@@ -170,14 +170,6 @@ def test_the_number_shows_the_error_of_the_frame_and_the_graph_has_passed_so_far
         assert any(len(points) != len(drawn[0]) for points in drawn)
 
 
-def test_the_file_needs_no_script_to_play():
-    build_scene(reconstruct(swinging_clip(seconds=0.6), "5"), SETTINGS)
-    assert not bpy.data.texts
-    for block in bpy.data.user_map():
-        data = getattr(block, "animation_data", None)
-        assert data is None or not data.drivers, block
-
-
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
@@ -236,13 +228,13 @@ def test_a_deviation_of_millimetres_is_drawn_larger_and_the_picture_says_how_muc
         assert np.allclose(places[1] - places[2], 20.0 * (places[0] - places[2]), atol=1e-5)
 
 
-def test_a_clip_shorter_than_a_frame_is_one_frame():
-    scene = build_scene(reconstruct(swinging_clip(seconds=0.05), "30", TWO), SETTINGS)
-    assert (scene.frame_start, scene.frame_end) == (1, 1)
-    assert len(evaluated_points(bpy.data.objects["Time"]))
-
-
 def test_an_object_that_would_be_lost_on_its_path_is_shown_larger_and_says_so():
     build_scene(reconstruct(changed(swinging_clip(seconds=1.0), 100.0), "5", TWO), SETTINGS)
     assert "object shown" in bpy.data.curves["Legend"].body
     assert np.ptp(vertices_of(bpy.data.objects["dq_sclerp"].data), axis=0).max() > 0.5
+
+
+def test_a_clip_shorter_than_a_frame_is_one_frame():
+    scene = build_scene(reconstruct(swinging_clip(seconds=0.05), "30", TWO), SETTINGS)
+    assert (scene.frame_start, scene.frame_end) == (1, 1)
+    assert len(evaluated_points(bpy.data.objects["Time"]))

@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 import zenoh  # noqa: F401 - without it these tests are skipped
 
+from rigid_motion.motion.quaternions import normalise
 from rigid_motion.streams import Receiver
 from rigid_motion_batch.cli.stream import main
 from rigid_motion_batch.recordings.bvh_writing import write_bvh
@@ -26,7 +27,6 @@ from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.rest_bodies import RestBody
 from rigid_motion_batch.streaming.receiving import Receiving
 from rigid_motion_batch.streaming.rooms import HERE, Room, is_local, locator, opened, settings
-from tests.scripts.streaming.motions import swinging
 from tests.streams.links import body, dance
 
 pytestmark = pytest.mark.network
@@ -66,8 +66,14 @@ def endless(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def write_csv(path: Path, seconds: float) -> Path:
-    times, poses = swinging(3, seconds)
-    rows = np.column_stack((times, poses.positions, poses.quaternions)).tolist()
+    """A smooth motion of a few decimetres and half turns, up to twice a second, recorded 90 times a second."""
+    random = np.random.default_rng(3)
+    times = np.arange(round(seconds * 90.0) + 1) / 90.0
+    frequencies, phases = random.uniform(0.1, 2.0, (7, 4, 1)), random.uniform(0.0, 2.0 * np.pi, (7, 4, 1))
+    waves = random.normal(size=(7, 4, 1)) / frequencies * np.sin(2.0 * np.pi * frequencies * times + phases)
+    channels = waves.sum(axis=1).T
+    turns = normalise(channels[:, 3:] + (3.0, 0.0, 0.0, 0.0))
+    rows = np.column_stack((times, 0.2 * channels[:, :3], turns)).tolist()
     path.write_text("\n".join(["t,x,y,z,qw,qx,qy,qz", *(",".join(map(repr, row)) for row in rows)]))
     return path
 
@@ -107,9 +113,13 @@ def largest_mm(printed: str) -> float:
 
 def test_a_hand_is_shown_within_the_tolerance(tmp_path, at, hand):
     shown = tmp_path / "shown.csv"
-    with running("receive", "--room", "r", "--at", at, "--output", shown, "--truth", hand, *MARGIN) as receiver:
+    with (
+        running("receive", "--room", "r", "--at", at, "--output", shown, "--truth", hand, *MARGIN) as receiver,
+        running("receive", "--room", "q", "--at", at, "--seconds", 4) as other,
+    ):
         sent = run("send", hand, "--room", "r", "--user", "ada", "--at", at)
         printed = done(receiver)
+        assert "nobody sent anything in q" in other.communicate(timeout=PATIENCE)[1]
     assert "joined: 1\n" in sent
     assert largest_mm(printed) < 5.1
     assert printed.splitlines()[-1] == str(shown)
@@ -155,15 +165,6 @@ def test_many_bodies_of_many_senders_are_told_apart(tmp_path, at, hand, endless)
     assert made == ["shown-ada-left.bvh", "shown-ada-right.bvh", "shown-bob-endless.bvh"]
 
 
-@pytest.mark.slow
-def test_another_room_is_not_heard(at, hand):
-    with running("receive", "--room", "r", "--at", at, "--seconds", 4) as receiver:
-        run("send", hand, "--room", "q", "--at", at)
-        _, said = receiver.communicate(timeout=PATIENCE)
-    assert receiver.returncode == 2
-    assert "nobody sent anything in r" in said
-
-
 def test_an_even_rate_sends_a_key_at_each_tick_and_a_mode_is_of_these(tmp_path, at, hand):
     errors = {}
     options = ("--room", "r", "--at", at, "--truth", hand, *MARGIN)
@@ -189,36 +190,6 @@ def test_ctrl_c_leaves_the_file_of_what_was_shown(tmp_path, at, endless, what):
         if what == "send":
             done(receiver)
     assert len(shown.read_text().splitlines()) > 20
-
-
-@pytest.mark.slow
-def test_a_router_that_is_killed_and_started_again_is_found_again(tmp_path, endless):
-    place = f"{HERE}:{free_port()}"
-    config = tmp_path / "router.json5"
-    config.write_text(json.dumps({"connect": {"endpoints": [f"tcp/{place}"]}}))
-    with (
-        running("router", "--at", place) as router,
-        running("send", endless, "--room", "r", "--config", config),
-        Room(opened("peer", config=config), "r") as room,
-    ):
-        receiving = Receiving(room, "bob", 60.0, 0.0)
-        moments = []
-        receiving.on_frame.append(lambda shown: moments.extend(one.moment for one in shown))
-        receiving.hear(time.monotonic() + 2.0, ())
-        assert moments
-        router.kill()
-        router.wait(PATIENCE)
-        receiving.hear(time.monotonic() + 1.0, ())
-        before = receiving.datagrams.total()
-        with running("router", "--at", place):
-            deadline = time.monotonic() + PATIENCE
-            while receiving.datagrams.total() == before and time.monotonic() < deadline:
-                receiving.hear(time.monotonic() + 0.05, ())
-            receiving.hear(time.monotonic() + 2.0, ())
-    assert receiving.datagrams.total() > before
-    # The picture goes on, forwards, and is a delay behind again.
-    assert np.all(np.diff(moments) >= 0.0)
-    assert moments[-1] - moments[0] > 3.0
 
 
 def test_whoever_joins_late_sees_a_body_at_rest_within_a_third_of_a_second(tmp_path, at):
@@ -311,9 +282,6 @@ def test_blender_gets_the_datagrams_as_they_are_and_its_answers_get_to_the_sende
     assert [own.name for own in what.bodies] == ["endless"]
 
 
-# Without a room
-
-
 def test_what_nobody_asked_for_stays_on_this_machine():
     for role in ("peer", "router"):
         result = settings(role, None, False)
@@ -372,15 +340,12 @@ def test_without_zenoh_the_way_out_is_said(monkeypatch, capsys, hand):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (("send", "hand.csv"), "--room"),
         (("send", "hand.csv", "--room", "a/*"), "no name of a room"),
         (("send", "hand.csv", "--room", "r", "--user", "a/b"), "no name of a user"),
         (("send", "hand.csv", "--room", "r", "--tolerance", "5 parsecs"), "5 parsecs"),
         (("send", "hand.csv", "--room", "r", "--delay", "9"), "no number of seconds"),
         (("receive", "--room", "r", "--output", "shown.txt"), "one that ends in .csv, .bvh"),
-        (("receive", "--room", "r", "--to-blender", "10.0.0.7:39539"), "give --network as well"),
         (("receive", "--room", "r", "--to-blender", "39539"), "no address"),
-        (("relay", "--port", "9000"), "invalid choice: 'relay'"),
     ],
 )
 def test_what_cannot_be_is_refused(capsys, options, said):

@@ -27,13 +27,6 @@ def circling(name: str = "circling", turns: float = 0.0, *, rate: float = 240.0,
     return clip(name, times, positions, turns * angles)
 
 
-def spinning_straight(name: str = "straight") -> Clip:
-    """A body that turns about z, evenly, while its origin runs straight."""
-    times = np.arange(481) / 120.0
-    positions = np.stack((0.5 * times, np.zeros_like(times), np.zeros_like(times)), axis=-1)
-    return clip(name, times, positions, 3.0 * times)
-
-
 @cache
 def thrown() -> Clip:
     """A drill that is thrown and caught."""

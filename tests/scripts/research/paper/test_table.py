@@ -20,13 +20,6 @@ def test_on_a_circle_without_turning_the_screw_is_the_straight_line():
     assert table.needed(circling(turns=0.0))["dq_sclerp"] == pytest.approx([1.0] * 4, rel=0.01)
 
 
-def test_a_spline_of_a_circle_needs_far_fewer_updates_than_chords():
-    own = table.needed(circling(turns=0.5))
-    assert set(own) == set(table.WAYS)
-    for name in ("motor_spline", f"motor_spline{table.CHOSEN}"):
-        assert max(own[name]) < 0.6
-
-
 def test_means_are_geometric_and_over_the_clips_that_got_there():
     nan = np.nan
     mean = table.means([[0.25, nan, nan, nan], [1.0, nan, nan, np.inf], [np.inf, nan, nan, nan], [nan] * 4])
@@ -34,15 +27,6 @@ def test_means_are_geometric_and_over_the_clips_that_got_there():
     assert mean["saved"][0] == pytest.approx(0.5)
     assert (mean["reached"].tolist(), mean["asked"].tolist()) == ([2, 0, 0, 0], [3, 0, 0, 1])
     assert np.isnan(mean["saved"][3])
-
-
-# -- bows --------------------------------------------------------------------------------------------------------------
-
-
-def test_a_pivot_has_all_of_the_bow_and_the_screw_no_error():
-    result = table.bows_of(circling(turns=1.0))
-    assert list(result) == list(table.BOW_RATES)
-    assert all(share == pytest.approx(1.0, abs=1e-9) and error < 1e-9 for share, error in result.values())
 
 
 @pytest.mark.parametrize("seed", range(8))
