@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
@@ -16,15 +18,16 @@ from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, ran
 
 FACTORS = (-0.3, 0.0, 0.35, 1.0, 1.25)
 BEFORE, NOW, AFTER = 11.0, 17.0, 24.0
+NO_DELTAS = Own()
 
 
-def key_poses(obj: bpy.types.Object, own: Own | None = None) -> Poses:
-    """What `key` has set on an object, with delta transforms of its own."""
-    return Poses.from_matrices(expected_bases(obj, FRAMES, own))
+def key_poses(obj: bpy.types.Object, own: Own = NO_DELTAS) -> Poses:
+    """What `key` has set on an object, with delta transforms of its own but for their scale."""
+    return Poses.from_matrices(expected_bases(obj, FRAMES, replace(own, scale=NO_DELTAS.scale)))
 
 
-def as_matrices(poses: Poses) -> np.ndarray:
-    scales = np.ones(len(poses)) if poses.scales is None else poses.scales
+def as_matrices(poses: Poses, own: Own = NO_DELTAS) -> np.ndarray:
+    scales = own.scale[0] * (np.ones(len(poses)) if poses.scales is None else poses.scales)
     return matrices(poses.positions, poses.quaternions, np.repeat(scales[:, None], 3, axis=1))
 
 
@@ -50,7 +53,7 @@ def test_a_breakdown_is_on_the_path_of_the_mode(live_file, mode, order, scale):
         if KEYFRAME_MODES[mode].is_smooth and not 0.0 <= factor <= 1.0:
             continue
         tries.apply(factor)
-        expected = as_matrices(on_path(keys, mode, factor))[0]
+        expected = as_matrices(on_path(keys, mode, factor), own)[0]
         np.testing.assert_allclose(world_now(), expected, atol=2e-5 * np.abs(expected).max())
         assert key_frames(obj).tolist() == [FRAMES[0], BEFORE, NOW, AFTER, FRAMES[3]]
         # It is a key like any other: from frame to frame and back it stays.
@@ -108,12 +111,12 @@ def test_push_and_relax_go_from_the_pose_that_is_seen_along_the_mode(live_file, 
     keys = key_poses(obj, own)
     share = (NOW - BEFORE) / (AFTER - BEFORE)
     between = on_path(keys, mode, share)
-    np.testing.assert_allclose(world_now(), as_matrices(between)[0], atol=2e-5)
+    np.testing.assert_allclose(world_now(), as_matrices(between, own)[0], atol=2e-5)
     obj.location = np.add(obj.location, (0.4, -0.3, 0.2))
     bpy.context.view_layer.update()
     seen = world_now()
     breakdown(obj, 0.3, kind)
-    ends = Poses.from_matrices(np.concatenate((seen[None], as_matrices(between))))
+    ends = Poses.from_matrices(np.concatenate((seen[None], as_matrices(between, own))))
     factor = -0.3 if kind == "PUSH" else 0.3
     expected = interpolate((0.0, 1.0), ends, np.array([factor]), mode, extrapolate=True)
     np.testing.assert_allclose(world_now(), as_matrices(expected)[0], atol=3e-5 * max(1.0, np.abs(seen).max()))

@@ -114,7 +114,7 @@ def key_on(carrier, frame: int) -> None:
     bpy.context.view_layer.update()
 
 
-@pytest.mark.parametrize(("handles", "mode"), in_turn(HANDLES, [mode for mode in MODE_IDS if mode != "BLENDER"]))
+@pytest.mark.parametrize(("mode", "handles"), in_turn([mode for mode in MODE_IDS if mode != "BLENDER"], [*HANDLES]))
 def test_a_key_in_between_leaves_the_motion_as_it_was(live_file, mode, handles):
     obj = keyed(new_object())
     HANDLES[handles](obj)
