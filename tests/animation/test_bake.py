@@ -56,15 +56,6 @@ def test_a_shared_action_keeps_what_others_have_in_it(empty):
     assert_read_back(other, frames, still)
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_euler_objects_of_every_order_take_the_same_poses(empty, order):
-    frames, poses = motion(200, scaled=True)
-    empty.rotation_mode = order
-    bake_poses(empty, frames, poses)
-    assert {path for path, _ in curves_of(empty)} == {"location", "rotation_euler", "scale"}
-    assert_read_back(empty, frames, poses)
-
-
 def test_an_object_that_turns_by_axis_and_angle_is_refused_untouched(empty):
     empty.rotation_mode = "AXIS_ANGLE"
     with pytest.raises(ValueError, match="Tool turns by axis and angle"):
@@ -84,11 +75,6 @@ def test_a_part_is_baked_where_its_angles_are_not_all_keyed_outside_of_it(live_f
         expected = expected_worlds(obj, frames)
         assert bake(obj, first=frames[0], last=frames[-1]) == (frames[0], frames[-1])
         assert np.abs(shown_worlds([obj], frames)[0] - expected).max() < 1e-5 * np.abs(expected).max()
-
-
-def test_only_lines_and_holds_are_baked(live_file):
-    with pytest.raises(ValueError, match="interpolation: LINEAR or CONSTANT, not 'BEZIER'"):
-        bake(key(new_object()), interpolation="BEZIER")
 
 
 def test_delta_scales_that_cancel_out_leave_the_scale_to_blender(live_file):

@@ -105,17 +105,19 @@ def test_channels_without_keys_count_as_they_are(live_file, mode, kept, order):
     assert_posed(rig, PLAYED)
 
 
-@pytest.mark.parametrize("kind", ["REPEAT", "MIRROR"])
+@pytest.mark.parametrize("kind", ["REPEAT_OFFSET", "MIRROR"])
 @pytest.mark.parametrize("order", ["QUATERNION", "YXZ"])
 def test_bones_repeat_the_motion_of_their_mode_with_cycles(live_file, order, kind):
     rig = key_all(new_rig(rotation_mode=order), (31.0, 35.0, 42.0), interpolation="LINEAR")
     for fcurve in curves_of(rig).values():
         modifier = fcurve.modifiers.new("CYCLES")
-        modifier.mode_before = modifier.mode_after = kind
+        modifier.mode_before, modifier.mode_after = "REPEAT", kind
+        # It ends as it began, so that offsets are none.
+        fcurve.keyframe_points[-1].co_ui.y = fcurve.keyframe_points[0].co_ui.y
     live_file.scene.frame_start, live_file.scene.frame_end = 0, 75
     set_mode(list(rig.pose.bones), "dq_sclerp")
     first = np.arange(32.0, 42.0)
-    before, shown, after = (shown_poses([rig], first + shift)[0] for shift in (-22.0, 0.0, 22.0))
+    before, shown, after = (shown_poses([rig], first + shift)[0] for shift in (-11.0, 0.0, 22.0))
     assert_same_poses(rig, first, shown, expected_poses(rig, first))
     for again in (before, after):
         assert_same_poses(rig, first, again, shown)

@@ -16,10 +16,12 @@ from rigid_motion import animation
 from rigid_motion.animation.live.follower import show_seen_in_channels
 from rigid_motion.animation.transforms import transform_of
 from tests.animation.bones.coming_and_going import ComingAndGoing
+from tests.animation.bones.poses import shown_poses
 from tests.animation.bones.rig_editing import (
     BONES,
     TOLERANCE,
     Name,
+    as_blender_has_it,
     has_live_segments,
     own_constraints,
 )
@@ -268,6 +270,28 @@ class EditingBones(ComingAndGoing):
         self._edit(lambda: animation.set_mode(self._found(name), "BLENDER"))
         assert len(self._sharing(name)) > 1 or name not in self.taken_off
         self._edit(lambda: animation.set_mode(self._found(name), mode))
+
+    @precondition(lambda self: self.on)
+    @rule(who=shares, influence=st.sampled_from((0.0, 0.25, 0.75)))
+    def weaken_the_constraint_and_back(self, who, influence):
+        name = self._named(who)
+        bone = self._found(name)
+        constraint = next(iter(own_constraints(bone)), None)
+        if constraint is None or constraint.mute or self._is_at_odds(name):
+            return
+        constraint.influence = influence
+        bpy.context.view_layer.update()
+        frames = np.array(self._frames_that_are_seen([bone])[::7], dtype=np.float64)
+        (shown,) = shown_poses([bone.id_data], frames)
+        native, expected = (self._placed(bone, shown, how(bone, frames)) for how in (as_blender_has_it, expected_bases))
+        between = native[:, :3, 3] + influence * (expected - native)[:, :3, 3]
+        error = np.abs(shown[bone.name][:, :3, 3] - between).max()
+        assert error < 2 * TOLERANCE * max(1.0, np.abs(expected).max(), np.abs(native).max()), (
+            f"{name} is off by {error}"
+        )
+        (constraint,) = own_constraints(self._found(name))
+        constraint.influence = 1.0
+        bpy.context.view_layer.update()
 
     # Actions that go and come
 
