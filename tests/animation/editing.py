@@ -15,7 +15,6 @@ from tests.animation.oracle import expected_bases, may_spin
 from tests.animation.path_oracle import DEPENDS_ON_KEYS
 from tests.animation.scenes import random_values
 
-ORDERS = ("QUATERNION", "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 INTERPOLATIONS = [item.identifier for item in bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items]
 EASINGS = [item.identifier for item in bpy.types.Keyframe.bl_rna.properties["easing"].enum_items]
 HANDLES = [item.identifier for item in bpy.types.Keyframe.bl_rna.properties["handle_left_type"].enum_items]

@@ -64,10 +64,10 @@ def on_a_farm(program: str, *arguments: object) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def played_on_a_farm(path: Path, names: Sequence[str], frames: np.ndarray, then: str = "") -> Played:
+def played_on_a_farm(path: Path, names: Sequence[str], frames: np.ndarray) -> Played:
     """Play a file there, and run a program on it afterwards; `SAVE` saves it as NAME-farm.blend."""
     found = path.with_suffix(".npy")
     np.save(found, frames)
-    on_a_farm(PLAY + then, path, found, *names)
+    on_a_farm(PLAY, path, found, *names)
     with np.load(found.with_suffix(".npz")) as result:
         return Played(**result)

@@ -63,29 +63,6 @@ def expected_bases(
         return matrices(location + moved - _channels(obj, "location", held), quaternion, scale)
 
 
-def expected_off_whole_frames(obj: Carrier, frames: Sequence[float], own: Own | None = None) -> np.ndarray:
-    """The same between whole frames, where Blender goes straight from one difference to the next.
-
-    For objects that turn by quaternions.
-    """
-    own = own or Own()
-    frames = np.asarray(frames, dtype=np.float64)
-    share = (frames - np.floor(frames))[:, None]
-    moved, turned, grown = [], [], []
-    for at in (np.floor(frames), np.ceil(frames)):
-        (location, quaternion, scale), native = _components(obj, at, own), _native(obj, at)
-        moved.append(location - native[0])
-        turned.append(multiply(quaternion, native[1] * (1.0, -1.0, -1.0, -1.0)))
-        grown.append(scale / native[2])
-    turned[1] *= np.where(np.einsum("mi,mi->m", *turned) < 0.0, -1.0, 1.0)[:, None]
-
-    def between(ends: list[np.ndarray]) -> np.ndarray:
-        return ends[0] + share * (ends[1] - ends[0])
-
-    location, quaternion, scale = _native(obj, frames)
-    return matrices(location + between(moved), multiply(between(turned), quaternion), scale * between(grown))
-
-
 def _components(
     obj: Carrier, frames: Sequence[float], own: Own | None, keys: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -288,9 +265,7 @@ def _codes(obj: Carrier, frame: float) -> set[str]:
     return result
 
 
-def expected_worlds(
-    obj: bpy.types.Object, frames: Sequence[float], owns: dict[str, Own] | None = None, at: float | None = None
-) -> np.ndarray:
+def expected_worlds(obj: bpy.types.Object, frames: Sequence[float], owns: dict[str, Own] | None = None) -> np.ndarray:
     """The same in the world, parents moving along. `owns` is by the objects' names."""
     owns = owns or {}
     bases = expected_bases(obj, frames, owns.get(obj.name))
@@ -324,6 +299,12 @@ def shown_worlds(objects: Iterable[bpy.types.Object], frames: Sequence[float]) -
             result[row] = obj.evaluated_get(depsgraph).matrix_world
     scene.frame_set(before, subframe=subframe)
     return shown
+
+
+def world_now(name: str = "Tool") -> np.ndarray:
+    """The world matrix of an object as it is on the screen."""
+    bpy.context.view_layer.update()
+    return np.array(bpy.data.objects[name].evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
 
 
 def assert_shown(

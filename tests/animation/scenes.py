@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 
 import addon_utils
 import bpy
@@ -100,6 +101,16 @@ def new_strip(
     strip = obj.animation_data.nla_tracks.new().strips.new(slot.name_display, start, action)
     strip.action_slot, strip.action_frame_start, strip.action_frame_end = slot, 1, last
     return strip
+
+
+def linked(library: Path, name: str) -> bpy.types.Object:
+    """An object of another file, in the scene."""
+    with bpy.data.libraries.load(str(library), link=True) as (_, expected):
+        expected.objects = [name]
+    (obj,) = expected.objects
+    bpy.context.scene.collection.objects.link(obj)
+    bpy.context.view_layer.update()
+    return obj
 
 
 @contextmanager

@@ -6,11 +6,11 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import bake, bake_poses, read_poses, set_mode, unbake
+from rigid_motion.animation import bake, bake_poses, read_poses, set_mode
 from rigid_motion.motion import Poses, interpolate
 from rigid_motion.motion.eulers import ORDERS
 from rigid_motion.motion.quaternions import angle_between
-from tests.animation.keyed import curves_of, snapshot
+from tests.animation.keyed import curves_of
 from tests.animation.oracle import assert_shown, expected_worlds, shown_worlds
 from tests.animation.scenes import FRAMES, key, new_object
 
@@ -56,15 +56,6 @@ def test_a_shared_action_keeps_what_others_have_in_it(empty):
     assert_read_back(other, frames, still)
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_euler_objects_of_every_order_take_the_same_poses(empty, order):
-    frames, poses = motion(200, scaled=True)
-    empty.rotation_mode = order
-    bake_poses(empty, frames, poses)
-    assert {path for path, _ in curves_of(empty)} == {"location", "rotation_euler", "scale"}
-    assert_read_back(empty, frames, poses)
-
-
 def test_an_object_that_turns_by_axis_and_angle_is_refused_untouched(empty):
     empty.rotation_mode = "AXIS_ANGLE"
     with pytest.raises(ValueError, match="Tool turns by axis and angle"):
@@ -84,29 +75,6 @@ def test_a_part_is_baked_where_its_angles_are_not_all_keyed_outside_of_it(live_f
         expected = expected_worlds(obj, frames)
         assert bake(obj, first=frames[0], last=frames[-1]) == (frames[0], frames[-1])
         assert np.abs(shown_worlds([obj], frames)[0] - expected).max() < 1e-5 * np.abs(expected).max()
-
-
-@pytest.mark.parametrize("order", ["QUATERNION", "XYZ"])
-@pytest.mark.parametrize("step", [2.0, 3.0])
-def test_a_bake_on_twos_or_threes_holds_the_poses_of_the_mode(live_file, order, step):
-    obj = key(new_object(rotation_mode=order), seed=3, scale="even")
-    set_mode(obj, "cga_slerp")
-    keyed = snapshot(obj)
-    grid = np.union1d(np.arange(FRAMES[0], FRAMES[-1] + 0.5, step), FRAMES)
-    frames = np.arange(-3.0, 45.0, 0.25)
-    held = grid[np.clip(np.searchsorted(grid, frames, side="right") - 1, 0, None)]
-    expected = expected_worlds(obj, held)
-    bake(obj, step=step, interpolation="CONSTANT")
-    np.testing.assert_allclose(shown_worlds([obj], frames)[0], expected, rtol=0, atol=1e-5 * np.abs(expected).max())
-    for fcurve in curves_of(obj).values():
-        assert {point.interpolation for point in fcurve.keyframe_points} <= {"CONSTANT"}
-    unbake(obj)
-    assert snapshot(obj) == keyed
-
-
-def test_only_lines_and_holds_are_baked(live_file):
-    with pytest.raises(ValueError, match="interpolation: LINEAR or CONSTANT, not 'BEZIER'"):
-        bake(key(new_object()), interpolation="BEZIER")
 
 
 def test_delta_scales_that_cancel_out_leave_the_scale_to_blender(live_file):

@@ -18,14 +18,6 @@ def is_filled_in(obj: bpy.types.Object) -> bool:
     return any(path.startswith("delta_") for path, _ in curves_of(obj))
 
 
-def remove(obj: bpy.types.Object, *channels: tuple[str, int]) -> None:
-    """Take channels away; the object rests at a value of its own in them."""
-    fcurves = obj.animation_data.action.layers[0].strips[0].channelbag(obj.animation_data.action_slot).fcurves
-    for path, index in channels:
-        fcurves.remove(fcurves.find(path, index=index))
-        getattr(obj, path)[index] = 0.3 + 0.1 * index
-
-
 @pytest.mark.parametrize("kind", ["LINK_COPY", "FULL_COPY"])
 def test_linear_extrapolation_goes_on_to_where_a_scene_ends_that_was_made_anew(live_file, kind):
     obj = key(new_object(), (5.0, 11.0, 30.0), interpolation="LINEAR")

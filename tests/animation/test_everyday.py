@@ -9,32 +9,10 @@ import pytest
 from rigid_motion import animation
 from rigid_motion.animation import key_frames, modes_of, problem_of, read_poses, set_mode
 from tests.animation.keyed import curves_of
-from tests.animation.oracle import Own, assert_shown
-from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object
+from tests.animation.oracle import assert_shown
+from tests.animation.scenes import FRAMES, key, new_object
 
 PLAYED = np.arange(-2.0, 44.0)
-BETWEEN = 17
-"""A frame between keys."""
-
-
-def tool(order: str = "QUATERNION", own: bool = False, name: str = "Tool", seed: int = 0) -> bpy.types.Object:
-    """An object that moves by screws, shown on a frame between keys."""
-    obj = new_object(name, order)
-    if own:
-        give_own_deltas(obj, seed)
-    key(obj, seed=seed)
-    set_mode(obj, "dq_sclerp")
-    bpy.context.scene.frame_set(BETWEEN)
-    return obj
-
-
-def link(obj: bpy.types.Object, action: bpy.types.Action | None, slot: bpy.types.ActionSlot | None = None) -> None:
-    """Choose an Action, as in the Action Editor's header."""
-    data = obj.animation_data_create()
-    data.action = action
-    if slot is not None:
-        data.action_slot = slot
-    bpy.context.view_layer.update()
 
 
 @pytest.mark.parametrize("interpolation", ["LINEAR", "BEZIER"])
@@ -53,20 +31,6 @@ def test_an_action_that_goes_on_outside_of_its_keys_is_no_longer_for_it(live_fil
     assert (strip.frame_start, strip.frame_end) == (1.0, 100.0)
     set_mode(obj, "BLENDER")
     assert not action.use_frame_range
-
-
-def test_keys_before_frame_zero_make_an_action_no_longer(live_file):
-    obj = key(new_object(), (-60.0, -31.0, -12.0))
-    set_mode(obj, "dq_sclerp")
-    assert tuple(obj.animation_data.action.frame_range) == (-60.0, -12.0)
-    for fcurve in curves_of(obj).values():
-        for point in fcurve.keyframe_points:
-            point.co_ui.x += 100.0
-    bpy.context.view_layer.update()
-    action = obj.animation_data.action
-    assert tuple(action.frame_range) == (40.0, 88.0)
-    assert not action.use_frame_range
-    assert_shown([obj], np.arange(38.0, 91.0))
 
 
 def test_a_frame_range_that_the_animator_has_set_stays(live_file):
@@ -88,7 +52,8 @@ def test_a_mode_that_was_chosen_before_there_were_keys_waits_for_them(live_file)
         bpy.context.view_layer.update()
         assert modes_of(waiting, np.array(FRAMES[:1])) == [mode]
         assert_shown([waiting], PLAYED)
-        link(waiting, None)
+        waiting.animation_data.action = None
+        bpy.context.view_layer.update()
         key(waiting, seed=3)
         bpy.context.view_layer.update()
         assert modes_of(waiting, np.array(FRAMES[:1])) == ["BLENDER"], "it was for the first Action"
@@ -111,26 +76,10 @@ def test_many_objects_get_a_mode_at_once_and_what_refuses_is_named(live_file):
     assert len(bpy.data.actions) == 4
 
 
-def test_there_are_samples_only_where_something_differs(live_file):
-    obj = new_object("Tool", "XYZ")
-    animation.write_channel(obj, "location", np.array(FRAMES), np.array([(i, 2.0 * i, 5.0) for i in range(4)]))
-    animation.write_channel(obj, "rotation_euler", np.array(FRAMES), np.array([(0.0, 0.0, 0.8 * i) for i in range(4)]))
-    set_mode(obj, "dq_sclerp", [11.0])
-    filled = {channel: c for channel, c in curves_of(obj).items() if channel[0].startswith("delta_")}
-    assert set(filled) == {("delta_location", 0), ("delta_location", 1)}
-    assert {tuple(fcurve.range()) for fcurve in filled.values()} == {(11.0, 24.0)}
-    assert_shown([obj], PLAYED)
-    obj.delta_location.z = 0.75
-    bpy.context.view_layer.update()
-    assert_shown([obj], PLAYED, {"Tool": Own((0.0, 0.0, 0.75))})
-    live_file.scene.frame_set(BETWEEN)
-    link(obj, None)
-    assert tuple(obj.delta_location) == (0.0, 0.0, 0.75)
-
-
 def test_what_is_deleted_with_an_edit_of_it_still_to_be_seen_is_asked_for_nothing_more(live_file):
     for number in range(30):
-        obj = tool(name=f"Tool {number}", seed=number)
+        obj = key(new_object(f"Tool {number}"), seed=number)
+        set_mode(obj, "dq_sclerp")
         obj.location.x += 1.0
         bpy.data.objects.remove(obj)
         if number % 2:

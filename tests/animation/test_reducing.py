@@ -25,11 +25,11 @@ from rigid_motion.animation import (
     unbake,
     write_channel,
 )
-from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate, interpolate_by_segments, shell_error
+from rigid_motion.motion import Poses, interpolate, interpolate_by_segments, shell_error
 from tests.animation.keyed import curves_of, rotation_path, snapshot
 from tests.animation.oracle import shown_worlds
 from tests.animation.reduced import RADIUS, TOLERANCE, keys_of, motion, off, recorded
-from tests.animation.scenes import give_own_deltas, key, new_object
+from tests.animation.scenes import key, new_object
 
 
 @pytest.mark.parametrize("count", [2, 5, 12])
@@ -56,15 +56,6 @@ def test_no_motion_has_fewer_keys_than_two_or_more_than_it_had(live_file, count,
     assert not is_reduced(obj)
 
 
-def best_of(obj: bpy.types.Object, mode: str = "motor_spline", tolerance: float = TOLERANCE):
-    """Reduce with the best mode of each segment: the frames of the keys, and the modes of the segments."""
-    reduction = reduce_keys_of(obj, mode, tolerance, RADIUS, best_of=True)
-    kept = key_frames(obj)
-    modes = modes_of(obj, kept[:-1])
-    assert reduction.segments == {mode: modes.count(mode) for mode in modes}
-    return kept, modes
-
-
 @pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XZY"])
 @pytest.mark.parametrize(
     ("name", "mode"),
@@ -77,7 +68,10 @@ def test_the_best_mode_of_each_segment_is_keyed_and_blender_shows_it(live_file, 
     reduce_keys_of(obj, mode, TOLERANCE, RADIUS)
     single, expected = key_frames(obj), shell_error(read_poses(obj, frames), truth, RADIUS)
     restore_keys(obj)
-    kept, modes = best_of(obj, mode)
+    reduction = reduce_keys_of(obj, mode, TOLERANCE, RADIUS, best_of=True)
+    kept = key_frames(obj)
+    modes = modes_of(obj, kept[:-1])
+    assert reduction.segments == {mode: modes.count(mode) for mode in modes}
     assert kept.tolist() == single.tolist() == keys_of(obj, "rigid_motion.mode")
     assert len(set(modes)) > 1
     shown = read_poses(obj, frames)
@@ -87,31 +81,6 @@ def test_the_best_mode_of_each_segment_is_keyed_and_blender_shows_it(live_file, 
     assert np.mean(error**2) < np.mean(expected**2)
     assert error.max() <= TOLERANCE * (1.0 + 1e-5)
     assert reduction_of(obj).largest_error == pytest.approx(error.max(), abs=1e-6)
-    for first, last, chosen in zip(kept[:-1], kept[1:], modes, strict=True):
-        inside = (frames > first) & (frames < last)
-        for other in KEYFRAME_MODES:
-            errors = shell_error(interpolate(kept, keys, frames[inside], other), truth[inside], RADIUS)
-            if inside.any() and errors.max() <= TOLERANCE:
-                least = np.sqrt(np.mean(errors**2))
-                assert np.sqrt(np.mean(error[inside] ** 2)) <= least + 5e-6, (first, chosen, other)
-
-
-@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "YZX"])
-def test_delta_transforms_of_its_own_stay_in_force_and_come_back(live_file, rotation_mode):
-    obj = new_object(rotation_mode=rotation_mode)
-    give_own_deltas(obj)
-    obj.delta_scale = (1.0, 1.0, 1.0)
-    recorded(obj=obj)
-    own = [tuple(value) for value in (obj.delta_location, obj.delta_rotation_euler, obj.delta_rotation_quaternion)]
-    frames = key_frames(obj)
-    truth = read_poses(obj, frames)
-    reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
-    assert off(obj, frames, truth) <= TOLERANCE * (1.0 + 1e-5)
-    restore_keys(obj)
-    assert off(obj, frames, truth) < 1e-6
-    assert own == [
-        tuple(value) for value in (obj.delta_location, obj.delta_rotation_euler, obj.delta_rotation_quaternion)
-    ]
 
 
 def test_the_tolerance_is_one_of_the_scene_also_under_a_parent_in_other_units(live_file):
@@ -185,6 +154,18 @@ def test_a_scale_that_only_stands_there_on_every_frame_goes_with_the_keys(live_f
     assert np.linalg.norm(moved, axis=1).max() <= TOLERANCE * (1.0 + 1e-5)
 
 
+def test_a_scale_that_changes_alike_along_all_axes_goes_with_the_keys(live_file):
+    obj = recorded()
+    frames = key_frames(obj)
+    write_channel(obj, "scale", frames, np.repeat(1.0 + 0.3 * np.sin(0.1 * frames[:, None]), 3, axis=1))
+    (before,) = shown_worlds([obj], frames)
+    reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
+    assert keys_of(obj, "scale") == keys_of(obj, "location")
+    corners = np.vstack((RADIUS * np.eye(3), np.ones(3)))
+    moved = ((shown_worlds([obj], frames)[0] - before) @ corners)[:, :3]
+    assert 0.0 < np.linalg.norm(moved, axis=1).max() <= TOLERANCE * (1.0 + 1e-5)
+
+
 def test_a_scale_that_differs_from_axis_to_axis_keeps_its_keys_and_the_motion_keeps_to_the_tolerance(live_file):
     obj = recorded()
     frames = key_frames(obj)
@@ -242,41 +223,6 @@ def test_a_strip_shows_the_reduced_keys_and_then_its_own_again(live_file):
     restore_keys(obj)
     assert strip.action == action
     assert off(obj, frames, truth) < 1e-6
-
-
-def test_of_several_strips_those_are_reduced_that_can_be(live_file):
-    obj = recorded()
-    dense = obj.animation_data.action
-    obj.animation_data.action = None
-    sparse = key(obj, [1.0, 9.0, 17.0]).animation_data.action
-    obj.animation_data.action = None
-    track = obj.animation_data.nla_tracks.new()
-    strips = [track.strips.new("Dense", 1, dense), track.strips.new("Sparse", 301, sparse)]
-    reduction = reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
-    assert reduction.before == len(motion()[0])
-    assert [strip.action in (dense, sparse) for strip in strips] == [False, True]
-
-
-def test_a_motion_that_blender_baked_is_reduced(live_file):
-    leader, obj = recorded(), new_object("Follower", "XYZ")
-    obj.constraints.new("COPY_TRANSFORMS").target = leader
-    frames = key_frames(leader)
-    truth = read_poses(obj, frames)
-    with pytest.raises(Refused, match=r"Follower has no keys.*Bake Action, with Visual Keying"):
-        reduce_keys_of(obj)
-    obj.select_set(True)
-    bpy.context.view_layer.objects.active = obj
-    bpy.ops.nla.bake(
-        frame_start=1,
-        frame_end=int(frames[-1]),
-        visual_keying=True,
-        clear_constraints=True,
-        only_selected=False,
-        bake_types={"OBJECT"},
-    )
-    reduction = reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
-    assert off(obj, frames, truth) <= TOLERANCE * (1.0 + 1e-3)
-    assert reduction.after < 0.5 * reduction.before
 
 
 def test_the_file_keeps_the_dense_keys_until_they_are_let_go(live_file, tmp_path):

@@ -12,12 +12,12 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion import animation
-from rigid_motion.animation import is_baked, modes_of, problem_of, refresh, set_mode
+from rigid_motion.animation import modes_of, problem_of, refresh, set_mode
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones import rigs
 from tests.animation.bones.poses import assert_posed, assert_same_poses, expected_poses, names_of, shown_poses
 from tests.animation.bones.rigs import INHERIT_SCALES, PLAYED, key_all, moving_rig, new_rig
+from tests.animation.bones.test_bone_files import save
 from tests.animation.farm import SAVE, on_a_farm, played_on_a_farm
 from tests.animation.keyed import curves_of, snapshot
 from tests.animation.oracle import Own, assert_shown, expected_worlds, shown_worlds
@@ -25,11 +25,6 @@ from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own
 from tests.thoroughness import sample
 
 ORDERS = ("QUATERNION", "XYZ", "ZYX", "YXZ")
-
-
-def save(path: Path) -> Path:
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    return path
 
 
 def assert_same(worlds: Sequence[np.ndarray], expected: Sequence[np.ndarray], tolerance: float = 1e-6) -> None:
@@ -129,39 +124,6 @@ def test_what_a_farm_saves_again_comes_back_whole(live_file, tmp_path, order, ow
     assert own_deltas(obj) == owns.get("Tool", Own())
     assert_posed(rig, PLAYED)
     assert not any(len(bone.constraints) for bone in rig.pose.bones)
-
-
-def test_what_a_farm_edits_and_renames_is_followed_when_the_extension_is_there_again(live_file, tmp_path):
-    obj, rig, owns = tool_and_rig("dq_sclerp")
-    edit = """
-for fcurve in bpy.data.objects["Tool"].animation_data.action.layers[0].strips[0].channelbags[0].fcurves:
-    if fcurve.data_path == "location":
-        fcurve.keyframe_points[1].co_ui.y += 2.0
-bpy.data.armatures[0].bones["Lower"].name = "Fore"
-"""
-    before = shown_worlds([obj], PLAYED)[0]
-    on_a_farm(edit + SAVE, save(tmp_path / "shot.blend"), tmp_path / "farm.blend")
-    obj, rig = reopened(tmp_path / "farm.blend")
-    assert_shown([obj], PLAYED, owns)
-    assert np.abs(shown_worlds([obj], PLAYED)[0] - before).max() > 1.0
-    assert modes_of(rig.pose.bones["Fore"], np.array(FRAMES[:1])) == ["dq_sclerp"]
-    assert_posed(rig, PLAYED)
-
-
-def test_what_is_baked_plays_alike_on_a_farm_and_can_be_un_baked_after_it_saved_the_file(live_file, tmp_path):
-    obj, rig, owns = tool_and_rig("dq_sclerp")
-    keys = [snapshot(obj), snapshot(rig)]
-    expected, posed = expected_worlds(obj, PLAYED, owns), expected_poses(rig, PLAYED)
-    animation.bake([obj, *rig.pose.bones])
-    played = played_on_a_farm(save(tmp_path / "shot.blend"), ["Tool", "Rig"], PLAYED, then=SAVE)
-    assert_same(played.worlds[:1], [expected], 1e-5)
-    assert_same_poses(rig, PLAYED, named(rig, played.poses), posed)
-    obj, rig = reopened(tmp_path / "shot-farm.blend")
-    assert all(is_baked(carrier) for carrier in (obj, *rig.pose.bones))
-    animation.unbake([obj, *rig.pose.bones])
-    assert [snapshot(obj), snapshot(rig)] == keys
-    assert_shown([obj], PLAYED, owns)
-    assert_posed(rig, PLAYED)
 
 
 def test_the_numbers_of_modes_in_files_stay_what_they_are(live_file):

@@ -175,33 +175,6 @@ def test_delta_keys_of_the_animators_are_left_alone_in_the_other_strip(live_file
     assert [tuple(point.co) for point in kept.keyframe_points] == [(5.0, 0.25)]
 
 
-@pytest.mark.parametrize("frame", [np.nan, np.inf, -1e30])
-def test_a_strip_with_damaged_keys_holds_them_too(live_file, frame):
-    _, _, actions, _ = two_strips()
-    fcurves = fcurves_of(actions[1])
-    for fcurve in [fcurve for fcurve in fcurves if fcurve.data_path.startswith("delta_")]:
-        fcurves.remove(fcurve)
-    for fcurve in fcurves:
-        points = np.empty(2 * len(fcurve.keyframe_points), np.float32)
-        fcurve.keyframe_points.foreach_get("co", points)
-        points[::2] = frame
-        fcurve.keyframe_points.foreach_set("co", points)
-    refresh()
-    assert held_in(actions[1]) == {"delta_location", "delta_rotation_quaternion"}
-
-
-def test_above_a_strip_with_a_mode_one_that_keys_something_else_leaves_it_its_in_betweens(live_file):
-    obj, _, actions, expected = two_strips()
-    fcurves = fcurves_of(actions[1])
-    fcurves.clear()
-    fcurves.new("color", index=1).keyframe_points.insert(KEYS[0], 0.5)
-    obj.animation_data.nla_tracks[1].strips[0].frame_start = 1.0
-    bpy.context.view_layer.update()
-    refresh()
-    assert held_in(actions[1]) == set()
-    assert_at(obj, ACTION_FRAMES, expected[0])
-
-
 def test_a_strip_that_adds_holds_nothing(live_file):
     obj, _, actions, _ = two_strips()
     assert held_in(actions[1]) != set()
@@ -214,17 +187,6 @@ def test_a_strip_that_adds_holds_nothing(live_file):
 def test_where_there_are_no_own_delta_transforms_the_other_strip_holds_none(live_file):
     _, _, actions, _ = two_strips(own=False)
     assert held_in(actions[1]) == set()
-
-
-def test_an_action_of_two_objects_holds_what_both_have(live_file):
-    obj, _, actions, expected = two_strips()
-    twin = obj.copy()
-    live_file.collection.objects.link(twin)
-    bpy.context.view_layer.update()
-    refresh()
-    assert held_in(actions[1]) != set()
-    for start, worlds in zip((1, 101), expected, strict=True):
-        assert_at(twin, ACTION_FRAMES + start - 1, worlds)
 
 
 def test_an_action_of_two_objects_with_other_delta_transforms_holds_those_of_neither(live_file):

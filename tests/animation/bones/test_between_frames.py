@@ -5,14 +5,12 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from mathutils import Quaternion
 
 from rigid_motion.animation import refresh, set_mode
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import expected_poses, shown_poses
-from tests.animation.bones.rigs import ORDERS, Rest, in_turn, key_all, moving_rig, new_rig, write_bone
-from tests.animation.keyed import curves_of, rotation_path
-from tests.animation.scenes import push_down
+from tests.animation.bones.rigs import ORDERS, in_turn, key_all, moving_rig, new_rig
+from tests.animation.keyed import curves_of
 
 PROMISE = 1e-4
 """Metres."""
@@ -81,8 +79,6 @@ def test_a_manual_frame_range_of_the_animators_stays_and_one_that_is_unticked_co
         bpy.context.view_layer.update()
 
     action.use_frame_range = False
-    errors = largest_error(rig, EIGHTHS)
-    assert max(errors.values()) < PROMISE, "it is what strips and exports take, no more"
     edit()
     assert action.use_frame_range
     assert tuple(action.frame_range) == (1.0, 40.0)
@@ -92,8 +88,6 @@ def test_a_manual_frame_range_of_the_animators_stays_and_one_that_is_unticked_co
     set_mode(list(rig.pose.bones), "dq_sclerp")
     edit()
     assert tuple(action.frame_range) == (5.0, 30.0)
-    errors = largest_error(rig, EIGHTHS)
-    assert max(errors.values()) < PROMISE, errors
 
 
 def test_slow_motions_have_one_sample_a_frame(live_file):
@@ -104,28 +98,3 @@ def test_slow_motions_have_one_sample_a_frame(live_file):
     assert not action.use_frame_range
     errors = largest_error(rig, np.arange(1.0, 400.0, 5.3))
     assert max(errors.values()) < PROMISE, errors
-
-
-@pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline"])
-@pytest.mark.parametrize("order", ["QUATERNION", "XYZ"])
-def test_a_swing_is_slowed_down_fourfold(live_file, mode, order):
-    arm = (
-        Rest("Upper", (0, 0, 0), (0.5, 0, 0)),
-        Rest("Lower", (0.5, 0, 0), (1, 0, 0), "Upper"),
-        Rest("Hand", (1, 0, 0), (1.5, 0, 0), "Lower"),
-    )
-    rig, frames = new_rig(bones=arm, rotation_mode=order), np.array((1.0, 13.0, 25.0))
-    for bone, share in zip(rig.pose.bones, (0.3, 0.4, 0.3), strict=True):
-        turns = [Quaternion((0.2, 0.9, 0.4), np.radians(150.0 * share * there)) for there in (0, 1, 0)]
-        rotations = [turn if order == "QUATERNION" else turn.to_euler(order) for turn in turns]
-        write_bone(bone, rotation_path(bone), frames, np.array(rotations), "BEZIER")
-    write_bone(rig.pose.bones["Hand"], "location", frames, 0.3 * np.outer((0, 1, 0), (2.0, -0.7, 1.0)), "BEZIER")
-    set_mode(list(rig.pose.bones), mode)
-    bpy.context.view_layer.update()
-    at = np.arange(1.0, 25.0, 1.0 / 32.0)
-    expected = expected_poses(rig, at)["Hand"]
-    push_down(rig, scale=4.0)
-    (shown,) = shown_poses([rig], 1.0 + 4.0 * (at - 1.0))
-    points = np.concatenate((np.zeros((1, 3)), 0.5 * np.eye(3)))
-    one, other = (m[:, None, :3, :3] @ points[:, :, None] + m[:, None, :3, 3:] for m in (shown["Hand"], expected))
-    assert np.linalg.norm(one - other, axis=2).max() < PROMISE

@@ -13,6 +13,7 @@ from tests.animation.bones.poses import assert_posed, assert_same_poses, expecte
 from tests.animation.bones.rigs import FRAMES, PLAYED, key_all, moving_rig, new_rig
 from tests.animation.farm import SAVE, on_a_farm, played_on_a_farm
 from tests.animation.keyed import curves_of
+from tests.animation.scenes import linked
 
 
 def save(path: Path) -> Path:
@@ -40,15 +41,6 @@ def library(live_file, tmp_path) -> Path:
     return path
 
 
-def linked(library: Path, name: str) -> bpy.types.Object:
-    with bpy.data.libraries.load(str(library), link=True) as (_, expected):
-        expected.objects = [name]
-    obj = bpy.data.objects[name]
-    bpy.context.scene.collection.objects.link(obj)
-    bpy.context.view_layer.update()
-    return obj
-
-
 def overridden(library: Path, name: str) -> bpy.types.Object:
     """A rig of the library that this file may animate."""
     rig = linked(library, name).override_create(remap_local_usages=True)
@@ -64,13 +56,6 @@ def test_a_linked_rig_shows_the_modes_of_its_library(library, tmp_path):
         set_mode(list(rig.pose.bones), "pga_lerp")
     assert_posed(rig, PLAYED)
     assert_posed(reopened(save(tmp_path / "shot.blend")), PLAYED)
-
-
-def test_an_overridden_rig_whose_action_is_linked_is_refused_by_its_name(library):
-    rig = overridden(library, "Rig")
-    with pytest.raises(ValueError, match="linked from another file"):
-        set_mode(list(rig.pose.bones), "pga_lerp")
-    assert_posed(rig, PLAYED)
 
 
 def test_an_overridden_rig_takes_modes_and_has_them_when_the_file_is_opened_again(library, tmp_path):

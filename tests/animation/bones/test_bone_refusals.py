@@ -8,55 +8,14 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import Refused, bake, problem_of, refresh, set_mode
-from tests.animation.actions.test_refusals import HINDRANCES as HINDRANCES_OF_OBJECTS
+from rigid_motion.animation import problem_of, refresh
+from tests.animation.actions.test_refusals import HINDRANCES
 from tests.animation.bones.poses import assert_posed, shown_poses
-from tests.animation.bones.rigs import PLAYED, key_all, moving_rig, new_rig
-from tests.animation.keyed import curves_of, snapshot
-
-HINDRANCES = {
-    name: HINDRANCES_OF_OBJECTS[name]
-    for name in ("axis and angle", "noise", "cycles in part", "all driven", "sampled keys", "not a number")
-}
-"""What to do to a bone, and what it is told."""
+from tests.animation.bones.rigs import PLAYED, moving_rig
+from tests.animation.keyed import curves_of
 
 
-def state_of(rig: bpy.types.Object) -> tuple:
-    """All that choosing a mode may ever touch, and what is to be seen."""
-    action = rig.animation_data.action
-    return (
-        repr(snapshot(rig)),
-        [(fcurve.data_path, fcurve.array_index) for fcurve in curves_of(rig).values()],
-        [bone.rigid_motion.mode for bone in rig.pose.bones],
-        [[constraint.name for constraint in bone.constraints] for bone in rig.pose.bones],
-        [slot.identifier for slot in action.slots],
-        [(slot.handle, slot.prefix, slot.digest) for slot in action.rigid_motion.slots],
-        [group.name for bag in action.layers[0].strips[0].channelbags for group in bag.groups],
-        sorted(block.name for block in bpy.data.actions),
-        {name: matrices.tobytes() for name, matrices in shown_poses([rig], PLAYED)[0].items()},
-    )
-
-
-@pytest.mark.parametrize("frames", [None, (1.0, 11.0)], ids=["whole bone", "keys"])
-@pytest.mark.parametrize("hindrance", HINDRANCES)
-def test_a_mode_that_cannot_work_is_refused_by_name_and_nothing_changes(live_file, hindrance, frames):
-    rig = key_all(new_rig(), scale="even")
-    hand = rig.pose.bones["Hand"]
-    hinder, message = HINDRANCES[hindrance]
-    hinder(hand)
-    bpy.context.view_layer.update()
-    before = state_of(rig)
-    with pytest.raises(Refused, match=f"^Rig.*Hand.*{message}"):
-        set_mode(hand, "dq_sclerp", frames)
-    assert state_of(rig) == before
-    set_mode(hand, "BLENDER")
-    assert state_of(rig) == before, "Blender's own mode is always to be had"
-    with pytest.raises(Refused):
-        bake(hand)
-    assert state_of(rig) == before
-
-
-@pytest.mark.parametrize("hindrance", HINDRANCES)
+@pytest.mark.parametrize("hindrance", ["noise", "all driven", "sampled keys"])
 def test_what_comes_in_the_way_later_gives_blenders_own_motion_and_a_reason(live_file, hindrance):
     rig = moving_rig(scale="even")
     lower = rig.pose.bones["Lower"]

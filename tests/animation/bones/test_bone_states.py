@@ -25,8 +25,8 @@ from tests.animation.bones.rig_editing import (
     has_live_segments,
     own_constraints,
 )
-from tests.animation.bones.rigs import new_rig, pose_mode, write_bone
-from tests.animation.editing import LAST, ORDERS, frames_in, mode_channel, seeds, shares
+from tests.animation.bones.rigs import ORDERS, new_rig, pose_mode, write_bone
+from tests.animation.editing import LAST, frames_in, mode_channel, seeds, shares
 from tests.animation.keyed import MODE_IDS, key_frames, mode_at, transform_paths
 from tests.animation.machine import goes_on
 from tests.animation.oracle import expected_bases

@@ -5,17 +5,13 @@ In-betweens are exact on the whole frames of the Action, so strips are looked at
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import bpy
 import numpy as np
 import pytest
 
 from rigid_motion.animation import refresh, set_mode
 from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
-from tests.animation.bones.rigs import ORDERS, in_turn, key_all, key_desired, moving_rig, new_rig, twin_of
-from tests.animation.keyed import curves_of
-from tests.animation.oracle import expected_bases
+from tests.animation.bones.rigs import ORDERS, in_turn, key_all, moving_rig, new_rig
 from tests.animation.scenes import new_strip, push_down
 
 KEYS = (1.0, 11.0, 21.0, 41.0)
@@ -61,16 +57,14 @@ def test_a_strip_shows_the_modes_of_its_action(live_file, place, order):
 
 
 def several(
-    *modes: str, order: str = "QUATERNION", amount: float = 1.0, turning: bool = True
+    *modes: str, order: str = "QUATERNION"
 ) -> tuple[bpy.types.Object, list[tuple[bpy.types.Action, bpy.types.ActionSlot]], list[Poses]]:
     """A rig, an Action for each of these modes with its slot, and where the bones have to be in each."""
     rig, actions, expected = new_rig(rotation_mode=order), [], []
     data = rig.animation_data_create()
     for seed, mode in enumerate(modes):
         data.action = None
-        key_all(rig, KEYS, seed=seed, amount=amount)
-        for pose_bone in rig.pose.bones if not turning else ():
-            remove_turns(pose_bone)
+        key_all(rig, KEYS, seed=seed)
         set_mode(list(rig.pose.bones), mode, KEYS)
         actions.append((data.action, data.action_slot))
         expected.append(expected_poses(rig, ACTION_FRAMES))
@@ -105,75 +99,6 @@ def test_two_strips_each_have_the_mode_that_is_keyed_in_their_action(live_file, 
     for start, poses in zip((1, 101), expected, strict=True):
         assert_at(rig, ACTION_FRAMES + start - 1, poses)
     assert_at(rig, np.array((60.0, 90.0)), rows(expected[0], np.array((-1, -1))))
-
-
-def remove_turns(pose_bone: bpy.types.PoseBone) -> None:
-    """Leave a bone its location keys alone."""
-    data = pose_bone.id_data.animation_data
-    fcurves = data.action.layers[0].strips[0].channelbag(data.action_slot).fcurves
-    for (path, _), fcurve in curves_of(pose_bone).items():
-        if path.startswith("rotation"):
-            fcurves.remove(fcurve)
-
-
-def cross_fading(
-    modes: tuple[str, str], order: str, how: Callable[[list[bpy.types.NlaStrip]], None], **settings: object
-) -> tuple[Poses, Poses, Poses, bpy.types.Object]:
-    """A rig with modes in two strips that fade into one another, the same with real keys, and with Blender's motion."""
-    rig, actions, _ = several(*modes, order=order, **settings)
-    rigs, owned = [rig, twin_of(rig), twin_of(rig)], [actions, [], []]
-    for action, slot in actions:
-        rig.animation_data.action, rig.animation_data.action_slot = action, slot
-        native = {bone.name: expected_bases(bone, ACTION_FRAMES, keys=np.empty(0)) for bone in rig.pose.bones}
-        for twin, own, bases in ((rigs[1], owned[1], None), (rigs[2], owned[2], native)):
-            data = twin.animation_data_create()
-            data.action = None
-            key_desired(twin, rig, ACTION_FRAMES, bases)
-            own.append((data.action, data.action_slot))
-    for one, own in zip(rigs, owned, strict=True):
-        one.animation_data.action = None
-        how(put_into_strips(one, own, (1, 26)))
-    bpy.context.view_layer.update()
-    return *shown_poses(rigs, FADED), rig
-
-
-FADED = np.arange(-3.0, 70.0)
-
-MODES_OF_TWO = [("dq_sclerp", "pga_lerp"), ("dq_sclerp", "BLENDER"), ("BLENDER", "pga_slerp")]
-
-
-def blend_in(strips: list[bpy.types.NlaStrip]) -> None:
-    """Let the second strip take over from the first, as long as both play."""
-    strips[1].blend_in = 15.0
-
-
-@pytest.mark.parametrize("modes", MODES_OF_TWO)
-def test_strips_that_cross_fade_mix_places_as_they_mix_real_keys(live_file, modes):
-    shown, real, native, rig = cross_fading(modes, "QUATERNION", blend_in, turning=False)
-    assert_same_poses(rig, FADED, shown, real)
-    assert np.abs(native["Hand"] - real["Hand"]).max() > 1e-2
-
-
-MIXED_TIMES = pytest.mark.xfail(
-    strict=True,
-    reason="Blender mixes evaluation times with 0 where strips leave room for the pose at rest: other frames show",
-)
-
-
-@pytest.mark.parametrize("influence", [0.0, pytest.param(0.3, marks=MIXED_TIMES), 1.0])
-def test_a_strip_of_less_influence_takes_its_share_of_the_mode(live_file, influence):
-    rig, expected = filled()
-    twin = twin_of(rig)
-    key_desired(twin, rig, ACTION_FRAMES)
-    for owner in (rig, twin):
-        strip = push_down(owner, 1)
-        strip.use_animated_influence = True
-        strip.influence = influence
-        strip.fcurves[0].keyframe_points.insert(1.0, influence)
-    bpy.context.view_layer.update()
-    shown, real = shown_poses([rig, twin], ACTION_FRAMES)
-    assert_same_poses(rig, ACTION_FRAMES, shown, real)
-    assert (influence < 1.0) == bool(np.abs(shown["Hand"] - expected["Hand"]).max() > 1e-3)
 
 
 @pytest.mark.parametrize("name", ["Before", "Zulu"])

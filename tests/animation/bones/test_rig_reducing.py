@@ -8,7 +8,6 @@ import pytest
 
 from rigid_motion.animation import (
     Refused,
-    channelbag_of,
     is_reduced,
     key_frames,
     modes_of,
@@ -18,13 +17,18 @@ from rigid_motion.animation import (
     total_reduction,
     write_channel,
 )
-from rigid_motion.ui.wording import reduction_summary
-from tests.animation.bones.rigs import in_turn
-from tests.animation.scenes import new_object
+from tests.animation.bones.rigs import Rest, in_turn, new_rig
 from tests.balls import largest_displacements
 from tests.rigs.recorded import FRAMES, NAMES, recorded_rig
 
 TOLERANCE, RADIUS = 0.01, 0.05
+
+LEG = (
+    Rest("Hip", (0.0, 0.0, 1.0), (0.0, 0.001, 0.9)),
+    Rest("Thigh", (0.0, 0.0, 0.9), (0.0, 0.001, 0.5), "Hip"),
+    Rest("Shin", (0.0, 0.0, 0.5), (0.0, 0.001, 0.1), "Thigh"),
+    Rest("Foot", (0.0, 0.0, 0.1), (0.0, 0.001, 0.05), "Shin"),
+)
 
 
 def bones(rig: bpy.types.Object, *names: str) -> list[bpy.types.PoseBone]:
@@ -103,21 +107,6 @@ def test_a_rig_that_moves_itself_has_its_keys_on_the_key_poses(live_file):
     assert total_reduction([rig, *bones(rig)]).largest_error < by_nine
 
 
-def test_more_keys_in_all_channels_than_before_are_no_secret(live_file):
-    rig = recorded_rig()
-    # As importers leave what is always the same: with a key at either end.
-    for bone in bones(rig):
-        write_channel(rig, bone.path_from_id("scale"), FRAMES[[0, -1]], np.ones((2, 3)))
-    had = sum(len(fcurve.keyframe_points) for fcurve in channelbag_of(rig).fcurves)
-    reduce_keys_of(bones(rig), "motor_spline", radius=RADIUS, count=80)
-    has = sum(len(fcurve.keyframe_points) for fcurve in channelbag_of(rig).fcurves)
-    reduction = total_reduction(bones(rig))
-    assert reduction.channel_keys == (had, has)
-    assert has > had
-    said = reduction_summary(bpy.context.scene, reduction)
-    assert f"but channels have {has} keys together, and had {had}" in said
-
-
 def test_what_hangs_on_a_target_keeps_its_own_keys_and_to_the_tolerance(live_file):
     rig = recorded_rig()
     truth = matrices(rig)
@@ -126,17 +115,6 @@ def test_what_hangs_on_a_target_keeps_its_own_keys_and_to_the_tolerance(live_fil
     off = errors(rig, truth)
     assert off["Root"] == 0.0
     assert 0.0 < off["Hand.L"] <= TOLERANCE * (1.0 + 1e-4)
-    together = len(key_frames(rig.pose.bones["Spine"]))
-    restore_keys(bones(rig, "Spine"))
-    # With nothing that hangs on it the spine needs fewer.
-    alone = recorded_rig()
-    bpy.context.view_layer.objects.active = alone
-    bpy.ops.object.mode_set(mode="EDIT")
-    for name in NAMES[2:]:
-        alone.data.edit_bones[name].parent = None
-    bpy.ops.object.mode_set(mode="OBJECT")
-    reduce_keys_of(bones(alone, "Spine"), "motor_spline", TOLERANCE, RADIUS)
-    assert len(key_frames(alone.pose.bones["Spine"])) < together
 
 
 def test_a_bone_that_hardly_moves_is_left_with_one_key(live_file):
@@ -153,14 +131,7 @@ def test_a_bone_that_hardly_moves_is_left_with_one_key(live_file):
 @pytest.mark.parametrize("carried", [False, True])
 def test_a_foot_that_stands_is_held(live_file, carried):
     """Under a hip that sways. Carried, the rig moves on, and the hip goes as far back in it."""
-    rig = new_object("Leg", data=bpy.data.armatures.new("Leg"))
-    bpy.context.view_layer.objects.active = rig
-    bpy.ops.object.mode_set(mode="EDIT")
-    for name, head, tail in (("Hip", 1.0, 0.9), ("Thigh", 0.9, 0.5), ("Shin", 0.5, 0.1), ("Foot", 0.1, 0.05)):
-        bone = rig.data.edit_bones.new(name)
-        bone.head, bone.tail = (0.0, 0.0, head), (0.0, 0.001, tail)
-        bone.parent = rig.data.edit_bones[-2] if len(rig.data.edit_bones) > 1 else None
-    bpy.ops.object.mode_set(mode="OBJECT")
+    rig = new_rig("Leg", LEG)
     # A pendulum that hangs from the swaying hip, with its end where it is.
     sway = 0.08 * np.sin(0.2 * FRAMES)
     on = 0.02 * FRAMES if carried else 0.0 * FRAMES

@@ -106,28 +106,6 @@ def test_a_constraint_that_was_deleted_is_not_brought_back_by_edit_mode(live_fil
     assert constraint_trouble(rig.pose.bones["Hand.L"]) == "REMOVED"
 
 
-def test_each_of_several_actions_in_the_nla_is_shown_again_after_edit_mode(live_file):
-    rig = rig_with_hands()
-    data = rig.animation_data
-    for number in range(2):
-        if number:
-            data.action = None
-            key_all(rig, seed=number)
-            set_mode(list(rig.pose.bones), "pga_lerp")
-        data.nla_tracks.new().strips.new(f"Strip {number}", 1 + 60 * number, data.action)
-    data.action = None
-    bpy.context.view_layer.update()
-    refresh()
-    before = {name: [(c.name, c.action) for c in held] for name, held in own_constraints(rig).items()}
-    assert {len(held) for held in before.values()} == {2}
-    with edit_mode(rig) as edit_bones:
-        assert shown_slots(rig) == NONE_SHOWN
-        symmetrize(edit_bones)
-    assert {name: [(c.name, c.action) for c in held] for name, held in own_constraints(rig).items()} == before
-    assert set(shown_slots(rig).values()) == {("Rigid Motion", "Rigid Motion")}
-    assert refresh() == 0
-
-
 def test_a_file_that_is_saved_in_edit_mode_plays_in_a_blender_without_the_extension(live_file, tmp_path):
     rig = rig_with_hands()
     expected = expected_poses(rig, PLAYED)
@@ -137,26 +115,6 @@ def test_a_file_that_is_saved_in_edit_mode_plays_in_a_blender_without_the_extens
     on_a_farm("bpy.ops.object.mode_set(mode='OBJECT')\n" + SAVE, path, path)
     played = posed_on_a_farm(path, rig)
     assert_same_poses(rig, PLAYED, played, expected)
-
-
-def test_undo_and_redo_go_into_edit_mode_and_out_of_it(live_file):
-    rig_with_hands()
-    bpy.ops.ed.undo_push(message="rig")
-    select_only(bpy.data.objects["Rig"])
-    bpy.ops.object.mode_set(mode="EDIT")
-    bpy.ops.ed.undo_push(message="into Edit Mode")
-    symmetrize(bpy.data.objects["Rig"].data.edit_bones)
-    bpy.ops.ed.undo_push(message="symmetrized")
-    bpy.ops.object.mode_set(mode="OBJECT")
-    bpy.ops.ed.undo_push(message="out of Edit Mode")
-    steps = [bpy.ops.ed.undo] * 3 + [bpy.ops.ed.redo] * 3
-    for step, mode in zip(steps, ("EDIT", "EDIT", "OBJECT", "EDIT", "EDIT", "OBJECT"), strict=True):
-        step()
-        rig = bpy.data.objects["Rig"]
-        bpy.context.view_layer.update()
-        assert rig.mode == mode
-        assert shown_slots(rig) == (NONE_SHOWN if mode == "EDIT" else ALL_SHOWN)
-    assert_posed(rig, PLAYED)
 
 
 def test_a_rig_in_edit_mode_gets_its_slots_back_when_the_extension_is_switched_off(live_file):

@@ -8,16 +8,11 @@ import pytest
 
 from rigid_motion.animation import modes_of, refresh, set_mode
 from tests.animation.bones.poses import assert_posed
-from tests.animation.bones.rigs import FRAMES, PLAYED, Rest, key_all, moving_rig, new_rig, own_constraints
+from tests.animation.bones.rigs import FRAMES, PLAYED, key_all, moving_rig, new_rig, own_constraints
+from tests.animation.bones.test_rigs_in_edit_mode import HANDS
 from tests.animation.keyed import curves_of
 from tests.animation.oracle import assert_shown
 from tests.animation.scenes import key, new_object
-
-SIDES = (
-    Rest("Body", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-    Rest("Hand.L", (0.5, 0.0, 1.0), (1.0, 0.0, 1.0), "Body"),
-    Rest("Hand.R", (-0.5, 0.0, 1.0), (-1.0, 0.0, 1.0), "Body"),
-)
 
 
 def mode_of(carrier: bpy.types.Object | bpy.types.PoseBone) -> str:
@@ -55,14 +50,6 @@ def test_a_duplicate_of_a_slot_goes_its_own_way(moved):
     assert_shown([moved, other], PLAYED)
 
 
-def test_a_duplicate_of_a_slot_has_the_mode_that_was_duplicated_and_not_that_of_its_new_user(moved):
-    other = key(new_object("Other"))
-    set_mode(other, "pga_lerp")
-    bpy.context.view_layer.update()
-    assert mode_of(with_duplicate(other, moved)) == "dq_sclerp"
-    assert_shown([moved, other], PLAYED)
-
-
 @pytest.mark.parametrize("user", ["itself", "another"])
 def test_a_rig_that_gets_a_duplicate_of_a_slot_gets_the_modes_of_all_bones(live_file, user):
     rig = moving_rig("dq_sclerp")
@@ -90,7 +77,7 @@ def test_a_rig_that_gets_a_duplicate_of_a_slot_gets_the_modes_of_all_bones(live_
 
 @pytest.mark.parametrize("modes", [("dq_sclerp", "BLENDER"), ("BLENDER", "dq_sclerp"), ("dq_sclerp", "pga_lerp")])
 def test_an_action_that_is_flipped_leaves_each_bone_its_mode_and_nothing_of_the_other(live_file, modes):
-    rig = key_all(new_rig("Rig", SIDES))
+    rig = key_all(new_rig("Rig", HANDS))
     hands = [rig.pose.bones[name] for name in ("Hand.L", "Hand.R")]
     for hand, mode in zip(hands, modes, strict=True):
         set_mode(hand, mode)

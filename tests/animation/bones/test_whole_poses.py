@@ -59,28 +59,6 @@ def test_the_visual_transform_applied_leaves_bones_where_they_are(rig, live_file
     assert np.abs(placed(rig) - seen).max() < 2e-5
 
 
-def test_the_visual_transform_below_another_constraint_is_kept_when_that_is_removed(rig):
-    hand = rig.pose.bones["Hand"]
-    limit = hand.constraints.new("LIMIT_LOCATION")
-    limit.use_min_x = limit.use_max_x = True
-    limit.owner_space = "LOCAL"
-    limit.min_x = limit.max_x = 0.25
-    seen = placed(rig)
-    apply_visual_transform(rig)
-    assert np.abs(placed(rig) - seen).max() < 2e-5
-    hand.constraints.remove(limit)
-    assert np.abs(placed(rig) - seen).max() < 2e-5
-
-
-def test_a_bone_that_is_moved_on_by_hand_is_keyed_where_it_is(rig):
-    apply_visual_transform(rig)
-    placed(rig)
-    as_an_animator(bpy.ops.transform.translate, value=(0.2, 0.1, 0.0))
-    seen = placed(rig)
-    insert_keys(rig)
-    assert np.abs(placed(rig) - seen).max() < 2e-5
-
-
 @pytest.mark.parametrize("keyed", ["at once", "later"])
 @pytest.mark.parametrize("applied", [False, True], ids=["as it is", "with the visual transform applied"])
 def test_rigify_keeps_a_transform_where_it_is_seen_when_a_parent_is_switched(rig, live_file, applied, keyed):

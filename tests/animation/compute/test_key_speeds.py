@@ -12,42 +12,18 @@ from rigid_motion.animation.actions.slots import bindings_of
 from rigid_motion.animation.compute.differences import in_betweens
 from rigid_motion.animation.transforms import transform_of
 from tests.animation.bones.rigs import in_turn
-from tests.animation.keyed import curves_of
+from tests.animation.live.test_kept_motion import POSES, keyed, keys_of
 from tests.animation.oracle import matrices, shown_worlds
 from tests.animation.scenes import new_object
 
 INTERPOLATIONS = [item.identifier for item in bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items]
 
-POSES = [
-    ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)),
-    ((1.0, 0.4, -0.3), (0.9, 0.1, -0.2, 0.37)),
-    ((1.9, 1.5, 0.1), (0.6, 0.3, -0.3, 0.67)),
-    ((3.5, 1.9, 0.2), (0.2, 0.5, -0.3, 0.78)),
-]
 
-
-def keyed(frames, poses=POSES, *, interpolation: str | None = None, carrier=None):
-    """Something with keys as I sets them, with Blender's default handles."""
-    carrier = new_object() if carrier is None else carrier
-    for frame, (location, quaternion) in zip(frames, poses, strict=False):
-        carrier.location, carrier.rotation_quaternion = location, quaternion / np.linalg.norm(quaternion)
-        for path in ("location", "rotation_quaternion"):
-            carrier.keyframe_insert(path, frame=frame)
-    for point in points(carrier):
-        if interpolation:
-            point.interpolation = interpolation
-    return carrier
-
-
-def points(carrier) -> list[bpy.types.Keyframe]:
-    return [point for fcurve in curves_of(carrier).values() for point in fcurve.keyframe_points]
-
-
-def set_slopes(carrier, frame: float, factor: float, sides: str = "left right") -> None:
+def set_slopes(carrier, frame: float, factor: float) -> None:
     """Make the handles of a key so many times as steep."""
-    for point in points(carrier):
+    for point in keys_of(carrier):
         if point.co.x == frame:
-            for side in sides.split():
+            for side in ("left", "right"):
                 setattr(point, f"handle_{side}_type", "FREE")
                 handle = getattr(point, f"handle_{side}")
                 handle.y = point.co.y + factor * (handle.y - point.co.y)
@@ -71,16 +47,16 @@ def speeds(obj, frame: float, step: float = 0.02) -> tuple[np.ndarray, np.ndarra
 
 @pytest.mark.parametrize(("interpolation", "easing"), in_turn(INTERPOLATIONS, ["AUTO", "EASE_IN", "EASE_IN_OUT"]))
 def test_between_two_keys_it_is_the_screw_with_its_easing(live_file, interpolation, easing):
-    obj = keyed((1.0, 25.0), interpolation=interpolation)
-    for point in points(obj):
-        point.easing = easing
+    obj = keyed(new_object(), (1.0, 25.0))
+    for point in keys_of(obj):
+        point.interpolation, point.easing = interpolation, easing
     frames = np.arange(-3.0, 30.0)
     difference = worlds(obj, "motor_spline", frames) - worlds(obj, "dq_sclerp", frames)
     assert np.abs(difference).max() < 1e-5
 
 
 def test_it_passes_keys_with_automatic_handles_at_one_speed(live_file):
-    obj = keyed((1.0, 13.0, 25.0, 41.0))
+    obj = keyed(new_object(), (1.0, 13.0, 25.0, 41.0))
     set_mode(obj, "motor_spline")
     for frame in (13.0, 25.0):
         before, after = speeds(obj, frame)
@@ -91,7 +67,7 @@ def test_it_passes_keys_with_automatic_handles_at_one_speed(live_file):
 def test_it_rests_where_all_handles_are_flat_and_hurries_where_they_are_steep(live_file):
     lengths = {}
     for factor in (0.0, 1.0, 1.5):
-        obj = keyed((1.0, 13.0, 25.0, 41.0), carrier=new_object(f"Tool {factor}"))
+        obj = keyed(new_object(f"Tool {factor}"), (1.0, 13.0, 25.0, 41.0))
         set_slopes(obj, 13.0, factor)
         set_mode(obj, "motor_spline")
         lengths[factor] = [np.linalg.norm(side) for side in speeds(obj, 13.0)]
@@ -103,8 +79,8 @@ def test_it_rests_where_all_handles_are_flat_and_hurries_where_they_are_steep(li
 def test_a_third_key_far_away_does_not_make_the_first_segment_jump(live_file, far):
     """It is bent towards what follows by no more than 4/27 of its way."""
     frames = np.arange(1.0, 26.0)
-    before = worlds(keyed((1.0, 25.0)), "motor_spline", frames)
-    after = worlds(keyed((1.0, 25.0, far), carrier=new_object("Other")), "motor_spline", frames)
+    before = worlds(keyed(new_object(), (1.0, 25.0)), "motor_spline", frames)
+    after = worlds(keyed(new_object("Other"), (1.0, 25.0, far)), "motor_spline", frames)
     assert np.abs(after - before).max() < 4.0 / 27.0 * np.linalg.norm(np.subtract(POSES[1][0], POSES[0][0]))
 
 
@@ -112,7 +88,9 @@ def test_a_third_key_far_away_does_not_make_the_first_segment_jump(live_file, fa
 def test_nothing_swings_beside_a_change_of_space(live_file, interpolation):
     """Keys on two frames, 5 m apart, as *Child Of* needs them where it is switched."""
     poses = [*POSES[:2], ((6.0, 0.4, -0.3), POSES[1][1]), ((7.0, 0.9, 0.0), POSES[2][1])]
-    obj = keyed((1.0, 20.0, 21.0, 40.0), poses, interpolation=interpolation)
+    obj = keyed(new_object(), (1.0, 20.0, 21.0, 40.0), poses)
+    for point in keys_of(obj):
+        point.interpolation = interpolation
     frames = np.arange(1.0, 41.0)
     difference = worlds(obj, "motor_spline", frames) - worlds(obj, "dq_sclerp", frames)
     assert np.abs(difference).max() < 1e-5

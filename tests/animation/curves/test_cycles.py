@@ -57,17 +57,6 @@ def test_key_times_are_copied_into_every_cycle(mode, expected):
     assert cyclic_times(keys, keys.times, -10.0, 60.0).tolist() == expected
 
 
-def test_key_times_of_other_channels_are_copied_where_they_are_inside_of_the_cycle():
-    keys = keys_of((10, 20), (0, 1), cycles=Cycles("NONE", "REPEAT", 0, 0))
-    assert cyclic_times(keys, np.array([5.0, 12.0, 25.0]), 0.0, 35.0).tolist() == [5.0, 12.0, 22.0, 25.0, 32.0]
-
-
-def test_key_times_fold_back_onto_keys():
-    keys = keys_of((1, 6, 9), (0, 1, 3), cycles=Cycles("MIRROR", "REPEAT", 0, 0))
-    folded, _ = cycled(keys, cyclic_times(keys, keys.times, -100.0, 100.0))
-    assert set(folded.tolist()) == {1.0, 6.0, 9.0}
-
-
 def test_millions_of_short_cycles_are_refused():
     keys = keys_of((1, 1.001), (0, 1), cycles=Cycles("NONE", "REPEAT", 0, 0))
     with pytest.raises(TooManyRounds) as refused:

@@ -5,13 +5,11 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_motion.animation.curves.evaluation import evaluate
-from rigid_motion.animation.curves.keys import EASINGS
-from tests.animation.curves.examples import all_cycles, curves, evaluate_one, frames_about, joined, keys_of
+from tests.animation.curves.examples import all_cycles, curves, evaluate_one, frames_about, joined
 from tests.thoroughness import tried
 
 
@@ -48,17 +46,3 @@ def test_curves_keyed_together_have_the_values_that_each_has_alone(drawn, cycles
         expected = evaluate_one(keys, frames, unit_elastic=unit_elastic)
         size = max(np.abs(rows[..., 1]).max() for rows in (keys.points, keys.left, keys.right))
         np.testing.assert_allclose(own, expected, rtol=1e-9, atol=1e-6 * size)
-
-
-@pytest.mark.parametrize("easing", EASINGS)
-def test_the_elastic_timing_of_channels_is_their_own_or_that_of_a_curve_from_0_to_1(easing):
-    ways = (8.0, -3.0, 1.0)
-    settings = {"easing": np.full(2, easing, np.int32), "easing_settings": ((0, 0), (1.5, 1.5), (7, 7))}
-    together = [keys_of((1, 21), (0, way), "ELASTIC", **settings) for way in ways]
-    frames = np.arange(1.0, 21.5, 0.25)
-    alone = [evaluate_one(keys, frames) for keys in together]
-    np.testing.assert_array_equal(np.concatenate(evaluate(together, [frames] * 3)), alone)
-    np.testing.assert_array_equal(evaluate([joined(together)], [frames])[0], alone)
-    unit = np.concatenate(evaluate(together, [frames] * 3, unit_elastic=True))
-    np.testing.assert_allclose(unit, np.multiply.outer(ways, alone[2]), rtol=0.0, atol=1e-12)
-    assert not np.allclose(unit[:2], alone[:2])

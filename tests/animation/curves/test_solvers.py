@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigid_motion.animation.curves.solvers import bezier_cubics, solve_cubics
+from rigid_motion.animation.curves.solvers import solve_cubics
 
 T = np.linspace(0.0, 1.0, 1001)
 
@@ -22,14 +22,6 @@ def cubics_from(handles: np.ndarray) -> np.ndarray:
 
 def time_of(cubic: np.ndarray, t: np.ndarray) -> np.ndarray:
     return ((cubic[2] * t + cubic[1]) * t + cubic[0]) * t
-
-
-def de_casteljau(points: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """The Bezier curve of points (4, 2) by halving lines, shape (m, 2)."""
-    points = points[:, None, :]
-    while len(points) > 1:
-        points = points[:-1] + (points[1:] - points[:-1]) * t[:, None]
-    return points[0]
 
 
 @given(lengths, lengths)
@@ -47,22 +39,3 @@ def test_times_at_which_the_curve_is_level_are_solved_too(handles):
     u = np.concatenate((T, 0.5 + np.array((-1e-3, -1e-6, -1e-9, 0.0, 1e-9, 1e-6, 1e-3))))
     cubic = np.repeat(cubics_from([handles]), len(u), axis=1)
     np.testing.assert_allclose(time_of(cubic, solve_cubics(u, cubic)), u, rtol=0.0, atol=1e-9)
-
-
-def test_a_cubic_is_its_bezier_curve():
-    points = np.array(((1.0, 2.0), (3.0, 5.0), (7.0, -4.0), (9.0, 1.0)), np.float32)
-    c1, c2, c3 = bezier_cubics(*points[:, None, :])
-    result = points[0] + ((c3 * T[:, None] + c2) * T[:, None] + c1) * T[:, None]
-    np.testing.assert_allclose(result, de_casteljau(points.astype(np.float64), T), rtol=0.0, atol=1e-6)
-
-
-@pytest.mark.parametrize("reach", [5.0, 40.0])
-def test_handles_longer_than_their_segment_are_shortened_in_their_direction(reach):
-    """Then time does not run backwards."""
-    start, end = np.float32([[0.0, 0.0]]), np.float32([[4.0, 1.0]])
-    right, left = np.float32([[reach, 2.0 * reach]]), np.float32([[4.0 - reach, 1.0 - reach]])
-    cubics = bezier_cubics(start, right, left, end)
-    np.testing.assert_allclose(
-        cubics, bezier_cubics(start, np.float32([[4, 8]]), np.float32([[0, -3]]), end), atol=1e-5
-    )
-    assert np.all(np.diff(time_of(cubics[:, 0, 0], T)) >= -1e-9)

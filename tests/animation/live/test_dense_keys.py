@@ -72,20 +72,6 @@ def test_keys_that_are_not_on_the_curves_stay_as_they_are(tool):
     assert [point.co.y for point in fcurve.keyframe_points if point.co.x in (14.0, 17.0)] == [7.0, 7.0]
 
 
-def test_undo_and_redo_give_the_same_motion(tool):
-    before = shown_worlds([tool], FRAMES)[0]
-    bpy.ops.ed.undo_push(message="begin")
-    with editor("DOPESHEET_EDITOR"):
-        bpy.ops.action.bake_keys()
-    bpy.ops.ed.undo_push(message="baked")
-    bpy.context.view_layer.update()
-    bpy.ops.ed.undo()
-    assert shown_worlds([bpy.data.objects["Tool"]], FRAMES)[0] == pytest.approx(before, abs=2e-5)
-    bpy.ops.ed.redo()
-    assert len(key_frames(bpy.data.objects["Tool"])) == 40
-    assert shown_worlds([bpy.data.objects["Tool"]], FRAMES)[0] == pytest.approx(before, abs=2e-5)
-
-
 @pytest.mark.parametrize("remove", [False, True])
 def test_bake_channels_keeps_the_motion(tool, remove):
     before = shown_worlds([tool], FRAMES)[0]

@@ -8,7 +8,7 @@ import bpy
 import pytest
 
 from rigid_motion.animation.live.edited import objects_to_evaluate
-from tests.animation.scenes import new_object
+from tests.animation.scenes import linked, new_object
 from tests.blank import blank
 
 
@@ -19,12 +19,7 @@ def namesakes(tmp_path: Path) -> list[bpy.types.Object]:
     bpy.data.libraries.write(str(tmp_path / "library.blend"), {new_object("Tool")})
     blank()
     local = new_object("Tool")
-    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, expected):
-        expected.objects = ["Tool"]
-    (linked,) = expected.objects
-    bpy.context.scene.collection.objects.link(linked)
-    bpy.context.view_layer.update()
-    return [local, linked]
+    return [local, linked(tmp_path / "library.blend", "Tool")]
 
 
 @pytest.mark.parametrize("number", [0, 1])

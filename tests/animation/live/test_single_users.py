@@ -25,27 +25,17 @@ def make_single_user(obj: bpy.types.Object) -> None:
     assert obj.animation_data.action not in (shared, None)
 
 
-def copy_of(obj: bpy.types.Object) -> bpy.types.Object:
-    copy = obj.copy()
-    bpy.context.scene.collection.objects.link(copy)
-    bpy.context.view_layer.update()
-    return copy
-
-
-def raise_keys(carrier: bpy.types.Object | bpy.types.PoseBone) -> None:
-    """As a script does that edits keys where they are."""
-    for index in range(3):
-        curves_of(carrier)["location", index].keyframe_points[1].co.y += 1.5
-
-
 @pytest.mark.parametrize("to", ["this frame", "another frame"])
 def test_keys_that_a_script_sets_are_followed(live_file, to):
     obj = key(new_object("Tool"), FRAMES)
     set_mode(obj, "dq_sclerp")
-    single = copy_of(obj)
+    single = obj.copy()
+    live_file.collection.objects.link(single)
+    live_file.view_layer.update()
     live_file.scene.frame_set(BETWEEN)
     make_single_user(single)
-    raise_keys(single)
+    for index in range(3):
+        curves_of(single)["location", index].keyframe_points[1].co.y += 1.5
     live_file.view_layer.update()
     if to == "another frame":
         live_file.scene.frame_set(BETWEEN + 1)

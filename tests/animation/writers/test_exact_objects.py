@@ -9,14 +9,10 @@ import pytest
 from rigid_motion.animation import error_between_frames, refresh, set_exact, set_mode
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.rigs import ORDERS, in_turn
+from tests.animation.bones.test_between_frames import EIGHTHS, PROMISE
 from tests.animation.keyed import curves_of
 from tests.animation.oracle import Own, expected_worlds, shown_worlds
-from tests.animation.scenes import give_own_deltas, key, new_object, own_deltas, push_down
-
-PROMISE = 1e-4
-"""Metres."""
-
-EIGHTHS = np.arange(8 * 1.0, 8 * 40.0 + 1.0) / 8.0
+from tests.animation.scenes import key, new_object, push_down
 
 POINTS = np.concatenate((np.zeros((1, 3)), 0.1 * np.eye(3)))
 
@@ -53,20 +49,6 @@ def test_an_object_is_right_between_frames(live_file, mode, order, parent):
     assert any(path.startswith("delta_") for path, _ in curves_of(obj))
 
 
-@pytest.mark.parametrize("order", ["QUATERNION", "XYZ"])
-def test_delta_transforms_of_its_own_stay_the_objects(live_file, order):
-    obj = new_object("Tool", order)
-    own = give_own_deltas(obj)
-    set_mode(key(obj), "dq_sclerp")
-    set_exact(obj)
-    bpy.context.view_layer.update()
-    assert own_deltas(obj) == own
-    assert largest_error(obj, EIGHTHS, own) < PROMISE
-    set_exact(obj, False)
-    set_mode(obj, "BLENDER")
-    assert own_deltas(obj) == own
-
-
 def test_who_comes_to_share_the_action_is_exact_as_well(live_file):
     obj, other = (set_up(name) for name in ("Tool", "Other"))
     set_exact(obj)
@@ -80,21 +62,6 @@ def test_who_comes_to_share_the_action_is_exact_as_well(live_file):
     for item in (obj, other):
         assert not len(item.constraints)
         assert largest_error(item, np.arange(1.0, 41.0)) < PROMISE
-    assert refresh() == 0
-
-
-def test_an_exact_action_that_comes_to_another_object_is_as_that_has_it(live_file):
-    obj, other = (set_up(name) for name in ("Tool", "Other"))
-    set_exact(obj)
-    action, slot = obj.animation_data.action, obj.animation_data.action_slot
-    obj.animation_data.action = None
-    bpy.context.view_layer.update()
-    assert not len(obj.constraints)
-    other.animation_data.action, other.animation_data.action_slot = action, slot
-    bpy.context.view_layer.update()
-    assert largest_error(other, np.arange(1.0, 41.0)) < PROMISE
-    assert not len(other.constraints)
-    assert len(action.slots) == 1
     assert refresh() == 0
 
 
@@ -125,28 +92,6 @@ def test_it_is_saved_undone_and_slowed_down(live_file, tmp_path):
     push_down(obj, scale=4.0)
     (shown,) = shown_worlds([obj], 1.0 + 4.0 * (EIGHTHS - 1.0))
     assert np.abs(shown - expected).max() < PROMISE
-    obj.parent = new_object("Parent")
-    obj.parent.location.x = 1.0
-    refresh()
-    bpy.context.view_layer.update()
-    (shown,) = shown_worlds([obj], 1.0 + 4.0 * (EIGHTHS - 1.0))
-    assert np.abs(shown[:, :3, 3] - (1.0, 0.0, 0.0) - expected[:, :3, 3]).max() < PROMISE
-
-
-@pytest.mark.parametrize(("mode", "order"), in_turn(KEYFRAME_MODES, ORDERS))
-def test_delta_transforms_hit_keys_off_whole_frames_too(live_file, mode, order):
-    frames = (1.3, 10.5, 16.4, 40.0)
-    obj = new_object("Tool", order)
-    own = give_own_deltas(obj)
-    set_mode(key(obj, frames), mode)
-    bpy.context.view_layer.update()
-    assert largest_error(obj, np.array((*frames, *range(2, 40))), own) < PROMISE
-    for fcurve in curves_of(obj).values():
-        if len(fcurve.keyframe_points) > 2:
-            fcurve.keyframe_points[2].co_ui.x = 20.7
-    bpy.context.view_layer.update()
-    assert largest_error(obj, np.array((1.3, 10.5, 20.7, 40.0)), own) < PROMISE
-    assert refresh() == 0
 
 
 def test_a_driver_of_the_rotation_may_come_and_go(live_file):

@@ -8,17 +8,14 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import refresh, set_mode
+from rigid_motion.animation import problem_of, refresh, set_mode
 from tests.animation.bones.poses import assert_posed
+from tests.animation.bones.rig_editing import channelbags
 from tests.animation.bones.rigs import moving_rig
-from tests.animation.keyed import curves_of
+from tests.animation.keyed import curves_of, snapshot
 from tests.animation.scenes import give_own_deltas, key, new_object, own_deltas
 
 PLAYED = np.arange(-3.0, 46.0)
-
-
-def channelbags(action: bpy.types.Action) -> list[bpy.types.ActionChannelbag]:
-    return list(action.layers[0].strips[0].channelbags)
 
 
 def group(action: bpy.types.Action) -> None:
@@ -73,3 +70,32 @@ def test_delta_transforms_that_the_animator_has_sampled_are_left_alone(live_file
     with pytest.raises(ValueError, match="animated already"):
         set_mode(obj, "dq_sclerp")
     assert len(curves_of(obj)["delta_location", 0].sampled_points) == 39
+
+
+def delta_keys(obj: bpy.types.Object, path: str) -> list[list[tuple[float, ...]]]:
+    return [
+        [tuple(point.co) for point in fcurve.keyframe_points]
+        for (own, _), fcurve in curves_of(obj).items()
+        if own == path and len(fcurve.keyframe_points)
+    ]
+
+
+@pytest.mark.parametrize(("path", "in_the_way"), [("delta_scale", True), ("delta_rotation_euler", False)])
+def test_delta_transforms_that_the_animator_keys_later_stay(live_file, path, in_the_way):
+    obj = key(new_object())
+    set_mode(obj, "dq_sclerp")
+    setattr(obj, path, (1.0, 2.0, 3.0))
+    for frame in (5, 20):
+        obj.keyframe_insert(path, frame=frame)
+        bpy.context.view_layer.update()
+    keyed, keys = delta_keys(obj, path), snapshot(obj)
+    assert keyed == [[(5.0, value), (20.0, value)] for value in (1.0, 2.0, 3.0)]
+    assert (f"{obj.name}: Delta Scale X is animated already" in problem_of(obj)) is in_the_way
+    refresh()
+    fcurve = curves_of(obj)["location", 0]
+    fcurve.keyframe_points[1].co_ui.y += 1.0
+    fcurve.update()
+    bpy.context.view_layer.update()
+    set_mode(obj, "BLENDER")
+    assert delta_keys(obj, path) == keyed
+    assert set(snapshot(obj)) == set(keys)
