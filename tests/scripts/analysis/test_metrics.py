@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import shell_error
-from rigid_motion_batch.analysis.choices import Uniform
+from rigid_motion_batch.analysis.choices import Radii, Uniform
 from rigid_motion_batch.analysis.metrics import table_names, write_tables
 from rigid_motion_batch.analysis.modes import BEST_OF
-from rigid_motion_batch.analysis.radii import Radii
 from rigid_motion_batch.analysis.reconstructions import reconstruct as choose
 from rigid_motion_batch.analysis.results import clip_result, measured
 from rigid_motion_batch.places import ASSETS

@@ -10,8 +10,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from rigid_motion_batch.analysis.choices import Uniform
-from rigid_motion_batch.analysis.radii import Radii
+from rigid_motion_batch.analysis.choices import Radii, Uniform
 from rigid_motion_batch.analysis.results import clip_result
 from rigid_motion_batch.recordings.clips import Clip
 from tests.blank import blank
