@@ -26,11 +26,8 @@ from .bodies import (
     blended,
     channels_at_ends,
     differ,
-    each,
     filled_height,
-    height,
     progress_weights,
-    sampled,
     take_off,
     turn_into_quaternions,
     undo_blending,
@@ -39,7 +36,7 @@ from .breakdowns import Passages
 from .components import LOCATION, MODE_NAMES, MODE_NUMBERS, REST, ROTATION, ROWS, SCALE, SMOOTH
 from .ends import MEASURED, Ends, corrected, measured_in, packed
 from .samples import Samples, kept_rows, largest_errors, range_of_each
-from .sources import Source
+from .sources import Source, each, height, sampled
 
 AT_ONCE = 131072
 """Samples that are prepared for at once."""

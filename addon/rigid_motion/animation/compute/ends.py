@@ -26,9 +26,9 @@ from ...motion import KEYFRAME_MODES, Poses, prepare, twists
 from ...motion.curves import twist_shares
 from ...motion.poses import beyond
 from ...motion.segments import prepare_within
-from .bodies import body_poses, each, height, idle_progress, location_axes, sampled
+from .bodies import body_poses, idle_progress, location_axes
 from .breakdowns import moved_by
-from .sources import Source
+from .sources import Source, each, height, sampled
 from .turning import Turning, needs_turning, turning_of, without_spins
 
 STEP = 1.0 / 8.0
