@@ -70,7 +70,6 @@ class BoneTransform(Transform):
         "POSE_OT_rigify_",
         "RIGID_MOTION_OT_switch_parent",
     )
-    matrix_lacks_difference = False
 
     def __init__(self, bone: bpy.types.PoseBone) -> None:
         self.animated, self.carrier, self.prefix = bone.id_data, bone, prefix_of(bone.name)
@@ -162,7 +161,6 @@ class ObjectTransform(Transform):
     )
     placed_by = ("TRANSFORM_OT_", "VIEW3D_OT_snap_", "OBJECT_OT_align")
     stored_by = ()
-    matrix_lacks_difference = True
 
     def __init__(self, obj: bpy.types.Object) -> None:
         self.animated = self.carrier = obj
@@ -264,7 +262,6 @@ class ExactObjectTransform(ObjectTransform):
     """
 
     has_difference_slot = True
-    matrix_lacks_difference = False
 
     def differences_for(self, rotation: str) -> dict[int, Channel]:
         return channels_under("", rotation)

@@ -16,7 +16,6 @@ from mathutils import Quaternion
 from ..actions.records import record_constraint, recorded_digest, remove_records
 from ..actions.slots import Binding, Curves, Slot, bindings_for, bindings_of, is_time, slot_with, slots_alone
 from ..compute.components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
-from ..compute.sources import Source
 from ..transforms import (
     CONSTRAINT,
     WIDTHS,
@@ -39,19 +38,14 @@ from .bone_constraints import (
     slot_of_differences,
 )
 from .sampled import Layout, Pieces, remove_if_empty, replace_samples
-from .times import held_by, is_line, most_samples, name_of, new_line, remove_time, says, time_of, write_line, write_time
-from .writer import Writer
+from .times import held_by, is_line, name_of, new_line, remove_time, says, time_of, write_line, write_time
 
 AT_REST = "Rigid Motion Rest"
 """The group of what a slot of differences holds of objects that has no samples."""
 
 
-class ConstraintWriter(Writer):
-    def layout(self, source: Source, rate: int) -> Layout:
-        return Layout.of(source, rate, is_apart=True)
-
-    def most_samples(self, source: Source) -> int:
-        return most_samples(source)
+class ConstraintWriter:
+    """What `DeltaWriter` does, by constraints."""
 
     def write(self, binding: Binding, points: dict[Channel, np.ndarray], layout: Layout | None, pieces: Pieces) -> None:
         present = binding.filled
@@ -78,6 +72,9 @@ class ConstraintWriter(Writer):
         time = time_of(binding)
         return time is not None and says(time, layout) and all(has_constraint(user, binding) for user in binding.users)
 
+    def prepare(self, binding: Binding) -> None:
+        return
+
     def show(self, binding: Binding) -> None:
         for user in binding.users:
             if user.animated.is_editable:
@@ -86,12 +83,12 @@ class ConstraintWriter(Writer):
                 if has_stale_constraint(user, binding):
                     self.release([user])
 
-    def difference(self, binding: Binding, user: Transform, frame: float | None) -> np.ndarray:
+    def difference(self, binding: Binding, user: Transform, frame: float) -> np.ndarray:
         filled, constraint = binding.filled, constraint_of(user, binding)
         if not filled or constraint is None or not constraint.enabled:
             return _no_difference(user)
         time = constraint.eval_time
-        if frame is not None and (fcurve := time_of(binding)) is not None:
+        if (fcurve := time_of(binding)) is not None:
             time = min(max(fcurve.evaluate(frame), 0.0), 1.0)
         return _difference_at(constraint, time, filled, user)
 

@@ -35,6 +35,7 @@ from ..transforms.sizes import metres_per_channel_unit, reach_at_rest
 from .corners import corners
 from .sampled import Layout
 from .table import release, writer_of
+from .times import most_samples
 
 LARGE = 10_000
 """Bones times frames. Blender copies less in a few milliseconds, however many samples a frame there are."""
@@ -111,12 +112,11 @@ def fill_in(readings: Sequence[tuple[Binding, Source]], *, in_draft: bool = Fals
     rounds = [replace(source, seen=None) if source.repeats else source for _, source, _ in anew]
     longer, emptied = set(), []
     for (binding, source, need), samples in zip(anew, sampled(rounds, [need for *_, need in anew]), strict=True):
-        writer = writer_of(binding)
-        layout, channels = writer.layout(source, samples.rate), _channels(binding, source)
+        layout, channels = _layout(binding, source, samples.rate), _channels(binding, source)
         pieces, error = corners(source, samples, layout, need)
         error = max(samples.error, error) if math.isfinite(need.tolerance) else recorded(binding).error
         record_in_betweens(binding, source.digest, samples, samples.rate, error)
-        writer.write(
+        writer_of(binding).write(
             binding,
             {channels[row]: layout.points(points) for row, points in samples.items()},
             layout,
@@ -157,7 +157,8 @@ def _needs(readings: Sequence[tuple[Binding, Source]]) -> list[Need]:
             continue
         user = binding.users[0]
         unit, reach = metres_per_channel_unit(user), reach_at_rest(user, reaches)
-        needs.append(Need(TOLERANCE * max(1.0 / unit, reach), reach, most=writer_of(binding).most_samples(source)))
+        most = most_samples(source) if binding.kind.has_difference_slot else 1
+        needs.append(Need(TOLERANCE * max(1.0 / unit, reach), reach, most=most))
     return needs
 
 
@@ -179,7 +180,7 @@ def _edit_of(binding: Binding, source: Source, need: Need) -> _Edit | None:
     old, rate = cached_source(recorded_digest(binding)), recorded(binding).rate
     if old is None or old is source or rate > need.most or old.sample_range(rate) != source.sample_range(rate):
         return None
-    frames, layout = changed_range(old, source), writer_of(binding).layout(source, rate)
+    frames, layout = changed_range(old, source), _layout(binding, source, rate)
     if frames is None or layout.is_ring or not is_complete(binding, source, layout):
         return None
     # On a whole frame around it, keys off whole frames leave no sample.
@@ -248,14 +249,19 @@ def _continue(values: np.ndarray, before: np.ndarray, rows: Sequence[int], sourc
 
 def is_complete(binding: Binding, source: Source, layout: Layout | None = None) -> bool:
     """Return whether all F-curves are as they were written for a source, whose samples lie so."""
-    writer, channels, curves = writer_of(binding), _channels(binding, source), binding.filled
-    layout = layout or writer.layout(source, recorded(binding).rate)
+    channels, curves = _channels(binding, source), binding.filled
+    layout = layout or _layout(binding, source, recorded(binding).rate)
     written = [channels.get(row) for row in recorded_rows(binding)]
     return (
         all(channel in curves and layout.fits(curves[channel]) for channel in written)
         and len(curves) == len(written)
-        and writer.is_shown(binding, layout, written)
+        and writer_of(binding).is_shown(binding, layout, written)
     )
+
+
+def _layout(binding: Binding, source: Source, rate: int) -> Layout:
+    """Return how the samples of a source lie in F-curves, so many of them a frame."""
+    return Layout.of(source, rate, is_apart=binding.kind.has_difference_slot)
 
 
 def clear(bindings: Sequence[Binding]) -> None:

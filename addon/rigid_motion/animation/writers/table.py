@@ -12,7 +12,8 @@ from ..actions.slots import Binding
 from ..transforms import BoneTransform, ExactObjectTransform, ObjectTransform, Transform, visible_components
 from .constraints import ConstraintWriter
 from .deltas import DeltaWriter
-from .writer import Writer
+
+Writer = ConstraintWriter | DeltaWriter
 
 WRITERS: dict[type[Transform], Writer] = {
     BoneTransform: ConstraintWriter(),
