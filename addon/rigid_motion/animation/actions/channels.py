@@ -132,11 +132,11 @@ def empty_key_fields(count: int) -> KeyFields:
     return {name: np.zeros((count, width), kind) for name, (width, kind) in KEY_FIELDS.items()}
 
 
-def key_fields(fcurve: bpy.types.FCurve) -> KeyFields:
-    """Return all there is to the keys of an F-curve."""
-    fields = empty_key_fields(len(fcurve.keyframe_points))
+def key_fields(keys: bpy.types.bpy_prop_collection) -> KeyFields:
+    """Return all there is to the `keyframe_points` of an F-curve."""
+    fields = empty_key_fields(len(keys))
     for name, numbers in fields.items():
-        fcurve.keyframe_points.foreach_get(name, numbers.ravel())
+        keys.foreach_get(name, numbers.ravel())
     return fields
 
 
@@ -174,7 +174,7 @@ def copy_fcurve(fcurve: bpy.types.FCurve, channelbag: bpy.types.ActionChannelbag
     copy = channelbag.fcurves.new(fcurve.data_path, index=fcurve.array_index)
     if fcurve.group is not None:
         copy.group = ensure_group(channelbag, fcurve.group.name)
-    set_key_fields(copy, key_fields(fcurve))
+    set_key_fields(copy, key_fields(fcurve.keyframe_points))
     for modifier in fcurve.modifiers:
         _copy_settings(modifier, copied := copy.modifiers.new(modifier.type))
         if modifier.type == "ENVELOPE":
