@@ -233,6 +233,8 @@ class Follower:
             choose_slots(obj)
             assigned = {} if depsgraph is None else assigned_to(obj, depsgraph)
             self.left.notice_assignments(assigned)
+            if depsgraph is not None and obj.animation_data is not None and obj.animation_data.action is None:
+                self.left.keep_without_action(obj, depsgraph)
             for binding in filled_bindings(obj):
                 self.alone(writer_of(binding).prepare, binding)
                 for transform in assigned.keys() & binding.users:
