@@ -104,7 +104,14 @@ class Source:
         for rows, keys in self.channels:
             summary.update(bytes(rows))
             summary.update(keys.raw)
-        summary.update(self.settings)
+        # Where something stands that is not keyed does not change how far off its in-betweens are.
+        rest = {row: value for row, value in self.rest.items() if row >= ROWS[ROTATION].start}
+        summary.update((repr(rest).encode() if rest else b"") + self.original.tobytes())
+        if self.location_axes is not None:
+            summary.update(self.location_axes.tobytes())
+        summary.update(self.mode.raw if isinstance(self.mode, Keys) else b"%d" % self.mode)
+        if self.turns is not None:
+            summary.update(self.turns.raw + self.turns_axis.encode())
         if self.has_half_turns:
             summary.update(b"spins")
         span = self.seen if self.goes_on and not self.repeats else None
@@ -116,19 +123,6 @@ class Source:
         if self.has_modified_scale:
             summary.update(b"modified scale")
         return summary.hexdigest()
-
-    @property
-    def settings(self) -> bytes:
-        """What in-betweens depend on beside the keys of location, rotation and scale, and what is seen of them."""
-        # Where something stands that is not keyed does not change how far off its in-betweens are.
-        rest = {row: value for row, value in self.rest.items() if row >= ROWS[ROTATION].start}
-        parts = [repr(rest).encode() if rest else b"", self.original.tobytes()]
-        if self.location_axes is not None:
-            parts.append(self.location_axes.tobytes())
-        parts.append(self.mode.raw if isinstance(self.mode, Keys) else b"%d" % self.mode)
-        if self.turns is not None:
-            parts += [self.turns.raw, self.turns_axis.encode()]
-        return b"".join(parts)
 
     @property
     def difference_at_keys(self) -> np.ndarray:
