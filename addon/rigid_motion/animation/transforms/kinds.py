@@ -228,24 +228,23 @@ class ObjectTransform(Transform):
 
     def follow_original(self) -> None:
         """Show an edit of what is written down in all components that in-betweens are not in."""
-        noted = self._recorded
-        for path in {path for path, _ in noted}:
-            _set_if_other(self.carrier, path, self._noted_values(path, set(_CHANNELS) - noted))
+        self._show(set(_CHANNELS) - self._recorded)
 
     def show_original(self) -> None:
         """Set the delta transforms to what is written down, for as long as Blender leaves them so."""
-        noted = self._recorded
-        for path in {path for path, _ in noted}:
-            _set_if_other(self.carrier, path, self._noted_values(path, noted))
+        self._show(self._recorded)
 
     def restore_original(self, filled: Iterable[Channel]) -> None:
         """Give the original values back, but for these channels, which are animated still."""
         noted = self._recorded
-        gone = noted.difference(filled)
-        for path in {path for path, _ in gone}:
-            setattr(self.carrier, path, self._noted_values(path, gone))
-        if gone:
+        if gone := noted.difference(filled):
+            self._show(gone)
             self._keep(noted - gone)
+
+    def _show(self, channels: Collection[Channel]) -> None:
+        """Set these components of delta transforms of which any is written down to that."""
+        for path in {path for path, _ in self._recorded}:
+            _set_if_other(self.carrier, path, self._noted_values(path, channels))
 
     @property
     def _recorded(self) -> frozenset[Channel]:
