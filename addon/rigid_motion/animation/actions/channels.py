@@ -150,10 +150,10 @@ def set_key_fields(fcurve: bpy.types.FCurve, fields: KeyFields) -> None:
     fcurve.update()
 
 
-def key_points(fcurve: bpy.types.FCurve) -> np.ndarray:
-    """Return frame and value of the keys of an F-curve, shape (n, 2)."""
+def key_points(fcurve: bpy.types.FCurve, name: str = "co") -> np.ndarray:
+    """Return frame and value of the keys of an F-curve, or of their handles on one side, shape (n, 2)."""
     points = np.empty((len(fcurve.keyframe_points), 2), np.float32)
-    fcurve.keyframe_points.foreach_get("co", points.ravel())
+    fcurve.keyframe_points.foreach_get(name, points.ravel())
     return points
 
 

@@ -126,7 +126,7 @@ class Binding:
 
     @property
     def kind(self) -> type[Transform]:
-        return self.users[0].kind
+        return type(self.users[0])
 
     @property
     def name(self) -> str:

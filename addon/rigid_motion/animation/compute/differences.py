@@ -35,7 +35,7 @@ from .bodies import (
 from .breakdowns import Passages
 from .components import LOCATION, MODE_NAMES, MODE_NUMBERS, REST, ROTATION, ROWS, SCALE, SMOOTH
 from .ends import MEASURED, Ends, corrected, measured_in, packed
-from .samples import Samples, kept_rows, largest_errors, range_of_each
+from .samples import Samples, kept_rows, largest_errors
 from .sources import Source, each, height, sampled
 
 AT_ONCE = 131072
@@ -174,7 +174,7 @@ def differences(
         errors = itertools.repeat(0.0)
         if reaches is not None:
             errors = largest_errors(delta, samples, spans, [reach_of[source] for source in portion])
-        kept = kept_rows(portion, delta[:, starts], range_of_each(delta, starts))
+        kept = kept_rows(portion, delta, starts)
         points = points.view(np.float32).reshape(*rows.shape, 2)[: len(delta)]
         points[..., 0] = np.concatenate(frames)
         points[..., 1] = delta

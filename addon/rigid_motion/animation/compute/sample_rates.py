@@ -32,30 +32,18 @@ def sampled(sources: Sequence[Source], needs: Sequence[Need]) -> list[Samples]:
         return differences(sources)
     result = differences(sources, reaches=[need.reach for need in needs])
     coarser: dict[int, Samples] = {}
-    pending = [
-        number for number, (samples, need) in enumerate(zip(result, needs, strict=True)) if _is_open(samples, need)
-    ]
-    while pending:
+    while pending := [number for number, need in enumerate(needs) if _is_open(result[number], need)]:
         rates = [_next_rate(result[number], needs[number]) for number in pending]
-        reaches, open_still = [needs[number].reach for number in pending], []
+        reaches = [needs[number].reach for number in pending]
         finer_samples = differences([sources[number] for number in pending], rates, reaches)
         for number, finer in zip(pending, finer_samples, strict=True):
-            need, before = needs[number], result[number]
-            first = coarser.get(number, before)
+            before, result[number] = result[number], finer
             if math.isinf(before.error):
                 # There were too few to tell: half as far apart, a curve is four times as near to the line.
+                first = coarser.setdefault(number, before)
                 guess = finer.error * (finer.rate / first.rate) ** 2
-                if math.isinf(guess):
-                    coarser[number], result[number] = first, finer
-                    open_still.append(number)
-                    continue
-                if guess <= need.tolerance or first.rate >= need.most:
+                if guess <= needs[number].tolerance or (math.isfinite(guess) and first.rate >= needs[number].most):
                     first.error, result[number] = guess, first
-                    continue
-            result[number] = finer
-            if _is_open(finer, need):
-                open_still.append(number)
-        pending = open_still
     return result
 
 

@@ -123,10 +123,6 @@ class Transform(ABC):
         return False
 
     @property
-    def kind(self) -> type[Transform]:
-        return type(self)
-
-    @property
     def motion(self) -> bpy.types.PropertyGroup:
         """The properties that this extension keeps on it."""
         return self.carrier.rigid_motion
