@@ -11,7 +11,7 @@ import numpy as np
 from ..actions.records import recorded_digest
 from ..actions.slots import Binding, Slot, bindings_of, is_filled_in, strips_of, with_inner_strips
 from ..compute.components import PART_OF
-from ..transforms import GROUP, ORIGINALS, Channel, ObjectTransform, Transform, default_of
+from ..transforms import ORIGINALS, Channel, ObjectTransform, Transform, default_of
 from .sampled import Layout, Pieces, hold_constants, replace_samples
 
 
@@ -26,11 +26,10 @@ class DeltaWriter:
         """
         for user in binding.users:
             user.note_original(points)
-        curves, gone = replace_samples(binding.channelbag, GROUP, binding.filled, points, layout, pieces)
+        gone = replace_samples(binding, points, layout, pieces)
         for channel in gone:
             binding.curves.pop(channel, None)
-        binding.curves.update(curves)
-        binding.has_filled(curves)
+        binding.curves.update(binding.filled)
         if gone and points:
             self.release(binding.users)
 
@@ -100,7 +99,7 @@ class DeltaWriter:
         held, before = _held(binding, beside), binding.filled
         for user in binding.users:
             user.note_original(held)
-        is_new = hold_constants(binding, GROUP, before, held)
+        is_new = hold_constants(binding, held)
         if is_new and before.keys() - held.keys():
             self.release(binding.users)
         return is_new
