@@ -34,7 +34,7 @@ from .table import release, writer_of
 from .times import most_samples
 
 LARGE = 2_000
-"""Bones times frames. Blender copies less in a few milliseconds, however many samples a frame there are."""
+"""Bones times frames. Less is computed and copied in a few milliseconds, however many samples a frame there are."""
 
 TOLERANCE = 0.00005
 """The largest error of a body between frames, in metres, within a metre of its origin; and what reaches farther, by
