@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import bpy
 import numpy as np
@@ -232,12 +233,20 @@ class _Rig:
         radii: np.ndarray,
         weights: np.ndarray,
         fixed: list[bool],
-        **wishes: object,
+        **wishes: Any,
     ) -> list[np.ndarray]:
         """Return the moments of the keys of each joint that are found."""
         samples = np.flatnonzero(self.sampled)
-        some = {"radius": radii, "weights": weights[:, samples], "fixed": fixed}
-        keys = reduce_skeleton_keys(self.frames[samples], poses[:, samples], parents, mode, **some, **wishes)
+        keys = reduce_skeleton_keys(
+            self.frames[samples],
+            poses[:, samples],
+            parents,
+            mode,
+            radius=radii,
+            weights=weights[:, samples],
+            fixed=fixed,
+            **wishes,
+        )
         return [samples[rows] for rows in keys]
 
     def _fixed(self) -> list[bool]:
