@@ -44,10 +44,10 @@ def _bezier(points: np.ndarray, t: np.ndarray) -> np.ndarray:
     ],
 )
 def test_one_segment_is_recovered(handles):
-    values = values_of(np.array(handles), TIMES)
-    result = fit_together(TIMES, values, np.array((1.0,)), np.array(((0.2, 0.5),)))[0]
+    handles = np.array(handles)
+    result = fit_together(TIMES, values_of(handles, TIMES), np.array((1.0,)), handles[None, :, 0])[0]
     often = np.linspace(0.0, 1.0, 333)
-    assert np.abs(values_of(result, often) - values_of(np.array(handles), often)).max() < 1e-4
+    assert np.abs(values_of(result, often) - values_of(handles, often)).max() < 1e-4
     assert np.all((result[:, 0] >= 0.0) & (result[:, 0] <= 1.0))
 
 
@@ -63,3 +63,11 @@ def test_what_no_single_segment_is_can_be_the_mean_of_several():
         mean = sum(share * values_of(each, TIMES) for share, each in zip(new, result, strict=True))
         errors.append(np.abs(mean - values).max())
     assert max(errors) < 2e-4
+
+
+def test_what_is_a_cubic_in_time_on_top_of_a_segment_is_the_mean_of_one_and_the_other():
+    segment, in_time = np.array(((0.39, 0.2), (0.61, 0.7))), np.array(((1 / 3, 0.5), (2 / 3, 1.1)))
+    values = 0.5 * (values_of(segment, TIMES) + values_of(in_time, TIMES))
+    result = fit_together(TIMES, values, np.array((0.6, 0.4)), np.array((segment[:, 0],) * 2))
+    mean = 0.6 * values_of(result[0], TIMES) + 0.4 * values_of(result[1], TIMES)
+    assert np.abs(mean - values).max() < 1e-4

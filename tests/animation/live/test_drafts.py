@@ -105,17 +105,28 @@ def test_a_render_is_exact(rig):
     assert is_exact_by_itself(rig)
 
 
-def test_strips_are_exact(rig):
+BETWEEN = {"scale": 2.0}, {"frame_start_ui": 1.5}, {"use_reverse": True}, {"repeat": 1.5}, {"use_animated_time": True}
+
+
+@pytest.mark.parametrize("settings", BETWEEN, ids=lambda settings: next(iter(settings)))
+def test_strips_that_show_what_is_between_frames_are_exact(rig, settings):
     edit(rig)
     action = rig.animation_data.action
-    push_down(rig)
+    strip = push_down(rig)
+    edit_in(action)
+    assert action.rigid_motion.is_draft
+    for name, value in settings.items():
+        setattr(strip, name, value)
     bpy.context.view_layer.update()
-    assert not action.rigid_motion.is_draft
-    assert max(rates_in(action)) > 1
+    for _ in range(2):
+        assert not action.rigid_motion.is_draft
+        assert max(rates_in(action)) > 1
+        edit_in(action)
+
+
+def edit_in(action: bpy.types.Action) -> None:
     action.layers[0].strips[0].channelbags[0].fcurves[0].keyframe_points[1].co_ui.y += 0.2
     bpy.context.view_layer.update()
-    assert not action.rigid_motion.is_draft
-    assert max(rates_in(action)) > 1
 
 
 def test_nothing_is_left_in_draft_where_edits_are_not_followed(rig):

@@ -46,6 +46,7 @@ ENDS: dict[str, Callable[[bpy.types.Object], None]] = {
     "keyframes cleared": clear_keyframes,
     "channels deleted": delete_channels,
     "slot unlinked": lambda obj: setattr(obj.animation_data, "action_slot", None),
+    "Action deleted": lambda obj: bpy.data.actions.remove(obj.animation_data.action),
     "slot deleted": lambda obj: obj.animation_data.action.slots.remove(obj.animation_data.action_slot),
 }
 

@@ -132,11 +132,11 @@ def empty_key_fields(count: int) -> KeyFields:
     return {name: np.zeros((count, width), kind) for name, (width, kind) in KEY_FIELDS.items()}
 
 
-def key_fields(fcurve: bpy.types.FCurve) -> KeyFields:
-    """Return all there is to the keys of an F-curve."""
-    fields = empty_key_fields(len(fcurve.keyframe_points))
+def key_fields(keys: bpy.types.bpy_prop_collection) -> KeyFields:
+    """Return all there is to the `keyframe_points` of an F-curve."""
+    fields = empty_key_fields(len(keys))
     for name, numbers in fields.items():
-        fcurve.keyframe_points.foreach_get(name, numbers.ravel())
+        keys.foreach_get(name, numbers.ravel())
     return fields
 
 
@@ -150,10 +150,10 @@ def set_key_fields(fcurve: bpy.types.FCurve, fields: KeyFields) -> None:
     fcurve.update()
 
 
-def key_points(fcurve: bpy.types.FCurve) -> np.ndarray:
-    """Return frame and value of the keys of an F-curve, shape (n, 2)."""
+def key_points(fcurve: bpy.types.FCurve, name: str = "co") -> np.ndarray:
+    """Return frame and value of the keys of an F-curve, or of their handles on one side, shape (n, 2)."""
     points = np.empty((len(fcurve.keyframe_points), 2), np.float32)
-    fcurve.keyframe_points.foreach_get("co", points.ravel())
+    fcurve.keyframe_points.foreach_get(name, points.ravel())
     return points
 
 
@@ -174,7 +174,7 @@ def copy_fcurve(fcurve: bpy.types.FCurve, channelbag: bpy.types.ActionChannelbag
     copy = channelbag.fcurves.new(fcurve.data_path, index=fcurve.array_index)
     if fcurve.group is not None:
         copy.group = ensure_group(channelbag, fcurve.group.name)
-    set_key_fields(copy, key_fields(fcurve))
+    set_key_fields(copy, key_fields(fcurve.keyframe_points))
     for modifier in fcurve.modifiers:
         _copy_settings(modifier, copied := copy.modifiers.new(modifier.type))
         if modifier.type == "ENVELOPE":

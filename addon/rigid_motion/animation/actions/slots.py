@@ -60,6 +60,19 @@ class Slot:
         return any(len(user.animation_data.nla_tracks) > 0 for user in self.users)
 
     @property
+    def is_seen_between(self) -> bool:
+        """Return whether strips may show what is between the frames of its Action on whole frames of a scene."""
+        return any(
+            (strip.scale, strip.repeat) != (1.0, 1.0)
+            or strip.use_reverse
+            or strip.use_animated_time
+            or not (strip.frame_start - strip.action_frame_start).is_integer()
+            for user in self.users
+            for strip in strips_of(user)
+            if strip.action == self.action
+        )
+
+    @property
     def channelbag(self) -> bpy.types.ActionChannelbag | None:
         slot = slot_with(self.action, self.handle)
         return None if slot is None else action_get_channelbag_for_slot(self.action, slot)
@@ -113,7 +126,7 @@ class Binding:
 
     @property
     def kind(self) -> type[Transform]:
-        return self.users[0].kind
+        return type(self.users[0])
 
     @property
     def name(self) -> str:

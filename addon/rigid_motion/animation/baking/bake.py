@@ -220,7 +220,7 @@ def _bake_place(transform: Transform, binding: Binding, source: Source, frames: 
 
 def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarray, interpolation: str) -> None:
     """Put keys on these frames, all of this interpolation, and leave what is before and behind as it is."""
-    old = key_fields(fcurve)
+    old = key_fields(fcurve.keyframe_points)
     at = old["co"][:, 0]
     before, behind = at < frames[0] - SAME_FRAME, at > frames[-1] + SAME_FRAME
     new = empty_key_fields(len(frames))

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import bpy
 import numpy as np
@@ -206,7 +207,7 @@ class _Rig:
 
     def find_key_poses(self, mode: str, count: int, of_rig: Source | None) -> None:
         """Find the best moments for so many key poses of all bones, and of the rig itself where it has keys."""
-        samples, fixed = np.flatnonzero(self.sampled), self._fixed()
+        fixed = self._fixed()
         poses, parents, radii, weights = self.poses, self.skeleton.parents, self.motion.radii, self.weights
         if of_rig is not None:
             # The bones hang on the rig as on one joint more, which counts by them alone.
@@ -218,52 +219,55 @@ class _Rig:
                 None if poses.scales is None else np.concatenate((np.ones((1, len(self.frames))), poses.scales)),
             )
             parents = np.append(-1, np.where(parents < 0, 0, parents + 1))
-            radii, weights, fixed = (
-                np.append(0.0, radii),
-                np.vstack((np.zeros(len(self.frames)), weights)),
-                [False, *fixed],
-            )
+            radii, fixed = np.append(0.0, radii), [False, *fixed]
+            weights = np.vstack((np.zeros(len(self.frames)), weights))
         if not all(fixed):
-            keys = reduce_skeleton_keys(
-                self.frames[samples],
-                poses[:, samples],
-                parents,
-                mode,
-                budget=count,
-                radius=radii,
-                shared=True,
-                weights=weights[:, samples],
-                fixed=fixed,
-            )
-            self.key_poses = samples[keys[fixed.index(False)]]
+            keys = self._searched(poses, parents, mode, radii, weights, fixed, shared=True, budget=count)
+            self.key_poses = keys[fixed.index(False)]
+
+    def _searched(
+        self,
+        poses: Poses,
+        parents: np.ndarray,
+        mode: str,
+        radii: np.ndarray,
+        weights: np.ndarray,
+        fixed: list[bool],
+        **wishes: Any,
+    ) -> list[np.ndarray]:
+        """Return the moments of the keys of each joint that are found."""
+        samples = np.flatnonzero(self.sampled)
+        keys = reduce_skeleton_keys(
+            self.frames[samples],
+            poses[:, samples],
+            parents,
+            mode,
+            radius=radii,
+            weights=weights[:, samples],
+            fixed=fixed,
+            **wishes,
+        )
+        return [samples[rows] for rows in keys]
 
     def _fixed(self) -> list[bool]:
         """Return which bones keep the keys that they have."""
         return [n not in self.targets or self._keeps_all(n) for n in range(len(self.motion.bones))]
 
     def fewer_keys(self, mode: str, *, shared: bool, best_of: bool) -> dict[Transform, FewerKeys]:
-        samples, fixed = np.flatnonzero(self.sampled), self._fixed()
+        fixed = self._fixed()
         able = [number for number, stays in enumerate(fixed) if not stays]
         chosen: dict[int, np.ndarray] = {}
         if self.key_poses is not None:
             chosen = {number: self._within_its_keys(self.key_poses, number) for number in able}
         elif able:
-            keys = reduce_skeleton_keys(
-                self.frames[samples],
-                self.poses[:, samples],
-                self.skeleton.parents,
-                mode,
-                tolerance=(self.tolerance - self.largest_own) / (self.motion.unit * self.parts),
-                radius=self.motion.radii,
-                shared=shared,
-                weights=self.weights[:, samples],
-                fixed=fixed,
-            )
-            chosen = {number: self._within_its_keys(samples[keys[number]], number) for number in able}
+            tolerance = (self.tolerance - self.largest_own) / (self.motion.unit * self.parts)
+            rig = self.poses, self.skeleton.parents, mode, self.motion.radii, self.weights, fixed
+            keys = self._searched(*rig, shared=shared, tolerance=tolerance)
+            chosen = {number: self._within_its_keys(keys[number], number) for number in able}
         fewer = self._proven(chosen, mode, shared=shared)
         if not fewer:
             text = NOT_SO_MANY if self.key_poses is not None else NO_FEWER_POSES if shared else NO_FEWER
-            raise NeedsItsKeys(text, name=self.rig.name, frames=len(samples))
+            raise NeedsItsKeys(text, name=self.rig.name, frames=np.count_nonzero(self.sampled))
         if best_of:
             if self.key_poses is not None:
                 # As far off as it is by now, and no farther.

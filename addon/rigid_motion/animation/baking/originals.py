@@ -312,9 +312,10 @@ def _animators(binding: Binding) -> dict[tuple[str, int], bpy.types.FCurve]:
 
 def _summary(fcurve: bpy.types.FCurve) -> tuple:
     """Return what tells whether channels are the same."""
-    fields = [numbers.tobytes() for name, numbers in key_fields(fcurve).items() if not name.startswith("select")]
+    fields = key_fields(fcurve.keyframe_points).items()
+    numbers = [numbers.tobytes() for name, numbers in fields if not name.startswith("select")]
     modifiers = [(modifier.type, modifier.mute) for modifier in fcurve.modifiers]
-    return fields, fcurve.extrapolation, fcurve.mute, modifiers, read_cycles(fcurve.modifiers)
+    return numbers, fcurve.extrapolation, fcurve.mute, modifiers, read_cycles(fcurve.modifiers)
 
 
 def _copy_channels(source: Binding, target: Binding) -> None:

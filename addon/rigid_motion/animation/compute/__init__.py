@@ -2,7 +2,7 @@
 
 components    the rows of arrays: location, rotation, scale; and the numbers of modes
 sources       what is keyed, as arrays with a digest
-source_cache  the sources of earlier edits, and what has changed since
+source_cache  the sources of earlier edits
 bodies        the channels' own values, progress in a segment, poses of a body, and back to differences
 turning       whole turns, of Euler angles or of the channel
 samples       which differences vary from frame to frame, and how far off a motion is between samples

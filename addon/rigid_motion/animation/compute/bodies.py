@@ -11,8 +11,7 @@ strip would show with real keys. So delta transforms get those values that, blen
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from operator import itemgetter
 
@@ -24,45 +23,10 @@ from ...motion.quaternions import conjugate, multiply, normalise
 from ..curves.evaluation import evaluate
 from ..curves.keys import Keys
 from .components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
-from .sources import FULL_TURN, SAME_FRAME, Source
+from .sources import FULL_TURN, SAME_FRAME, Source, each, sampled
 
 LEAST = 1e-3
 """The influence below which nothing is to be seen of a strip, and that is not made up for."""
-
-
-def each(sources: Sequence[Source], counts: Iterator[int]) -> list[tuple[Source, slice]]:
-    """Return each source with the span of what it has this many of."""
-    bounds = [0, *itertools.accumulate(counts)]
-    return [(source, slice(*span)) for source, span in zip(sources, itertools.pairwise(bounds), strict=True)]
-
-
-def sampled(
-    samples: list[tuple[Source, slice]],
-    frames: Sequence[np.ndarray],
-    *,
-    unit_elastic: bool = False,
-    out: np.ndarray | None = None,
-) -> np.ndarray:
-    """Return the channels' own values at the frames of each source, m in all, with a row for each of the `height`."""
-    rows = np.empty((height([source for source, _ in samples]), samples[-1][1].stop)) if out is None else out
-    curves, times, out, apart = [], [], [], []
-    for (source, span), at in zip(samples, frames, strict=True):
-        _rest(rows[:, span], source)
-        for keyed_rows, keys in source.channels:
-            if at is source.key_frames and source.is_together:
-                rows[keyed_rows, span] = keys.values
-                continue
-            curves.append(keys)
-            times.append(at)
-            if keyed_rows[-1] - keyed_rows[0] < len(keyed_rows):
-                out.append(rows[keyed_rows[0] : keyed_rows[-1] + 1, span])
-            else:
-                out.append(np.empty((len(keyed_rows), len(at))))
-                apart.append((keyed_rows, span, out[-1]))
-    evaluate(curves, times, unit_elastic=unit_elastic, out=out)
-    for keyed_rows, span, values in apart:
-        rows[keyed_rows, span] = values
-    return rows
 
 
 def channels_at_ends(
@@ -85,25 +49,9 @@ def channels_at_ends(
     return start, end
 
 
-def height(sources: Sequence[Source]) -> int:
-    """Return how many of the components are needed for what the sources key."""
-    return ROWS[SCALE].stop if any(SCALE in source.keyed for source in sources) else ROWS[ROTATION].stop
-
-
 def filled_height(sources: Sequence[Source]) -> int:
     """Return how many of them for what is filled in."""
     return ROWS[SCALE].stop if sources[0].uniform_scale else ROWS[ROTATION].stop
-
-
-def _rest(rows: np.ndarray, source: Source) -> None:
-    """Fill in what a source does not key."""
-    for name, part in ROWS.items():
-        if name not in source.keyed and part.start < len(rows):
-            rows[part] = REST[part, None]
-    for row, value in source.rest.items():
-        rows[row] = value
-    if source.order is not None:
-        rows[6] = 0.0
 
 
 def _jumps(keys: Keys, times: np.ndarray) -> np.ndarray:

@@ -26,11 +26,8 @@ from .bodies import (
     blended,
     channels_at_ends,
     differ,
-    each,
     filled_height,
-    height,
     progress_weights,
-    sampled,
     take_off,
     turn_into_quaternions,
     undo_blending,
@@ -38,8 +35,8 @@ from .bodies import (
 from .breakdowns import Passages
 from .components import LOCATION, MODE_NAMES, MODE_NUMBERS, REST, ROTATION, ROWS, SCALE, SMOOTH
 from .ends import MEASURED, Ends, corrected, measured_in, packed
-from .samples import Samples, kept_rows, largest_errors, range_of_each
-from .sources import Source
+from .samples import Samples, kept_rows, largest_errors
+from .sources import Source, each, height, sampled
 
 AT_ONCE = 131072
 """Samples that are prepared for at once."""
@@ -124,7 +121,6 @@ def progress_at(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> list
 
 def differences(
     sources: Sequence[Source],
-    ranges: Sequence[tuple[int, int]] | None = None,
     rates: Sequence[int] | None = None,
     reaches: Sequence[float] | None = None,
 ) -> list[Samples]:
@@ -138,9 +134,6 @@ def differences(
     Parameters
     ----------
     sources
-    ranges : sequence of pairs, optional
-        The first and last samples of each, counted from frame 0, in place of those of the source. Then no component
-        is left out that may differ elsewhere.
     rates : sequence of int, optional
         How many samples a frame each has; one where there are none.
     reaches : sequence of float, optional
@@ -151,8 +144,6 @@ def differences(
     rate_of = dict(zip(sources, rates, strict=True))
     reach_of = dict(zip(sources, reaches or rates, strict=True))
     range_of = {source: source.sample_range(rate) for source, rate in rate_of.items()}
-    if ranges is not None:
-        range_of = dict(zip(sources, ranges, strict=True))
     for portion in _portions(sources, range_of):
         spans = [(*range_of[source], rate_of[source]) for source in portion]
         of_range = {span: np.arange(span[0], span[1] + 1.0) / span[2] for span in set(spans)}
@@ -183,9 +174,7 @@ def differences(
         errors = itertools.repeat(0.0)
         if reaches is not None:
             errors = largest_errors(delta, samples, spans, [reach_of[source] for source in portion])
-        kept = [source.filled_rows for source in portion]
-        if ranges is None:
-            kept = kept_rows(portion, delta[:, starts], range_of_each(delta, starts))
+        kept = kept_rows(portion, delta, starts)
         points = points.view(np.float32).reshape(*rows.shape, 2)[: len(delta)]
         points[..., 0] = np.concatenate(frames)
         points[..., 1] = delta

@@ -26,9 +26,9 @@ from ...motion import KEYFRAME_MODES, Poses, prepare, twists
 from ...motion.curves import twist_shares
 from ...motion.poses import beyond
 from ...motion.segments import prepare_within
-from .bodies import body_poses, each, height, idle_progress, location_axes, sampled
+from .bodies import body_poses, idle_progress, location_axes
 from .breakdowns import moved_by
-from .sources import Source
+from .sources import Source, each, height, sampled
 from .turning import Turning, needs_turning, turning_of, without_spins
 
 STEP = 1.0 / 8.0
@@ -112,11 +112,6 @@ def packed(poses: Poses) -> np.ndarray:
     return np.concatenate((poses.positions, poses.quaternions, *scales), axis=-1)
 
 
-def progress_slopes(progress: np.ndarray) -> np.ndarray:
-    """Return the slopes at both ends (2, S) from the progress at the moments `MEASURED` (S, 6), in unit time."""
-    return np.stack((progress[:, :3] @ SLOPES, (1.0 - progress[:, :2:-1]) @ SLOPES))
-
-
 def native_twists(keys: Poses, measured: Poses) -> np.ndarray:
     """Return Blender's own twists at both ends, shape (2, 6, S), in unit time.
 
@@ -143,7 +138,7 @@ def tangents_and_lacks(
     Parameters
     ----------
     slopes : array, shape (2, S)
-        Of progress, as `progress_slopes` has them.
+        Of progress, in unit time.
     native : array, shape (2, 6, S)
         As `native_twists` has them.
     screws : array, shape (2, 6, S)
@@ -257,7 +252,8 @@ class Ends:
 
     def at_keys(self, progress: np.ndarray, measured: np.ndarray, source: Source) -> tuple[np.ndarray, np.ndarray]:
         """Return `tangents_and_lacks`, from progress (S, 6) and the channels (., S, 6) at the moments `MEASURED`."""
-        first, second, slopes = self.keys[:, 0], self.keys[:, 1], progress_slopes(progress)
+        first, second = self.keys[:, 0], self.keys[:, 1]
+        slopes = np.stack((progress[:, :3] @ SLOPES, (1.0 - progress[:, :2:-1]) @ SLOPES))
         turned = second.quaternions if self.whole is None else self.whole.second
         screws = twists.between(
             first.positions, first.quaternions, second.positions, turned, shortest=self.whole is None

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
-
-from .components import ROTATION, ROWS
 from .differences import differences
-from .samples import MOST_SAMPLES, Samples, largest_errors
+from .samples import MOST_SAMPLES, Samples
 from .sources import Source
 
 
@@ -23,74 +20,31 @@ class Need(NamedTuple):
     reach: float
     """The distance that the body reaches from its origin, in the same units."""
 
-    fewest: int = 1
     most: int = MOST_SAMPLES
     """The largest number of samples a frame."""
 
 
-def sampled(
-    sources: Sequence[Source], needs: Sequence[Need], ranges: Sequence[tuple[int, int]] | None = None
-) -> list[Samples]:
+def sampled(sources: Sequence[Source], needs: Sequence[Need]) -> list[Samples]:
     """Return the differences of each source, with as few samples a frame as it needs, and the error that is left
     between them.
-
-    Parameters
-    ----------
-    sources, needs
-    ranges : sequence of pairs, optional
-        The first and last samples of each, counted from frame 0, in place of those of the source: then there are the
-        fewest a frame that may be.
     """
-    rates = [need.fewest for need in needs]
     if all(math.isinf(need.tolerance) for need in needs):
-        return differences(sources, ranges, rates)
-    result = differences(sources, ranges, rates, [need.reach for need in needs])
+        return differences(sources)
+    result = differences(sources, reaches=[need.reach for need in needs])
     coarser: dict[int, Samples] = {}
-    pending = [
-        number for number, (samples, need) in enumerate(zip(result, needs, strict=True)) if _is_open(samples, need)
-    ]
-    while pending:
+    while pending := [number for number, need in enumerate(needs) if _is_open(result[number], need)]:
         rates = [_next_rate(result[number], needs[number]) for number in pending]
-        finer_ranges = (
-            None
-            if ranges is None
-            else [
-                tuple(end * rate // needs[number].fewest for end in ranges[number])
-                for number, rate in zip(pending, rates, strict=True)
-            ]
-        )
-        reaches, open_still = [needs[number].reach for number in pending], []
-        finer_samples = differences([sources[number] for number in pending], finer_ranges, rates, reaches)
+        reaches = [needs[number].reach for number in pending]
+        finer_samples = differences([sources[number] for number in pending], rates, reaches)
         for number, finer in zip(pending, finer_samples, strict=True):
-            need, before = needs[number], result[number]
-            first = coarser.get(number, before)
+            before, result[number] = result[number], finer
             if math.isinf(before.error):
                 # There were too few to tell: half as far apart, a curve is four times as near to the line.
+                first = coarser.setdefault(number, before)
                 guess = finer.error * (finer.rate / first.rate) ** 2
-                if math.isinf(guess):
-                    coarser[number], result[number] = first, finer
-                    open_still.append(number)
-                    continue
-                if guess <= need.tolerance or first.rate >= need.most:
+                if guess <= needs[number].tolerance or (math.isfinite(guess) and first.rate >= needs[number].most):
                     first.error, result[number] = guess, first
-                    continue
-            result[number] = finer
-            if _is_open(finer, need):
-                open_still.append(number)
-        pending = open_still
     return result
-
-
-def error_of(source: Source, points: Mapping[int, np.ndarray], rate: int, reach: float) -> float:
-    """Return how far a body is off between samples, as `differences` returns them for all of a source's range."""
-    first, last = source.sample_range(rate)
-    delta = np.repeat(source.difference_at_keys[:, None], last - first + 1, axis=1)
-    if source.order is not None:
-        delta[ROWS[ROTATION]] = 0.0
-    for row, samples in points.items():
-        delta[row] = samples[1::2]
-    (error,) = largest_errors(delta, [(source, slice(0, last - first + 1))], [(first, last, rate)], [reach])
-    return float(error) if math.isfinite(error) else 0.0
 
 
 def _is_open(samples: Samples, need: Need) -> bool:

@@ -22,10 +22,10 @@ EULER = 2.0**0.5
 """By how much more than the length of three small angles a body can turn."""
 
 
-def kept_rows(sources: Sequence[Source], first: np.ndarray, ranges: np.ndarray) -> list[list[int]]:
-    """Return the rows that each source has samples of, whose first values and ranges are these, (., sources)."""
-    kept = []
-    for source, constant, varies in zip(sources, first.T, (ranges > NOTHING).T.tolist(), strict=True):
+def kept_rows(sources: Sequence[Source], delta: np.ndarray, starts: Sequence[int]) -> list[list[int]]:
+    """Return the rows that each source has samples of, from the differences (., m) and where those of each start."""
+    ranges, kept = np.maximum.reduceat(delta, starts, axis=1) - np.minimum.reduceat(delta, starts, axis=1), []
+    for source, constant, varies in zip(sources, delta[:, starts].T, (ranges > NOTHING).T.tolist(), strict=True):
         changing = {row for row in source.filled_rows if varies[row]}
         kept.append(sorted(changing | _held_rows(source, changing, constant)))
     return kept
@@ -48,11 +48,6 @@ def _held_rows(source: Source, changing: set[int], constant: np.ndarray) -> set[
             or (source.in_nla and abs(constant[row] - default[row]) > NOTHING)
         )
     }
-
-
-def range_of_each(rows: np.ndarray, starts: Sequence[int]) -> np.ndarray:
-    """Return by how much rows (r, m) vary within each of the parts that start there, shape (r, parts)."""
-    return np.maximum.reduceat(rows, starts, axis=1) - np.minimum.reduceat(rows, starts, axis=1)
 
 
 class Samples(dict[int, np.ndarray]):

@@ -7,8 +7,9 @@ of the Action; values are in the channels' own units.
 from __future__ import annotations
 
 import hashlib
+import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -103,7 +104,14 @@ class Source:
         for rows, keys in self.channels:
             summary.update(bytes(rows))
             summary.update(keys.raw)
-        summary.update(self.settings)
+        # Where something stands that is not keyed does not change how far off its in-betweens are.
+        rest = {row: value for row, value in self.rest.items() if row >= ROWS[ROTATION].start}
+        summary.update((repr(rest).encode() if rest else b"") + self.original.tobytes())
+        if self.location_axes is not None:
+            summary.update(self.location_axes.tobytes())
+        summary.update(self.mode.raw if isinstance(self.mode, Keys) else b"%d" % self.mode)
+        if self.turns is not None:
+            summary.update(self.turns.raw + self.turns_axis.encode())
         if self.has_half_turns:
             summary.update(b"spins")
         span = self.seen if self.goes_on and not self.repeats else None
@@ -115,19 +123,6 @@ class Source:
         if self.has_modified_scale:
             summary.update(b"modified scale")
         return summary.hexdigest()
-
-    @property
-    def settings(self) -> bytes:
-        """What in-betweens depend on beside the keys of location, rotation and scale, and what is seen of them."""
-        # Where something stands that is not keyed does not change how far off its in-betweens are.
-        rest = {row: value for row, value in self.rest.items() if row >= ROWS[ROTATION].start}
-        parts = [repr(rest).encode() if rest else b"", self.original.tobytes()]
-        if self.location_axes is not None:
-            parts.append(self.location_axes.tobytes())
-        parts.append(self.mode.raw if isinstance(self.mode, Keys) else b"%d" % self.mode)
-        if self.turns is not None:
-            parts += [self.turns.raw, self.turns_axis.encode()]
-        return b"".join(parts)
 
     @property
     def difference_at_keys(self) -> np.ndarray:
@@ -428,16 +423,53 @@ class Source:
         return next((keys for keys in self.curves if keys.cycles is not None), None)
 
 
+def each(sources: Sequence[Source], counts: Iterator[int]) -> list[tuple[Source, slice]]:
+    """Return each source with the span of what it has this many of."""
+    bounds = [0, *itertools.accumulate(counts)]
+    return [(source, slice(*span)) for source, span in zip(sources, itertools.pairwise(bounds), strict=True)]
+
+
+def sampled(
+    samples: list[tuple[Source, slice]],
+    frames: Sequence[np.ndarray],
+    *,
+    unit_elastic: bool = False,
+    out: np.ndarray | None = None,
+) -> np.ndarray:
+    """Return the channels' own values at the frames of each source, m in all, with a row for each of the `height`.
+
+    What a source does not key rests.
+    """
+    rows = np.empty((height([source for source, _ in samples]), samples[-1][1].stop)) if out is None else out
+    curves, times, out, apart = [], [], [], []
+    for (source, span), at in zip(samples, frames, strict=True):
+        rows[:, span] = REST[: len(rows), None]
+        for row, value in source.rest.items():
+            rows[row, span] = value
+        for keyed_rows, keys in source.channels:
+            if at is source.key_frames and source.is_together:
+                rows[keyed_rows, span] = keys.values
+                continue
+            curves.append(keys)
+            times.append(at)
+            if keyed_rows[-1] - keyed_rows[0] < len(keyed_rows):
+                out.append(rows[keyed_rows[0] : keyed_rows[-1] + 1, span])
+            else:
+                out.append(np.empty((len(keyed_rows), len(at))))
+                apart.append((keyed_rows, span, out[-1]))
+    evaluate(curves, times, unit_elastic=unit_elastic, out=out)
+    for keyed_rows, span, values in apart:
+        rows[keyed_rows, span] = values
+    return rows
+
+
+def height(sources: Sequence[Source]) -> int:
+    """Return how many of the components are needed for what the sources key."""
+    return ROWS[SCALE].stop if any(SCALE in source.keyed for source in sources) else ROWS[ROTATION].stop
+
+
 def values_of(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> list[np.ndarray]:
     """Return what the channels of each source alone have on frames of its own, shape (10, m)."""
-    curves = [keys for source in sources for keys in source.curves]
-    times = [times_of_source for source, times_of_source in zip(sources, frames, strict=True) for _ in source.channels]
-    evaluated, result = iter(evaluate(curves, times)), []
-    for source, times_of_source in zip(sources, frames, strict=True):
-        rows = np.repeat(REST[:, None], len(times_of_source), axis=1)
-        for row, value in source.rest.items():
-            rows[row] = value
-        for of_channels, _ in source.channels:
-            rows[of_channels] = next(evaluated)
-        result.append(rows)
-    return result
+    samples = each(sources, map(len, frames))
+    rows = sampled(samples, frames, out=np.empty((10, sum(map(len, frames)))))
+    return [rows[:, span] for _, span in samples]

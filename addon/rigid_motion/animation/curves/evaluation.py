@@ -6,7 +6,7 @@ Results are doubles.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,9 +16,6 @@ from .spans import Spans
 
 BLOCK = 16384
 """Frames worked on at once: few enough for the processor's caches, enough to make light of the calls to NumPy."""
-
-CHUNK = 65536
-"""Values of curves with the same timing that are worked out at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,18 +42,6 @@ class Group:
 
     offsets: np.ndarray | None
     """Values that cycles add to each curve, in the order of the result, shape (c, m). None: nothing."""
-
-    def chunks(self, size: int) -> Iterator[tuple[slice, Group]]:
-        """Yield this group with about `size` of the curves at a time, and which these are."""
-        begin = first = end = 0
-        for stop, (_, channels) in enumerate(self.members, start=1):
-            end += channels.stop - channels.start
-            if end - begin >= size or stop == len(self.members):
-                chunk = slice(begin, end)
-                offsets = None if self.offsets is None else self.offsets[chunk]
-                members = self.members[first:stop]
-                yield chunk, replace(self, members=members, curves=self.curves[chunk], offsets=offsets)
-                begin, first = end, stop
 
     def write(self, values: np.ndarray, out: Sequence[np.ndarray]) -> None:
         """Write values (c, m) of the rising frames to where they belong, see `evaluate`."""
@@ -180,16 +165,8 @@ def _evaluate_groups(groups: list[Group], spans: Spans, out: Sequence[np.ndarray
     for power in range(degree):
         np.multiply(powers[power], parameters, out=powers[power + 1])
 
-    def values_of(curves: slice) -> np.ndarray:
-        values = np.empty((len(rows[curves]), len(parameters)))
-        combine(spans.polynomials[: degree + 1, rows[curves]].transpose(1, 0, 2), powers, counts, values)
-        return values
-
-    if len(groups) == 1:
-        for chunk, group in groups[0].chunks(CHUNK // max(1, len(parameters))):
-            group.write(values_of(chunk), out)
-        return
-    begin, values = 0, values_of(slice(None))
+    values, begin = np.empty((len(rows), len(parameters))), 0
+    combine(spans.polynomials[: degree + 1, rows].transpose(1, 0, 2), powers, counts, values)
     for group in groups:
         group.write(values[:, begin : begin + len(group.frames)], out)
         begin += len(group.frames)

@@ -13,20 +13,14 @@ NEWTON_STEPS = 4
 BRACKETED_STEPS = 100
 """More than bisection alone takes to the last bit."""
 
-STARTS = ((1.0 / 3.0, 2.0 / 3.0), (0.1, 0.6), (0.4, 0.9), (0.1, 0.9), (0.7, 0.3))
-"""The places where handles are tried at first, in time; at the first of them the segment is a cubic in time."""
-
-STEPS = 40
-"""Steps of the Levenberg-Marquardt method, from each of the starts."""
+IN_TIME = (1.0 / 3.0, 2.0 / 3.0)
+"""The times of handles with which a segment is a cubic in time."""
 
 GOOD = 1e-6
 """The largest error with which nothing better is looked for: a few times the rounding of single precision."""
 
 LEAST_PULL = 1e-6
 """The least that a handle counts for, relative to the largest, to be moved for the others."""
-
-RIDGE = 1e-9
-"""Keeps steps finite where handles may be anywhere, as on a straight line."""
 
 
 def bezier_cubics(start: np.ndarray, right: np.ndarray, left: np.ndarray, end: np.ndarray) -> np.ndarray:
@@ -118,7 +112,7 @@ def _solve_bracketed(u: np.ndarray, cubics: np.ndarray) -> np.ndarray:
 def fit_together(times: np.ndarray, values: np.ndarray, shares: np.ndarray, native: np.ndarray) -> np.ndarray:
     """Return the handles of segments from (0, 0) to (1, 1) whose mean is nearest to values at times.
 
-    They have their handles in common where that is as good.
+    They keep the times of their handles. Where that is much better, every other segment is a cubic in time instead.
 
     Parameters
     ----------
@@ -127,28 +121,17 @@ def fit_together(times: np.ndarray, values: np.ndarray, shares: np.ndarray, nati
     shares : array, shape (c,)
         What each of the segments counts for in the mean.
     native : array, shape (c, 2)
-        The times of both handles in the first place.
+        The times of both handles.
 
     Returns
     -------
     array, shape (c, 2, 2)
-        Time and value of either handle of each. No handle is longer in time than the segment.
+        Time and value of either handle of each.
     """
-    best, least = cubics_in_time(times, values[None])
-    if least < GOOD:
-        return np.repeat(best, len(shares), axis=0)
-    # What is not the curve of one segment can be a mean of several, whose handles differ in time.
-    others = native.copy()
-    others[np.argsort(-shares)[1::2]] = STARTS[0]
-    together = [(np.array((start,)), np.ones(1)) for start in STARTS]
-    best, least = None, np.inf
-    for x, counts in (*together, (native, shares), (others, shares)):
-        handles, error = _improved(x, times, values, counts)
-        if error < (least if len(x) == 1 else 0.5 * least):
-            best, least = handles, error
-        if least < GOOD:
-            break
-    return best if len(best) == len(shares) else np.repeat(best, len(shares), axis=0)
+    mixed = native.copy()
+    mixed[np.argsort(-shares)[1::2]] = IN_TIME
+    (best, least), (others, error) = (_nearest(x, times, values, shares) for x in (native, mixed))
+    return others if error < 0.5 * least and least > GOOD else best
 
 
 def cubics_in_time(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -159,53 +142,19 @@ def cubics_in_time(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, n
     handles = np.stack((3.0 * times * (1.0 - times) ** 2, 3.0 * times * times * (1.0 - times)))
     desired = values - times**3
     y = desired @ np.linalg.pinv(handles)
-    result = np.stack((np.broadcast_to(STARTS[0], y.shape), y), axis=-1)
+    result = np.stack((np.broadcast_to(IN_TIME, y.shape), y), axis=-1)
     return result, np.abs(y @ handles - desired).max(axis=-1)
 
 
-def _improved(x: np.ndarray, times: np.ndarray, values: np.ndarray, shares: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return handles (c, 2, 2) and the largest error, from where the handles (c, 2) are at first in time."""
-    functions, _ = _functions(x, times)
-    y = np.stack([np.linalg.lstsq(rows[:2].T, values - rows[2], rcond=None)[0] for rows in functions])
-    damping, (off, slopes) = 1e-3, _off(x, y, times, values, shares)
-    if len(x) > 1:
-        # From where each of them would be alone, as little as can be.
-        y -= np.linalg.lstsq(slopes[y.size :].T, off, rcond=LEAST_PULL)[0].reshape(y.shape)
-        off, slopes = _off(x, y, times, values, shares)
-    for _ in range(STEPS):
-        if np.abs(off).max() < GOOD:
-            break
-        gradient, squared = slopes @ off, slopes @ slopes.T
-        step = np.linalg.solve(squared + damping * np.diag(np.diag(squared) + RIDGE), -gradient).reshape(2, *x.shape)
-        tried = np.clip(x + step[0], 0.0, 1.0), y + step[1]
-        there = _off(*tried, times, values, shares)
-        if there[0] @ there[0] < off @ off:
-            (x, y), (off, slopes), damping = tried, there, 0.2 * damping
-        elif damping > 1e8:
-            break
-        else:
-            damping *= 5.0
-    return np.stack((x, y), axis=2), float(np.abs(off).max())
-
-
-def _functions(x: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return what both handles and the end count for at times, shape (c, 3, m), and the parameters (c, m)."""
+def _nearest(x: np.ndarray, times: np.ndarray, values: np.ndarray, shares: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return the handles (c, 2, 2) at these times (c, 2), and the largest error of their mean."""
     cubics = np.stack((3.0 * x[:, 0], 3.0 * (x[:, 1] - 2.0 * x[:, 0]), 1.0 + 3.0 * (x[:, 0] - x[:, 1])))
     t = solve_cubics(np.tile(times, len(x)), cubics.repeat(len(times), axis=1)).reshape(len(x), -1)
-    return np.stack((3.0 * t * (1.0 - t) ** 2, 3.0 * t * t * (1.0 - t), t**3), axis=1), t
-
-
-def _off(
-    x: np.ndarray, y: np.ndarray, times: np.ndarray, values: np.ndarray, shares: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return how far off the mean is (m,), and how that changes with x and y, shape (4 c, m)."""
-    functions, t = _functions(x, times)
-
-    def rate(handles: np.ndarray) -> np.ndarray:
-        first, second = handles.T[..., None]
-        return 3.0 * (first * (1.0 - t) ** 2 + 2.0 * (second - first) * t * (1.0 - t) + (1.0 - second) * t * t)
-
-    slope = np.clip(rate(y) / np.maximum(rate(x), 1e-6), -1e3, 1e3)
-    off = shares @ (np.einsum("ch,chm->cm", y, functions[:, :2]) + functions[:, 2]) - values
-    pulls = shares[:, None, None] * functions[:, :2]
-    return off, np.stack((-slope[:, None] * pulls, pulls)).reshape(-1, len(times))
+    pulls = np.stack((3.0 * t * (1.0 - t) ** 2, 3.0 * t * t * (1.0 - t)), axis=1)
+    desired = values - t**3
+    # From where each of them would be alone, as little as can be.
+    y = np.stack([np.linalg.lstsq(of_one.T, rest, rcond=None)[0] for of_one, rest in zip(pulls, desired, strict=True)])
+    together = (shares[:, None, None] * pulls).reshape(-1, len(times))
+    off = shares @ desired - y.ravel() @ together
+    y += np.linalg.lstsq(together.T, off, rcond=LEAST_PULL)[0].reshape(y.shape)
+    return np.stack((x, y), axis=2), float(np.abs(shares @ desired - y.ravel() @ together).max())

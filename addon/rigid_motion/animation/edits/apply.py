@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import bpy
 
-from ..actions.reading import sources_of_users
+from ..actions.reading import leading, sources_of_users
 from ..actions.records import follow_renamed
 from ..actions.refusals import refuse_numbers
 from ..actions.slots import Binding, bindings_of
@@ -92,12 +92,12 @@ def apply_edit(
     if becomes is None:
         follower.refresh(acted)
     else:
-        read = [
-            (binding, [becomes(source) if isinstance(source, Source) else source for source in sources])
+        leaders = {
+            binding: leading(binding, [becomes(source) if isinstance(source, Source) else source for source in sources])
             for binding, sources in zip(bindings, of_users, strict=True)
             if not acted.isdisjoint(binding.users)
-        ]
-        follower.refresh_read(read)
+        }
+        follower.follower.alone(follower.follower.refresh_bindings, list(leaders), list(leaders.values()))
     return results
 
 

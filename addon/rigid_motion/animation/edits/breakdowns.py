@@ -225,7 +225,7 @@ class Breakdowns:
             (float(keys[after - 1]), float(keys[after])),
             (transform.components() if seen is None else seen) - added,
             {name: tuple(getattr(transform.carrier, name)) for name in transform.properties.values()},
-            {channel: None if fcurve is None else key_fields(fcurve) for channel, fcurve in curves.items()},
+            {channel: fcurve and key_fields(fcurve.keyframe_points) for channel, fcurve in curves.items()},
         )
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from ..actions.channels import key_points
 from ..actions.reading import added_values
 from ..actions.slots import Binding
 from ..compute.differences import in_betweens
@@ -90,24 +91,18 @@ def _set_keys(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarray, 
     The keys on the bounds keep their handles, which shape the segments outside.
     """
     keys = fcurve.keyframe_points
-
-    def read(name: str) -> np.ndarray:
-        points = np.empty((len(keys), 2), np.float32)
-        keys.foreach_get(name, points.ravel())
-        return points
-
-    ends = np.searchsorted(read("co")[:, 0], bounds - SAME_FRAME)
+    ends = np.searchsorted(key_points(fcurve)[:, 0], bounds - SAME_FRAME)
     for end, frame in zip(ends.tolist(), bounds.tolist(), strict=True):
         if end < len(keys) and abs(keys[end].co.x - frame) < SAME_FRAME:
             keys[end].handle_left_type = keys[end].handle_right_type = "FREE"
-    for frame in _without(frames, read("co")[:, 0].astype(np.float64)).tolist():
+    for frame in _without(frames, key_points(fcurve)[:, 0].astype(np.float64)).tolist():
         keys.insert(frame, fcurve.evaluate(frame), options={"FAST"})
     fcurve.update()
-    times = read("co")[:, 0]
+    times = key_points(fcurve)[:, 0]
     indices = np.clip(np.searchsorted(times, frames - SAME_FRAME), 0, len(times) - 1)
-    moved = values - read("co")[indices, 1]
+    moved = values - key_points(fcurve)[indices, 1]
     for name in ("co", "handle_left", "handle_right"):
-        points = read(name)
+        points = key_points(fcurve, name)
         points[indices, 1] += moved
         keys.foreach_set(name, points.ravel())
     fcurve.update()

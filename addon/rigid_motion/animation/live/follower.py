@@ -15,7 +15,6 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..actions.mode_property import show_pending_modes
-from ..actions.reading import leading
 from ..actions.records import forget_names
 from ..actions.slots import Binding, bindings_of, choose_slots, filled_bindings, slots_in
 from ..compute import source_cache
@@ -233,6 +232,8 @@ class Follower:
             choose_slots(obj)
             assigned = {} if depsgraph is None else assigned_to(obj, depsgraph)
             self.left.notice_assignments(assigned)
+            if depsgraph is not None and obj.animation_data is not None and obj.animation_data.action is None:
+                self.left.keep_without_action(obj, depsgraph)
             for binding in filled_bindings(obj):
                 self.alone(writer_of(binding).prepare, binding)
                 for transform in assigned.keys() & binding.users:
@@ -373,12 +374,6 @@ def refresh(targets: Targets | None = None) -> int:
         How much had to be filled in anew, counted in transforms of slots.
     """
     return follower.refresh(targets)
-
-
-def refresh_read(readings: Sequence[tuple[Binding, list[Source | Refused]]]) -> None:
-    """Bring the in-betweens of these up to date, which are read already, as each of their users has them."""
-    sources = [leading(binding, of_users) for binding, of_users in readings]
-    follower.alone(follower.refresh_bindings, [binding for binding, _ in readings], sources)
 
 
 def follow_original(transform: ObjectTransform) -> None:

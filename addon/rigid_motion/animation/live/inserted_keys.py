@@ -238,9 +238,10 @@ class InsertedKeys:
         if not changed or self._undone.get(transform.identity) == transform.components().tobytes():
             return False
         is_whole = self._is_shown_whole(transform) or operators.are_any(transform.stored_by)
-        if not is_whole and not transform.matrix_lacks_difference and operators.is_script:
+        if not is_whole and transform.has_difference_slot and operators.is_script:
             is_whole = changed > 1 or transform.is_as_seen(evaluated)
-        on_top = operators.are_any(transform.placed_by) or (transform.matrix_lacks_difference and changed > 1)
+        # From what a matrix is set to, Blender takes delta transforms off.
+        on_top = operators.are_any(transform.placed_by) or (not transform.has_difference_slot and changed > 1)
         on_top = on_top and not is_whole
         self._keep(transform, _Posed(frame, transform.components(), on_top, is_whole, is_shown=False))
         return is_whole

@@ -90,7 +90,7 @@ def refresh_bindings(
     editable = [binding for binding in bindings if binding.slot.action.is_editable]
     # Keys of what has no mode count in the frame range of an Action as well.
     limit_ranges({binding.slot.action for binding in editable} - {binding.slot.action for binding, _ in stale})
-    finish_drafts({binding.slot.action for binding in editable if binding.slot.in_nla})
+    finish_drafts({slot.action for slot in {binding.slot for binding in editable} if slot.is_seen_between})
     _hold(idle, editable)
     # A bone was renamed or deleted: then it is no edit of a single one.
     if len(editable) > 1:

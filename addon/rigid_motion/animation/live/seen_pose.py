@@ -24,7 +24,7 @@ from bpy_extras.anim_utils import bake_action_objects_iter
 
 from ..actions.slots import Binding, actions_of, bindings_for, bindings_of
 from ..compute.components import PART_OF
-from ..transforms import Refused, Transform, transform_in, transform_of
+from ..transforms import Refused, Transform, shows_differences, transform_in, transform_of
 from ..writers.table import shown_components, writer_of
 from .edited import BlockKey, key_of, objects_of
 from .snapshots import property_bits
@@ -45,6 +45,17 @@ class LeftInPlace:
         for transform, (evaluated, parts) in assigned.items():
             if transform.is_part or transform.carrier.matrix_world == evaluated.matrix_world:
                 self._set[transform] = parts
+
+    def keep_without_action(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+        """Keep an object and its bones in place whose Action was deleted: what was evaluated last has it still."""
+        before = obj.evaluated_get(depsgraph)
+        bones = zip(obj.pose.bones, before.pose.bones, strict=False) if obj.rigid_motion.has_bones else ()
+        for carrier, evaluated in ((obj, before), *bones):
+            if any(shows_differences(item) and item.action is None for item in carrier.constraints):
+                transform, seen = transform_of(carrier), transform_of(evaluated)
+                with suppress(Refused):
+                    parts = writer_of(seen).shown_parts(seen) - self._set.get(transform, set())
+                    transform.set_components(shown_components(seen), parts)
 
     def forget_assignments(self) -> None:
         """Forget the assignments: they are evaluated by now."""

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import bpy
 import numpy as np
 
-from ..actions.channels import KEY_FIELDS
+from ..actions.channels import key_fields
 from ..actions.slots import (
     Binding,
     Curves,
@@ -71,7 +71,7 @@ def read_keys(channels: Channels) -> list[bytes]:
         _Layout.size = _checked_size(channels)
     size = _Layout.size
     if not size:
-        return [_by_property(keys) for keys in channels]
+        return [b"".join(numbers.tobytes() for numbers in key_fields(keys).values()) for keys in channels]
     return [_view(keys[0].as_pointer(), size * count).tobytes() if (count := len(keys)) else b"" for keys in channels]
 
 
@@ -92,23 +92,9 @@ def _agrees(keys: bpy.types.bpy_prop_collection, size: int) -> bool:
     count, first = len(keys), keys[0].as_pointer()
     if size < 4 * NUMBERS or size % 4 or keys[count - 1].as_pointer() - first != size * (count - 1):
         return False
-    numbers = _view(first, size * count).reshape(count, size)[:, : 4 * NUMBERS].copy().view(np.int32)
-    for name, columns in POINTS.items():
-        expected = np.empty((count, 2), np.float32)
-        keys.foreach_get(name, expected.ravel())
-        if not np.array_equal(numbers[:, columns], expected.view(np.int32)):
-            return False
-    return True
-
-
-def _by_property(keys: bpy.types.bpy_prop_collection) -> bytes:
-    """Return all there is to keys, as Blender's own functions have it."""
-    result = []
-    for name, (width, kind) in KEY_FIELDS.items():
-        values = np.empty(len(keys) * width, kind)
-        keys.foreach_get(name, values)
-        result.append(values.tobytes())
-    return b"".join(result)
+    numbers = _view(first, size * count).view(np.int32).reshape(count, -1)
+    fields = key_fields(keys)
+    return all(np.array_equal(numbers[:, columns], fields[name].view(np.int32)) for name, columns in POINTS.items())
 
 
 class _Memory:

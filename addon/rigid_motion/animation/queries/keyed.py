@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 
 import bpy
@@ -13,9 +12,9 @@ from ..actions.reading import keyed_in, read
 from ..actions.records import recorded_mode
 from ..actions.refusals import refuse_numbers
 from ..actions.slots import Binding, bindings_for, bindings_of
-from ..compute.components import MODE_NAMES, UNKNOWN
+from ..compute.components import MODE_NAMES
 from ..compute.sources import SAME_FRAME, Source, distinct
-from ..transforms import WIDTHS, Refused, Transform, transform_of
+from ..transforms import WIDTHS, Channel, Refused, Transform, transform_of
 
 
 def active_binding(transform: Transform, bindings: Iterable[Binding] | None = None) -> Binding | None:
@@ -105,32 +104,25 @@ def frames_in(binding: Binding, *, selected: bool = False) -> np.ndarray:
 
 def modes_in(binding: Binding, frames: np.ndarray) -> list[int]:
     """Return the numbers of the modes at these frames; Blender's own where there is what is no mode."""
-    fcurve = binding.curves.get(binding.users[0].mode_channel)
-    if fcurve is None or fcurve.mute or not fcurve.keyframe_points:
-        modes = [recorded_mode(binding)] * len(frames)
-    else:
-        modes = [_mode_at(fcurve, frame) for frame in frames.tolist()]
-    return [mode if mode in MODE_NAMES else 0 for mode in modes]
+    values = _held_in(binding, binding.users[0].mode_channel, frames)
+    modes = [recorded_mode(binding)] * len(frames) if values is None else np.rint(values).tolist()
+    return [int(mode) if mode in MODE_NAMES else 0 for mode in modes]
 
 
 def turns_in(binding: Binding, frames: np.ndarray) -> np.ndarray:
     """Return the turns more of the segments at these frames, shape (n,)."""
-    fcurve = binding.curves.get(binding.users[0].turns_channel)
+    turns = _held_in(binding, binding.users[0].turns_channel, frames, before=0.0)
+    return np.zeros(len(frames)) if turns is None else np.nan_to_num(turns)
+
+
+def _held_in(binding: Binding, channel: Channel, frames: np.ndarray, before: float | None = None) -> np.ndarray | None:
+    """Return what the keys of a channel say of segments that begin on these frames, shape (n,).
+
+    Before its keys that is what the first one says, if nothing else is given. None where no keys have a say.
+    """
+    fcurve = binding.curves.get(channel)
     if fcurve is None or fcurve.mute or not fcurve.keyframe_points:
-        return np.zeros(len(frames))
+        return None
     times, values = key_points(fcurve).T
-    at = np.searchsorted(times, frames + 0.5 * SAME_FRAME, side="right") - 1
-    turns = np.where(at < 0, 0.0, values[np.clip(at, 0, None)])
-    return np.nan_to_num(turns)
-
-
-def _mode_at(fcurve: bpy.types.FCurve, frame: float) -> int:
-    """Return the mode of the segment that begins on this frame, `UNKNOWN` where that is not a number."""
-    moment = frame + 0.5 * SAME_FRAME
-    if any(modifier.type != "CYCLES" for modifier in fcurve.modifiers):
-        # The modes are those of the keys, whichever frames are held, and whatever is added.
-        keys = [key.co for key in fcurve.keyframe_points]
-        value = next((key.y for key in reversed(keys) if key.x <= moment), keys[0].y)
-    else:
-        value = fcurve.evaluate(moment)
-    return round(value) if math.isfinite(value) else UNKNOWN
+    at = np.searchsorted(times, frames + 0.5 * SAME_FRAME, side="right")
+    return np.insert(values, 0, values[0] if before is None else before)[at]

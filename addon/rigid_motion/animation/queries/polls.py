@@ -6,6 +6,7 @@ one by one: who needs no more than the first does not wait for the rest.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator
 
 import bpy
@@ -17,36 +18,32 @@ from ..transforms import MODE_PROPERTY, WIDTHS, Transform, split_path
 def with_modes(transforms: Iterable[Transform]) -> Iterator[Transform]:
     """Yield those for which another mode than Blender's own was chosen, in their slots or before they had any."""
     for moved, slots in _by_data_block(transforms):
-        result = {prefix for prefix, one in moved.items() if one.motion.awaited != "BLENDER"}
-        yield from (moved[prefix] for prefix in result)
-        for record in _records(slots):
-            if record.prefix in moved and record.prefix not in result and (record.digest or record.mode != "BLENDER"):
-                result.add(record.prefix)
-                yield moved[record.prefix]
-        for path, _ in _curves(slots):
-            if path.endswith(MODE_PROPERTY):
-                prefix, prop = split_path(path)
-                if prop == MODE_PROPERTY and prefix in moved and prefix not in result:
-                    result.add(prefix)
-                    yield moved[prefix]
+        waiting = (prefix for prefix, one in moved.items() if one.motion.awaited != "BLENDER")
+        recorded = (record.prefix for record in _records(slots) if record.digest or record.mode != "BLENDER")
+        # To take a path apart takes longest.
+        paths = (split_path(path) for path, _ in _curves(slots) if path.endswith(MODE_PROPERTY))
+        keyed = (prefix for prefix, prop in paths if prop == MODE_PROPERTY)
+        yield from _each_once(moved, itertools.chain(waiting, recorded, keyed))
 
 
 def with_in_betweens(transforms: Iterable[Transform]) -> Iterator[Transform]:
     """Yield those for which in-betweens were filled in."""
     for moved, slots in _by_data_block(transforms):
-        result = {record.prefix: None for record in _records(slots) if record.digest and record.prefix in moved}
-        yield from (moved[prefix] for prefix in result)
+        yield from _each_once(moved, (record.prefix for record in _records(slots) if record.digest))
 
 
 def with_more_keys_than(transforms: Iterable[Transform], count: int) -> Iterator[Transform]:
     """Yield those of which a channel of location, rotation or scale has more keys than this."""
     for moved, slots in _by_data_block(transforms):
-        result = set()
-        for path, fcurve in _curves(slots):
-            prefix, prop = split_path(path)
-            if prefix in moved and prefix not in result and prop in WIDTHS and len(fcurve.keyframe_points) > count:
-                result.add(prefix)
-                yield moved[prefix]
+        keyed = ((*split_path(path), fcurve) for path, fcurve in _curves(slots))
+        has_more = (name for name, prop, curve in keyed if prop in WIDTHS and len(curve.keyframe_points) > count)
+        yield from _each_once(moved, has_more)
+
+
+def _each_once(moved: dict[str, Transform], prefixes: Iterable[str]) -> Iterator[Transform]:
+    """Yield what these prefixes stand for, each once."""
+    left = dict(moved)
+    return (left.pop(prefix) for prefix in prefixes if prefix in left)
 
 
 def _by_data_block(transforms: Iterable[Transform]) -> Iterator[tuple[dict[str, Transform], list[Slot]]]:

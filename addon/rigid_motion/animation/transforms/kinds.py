@@ -70,7 +70,6 @@ class BoneTransform(Transform):
         "POSE_OT_rigify_",
         "RIGID_MOTION_OT_switch_parent",
     )
-    matrix_lacks_difference = False
 
     def __init__(self, bone: bpy.types.PoseBone) -> None:
         self.animated, self.carrier, self.prefix = bone.id_data, bone, prefix_of(bone.name)
@@ -162,7 +161,6 @@ class ObjectTransform(Transform):
     )
     placed_by = ("TRANSFORM_OT_", "VIEW3D_OT_snap_", "OBJECT_OT_align")
     stored_by = ()
-    matrix_lacks_difference = True
 
     def __init__(self, obj: bpy.types.Object) -> None:
         self.animated = self.carrier = obj
@@ -230,24 +228,23 @@ class ObjectTransform(Transform):
 
     def follow_original(self) -> None:
         """Show an edit of what is written down in all components that in-betweens are not in."""
-        noted = self._recorded
-        for path in {path for path, _ in noted}:
-            _set_if_other(self.carrier, path, self._noted_values(path, set(_CHANNELS) - noted))
+        self._show(set(_CHANNELS) - self._recorded)
 
     def show_original(self) -> None:
         """Set the delta transforms to what is written down, for as long as Blender leaves them so."""
-        noted = self._recorded
-        for path in {path for path, _ in noted}:
-            _set_if_other(self.carrier, path, self._noted_values(path, noted))
+        self._show(self._recorded)
 
     def restore_original(self, filled: Iterable[Channel]) -> None:
         """Give the original values back, but for these channels, which are animated still."""
         noted = self._recorded
-        gone = noted.difference(filled)
-        for path in {path for path, _ in gone}:
-            setattr(self.carrier, path, self._noted_values(path, gone))
-        if gone:
+        if gone := noted.difference(filled):
+            self._show(gone)
             self._keep(noted - gone)
+
+    def _show(self, channels: Collection[Channel]) -> None:
+        """Set these components of delta transforms of which any is written down to that."""
+        for path in {path for path, _ in self._recorded}:
+            _set_if_other(self.carrier, path, self._noted_values(path, channels))
 
     @property
     def _recorded(self) -> frozenset[Channel]:
@@ -264,7 +261,6 @@ class ExactObjectTransform(ObjectTransform):
     """
 
     has_difference_slot = True
-    matrix_lacks_difference = False
 
     def differences_for(self, rotation: str) -> dict[int, Channel]:
         return channels_under("", rotation)

@@ -88,9 +88,6 @@ class Transform(ABC):
     stored_by: ClassVar[tuple[str, ...]]
     """The beginnings of the names of operators that set its properties to a whole pose, whatever they had before."""
 
-    matrix_lacks_difference: ClassVar[bool]
-    """True if Blender takes the difference off where the properties are set from a matrix."""
-
     @classmethod
     @abstractmethod
     def difference_group(cls, prefix: str) -> str:
@@ -124,10 +121,6 @@ class Transform(ABC):
     def is_as_seen(self, _evaluated: bpy.types.Object | bpy.types.PoseBone) -> bool:
         """Return whether its properties were set to what was seen when it was evaluated, difference and all."""
         return False
-
-    @property
-    def kind(self) -> type[Transform]:
-        return type(self)
 
     @property
     def motion(self) -> bpy.types.PropertyGroup:

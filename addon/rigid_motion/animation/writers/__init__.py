@@ -2,8 +2,7 @@
 
 sampled           F-curves without keys, and how samples lie in them
 corners           keys between samples
-writer            the interface of a writer
-deltas            objects
+deltas            objects, and what every writer does
 times             which frame a constraint shows, and how much of it
 bone_constraints  constraints on bones, each of which shows a slot, and what may be amiss with them
 constraints       pose bones, and objects that are exact between frames

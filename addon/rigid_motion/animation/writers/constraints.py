@@ -16,7 +16,6 @@ from mathutils import Quaternion
 from ..actions.records import record_constraint, recorded_digest, remove_records
 from ..actions.slots import Binding, Curves, Slot, bindings_for, bindings_of, is_time, slot_with, slots_alone
 from ..compute.components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
-from ..compute.sources import Source
 from ..transforms import (
     CONSTRAINT,
     WIDTHS,
@@ -39,36 +38,30 @@ from .bone_constraints import (
     slot_of_differences,
 )
 from .sampled import Layout, Pieces, remove_if_empty, replace_samples
-from .times import held_by, is_line, most_samples, name_of, new_line, remove_time, says, time_of, write_line, write_time
-from .writer import Writer
+from .times import held_by, is_line, name_of, new_line, remove_time, says, time_of, write_line, write_time
 
 AT_REST = "Rigid Motion Rest"
 """The group of what a slot of differences holds of objects that has no samples."""
 
 
-class ConstraintWriter(Writer):
-    def layout(self, source: Source, rate: int) -> Layout:
-        return Layout.of(source, rate, is_apart=True)
-
-    def most_samples(self, source: Source) -> int:
-        return most_samples(source)
+class ConstraintWriter:
+    """What `DeltaWriter` does, by constraints."""
 
     def write(self, binding: Binding, points: dict[Channel, np.ndarray], layout: Layout | None, pieces: Pieces) -> None:
-        present = binding.filled
         if points:
             _avoid_names(binding)
-            _make_room(binding, points)
-            curves, _ = replace_samples(_channelbag(binding), binding.group, present, points, layout, pieces)
-            binding.has_filled(curves)
+            _ensure_channelbag(binding)
+            # Quaternions that get samples need the room.
+            _keep_at_rest(binding, {})
+            replace_samples(binding, points, layout, pieces)
             _keep_at_rest(binding, points)
             write_time(binding, layout)
             for user in binding.users:
                 if user.animated.is_editable and not has_constraint(user, binding):
                     ensure_constraint(user, binding)
-        elif present:
+        elif binding.filled:
             remove_time(binding)
-            replace_samples(binding.slot.bones_channelbag, binding.group, present, {}, None, {})
-            binding.has_filled({})
+            replace_samples(binding, {}, None, {})
             _keep_at_rest(binding, {})
             _remove_slot_if_empty(binding.slot)
 
@@ -78,6 +71,9 @@ class ConstraintWriter(Writer):
         time = time_of(binding)
         return time is not None and says(time, layout) and all(has_constraint(user, binding) for user in binding.users)
 
+    def prepare(self, binding: Binding) -> None:
+        return
+
     def show(self, binding: Binding) -> None:
         for user in binding.users:
             if user.animated.is_editable:
@@ -86,12 +82,12 @@ class ConstraintWriter(Writer):
                 if has_stale_constraint(user, binding):
                     self.release([user])
 
-    def difference(self, binding: Binding, user: Transform, frame: float | None) -> np.ndarray:
+    def difference(self, binding: Binding, user: Transform, frame: float) -> np.ndarray:
         filled, constraint = binding.filled, constraint_of(user, binding)
         if not filled or constraint is None or not constraint.enabled:
             return _no_difference(user)
         time = constraint.eval_time
-        if frame is not None and (fcurve := time_of(binding)) is not None:
+        if (fcurve := time_of(binding)) is not None:
             time = min(max(fcurve.evaluate(frame), 0.0), 1.0)
         return _difference_at(constraint, time, filled, user)
 
@@ -191,17 +187,15 @@ def _avoid_names(binding: Binding) -> None:
         record_constraint(binding, name)
 
 
-def _channelbag(binding: Binding) -> bpy.types.ActionChannelbag:
-    """Return where the differences of the bones of a slot are; made where there is none yet."""
-    result = binding.slot.bones_channelbag
-    if result is not None:
-        return result
-    action = binding.slot.action
-    pairs = action.rigid_motion.bone_slots
-    pair = next((pair for pair in pairs if pair.handle == binding.slot.handle), None) or pairs.add()
-    slot = slot_with(action, pair.differences) or action.slots.new("OBJECT", CONSTRAINT)
-    pair.handle, pair.differences = binding.slot.handle, slot.handle
-    return action.layers[0].strips[0].channelbag(slot, ensure=True)
+def _ensure_channelbag(binding: Binding) -> None:
+    """Make where the differences of the bones of a slot are, if there is nothing yet."""
+    if binding.slot.bones_channelbag is None:
+        action = binding.slot.action
+        pairs = action.rigid_motion.bone_slots
+        pair = next((pair for pair in pairs if pair.handle == binding.slot.handle), None) or pairs.add()
+        slot = slot_with(action, pair.differences) or action.slots.new("OBJECT", CONSTRAINT)
+        pair.handle, pair.differences = binding.slot.handle, slot.handle
+        action.layers[0].strips[0].channelbag(slot, ensure=True)
 
 
 def _remove_slot_if_empty(slot: Slot) -> None:
@@ -249,21 +243,6 @@ def _frame_of_a_key(binding: Binding) -> float:
     return min(frames, key=lambda frame: (abs(frame - round(frame)), frame), default=0.0)
 
 
-def _at_rest(channelbag: bpy.types.ActionChannelbag) -> dict[Channel, bpy.types.FCurve]:
-    """Return the F-curves that hold quaternions without samples."""
-    group = channelbag.groups.get(AT_REST)
-    return {} if group is None else {(channel.data_path, channel.array_index): channel for channel in group.channels}
-
-
-def _make_room(binding: Binding, points: Collection[Channel]) -> None:
-    """Take out what holds quaternions that get samples."""
-    if binding.kind.is_part or (channelbag := binding.slot.bones_channelbag) is None:
-        return
-    present = _at_rest(channelbag)
-    for channel in present.keys() & points:
-        channelbag.fcurves.remove(present[channel])
-
-
 def _keep_at_rest(binding: Binding, points: Collection[Channel]) -> None:
     """Hold the quaternions that a slot of differences has no samples of.
 
@@ -276,7 +255,8 @@ def _keep_at_rest(binding: Binding, points: Collection[Channel]) -> None:
         held = {("delta_rotation_quaternion", 0)}
         if all(path != "rotation_quaternion" for path, _ in points):
             held.add(("rotation_quaternion", 0))
-    present = _at_rest(channelbag)
+    group = channelbag.groups.get(AT_REST)
+    present = {(item.data_path, item.array_index): item for item in (() if group is None else group.channels)}
     for channel in present.keys() - held:
         channelbag.fcurves.remove(present[channel])
     remove_if_empty(channelbag, AT_REST)

@@ -11,39 +11,40 @@ import numpy as np
 from ..actions.records import recorded_digest
 from ..actions.slots import Binding, Slot, bindings_of, is_filled_in, strips_of, with_inner_strips
 from ..compute.components import PART_OF
-from ..compute.sources import Source
-from ..transforms import GROUP, ORIGINALS, Channel, ObjectTransform, Transform, default_of
+from ..transforms import ORIGINALS, Channel, ObjectTransform, Transform, default_of
 from .sampled import Layout, Pieces, hold_constants, replace_samples
-from .writer import Writer
 
 
-class DeltaWriter(Writer):
-    def layout(self, source: Source, rate: int) -> Layout:
-        return Layout.of(source)
-
-    def most_samples(self, source: Source) -> int:
-        return 1
+class DeltaWriter:
+    """What a writer does, here by delta transforms. It keeps nothing itself: all there is to it is in the file."""
 
     def write(self, binding: Binding, points: dict[Channel, np.ndarray], layout: Layout | None, pieces: Pieces) -> None:
+        """Replace the in-betweens of a transform by these samples and pieces.
+
+        Points are frame and value of each sample alternately. Channels that have none are taken out; without any, its
+        users are to be released.
+        """
         for user in binding.users:
             user.note_original(points)
-        curves, gone = replace_samples(binding.channelbag, GROUP, binding.filled, points, layout, pieces)
+        gone = replace_samples(binding, points, layout, pieces)
         for channel in gone:
             binding.curves.pop(channel, None)
-        binding.curves.update(curves)
-        binding.has_filled(curves)
+        binding.curves.update(binding.filled)
         if gone and points:
             self.release(binding.users)
 
     def is_shown(self, binding: Binding, layout: Layout, channels: Collection[Channel]) -> bool:
+        """Return whether what is written in these channels, lying so, is to be seen on all users."""
         return all(user.is_recorded(channels) for user in binding.users)
 
     def prepare(self, binding: Binding) -> None:
+        """Get users ready that were edited, before Blender evaluates them with what is written."""
         filled = binding.filled
         for user in binding.users:
             user.note_original(filled)
 
     def show(self, binding: Binding) -> None:
+        """Have users see what is written that came to the slot after it was."""
         filled = binding.filled
         for user in binding.users if filled else ():
             if not user.animated.is_editable:
@@ -53,8 +54,12 @@ class DeltaWriter(Writer):
             if user.is_more_noted(filled):  # An Action that it had before may have moved more of it.
                 self.release([user])
 
-    def difference(self, binding: Binding, user: Transform, frame: float | None) -> np.ndarray:
-        difference, filled = np.zeros(10), {} if frame is None else binding.filled
+    def difference(self, binding: Binding, user: Transform, frame: float) -> np.ndarray:
+        """Return what is on top of a user on a frame of the Action.
+
+        As components (10,): the rotation as the properties have it.
+        """
+        difference, filled = np.zeros(10), binding.filled
         for row, channel in user.differences.items():
             path, index = channel
             fcurve = filled.get(channel)
@@ -62,6 +67,10 @@ class DeltaWriter(Writer):
         return difference
 
     def shown_differences(self, user: Transform) -> list[tuple[np.ndarray, set[str]]]:
+        """Return what is on top of a user as it is shown now, even where nothing moves it any more, one by one.
+
+        Each as components (10,), and which of location, rotation and scale it is in.
+        """
         parts = self.shown_parts(user)
         if not parts:
             return []
@@ -71,28 +80,32 @@ class DeltaWriter(Writer):
         return [(difference, parts)]
 
     def shown_parts(self, user: Transform) -> set[str]:
+        """Return which of location, rotation and scale they are in."""
         return {PART_OF[row] for row, channel in user.differences.items() if user.is_recorded([channel])}
 
     def hide(self, binding: Binding, user: Transform) -> None:
+        """Show a user as its properties have it, until Blender evaluates its animation again."""
         user.show_original()
 
     def hold(self, binding: Binding, beside: Sequence[Binding]) -> bool:
-        """Return whether a slot without in-betweens has come to hold its users' original differences.
+        """Have a slot hold what the NLA needs of it beside others that are filled in. Whether that was new to it.
 
-        It has to while a strip plays whose Action lacks a channel that another strip's has: Blender puts that to its
-        default, or leaves what is below.
+        `beside` is what moves the same users in the NLA, the binding itself among it. Original differences are held
+        while a strip plays whose Action lacks a channel that another strip's has: Blender puts that to its default, or
+        leaves what is below.
         """
         if recorded_digest(binding):
             return False
         held, before = _held(binding, beside), binding.filled
         for user in binding.users:
             user.note_original(held)
-        is_new = hold_constants(binding, GROUP, before, held)
+        is_new = hold_constants(binding, held)
         if is_new and before.keys() - held.keys():
             self.release(binding.users)
         return is_new
 
     def release(self, transforms: Iterable[Transform]) -> None:
+        """Take off these what was put on them for slots that do not move them any more."""
         noted = [transform for transform in transforms if any(transform.motion.filled)]
         if not noted:
             return

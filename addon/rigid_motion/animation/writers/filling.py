@@ -17,34 +17,28 @@ import math
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import bpy
-import numpy as np
 
 from ..actions.reading import keyed_in
 from ..actions.records import record_in_betweens, recorded, recorded_digest, recorded_rows
 from ..actions.slots import Binding, bindings_in, handles_of_differences, is_filled_in, is_time, slots_in
-from ..compute.components import PART_OF, ROTATION
-from ..compute.sample_rates import Need, error_of, sampled
-from ..compute.samples import NOTHING, Samples
-from ..compute.source_cache import cached_source, changed_range
-from ..compute.sources import FULL_TURN, Source
+from ..compute.sample_rates import Need, sampled
+from ..compute.source_cache import cached_source
+from ..compute.sources import Source
 from ..transforms import Channel
 from ..transforms.sizes import metres_per_channel_unit, reach_at_rest
 from .corners import corners
 from .sampled import Layout
 from .table import release, writer_of
+from .times import most_samples
 
-LARGE = 10_000
-"""Bones times frames. Blender copies less in a few milliseconds, however many samples a frame there are."""
+LARGE = 2_000
+"""Bones times frames. Less is computed and copied in a few milliseconds, however many samples a frame there are."""
 
 TOLERANCE = 0.00005
 """The largest error of a body between frames, in metres, within a metre of its origin; and what reaches farther, by
 this part of its reach. It is half of what is promised, for bones hang on one another."""
-
-SAME_ROTATION = 1e-4
-"""Components of rotations that are one, in single precision, and far from those a turn or a sign apart."""
 
 
 def begin_drafts(readings: Sequence[tuple[Binding, Source]]) -> list[tuple[Binding, Source]]:
@@ -60,8 +54,7 @@ def begin_drafts(readings: Sequence[tuple[Binding, Source]]) -> list[tuple[Bindi
     for action, large in apart.items():
         longest = max(last - first for first, last in (source.frame_range for _, source in large))
         is_large = max(len(large), len(action.rigid_motion.slots)) * longest >= LARGE
-        # Strips may show what is between the frames of an Action on whole frames of the scene.
-        if not is_large or is_draft(action) or any(slot.in_nla for slot in slots_in([action])):
+        if not is_large or is_draft(action) or any(slot.is_seen_between for slot in slots_in([action])):
             continue
         action.rigid_motion.is_draft = action.rigid_motion.has_longer = True
         if any(record.rate > 1 for record in action.rigid_motion.slots):
@@ -93,30 +86,22 @@ def end_drafts(actions: Collection[bpy.types.Action], filled_in: Iterable[Bindin
 
 
 def fill_in(readings: Sequence[tuple[Binding, Source]], *, in_draft: bool = False) -> None:
-    """Compute and write the in-betweens of these; of those that are there already, what has changed.
+    """Compute and write the in-betweens of these.
 
     Large Actions may begin a draft, where `in_draft`.
     """
     if in_draft:
         readings = [*readings, *begin_drafts(readings)]
-    changed, anew = [], []
-    for (binding, source), need in zip(readings, _needs(readings), strict=True):
-        edit = _edit_of(binding, source, need)
-        if edit is None:
-            anew.append((binding, source, need))
-        else:
-            changed.append(edit)
-    anew += _fill_in_changed(changed)
+    needs = _needs(readings)
     # However far cycles are seen, one round is all that is written where it repeats.
-    rounds = [replace(source, seen=None) if source.repeats else source for _, source, _ in anew]
+    rounds = [replace(source, seen=None) if source.repeats else source for _, source in readings]
     longer, emptied = set(), []
-    for (binding, source, need), samples in zip(anew, sampled(rounds, [need for *_, need in anew]), strict=True):
-        writer = writer_of(binding)
-        layout, channels = writer.layout(source, samples.rate), _channels(binding, source)
+    for (binding, source), need, samples in zip(readings, needs, sampled(rounds, needs), strict=True):
+        layout, channels = _layout(binding, source, samples.rate), _channels(binding, source)
         pieces, error = corners(source, samples, layout, need)
         error = max(samples.error, error) if math.isfinite(need.tolerance) else recorded(binding).error
         record_in_betweens(binding, source.digest, samples, samples.rate, error)
-        writer.write(
+        writer_of(binding).write(
             binding,
             {channels[row]: layout.points(points) for row, points in samples.items()},
             layout,
@@ -157,105 +142,26 @@ def _needs(readings: Sequence[tuple[Binding, Source]]) -> list[Need]:
             continue
         user = binding.users[0]
         unit, reach = metres_per_channel_unit(user), reach_at_rest(user, reaches)
-        needs.append(Need(TOLERANCE * max(1.0 / unit, reach), reach, most=writer_of(binding).most_samples(source)))
+        most = most_samples(source) if binding.kind.has_difference_slot else 1
+        needs.append(Need(TOLERANCE * max(1.0 / unit, reach), reach, most=most))
     return needs
 
 
-class _Edit(NamedTuple):
-    """A binding in which some samples are to be filled in anew, and the rest is as it has to be."""
-
-    binding: Binding
-    source: Source
-    need: Need
-    layout: Layout
-    """The layout of the samples."""
-
-    span: tuple[int, int]
-    """The first and the last of those to be filled in."""
-
-
-def _edit_of(binding: Binding, source: Source, need: Need) -> _Edit | None:
-    """Return what has to be filled in of a binding, None where all has to be."""
-    old, rate = cached_source(recorded_digest(binding)), recorded(binding).rate
-    if old is None or old is source or rate > need.most or old.sample_range(rate) != source.sample_range(rate):
-        return None
-    frames, layout = changed_range(old, source), writer_of(binding).layout(source, rate)
-    if frames is None or layout.is_ring or not is_complete(binding, source, layout):
-        return None
-    # On a whole frame around it, keys off whole frames leave no sample.
-    first, last = (min(max(frame * rate, layout.first), layout.last) for frame in frames)
-    return _Edit(binding, source, need, layout, (first, last))
-
-
-def _fill_in_changed(edits: Sequence[_Edit]) -> list[tuple[Binding, Source, Need]]:
-    """Fill in a range of samples of each. Those for which that will not do are returned, and left as they are."""
-    others = []
-    fixed = [Need(edit.need.tolerance, edit.need.reach, edit.layout.rate, edit.layout.rate) for edit in edits]
-    result = sampled([edit.source for edit in edits], fixed, [edit.span for edit in edits])
-    for (binding, source, need, layout, (first, last)), samples in zip(edits, result, strict=True):
-        channels, rows, before = _channels(binding, source), recorded_rows(binding), recorded(binding)
-        if (samples.error > need.tolerance and before.rate < need.most) or not _are_covered(samples, rows):
-            others.append((binding, source, need))
-            continue
-        curves = [binding.filled[channels[row]] for row in rows]
-        written = np.empty((len(rows), 2 * layout.count), np.float32)
-        for fcurve, points in zip(curves, written, strict=True):
-            fcurve.sampled_points.foreach_get("co", points)
-        present = written[:, 2 * (first - layout.first) + 1 : 2 * (last - layout.first) + 2 : 2]
-        values = np.array([samples[row][1::2] for row in rows]).reshape(present.shape)
-        if not _continue(values, present, rows, source):
-            others.append((binding, source, need))
-            continue
-        present[:] = values
-        all_samples = dict(zip(rows, written, strict=True))
-        pieces, error = corners(source, all_samples, layout, need)
-        for row, fcurve, points in zip(rows, curves, written, strict=True):
-            fcurve.sampled_points.foreach_set("co", points)
-            layout.modify(fcurve, pieces.get(row, ()))
-        elsewhere = before.error
-        if math.isfinite(need.tolerance):
-            if elsewhere > need.tolerance and elsewhere > samples.error:
-                elsewhere = error_of(source, all_samples, before.rate, need.reach)
-            elsewhere = max(samples.error, error, elsewhere)
-        record_in_betweens(binding, source.digest, rows, before.rate, elsewhere)
-        _tag(binding)
-    return others
-
-
-def _are_covered(samples: Samples, rows: Sequence[int]) -> bool:
-    """Return whether there are F-curves for all components that differ here, and samples for all F-curves."""
-    others = samples.keys() - set(rows)
-    return len(others) + len(rows) == len(samples) and all(np.ptp(samples[row][1::2]) < NOTHING for row in others)
-
-
-def _continue(values: np.ndarray, before: np.ndarray, rows: Sequence[int], source: Source) -> bool:
-    """Have rotations go on from those on the first frame, in the sign and in the turn that they have; in place.
-
-    False where they do not arrive in those of the last frame, on from where all stays as it is. Both are of shape
-    (rows, m).
-    """
-    turning = [number for number, row in enumerate(rows) if PART_OF[row] == ROTATION]
-    if not turning:
-        return True
-    rotations = slice(turning[0], turning[-1] + 1)
-    new, old = values[rotations], before[rotations]
-    if source.order is None:
-        new *= -1.0 if new[:, 0] @ old[:, 0] < 0.0 else 1.0
-    else:
-        new += (FULL_TURN * np.rint((old[:, 0] - new[:, 0]) / FULL_TURN))[:, None]
-    return bool(np.abs(new[:, [0, -1]] - old[:, [0, -1]]).max() < SAME_ROTATION)
-
-
-def is_complete(binding: Binding, source: Source, layout: Layout | None = None) -> bool:
-    """Return whether all F-curves are as they were written for a source, whose samples lie so."""
-    writer, channels, curves = writer_of(binding), _channels(binding, source), binding.filled
-    layout = layout or writer.layout(source, recorded(binding).rate)
+def is_complete(binding: Binding, source: Source) -> bool:
+    """Return whether all F-curves are as they were written for a source."""
+    channels, curves = _channels(binding, source), binding.filled
+    layout = _layout(binding, source, recorded(binding).rate)
     written = [channels.get(row) for row in recorded_rows(binding)]
     return (
         all(channel in curves and layout.fits(curves[channel]) for channel in written)
         and len(curves) == len(written)
-        and writer.is_shown(binding, layout, written)
+        and writer_of(binding).is_shown(binding, layout, written)
     )
+
+
+def _layout(binding: Binding, source: Source, rate: int) -> Layout:
+    """Return how the samples of a source lie in F-curves, so many of them a frame."""
+    return Layout.of(source, rate, is_apart=binding.kind.has_difference_slot)
 
 
 def clear(bindings: Sequence[Binding]) -> None:

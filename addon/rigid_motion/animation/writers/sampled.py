@@ -232,21 +232,13 @@ def _ends(source: Source, first: float, last: float) -> tuple[float, float]:
 
 
 def replace_samples(
-    channelbag: bpy.types.ActionChannelbag,
-    group: str,
-    present: Mapping[Channel, bpy.types.FCurve],
-    points: Mapping[Channel, np.ndarray],
-    layout: Layout | None,
-    pieces: Pieces,
-) -> tuple[Curves, list[Channel]]:
-    """Have sampled F-curves of a group hold these samples, frame and value of each alternately, and no others.
+    binding: Binding, points: Mapping[Channel, np.ndarray], layout: Layout | None, pieces: Pieces
+) -> list[Channel]:
+    """Have the in-betweens of a binding be these samples, frame and value of each alternately, and no others.
 
     Parameters
     ----------
-    channelbag, group
-        Where they are, or are to be.
-    present
-        Those that there are.
+    binding
     points
         The samples of each channel.
     layout
@@ -256,12 +248,13 @@ def replace_samples(
 
     Returns
     -------
-    curves, gone
-        The F-curves by now, and the channels of those that were taken out.
+    list
+        The channels of the F-curves that were taken out.
     """
     curves: Curves = {}
+    channelbag, present = binding.home, binding.filled
     # Blender goes through all groups for a name.
-    home = ensure_group(channelbag, group) if points.keys() - present.keys() else None
+    home = ensure_group(channelbag, binding.group) if points.keys() - present.keys() else None
     for channel, samples in points.items():
         fcurve = present.get(channel)
         if fcurve is None:
@@ -275,12 +268,14 @@ def replace_samples(
     for channel in gone:
         channelbag.fcurves.remove(present[channel])
     if gone:
-        remove_if_empty(channelbag, group)
-    return curves, gone
+        remove_if_empty(channelbag, binding.group)
+    binding.has_filled(curves)
+    return gone
 
 
-def hold_constants(binding: Binding, group: str, present: Curves, held: Mapping[Channel, float]) -> bool:
-    """Have sampled F-curves of a group in a slot hold these values, and no others. Whether they did not already."""
+def hold_constants(binding: Binding, held: Mapping[Channel, float]) -> bool:
+    """Have the in-betweens of a binding hold these values, and nothing else. Whether they did not already."""
+    present = binding.filled
     values = {channel: next((point.co[1] for point in item.sampled_points), None) for channel, item in present.items()}
     if held == values:
         return False
@@ -290,11 +285,8 @@ def hold_constants(binding: Binding, group: str, present: Curves, held: Mapping[
     points = {channel: np.array((first, value, first + 1, value), dtype=np.float32) for channel, value in held.items()}
     for channel in present:
         binding.curves.pop(channel, None)
-    curves, _ = replace_samples(
-        binding.channelbag, group, present, points, Layout(first, first + 1, (first, first + 1)), {}
-    )
-    binding.curves.update(curves)
-    binding.has_filled(curves)
+    replace_samples(binding, points, Layout(first, first + 1, (first, first + 1)), {})
+    binding.curves.update(binding.filled)
     return True
 
 

@@ -12,7 +12,8 @@ from ..actions.slots import Binding
 from ..transforms import BoneTransform, ExactObjectTransform, ObjectTransform, Transform, visible_components
 from .constraints import ConstraintWriter
 from .deltas import DeltaWriter
-from .writer import Writer
+
+Writer = ConstraintWriter | DeltaWriter
 
 WRITERS: dict[type[Transform], Writer] = {
     BoneTransform: ConstraintWriter(),
@@ -24,7 +25,7 @@ WRITERS: dict[type[Transform], Writer] = {
 
 def writer_of(moved: Binding | Transform) -> Writer:
     """Return where the differences of a transform go."""
-    return WRITERS[moved.kind]
+    return WRITERS[moved.kind if isinstance(moved, Binding) else type(moved)]
 
 
 def leave_other_way(binding: Binding) -> None:
@@ -47,7 +48,7 @@ def release(transforms: Iterable[Transform]) -> None:
     """Take off these what was put on them for slots that do not move them any more."""
     by_kind: defaultdict[type[Transform], list[Transform]] = defaultdict(list)
     for transform in transforms:
-        by_kind[transform.kind].append(transform)
+        by_kind[type(transform)].append(transform)
     for kind, same in by_kind.items():
         WRITERS[kind].release(same)
 

@@ -140,7 +140,7 @@ def _read(
     else:
         parents = None
     mode, tick_step, axes_size, ghost_step, *_ = settings
-    kind = PATH_KINDS[target.kind]
+    kind = PATH_KINDS[type(target)]
     point, size = kind.point(target.carrier, source, turn), kind.axis_length(target.carrier, source)
     entry.selected = _selection(binding)
     # What is not keyed moves the path and not its in-betweens, so it is no part of their digest.
