@@ -21,7 +21,7 @@ sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")
 
 from examples import figure
 from examples.dancer import dance
-from research.making.stills import render_still
+from examples.stills import render_still
 from rigid_motion import animation
 from rigid_motion_batch.analysis.choices import EVERYWHERE, Uniform
 from rigid_motion_batch.analysis.results import ChoiceResult, compare_clip

@@ -22,7 +22,7 @@ DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
 from examples import figure
-from research.making.stills import render_still
+from examples.stills import render_still
 from rigid_motion import animation
 from rigid_motion_batch import palette
 from rigid_motion_batch.scenes import captions

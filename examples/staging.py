@@ -17,7 +17,7 @@ import numpy as np
 from mathutils import Euler, Matrix, Vector
 
 from examples import figure
-from research.making.stills import render_still
+from examples.stills import render_still
 from rigid_motion import animation
 from rigid_motion_batch import palette
 from rigid_motion_batch.scenes import captions

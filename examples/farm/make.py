@@ -17,8 +17,8 @@ ROOT = HERE.parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "addon"), str(ROOT / "scripts")]
 
 from examples import staging
+from examples.stills import render_still
 from research.making.motions import MOTIONS
-from research.making.stills import render_still
 from research.making.tracking import table, tick, track
 from rigid_motion_batch import palette
 from rigid_motion_batch.cli import job_bundle

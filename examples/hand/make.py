@@ -12,8 +12,8 @@ ROOT = HERE.parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "addon"), str(ROOT / "scripts")]
 
 from examples import staging
+from examples.stills import render_still
 from research.making.motions import MOTIONS
-from research.making.stills import render_still
 from research.making.tracking import tick, track
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.reconstructions import reconstruct
