@@ -48,9 +48,6 @@ def scenario(hand: Hand) -> Steps[None]:
     assert settings.show_ghosts
     both = yield from bluish(hand, view, "ghosts")
     assert both > 2 * path, (both, path)
-    yield from hand.picture("ghosts-and-panel")
-    bpy.context.scene.frame_set(30)
-    yield from bluish(hand, view, "ghosts-later")
     yield from hand.click(show)
     alone = yield from bluish(hand, view, "ghosts-alone")
     assert alone > path, (alone, path)

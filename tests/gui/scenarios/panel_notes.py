@@ -14,13 +14,9 @@ import numpy as np
 
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
+from tests.gui.keyed import cube
 
 SCREW = "dq_sclerp"
-
-
-def cube() -> bpy.types.Object:
-    """The default cube, asked for anew each time: undo replaces it."""
-    return bpy.data.objects["Cube"]
 
 
 def extension() -> bpy.types.Addon:
