@@ -11,7 +11,7 @@ import pytest
 from babel.messages.pofile import read_po
 
 from rigid_motion import translations
-from tests.translations.shown_texts import MARKS, marked_or_drawn, messages, parsed, sentences, sources, texts_of
+from tests.translations.shown_texts import MARKS, messages, parsed, sentences, sources, texts_of
 
 LANGUAGES = translations.languages()
 GERMAN = LANGUAGES["de"]
@@ -70,13 +70,6 @@ def test_every_translation_is_of_a_text_that_is_shown(shown, language):
     assert LANGUAGES[language].keys() - shown == set()
 
 
-def test_a_text_that_is_new_would_be_missed(shown):
-    (result,) = marked_or_drawn(ast.parse('layout.label(text="New in this version")'))
-    assert result not in GERMAN
-    (result,) = marked_or_drawn(ast.parse('raise Refused(rpt_("{name} is new").format(name=name))'))
-    assert result not in GERMAN
-
-
 def test_no_literal_goes_around_the_translation(shown):
     known = texts_of(shown) | UNSEEN
     missed = [
@@ -124,15 +117,6 @@ def test_a_translation_fits_its_text(english, translation):
     assert beginning(translation) == beginning(english)
     assert translation.count("„") == translation.count("“")
     assert "  " not in translation
-
-
-@pytest.mark.parametrize(
-    ("english", "translation"),
-    [("{count} keys", "{keys} Schlüsselbilder"), ("{frame:g}", "{frame}"), ("Bake...", "Backen"), (", keys", "Keys")],
-)
-def test_a_translation_that_does_not_fit_is_found(english, translation):
-    with pytest.raises(AssertionError):
-        test_a_translation_fits_its_text(english, translation)
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
