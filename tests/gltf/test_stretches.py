@@ -68,20 +68,6 @@ def test_all_that_moves_has_keys_where_stretches_meet_and_few_more_elsewhere(tmp
     assert result.after.keys <= 1.15 * whole.after.keys
 
 
-def test_what_hardly_moves_has_one_key_throughout(tmp_path):
-    made = walk(seconds=8.0)
-    times = np.arange(241) / 30.0
-    made.json["nodes"].append({"translation": [0.0, 0.2, 0.0]})
-    made.json["nodes"][5]["children"] = [6]
-    tremble = np.random.default_rng(3).normal(0.0, 4e-5, (241, 3))
-    made.channel(6, "translation", made.times(times), np.array([0.0, 0.2, 0.0]) + tremble)
-    path = made.write(tmp_path / "walk.glb")
-    report = reduce_file(path, tmp_path / "out.glb", Options(TOLERANCE, RADIUS))
-    after = File(tmp_path / "out.glb")
-    assert len(after.tracks(0)[6, "translation"][1]) == 1
-    assert off(File(path), after, 0, RADIUS) <= report.tolerance + SINGLE
-
-
 def standing_body(path: Path) -> tuple[Path, float, float]:
     """A body whose leg turns to and fro below its hips, which go along: its foot stands from one time to another."""
     made = Making()

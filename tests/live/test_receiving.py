@@ -29,11 +29,6 @@ SINGLE = 2e-6
 """What single precision leaves of metres."""
 
 
-@pytest.fixture
-def live(extension):
-    return extension.scene.rigid_motion_live
-
-
 @pytest.mark.parametrize(("prefix", "larger", "turned_by"), [("", 1.0, 0.0), ("mixamorig:", 1.0, 0.7), ("", 1.3, 0.2)])
 def test_a_performer_moves_the_bones_of_a_rig_of_any_size_rest_and_naming(live, sent, prefix, larger, turned_by):
     live.armature = rig = new_rig(prefix, larger, turned_by)

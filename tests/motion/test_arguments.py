@@ -108,11 +108,9 @@ def test_what_is_no_poses_is_refused_by_name(use, name, given):
         lambda times: decimate(times, 5.0).tolist(),
         lambda times: fit_keys(times, POSES, KEYS).positions.tolist(),
         lambda times: measure(times, POSES, POSES).velocity.tolist(),
-        lambda times: reduce_keys(times, POSES, tolerance=0.5).tolist(),
         lambda times: repair(times, POSES)[0].tolist(),
         lambda times: standing(times, POSES.positions[None].tolist()).tolist(),
     ],
-    ids=["by_segments", "decimate", "fit_keys", "measure", "reduce_keys", "repair", "standing"],
 )
 def test_times_may_be_a_list(use):
     assert use(TIMES.tolist()) == use(TIMES)

@@ -132,12 +132,7 @@ def test_files_are_read_as_other_programs_read_them(language):
 
 def test_lines_escapes_and_contexts_are_read_and_what_is_not_translated_is_left_out():
     po = r"""
-msgid ""
-msgstr "Language: de\n"
-
-# Said by \"hand\"
 #: panels.py:7
-#, python-brace-format
 msgctxt "Operator"
 msgid ""
 "The \"long\" text\n"
@@ -149,7 +144,6 @@ msgid "Not yet"
 msgstr ""
 
 #, fuzzy
-#| msgid "Guess"
 msgid "Guessed"
 msgstr "Geraten"
 msgid "Bake"

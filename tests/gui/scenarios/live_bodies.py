@@ -11,14 +11,10 @@ import numpy as np
 
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
-from tests.gui.places import Place
 from tests.gui.scenarios.panel_notes import extension
 from tests.live.performing import dance, frames_of_vmc, heads_of, in_world, new_rig
 
 RATE = 60
-
-ICON = 0.12
-"""Where the panel's header has its button, as a share of the sidebar's width."""
 
 TOLERANCE = 0.002
 WITHIN = 0.005
@@ -63,17 +59,6 @@ def off_by(moment: float) -> float:
     return float(np.linalg.norm(heads_of(rig()) - world, axis=1).max())
 
 
-def button(hand: Hand, view: bpy.types.Area, what: str) -> Steps[Place]:
-    """Where the button of an operator is in the header of a panel of the sidebar."""
-    part = places.region(view, "UI")
-    for y in range(part.y + part.height, part.y, -10):
-        place = part.x + int(ICON * part.width), y
-        yield from hand.hover(place)
-        if hand._under_the_mouse(view, part) == f"bpy.ops.{what}":
-            return place
-    raise LookupError(f"{what} has no button in the sidebar")
-
-
 def scenario(hand: Hand) -> Steps[None]:
     receiving = import_module(f"{extension().module}.live.receiving")
     view = hand.area("VIEW_3D")
@@ -89,7 +74,7 @@ def scenario(hand: Hand) -> Steps[None]:
     yield from hand.open_sidebar(view, "Animation")
     assert receiving.listening() is None, "nothing listens until it is asked to"
 
-    header = x, y = yield from button(hand, view, "rigid_motion.live_listen")
+    header = x, y = yield from hand.find_button(view, "UI", "rigid_motion.live_listen", narrow=True)
     yield from hand.click((x + 60, y))  # the header, to unfold the panel
     yield from hand.click(header)
     program = Program(live.port)

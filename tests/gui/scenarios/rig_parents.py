@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from mathutils import Euler
 
 from tests.animation.bones.poses import seen
 from tests.animation.keyed import key_frames
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 from tests.rigs.human import human
+from tests.rigs.poses import key_controls
 
 HAND, TORSO = "hand_ik.L", "torso"
 POSES = {HAND: ((0.3, -0.2, 0.4), (0.9, 0.7, 1.2)), TORSO: ((0.2, 0.3, 0.1), (0.2, 0.5, 1.4))}
@@ -70,14 +70,7 @@ def pose_the_human(hand: Hand, view: bpy.types.Area) -> Steps[None]:
         collection.is_visible = collection.name not in ("DEF", "MCH", "ORG")
     bpy.context.view_layer.objects.active = rig()
     rig().select_set(True)
-    for name, pose in POSES.items():
-        bone = rig().pose.bones[name]
-        bone.rotation_mode = "QUATERNION"
-        for frame, part in zip(KEYS, (0.0, 1.0), strict=True):
-            bone.location = np.multiply(pose[0], part)
-            bone.rotation_quaternion = Euler(np.multiply(pose[1], part)).to_quaternion()
-            for path in ("location", "rotation_quaternion", "scale"):
-                bone.keyframe_insert(path, frame=frame)
+    key_controls(rig(), POSES, KEYS)
     bpy.ops.ed.undo_push(message="Rig")
     yield from hand.hover(places.centre(places.region(view)))
     yield from hand.press("TAB", ctrl=True)
