@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -41,9 +43,14 @@ def test_latency_that_changes_for_good(before: float, after: float, answers: boo
     assert outcome.steps.max() < 3.0 * usual
 
 
-@pytest.mark.parametrize("step", [5.0, -5.0, -0.7])
-@pytest.mark.parametrize("whose", ["the receiver's", "the sender's", "the sender's unheard"])
-def test_a_clock_that_steps_is_no_motion(step: float, whose: str) -> None:
+@pytest.mark.parametrize(
+    ("whose", "step"),
+    [
+        *itertools.product(["the receiver's"], [5.0, -5.0]),
+        *itertools.product(["the sender's", "the sender's unheard"], [5.0, -5.0, -0.7]),
+    ],
+)
+def test_a_clock_that_steps_is_no_motion(whose: str, step: float) -> None:
     own = body()
     if whose == "the receiver's":
         outcome = run(own, *dance(own, 6.0), clock=lambda now: now + 1000.0 + step * (now > 3.0))
