@@ -190,16 +190,3 @@ def test_a_mode_that_is_said_to_be_the_same_motion_as_another_is_that(motion, na
         key_times, keys = key_times[:2], keys[:2]
     times = times_between(key_times)
     assert_close(interpolate(key_times, keys, times, name), interpolate(key_times, keys, times, other))
-
-
-def test_the_numbers_that_files_store_never_change():
-    assert {mode: MODES[mode].number for mode in MODES} == {
-        "lerp_slerp": 1,
-        "dq_sclerp": 2,
-        "pga_lerp": 3,
-        "pga_slerp": 4,
-        "cga_lerp": 5,
-        "cga_slerp": 6,
-        "motor_spline": 7,
-        "motor_spline_causal": 8,
-    }
