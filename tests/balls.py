@@ -4,11 +4,23 @@ import numpy as np
 
 
 def largest_displacements(offsets: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    """By how much the farthest points move, shape (n,), of balls that move by offsets (n, 3) and turn.
+    """By how much the farthest points move, shape (...), of balls that move by offsets (..., 3) and turn and grow.
 
-    `turns` (n, 3, 3) are the differences of two rotation matrices, times the radius: they make a disc of the ball, for
-    all of its points move across the axis of the turn.
+    `turns` (..., 3, 3) are differences of two matrices, times the radius: they make an ellipsoid of the ball, with an
+    axis of symmetry, the shortest one. The point that gets furthest is in the plane of that axis and the displacement
+    of the centre; it is searched for.
     """
     axes, sizes, _ = np.linalg.svd(turns)
-    moved = np.einsum("nij,ni->nj", axes, offsets)
-    return np.hypot(moved[:, 2], np.hypot(moved[:, 0], moved[:, 1]) + sizes[:, 0])
+    moved = np.abs(np.einsum("...ij,...i->...j", axes, offsets))
+    along, across = moved[..., 2], np.hypot(moved[..., 0], moved[..., 1])
+
+    def reached(angles: np.ndarray) -> np.ndarray:
+        return np.hypot(along + sizes[..., 2] * np.sin(angles), across + sizes[..., 0] * np.cos(angles))
+
+    middle, width = np.full(along.shape, np.pi / 4.0), np.pi / 4.0
+    while width > 1e-9:
+        steps = np.linspace(-1.0, 1.0, 33).reshape(33, *[1] * along.ndim)
+        angles = np.clip(middle + width * steps, 0.0, np.pi / 2.0)
+        middle = np.take_along_axis(angles, np.argmax(reached(angles), axis=0)[None], axis=0)[0]
+        width /= 8.0
+    return reached(middle)

@@ -81,13 +81,6 @@ def test_an_example_says_what_to_type_shows_a_picture_and_is_listed(name: str) -
     assert f"]({name}/README.md)" in (EXAMPLES / "README.md").read_text(encoding="utf-8")
 
 
-def test_an_example_that_is_none_is_refused_with_those_there_are(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as left:
-        make_examples.main(["door"])
-    assert left.value.code == 2
-    assert "no example 'door'; the examples are lid, sword" in capsys.readouterr().err
-
-
 def test_a_lid_stays_in_its_hinge_by_the_screw_and_leaves_it_by_blenders_own(make: Callable, tmp_path: Path) -> None:
     printed = make("lid")
     assert all(line in printed for line in claims("lid"))

@@ -42,8 +42,3 @@ def test_the_glossary_lists_all_of_its_entries_in_order():
         entries = anchors(group)
         assert [link.removeprefix("#") for link in links(row)] == entries, name
         assert entries == sorted(entries), name
-
-
-@pytest.mark.parametrize("name", ["README.md", "docs/animators.md", "docs/comparing.md", "docs/streaming.md"])
-def test_pages_lead_to_the_glossary(name: str):
-    assert "glossary.md#" in (ROOT / name).read_text(encoding="utf-8")

@@ -18,7 +18,6 @@ import rigid_motion
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "addon" / "rigid_motion"
-SOURCES = sorted(path for folder in ("addon", "assets", "scripts") for path in (ROOT / folder).rglob("*.py"))
 
 BLENDER = {"bpy", "bpy_extras", "mathutils"}
 
@@ -89,9 +88,3 @@ def test_the_extension_imports_downwards_and_nothing_else(floor):
             inside = 1 <= dots <= depth
             lower = (dots == depth + 1 and name.lstrip(".") in below) or (name == ".." and floor == "ui")
             assert known or inside or lower, f"{path.relative_to(ROOT)} imports {name}"
-
-
-def test_every_module_says_what_lives_in_it():
-    for path in SOURCES:
-        source = path.read_text(encoding="utf-8")
-        assert not source.strip() or ast.get_docstring(ast.parse(source)), f"{path.relative_to(ROOT)} has no docstring"

@@ -14,18 +14,8 @@ from rigid_motion import motion
 from rigid_motion_batch.cli.commands import COMMANDS
 from scripts import build_site
 
-LOADED = {
-    ("audio", "src"),
-    ("embed", "src"),
-    ("iframe", "src"),
-    ("img", "src"),
-    ("object", "data"),
-    ("script", "src"),
-    ("source", "src"),
-    ("video", "poster"),
-    ("video", "src"),
-}
-"""What a browser fetches when it opens a page, beside stylesheets and icons."""
+LOADING = ("src", "data", "poster")
+"""Attributes of what a browser fetches when it opens a page, beside stylesheets and icons."""
 
 
 @dataclass(repr=False)
@@ -47,7 +37,7 @@ class Page(HTMLParser):
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         given = dict(attrs)
         self.anchors |= {given[name] for name in ("id", "name") if given.get(name)}
-        self.loaded += [given[name] for kind, name in LOADED if kind == tag and given.get(name)]
+        self.loaded += [given[name] for name in LOADING if given.get(name)]
         if tag == "link" and given["rel"] not in ("index", "search", "next", "prev", "canonical"):
             self.loaded.append(given["href"])
         if tag == "a" and given.get("href"):

@@ -122,9 +122,9 @@ def beside(body: Clip, way: str) -> list[dict[str, Any]]:
     report(f"{body.name}, {way}")
     made = reduced(body, shared=WAYS[way])
     (row,) = measured(made).rows
-    slides = row.foot_slide_m, measured.recorded_slide_m
+    slides = row.foot_slide_m, row.recorded_slide_m
     slide, recorded = (None if metres is None else 1e3 * metres for metres in slides)
-    own = {"frames": row.key_frames, "key_count": measured.keys, "numbers": numbers_of(made)}
+    own = {"frames": row.key_frames, "key_count": row.keys, "numbers": numbers_of(made)}
     left = DecimatedBody(made).within(row.max_shell_m)
     return [
         {"body": body.name, "how": way, **own, "error_mm": 1e3 * row.max_shell_m}

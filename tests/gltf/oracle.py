@@ -8,6 +8,7 @@ from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 SIZES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5126: "<f4"}
 
@@ -104,20 +105,9 @@ class File:
             else np.tile(np.array(node.get(path, rest), dtype=np.float64), (len(times), 1))
             for path, rest in REST.items()
         }
-        x, y, z, w = (values["rotation"] / np.linalg.norm(values["rotation"], axis=1, keepdims=True)).T
         made = np.zeros((len(times), 4, 4))
         made[:, 3, 3] = 1.0
-        made[:, :3, :3] = np.moveaxis(
-            np.array(
-                [
-                    [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                    [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                    [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-                ]
-            ),
-            -1,
-            0,
-        )
+        made[:, :3, :3] = Rotation.from_quat(values["rotation"]).as_matrix()
         made[:, :3, :3] *= values["scale"][:, None]
         made[:, :3, 3] = values["translation"]
         return made

@@ -191,19 +191,9 @@ class Hand:
             yield from self.hover(places.centre(places.region(area)))
             yield from self.press("N")
         yield from self.wait_until(lambda: sidebar.width > 1, "the sidebar opens")
-        # Over the tabs: a number field would take the wheel for itself.
-        yield from self.hover((sidebar.x + sidebar.width - 10, places.centre(sidebar)[1]))
-        seen = [sidebar.active_panel_category]
-        while seen[-1] != category:
-            yield from self.press("WHEELDOWNMOUSE", ctrl=True)
-            seen.append(sidebar.active_panel_category)
-            if seen[-1] == seen[-2]:
-                break
-        while seen[-1] != category:
-            yield from self.press("WHEELUPMOUSE", ctrl=True)
-            seen.append(sidebar.active_panel_category)
-            if seen[-1] == seen[-2]:
-                raise LookupError(f"the sidebar of the {area.type} has no tab {category!r}, only {sorted(set(seen))}")
+        yield
+        sidebar.active_panel_category = category
+        yield
 
     def find_button(self, area: bpy.types.Area, kind: str, what: str, *, narrow: bool = False) -> Steps[Place]:
         """Where in a region the button of a property or an operator is, found by moving the mouse over all of it.

@@ -23,6 +23,12 @@ def port(extension) -> int:
 
 
 @pytest.fixture
+def live(extension) -> bpy.types.PropertyGroup:
+    """The settings of the scene."""
+    return extension.scene.rigid_motion_live
+
+
+@pytest.fixture
 def sent(port) -> Iterator[Sent]:
     """What another program sends to a port that Blender listens to."""
     assert bpy.ops.rigid_motion.live_listen() == {"FINISHED"}

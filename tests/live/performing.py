@@ -64,6 +64,11 @@ class Sent:
         time.sleep(0.001)
         receiving.listening().tick(now)
 
+    def dance(self, first: int, last: int, now: float = 50.0) -> None:
+        """Send the frames of a dance, from one to another."""
+        for row, datagrams in enumerate(frames_of_vmc(np.arange(first, last) / 60.0), first):
+            self.send(datagrams, now + row / 60.0)
+
     def close(self) -> None:
         self._socket.close()
 

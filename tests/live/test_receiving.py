@@ -29,11 +29,6 @@ SINGLE = 2e-6
 """What single precision leaves of metres."""
 
 
-@pytest.fixture
-def live(extension):
-    return extension.scene.rigid_motion_live
-
-
 @pytest.mark.parametrize(("prefix", "larger", "turned_by"), [("", 1.0, 0.0), ("mixamorig:", 1.0, 0.7), ("", 1.3, 0.2)])
 def test_a_performer_moves_the_bones_of_a_rig_of_any_size_rest_and_naming(live, sent, prefix, larger, turned_by):
     live.armature = rig = new_rig(prefix, larger, turned_by)
@@ -55,15 +50,13 @@ def test_a_rig_is_where_its_object_and_its_parent_put_it(live, sent):
     rig.data.transform(
         rig.matrix_basis.inverted() @ bpy.data.objects["Rig"].matrix_basis.__class__.Translation((0, 1, 0))
     )
-    for row, datagrams in enumerate(frames_of_vmc(TIMES)[:10]):
-        sent.send(datagrams, 50.0 + TIMES[row])
+    sent.dance(0, 10)
     x, y, z = in_world(dance(TIMES)).positions[:, 9].T
     assert heads_of(rig) == pytest.approx(np.stack((5.0 - (y + 1.0), x, z), axis=1), abs=4 * SINGLE)
 
 
 def test_without_a_rig_a_body_is_an_armature_with_its_rest(live, sent):
-    for row, datagrams in enumerate(frames_of_vmc(TIMES)[:10]):
-        sent.send(datagrams, 50.0 + TIMES[row])
+    sent.dance(0, 10)
     (rig,) = bpy.context.scene.objects
     assert rig.type == "ARMATURE"
     assert {bone.name for bone in rig.data.bones} == {"Root", *JOINTS}
@@ -104,8 +97,7 @@ def test_rigid_bodies_of_the_codec_are_objects_and_a_skeleton_moves_the_rig(live
 @pytest.mark.slow
 def test_a_rig_of_rigify_follows_by_its_controls(live, sent):
     live.armature = rig = human()
-    for row, datagrams in enumerate(frames_of_vmc(TIMES)[:8]):
-        sent.send(datagrams, 50.0 + TIMES[row])
+    sent.dance(0, 8)
     bpy.context.view_layer.update()
     assert {item.name: item.bone for item in live.bones}["LeftUpperArm"] == "upper_arm_fk.L"
     world = in_world(dance(TIMES))
@@ -120,16 +112,13 @@ def test_a_rig_of_rigify_follows_by_its_controls(live, sent):
 
 def test_a_corrected_table_is_what_moves(live, sent):
     live.armature = rig = new_rig()
-    frames = frames_of_vmc(TIMES)
-    for row in range(5):
-        sent.send(frames[row], 50.0 + TIMES[row])
+    sent.dance(0, 5)
     live.bones[list(live.bones.keys()).index("LeftUpperArm")].bone = ""
     rig.pose.bones["LeftUpperArm"].rotation_quaternion = (0.0, 1.0, 0.0, 0.0)
-    for row in range(5, 10):
-        sent.send(frames[row], 50.0 + TIMES[row])
+    sent.dance(5, 10)
     assert rig.pose.bones["LeftUpperArm"].rotation_quaternion[1] == pytest.approx(1.0)
     assert bpy.ops.rigid_motion.live_match() == {"FINISHED"}
-    sent.send(frames[10], 50.0 + TIMES[10])
+    sent.dance(10, 11)
     assert heads_of(rig) == pytest.approx(in_world(dance(TIMES)).positions[:, 10], abs=SINGLE)
 
 
@@ -144,29 +133,23 @@ def test_two_bodies_of_one_name_are_two(live, sent, port):
 
 
 def test_what_vanishes_stays_where_it_was_and_comes_back_as_the_same(live, sent, port):
-    frames = frames_of_vmc(TIMES)
-    for row in range(5):
-        sent.send(frames[row], 50.0 + TIMES[row])
+    sent.dance(0, 5)
     sent.send([], 70.0)
     assert receiving.listening().joints == {}
     assert len(bpy.context.scene.objects) == 1
     other = Sent(port)
-    for row in range(5):
-        other.send(frames[row], 80.0 + TIMES[row])
+    other.dance(0, 5, 80.0)
     other.close()
     assert [obj.name for obj in bpy.context.scene.objects] == ["VMC"]
 
 
 def test_what_is_deleted_stays_away_until_an_undo(live, sent):
-    frames = frames_of_vmc(TIMES)
-    for row in range(5):
-        sent.send(frames[row], 50.0 + TIMES[row])
+    sent.dance(0, 5)
     bpy.data.objects.remove(bpy.data.objects["VMC"])
-    for row in range(5, 8):
-        sent.send(frames[row], 50.0 + TIMES[row])
+    sent.dance(5, 8)
     assert len(bpy.context.scene.objects) == 0
     receiving.HANDLERS["undo_post"]()
-    sent.send(frames[8], 50.0 + TIMES[8])
+    sent.dance(8, 9)
     assert len(bpy.context.scene.objects) == 1
 
 
@@ -174,8 +157,7 @@ def test_a_frame_with_keys_does_not_take_the_picture_back(live, sent):
     live.armature = rig = new_rig()
     bone = rig.pose.bones["LeftUpperArm"]
     bone.keyframe_insert("rotation_quaternion", frame=1)
-    for row, datagrams in enumerate(frames_of_vmc(TIMES)[:8]):
-        sent.send(datagrams, 50.0 + TIMES[row])
+    sent.dance(0, 8)
     bpy.context.scene.frame_set(2)
     assert heads_of(rig) == pytest.approx(in_world(dance(TIMES)).positions[:, 7], abs=SINGLE)
 
@@ -188,8 +170,7 @@ def test_linked_rigs_are_left_alone(live, sent, tmp_path):
         expected.objects = ["Rig"]
     bpy.context.scene.collection.objects.link(expected.objects[0])
     live.armature = expected.objects[0]
-    for row, datagrams in enumerate(frames_of_vmc(TIMES)[:5]):
-        sent.send(datagrams, 50.0 + TIMES[row])
+    sent.dance(0, 5)
     assert receiving.running.trouble == ""
 
 

@@ -1,10 +1,33 @@
-"""Bodies for tests: random skeletons that move, and how far off they are, by matrices and apart from the program."""
+"""Recordings for tests, of single bodies and skeletons, and how far off they are, by matrices of SciPy."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rigid_motion.motion import Poses, interpolate
-from tests.motion.test_reduction import wandering
+from rigid_motion.motion import Poses, interpolate, twists
+from rigid_motion.motion.quaternions import align_signs, normalise
+from tests import balls
+
+RADIUS = 0.1
+
+
+def wandering(count: int, seed: int, noise: float = 0.0, rough: float = 3.0) -> tuple[np.ndarray, Poses]:
+    """A recording at uneven times: a smooth walk of a body, with rests, and noise on top."""
+    random = np.random.default_rng(seed)
+    times = np.cumsum(random.uniform(0.005, 0.02, count))
+    knots = np.linspace(times[0], times[-1], max(4, int(rough * (times[-1] - times[0]))))
+    values = np.cumsum(random.normal(size=(len(knots), 6)) * (random.uniform(size=(len(knots), 1)) > 0.3), axis=0)
+    rows = np.array([np.interp(times, knots, column) for column in values.T])
+    width = min(15, count)
+    smooth = np.array([np.convolve(row, np.ones(width) / width, mode="same") for row in rows])
+    turn, _ = twists.exponential(np.concatenate((smooth[:3], np.zeros((3, count)))))
+    quaternions = turn.T + noise * random.normal(size=(count, 4))
+    positions = 0.3 * smooth[3:].T + noise * random.normal(size=(count, 3))
+    return times, Poses(positions, align_signs(normalise(quaternions)))
+
+
+def shell_errors(times: np.ndarray, poses: Poses, keys: np.ndarray, mode: str, radius: float = RADIUS) -> np.ndarray:
+    """The largest displacement of any point within the radius on every sample."""
+    return largest_displacements(matrices(interpolate(times[keys], poses[keys], times, mode)), matrices(poses), radius)
 
 
 def random_parents(random: np.random.Generator, joints: int) -> np.ndarray:
@@ -58,25 +81,12 @@ def in_root_space(poses: Poses, parents: np.ndarray) -> np.ndarray:
     return result
 
 
-def largest_displacements(a: np.ndarray, b: np.ndarray, radii: np.ndarray) -> np.ndarray:
-    """How far matrices (joints, n, 4, 4) move any point of a ball (joints,) from one another, shape (joints, n).
-
-    The ball becomes an ellipsoid with an axis of symmetry, the shortest one. The point that gets furthest is in the
-    plane of that axis and the displacement of the centre; it is searched for.
+def largest_displacements(a: np.ndarray, b: np.ndarray, radii: np.ndarray | float) -> np.ndarray:
+    """How far matrices (..., 4, 4) move any point of a ball from one another, shape (...); radii are those of the first
+    axis.
     """
-    axes, sizes, _ = np.linalg.svd(radii[:, None, None, None] * (a - b)[..., :3, :3])
-    moved = np.abs(np.einsum("jnik,jni->jnk", axes, (a - b)[..., :3, 3]))
-    along, across = moved[..., 2], np.hypot(moved[..., 0], moved[..., 1])
-
-    def reached(angles: np.ndarray) -> np.ndarray:
-        return np.hypot(along + sizes[..., 2] * np.sin(angles), across + sizes[..., 0] * np.cos(angles))
-
-    middle, width = np.full(along.shape, np.pi / 4.0), np.pi / 4.0
-    while width > 1e-9:
-        angles = np.clip(middle + width * np.linspace(-1.0, 1.0, 33)[:, None, None], 0.0, np.pi / 2.0)
-        middle = np.take_along_axis(angles, np.argmax(reached(angles), axis=0)[None], axis=0)[0]
-        width /= 8.0
-    return reached(middle)
+    radii = np.reshape(radii, (-1, *[1] * (a.ndim - 1)))
+    return balls.largest_displacements((a - b)[..., :3, 3], radii * (a - b)[..., :3, :3])
 
 
 def body_errors(

@@ -13,15 +13,11 @@ from rigid_motion.motion import (
     interpolate,
     interpolate_by_segments,
     reduce_keys,
-    twists,
 )
 from rigid_motion.motion.best_of import least_errors
-from rigid_motion.motion.quaternions import multiply
+from tests.motion.bodies import RADIUS, shell_errors, wandering
 from tests.motion.cases import assert_same, random_quaternions
-from tests.motion.test_reduction import shell_errors, wandering
 from tests.thoroughness import tried
-
-RADIUS = 0.1
 
 
 def errors_by_segments(times, poses, keys, modes) -> np.ndarray:
@@ -70,19 +66,6 @@ def test_what_is_shown_is_in_each_segment_what_its_mode_shows(count, seed, scale
         here = segment == number
         if here.any():
             assert_same(shown[here], interpolate(key_times, keys, times, mode)[here])
-
-
-def test_a_screw_gets_the_screw_and_a_straight_flight_the_straight_line():
-    """Five segments about an axis that stands still, and five of a body that tumbles as it flies."""
-    times = np.linspace(0.0, 10.0, 201)
-    screw = np.outer((0.2, 0.9, -0.4, 0.3, 0.1, 0.5), np.minimum(times, 5.0))
-    turn, place = twists.exponential(screw)
-    flight = np.maximum(times - 5.0, 0.0)
-    spin, _ = twists.exponential(np.outer((0.0, 0.0, 1.2, 0.0, 0.0, 0.0), flight))
-    poses = Poses(place.T + np.outer(flight, (0.7, 0.2, -0.3)), multiply(spin.T, turn.T))
-    keys = np.arange(0, 201, 20)
-    modes = ("lerp_slerp", "dq_sclerp", "pga_lerp")
-    assert best_modes(times, poses, keys, modes, RADIUS) == ("dq_sclerp",) * 5 + ("lerp_slerp",) * 5
 
 
 def test_modes_that_are_one_motion_are_not_told_apart_by_rounding():

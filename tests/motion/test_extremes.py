@@ -33,3 +33,16 @@ def test_all_of_the_range_of_single_precision_can_be_filled_in() -> None:
     for mode in MODES:
         shown = interpolate([0.0, 1.0, 2.0], keys, np.linspace(0.0, 2.0, 41), mode)
         assert np.isfinite(shown.positions).all()
+
+
+def test_the_numbers_that_files_store_never_change():
+    assert {mode: MODES[mode].number for mode in MODES} == {
+        "lerp_slerp": 1,
+        "dq_sclerp": 2,
+        "pga_lerp": 3,
+        "pga_slerp": 4,
+        "cga_lerp": 5,
+        "cga_slerp": 6,
+        "motor_spline": 7,
+        "motor_spline_causal": 8,
+    }

@@ -6,7 +6,7 @@ import pytest
 from rigid_motion.motion import MODES, Poses, reduce_keys, twists
 from rigid_motion.motion.key_splines import SplineErrors
 from rigid_motion.motion.quaternions import align_signs
-from tests.motion.test_reduction import RADIUS, shell_errors, wandering
+from tests.motion.bodies import RADIUS, shell_errors, wandering
 
 MEMORYLESS = [name for name, mode in MODES.items() if not mode.is_smooth]
 TOLERANCES = (0.01, 0.03, 0.08)

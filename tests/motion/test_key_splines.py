@@ -7,7 +7,7 @@ import pytest
 
 from rigid_motion.motion import Poses, key_splines
 from rigid_motion.motion.key_costs import Costs, Recording
-from tests.motion.test_reduction import RADIUS, shell_errors, wandering
+from tests.motion.bodies import RADIUS, shell_errors, wandering
 
 
 def errors_of(times: np.ndarray, poses: Poses, keys: np.ndarray) -> np.ndarray:

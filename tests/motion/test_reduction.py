@@ -4,38 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
 
-from rigid_motion.motion import MODES, Poses, interpolate, reduce_keys, repair, twists
-from rigid_motion.motion.quaternions import align_signs, normalise
-from rigid_motion_batch.recordings import read_trajectories
-from tests.balls import largest_displacements
-from tests.recordings import RECORDINGS
-from tests.thoroughness import sample, tried
-
-RADIUS = 0.1
-
-
-def shell_errors(times: np.ndarray, poses: Poses, keys: np.ndarray, mode: str, radius: float = RADIUS) -> np.ndarray:
-    """The largest displacement of any point within the radius on every sample, by singular values of matrices."""
-    shown = interpolate(times[keys], poses[keys], times, mode)
-    a, b = (Rotation.from_quat(some.quaternions, scalar_first=True).as_matrix() for some in (shown, poses))
-    return largest_displacements(shown.positions - poses.positions, radius * (a - b))
-
-
-def wandering(count: int, seed: int, noise: float = 0.0, rough: float = 3.0) -> tuple[np.ndarray, Poses]:
-    """A recording at uneven times: a smooth walk of a body, with rests, and noise on top."""
-    random = np.random.default_rng(seed)
-    times = np.cumsum(random.uniform(0.005, 0.02, count))
-    knots = np.linspace(times[0], times[-1], max(4, int(rough * (times[-1] - times[0]))))
-    values = np.cumsum(random.normal(size=(len(knots), 6)) * (random.uniform(size=(len(knots), 1)) > 0.3), axis=0)
-    rows = np.array([np.interp(times, knots, column) for column in values.T])
-    width = min(15, count)
-    smooth = np.array([np.convolve(row, np.ones(width) / width, mode="same") for row in rows])
-    turn, _ = twists.exponential(np.concatenate((smooth[:3], np.zeros((3, count)))))
-    quaternions = turn.T + noise * random.normal(size=(count, 4))
-    positions = 0.3 * smooth[3:].T + noise * random.normal(size=(count, 3))
-    return times, Poses(positions, align_signs(normalise(quaternions)))
+from rigid_motion.motion import MODES, Poses, key_costs, key_search, reduce_keys, twists
+from tests.motion.bodies import RADIUS, shell_errors, wandering
+from tests.thoroughness import tried
 
 
 @settings(max_examples=tried(60))
@@ -117,18 +89,21 @@ def test_one_screw_needs_two_keys(mode):
     assert reduce_keys(times, Poses(advance.T, turn.T), mode, 1e-9).tolist() == [0, 299]
 
 
+@pytest.mark.parametrize("options", [{"tolerance": 1e-6}, {"budget": 30}, {"budget": 30, "rms": True}], ids=str)
 @pytest.mark.parametrize("mode", MODES)
-def test_a_body_at_rest_needs_two_keys(mode):
+def test_a_body_at_rest_has_two_keys(mode, options):
     poses = Poses(np.tile((1.0, 2.0, 3.0), (200, 1)), np.tile((0.5, 0.5, 0.5, 0.5), (200, 1)))
-    assert reduce_keys(np.arange(200.0), poses, mode, 1e-6).tolist() == [0, 199]
+    assert reduce_keys(np.arange(200.0), poses, mode, **options).tolist() == [0, 199]
 
 
-def greedy(times: np.ndarray, poses: Poses, tolerance: float) -> np.ndarray:
-    """Keys put in one after the other, each where the error is largest."""
-    keys = [0, len(times) - 1]
-    while (errors := shell_errors(times, poses, np.array(keys), "motor_spline")).max() > tolerance:
-        keys = sorted({*keys, int(np.argmax(errors))})
-    return np.array(keys)
+@pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline", "motor_spline_causal"])
+def test_keys_are_the_same_whatever_is_remembered_or_put_off(mode, monkeypatch):
+    times, poses = wandering(200, 7, 0.001)
+    keys = reduce_keys(times, poses, mode, 0.02, RADIUS).tolist()
+    monkeypatch.setattr(key_costs, "REMEMBERED", 10)
+    assert reduce_keys(times, poses, mode, 0.02, RADIUS).tolist() == keys
+    monkeypatch.setattr(key_search, "MUCH", 0)
+    assert reduce_keys(times, poses, mode, 0.02, RADIUS).tolist() == keys
 
 
 def test_signs_of_quaternions_do_not_matter():
@@ -142,29 +117,5 @@ def test_scale_is_part_of_the_pose():
     scales = 1.0 + 0.5 * np.sin(7.0 * times)
     growing = Poses(poses.positions, poses.quaternions, scales)
     keys = reduce_keys(times, growing, tolerance=0.002)
-    shown = interpolate(times[keys], growing[keys], times, "motor_spline")
-    assert RADIUS * np.abs(shown.scales - scales).max() <= 0.002 + 1e-9
+    assert shell_errors(times, growing, keys, "motor_spline").max() <= 0.002 * (1.0 + 1e-9)
     assert len(keys) > len(reduce_keys(times, poses, tolerance=0.002))
-
-
-@pytest.fixture(scope="module")
-def recordings() -> dict[str, tuple[np.ndarray, Poses]]:
-    result = {}
-    for path in sorted(RECORDINGS.glob("*")):
-        if path.suffix != ".md":
-            trajectory = read_trajectories(str(path)).trajectories[0]
-            times, poses, _ = repair(trajectory.times, trajectory.rigid)
-            result[path.name] = times, poses
-    return result
-
-
-@pytest.mark.recordings
-@pytest.mark.parametrize(
-    ("mode", "tolerance"),
-    [("lerp_slerp", 0.005), ("dq_sclerp", 0.005), ("motor_spline", 0.001), ("motor_spline", 0.03)],
-)
-def test_recordings_keep_to_the_tolerance(recordings, mode, tolerance):
-    for name in sample(list(recordings)):
-        times, poses = recordings[name]
-        keys = reduce_keys(times, poses, mode, tolerance, RADIUS)
-        assert shell_errors(times, poses, keys, mode).max() <= tolerance * (1.0 + 1e-9), name

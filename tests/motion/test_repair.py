@@ -17,10 +17,6 @@ def recording(count: int = 20, seed: int = 0) -> tuple[np.ndarray, Poses]:
     return np.arange(count) / 100.0, Poses(random.normal(size=(count, 3)), quaternions)
 
 
-def faults(repairs) -> str:
-    return "; ".join(str(r) for r in repairs)
-
-
 def test_a_sound_recording_stays_as_it_is():
     times, poses = recording()
     kept, mended, repairs = repair(times, poses)
@@ -29,14 +25,16 @@ def test_a_sound_recording_stays_as_it_is():
     assert repairs == []
 
 
-def test_rows_of_nan_and_zero_quaternions_are_dropped_and_named():
+def test_rows_of_nan_zero_quaternions_and_zero_scales_are_dropped_and_named():
     times, poses = recording()
+    poses = Poses(poses.positions, poses.quaternions, np.ones(20))
     poses.positions[3, 1] = np.nan
     poses.quaternions[5] = 0.0
+    poses.scales[0] = 0.0
     kept, _, repairs = repair(times, poses)
-    assert np.array_equal(kept, np.delete(times, [3, 5]))
-    assert [r.rows.tolist() for r in repairs[:2]] == [[3], [5]]
-    assert "row 3" in str(repairs[0])
+    assert np.array_equal(kept, np.delete(times, [0, 3, 5]))
+    assert [r.rows.tolist() for r in repairs[:2]] == [[0, 3], [5]]
+    assert "row 0, 3" in str(repairs[0])
     assert "zero" in str(repairs[1])
 
 
@@ -46,16 +44,7 @@ def test_of_equal_times_the_last_is_kept():
     kept, mended, repairs = repair(times, poses)
     assert np.all(np.diff(kept) > 0)
     assert np.array_equal(mended.positions[4], poses.positions[6])
-    assert "comes again" in faults(repairs)
-
-
-def test_a_clock_that_jumps_back_loses_as_few_rows_as_can_be():
-    times, poses = recording()
-    times[7] = 1e6
-    kept, _, repairs = repair(times, poses)
-    assert np.array_equal(kept, np.delete(times, 7))
-    assert repairs[0].rows.tolist() == [7]
-    assert "backwards" in str(repairs[0])
+    assert "comes again" in str(repairs[0])
 
 
 @pytest.mark.parametrize("time", [-1e25, 0.0, 1e6, 1.7e12, 1e25])
@@ -75,21 +64,19 @@ def test_wild_times_at_both_ends_are_dropped_though_they_rise():
     times[:2], times[-2:] = [-1e20, -1e6], [1e6, 1e25]
     kept, _, repairs = repair(times, poses)
     assert np.array_equal(kept, times[2:-2])
-    assert "far from that of all others, such as -1e+20 s (4: row 0, 1, 98, 99)" in faults(repairs)
+    assert "far from that of all others, such as -1e+20 s (4: row 0, 1, 98, 99)" in str(repairs[0])
 
 
-@pytest.mark.parametrize(("count", "pause"), [(2, 1e25), (3, 1e25), (100, 5.0)], ids=["two", "three", "a break"])
-def test_what_may_be_a_pause_is_left(count: int, pause: float):
+@pytest.mark.parametrize(
+    ("count", "row", "pause"),
+    [(2, -1, 1e25), (3, -1, 1e25), (100, -1, 5.0), (20, 10, 1e6)],
+    ids=["two", "three", "a break", "two halves"],
+)
+def test_what_may_be_a_pause_is_left(count: int, row: int, pause: float):
     times, poses = recording(count)
-    times[-1] += pause
+    times[row:] += pause
     kept, _, _ = repair(times, poses)
     assert np.array_equal(kept, times)
-
-
-def test_two_halves_far_apart_are_both_left():
-    times, poses = recording()
-    times[10:] += 1e6
-    assert np.array_equal(repair(times, poses)[0], times)
 
 
 def test_lengths_are_made_unit_and_only_said_where_they_were_off():
@@ -116,14 +103,6 @@ def test_gaps_are_left_and_reported_with_their_length():
     assert np.array_equal(kept, times)
     assert repairs[0].rows.tolist() == [11]
     assert "60 ms" in str(repairs[0])
-
-
-def test_scales_that_are_no_scales_are_dropped():
-    times, poses = recording()
-    scales = np.ones(20)
-    scales[0] = 0.0
-    kept, _, _ = repair(times, Poses(poses.positions, poses.quaternions, scales))
-    assert np.array_equal(kept, times[1:])
 
 
 def test_nothing_left_is_no_crash():

@@ -115,6 +115,3 @@ def test_a_budget_is_of_rotations_and_locations(count, joints, seed, more):
     if least > 2:
         with pytest.raises(ValueError, match=f"a budget of {least - 1} keys is too small for {changing} rotations and"):
             reduce_skeleton_keys(times, poses, parents, "lerp_slerp", budget=least - 1, separate=True)
-
-
-TIMES, BODY, PARENTS = wandering_body(20, 3, 1, resting=0.0, scaled=True)

@@ -6,9 +6,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rigid_motion.motion import MODES, Poses, reduce_skeleton_keys
-from rigid_motion.motion.quaternions import multiply, rotate
 from tests.motion.bodies import body_errors, in_root_space, wandering_body
-from tests.motion.cases import random_quaternions
 from tests.thoroughness import tried
 
 TWO_WAYS = pytest.mark.parametrize("shared", [False, True])
@@ -102,24 +100,6 @@ def test_a_budget_is_kept(count, joints, seed, more, mode):
     check_keys(shared, joints, count, True)
     rests = all(not np.ptp(rows, axis=1).any() for rows in (body[1].positions, body[1].quaternions))
     assert len(shared[0]) == (2 if rests else min(2 + more, count))
-
-
-@TWO_WAYS
-@pytest.mark.parametrize("mode", ["lerp_slerp", "motor_spline"])
-@pytest.mark.parametrize("seed", [1, 2])
-def test_how_the_whole_body_stands_does_not_matter(seed, mode, shared):
-    """But for rounding, which decides between keys that are equally good in one body of sixteen (0 is such a one)."""
-    random = np.random.default_rng(seed)
-    times, poses, parents = wandering_body(80, 6, seed)
-    turn, shift, roots = random_quaternions(random), random.normal(size=3), parents < 0
-    positions, quaternions = poses.positions.copy(), poses.quaternions.copy()
-    positions[roots] = rotate(turn, positions[roots]) + shift
-    quaternions[roots] = multiply(turn, quaternions[roots])
-    here, there = (
-        reduce_skeleton_keys(times, some, parents, mode, tolerance=0.02, shared=shared)
-        for some in (poses, Poses(positions, quaternions))
-    )
-    assert list(map(len, here)) == list(map(len, there))
 
 
 @pytest.mark.parametrize("mode", MODES)

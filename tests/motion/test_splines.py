@@ -10,9 +10,9 @@ from scipy.linalg import expm, logm
 
 from rigid_motion.motion import MODES, Poses, in_betweens, interpolate, twists
 from rigid_motion.motion.quaternions import angle_between, multiply, rotate
+from tests.motion.bodies import matrices
 from tests.motion.cases import assert_same, random_quaternions
-from tests.motion.test_properties import assert_close, reseated
-from tests.motion.test_twists import pose_matrix
+from tests.motion.test_properties import assert_close
 
 SMOOTH = [name for name, mode in MODES.items() if mode.is_smooth]
 CAUSAL = "motor_spline_causal"
@@ -100,7 +100,7 @@ def test_turns_of_almost_half_a_turn_stay_sound(mode, short):
 
 def slow_spline(times: np.ndarray, keys: Poses, moments: np.ndarray, mode: str) -> np.ndarray:
     """A motor spline by SciPy's matrix functions, one moment after the other, shape (m, 4, 4)."""
-    poses = [pose_matrix(q, p) for q, p in zip(keys.quaternions, keys.positions, strict=True)]
+    poses = matrices(keys)
     ways = [logm(np.linalg.inv(a) @ b).real for a, b in itertools.pairwise(poses)]
     h = np.diff(times)
     speeds = [ways[0] / h[0]]
@@ -138,8 +138,7 @@ def test_the_motor_spline_is_that_of_matrix_exponentials(seed, mode):
     moments = np.linspace(times[0], times[-1], 50)
     path = interpolate(times, keys, moments, mode)
     expected = slow_spline(times, keys, moments, mode)
-    for pose, matrix in zip(zip(path.quaternions, path.positions, strict=True), expected, strict=True):
-        np.testing.assert_allclose(pose_matrix(*pose), matrix, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(matrices(path), expected, rtol=0, atol=1e-8)
 
 
 @every_spline
@@ -163,14 +162,17 @@ def wild_times(draw, least: int = 3, most: int = 8) -> np.ndarray:
     return np.concatenate(((0.0,), np.cumsum(10.0 ** np.array(exponents))))
 
 
-def steps(random: np.random.Generator, angles: np.ndarray, axes: np.ndarray, advances: np.ndarray) -> Poses:
-    """Keys, each a turn about a body axis and an advance further than the one before."""
+def wild_keys(times: np.ndarray, seed: int, spread: float) -> tuple[np.ndarray, Poses]:
+    """Keys, each a turn by an angle about a body axis and an advance further than the one before."""
+    random, count = np.random.default_rng(seed), len(times) - 1
+    angles, ways = 3.0 * 10.0 ** -random.uniform(0.0, spread, (2, count))
+    axes, advances = random.normal(size=(3, count)), ways * random.normal(size=(3, count))
     positions, quaternions = [random.normal(size=3)], [random_quaternions(random)]
-    turns, ways = twists.exponential(np.concatenate(((angles * (axes / np.linalg.norm(axes, axis=0))), advances)))
+    turns, ways = twists.exponential(np.concatenate((angles * (axes / np.linalg.norm(axes, axis=0)), advances)))
     for turn, way in zip(turns.T, ways.T, strict=True):
         positions.append(positions[-1] + rotate(quaternions[-1], way))
         quaternions.append(multiply(quaternions[-1], turn))
-    return Poses(np.array(positions), np.array(quaternions))
+    return angles, Poses(np.array(positions), np.array(quaternions))
 
 
 def filled(times: np.ndarray, keys: Poses, mode: str, count: int = 100) -> Poses:
@@ -179,6 +181,14 @@ def filled(times: np.ndarray, keys: Poses, mode: str, count: int = 100) -> Poses
     path = in_betweens(times, keys, [count + 1] * (len(times) - 1), progress, mode)
     shape = len(times) - 1, count + 1
     return Poses(path.positions.reshape(*shape, 3), path.quaternions.reshape(*shape, 4))
+
+
+def reseated(poses: Poses, on: Poses) -> Poses:
+    """The poses of another point and set of axes of the same body: `on` has one pose."""
+    moved = rotate(poses.quaternions, np.broadcast_to(on.positions, poses.positions.shape))
+    return Poses(
+        poses.positions + moved, multiply(poses.quaternions, np.broadcast_to(on.quaternions, poses.quaternions.shape))
+    )
 
 
 def turnings(path: Poses) -> np.ndarray:
@@ -194,9 +204,8 @@ def lengths(path: Poses) -> np.ndarray:
 @given(wild_times(), st.integers(0, 2**16), st.floats(0.0, 4.0))
 def test_whatever_the_keys_a_stream_stays_in_their_neighbourhood(times, seed, spread):
     """It leaves a key by at most 1.31 of the twist before and half of that before it, for twice the time before."""
-    random, count = np.random.default_rng(seed), len(times) - 1
-    angles, ways = 3.0 * 10.0 ** -random.uniform(0.0, spread, (2, count))
-    keys = steps(random, angles, random.normal(size=(3, count)), ways * random.normal(size=(3, count)))
+    angles, keys = wild_keys(times, seed, spread)
+    count = len(angles)
     path, screw = (filled(times, keys, mode) for mode in (CAUSAL, "dq_sclerp"))
     for amounts, away in (
         (lengths(screw), np.linalg.norm(path.positions - screw.positions, axis=-1)),
@@ -210,9 +219,7 @@ def test_whatever_the_keys_a_stream_stays_in_their_neighbourhood(times, seed, sp
 @given(wild_times(), st.integers(0, 2**16), st.floats(0.0, 4.0))
 def test_whatever_the_keys_no_point_of_the_body_leaves_their_neighbourhood(times, seed, spread):
     """The bounds of docs/conventions.md, with steps of any size, up to 10 000 times as far as those next to them."""
-    random, count = np.random.default_rng(seed), len(times) - 1
-    angles, ways = 3.0 * 10.0 ** -random.uniform(0.0, spread, (2, count))
-    keys = steps(random, angles, random.normal(size=(3, count)), ways * random.normal(size=(3, count)))
+    random, (angles, keys) = np.random.default_rng(seed), wild_keys(times, seed, spread)
     body = Poses(random.normal(size=3), random_quaternions(random))
     for seated in (keys, reseated(keys, body)):
         path, screw = (filled(times, seated, mode) for mode in ("motor_spline", "dq_sclerp"))

@@ -6,9 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rigid_motion.motion import MODES, Poses, interpolate, trigonometry
+from rigid_motion.motion import Poses, interpolate, trigonometry
 from rigid_motion.motion.trigonometry import NARROW, fill_sine_and_cosine
-from tests.motion.cases import random_quaternions
 
 both_ways = pytest.mark.parametrize("vector_tangent", [False, True], ids=["polynomial", "tangent"])
 
@@ -68,27 +67,11 @@ def test_without_a_word_from_numpy_the_polynomial_is_taken(monkeypatch):
     assert not trigonometry._has_vector_tangent()
 
 
-@pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])
-def test_all_processors_show_the_same_motion(monkeypatch, mode, scaled):
-    random = np.random.default_rng(6)
-    scales = np.exp(random.normal(size=30)) if scaled else None
-    keys = Poses(random.normal(size=(30, 3)), random_quaternions(random, 30), scales)
-    times = random.uniform(0.0, 29.0, size=5000)
-    shown = []
-    for vector_tangent in (False, True):
-        monkeypatch.setattr(trigonometry, "VECTOR_TANGENT", vector_tangent)
-        shown.append(interpolate(np.arange(30.0), keys, times, mode))
-    polynomial, tangent = shown
-    np.testing.assert_allclose(polynomial.positions, tangent.positions, rtol=0.0, atol=1e-13)
-    np.testing.assert_allclose(polynomial.quaternions, tangent.quaternions, rtol=0.0, atol=1e-14)
-    if scaled:
-        np.testing.assert_allclose(polynomial.scales, tangent.scales, rtol=1e-13)
-
-
+@both_ways
 @pytest.mark.parametrize("mode", ["lerp_slerp", "dq_sclerp", "pga_slerp", "cga_slerp"])
-def test_far_outside_of_the_keys_the_turn_goes_on(mode):
+def test_far_outside_of_the_keys_the_turn_goes_on(mode, monkeypatch, vector_tangent):
     """Three whole turns and more: psi passes pi / 2 and pi, where half of it has a tangent that jumps."""
+    monkeypatch.setattr(trigonometry, "VECTOR_TANGENT", vector_tangent)
     half = np.radians(50.0)
     keys = Poses(
         [[1.0, 0.0, 0.0], [np.cos(2 * half), np.sin(2 * half), 0.5]], [[1, 0, 0, 0], [np.cos(half), 0, 0, np.sin(half)]]

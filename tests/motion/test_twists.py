@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from rigid_motion.motion import twists
+from rigid_motion.motion import Poses, twists
+from tests.motion.bodies import matrices
 
 ANGLES = [0.0, 1e-12, 1e-6, 1e-3, 0.02999, 0.03001, 0.5, 2.0, 3.1, np.pi - 1e-9]
 
@@ -18,18 +19,6 @@ def matrix_of(twist: np.ndarray) -> np.ndarray:
     return matrix
 
 
-def pose_matrix(quaternion: np.ndarray, translation: np.ndarray) -> np.ndarray:
-    w, x, y, z = quaternion
-    matrix = np.eye(4)
-    matrix[:3, :3] = (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    )
-    matrix[:3, 3] = translation
-    return matrix
-
-
 def some_twists(angle: float, count: int = 20) -> np.ndarray:
     random = np.random.default_rng(3)
     axes = random.normal(size=(3, count))
@@ -39,8 +28,9 @@ def some_twists(angle: float, count: int = 20) -> np.ndarray:
 @pytest.mark.parametrize("angle", [*ANGLES, 3.5, 6.0, 9.0])
 def test_exponentials_are_those_of_matrices(angle):
     given = some_twists(angle)
-    for twist, quaternion, translation in zip(given.T, *(rows.T for rows in twists.exponential(given)), strict=True):
-        np.testing.assert_allclose(pose_matrix(quaternion, translation), expm(matrix_of(twist)), rtol=0, atol=1e-13)
+    quaternions, translations = twists.exponential(given)
+    result = matrices(Poses(translations.T, quaternions.T))
+    np.testing.assert_allclose(result, [expm(matrix_of(twist)) for twist in given.T], rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

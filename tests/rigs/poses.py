@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import bpy
 import numpy as np
-from mathutils import Quaternion
+from mathutils import Euler, Quaternion
 
 KEYS = (1, 15, 31)
 
@@ -27,6 +27,18 @@ def key_at_random(bones: Iterable[bpy.types.PoseBone]) -> None:
                 bone.rotation_euler = turned.to_euler(bone.rotation_mode)
                 bone.keyframe_insert("rotation_euler", frame=frame, group=bone.name)
     bpy.context.view_layer.update()
+
+
+def key_controls(rig: bpy.types.Object, poses: dict[str, tuple[tuple, tuple]], frames: tuple[int, int]) -> None:
+    """Keys of controls by name, from rest to a location and angles about X, Y and Z."""
+    for name, (location, angles) in poses.items():
+        bone = rig.pose.bones[name]
+        bone.rotation_mode = "QUATERNION"
+        for frame, part in zip(frames, (0.0, 1.0), strict=True):
+            bone.location = np.multiply(location, part)
+            bone.rotation_quaternion = Euler(np.multiply(angles, part)).to_quaternion()
+            for path in ("location", "rotation_quaternion", "scale"):
+                bone.keyframe_insert(path, frame=frame)
 
 
 def ends_of_bones(rig: bpy.types.Object) -> np.ndarray:

@@ -111,7 +111,7 @@ def test_all_numbers_are_in_the_report_before_the_first_frame_is_rendered(short_
     assert all('src="toss/5/comparison.mp4"' in page and "Smooth Screw" in page for page in pages)
     files = [path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file()]
     tables = {f"toss/{rate}/{name}.csv" for rate in (5, 10) for name in ("keys", *KEYFRAME_MODES)}
-    shown = {f"toss/5/comparison.{ending}" for ending in ("mp4", "blend", "glb")}
+    shown = {f"toss/5/comparison.{ending}" for ending in ("mp4", "blend")}
     assert {str(path) for path in files if path.parts[0] != OWN} == tables | shown | {"metrics.csv", "report.html"}
     said = capsys.readouterr()
     assert f"films come as they are made: {tmp_path / 'report.html'}" in said.err

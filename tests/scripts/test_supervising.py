@@ -112,7 +112,7 @@ def test_ctrl_c_within_an_importer_or_exporter_is_no_fault_of_the_file(tmp_path)
         raise interrupted
 
     with pytest.raises(KeyboardInterrupt):
-        importing._import(tmp_path / "walk.fbx", importer)
+        importing._imported(tmp_path / "walk.fbx", importer)
     with pytest.raises(KeyboardInterrupt):
         exporting._reason(interrupted)
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import os
-import time
 import tracemalloc
 import zlib
 
@@ -163,17 +162,3 @@ def test_strangers_cannot_fill_the_memory() -> None:
     tracemalloc.stop()
     assert 0 < 200 * len(receiver.streams) <= MOST_ALL_JOINTS
     assert most < MOST_BYTES
-
-
-def test_a_datagram_costs_little_time() -> None:
-    own = body(60)
-    sender = Sender([own])
-    receiver = Receiver()
-    for datagram in sender.add(0.0, own.rest):
-        receiver.take(datagram, 0.0)
-    rng = np.random.default_rng(1)
-    begun = time.process_time()
-    for number in range(200):
-        head = bytes([0x41]) + sender.identity + (100 + number).to_bytes(2, "little")
-        receiver.take(head + rng.bytes(40), 0.1 + number)
-    assert time.process_time() - begun < 10.0

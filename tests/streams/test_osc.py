@@ -58,14 +58,6 @@ def test_bundles_are_read_in_bundles():
     assert [message.address for message in OscBundle(written)] == ["/a", "/b"]
 
 
-def test_what_is_said_of_time_in_the_documentation():
-    # /VMC/Ext/T (float){time}
-    data = bytes.fromhex("2f564d432f4578742f5400002c6600003dcccccd")
-    (message,) = osc.read(data)
-    assert message == ("/VMC/Ext/T", (pytest.approx(0.1),))
-    assert osc.write_message("/VMC/Ext/T", 0.1) == data
-
-
 def test_bundles_that_hold_themselves_end():
     data = osc.write_message("/deep", 1)
     for _ in range(50):

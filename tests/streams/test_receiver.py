@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -15,19 +17,12 @@ TOLERANCE = 0.0051
 
 
 @pytest.mark.parametrize("joins", np.arange(0.3, 2.5, 0.37).round(2))
-def test_somebody_who_joins_is_shown_the_motion_within_0_3_s(joins: float) -> None:
+@pytest.mark.parametrize("answers", [True, False])
+def test_somebody_who_joins_is_soon_shown_the_motion(joins: float, answers: bool) -> None:
     own = body()
-    outcome = run(own, *dance(own, joins + 1.5), heard_from=joins)
-    assert outcome.now[0] < joins + 0.3
-    assert outcome.errors.max() <= TOLERANCE
-
-
-@pytest.mark.parametrize("joins", np.arange(0.3, 2.5, 0.37).round(2))
-def test_somebody_who_joins_unheard_is_shown_it_within_one_refresh(joins: float) -> None:
-    own = body()
-    outcome = run(own, *dance(own, joins + 2.0), heard_from=joins, answers=False)
-    # A refresh, and from its first knot on the delay.
-    assert outcome.now[0] < joins + 1.0 + 0.02 + 0.1
+    outcome = run(own, *dance(own, joins + 2.0), heard_from=joins, answers=answers)
+    # Unheard within a refresh, and from its first knot on the delay.
+    assert outcome.now[0] < joins + (0.3 if answers else 1.0 + 0.02 + 0.1)
     assert outcome.errors.max() <= TOLERANCE
 
 
@@ -48,20 +43,21 @@ def test_latency_that_changes_for_good(before: float, after: float, answers: boo
     assert outcome.steps.max() < 3.0 * usual
 
 
-@pytest.mark.parametrize("step", [5.0, -5.0])
-def test_a_clock_that_steps_is_a_new_offset(step: float) -> None:
+@pytest.mark.parametrize(
+    ("whose", "step"),
+    [
+        *itertools.product(["the receiver's"], [5.0, -5.0]),
+        *itertools.product(["the sender's", "the sender's unheard"], [5.0, -5.0, -0.7]),
+    ],
+)
+def test_a_clock_that_steps_is_no_motion(whose: str, step: float) -> None:
     own = body()
-    outcome = run(own, *dance(own, 6.0), clock=lambda now: now + 1000.0 + step * (now > 3.0))
-    assert outcome.errors.max() <= TOLERANCE
-    assert np.diff(outcome.moments).min() >= 0.0
-    assert (outcome.now - outcome.moments)[outcome.now > 4.0].max() < 0.13
-
-
-@pytest.mark.parametrize("step", [5.0, -5.0, -0.7])
-@pytest.mark.parametrize("answers", [True, False])
-def test_a_sender_s_clock_that_steps_is_no_motion(step: float, answers: bool) -> None:
-    own = body()
-    outcome = run(own, *dance(own, 6.0), set_by=lambda now: step * (now > 3.008), answers=answers)
+    if whose == "the receiver's":
+        outcome = run(own, *dance(own, 6.0), clock=lambda now: now + 1000.0 + step * (now > 3.0))
+        assert (outcome.now - outcome.moments)[outcome.now > 4.0].max() < 0.13
+    else:
+        heard = whose == "the sender's"
+        outcome = run(own, *dance(own, 6.0), set_by=lambda now: step * (now > 3.008), answers=heard)
     assert outcome.errors.max() <= TOLERANCE
     assert np.diff(outcome.moments).min() >= 0.0
 
@@ -114,28 +110,6 @@ def test_a_datagram_that_is_lost_costs_no_later_one_its_meaning(number: int, ans
     assert outcome.between(sent[0] + 0.5, 4.0).max() <= TOLERANCE
 
 
-def test_datagrams_in_any_order_come_to_the_same_motion() -> None:
-    own = body()
-    samples = dance(own, 6.0)
-    outcome = run(own, *samples, latency=0.05, jitter=0.25)
-    sequences = [int.from_bytes(datagram[4:6], "little") for _, datagram in outcome.datagrams]
-    assert len(sequences) > 40
-    assert np.mean(outcome.between(3.0, 6.0) <= TOLERANCE) > 0.8
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("loss", "within"), [(0.01, 0.98), (0.05, 0.93), (0.2, 0.7)])
-def test_loss(loss: float, within: float) -> None:
-    own = body()
-    rng = np.random.default_rng(3)
-    outcome = run(own, *dance(own, 20.0), lost=lambda now, count: rng.random() < loss, latency=0.03)
-    assert np.mean(outcome.errors <= 0.02) >= within
-    patience = 0.5 + 0.4 * (loss > 0.1)
-    bad = outcome.now[outcome.errors > 0.02]
-    for first in bad[bad < outcome.now[-1] - patience]:
-        assert outcome.between(first, first + patience).min() <= TOLERANCE
-
-
 @pytest.mark.parametrize("answers", [True, False])
 @pytest.mark.parametrize(("loss", "within"), [(0.0, 1.0), (0.01, 0.98), (0.05, 0.93), (0.2, 0.6)])
 def test_a_long_way_with_jitter_loss_and_duplicates(loss: float, within: float, answers: bool) -> None:
@@ -158,17 +132,6 @@ def test_where_datagrams_are_lost_no_hand_goes_back_against_its_motion(loss: flo
     outcome = run(own, *samples, lost=lost, latency=0.21, jitter=0.08, seed=seed)
     # Half a centimetre in one picture is a jump; corrections of what was never sent are gentler.
     assert outcome.turned_back[outcome.now[2:] > 2.0].max() < 0.005
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("answers", [True, False])
-def test_where_datagrams_are_lost_no_joint_leaps_back_to_the_motion(answers: bool) -> None:
-    own = body()
-    samples = dance(own, 4.0, speed=3.0)
-    usual = run(own, *samples, answers=answers).steps.max()
-    for number in (10, 14, 18):
-        lost = lambda now, count: count in (number, number + 1)  # noqa: B023, E731
-        assert run(own, *samples, lost=lost, answers=answers).steps.max() < 3.0 * usual
 
 
 @pytest.mark.parametrize("answers", [True, False])
@@ -196,30 +159,14 @@ def test_where_much_is_lost_everything_is_sent_twice() -> None:
     assert len(sent[False]) == len(set(sent[False]))
 
 
-def test_a_sender_that_begins_again_is_told_by_its_identity() -> None:
-    own = body()
-    times, poses = dance(own, 4.0)
-    receiver, again = Receiver(), Sender([own], rate=60.0)
-    sender = Sender([own], rate=60.0)
-    for row, time in enumerate(times.tolist()):
-        # It begins with times of its own.
-        datagrams = sender.add(time, poses[:, row]) if time < 2.0 else again.add(time - 2.0, poses[:, row])
-        for datagram in datagrams:
-            receiver.take(datagram, 50.0 + time, "somebody")
-        receiver.show(50.0 + time)
-    (stream, shown), *others = receiver.show(54.0).items()
-    assert not others
-    assert stream.identity == again.identity != sender.identity
-    assert 1.8 < shown.moment < 2.0
-
-
-def test_replays_of_a_sender_that_is_gone_change_nothing() -> None:
+def test_a_sender_that_begins_again_is_told_by_its_identity_and_replays_of_the_one_before_change_nothing() -> None:
     own = body()
     times, poses = dance(own, 4.0)
     receiver, old = Receiver(), []
     first, sender = Sender([own], rate=60.0), Sender([own], rate=60.0)
     for row, time in enumerate(times.tolist()):
-        datagrams = (first if time < 2.0 else sender).add(time, poses[:, row])
+        # It begins with times of its own.
+        datagrams = first.add(time, poses[:, row]) if time < 2.0 else sender.add(time - 2.0, poses[:, row])
         old += datagrams if time < 2.0 else []
         for datagram in datagrams:
             receiver.take(datagram, time, "somebody")
@@ -228,6 +175,7 @@ def test_replays_of_a_sender_that_is_gone_change_nothing() -> None:
         shown = receiver.show(time)
         if time > 2.2:
             assert [stream.identity for stream in shown] == [sender.identity]
+    assert [1.8 < one.moment < 2.0 for one in shown.values()] == [True]
 
 
 def test_several_senders_do_not_mix() -> None:

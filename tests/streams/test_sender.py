@@ -56,20 +56,12 @@ def swing(rate: float) -> tuple[Body, np.ndarray, Poses]:
 
 
 @pytest.mark.parametrize("rate", [60.0, 91.0, 120.0])
-def test_a_fast_hand_is_within_the_tolerance_between_samples(rate: float) -> None:
-    own, times, poses = swing(rate)
-    speeds = np.linalg.norm(np.diff(poses.positions[0], axis=0), axis=-1) * rate
-    assert 18.0 < speeds.max() < 25.0
-    outcome = run(own, times, poses, fps=1000.0)
-    assert outcome.errors.max() <= 0.005 * SLACK
-
-
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("uneven", [0.0, 0.001])
 @pytest.mark.parametrize("answers", [True, False])
-def test_uneven_samples_are_shown_within_the_tolerance_between_them(seed: int, answers: bool) -> None:
-    """Knots lie on a grid, beside the samples; one just behind the start of a window is seen by no sample."""
-    own, times, poses = swing(90.0)
-    times = times + np.random.default_rng(seed).uniform(0.0, 0.001, len(times))
+def test_a_fast_hand_is_within_the_tolerance_between_samples(rate: float, uneven: float, answers: bool) -> None:
+    """Knots lie on a grid, beside uneven samples; one just behind the start of a window is seen by no sample."""
+    own, times, poses = swing(rate)
+    times = times + np.random.default_rng(int(rate)).uniform(0.0, uneven, len(times))
     outcome = run(own, times, poses, fps=1000.0, answers=answers)
     assert outcome.errors.max() <= 0.005 * SLACK
 
@@ -135,17 +127,6 @@ def test_finish_says_the_rest() -> None:
         said.append(len(sender.finish()))
         assert sender.finish() == []
     assert set(said) == {0, 1}
-
-
-def test_a_clock_that_is_set_makes_no_difference() -> None:
-    own = body()
-    times, poses = dance(own, 3.0)
-    sent = []
-    for set_by in (0.0, 5.0, -5.0):
-        sender, own_clock = Sender([own], rate=60.0), times + set_by * (times > 1.5)
-        sent.append([[d[4:] for d in sender.add(float(t), poses[:, row])] for row, t in enumerate(own_clock)])
-    usual, *others = (sum(len(datagram) for datagrams in run for datagram in datagrams) for run in sent)
-    assert others == pytest.approx([usual, usual], rel=0.03)
 
 
 @pytest.mark.parametrize("wrong", [{"tolerance": 0.0}, {"delay": float("nan")}, {"keepalive": -1.0}])

@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 from pythonosc.osc_bundle import OscBundle
-from pythonosc.osc_message_builder import OscMessageBuilder
 
 from rigid_motion.live.driving import Retargeting, matched
 from rigid_motion.motion import Poses, Skeleton, shell_error
@@ -23,17 +22,10 @@ from rigid_motion.streams.vmc import (
     write,
     write_trackers,
 )
+from tests.live.performing import JOINTS as NAMES
+from tests.live.performing import PARENTS, PLACES
+from tests.motion.cases import random_quaternions
 from tests.thoroughness import sample
-
-NAMES = ("Hips", "Spine", "Chest", "Neck", "Head", "LeftUpperArm", "LeftLowerArm", "LeftHand", "LeftUpperLeg")
-NAMES += ("LeftLowerLeg", "LeftFoot")
-PARENTS = np.array([-1, 0, 1, 2, 3, 2, 5, 6, 0, 8, 9])
-PLACES = np.array(
-    [
-        *([0.0, 0.0, 0.9], [0.0, 0.0, 0.1], [0.0, 0.0, 0.2], [0.0, 0.0, 0.2], [0.0, 0.0, 0.1]),
-        *([0.2, 0.0, 0.15], [0.3, 0.0, 0.0], [0.25, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, -0.4], [0.0, 0.0, -0.4]),
-    ]
-)
 
 
 def world(body: Body, poses: Poses) -> Poses:
@@ -47,14 +39,9 @@ def about(axis: int, degrees: float) -> np.ndarray:
     return quaternion
 
 
-def random_turns(count: int, seed: int = 1) -> np.ndarray:
-    turns = np.random.default_rng(seed).normal(size=(count, 4))
-    return turns / np.linalg.norm(turns, axis=1, keepdims=True)
-
-
 def frame(seed: int) -> dict[str, Poses]:
     """A pose of all bones, in their parents' space."""
-    turns = random_turns(len(NAMES), seed)
+    turns = random_quaternions(np.random.default_rng(seed), len(NAMES))
     return {name: Poses(PLACES[row], turns[row]) for row, name in enumerate(NAMES)}
 
 
@@ -81,31 +68,6 @@ def test_a_frame_is_what_the_documentation_says_it_is():
     assert max(map(len, write(0.0, {name: frame(1)["Hips"] for name in JOINTS}))) < 1400
 
 
-def test_what_another_program_sends_in_single_messages_is_shown():
-    def message(address: str, *arguments: object) -> bytes:
-        builder = OscMessageBuilder(address)
-        for argument in arguments:
-            builder.add_arg(argument)
-        return builder.build().dgram
-
-    receiver = Receiver(delay=0.0)
-    for second in range(3):
-        datagrams = [
-            message("/VMC/Ext/OK", 1, 3, 0, 1),
-            message("/VMC/Ext/Root/Pos", "root", *[0.0] * 6, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0),
-            message("/VMC/Ext/Bone/Pos", "Hips", 0.0, 1.0, 0.1 * second, 0.0, 0.0, 0.0, 1.0),
-            message("/VMC/Ext/Bone/Pos", "Tail", 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0),
-            message("/VMC/Ext/Blend/Val", "Joy", 1.0),
-            message("/VMC/Ext/Blend/Apply"),
-            message("/VMC/Ext/T", 100.0 + 0.1 * second),
-        ]
-        heard(datagrams, 0.1 * second, receiver)
-    (shown,) = receiver.show(0.15).values()
-    assert shown.bodies[0].joints == (ROOT, "Hips")
-    assert shown.moment == pytest.approx(100.15)
-    assert shown.poses["VMC"].positions[1] == pytest.approx([0.0, -0.15, 1.0], abs=1e-5)
-
-
 OK_1 = b"/VMC/Ext/OK\0,i\0\0\0\0\0\1"
 OK_3 = b"/VMC/Ext/OK\0,iii\0\0\0\0\0\0\0\1\0\0\0\3\0\0\0\0"
 OK_4 = b"/VMC/Ext/OK\0,iiii\0\0\0\0\0\0\1\0\0\0\3\0\0\0\0\0\0\0\1"
@@ -118,6 +80,7 @@ POSE_7 = b"\x3f\x80\0\0\x40\0\0\0\x40\x40\0\0" + b"\0\0\0\0\x3f\x35\x04\xf3\0\0\
 ROOT_7 = b"/VMC/Ext/Root/Pos\0\0\0,sfffffff\0\0\0root\0\0\0\0" + POSE_7
 ROOT_13 = b"/VMC/Ext/Root/Pos\0\0\0,sfffffffffffff\0root\0\0\0\0" + POSE_7 + 3 * b"\x3f\x80\0\0" + 12 * b"\0"
 HIPS = b"/VMC/Ext/Bone/Pos\0\0\0,sfffffff\0\0\0Hips\0\0\0\0" + POSE_7
+TAIL = HIPS.replace(b"Hips", b"Tail")
 JOY = b"/VMC/Ext/Blend/Val\0\0,sf\0Joy\0\x3f\x80\0\0"
 
 
@@ -131,7 +94,7 @@ def bundled(*messages: bytes) -> bytes:
 @pytest.mark.parametrize("pack", ["one by one", "a frame in a bundle", "a bundle for each"])
 def test_bytes_written_after_the_documentation_are_shown(available, root, pack):
     """Every form of https://protocol.vmc.info/marionette-spec, in any packing that OSC allows."""
-    messages = [available, root, HIPS, JOY, TIME]
+    messages = [available, root, HIPS, TAIL, JOY, TIME]
     datagrams = {
         "one by one": messages,
         "a frame in a bundle": [bundled(*messages)],
@@ -205,7 +168,7 @@ def test_trackers_that_are_written_are_shown_without_times():
     receiver, rng = Receiver(delay=0.0), np.random.default_rng(2)
     places = rng.normal(size=(4, MOST_DEVICES + 5, 3))
     for row in range(4):
-        turns = random_turns(MOST_DEVICES + 5, row)
+        turns = random_quaternions(rng, MOST_DEVICES + 5)
         poses = {f"ball {number}": Poses(places[row, number], turns[number]) for number in range(MOST_DEVICES + 5)}
         heard(write_trackers(poses), 0.1 * row, receiver)
     (keys,) = receiver.keys()
@@ -223,7 +186,7 @@ def skeleton(rest_turns: np.ndarray, arms_down: float, larger: float, prefix: st
 
 
 def test_a_skeleton_of_another_size_rest_and_naming_does_the_same():
-    joints, rest = skeleton(random_turns(len(NAMES), 5), 50.0, 1.25, "mixamorig:")
+    joints, rest = skeleton(random_quaternions(np.random.default_rng(5), len(NAMES)), 50.0, 1.25, "mixamorig:")
     performer = Performer(tuple(joints), rest)
     assert list(performer.bones) == [name for name in HUMANOID if name in NAMES]
     # At rest its arms hang down; in a T-pose nothing is turned at all.

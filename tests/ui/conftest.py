@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import write_channel
+from tests.animation.keyed import curves_of
 from tests.animation.scenes import new_object
 
 FRAMES = np.array((1.0, 11.0, 21.0, 41.0))
@@ -33,8 +34,8 @@ def keyed(name: str, rotation_mode: str = "QUATERNION") -> bpy.types.Object:
     return obj
 
 
-def select_keys(obj: bpy.types.Object, *frames: float) -> None:
-    """Have these keys of an object selected, and no others."""
-    for fcurve in obj.animation_data.action.layers[0].strips[0].channelbag(obj.animation_data.action_slot).fcurves:
+def select_keys(carrier: bpy.types.Object | bpy.types.PoseBone, *frames: float) -> None:
+    """Have these keys of an object or a bone selected, and no others of it."""
+    for fcurve in curves_of(carrier).values():
         for key in fcurve.keyframe_points:
             key.select_control_point = key.co.x in frames

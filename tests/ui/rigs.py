@@ -2,73 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-
 import bpy
 import numpy as np
 
-from rigid_motion.animation import write_channel
-from tests.animation.scenes import new_object
+from rigid_motion.animation.transforms import transform_of
+from rigid_motion.ui.overlay.cache import paths_of
+from rigid_motion.ui.overlay.kinds import space_of_bone
+from rigid_motion.ui.overlay.points import Path
+from tests.animation.bones import rigs
+from tests.animation.bones.rigs import Rest, select_bones
 
-NAMES = ("Hip", "Arm", "Hand")
 FRAMES = np.array((1.0, 11.0, 21.0, 41.0))
+CHAIN = (
+    Rest("Hip", (0.0, 0.0, 0.0), (0.0, 0.3, 0.8), roll=0.3),
+    Rest("Arm", (0.1, 0.0, 1.0), (0.1, 0.3, 1.8), "Hip", 0.3),
+    Rest("Hand", (0.2, 0.0, 2.0), (0.2, 0.3, 2.8), "Arm", 0.3),
+)
 
 
-def new_rig(name: str = "Rig", bones: Sequence[str] = NAMES) -> bpy.types.Object:
-    """An armature with a chain of bones that lean, each the child of the one before, in Pose Mode."""
-    if bpy.context.mode != "OBJECT":
-        bpy.ops.object.mode_set(mode="OBJECT")
-    rig = new_object(name, data=bpy.data.armatures.new(name))
-    rig.location = (1.0, 2.0, 3.0)
-    rig.rotation_quaternion = (0.8, 0.0, 0.6, 0.0)
-    rig.select_set(True)
-    bpy.context.view_layer.objects.active = rig
-    bpy.ops.object.mode_set(mode="EDIT")
-    before = None
-    for number, bone_name in enumerate(bones):
-        bone = rig.data.edit_bones.new(bone_name)
-        bone.head, bone.tail = (0.1 * number, 0.0, float(number)), (0.1 * number, 0.3, number + 0.8)
-        bone.roll, bone.parent = 0.3, before
-        before = bone
-    bpy.ops.object.mode_set(mode="POSE")
-    select(rig, ())
+def new_rig(name: str = "Rig", **settings: object) -> bpy.types.Object:
+    """An armature that leans, in Pose Mode without a selected bone. `settings` are properties of its hand."""
+    rig = rigs.new_rig(name, CHAIN, **settings)
+    rig.rotation_mode, rig.location, rig.rotation_quaternion = "QUATERNION", (1.0, 2.0, 3.0), (0.8, 0.0, 0.6, 0.0)
+    rigs.pose_mode(rig)
+    select_bones(rig)
     return rig
 
 
-def key_bone(bone: bpy.types.PoseBone, *, seed: int = 0, paths: Iterable[str] = ("location", "rotation_quaternion")):
-    """Key these channels of a bone at random, all of it in a group of its name."""
-    random = np.random.default_rng((seed, *map(ord, bone.name)))
-    prefix = f'pose.bones["{bone.name}"].'
-    for path in paths:
-        values = random.normal(size=(len(FRAMES), 4 if path == "rotation_quaternion" else 3))
-        if path == "scale":
-            values = np.exp(0.3 * np.repeat(values[:, :1], 3, axis=1))
-        write_channel(bone.id_data, prefix + path, FRAMES, values)
-    return bone
+def key_bone(bone: bpy.types.PoseBone, **how: object) -> bpy.types.PoseBone:
+    """Key a bone of this rig at random, which turns by less than half a turn from key to key."""
+    return rigs.key_bone(bone, FRAMES, seed=343, **how)
 
 
 def keyed_rig(name: str = "Rig") -> bpy.types.Object:
-    """A rig with keys on all bones, the first of which are selected but for the hip; the hand is the active bone."""
+    """A rig with keys on all bones, which are selected but for the hip; the hand is the active bone."""
     rig = new_rig(name)
     for bone in rig.pose.bones:
         key_bone(bone)
-    select(rig, ("Arm", "Hand"))
+    select_bones(rig, "Hand", "Arm")
     return rig
 
 
-def select(rig: bpy.types.Object, names: Iterable[str]) -> None:
-    """Have these bones of a rig selected, and no others; the last of them is the active one."""
-    names = list(names)
-    for bone in rig.pose.bones:
-        (bone if bpy.app.version >= (5, 0) else bone.bone).select = bone.name in names
-    rig.data.bones.active = rig.data.bones[names[-1]] if names else None
-
-
-def select_keys(bone: bpy.types.PoseBone, *frames: float) -> None:
-    """Have these keys of a bone selected, and no others of it."""
-    data = bone.id_data.animation_data
-    prefix = f'pose.bones["{bone.name}"].'
-    for fcurve in data.action.layers[0].strips[0].channelbag(data.action_slot).fcurves:
-        if fcurve.data_path.startswith(prefix):
-            for key in fcurve.keyframe_points:
-                key.select_control_point = key.co.x in frames
+def path_and_space(bone: bpy.types.PoseBone) -> tuple[Path, np.ndarray]:
+    """The path of a bone, and the space (4, 4) that the overlay draws it in on the current frame."""
+    target = transform_of(bone)
+    space, turned = space_of_bone(bone, bpy.context.evaluated_depsgraph_get())
+    (path,) = paths_of([target], bpy.context.scene, {target: turned})
+    return path, np.array(space)

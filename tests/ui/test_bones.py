@@ -22,11 +22,12 @@ from rigid_motion.ui.targets import (
 )
 from rigid_motion.ui.wording import BLENDED, TROUBLES
 from tests.animation.bones.poses import seen
+from tests.animation.bones.rigs import select_bones
 from tests.animation.scenes import editor
 from tests.rigs.recorded import FRAMES as RECORDED
 from tests.rigs.recorded import recorded_rig
-from tests.ui.conftest import keyed
-from tests.ui.rigs import FRAMES, key_bone, keyed_rig, new_rig, select, select_keys
+from tests.ui.conftest import keyed, select_keys
+from tests.ui.rigs import FRAMES, key_bone, keyed_rig, new_rig
 from tests.ui.test_menus import drawn
 
 operators = bpy.ops.rigid_motion
@@ -180,8 +181,8 @@ def test_the_transform_on_screen_is_that_of_the_bone(extension, order):
     bone = rig.pose.bones["Hand"]
     bone.rotation_mode = order
     rotation = "rotation_quaternion" if order == "QUATERNION" else "rotation_euler"
-    key_bone(bone, paths=("location", rotation, "scale"))
-    select(rig, ("Hand",))
+    key_bone(bone, scale="even")
+    select_bones(rig, "Hand")
     set_mode(bone, SCREW)
     bpy.context.scene.frame_set(6)
     before = seen(rig, "Hand")
@@ -197,49 +198,29 @@ def test_the_transform_on_screen_is_that_of_the_bone(extension, order):
     assert seen(rig, "Hand") == pytest.approx(before, abs=1e-5)
 
 
-def _remove(bone):
-    bone.constraints.remove(bone.constraints[CONSTRAINT])
-
-
-def _mute(bone):
-    bone.constraints[CONSTRAINT].mute = True
-
-
-def _weaken(bone):
-    bone.constraints[CONSTRAINT].influence = 0.5
-
-
-def _change(bone):
-    bone.constraints[CONSTRAINT].mix_mode = "AFTER_FULL"
-
-
-def _put_behind(bone):
+def put_behind(bone):
     bone.constraints.new("COPY_LOCATION").target = bone.id_data
     bone.constraints.move(1, 0)
 
 
-def _rename(bone):
-    bone.constraints[CONSTRAINT].name = "Mine"
-
-
-def _go_by_a_target(bone):
-    bone.constraints[CONSTRAINT].use_eval_time = False
-
-
-def _show_another(bone):
+def show_another(bone):
     animation.set_enabled(False)
-    bone.constraints[CONSTRAINT].action = bpy.data.actions.new("Other")
+    ours(bone).action = bpy.data.actions.new("Other")
+
+
+def ours(bone):
+    return bone.constraints[CONSTRAINT]
 
 
 TAMPERINGS = [
-    (_remove, REMOVED),
-    (_rename, REMOVED),
-    (_go_by_a_target, REMOVED),
-    (_show_another, OTHER_SLOT),
-    (_mute, MUTED),
-    (_change, CHANGED),
-    (_put_behind, NOT_FIRST),
-    (_weaken, WEAK),
+    (lambda bone: bone.constraints.remove(ours(bone)), REMOVED),
+    (lambda bone: setattr(ours(bone), "name", "Mine"), REMOVED),
+    (lambda bone: setattr(ours(bone), "use_eval_time", False), REMOVED),
+    (show_another, OTHER_SLOT),
+    (lambda bone: setattr(ours(bone), "mute", True), MUTED),
+    (lambda bone: setattr(ours(bone), "mix_mode", "AFTER_FULL"), CHANGED),
+    (put_behind, NOT_FIRST),
+    (lambda bone: setattr(ours(bone), "influence", 0.5), WEAK),
 ]
 
 

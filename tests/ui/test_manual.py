@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import tomllib
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from rigid_motion.ui import manual, operators
 from rigid_motion.ui.overlay.settings import RigidMotionOverlay
 from rigid_motion.ui.preferences import RigidMotionPreferences
 from rigid_motion.ui.shown import ShownTransform
+from tests.test_glossary import anchors
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -21,12 +21,6 @@ ROOT = Path(__file__).resolve().parents[2]
 def page(doc_id: str) -> str | None:
     """What Blender opens for the identity that it gives a button, for instance "RIGID_MOTION_OT_bake.step"."""
     return WM_OT_doc_view_manual._lookup_rna_url(_wm_doc_get_id(doc_id, do_url=False), verbose=False)
-
-
-def anchors(text: str) -> set[str]:
-    """What headings of a page can be reached by."""
-    headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
-    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
 @pytest.mark.parametrize("cls", operators.CLASSES, ids=lambda cls: cls.__name__)

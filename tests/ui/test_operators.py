@@ -9,7 +9,7 @@ import pytest
 from rigid_motion.animation import bake_poses, is_baked, key_frames, modes_of, read_poses, reduction_of
 from rigid_motion.motion import MODES, Poses, interpolate, shell_error
 from rigid_motion.ui import CLASSES, gltf_export, live, pose_operators
-from tests.animation.keyed import curves_of
+from tests.animation.keyed import curves_of, snapshot
 from tests.animation.scenes import new_object
 from tests.ui.conftest import FRAMES, keyed, select_keys
 
@@ -21,17 +21,6 @@ OPERATORS = [cls for cls in CLASSES if issubclass(cls, bpy.types.Operator)]
 def modes(obj):
     """The modes of the three segments."""
     return modes_of(obj, FRAMES[:-1])
-
-
-def values(obj):
-    """All keys of an object, values and frames."""
-    slot = obj.animation_data.action_slot
-    fcurves = obj.animation_data.action.layers[0].strips[0].channelbag(slot).fcurves
-    return {
-        (fcurve.data_path, fcurve.array_index): [tuple(key.co) for key in fcurve.keyframe_points]
-        for fcurve in fcurves
-        if fcurve.keyframe_points
-    }
 
 
 def turns(obj):
@@ -187,7 +176,7 @@ def recorded(name: str = "Tool", size: float = 1.0) -> bpy.types.Object:
 
 def test_the_best_mode_of_each_segment_is_said_and_is_one_step_to_undo(extension, capfd):
     obj = recorded()
-    before = values(obj)
+    before = snapshot(obj)
     bpy.ops.ed.undo_push(message="recording")
     assert operators.reduce_keys(mode="lerp_slerp", tolerance=0.1, radius=0.5, best_of=True) == {"FINISHED"}
     bpy.ops.ed.undo_push(message="reduction")
@@ -199,7 +188,7 @@ def test_the_best_mode_of_each_segment_is_said_and_is_one_step_to_undo(extension
     for mode, count in segments.items():
         assert f"{count} {MODES[mode].short_label}" in said
     bpy.ops.ed.undo()
-    assert values(bpy.data.objects["Tool"]) == before
+    assert snapshot(bpy.data.objects["Tool"]) == before
 
 
 def test_the_tolerance_is_a_millimetre_in_any_unit(extension):
@@ -229,15 +218,15 @@ def test_each_object_has_the_radius_of_its_own_size(extension):
 
 def test_reduced_keys_are_restored_or_the_others_discarded(extension):
     obj = recorded()
-    before = values(obj)
+    before = snapshot(obj)
     operators.reduce_keys(tolerance=0.02)
     assert operators.restore_keys() == {"FINISHED"}
-    assert values(obj) == before
+    assert snapshot(obj) == before
     assert not operators.restore_keys.poll()
     operators.reduce_keys(tolerance=0.02)
-    reduced = values(obj)
+    reduced = snapshot(obj)
     assert operators.discard_dense_keys() == {"FINISHED"}
-    assert values(obj) == reduced
+    assert snapshot(obj) == reduced
     assert not operators.restore_keys.poll()
     assert not operators.discard_dense_keys.poll()
     assert [action.name for action in bpy.data.actions] == ["ToolAction Reduced"]

@@ -8,15 +8,20 @@ from collections.abc import Iterator
 import bpy
 import numpy as np
 import pytest
-from mathutils import Euler
 
 from rigid_motion.animation import key_frames, set_mode
 from rigid_motion.ui.pose_operators import Switch, switches_in, switches_of
 from tests.animation.bones.poses import seen
 from tests.animation.bones.rigs import pose_mode, select_bones
+from tests.rigs.poses import key_controls
 
 HAND, TORSO, POLE = "hand_ik.L", "torso", "upper_arm_ik_target.L"
 PARENTS = {"None": 0, "Root": 1, "Torso": 2, "Hips": 3, "Chest": 4, "Head": 5}
+POSES = {
+    HAND: ((0.3, -0.2, 0.4), (0.9, 0.7, 1.2)),
+    POLE: ((0.1, 0.2, -0.2), (0.4, 0.2, 0.0)),
+    TORSO: ((0.2, 0.3, 0.1), (0.2, 0.5, 1.4)),
+}
 KEYS = 1, 21
 STAYS = 1e-5
 """Meters, and parts of axes."""
@@ -27,23 +32,10 @@ def rig(human, extension) -> Iterator[bpy.types.Object]:
     """The human in Pose Mode with its own operators, a screw on the left hand, on its pole and on the torso."""
     script = human["rig_ui"].as_module()
     pose_mode(human)
-    key(human, HAND, (0.3, -0.2, 0.4), (0.9, 0.7, 1.2))
-    key(human, POLE, (0.1, 0.2, -0.2), (0.4, 0.2, 0.0))
-    key(human, TORSO, (0.2, 0.3, 0.1), (0.2, 0.5, 1.4))
+    key_controls(human, POSES, KEYS)
+    set_mode([human.pose.bones[name] for name in POSES], "dq_sclerp")
     yield human
     script.unregister()
-
-
-def key(rig: bpy.types.Object, name: str, location: tuple, angles: tuple) -> None:
-    bone = rig.pose.bones[name]
-    bone.rotation_mode = "QUATERNION"
-    for frame, part in zip(KEYS, (0.0, 1.0), strict=True):
-        bone.location = np.multiply(location, part)
-        bone.rotation_quaternion = Euler(np.multiply(angles, part)).to_quaternion()
-        for path in ("location", "rotation_quaternion", "scale"):
-            bone.keyframe_insert(path, frame=frame)
-    set_mode(bone, "dq_sclerp")
-    select_bones(rig, name)
 
 
 def go(frame: int) -> None:
@@ -168,17 +160,12 @@ def test_buttons_are_read_from_the_script_of_a_rig():
     ("written", "instead"),
     [
         ("'hand'", "name()"),
-        ("'hand'", "7"),
-        ("'hand'", "'hand"),
         ("props.bone", "props.bones"),
-        ('["None", "Root"]', "None, Root"),
         ('["None", "Root"]', "[1, 2]"),
         ('\'["None", "Root"]\'', "3"),
         ("(False, True, False)", "None"),
         ("(False, True, False)", "(False,)"),
-        ("(False, True, False)", "(" * 5000),
         ("(False, True, False)", "-" * 50000 + "1"),
-        ('text="Bob\'s", ', ""),
         ("'pose.rigify_switch_parent_abc'", "'pose.rigify_switch_parent_abc' + name"),
         ("                props.locks = (False, True, False)\n", ""),
     ],

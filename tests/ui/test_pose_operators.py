@@ -30,36 +30,27 @@ def rig(request, extension) -> bpy.types.Object:
     return rig
 
 
-def key_pose(rig: bpy.types.Object, name: str = "Hand.L") -> None:
+def key_pose(rig: bpy.types.Object, name: str) -> None:
     bone = rig.pose.bones[name]
     for path in ("location", rotation_path(bone)):
         bone.keyframe_insert(path)
 
 
-def test_a_copied_pose_is_pasted_as_it_was_seen(rig, extension):
-    copied = seen(rig, "Hand.L")
+@pytest.mark.parametrize("side", ["L", "R"], ids=["as it is", "flipped"])
+def test_a_copied_pose_is_pasted_as_it_was_seen(rig, extension, side):
+    copied, name = seen(rig, "Hand.L"), f"Hand.{side}"
+    expected = copied if side == "L" else FLIP @ copied @ FLIP
     assert bpy.ops.rigid_motion.copy_pose("EXEC_DEFAULT", True) == {"FINISHED"}
     assert np.abs(seen(rig, "Hand.L") - copied).max() < 1e-5
     extension.scene.frame_set(OTHER)
-    assert np.abs(seen(rig, "Hand.L") - copied).max() > 0.1
-    bpy.ops.pose.paste("EXEC_DEFAULT", True)
-    assert np.abs(seen(rig, "Hand.L") - copied).max() < 2e-5
-    key_pose(rig)
-    assert OTHER in key_frames(rig.pose.bones["Hand.L"])
-    assert np.abs(seen(rig, "Hand.L") - copied).max() < 2e-5
+    assert np.abs(seen(rig, name) - expected).max() > 0.1
+    bpy.ops.pose.paste("EXEC_DEFAULT", True, flipped=side == "R")
+    assert np.abs(seen(rig, name) - expected).max() < 2e-5
+    key_pose(rig, name)
+    assert OTHER in key_frames(rig.pose.bones[name])
+    assert np.abs(seen(rig, name) - expected).max() < 2e-5
     extension.scene.frame_set(BETWEEN)
-    assert BETWEEN not in key_frames(rig.pose.bones["Hand.L"])
-
-
-def test_a_copied_pose_is_pasted_flipped_as_it_was_seen(rig, extension):
-    copied = seen(rig, "Hand.L")
-    bpy.ops.rigid_motion.copy_pose("EXEC_DEFAULT", True)
-    extension.scene.frame_set(OTHER)
-    bpy.ops.pose.paste("EXEC_DEFAULT", True, flipped=True)
-    flipped = FLIP @ copied @ FLIP
-    assert np.abs(seen(rig, "Hand.R") - flipped).max() < 2e-5
-    key_pose(rig, "Hand.R")
-    assert np.abs(seen(rig, "Hand.R") - flipped).max() < 2e-5
+    assert BETWEEN not in key_frames(rig.pose.bones[name])
 
 
 def test_an_asset_has_the_pose_that_was_seen(rig, extension):
@@ -77,17 +68,11 @@ def test_an_asset_has_the_pose_that_was_seen(rig, extension):
     assert np.abs(seen(rig, "Hand.L") - expected).max() < 2e-5
 
 
-def mute_a_channel(rig: bpy.types.Object, name: str = "Hand.L") -> tuple[bpy.types.PoseBone, str]:
-    """Mute a channel of a bone's rotation, and return the bone and the property."""
-    bone = rig.pose.bones[name]
+def test_a_pose_pasted_where_a_channel_is_muted_stays_until_the_frame_changes(rig, extension):
+    bone = rig.pose.bones["Hand.L"]
     path = rotation_path(bone)
     curve_of(bone, path, 1).mute = True
     bpy.context.view_layer.update()
-    return bone, path
-
-
-def test_a_pose_pasted_where_a_channel_is_muted_stays_until_the_frame_changes(rig, extension):
-    bone, path = mute_a_channel(rig)
     copied = seen(rig, "Hand.L")
     bpy.ops.rigid_motion.copy_pose("EXEC_DEFAULT", True)
     extension.scene.frame_set(OTHER)

@@ -18,10 +18,10 @@ from rigid_motion.ui.targets import (
     targets_of,
 )
 from rigid_motion.ui.wording import KEYED_BONES
+from tests.animation.bones.rigs import select_bones
 from tests.animation.scenes import editor
 from tests.rigs.recorded import NAMES, recorded_rig
 from tests.ui.conftest import FRAMES, keyed, select_keys
-from tests.ui.rigs import select
 
 
 @pytest.mark.parametrize("kind", KEY_EDITORS)
@@ -54,7 +54,7 @@ def test_in_a_key_editor_modes_are_for_the_selected_keys_of_all_objects_shown(to
 def test_a_rig_in_object_mode_is_reduced_and_restored_in_every_editor(extension, kind):
     rig = recorded_rig()
     rig.select_set(True)
-    select(rig, ())
+    select_bones(rig)
     keys = bpy.ops.rigid_motion
     with editor(kind) as space:
         if kind in KEY_EDITORS:

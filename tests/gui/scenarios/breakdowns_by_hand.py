@@ -6,10 +6,11 @@ import bpy
 import numpy as np
 
 from rigid_motion.motion import Poses, interpolate
-from tests.animation.keyed import snapshot
+from tests.animation.keyed import key_frames, snapshot
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
-from tests.gui.scenarios.bones_by_hand import ALIKE, SCREW, hand_bone, key_frames, now, pose_the_rig
+from tests.gui.keyed import hand_bone, now, pose_the_rig
+from tests.gui.scenarios.bones_by_hand import ALIKE, SCREW
 
 FRAME, WAY = 8, 300
 
@@ -21,77 +22,62 @@ def scenario(hand: Hand) -> Steps[None]:
     bpy.ops.ed.undo_push(message="Screw")
     yield from dragged_and_cancelled(hand, view)
     yield from dragged_and_confirmed(hand, view)
-    yield from typed_and_beyond(hand, view)
-    yield from pushed(hand, view)
+    yield from typed_beyond(hand, view)
     yield from in_the_dope_sheet(hand, hand.area("DOPESHEET_EDITOR"))
 
 
-def keys() -> Poses:
-    """The first two keys of the hand, as `make_the_rig` sets them."""
-    turns = [0.0, 1.6]
-    quaternions = [(np.cos(a / 2), 0.6 * np.sin(a / 2), 0.0, 0.8 * np.sin(a / 2)) for a in turns]
-    return Poses([(-1.0, -0.3, 0.4), (0.0, 0.0, 0.0)], quaternions)
-
-
 def assert_on_the_screw(factor: float) -> None:
-    expected = interpolate((0.0, 1.0), keys(), np.array([factor]), SCREW, extrapolate=True)
+    """The hand is on the way between its first two keys, as `make_the_rig` sets them."""
+    quaternions = [(np.cos(a / 2), 0.6 * np.sin(a / 2), 0.0, 0.8 * np.sin(a / 2)) for a in (0.0, 1.6)]
+    keys = Poses([(-1.0, -0.3, 0.4), (0.0, 0.0, 0.0)], quaternions)
+    expected = interpolate((0.0, 1.0), keys, np.array([factor]), SCREW, extrapolate=True)
     np.testing.assert_allclose(now()[:3, 3], expected.positions[0], atol=ALIKE)
     turned = np.array(hand_bone().rotation_quaternion.normalized())
     np.testing.assert_allclose(turned * np.sign(turned @ expected.quaternions[0]), expected.quaternions[0], atol=ALIKE)
+    assert key_frames(hand_bone()).tolist() == [1, FRAME, 20, 40]
 
 
-def start(hand: Hand, view: bpy.types.Area, label: str, picture: str | None = None) -> Steps[tuple[int, int]]:
+def start(hand: Hand, view: bpy.types.Area) -> Steps[tuple[int, int]]:
     """Run it from Pose > In-Betweens; where the mouse is then."""
     centre = places.centre(places.region(view))
     yield from hand.hover(centre)
     with bpy.context.temp_override(window=hand.window, area=view, region=places.region(view)):
         bpy.ops.wm.call_menu("INVOKE_DEFAULT", name="VIEW3D_MT_pose_slide")
     yield 0.3
-    if picture:
-        yield from hand.picture(picture)
-    yield from hand.choose(label)
+    yield from hand.choose("Breakdown along Mode")
     yield 0.2
     return hand.place
 
 
 def dragged_and_cancelled(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     before, seen, steps = snapshot(hand_bone()), now(), undo_steps()
-    x, y = yield from start(hand, view, "Breakdown along Mode", "menu")
+    x, y = yield from start(hand, view)
     assert_on_the_screw(0.5)
-    yield from hand.picture("half-way")
     yield from hand.glide((x + WAY // 5, y), 4)
     yield
     assert_on_the_screw(0.7)
-    assert key_frames() == [1, FRAME, 20, 40]
     yield from hand.picture("dragged")
     yield from hand.press("ESC")
     assert snapshot(hand_bone()) == before, "Esc leaves the keys as they were"
     np.testing.assert_allclose(now(), seen, atol=1e-6)
     assert undo_steps() == steps, "and no undo step"
-    yield from hand.picture("cancelled")
 
 
 def dragged_and_confirmed(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     before, steps = snapshot(hand_bone()), undo_steps()
-    x, y = yield from start(hand, view, "Breakdown along Mode")
+    x, y = yield from start(hand, view)
     yield from hand.glide((x - 3 * WAY // 10, y), 4)
     yield from hand.click()
     assert_on_the_screw(0.2)
-    assert key_frames() == [1, FRAME, 20, 40]
     assert undo_steps() == steps + 1
-    yield from hand.picture("confirmed")
     yield from hand.press("Z", ctrl=True)
     assert snapshot(hand_bone()) == before, "one step back"
-    yield from hand.press("Z", ctrl=True, shift=True)
-    assert_on_the_screw(0.2)
-    yield from hand.press("Z", ctrl=True)
 
 
-def typed_and_beyond(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    yield from start(hand, view, "Breakdown along Mode")
+def typed_beyond(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    yield from start(hand, view)
     yield from hand.press("E")
     yield from hand.type("125")
-    yield from hand.picture("beyond")
     yield from hand.press("RET")
     assert_on_the_screw(1.25)
     yield from hand.press("F9")
@@ -101,25 +87,19 @@ def typed_and_beyond(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     yield from hand.press("Z", ctrl=True)
 
 
-def pushed(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    before = snapshot(hand_bone())
-    yield from start(hand, view, "Push from In-Between of Mode")
-    yield from hand.picture("push")
-    yield from hand.click(button="RIGHTMOUSE")
-    assert snapshot(hand_bone()) == before
-
-
 def in_the_dope_sheet(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
-    """By F3, for the bones whose channels are shown; the slider is in its header."""
+    """By F3, for the bones whose channels are shown; the slider is in its header. A right click cancels."""
     before = snapshot(hand_bone())
     yield from hand.hover(places.centre(places.region(sheet)))
-    yield from hand.search("Relax to In-Between of Mode")
-    yield 0.2
-    yield from hand.picture("dope-sheet")
-    yield from hand.press("RET")
-    assert key_frames() == [1, FRAME, 20, 40]
-    yield from hand.press("Z", ctrl=True)
-    assert snapshot(hand_bone()) == before
+    for ending in ("RET", "RIGHTMOUSE"):
+        yield from hand.search("Relax to In-Between of Mode")
+        yield 0.2
+        yield from hand.picture("dope-sheet")
+        yield from hand.press(ending)
+        if ending == "RET":
+            assert key_frames(hand_bone()).tolist() == [1, FRAME, 20, 40]
+            yield from hand.press("Z", ctrl=True)
+        assert snapshot(hand_bone()) == before
 
 
 def undo_steps() -> int:

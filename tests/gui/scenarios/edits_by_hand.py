@@ -1,11 +1,9 @@
-"""A screw that is edited by hand: keys moved and inserted, undone, played, every pose checked.
+"""A screw that is edited by hand: keys moved and inserted, undone, played, put somewhere with Auto Key.
 
 What is on the screen is held against `tests.animation.oracle` on every frame, after every edit.
 """
 
 from __future__ import annotations
-
-import math
 
 import bpy
 import numpy as np
@@ -14,10 +12,11 @@ from tests.animation.keyed import curves_of, key_frames, snapshot
 from tests.animation.oracle import assert_shown, expected_worlds, shown_worlds
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
+from tests.gui.keyed import FRAMES, cube, key_the_cube
 
-FRAMES = (1, 20, 40)
 WHOLE = range(1, 61)
 SCREW = "dq_sclerp"
+CURSOR = (1.0, 2.0, 0.5)
 
 ALIKE = 1e-5
 """What poses may differ by that are the same, in metres and in parts of a rotation matrix."""
@@ -26,27 +25,14 @@ HALF_WAY = 0.3
 """How far, in metres, the screw of these keys is at least from Blender's own way half-way between them."""
 
 
-def cube() -> bpy.types.Object:
-    """The default cube, asked for anew each time: undo replaces it."""
-    return bpy.data.objects["Cube"]
-
-
-def key_the_cube() -> None:
-    """Three keys, each a move with a turn about an axis that leans."""
-    obj = cube()
-    obj.rotation_mode = "QUATERNION"
-    for frame, location, angle in zip(FRAMES, ((-3, 0, 0), (0, 1, 1), (3, -1, 0)), (0, 1.8, 3.4), strict=True):
-        obj.location = location
-        obj.rotation_quaternion = (math.cos(angle / 2), 0.6 * math.sin(angle / 2), 0, 0.8 * math.sin(angle / 2))
-        obj.keyframe_insert("location", frame=frame)
-        obj.keyframe_insert("rotation_quaternion", frame=frame)
-    bpy.context.scene.frame_set(10)
-    bpy.ops.ed.undo_push(message="Keys")
-
-
 def shown() -> np.ndarray:
     """The cube's world matrices on all frames."""
     return shown_worlds([cube()], WHOLE)[0]
+
+
+def place() -> np.ndarray:
+    """Where the cube is on the screen."""
+    return np.array(cube().evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
 
 
 def assert_on_the_screw(*frames: float) -> None:
@@ -71,26 +57,22 @@ def scenario(hand: Hand) -> Steps[None]:
     yield from moved(hand, sheet)
     yield from inserted(hand, view, sheet)
     yield from played(hand, view)
+    bpy.context.scene.tool_settings.use_keyframe_insert_auto = True
+    yield from snapped(hand, view)
+    yield from typed(hand, sheet)
 
 
 def moved(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
     """The key in the middle comes later; undone and redone."""
-    before = shown()
     yield from hand.click(places.key(sheet, 20))
     yield from hand.press("G")
     yield from hand.glide(places.key(sheet, 28))
     yield from hand.click()
     assert_on_the_screw(1, 28, 40)
-    after = shown()
-    assert np.abs(after - before).max() > HALF_WAY
-    yield from hand.picture("key-moved")
-
     yield from hand.press("Z", ctrl=True)
     assert_on_the_screw(*FRAMES)
-    np.testing.assert_allclose(shown(), before, atol=ALIKE)
     yield from hand.press("Z", ctrl=True, shift=True)
     assert_on_the_screw(1, 28, 40)
-    np.testing.assert_allclose(shown(), after, atol=ALIKE)
 
 
 def inserted(hand: Hand, view: bpy.types.Area, sheet: bpy.types.Area) -> Steps[None]:
@@ -105,12 +87,9 @@ def inserted(hand: Hand, view: bpy.types.Area, sheet: bpy.types.Area) -> Steps[N
     np.testing.assert_allclose(shown(), before, atol=1e-3)
     stored = [curves_of(cube())["location", axis].evaluate(15) for axis in range(3)]
     np.testing.assert_allclose(stored, before[14, :3, 3], atol=ALIKE)
-    yield from hand.picture("key-inserted")
-
     yield from hand.press("Z", ctrl=True)
     assert_on_the_screw(1, 28, 40)
     assert snapshot(cube()) == keys
-    np.testing.assert_allclose(shown(), before, atol=ALIKE)
 
 
 def played(hand: Hand, view: bpy.types.Area) -> Steps[None]:
@@ -125,9 +104,35 @@ def played(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 
     yield from hand.hover(places.centre(places.region(view)))
     yield from hand.press("SPACE")
-    assert bpy.context.screen.is_animation_playing
     yield from hand.wait_until(note, "eight frames are played")
     yield from hand.press("SPACE")
     assert not bpy.context.screen.is_animation_playing
     for frame, matrix in seen.items():
         np.testing.assert_allclose(matrix, expected[frame - 1], atol=ALIKE, err_msg=f"frame {frame}")
+
+
+def snapped(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    """Shift S, Selection to Cursor: the cube is keyed where the cursor is, and turned as it was on the screen."""
+    bpy.context.scene.cursor.location = CURSOR
+    bpy.context.scene.frame_set(10)
+    before = place()
+    yield from hand.hover(places.centre(places.region(view)))
+    yield from hand.pie("S", "N", shift=True)
+    yield from hand.wait_until(lambda: 10.0 in key_frames(cube()), "the snapped cube is keyed")
+    before[:3, 3] = CURSOR
+    np.testing.assert_allclose(place(), before, atol=ALIKE)
+    assert_on_the_screw(1, 10, 28, 40)
+
+
+def typed(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
+    """After the playhead was dragged, a value that is typed into the Properties editor is the value of the key."""
+    yield from hand.click(places.playhead(sheet, 35))
+    field = yield from hand.find_button(hand.area("PROPERTIES"), "WINDOW", "location")
+    yield from hand.hover(field)
+    yield from hand.press("RET")
+    yield from hand.type("5")
+    yield from hand.press("RET")
+    yield from hand.wait_until(lambda: 35.0 in key_frames(cube()), "the typed value is keyed")
+    assert curves_of(cube())["location", 0].evaluate(35) == 5.0
+    assert abs(place()[0, 3] - 5.0) < ALIKE
+    yield from hand.picture("typed")

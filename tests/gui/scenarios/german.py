@@ -14,7 +14,8 @@ from bpy.app.translations import pgettext_iface, pgettext_rpt
 
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
-from tests.gui.scenarios.panel_notes import SCREW, cube, extension, key, preferences
+from tests.gui.keyed import cube
+from tests.gui.scenarios.panel_notes import SCREW, extension, key, preferences
 
 NOTHING_REDUCED = "The keys of these objects are not reduced"
 

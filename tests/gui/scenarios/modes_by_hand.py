@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-import math
-
 import bpy
 import numpy as np
 
+from tests.animation.keyed import curve_of
 from tests.animation.oracle import assert_shown, shown_worlds
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
+from tests.gui.keyed import cube, key_the_cube
 
-FRAMES = (1, 20, 40)
 BETWEEN = range(4, 41, 9)
-BLENDER, STRAIGHT, SCREW, MOTOR_SCREW, SMOOTH = "BLENDER", "lerp_slerp", "dq_sclerp", "pga_slerp", "motor_spline"
-PIE = "wm.call_menu_pie"
+BLENDER, STRAIGHT, SCREW, SMOOTH = "BLENDER", "lerp_slerp", "dq_sclerp", "motor_spline"
 
 ROW = 26
 """Pixels from one row of a panel to the next."""
-
-
-def cube() -> bpy.types.Object:
-    """The default cube, asked for anew each time: undo replaces it."""
-    return bpy.data.objects["Cube"]
 
 
 def assert_modes(keys: dict[float, int], of_object: str = BLENDER) -> None:
@@ -34,39 +27,14 @@ def assert_modes(keys: dict[float, int], of_object: str = BLENDER) -> None:
 
 def mode_keys() -> dict[float, int]:
     """The keys of the cube's modes: frame and number of the mode."""
-    bag = cube().animation_data.action.layers[0].strips[0].channelbag(cube().animation_data.action_slot)
-    curve = bag.fcurves.find("rigid_motion.mode")
+    curve = curve_of(cube(), "rigid_motion.mode")
     return {} if curve is None else {key.co.x: round(key.co.y) for key in curve.keyframe_points}
-
-
-def key_the_cube() -> None:
-    """Three keys, each a move along x with a turn about z."""
-    obj = cube()
-    obj.rotation_mode = "QUATERNION"
-    for frame, x, angle in zip(FRAMES, (-3, 0, 3), (0, 1.5, 3), strict=True):
-        obj.location.x = x
-        obj.rotation_quaternion = (math.cos(angle / 2), 0, 0, math.sin(angle / 2))
-        obj.keyframe_insert("location", frame=frame)
-        obj.keyframe_insert("rotation_quaternion", frame=frame)
-    bpy.context.scene.frame_set(10)
-    bpy.ops.ed.undo_push(message="Keys")
-
-
-def assert_the_shortcut_is_free() -> None:
-    """In all keymaps of this Blender that are asked in the three editors, Alt T is the extension's alone."""
-    asked = ("Window", "Screen", "3D View", "Object", "Dopesheet", "Graph Editor", "Anim", "Frames", "Markers")
-    for keymap in bpy.context.window_manager.keyconfigs.user.keymaps:
-        if keymap.name.startswith(asked) and not keymap.is_modal:
-            on_t = (item for item in keymap.keymap_items if item.type == "T" and item.alt)
-            others = [item.idname for item in on_t if not item.shift and not item.ctrl and item.idname != PIE]
-            assert not others, (keymap.name, others)
 
 
 def scenario(hand: Hand) -> Steps[None]:
     """An animator tries modes on the cube in three editors, takes some back, and bakes."""
     yield from hand.open_animation_workspace()
     view, sheet = hand.area("VIEW_3D"), hand.area("DOPESHEET_EDITOR")
-    assert_the_shortcut_is_free()
     key_the_cube()
     yield from in_the_viewport(hand, view)
     yield from in_the_panel(hand, view)
@@ -81,17 +49,10 @@ def in_the_viewport(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     centre = places.centre(places.region(view))
     around = places.box_around(centre, 840, 380)
     yield from hand.hover(centre)
-    yield from hand.pie("T", "NE", alt=True)
-    assert_modes({}, MOTOR_SCREW)
-    yield from hand.hover(centre)
-    yield from hand.pie("T", "W", picture="pie-ticks-the-mode", box=around, alt=True)
-    assert_modes({}, BLENDER)
-    yield from hand.hover(centre)
     yield from hand.pie("T", "N", alt=True)
     assert_modes({}, SMOOTH)
     yield from hand.hover(centre)
-    for _ in range(3):
-        yield from hand.press("Z", ctrl=True)
+    yield from hand.press("Z", ctrl=True)
     assert_modes({}, BLENDER)
     yield from hand.pie("T", "E", picture="pie", box=around, alt=True)
     assert_modes({}, SCREW)
@@ -145,7 +106,7 @@ def in_the_dope_sheet(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
 
 
 def in_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """For the object by its property, then for the segment under the playhead."""
+    """For the object by its property, then for the segment under the playhead; its turns, and exact between frames."""
     yield from hand.open_sidebar(view, "Animation")
     x, y = yield from hand.find_button(view, "UI", "rigid_motion.mode")
     yield from hand.click((x, y))
@@ -155,9 +116,24 @@ def in_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     yield from hand.picture("modes-in-the-panel")
     yield from hand.choose_row(2)
     assert_modes({1: 2, 20: 1})
+    turns = yield from hand.find_button(view, "UI", "rigid_motion.turns")
+    yield from hand.click(turns)
+    yield from hand.type("3")
+    yield from hand.press("RET")
+    assert cube().rigid_motion.turns == 3
+    assert_modes({1: 2, 20: 1})
+    exact = yield from hand.find_button(view, "UI", "rigid_motion.exact")
+    yield from hand.click(exact)
+    assert cube().constraints.keys() == ["Rigid Motion"]
     yield from hand.picture("panel")
-    for _ in range(2):
+    yield from hand.hover(places.centre(places.region(view)))
+    yield from hand.search("Set Turns")
+    yield from hand.press("RET")
+    last = bpy.context.window_manager.operators[-1]
+    assert (last.bl_idname, last.turns) == ("RIGID_MOTION_OT_set_turns", 3), "it begins with the turns that there are"
+    for _ in range(5):
         yield from hand.press("Z", ctrl=True)
+    assert not cube().constraints
     assert_modes({}, BLENDER)
 
 
@@ -178,12 +154,10 @@ def baked(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 
 
 def in_the_graph_editor(hand: Hand, graph: bpy.types.Area) -> Steps[None]:
-    """By the pie, and from the Key menu."""
+    """From the Key menu."""
     yield
     yield from hand.hover(places.centre(places.region(graph)))
     yield from hand.press("A")
-    yield from hand.pie("T", "E", picture="pie-in-the-graph-editor", alt=True)
-    assert_modes({1: 2, 20: 2, 40: 2})
     yield from hand.open_menu(graph, "GRAPH_MT_key")
     yield from hand.choose("Vector + Quaternion")
     assert_modes({1: 1, 20: 1, 40: 1})

@@ -5,41 +5,16 @@ That they are drawn, and in their colours, is counted in the pixels of the scree
 
 from __future__ import annotations
 
-import math
-
 import bpy
 import numpy as np
 
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
+from tests.gui.keyed import FRAMES, cube, key_the_cube
 
-FRAMES = (1, 30, 50)
 Color = tuple[float, float, float]
 NATIVE, MODE, SELECTED = (0.80, 0.80, 0.80), (0.20, 0.72, 1.0), (1.0, 0.75, 0.20)
 """The overlay's colours, as the preferences have them at first."""
-
-
-def cube() -> bpy.types.Object:
-    """The default cube, asked for anew each time: undo replaces it."""
-    return bpy.data.objects["Cube"]
-
-
-def key_the_cube() -> None:
-    """A way along x that turns a lot, with keys that are not selected."""
-    obj = cube()
-    obj.rotation_mode = "QUATERNION"
-    obj.scale = (0.4, 0.6, 0.25)
-    places_and_turns = zip(
-        FRAMES, ((-3, -1, 0), (1, 1, 1), (3, -2, 0)), ((0, 0, 0), (0, 0, 2.6), (2, 0, 2)), strict=True
-    )
-    for frame, location, (x, y, z) in places_and_turns:
-        angle = math.hypot(x, y, z)
-        axis = np.array((x, y, z)) / (angle or 1.0)
-        obj.location = location
-        obj.rotation_quaternion = (math.cos(angle / 2), *(math.sin(angle / 2) * axis))
-        obj.keyframe_insert("location", frame=frame)
-        obj.keyframe_insert("rotation_quaternion", frame=frame)
-    bpy.context.scene.frame_set(12)
 
 
 def look(hand: Hand, view: bpy.types.Area, name: str) -> Steps[dict[Color, int]]:
@@ -54,6 +29,7 @@ def look(hand: Hand, view: bpy.types.Area, name: str) -> Steps[dict[Color, int]]
 def scenario(hand: Hand) -> Steps[None]:
     """An animator looks at the cube's way, sees what a screw would make of it, plays, and puts it all out of sight."""
     key_the_cube()
+    cube().scale = (0.4, 0.6, 0.25)
     for screen in bpy.data.screens:
         for area in screen.areas:
             if area.type == "VIEW_3D":
@@ -83,7 +59,6 @@ def shown_from_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 
     mode = yield from hand.find_button(view, "UI", "rigid_motion_overlay.mode")
     yield from hand.click(mode)
-    yield from hand.picture("modes-to-compare")
     yield from hand.choose_row(2)
     assert settings.mode == "dq_sclerp", settings.mode
     seen = yield from look(hand, view, "compared")
@@ -92,11 +67,7 @@ def shown_from_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     assert cube().rigid_motion.mode == "BLENDER", "looking changes nothing"
     x, y, width, height = places.box(places.region(view))
     yield from hand.picture("path-and-panel", (x + width - 860, y + height - 660, 860, 440))
-    yield from from_afar(hand, view)
-
-
-def from_afar(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """The line is seen between fewer ticks, and the keys are all there, however short the path is on the screen."""
+    # The line is seen between fewer ticks, and the keys are all there, however short the path is on the screen.
     for distance in (40, 90):
         view.spaces.active.region_3d.view_distance = distance
         seen = yield from look(hand, view, f"from-afar-{distance}")
@@ -122,15 +93,8 @@ def hidden(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     assert seen[MODE] > 300, seen
     assert seen[NATIVE] < both[NATIVE] - 100, (seen, both)
     yield from hand.click(native)
-    show = yield from hand.find_button(view, "UI", "show_paths", narrow=True)
-    yield from hand.click(show)
-    seen = yield from look(hand, view, "switched-off")
-    assert seen[MODE] == 0, seen
-    yield from hand.click(show)
-
     yield from hand.hover(places.centre(places.region(view)))
     yield from hand.press("H")
-    assert cube().hide_get()
     seen = yield from look(hand, view, "cube-hidden")
     assert seen[MODE] == 0, seen
     yield from hand.press("H", alt=True)

@@ -8,13 +8,14 @@ import pytest
 
 from rigid_motion.animation import set_mode
 from rigid_motion.animation.transforms import transform_of
-from rigid_motion.ui.overlay.cache import path_of, paths_of
+from rigid_motion.ui.overlay.cache import path_of
 from rigid_motion.ui.overlay.ghosts import MOST_EDGES, MOST_GHOSTS, ghost_frames, octahedron, shape_of
-from rigid_motion.ui.overlay.kinds import space_of_bone
 from rigid_motion.ui.overlay.points import space_of
+from tests.animation.bones.poses import shown_poses
+from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import key, new_object
-from tests.ui.overlay.test_parents import SETTINGS
-from tests.ui.rigs import FRAMES, key_bone, new_rig
+from tests.ui.overlay.test_parents import SETTINGS, WHOLE
+from tests.ui.rigs import FRAMES, key_bone, new_rig, path_and_space
 
 
 @pytest.fixture
@@ -24,13 +25,11 @@ def ghostly(scene) -> bpy.types.Scene:
     return scene
 
 
-def assert_as_shown(path, space, matrix_of):
-    ghosts = path.ghosts
-    assert ghosts.frames.tolist() == list(range(4, 41, 4))
-    for frame, matrix in zip(ghosts.frames, ghosts.matrices, strict=True):
-        bpy.context.scene.frame_set(int(frame))
-        placed = matrix if path.in_world else np.array(space()) @ matrix
-        assert placed == pytest.approx(np.array(matrix_of()), abs=3e-5), frame
+def assert_as_shown(path, space, matrices):
+    """The ghosts are on their frames, as these matrices on all whole frames from the first on have it."""
+    assert path.ghosts.frames.tolist() == list(range(4, 41, 4))
+    placed = path.ghosts.matrices if path.in_world else np.array(space) @ path.ghosts.matrices
+    assert placed == pytest.approx(matrices[path.ghosts.frames.astype(int) - 1], abs=3e-5)
 
 
 @pytest.mark.parametrize("under", ["nothing", "a table that stands", "a table that moves"])
@@ -48,28 +47,25 @@ def test_ghosts_of_an_object_are_where_it_is_shown(ghostly, under, scale, order)
             key(obj.parent, FRAMES, seed=3)
     set_mode(obj, "motor_spline")
     bpy.context.view_layer.update()
-    path = path_of(obj, ghostly)
-    graph = bpy.context.evaluated_depsgraph_get()
-    assert_as_shown(path, lambda: space_of(obj, graph), lambda: obj.matrix_world)
+    path, space = path_of(obj, ghostly), space_of(obj, bpy.context.evaluated_depsgraph_get())
+    assert_as_shown(path, space, shown_worlds([obj], WHOLE)[0])
 
 
 @SETTINGS
 @pytest.mark.parametrize("under", ["stands", "moves"])
-@pytest.mark.parametrize("paths", [("location", "rotation_quaternion"), ("rotation_quaternion",)])
-def test_ghosts_of_a_bone_are_where_it_is_shown(ghostly, setting, under, paths):
-    rig = new_rig()
-    setting(rig.data.bones["Hand"])
+@pytest.mark.parametrize("moved", [False, True])
+def test_ghosts_of_a_bone_are_where_it_is_shown(ghostly, setting, under, moved):
+    rig = new_rig(**setting)
     rig.pose.bones["Arm"].rotation_quaternion = (0.8, 0.0, 0.0, 0.6)
     if under == "moves":
         set_mode(key_bone(rig.pose.bones["Hip"]), "dq_sclerp")
-    hand = key_bone(rig.pose.bones["Hand"], paths=paths)
-    hand.location = hand.location if "location" in paths else (0.3, 0.2, 0.1)
+    hand = key_bone(rig.pose.bones["Hand"], location=moved)
+    hand.location = hand.location if moved else (0.3, 0.2, 0.1)
     set_mode(hand, "motor_spline")
     bpy.context.view_layer.update()
-    target, graph = transform_of(hand), bpy.context.evaluated_depsgraph_get()
-    (path,) = paths_of([target], ghostly, {target: space_of_bone(hand, graph)[1]})
+    path, space = path_and_space(hand)
     assert path.in_world == (under == "moves")
-    assert_as_shown(path, lambda: space_of_bone(hand, graph)[0], lambda: rig.matrix_world @ hand.matrix)
+    assert_as_shown(path, space, np.array(rig.matrix_world) @ shown_poses([rig], WHOLE)[0]["Hand"])
 
 
 def test_of_a_long_motion_there_are_no_more_than_can_be_drawn():

@@ -7,34 +7,22 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import set_mode
-from rigid_motion.animation.transforms import transform_of
-from rigid_motion.ui.overlay.cache import path_of, paths_of
-from rigid_motion.ui.overlay.kinds import space_of_bone
+from rigid_motion.ui.overlay.cache import path_of
+from tests.animation.bones.poses import shown_poses
 from tests.animation.keyed import curves_of
+from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import give_own_deltas, key, new_object
-from tests.ui.rigs import FRAMES, key_bone, new_rig
+from tests.ui.rigs import FRAMES, key_bone, new_rig, path_and_space
 
 WHOLE = np.arange(FRAMES[0], FRAMES[-1] + 1.0)
 
 
 def shown(carrier, point=(0.0, 0.0, 0.0)):
     """Where Blender shows a point of an object or a bone in the world, on all whole frames."""
-    result = []
-    for frame in WHOLE:
-        bpy.context.scene.frame_set(int(frame))
-        if isinstance(carrier, bpy.types.PoseBone):
-            rig = carrier.id_data.evaluated_get(bpy.context.evaluated_depsgraph_get())
-            matrix = rig.matrix_world @ rig.pose.bones[carrier.name].matrix
-        else:
-            matrix = carrier.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world
-        result.append((np.array(matrix) @ (*point, 1.0))[:3])
-    return np.array(result)
-
-
-def path_under(bone):
-    target = transform_of(bone)
-    _, turned = space_of_bone(bone, bpy.context.evaluated_depsgraph_get())
-    return paths_of([target], bpy.context.scene, {target: turned})[0]
+    matrices = shown_worlds([carrier.id_data], WHOLE)[0]
+    if isinstance(carrier, bpy.types.PoseBone):
+        matrices = matrices @ shown_poses([carrier.id_data], WHOLE)[0][carrier.name]
+    return (matrices @ (*point, 1.0))[:, :3]
 
 
 def assert_in_world(path, expected):
@@ -55,10 +43,7 @@ def table(scene) -> bpy.types.Object:
 
 @pytest.mark.parametrize("connected", [False, True])
 def test_an_object_on_a_bone_that_moves(scene, table, connected):
-    rig = new_rig()
-    if connected:
-        bpy.ops.object.mode_set(mode="EDIT")
-        rig.data.edit_bones["Hand"].use_connect = True
+    rig = new_rig(use_connect=connected)
     bpy.ops.object.mode_set(mode="OBJECT")
     rig.parent = table
     for name in ("Hip", "Hand"):
@@ -69,58 +54,40 @@ def test_an_object_on_a_bone_that_moves(scene, table, connected):
     assert_in_world(path_of(obj, scene), shown(obj))
 
 
-def _plain(bone):
-    pass
-
-
-def _no_local_location(bone):
-    bone.use_local_location = False
-
-
-def _no_inherited_rotation(bone):
-    bone.use_inherit_rotation = False
-
-
-def _no_inherited_scale(bone):
-    bone.inherit_scale = "NONE"
-
-
-SETTINGS = pytest.mark.parametrize("setting", [_plain, _no_local_location, _no_inherited_rotation, _no_inherited_scale])
+SETTINGS = pytest.mark.parametrize(
+    "setting",
+    [{}, {"use_local_location": False}, {"use_inherit_rotation": False}, {"inherit_scale": "NONE"}],
+    ids=str,
+)
 
 
 @SETTINGS
 @pytest.mark.parametrize("moves", [False, True])
 def test_a_bone_under_bones_that_move(scene, setting, moves):
-    rig = new_rig()
-    setting(rig.data.bones["Hand"])
+    rig = new_rig(**setting)
     for name in ("Hip", "Arm"):
         set_mode(key_bone(rig.pose.bones[name]), "dq_sclerp")
-    paths = ("location", "rotation_quaternion") if moves else ("rotation_quaternion",)
-    hand = key_bone(rig.pose.bones["Hand"], paths=paths)
+    hand = key_bone(rig.pose.bones["Hand"], location=moves)
     set_mode(hand, "motor_spline")
     point = (0.0, 0.0, 0.0) if moves else (0.0, hand.bone.length, 0.0)
-    assert_in_world(path_under(hand), shown(hand, point))
+    assert_in_world(path_and_space(hand)[0], shown(hand, point))
 
 
-def constrained(table):
-    table.constraints.new("LIMIT_LOCATION")
+OTHERS = {
+    "constrained": lambda table: table.constraints.new("LIMIT_LOCATION"),
+    "driven": lambda table: table.driver_add("location", 0),
+    "in strips": lambda table: table.animation_data.nla_tracks.new().strips.new(
+        "Strip", 1, table.animation_data.action
+    ),
+}
 
 
-def driven(table):
-    table.driver_add("location", 0)
-
-
-def in_strips(table):
-    data = table.animation_data
-    data.nla_tracks.new().strips.new("Strip", 1, data.action)
-
-
-@pytest.mark.parametrize("other", [constrained, driven, in_strips])
+@pytest.mark.parametrize("other", OTHERS)
 def test_parents_that_do_not_move_by_keys_alone_are_as_they_are_now(scene, table, other):
     obj = key(new_object(), FRAMES)
     obj.parent = table
     assert path_of(obj, scene).in_world
-    other(table)
+    OTHERS[other](table)
     bpy.context.view_layer.update()
     assert not path_of(obj, scene).in_world
 

@@ -1,0 +1,90 @@
+"""What scenarios work on, the default cube or an arm with a hand: asked for anew each time, for undo replaces them."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+import numpy as np
+
+from tests.gui import places
+from tests.gui.driver import Hand, Steps
+
+FRAMES = (1, 20, 40)
+
+
+def cube() -> bpy.types.Object:
+    return bpy.data.objects["Cube"]
+
+
+def key_the_cube() -> None:
+    """Three keys, each a move with a turn about an axis that leans."""
+    obj = cube()
+    obj.rotation_mode = "QUATERNION"
+    for frame, location, angle in zip(FRAMES, ((-3, 0, 0), (0, 1, 1), (3, -1, 0)), (0, 1.8, 3.0), strict=True):
+        _key(obj, frame, location, angle)
+    bpy.context.scene.frame_set(10)
+    bpy.ops.ed.undo_push(message="Keys")
+
+
+def rig() -> bpy.types.Object:
+    return bpy.data.objects["Rig"]
+
+
+def hand_bone() -> bpy.types.PoseBone:
+    return rig().pose.bones["Hand"]
+
+
+def now() -> np.ndarray:
+    """How the hand is seen, in the space of its channels."""
+    bone = rig().evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones["Hand"]
+    above = {"parent_matrix": bone.parent.matrix, "parent_matrix_local": bone.parent.bone.matrix_local}
+    return np.array(bone.bone.convert_local_to_pose(bone.matrix, bone.bone.matrix_local, **above, invert=True))
+
+
+def make_the_rig() -> None:
+    """An arm and a hand that stands off it, each moved and turned from key to key, and nothing else."""
+    bpy.data.batch_remove(bpy.data.objects)
+    obj = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
+    bpy.context.scene.collection.objects.link(obj)
+    bpy.context.view_layer.objects.active = obj
+    obj.select_set(True)
+    bpy.ops.object.mode_set(mode="EDIT")
+    arm, hand = (obj.data.edit_bones.new(name) for name in ("Arm", "Hand"))
+    arm.head, arm.tail = (0, 0, 0), (0, 0.2, 1.5)
+    hand.head, hand.tail, hand.parent = (0, 0.3, 1.7), (0.4, 0.3, 2.6), arm
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for number, bone in enumerate(obj.pose.bones):
+        for frame, x, angle in zip(FRAMES, (-1, 0, 1), (0, 1.6, 3.0), strict=True):
+            _key(bone, frame, (x, 0.3 * number * x, 0.4 * abs(x)), angle * (0.5 + number) / 1.5)
+    bpy.context.scene.frame_set(10)
+
+
+def _key(carrier: bpy.types.Object | bpy.types.PoseBone, frame: int, location: tuple, angle: float) -> None:
+    carrier.location = location
+    carrier.rotation_quaternion = (math.cos(angle / 2), 0.6 * math.sin(angle / 2), 0, 0.8 * math.sin(angle / 2))
+    carrier.keyframe_insert("location", frame=frame)
+    carrier.keyframe_insert("rotation_quaternion", frame=frame)
+
+
+def pose_the_rig(hand: Hand) -> Steps[bpy.types.Area]:
+    """The rig in the Animation workspace, in Pose Mode with all bones selected, by hand; and the viewport."""
+    yield from hand.open_animation_workspace()
+    view = hand.area("VIEW_3D")
+    view.spaces.active.region_3d.view_distance, view.spaces.active.region_3d.view_location = 5, (0, 0, 1.2)
+    make_the_rig()
+    bpy.ops.ed.undo_push(message="Rig")
+    yield from hand.hover(places.centre(places.region(view)))
+    yield from hand.press("TAB", ctrl=True)
+    assert bpy.context.mode == "POSE", bpy.context.mode
+    yield from hand.press("A")
+    return view
+
+
+def only_the_hand(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    """Click on the hand on the screen."""
+    matrix = rig().evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones["Hand"].matrix
+    yield from hand.click(places.point(view, matrix.translation + 0.5 * hand_bone().length * matrix.col[1].xyz))
+    yield from hand.wait_until(
+        lambda: [bone.name for bone in bpy.context.selected_pose_bones] == ["Hand"], "the hand alone is selected"
+    )
