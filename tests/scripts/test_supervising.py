@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from rigid_motion_batch.keying import exporting
 from rigid_motion_batch.recordings import importing
 from tests.scripts.baking import one_object_file
 from tests.scripts.reducing import listed, object_file, write_csv
@@ -112,9 +111,7 @@ def test_ctrl_c_within_an_importer_or_exporter_is_no_fault_of_the_file(tmp_path)
         raise interrupted
 
     with pytest.raises(KeyboardInterrupt):
-        importing._imported(tmp_path / "walk.fbx", importer)
-    with pytest.raises(KeyboardInterrupt):
-        exporting._reason(interrupted)
+        importing.told(tmp_path / "walk.fbx", "import", importer)
 
 
 @pytest.mark.parametrize("moment", [0.0, 0.1, 0.4])
