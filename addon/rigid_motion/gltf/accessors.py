@@ -163,18 +163,13 @@ def _with_sparse(document: Document, accessor: Json, result: np.ndarray, what: s
 class GrowingView:
     """A view behind all that a document has, and its bytes, which are to be put into a buffer.
 
-    Parameters
-    ----------
-    json : dict
-        The document, to whose lists views and accessors are added.
-    more : int
-        What else is to be said of the view, such as its target.
+    Views and accessors are added to the lists of the document.
     """
 
-    def __init__(self, json: Json, **more: int) -> None:
+    def __init__(self, json: Json) -> None:
         self.accessors, views = (json.setdefault(name, []) for name in ("accessors", "bufferViews"))
         self.number = len(views)
-        self.json: Json = {"buffer": 0, **more}
+        self.json: Json = {"buffer": 0}
         views.append(self.json)
         self.data = bytearray()
         self._known: dict[tuple[str, int, bytes], int] = {}

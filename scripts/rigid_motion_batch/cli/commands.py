@@ -38,7 +38,6 @@ COMMANDS = {
     "stream": ("stream", "send a motion over a network in real time, or show what arrives"),
     "bundle": ("job_bundle", "write a comparison as a job for render farms"),
     "tasks": ("tasks", "list what a comparison did, and what failed"),
-    "examples": ("examples", "make small complete cases to begin with (in a checkout)"),
     "build": ("build_extension", "build the zip that Blender installs"),
     "completion": ("completion", "have a shell complete commands and options"),
 }
