@@ -175,6 +175,36 @@ def test_a_breakdown_that_is_moved_is_hit_and_takes_along_what_is_beside_it_alon
     assert bends.max() < 0.1, "and nowhere suddenly"
 
 
+def test_a_key_beside_a_breakdown_that_was_moved_changes_no_more_than_the_motion_up_to_the_keys_around_it(live_file):
+    obj = keyed(new_object())
+    set_mode(obj, "motor_spline")
+    key_on(obj, 31)
+    fcurve = curves_of(obj)["location", 2]
+    next(point for point in fcurve.keyframe_points if point.co[0] == 31.0).co_ui.y += 0.4
+    fcurve.update()
+    bpy.context.view_layer.update()
+    before = shown(obj)
+    key_on(obj, 40)
+    way = np.linalg.norm(shown(obj) - before, axis=1).max(axis=1)
+    assert way[(PLAYED <= 31.0) | (PLAYED == 40.0) | (PLAYED >= 49.0)].max() < 1e-5
+    assert way.max() < 0.4 / 6.0
+
+
+@pytest.mark.parametrize("mode", ["pga_lerp", "motor_spline"])
+def test_the_first_key_of_a_property_leaves_breakdowns_on_their_path(live_file, mode):
+    obj = keyed(new_object())
+    for frame in FRAMES:
+        obj.keyframe_delete("scale", frame=frame)
+    set_mode(obj, mode)
+    bpy.context.scene.frame_set(31)
+    obj.keyframe_insert("location")
+    bpy.context.view_layer.update()
+    motion = between(obj)
+    key_on(obj, 9)
+    assert ("scale", 0) in curves_of(obj)
+    assert largest(between(obj), motion) < MILLIMETRE
+
+
 def test_a_bake_of_one_side_of_a_breakdown_is_widened_to_its_path(live_file):
     obj = keyed(new_object())
     set_mode(obj, "pga_lerp")

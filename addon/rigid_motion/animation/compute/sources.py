@@ -298,16 +298,17 @@ class Source:
     def passed(self) -> np.ndarray:
         """Return which keys lie on the path between the keys around them instead of shaping it, shape (n,).
 
-        Breakdowns in all channels, that is, between others with the same mode, where a path depends on its keys and
-        goes the shortest way round.
+        Breakdowns in all channels that have a key there, that is, between others with the same mode, where a path
+        depends on its keys and goes the shortest way round.
         """
         passed = np.zeros(len(self.key_frames), dtype=bool)
         goes_the_shortest_way = self.turns is None and not self.has_half_turns
-        if self.cyclic is None and goes_the_shortest_way and all(keys.breakdowns is not None for keys in self.curves):
+        if self.cyclic is None and goes_the_shortest_way and any(keys.breakdowns is not None for keys in self.curves):
             modes = self.modes
             passed[1:-1] = np.isin(modes[1:], DEPENDS_ON_KEYS) & (modes[1:] == modes[:-1])
             for keys in self.curves:
-                passed &= np.isin(self.key_frames, keys.times[keys.breakdowns])
+                shaping = keys.times if keys.breakdowns is None else keys.times[~keys.breakdowns]
+                passed &= ~np.isin(self.key_frames, shaping)
         return passed
 
     @cached_property
