@@ -11,7 +11,7 @@ from rigid_motion import animation
 from tests.animation.edit_steps import LAST, frames_in, shares
 from tests.animation.keyed import MODE_IDS, WIDTHS, Carrier, curves_of, key_frames, mode_at, snapshot, transform_paths
 from tests.animation.machine import Machine, goes_on
-from tests.animation.oracle import expected_bases, may_spin
+from tests.animation.oracle import expected_bases, is_beside_path, may_spin
 from tests.animation.path_oracle import DEPENDS_ON_KEYS
 from tests.animation.scenes import random_values
 
@@ -138,6 +138,11 @@ class Editing(Machine):
         goes_on_as_before = held and not posed and is_timed_together(obj, frame) and not shapes_path(obj, frame)
         goes_on_as_before = goes_on_as_before and mode_at(obj, frame) == mode_at(obj, segment_start(keys, frame))
         goes_by = np.arange(keys[0], keys[-1], 0.5) if goes_on_as_before and is_seen_exactly(obj, frame) else ()
+        if len(goes_by):
+            first, last = keys[keys < frame][-1], keys[keys > frame][0]
+            if is_beside_path(obj, first, last, self.owns.get(name)):
+                # The new key is nearest to another moment of the path: up to the keys around it the motion may change.
+                goes_by = goes_by[(goes_by <= first) | (goes_by >= last)]
         before = expected_bases(obj, goes_by, self.owns.get(name))
         moved = self._is_posed(obj)
         if posed:

@@ -29,7 +29,7 @@ from tests.animation.keyed import (
     turns_at,
 )
 from tests.animation.modified import acting, held_frames, without_modifiers
-from tests.animation.path_oracle import DEPENDS_ON_KEYS, beside_path, lies_on_path
+from tests.animation.path_oracle import DEPENDS_ON_KEYS, beside_path, goes_beside, lies_on_path
 from tests.animation.smooth_oracle import share_of, with_tangents
 from tests.animation.spin_oracle import Spin, spin_and_end
 from tests.animation.timing_oracle import progress
@@ -95,6 +95,16 @@ def _components(
 def shaping_keys(obj: Carrier, keys: np.ndarray) -> np.ndarray:
     """The keys that shape a path: no breakdowns on the way, where it would matter."""
     return np.array([key for number, key in enumerate(keys) if not _is_passed(obj, keys, number)])
+
+
+def is_beside_path(obj: Carrier, first: float, last: float, own: Own | None = None) -> bool:
+    """Whether a breakdown at either end of a segment has a pose of its own, off the path of the keys around it."""
+    own, keys = own or Own(), key_frames(obj)
+    scaled = _scales_evenly(obj, keys)
+    path = Path(obj, shaping_keys(obj, keys), first, mode_at(obj, first), own, scaled)
+    if (path.first, path.last) == (first, last):
+        return False
+    return goes_beside(path, _key_poses(obj, np.array((first, last)), own, scaled))
 
 
 class Path:

@@ -20,17 +20,16 @@ DEPENDS_ON_KEYS = {"pga_lerp", "cga_lerp", "motor_spline"}
 
 
 def lies_on_path(curves: list[bpy.types.FCurve], frame: float, mode: str) -> bool:
-    """Whether a key between others is a breakdown in all channels, where that matters."""
-    types = {next((key.type for key in curve.keyframe_points if key.co[0] == frame), None) for curve in curves}
+    """Whether a key between others is a breakdown in all channels that have one there, where that matters."""
+    types = {key.type for curve in curves for key in curve.keyframe_points if key.co[0] == frame}
     repeats = any(modifier.type == "CYCLES" and not modifier.mute for curve in curves for modifier in curve.modifiers)
     return mode in DEPENDS_ON_KEYS and not repeats and types == {"BREAKDOWN"}
 
 
 def beside_path(path: Path, ends: Poses, share: np.ndarray) -> Poses:
     """The poses between two keys (2,) of which at least one is a breakdown: along the path, and as far off as they."""
-    places = [_nearest(path, ends[number : number + 1]) for number in (0, 1)]
-    at = path.poses(np.array(places))
-    (first, second), growths = _off(at, ends)[:, :6], _off(at, ends)[:, 6]
+    places, offs = _beside(path, ends)
+    (first, second), growths = offs[:, :6], offs[:, 6]
     poses = path.poses(places[0] + (places[1] - places[0]) * share)
     blend = np.clip(share, 0.0, 1.0)
     if path.mode == "motor_spline":
@@ -44,19 +43,31 @@ def beside_path(path: Path, ends: Poses, share: np.ndarray) -> Poses:
     return poses
 
 
+def goes_beside(path: Path, ends: Poses) -> bool:
+    """Whether any of these keys (2,) is off the path, and not by rounding alone."""
+    return bool(np.abs(_beside(path, ends)[1]).max() > 1e-4)
+
+
+def _beside(path: Path, ends: Poses) -> tuple[list[float], np.ndarray]:
+    """How far along the path the poses are that are nearest to keys (2,), and how far these are off it, (2, 7)."""
+    places = [_nearest(path, ends[number : number + 1]) for number in (0, 1)]
+    return places, _off(path.poses(np.array(places)), ends)
+
+
 def _nearest(path: Path, key: Poses) -> float:
     """How far along the path the pose is that is nearest to a key, a radian being as far as a unit of length."""
 
-    def distance(share: float) -> float:
-        return float((_off(path.poses(np.array((share,))), key) ** 2).sum())
+    def distances(shares: np.ndarray) -> np.ndarray:
+        return (_off(path.poses(shares), key[np.zeros(len(shares), dtype=int)]) ** 2).sum(axis=1)
 
     grid = np.linspace(-0.25, 1.25, 49)
-    best = grid[np.argmin([distance(share) for share in grid])]
+    best = grid[np.argmin(distances(grid))]
     low, high = best - 1.0 / 32.0, best + 1.0 / 32.0
-    for _ in range(80):
+    for _ in range(40):
         # By the golden section.
         first, second = high - (high - low) / 1.618034, low + (high - low) / 1.618034
-        low, high = (low, second) if distance(first) < distance(second) else (first, high)
+        of_first, of_second = distances(np.array((first, second)))
+        low, high = (low, second) if of_first < of_second else (first, high)
     return 0.5 * (low + high)
 
 
