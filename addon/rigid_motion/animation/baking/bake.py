@@ -164,8 +164,10 @@ def _widened(transform: Transform, source: Source, first: float | None, last: fl
             last=keys[-1],
         )
     if source.steps or source.modified:
-        # Without its modifiers no part can be left as it is.
-        return source.held_range
+        # Without its modifiers no part can be left as it is. Holds show what is between keys behind these, too.
+        (earliest, latest), longest = source.keyed_range, sum(step.step for step in source.steps)
+        has_before = any(earliest < step.offset for step in source.steps)
+        return (earliest - longest if has_before else earliest), latest + longest
     begin = 0 if first is None else np.searchsorted(keys, first + SAME_FRAME) - 1
     end = len(keys) - 1 if last is None else np.searchsorted(keys, last - SAME_FRAME)
     begin, end = int(np.clip(begin, 0, len(keys) - 2)), int(np.clip(end, 1, len(keys) - 1))

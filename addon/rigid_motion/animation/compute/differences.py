@@ -259,10 +259,17 @@ def _move(
     delta[:, on_keys] = original[:, owners]
     for number, (source, span) in enumerate(samples):
         if source.cyclic is not None:
-            before, after = source.used_up
-            outside = (frames[number] < before) | (frames[number] > after)
-            delta[:, span][:, outside] = original[:, number, None]
+            delta[:, span][:, _are_used_up(source, frames[number])] = original[:, number, None]
     return along
+
+
+def _are_used_up(source: Source, frames: np.ndarray) -> np.ndarray:
+    """Return at which frames cycles with a count are through: Blender goes back to the outermost keys."""
+    cycles = [keys.cycles for keys in source.curves if keys.cycles is not None]
+    before = any(cycle.before != "NONE" and cycle.before_count > 0 for cycle in cycles)
+    after = any(cycle.after != "NONE" and cycle.after_count > 0 for cycle in cycles)
+    first, last = source.key_frames[[0, -1]]
+    return (before & (frames < first)) | (after & (frames > last))
 
 
 Weights = tuple[np.ndarray, np.ndarray]

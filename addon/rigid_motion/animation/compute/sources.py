@@ -124,11 +124,6 @@ class Source:
             summary.update(b"modified scale")
         return summary.hexdigest()
 
-    @property
-    def difference_at_keys(self) -> np.ndarray:
-        """Components that are written on keys, shape (10,)."""
-        return REST if self.is_on_top else self.original
-
     @cached_property
     def curves(self) -> list[Keys]:
         """The keys of all channels that have any."""
@@ -194,10 +189,7 @@ class Source:
     @cached_property
     def keyed_range(self) -> tuple[float, float]:
         """The first and the last frame with a key."""
-        return (
-            min(float(keys.times[0]) for keys in self.curves),
-            max(float(keys.times[-1]) for keys in self.curves),
-        )
+        return min(float(keys.times[0]) for keys in self.curves), max(float(keys.times[-1]) for keys in self.curves)
 
     @cached_property
     def goes_on(self) -> bool:
@@ -332,28 +324,18 @@ class Source:
         return self.sample_range(1)
 
     def sample_range(self, rate: int) -> tuple[int, int]:
-        """Return the numbers of the first and last sample that in-betweens are for, from frame 0 on."""
-        first, last = self._live_range
-        return math.floor(first * rate), math.ceil(last * rate)
+        """Return the numbers of the first and last sample that in-betweens are for, from frame 0 on.
 
-    @cached_property
-    def _live_range(self) -> tuple[float, float]:
-        """From the first segment with a mode to the last.
-
-        Where it goes on outside of its keys, all that is seen, unless what is between the keys repeats.
+        They are those of the segments with a mode. Where it goes on outside of its keys, those of all that is seen,
+        unless what is between the keys repeats.
         """
+        first, last = self.keyed_range
         if self.goes_on and not self.repeats:
-            return self.seen_range
-        if self.cyclic is None and self.is_live:
+            first, last = self.seen_range
+        elif self.cyclic is None and self.is_live:
             live = np.flatnonzero(self.modes)
-            return float(self.key_frames[live[0]]), float(self.key_frames[live[-1] + 1])
-        return self.keyed_range
-
-    @property
-    def held_range(self) -> tuple[float, float]:
-        """The first and the last frame on which there may be anything between keys: holds show it behind these, too."""
-        (first, last), longest = self.keyed_range, sum(step.step for step in self.steps)
-        return (first - longest if any(first < step.offset for step in self.steps) else first), last + longest
+            first, last = self.key_frames[live[0]], self.key_frames[live[-1] + 1]
+        return math.floor(first * rate), math.ceil(last * rate)
 
     @cached_property
     def seen_range(self) -> tuple[int, int]:
@@ -382,8 +364,7 @@ class Source:
 
     def values_at(self, frames: np.ndarray) -> np.ndarray:
         """Return what the channels alone have on these frames, shape (10, m)."""
-        (rows,) = values_of([self], [frames])
-        return rows
+        return values_of([self], [frames])[0]
 
     @cached_property
     def holds(self) -> np.ndarray:
@@ -409,14 +390,6 @@ class Source:
     def is_elastic(self) -> bool:
         """Return whether any key eases elastically, which depends on how far a channel goes."""
         return any(keys.easing is not None and np.any(keys.interpolation == ELASTIC) for keys in self.curves)
-
-    @cached_property
-    def used_up(self) -> tuple[float, float]:
-        """Before and after which frame cycles with a count are through: Blender goes back to the outermost keys."""
-        cycles = [keys.cycles for keys in self.curves if keys.cycles is not None]
-        before = any(cycle.before != "NONE" and cycle.before_count > 0 for cycle in cycles)
-        after = any(cycle.after != "NONE" and cycle.after_count > 0 for cycle in cycles)
-        return float(self.key_frames[0]) if before else -np.inf, float(self.key_frames[-1]) if after else np.inf
 
     @cached_property
     def cyclic(self) -> Keys | None:

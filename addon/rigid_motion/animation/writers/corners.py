@@ -12,7 +12,7 @@ import numpy as np
 
 from ...motion.eulers import extrinsic_eulers_from_quaternions
 from ..compute.bodies import other_angles
-from ..compute.components import PART_OF, ROTATION, ROWS
+from ..compute.components import PART_OF, REST, ROTATION, ROWS
 from ..compute.sample_rates import Need
 from ..compute.sources import FULL_TURN, SAME_FRAME, Source
 from .sampled import Layout, Piece
@@ -66,7 +66,7 @@ def _keys(source: Source, layout: Layout) -> np.ndarray:
 
 def _at_keys(source: Source, rows: list[int], near: np.ndarray) -> np.ndarray:
     """Return what the differences are at keys, (rows, k): the original ones, in the sign and turn near to these."""
-    original = np.array(source.difference_at_keys)
+    original = np.array(REST if source.is_on_top else source.original)
     turning = [number for number, row in enumerate(rows) if PART_OF[row] == ROTATION]
     result = np.repeat(original[rows, None], near.shape[1], axis=1)
     if not turning:
