@@ -8,6 +8,8 @@ outcome is looked at exactly. Arrays have joints first, (joints, n), and compone
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from ..motion import Poses, shell_error
@@ -44,7 +46,7 @@ class Fitting:
 
     def __init__(self, codec: Codec, shown: Path | None, base: Message, back: int, ticks: int, samples: Path) -> None:
         self._codec, self._forest, self._shown, self._samples = codec, codec.forest, shown, samples
-        self._base, self._back, self._ticks = base, back, ticks
+        self._begun, self._ticks = partial(Message, codec, base, back, ticks), ticks
         self._start, self._end = (ticks - codec.terms.delay) / TICKS, ticks / TICKS
 
     def message(self) -> tuple[Message, bool]:
@@ -91,7 +93,7 @@ class Fitting:
     def _near(self, cells: list[int], finer: int) -> tuple[Message, float]:
         """Return the numbers nearest to the truth, with knots and, where that is not enough, with more of them."""
         tolerance, most_knots = self._codec.tolerance, min(MOST_KNOTS, max(MOST_GROUPS // len(self._forest.groups), 1))
-        message = Message(self._codec, self._base, self._back, self._ticks, finer)
+        message = self._begun(finer)
         for cell in cells:
             message.say(cell, samples=self._samples)
         while True:
@@ -143,7 +145,7 @@ class Fitting:
                     arms = (places[:, hung] - places[:, [joint]])[:, None]
                     does = np.stack([cross(about, arms), about * radii[hung]])
                 _reduce(values, errors, hung, does, most)
-        smaller = Message(self._codec, self._base, self._back, self._ticks, message.finer)
+        smaller = self._begun(message.finer)
         for cell, own in zip(message.cells, numbers, strict=True):
             smaller.say(cell, own)
         return smaller, float(self._look(smaller)[1].max())

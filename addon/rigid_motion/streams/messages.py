@@ -118,8 +118,8 @@ class Message:
         self._codec, self.back, self.end, self.finer = codec, back, end, finer
         self.factor = 0.5**finer
         """Of the steps."""
-        self.kind = UNKNOWN
-        """How the end is coded, a kind of `coding`."""
+        self.kind, self._goes_on = UNKNOWN, False
+        """How the end is coded, a kind of `coding`; and whether that is against what the motion did so far."""
         self.cells: list[int] = []
         """Of each knot, in the order in which they came, how many cells of the grid it is before the end."""
         self.supports: list[tuple[float, float, float]] = []
@@ -134,8 +134,8 @@ class Message:
             moments = np.array((end - codec.terms.delay, end)) / TICKS
             if back:
                 self.kind = STALE if end - base.end > OLD else NEAR if back == 1 else FAR
-            goes_on = self.kind in (NEAR, FAR)
-            self.path = Path(moments, base.path.at(moments) if goes_on else base.path.poses[:, [-1, -1]])
+                self._goes_on = self.kind in (NEAR, FAR)
+            self.path = Path(moments, base.path.at(moments) if self._goes_on else base.path.poses[:, [-1, -1]])
 
     def say(self, cell: int, numbers: np.ndarray | None = None, samples: Path | None = None) -> None:
         """Move the end, which comes first and is cell 0, or else a new knot, by whole numbers (groups, 3).
@@ -155,7 +155,7 @@ class Message:
             numbers = self._codec.rounded(poses[:, at], samples.pose(moment), self.factor)
         self.numbers.append(numbers)
         poses[:, at] = self._codec.moved(poses[:, at], numbers, self.factor)
-        if not cell and self.kind in (STALE, UNKNOWN):
+        if not (cell or self._goes_on):
             # How the motion got there is not known.
             poses[:, 0] = poses[:, 1]
         self.path = Path(moments, Poses(poses.positions, normalise(poses.quaternions))).going_on()
