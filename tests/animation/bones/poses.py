@@ -18,7 +18,7 @@ import bpy
 import numpy as np
 
 from tests.animation.keyed import key_frames
-from tests.animation.oracle import expected_bases, shortest_quaternion, shown_worlds
+from tests.animation.oracle import expected_bases, play, shortest_quaternion, shown_worlds
 
 TOLERANCE = 1e-5
 
@@ -29,8 +29,7 @@ def shown_poses(rigs: Iterable[bpy.types.Object], frames: Sequence[float]) -> li
     before, subframe = scene.frame_current, scene.frame_subframe
     shown = [{name: np.empty((len(frames), 4, 4)) for name in names_of(rig)} for rig in rigs]
     for row, frame in enumerate(frames):
-        whole = int(np.floor(frame))
-        scene.frame_set(whole, subframe=float(frame - whole))
+        play(rigs, frame)
         depsgraph = bpy.context.evaluated_depsgraph_get()
         for result, rig in zip(shown, rigs, strict=True):
             evaluated = rig.evaluated_get(depsgraph).pose.bones
