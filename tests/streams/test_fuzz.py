@@ -17,7 +17,7 @@ from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.coding import Coder
 from rigid_motion.streams.messages import Codec
 from rigid_motion.streams.receiver import MOST_ALL_JOINTS, MOST_STREAMS
-from rigid_motion.streams.wire import read, read_description
+from rigid_motion.streams.wire import VERSION, read, read_description
 
 from .links import body, dance, run
 
@@ -44,7 +44,7 @@ def damaged(rng: np.random.Generator, genuine: list[bytes]) -> bytes:
     """Random bytes; or a genuine datagram with bits flipped, cut off, prolonged, or put together of two."""
     kind = rng.integers(6)
     if kind == 0:
-        head = bytes([0x40 | int(rng.integers(5))]) if rng.random() < 0.8 else b""
+        head = bytes([VERSION << 4 | int(rng.integers(5))]) if rng.random() < 0.8 else b""
         return head + rng.bytes(int(rng.integers(0, 80)))
     data = bytearray(genuine[rng.integers(len(genuine))])
     if kind in (1, 2):

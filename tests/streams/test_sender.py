@@ -28,6 +28,14 @@ def test_what_is_shown_is_within_the_tolerance(rate: float, delay: float) -> Non
     assert len(outcome.errors) > 400
 
 
+def test_every_sample_of_a_window_may_need_a_knot() -> None:
+    """As of a tracker that trembles, at a long delay."""
+    times, rng = np.arange(240) / 120.0, np.random.default_rng(5)
+    places = rng.normal(scale=0.02, size=(1, 240, 3))
+    outcome = run(Body.rigid("hand"), times, Poses(places, np.tile((1.0, 0, 0, 0), (1, 240, 1))), delay=0.2)
+    assert outcome.errors.max() <= 0.005 * SLACK
+
+
 def test_messages_of_many_joints_are_as_long_as_they_have_to_be() -> None:
     own = body(60)
     outcome = run(own, *dance(own, 0.8), answers=False)

@@ -37,7 +37,7 @@ WIDTHS, FINENESS, BASES, ODD = (KNOT_COUNTS + number for number in (1, 2, 4, 5))
 of rigid bodies alone, and in the next table where joints hang on others; what a message builds on; and whether its end
 is between two moments of the grid."""
 
-FINEST, MOST_KNOTS = 3, 16
+FINEST, MOST_KNOTS = 3, 32
 """So many times steps are halved at most; and knots of a window."""
 
 MOST_GROUPS = 4096

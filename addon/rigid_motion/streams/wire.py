@@ -15,7 +15,7 @@ import numpy as np
 from ..motion import Poses
 from .bodies import Body, Forest
 
-VERSION = 4
+VERSION = 5
 
 TICKS = 3600
 """A second, in the unit of all times on the wire: whole numbers of it are the frames of 24, 25, 30, 60, 72, 90, 120."""
