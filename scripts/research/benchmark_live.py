@@ -157,18 +157,22 @@ def row(what: str, live: Seconds, beside: str, native: Seconds) -> dict[str, Any
     }
 
 
-def with_and_without(edit: Callable[[], None], rounds: int, edits: int = WARMING) -> tuple[Seconds, Seconds]:
+def with_and_without(
+    edit: Callable[[], None], rounds: int, edits: int = WARMING, modes_of: Targets = ()
+) -> tuple[Seconds, Seconds]:
     """Return the seconds of an edit, as the mean of several in a row, with in-betweens following and not.
 
-    What was not followed is caught up with outside of the measured time, and so are the caches that this costs.
+    Where targets are given they have no mode for the second. What was not followed is caught up with outside of the
+    measured time, and so are the caches that this costs.
     """
 
     def row_of_edits() -> None:
         for _ in range(edits):
             edit()
 
-    switches = {"on": partial(animation.set_enabled, True), "off": partial(animation.set_enabled, False)}
-    runs = {}
+    runs, switches = {}, {"on": partial(animation.set_enabled, True), "off": partial(animation.set_enabled, False)}
+    if modes_of:
+        switches = {"on": partial(set_modes, modes_of, MODE), "off": partial(set_modes, modes_of, "BLENDER")}
     for name, switch in switches.items():
         runs |= {name: switch, f"{name}, warm": row_of_edits, f"{name}, measured": row_of_edits}
     seconds = interleaved_seconds(runs, rounds)
@@ -291,7 +295,8 @@ def rigs(size: Size, rounds: int) -> list[dict[str, Any]]:
     set_modes(bones, MODE)
     animation.follower.set_drafts(True)
     try:
-        one, paused = with_and_without(partial(edit, keys[len(keys) // 2 :][:1]), rounds)
+        one, native_one = with_and_without(partial(edit, keys[len(keys) // 2 :][:1]), rounds, modes_of=bones)
+        set_modes(bones, MODE)
         each, _ = with_and_without(partial(edit, keys), few, 1)
         _, chosen = choose(bones, few)
         drafts = {"edit": partial(edit, keys[:1]), "finish": animation.follower.follower.finish_drafts}
@@ -307,7 +312,7 @@ def rigs(size: Size, rounds: int) -> list[dict[str, Any]]:
     baked = NativeBaking(bones, every_channel=True).seconds(few)
     played, native = play(bones, few)
     return [
-        row("one bone edited, and the view updated", one, "not followed", paused),
+        row("one bone edited, and the view updated", one, "native", native_one),
         *(row(what, live, "`bake_action_objects`, as *Bake Action* does", baked) for what, live in works.items()),
         row("all frames played", played, "native", native),
     ]
