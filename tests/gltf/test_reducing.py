@@ -238,6 +238,13 @@ def test_whatever_hangs_on_whatever_keeps_to_the_tolerance(tmp_path_factory, see
             made.channel(node, path, own, np.asarray(values, dtype="<f4"), kind)
     if not made.json["animations"]:
         return
+    moved = {channel["target"]["node"] for channel in made.json["animations"][0]["channels"]}
+    for node in set(range(count)) - moved:
+        if random.random() < 0.5:
+            matrix = np.eye(4)
+            matrix[:3, :3] += 0.3 * random.normal(size=(3, 3))
+            matrix[:3, 3] = nodes[node].pop("translation")
+            nodes[node]["matrix"] = matrix.T.ravel().tolist()
     path = made.write(folder / "made.glb")
     document = read_document(path)
     size = reduced(document, Options(radius=RADIUS * unit)).size
