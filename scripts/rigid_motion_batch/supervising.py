@@ -122,7 +122,8 @@ def supervise(program: str) -> int:
         if folder is not None:
             shutil.rmtree(folder, ignore_errors=True)
         for one, handler in before.items():
-            signal.signal(one, signal.SIG_DFL if handler is None else handler)
+            # Who asks once more while it ends does not get another exit code.
+            signal.signal(one, signal.SIG_IGN if received else signal.SIG_DFL if handler is None else handler)
 
 
 def death(code: int) -> str:

@@ -43,11 +43,13 @@ def test_a_reader_at_work_does_not_keep_a_command_from_its_end(tmp_path, command
     run = start(tmp_path, *command, where="slow.csv")
     run.wait_until_stuck()
     processes = descendants(run.process.pid)
-    for _ in range(3):
+    started = time.monotonic()
+    while run.process.poll() is None and time.monotonic() < started + SOON:
         # As a terminal does at Ctrl-C, pressed again and again: all processes get it.
         os.killpg(run.process.pid, by)
-        time.sleep(0.1)
-    printed, said, seconds = run.end()
+        time.sleep(0.002)
+    seconds = time.monotonic() - started
+    printed, said, _ = run.end()
     assert (run.process.returncode, printed.split()) == (128 + by, done), said
     assert said.splitlines()[-1].startswith(last)
     assert "Traceback" not in said
