@@ -7,8 +7,9 @@ from math import tau
 import bpy
 import numpy as np
 import pytest
+from mathutils import Euler
 
-from rigid_motion.animation import modes_of, refresh, set_mode, set_turns
+from rigid_motion.animation import channelbag_of, modes_of, refresh, set_mode, set_turns
 from tests.animation.bones.poses import assert_posed
 from tests.animation.bones.rigs import (
     ARM,
@@ -160,6 +161,19 @@ def test_constraints_that_are_copied_to_another_bone_make_no_second_motion(live_
     bpy.context.view_layer.update()
     refresh()
     assert_posed(rig, PLAYED)
+
+
+@pytest.mark.parametrize("order", ["QUATERNION", "ZXY"])
+def test_a_bone_without_keys_of_its_rotation_spins_as_well(live_file, order):
+    rig = moving_rig("pga_lerp", order)
+    lower, channels = rig.pose.bones["Lower"], channelbag_of(rig).fcurves
+    for fcurve in [it for it in channels if it.data_path.startswith(f"{lower.path_from_id()}.rotation")]:
+        channels.remove(fcurve)
+    set_turns(lower, 1, [1.0])
+    for angles in ((0.3, 0.2, 0.1), (1.0, 2.0, -1.0)):
+        lower.rotation_euler, lower.rotation_quaternion = angles, Euler(angles).to_quaternion()
+        bpy.context.view_layer.update()
+        assert_posed(rig, PLAYED)
 
 
 def test_a_renamed_bone_keeps_its_turns(live_file):

@@ -94,6 +94,28 @@ def test_what_does_not_turn_between_its_keys_spins_about_a_local_axis(live_file,
     assert np.abs(turned(obj, EACH[:25]) - expected).max() < 1e-5
 
 
+@pytest.mark.parametrize("order", ["QUATERNION", "ZXY"])
+@pytest.mark.parametrize("mode", ["dq_sclerp", "pga_lerp", "motor_spline"])
+def test_what_has_no_keys_of_its_rotation_spins_as_well(live_file, mode, order):
+    obj = new_object(rotation_mode=order)
+    own = {obj.name: give_own_deltas(obj, seed=3)}
+    write_channel(obj, "location", np.array((1.0, 25.0, 49.0)), np.eye(3), interpolation="BEZIER")
+    set_mode(obj, mode)
+    set_turns(obj, 2, [1.0])
+    for angles in ((0.4, -0.2, 0.9), (1.4, 0.3, -2.0)):
+        obj.rotation_euler, obj.rotation_quaternion = angles, Euler(angles).to_quaternion()
+        bpy.context.view_layer.update()
+        assert_shown([obj], EACH[:49], own)
+    keyed, (shown,) = snapshot(obj), shown_worlds([obj], EACH[:49])
+    animation.bake(obj)
+    assert np.abs(shown_worlds([obj], EACH[:49])[0] - shown).max() < 2e-5
+    animation.unbake(obj)
+    assert snapshot(obj) == keyed
+    assert_shown([obj], EACH[:49], own)
+    set_turns(obj, 0, [1.0])
+    assert_shown([obj], EACH[:49], own)
+
+
 def insert(obj: bpy.types.Object, frame: int) -> None:
     """Key an object's location and rotation on a frame, as I does with the playhead there."""
     bpy.context.scene.frame_set(frame)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import bpy
 import numpy as np
 
-from ..compute.components import PART_OF, REST, rows_left_to
+from ..compute.components import PART_OF, REST, ROTATION, ROWS, rows_left_to
 from ..compute.sources import Source
 from ..curves.keys import Keys
 from ..transforms import Channel, Refused, Transform
@@ -192,16 +192,18 @@ def _keyed_for(user: Transform, binding: Binding, drivers: Collection[Channel]) 
     has_modifiers = [row for row, fcurve in keyed.items() if fcurve.modifiers]
     if has_modifiers:
         refuse_different_steps(user.name, keyed.values())
+    modes, turns = (
+        [fcurve] if (fcurve := binding.curves.get(channel)) is not None and _has_say(user, fcurve) else []
+        for channel in (user.mode_channel, user.turns_channel)
+    )
     names = frozenset(map(PART_OF.__getitem__, keyed))
+    if keyed and turns and ROWS[ROTATION].start not in left and any(key.co.y for key in turns[0].keyframe_points):
+        names |= {ROTATION}  # It turns, with keys of its rotation or without.
     rest = {
         row: 0.0 if row in driven else getattr(user.carrier, path.removeprefix(user.prefix))[index]
         for row, (path, index) in channels.items()
         if row not in keyed and PART_OF[row] in names
     }
-    modes, turns = (
-        [fcurve] if (fcurve := binding.curves.get(channel)) is not None and _has_say(user, fcurve) else []
-        for channel in (user.mode_channel, user.turns_channel)
-    )
     original = user.original()
     # Delta transforms of its own would be blended along.
     is_blended = not user.has_difference_slot and np.array_equal(original, REST)

@@ -53,7 +53,7 @@ class Source:
     """The order of Euler angles, or None for quaternions."""
 
     keyed: frozenset[str]
-    """The parts of location, rotation and scale that are keyed, in one of their components at least."""
+    """The parts of location, rotation and scale that are keyed, in one of their components at least, or turned."""
 
     channels: tuple[tuple[list[int], Keys], ...]
     """The channels with keys, those together that are keyed together: their rows among the components, and keys."""
