@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TypeVar
 
 import bpy
@@ -112,6 +114,17 @@ def pose_mode(rig: bpy.types.Object, *selected: str) -> bpy.types.Object:
     bpy.ops.object.mode_set(mode="POSE")
     select_bones(rig, *(selected or rig.pose.bones.keys()))
     return rig
+
+
+@contextmanager
+def own_clipboard(folder: str | Path) -> Iterator[None]:
+    """Have copied poses apart from those of other Blenders on this machine: they are a file in the temporary folder."""
+    filepaths = bpy.context.preferences.filepaths
+    before, filepaths.temporary_directory = filepaths.temporary_directory, str(folder)
+    try:
+        yield
+    finally:
+        filepaths.temporary_directory = before
 
 
 def key_bone(

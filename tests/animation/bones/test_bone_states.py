@@ -25,7 +25,7 @@ from tests.animation.bones.rig_editing import (
     has_live_segments,
     own_constraints,
 )
-from tests.animation.bones.rigs import ORDERS, new_rig, pose_mode, write_bone
+from tests.animation.bones.rigs import ORDERS, new_rig, own_clipboard, pose_mode, write_bone
 from tests.animation.editing import LAST, frames_in, mode_channel, seeds, shares
 from tests.animation.keyed import MODE_IDS, key_frames, mode_at, transform_paths
 from tests.animation.machine import goes_on
@@ -156,13 +156,14 @@ class EditingBones(ComingAndGoing):
         show_seen_in_channels([transform_of(bone)])
         self._assert_seen(rig, seen)
         copied = [getattr(bone, path).copy() for path in transform_paths(bone)]
-        self._in_pose_mode(name, bpy.ops.pose.copy)
-        bpy.context.scene.frame_set(frame)
-        bone = self._found(name)
-        # With undo Blender would tell that it is the operator; a script is known by setting several properties.
-        if sum(map(operator.ne, copied, [getattr(bone, path) for path in transform_paths(bone)])) < 2:
-            return
-        self._in_pose_mode(name, bpy.ops.pose.paste)
+        with own_clipboard(self.folder.name):
+            self._in_pose_mode(name, bpy.ops.pose.copy)
+            bpy.context.scene.frame_set(frame)
+            bone = self._found(name)
+            # With undo Blender would tell that it is the operator; a script is known by setting several properties.
+            if sum(map(operator.ne, copied, [getattr(bone, path) for path in transform_paths(bone)])) < 2:
+                return
+            self._in_pose_mode(name, bpy.ops.pose.paste)
         self._assert_seen(rig, seen)
         settable = self._has_keys_for_any_pose(bone) and not any(
             constraint.mute for constraint in own_constraints(bone)

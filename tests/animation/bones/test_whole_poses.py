@@ -11,7 +11,7 @@ import pytest
 
 from rigid_motion.animation import key_frames, set_mode
 from tests.animation.bones.poses import placed
-from tests.animation.bones.rigs import key_all, new_rig, pose_mode
+from tests.animation.bones.rigs import key_all, new_rig, own_clipboard, pose_mode
 from tests.animation.keyed import curves_of, rotation_path
 
 BETWEEN = 15
@@ -99,13 +99,14 @@ def test_where_one_property_of_a_whole_pose_is_keyed_so_is_the_rest(rig):
     assert len(curves_of(bone)[rotation_path(bone), 0].keyframe_points) == 5
 
 
-def test_undo_brings_back_a_whole_pose_as_it_was_seen(rig, live_file):
+def test_undo_brings_back_a_whole_pose_as_it_was_seen(rig, live_file, tmp_path):
     live_file.scene.frame_set(24)
     copied = placed(rig)
-    as_an_animator(bpy.ops.pose.copy)
-    live_file.scene.frame_set(BETWEEN)
-    bpy.ops.ed.undo_push(message="Begin")
-    as_an_animator(bpy.ops.pose.paste)
+    with own_clipboard(tmp_path):
+        as_an_animator(bpy.ops.pose.copy)
+        live_file.scene.frame_set(BETWEEN)
+        bpy.ops.ed.undo_push(message="Begin")
+        as_an_animator(bpy.ops.pose.paste)
     assert np.abs(placed(rig) - copied).max() < 2e-5
     as_an_animator(bpy.ops.pose.transforms_clear)
     assert np.abs(placed(rig) - np.array([bone.bone.matrix_local for bone in rig.pose.bones])).max() < 1e-6
