@@ -174,7 +174,7 @@ class EditingBones(ComingAndGoing):
                 self._found(name).keyframe_insert(path, frame=frame)
 
         if keyed and name not in self.before_bake:
-            self._edit(insert)
+            self._edit(insert, self._only_share_out_turns)
             if settable:
                 self._assert_seen(rig, seen)
 
