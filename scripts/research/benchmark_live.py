@@ -162,23 +162,23 @@ def with_and_without(
 ) -> tuple[Seconds, Seconds]:
     """Return the seconds of an edit, as the mean of several in a row, with in-betweens following and not.
 
-    Where targets are given they have no mode for the second. What was not followed is caught up with outside of the
-    measured time, and so are the caches that this costs.
+    Where targets are given they have no mode for the second, and have one again then. What was not followed is caught
+    up with outside of the measured time, and so are the caches that this costs.
     """
 
     def row_of_edits() -> None:
         for _ in range(edits):
             edit()
 
-    runs, switches = {}, {"on": partial(animation.set_enabled, True), "off": partial(animation.set_enabled, False)}
-    if modes_of:
-        switches = {"on": partial(set_modes, modes_of, MODE), "off": partial(set_modes, modes_of, "BLENDER")}
-    for name, switch in switches.items():
-        runs |= {name: switch, f"{name}, warm": row_of_edits, f"{name}, measured": row_of_edits}
+    switch = partial(set_modes, modes_of) if modes_of else animation.set_enabled
+    states = (MODE, "BLENDER") if modes_of else (True, False)
+    runs = {}
+    for state in states:
+        runs |= {state: partial(switch, state), f"{state}, warm": row_of_edits, f"{state}, measured": row_of_edits}
     seconds = interleaved_seconds(runs, rounds)
-    animation.set_enabled(True)
+    switch(states[0])
     animation.refresh()
-    live, native = ([spent / edits for spent in seconds[f"{name}, measured"]] for name in switches)
+    live, native = ([spent / edits for spent in seconds[f"{state}, measured"]] for state in states)
     return live, native
 
 
@@ -296,7 +296,6 @@ def rigs(size: Size, rounds: int) -> list[dict[str, Any]]:
     animation.follower.set_drafts(True)
     try:
         one, native_one = with_and_without(partial(edit, keys[len(keys) // 2 :][:1]), rounds, modes_of=bones)
-        set_modes(bones, MODE)
         each, _ = with_and_without(partial(edit, keys), few, 1)
         _, chosen = choose(bones, few)
         drafts = {"edit": partial(edit, keys[:1]), "finish": animation.follower.follower.finish_drafts}
