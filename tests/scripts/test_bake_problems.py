@@ -153,7 +153,8 @@ def test_ctrl_c_while_blender_is_loaded_ends_it_at_once(tmp_path):
     path = one_object_file(tmp_path / "shot.blend")
     beside = tmp_path / "modules"
     beside.mkdir()
-    (beside / "bpy.py").write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")  # In the place of Blender.
+    in_the_place_of_blender = "import signal, time\nsignal.raise_signal(signal.SIGINT)\ntime.sleep(30)\n"
+    (beside / "bpy.py").write_text(in_the_place_of_blender)
     done = subprocess.run(
         [*COMMAND, path], capture_output=True, text=True, timeout=60, env=os.environ | {"PYTHONPATH": str(beside)}
     )
