@@ -1,5 +1,6 @@
 """How much is tried by tests that try many cases: a fair sample by default, all of them in continuous integration."""
 
+import itertools
 import math
 import os
 from collections.abc import Sequence
@@ -23,6 +24,13 @@ def tried(cases: int) -> int:
 def sample(cases: Sequence[Case]) -> Sequence[Case]:
     """Those of these cases to try, from the first to the last."""
     return cases if THOROUGH else cases[::SHARE]
+
+
+def combined(*choices: Sequence) -> list[tuple]:
+    """Combinations of these choices to try, in which each value of each choice is."""
+    if THOROUGH:
+        return list(itertools.product(*choices))
+    return [tuple(choice[row % len(choice)] for choice in choices) for row in range(max(map(len, choices)))]
 
 
 settings.register_profile("thorough", deadline=None)

@@ -9,15 +9,14 @@ import pytest
 
 from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.playing import MOST_JOINT_KNOTS
-from tests.thoroughness import tried
+from tests.thoroughness import combined, tried
 
 from .links import body, dance, run
 
 TOLERANCE = 0.0051
 
 
-@pytest.mark.parametrize("joins", np.arange(0.3, 2.5, 0.37).round(2))
-@pytest.mark.parametrize("answers", [True, False])
+@pytest.mark.parametrize(("joins", "answers"), combined(np.arange(0.3, 2.5, 0.37).round(2), [True, False]))
 def test_somebody_who_joins_is_soon_shown_the_motion(joins: float, answers: bool) -> None:
     own = body()
     outcome = run(own, *dance(own, joins + 2.0), heard_from=joins, answers=answers)
@@ -26,10 +25,9 @@ def test_somebody_who_joins_is_soon_shown_the_motion(joins: float, answers: bool
     assert outcome.errors.max() <= TOLERANCE
 
 
-@pytest.mark.parametrize(("before", "after"), [(0.05, 0.35), (0.35, 0.05), (0.02, 0.08)])
-@pytest.mark.parametrize("answers", [True, False])
-def test_latency_that_changes_for_good(before: float, after: float, answers: bool) -> None:
-    own = body()
+@pytest.mark.parametrize(("latencies", "answers"), combined([(0.05, 0.35), (0.35, 0.05), (0.02, 0.08)], [True, False]))
+def test_latency_that_changes_for_good(latencies: tuple[float, float], answers: bool) -> None:
+    own, (before, after) = body(), latencies
     outcome = run(own, *dance(own, 8.0), latency=lambda now: before if now < 4.0 else after, answers=answers)
     changed = 4.0 + max(before, after)
     assert outcome.between(0.0, 4.0).max() <= TOLERANCE
@@ -62,8 +60,7 @@ def test_a_clock_that_steps_is_no_motion(whose: str, step: float) -> None:
     assert np.diff(outcome.moments).min() >= 0.0
 
 
-@pytest.mark.parametrize("bursts", [0.1, 0.25])
-@pytest.mark.parametrize("answers", [True, False])
+@pytest.mark.parametrize(("bursts", "answers"), combined([0.1, 0.25], [True, False]))
 def test_a_receiver_with_a_busy_processor(bursts: float, answers: bool) -> None:
     own = body()
 
@@ -94,8 +91,7 @@ def test_copies_and_old_datagrams_change_nothing() -> None:
     np.testing.assert_array_equal(after.poses[own.name].positions, before.poses[own.name].positions)
 
 
-@pytest.mark.parametrize("number", [1, 2, 3, *range(4, 24, 4)])
-@pytest.mark.parametrize("answers", [True, False])
+@pytest.mark.parametrize(("number", "answers"), combined([1, 2, 3, *range(4, 24, 4)], [True, False]))
 def test_a_datagram_that_is_lost_costs_no_later_one_its_meaning(number: int, answers: bool) -> None:
     own = body()
     sent: list[float] = []
@@ -110,9 +106,11 @@ def test_a_datagram_that_is_lost_costs_no_later_one_its_meaning(number: int, ans
     assert outcome.between(sent[0] + 0.5, 4.0).max() <= TOLERANCE
 
 
-@pytest.mark.parametrize("answers", [True, False])
-@pytest.mark.parametrize(("loss", "within"), [(0.0, 1.0), (0.01, 0.98), (0.05, 0.93), (0.2, 0.6)])
-def test_a_long_way_with_jitter_loss_and_duplicates(loss: float, within: float, answers: bool) -> None:
+@pytest.mark.parametrize(
+    ("limits", "answers"), combined([(0.0, 1.0), (0.01, 0.98), (0.05, 0.93), (0.2, 0.6)], [True, False])
+)
+def test_a_long_way_with_jitter_loss_and_duplicates(limits: tuple[float, float], answers: bool) -> None:
+    loss, within = limits
     own, rng = body(), np.random.default_rng(3)
     lost = lambda now, count: rng.random() < loss  # noqa: E731
     outcome = run(
@@ -134,8 +132,7 @@ def test_where_datagrams_are_lost_no_hand_goes_back_against_its_motion(loss: flo
     assert outcome.turned_back[outcome.now[2:] > 2.0].max() < 0.005
 
 
-@pytest.mark.parametrize("answers", [True, False])
-@pytest.mark.parametrize("loss", [0.0, 0.01])
+@pytest.mark.parametrize(("loss", "answers"), combined([0.0, 0.01], [True, False]))
 def test_an_outage_of_2_s_heals_within_half_a_second(loss: float, answers: bool) -> None:
     own, rng = body(), np.random.default_rng(4)
     lost = lambda now, count: 4.0 <= now < 6.0 or rng.random() < loss  # noqa: E731

@@ -11,7 +11,7 @@ from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.bodies import Forest
 from rigid_motion.streams.paths import Path
 from rigid_motion.streams.wire import read
-from tests.thoroughness import tried
+from tests.thoroughness import combined, tried
 
 from .links import backs_of, body, dance, run
 
@@ -63,9 +63,7 @@ def swing(rate: float) -> tuple[Body, np.ndarray, Poses]:
     return Body.rigid("hand", radius=0.1), times, Poses(places[None], turns[None])
 
 
-@pytest.mark.parametrize("rate", [60.0, 91.0, 120.0])
-@pytest.mark.parametrize("uneven", [0.0, 0.001])
-@pytest.mark.parametrize("answers", [True, False])
+@pytest.mark.parametrize(("rate", "uneven", "answers"), combined([60.0, 91.0, 120.0], [0.0, 0.001], [True, False]))
 def test_a_fast_hand_is_within_the_tolerance_between_samples(rate: float, uneven: float, answers: bool) -> None:
     """Knots lie on a grid, beside uneven samples; one just behind the start of a window is seen by no sample."""
     own, times, poses = swing(rate)

@@ -19,6 +19,7 @@ from tests.scripts.clips.recordings import swinging_clip
 from tests.scripts.report.chromium import Browser, browser
 from tests.scripts.report.javascript import require
 from tests.scripts.report.runs import RATES, result_of
+from tests.thoroughness import combined, sample
 
 SETTINGS = Settings(0.1, "Rigid Motion 1.0", "compare a.csv b.csv")
 WARNING = ClipWarning("A gap of 183 ms.", "Record again.", 101.25, 101.5)
@@ -138,9 +139,9 @@ def box(page: Browser, selector: str) -> dict[str, float]:
                     ".getBoundingClientRect(); return { x, y, width, height }; })()")  # fmt: skip
 
 
-@pytest.mark.parametrize("name", ["two", "body", "adaptive", "large"])
-@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
-@pytest.mark.parametrize("width", [1440, 390])
+@pytest.mark.parametrize(
+    ("name", "dark", "width"), combined(["two", "body", "adaptive", "large"], [False, True], [1440, 390])
+)
 def test_every_page_draws_its_view_and_chart_and_fits(page, folder, name, dark, width):
     opened(page, folder / f"{name}.html", width=width, height=900, dark=dark)
     assert colours_in_view(page) > 20
@@ -194,7 +195,7 @@ def test_a_chip_hides_its_mode_everywhere(page: Browser, folder: Path) -> None:
     shows(page, count(LINES), modes)
 
 
-@pytest.mark.parametrize("name", ["two", "large"])
+@pytest.mark.parametrize("name", sample(["large", "two"]))
 def test_clips_and_choices_are_changed_and_kept_in_the_address(page: Browser, folder: Path, name: str) -> None:
     opened(page, folder / f"{name}.html", "#a,5,1")
     page.run("document.querySelector('[name=clip][value=\"1\"]').click()")

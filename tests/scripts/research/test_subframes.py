@@ -8,6 +8,7 @@ from research.subframes import Motion, measure
 from rigid_motion import animation
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.scripts.research.keeping import written
+from tests.thoroughness import combined
 
 BRISK = Motion("Brisk", degrees=90.0, metres=1.0, frames=24)
 
@@ -20,8 +21,7 @@ def live_file(empty_file):
     animation.unregister()
 
 
-@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XYZ"])
-@pytest.mark.parametrize("mode", KEYFRAME_MODES)
+@pytest.mark.parametrize(("mode", "rotation_mode"), combined([*KEYFRAME_MODES], ["QUATERNION", "XYZ"]))
 def test_a_brisk_motion_is_within_millimetres_between_frames_and_exact_on_them(
     live_file, monkeypatch, mode, rotation_mode
 ):
