@@ -89,7 +89,7 @@ class SplineErrors:
         result[:6] = twists.logarithm(*_seen_from(begin, end))
         rests = in_one_place(begin[:3], end[:3])
         if rests.any():
-            result[6] = rests & (np.einsum("kp,kp->p", result[:3], result[:3]) < (4.0 * STILL) ** 2)
+            result[6] = rests & (np.einsum("kp,kp->p", result[:3], result[:3]) < STILL**2)
         return result
 
     def _progress(self, samples: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:

@@ -27,8 +27,9 @@ from .piecewise import BLOCK, DENSE, blocks, combine, is_dense, multiply_matrice
 from .poses import Poses, aligned, of_rows, reshaped
 from .quaternions import components, cross, multiply, rotate
 
-STILL = 1e-12
-"""Turns in radians, and ways compared with the distance from the world's origin, that are rounding errors."""
+STILL = 1e-6
+"""Units of length, radians, and growth of the logarithm of scale between two keys that are one pose: what was computed
+for the same pose twice, in single precision, is not quite the same."""
 
 TURN = 1.5
 """Radians that a piece of a bent curve may turn by at most, for a series to be the same but for rounding."""
@@ -133,7 +134,7 @@ class Segments:
         if not still.any():
             return still
         turn, growth = self.screws[:3], self.screws[6]
-        return still & (_length(turn) < 4.0 * STILL) & (np.abs(growth) < STILL)
+        return still & (_length(turn) < STILL) & (np.abs(growth) < STILL)
 
     @cached_property
     def screws(self) -> np.ndarray:
@@ -422,8 +423,7 @@ def _flat(rows: np.ndarray) -> np.ndarray:
 
 def in_one_place(begin: np.ndarray, end: np.ndarray) -> np.ndarray:
     """Return whether positions (3, ...) are others' but for rounding."""
-    size = np.abs(0.5 * (begin + end)).max(axis=0) + SMALLEST_ANGLE
-    return np.asarray(np.abs(end - begin).max(axis=0) < STILL * size)
+    return np.asarray(np.abs(end - begin).max(axis=0) < STILL)
 
 
 def _length(components: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ from rigid_motion.animation.actions.slots import bindings_of
 from rigid_motion.animation.compute.differences import in_betweens
 from rigid_motion.animation.transforms import transform_of
 from tests.animation.bones.rigs import in_turn
+from tests.animation.keyed import curves_of
 from tests.animation.live.test_kept_motion import POSES, keyed, keys_of
 from tests.animation.oracle import matrices, shown_worlds
 from tests.animation.scenes import new_object
@@ -94,3 +95,18 @@ def test_nothing_swings_beside_a_change_of_space(live_file, interpolation):
     frames = np.arange(1.0, 41.0)
     difference = worlds(obj, "motor_spline", frames) - worlds(obj, "dq_sclerp", frames)
     assert np.abs(difference).max() < 1e-5
+
+
+@pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline"])
+@pytest.mark.parametrize("interpolation", ["BEZIER", "LINEAR"])
+def test_it_rests_where_a_pose_was_computed_twice(live_file, mode, interpolation):
+    """Off by rounding of single precision, of which handles that swing beyond their keys make nothing more."""
+    place, angles = POSES[1]
+    twice = (np.nextafter(np.float32(place), np.float32(9.0)), angles)
+    obj = keyed(new_object(), (1.0, 25.0, 49.0, 73.0), [POSES[0], POSES[1], twice, POSES[2]])
+    for fcurve in curves_of(obj).values():
+        for point in fcurve.keyframe_points:
+            point.interpolation, point.handle_left_type, point.handle_right_type = interpolation, "AUTO", "AUTO"
+        fcurve.update()
+    shown = worlds(obj, mode, np.arange(25.0, 50.0))
+    assert np.abs(shown - shown[0]).max() < 2e-6

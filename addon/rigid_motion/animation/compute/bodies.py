@@ -20,6 +20,7 @@ import numpy as np
 from ...motion import Poses
 from ...motion.eulers import extrinsic_eulers_from_quaternions, quaternions_from_extrinsic_eulers
 from ...motion.quaternions import conjugate, multiply, normalise
+from ...motion.segments import STILL
 from ..curves.evaluation import evaluate
 from ..curves.keys import Keys
 from .components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
@@ -75,7 +76,7 @@ def progress_weights(start: np.ndarray, end: np.ndarray, order: str | None) -> t
         # A unit quaternion moves by half of the angle that the object turns.
         weights[ROWS[ROTATION]] *= 4.0
     total = np.einsum("rs,rs->s", weights, chord)
-    weights /= np.where(total > 0.0, total, np.inf)
+    weights /= np.where(total > STILL**2, total, np.inf)
     return weights, np.einsum("rs,rs->s", weights, start)
 
 
