@@ -131,7 +131,7 @@ def test_vertices_of_skins_are_measured(tmp_path):
     numbers = {name: made.accessor(values) for name, values in attributes.items()}
     made.json["meshes"] = [{"primitives": [{"attributes": numbers}]}]
     made.json["nodes"].append({"mesh": 0, "skin": 0})
-    before, after, report = both(made, tmp_path, 5e-3, vertices=True)
+    before, after, report = both(made, tmp_path, 5e-3)
     times = np.union1d(before.moments(0), after.moments(0))
     moved = after.worlds(0, times)[:6] - before.worlds(0, times)[:6]
     moved = np.einsum("vk,vkmab,vb->mva", shares, moved[joints], np.column_stack((places, np.ones(50))))

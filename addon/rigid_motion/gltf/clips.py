@@ -6,7 +6,7 @@ A clip that would not become smaller stays as it was.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -14,13 +14,13 @@ import numpy as np
 
 from ..motion import SeparateKeys, Skeleton
 from ..motion.skeleton_stretches import Run
-from .errors import NOWHERE, PARTS, Feet, World
-from .nodes import Nodes, by_target, steadied
+from .documents import shown as quoted
+from .errors import NOWHERE, PARTS, Feet, World, Worst
+from .nodes import by_target
 from .rewriting import Amount, EveryKey, StoredTrack, amount, amount_before, key_size, shown, stored
 from .search import Search
-from .settling import moments, settled, shared_times
-from .tracks import ROTATION, TRANSLATION, Clip, Track, Tracks
-from .vertices import largest_displacement
+from .settling import Channel, settled, shared_times
+from .tracks import ROTATION, TRANSLATION, WEIGHTS, Clip, Target, Track, Tracks
 
 OF_INTEGERS = 0.85
 """The share of the tolerance that rotations may take that are stored as 16-bit integers."""
@@ -40,6 +40,8 @@ ROUNDS = 24
 LEAST = 0.1
 """The share of the tolerance that is worth a search."""
 
+NEEDED_CHANNELS, ALL_CHANNELS = CHANNELS = ("needed", "all")
+
 NEEDED, LARGER = "all of its keys are needed", "fewer keys would take more bytes"
 
 
@@ -51,7 +53,7 @@ class Options:
     """How far off any point within the radius of any node may be in the world; a share of the size where None."""
 
     radius: float | None = None
-    """The same for all nodes; where None that of meshes is theirs, and that of joints a share of the size."""
+    """The least radius of a node's ball, which holds all that the node carries; a share of the size where None."""
 
     shared: bool = False
     """Whether all nodes of a clip get their keys at the same times."""
@@ -59,8 +61,8 @@ class Options:
     count: int | None = None
     """So many key poses of each clip instead of a tolerance."""
 
-    vertices: bool = False
-    """Whether the largest displacement of any vertex of a skin is measured."""
+    channels: str = NEEDED_CHANNELS
+    """One of CHANNELS: whether those in which a node is as it rests keep a key, also where nothing else moves it."""
 
     run: Run = map
     """What has stretches of long clips searched, called as `map` is, with functions of modules."""
@@ -81,13 +83,17 @@ class ReducedClip:
     before: Amount
     after: Amount
     error: float = 0.0
-    """The largest displacement of any point that is promised, in the world."""
+    """The largest displacement of what is seen, in the world."""
+
+    where: str = ""
+    """What is displaced so far, and when."""
 
     slides: tuple[float, float] = (0.0, 0.0)
     """How far joints slide that stand on the ground, before and after."""
 
-    vertices: float | None = None
-    """The largest displacement of any vertex of a skin, where that was asked for and there is one."""
+
+class _LargerError(Exception):
+    """Other tracks take no fewer bytes than those of the clip."""
 
 
 class ClipReduction:
@@ -95,12 +101,11 @@ class ClipReduction:
 
     Parameters
     ----------
-    nodes : Nodes
+    world : World
+        As the clip moves it, with any moments.
     clip : Clip
-    moving : array of int, shape (n,)
-        The nodes that may move, parents before their children.
-    radii : array, shape (n,)
-        Of the balls around them.
+    needed : container of Target
+        Channels that keep a key also where nodes are as they rest.
     joints : iterable of int
         Nodes that are joints, some of which may be feet.
     size : float
@@ -111,10 +116,9 @@ class ClipReduction:
 
     def __init__(
         self,
-        nodes: Nodes,
+        world: World,
         clip: Clip,
-        moving: np.ndarray,
-        radii: np.ndarray,
+        needed: Container[Target],
         joints: Iterable[int],
         size: float,
         options: Options,
@@ -122,35 +126,58 @@ class ClipReduction:
         self.clip, self.options, self.size = clip, options, size
         assert options.tolerance is not None
         self.tolerance = options.tolerance
-        self.before = amount_before(nodes.document, clip)
-        span = np.unique([track.times[end] for track in clip.tracks for end in (0, -1)])[[0, -1]]
-        world = World(nodes, moving, radii, steadied(clip.tracks), np.unique(span))
-        self.world = replace(world, times=moments(world, clip, self.tolerance))
-        result = settled(self.world, clip, self.tolerance)
+        self.before = amount_before(world.nodes.document, clip)
+        channels = [Channel(world, track, self.tolerance) for track in clip.all_tracks]
+        moved = [channel.times for channel in channels if channel.track.path != WEIGHTS and not channel.track.is_constant]
+        times = np.unique(np.concatenate([world.times, *moved]))
+        self.world = world if np.array_equal(times, world.times) else replace(world, times=times)
+        self.given = by_target(clip.pointers)
+        """The tracks that stay."""
+        result = settled(channels[: len(clip.tracks)], needed)
         self.settled = {target: track for target, track in result.items() if track is not None}
-        self.dense = {target: track for target, track in by_target(clip.tracks).items() if target not in result}
+        moving = [target for target, track in {**self.settled, **self.given}.items() if len(track.times) > 1]
+        self.stepping = {node for node, path in moving if path in (TRANSLATION, ROTATION)}
+        """The nodes that are left out of the search."""
+        rest = {target: track for target, track in by_target(clip.tracks).items() if target not in result}
+        self.settled |= {target: track.whole for target, track in rest.items() if target[0] in self.stepping}
+        self.dense = {target: track for target, track in rest.items() if target[0] not in self.stepping}
         """The tracks that are to have fewer keys."""
         self.feet = Feet(self.world, joints)
 
     def reduced(self) -> ReducedClip:
         """Return the clip with fewer keys, or as it was."""
         count = self.options.count
-        result = self._so_many(count) if self.dense and count else self._within_tolerance()
+        try:
+            result = self._so_many(count) if self.dense and count else self._within_tolerance()
+        except _LargerError:
+            return self._kept(LARGER)
         if result is None:
             return self._kept(NEEDED)
-        tracks, error = result
-        after = amount(tracks)
-        if after.size >= self.before.size:
-            return self._kept(LARGER)
-        shown_tracks = self._shown(tracks)
-        off = largest_displacement(self.world, shown_tracks) if self.options.vertices else None
-        slides, name = self.feet.slides(shown_tracks), self.clip.name
-        return ReducedClip(self.clip.number, name, tuple(tracks), "", self.before, after, error, slides, off)
+        tracks, worst = result
+        after = self._amount(tracks)
+        slides, where = self.feet.slides(self._shown(tracks)), self._told(worst)
+        return ReducedClip(
+            self.clip.number, self.clip.name, tuple(tracks), "", self.before, after, worst.error, where, slides
+        )
+
+    def _told(self, worst: Worst) -> str:
+        if worst.node < 0:
+            return ""
+        name = self.world.nodes.document.json["nodes"][worst.node].get("name")
+        node = f"node {quoted(name)}" if isinstance(name, str) and name else f"node {worst.node}"
+        return f"{node} at {worst.time:.4g} s"
+
+    def _amount(self, tracks: list[StoredTrack]) -> Amount:
+        """Return how much tracks are. Raises _LargerError where that is no less than before."""
+        result = amount(tracks)
+        if result.size >= self.before.size:
+            raise _LargerError
+        return result
 
     def _kept(self, reason: str) -> ReducedClip:
         return ReducedClip(self.clip.number, self.clip.name, None, reason, self.before, self.before)
 
-    def _so_many(self, count: int) -> tuple[list[StoredTrack], float]:
+    def _so_many(self, count: int) -> tuple[list[StoredTrack], Worst]:
         """Tracks with so many key poses, those under which feet slide least, and the largest error."""
         search = self._search()
         best, farthest = [], np.inf
@@ -164,9 +191,9 @@ class ClipReduction:
                 best, farthest = tracks, farther
             if farther <= MORE_SLIDE * self.size:
                 break
-        return best, self.world.largest_error(self._shown(best))
+        return best, self.world.worst(self._shown(best), self.morphed)[0]
 
-    def _within_tolerance(self) -> tuple[list[StoredTrack], float] | None:
+    def _within_tolerance(self) -> tuple[list[StoredTrack], Worst] | None:
         """Tracks with few keys that keep to the tolerance, and the largest error; None where none do."""
         if not self.dense:
             return self._proven([])
@@ -184,12 +211,17 @@ class ClipReduction:
 
     def _search(self) -> Search:
         """Return a search for the keys of nodes, but for those whose steps are kept."""
-        moved = [target for target, track in self.settled.items() if len(track.times) > 1]
-        steps = [node for node, path in moved if path in (TRANSLATION, ROTATION)]
-        return Search(self.world, self.settled | self.dense, np.isin(self.world.moving, steps), self.options.run)
+        fixed = np.isin(self.world.moving, list(self.stepping))
+        return Search(self.world, self.given | self.settled | self.dense, fixed, self.options.run)
 
     @cached_property
-    def storing(self) -> tuple[frozenset[tuple[int, str]], float]:
+    def morphed(self) -> tuple[Worst, np.ndarray]:
+        """How far off morph targets are, which need no search."""
+        weights = [stored(track, integers=False) for (_, path), track in self.settled.items() if path == WEIGHTS]
+        return self.world.morphed(self._shown(weights))
+
+    @cached_property
+    def storing(self) -> tuple[frozenset[Target], float]:
         """The rotations that are stored as integers, and how far off all is with all keys, by that and what is settled.
 
         What moves least by its own rotation comes first.
@@ -205,7 +237,7 @@ class ClipReduction:
                 for target, track in self.dense.items()
             }
             held = [stored(track, integers=target in integers) for target, track in self.settled.items()]
-            return self.world.largest_error({**self._shown(held), **dense}, parts=1)
+            return self.world.worst({**self._shown(held), **dense}, self.morphed, parts=1)[0].error
 
         count, allowed = len(turned), OF_INTEGERS * self.tolerance
         if (off := taken(count)) > allowed:
@@ -221,21 +253,22 @@ class ClipReduction:
         of_nodes = [(path, keys[self.world.rows[node]]) for node, path in self.dense]
         return [own.rotation if path == ROTATION else own.location for path, own in of_nodes]
 
-    def _proven(self, samples: list[np.ndarray]) -> tuple[list[StoredTrack], float] | None:
+    def _proven(self, samples: list[np.ndarray]) -> tuple[list[StoredTrack], Worst] | None:
         """Return stored tracks with keys at these samples, more where the proof fails, and their largest error.
 
         None where the proof fails with more and more of them.
         """
-        sound: dict[int, tuple[int, float]] = {}
+        sound: dict[int, tuple[int, Worst]] = {}
         for _ in range(ROUNDS):
             tracks = self._stored(samples)
+            self._amount(tracks)
             rows, eighths = self._failures(self._shown(tracks), sound)
             if not len(rows):
-                return tracks, max(error for _, error in sound.values())
+                return tracks, max(worst for _, worst in sound.values())
             samples = self._with_more(samples, rows, eighths)
         return None
 
-    def _failures(self, tracks: Tracks, sound: dict[int, tuple[int, float]]) -> tuple[np.ndarray, np.ndarray]:
+    def _failures(self, tracks: Tracks, sound: dict[int, tuple[int, Worst]]) -> tuple[np.ndarray, np.ndarray]:
         """Where tracks break what is promised: rows of nodes, and eighths of moments.
 
         What is quickly seen comes first, and hides the rest. Of stretches that are sound, their digest and their
@@ -250,12 +283,12 @@ class ClipReduction:
             if number in sound and sound[number][0] == digest:
                 continue
             for parts in (1, PARTS):
-                error, rows, numbers = world.worst(tracks, self.tolerance, parts=parts, among=(number,))
+                worst, rows, numbers = world.worst(tracks, self.morphed, self.tolerance, parts=parts, among=(number,))
                 if len(rows):
                     failures.append((rows, PARTS // parts * numbers))
                     break
             else:
-                sound[number] = digest, error
+                sound[number] = digest, worst
         all_rows, all_numbers = map(np.concatenate, zip(*failures, strict=True))
         return all_rows, all_numbers
 
@@ -308,4 +341,4 @@ class ClipReduction:
 
     def _shown(self, tracks: Iterable[StoredTrack]) -> Tracks:
         of_channel = self._of_channel
-        return by_target(tuple(shown(of_channel[track.channel], track) for track in tracks))
+        return self.given | by_target(tuple(shown(of_channel[track.channel], track) for track in tracks))

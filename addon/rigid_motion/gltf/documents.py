@@ -13,7 +13,7 @@ import math
 import ntpath
 import re
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath, PureWindowsPath
@@ -133,6 +133,11 @@ class Document:
             raise GltfError(f"{length} bytes are more than a GLB can hold", "export it as .gltf, with files beside it")
         return beside | {name: b"".join((struct.pack("<4sII", MAGIC, 2, length), *parts))}
 
+    def reread(self) -> Document:
+        """Return what is read of the document where it has been written."""
+        name = "file.gltf" if self.chunks is None else "file.glb"
+        return _document(self.files(name)[name], lambda number, _: self.buffers[number])
+
     def companions(self, folder: Path) -> dict[str, bytes]:
         """Files that the document names and that have not changed, from its folder: names, and what is in them."""
         buffers = [buffer for number, buffer in enumerate(objects(self.json, "buffers")) if number not in self.changed]
@@ -154,11 +159,16 @@ def read_document(path: Path, *, in_memory: bool = False) -> Document:
         Where the file cannot be read.
     """
     content = path.read_bytes() if in_memory else FileBytes.of(path)
+    return _document(content, lambda number, uri: FileBytes.of(file_of(path.parent, number, uri)))
+
+
+def _document(content: bytes | FileBytes, file: Callable[[int, object], bytes | FileBytes | None]) -> Document:
+    """Return a document, with `file` for what is in files beside it, by the numbers and URIs of buffers."""
     chunks = chunks_of(content) if bytes(content[:4]) == MAGIC else None
     document = parsed(bytes(content if chunks is None else next(data for kind, data in chunks if kind == JSON_CHUNK)))
     binary = next((data for kind, data in chunks or () if kind == BINARY_CHUNK), None)
     buffers = [
-        _buffer(path.parent, number, buffer, binary if number == 0 else None)
+        _buffer(file, number, buffer, binary if number == 0 else None)
         for number, buffer in enumerate(objects(document, "buffers"))
     ]
     return Document(document, tuple(buffers), chunks)
@@ -283,7 +293,12 @@ def data_uri(data: bytes) -> str:
     return f"data:application/octet-stream;base64,{base64.b64encode(data).decode()}"
 
 
-def _buffer(folder: Path, number: int, buffer: Json, binary: bytes | FileBytes | None) -> bytes | FileBytes | None:
+def _buffer(
+    file: Callable[[int, object], bytes | FileBytes | None],
+    number: int,
+    buffer: Json,
+    binary: bytes | FileBytes | None,
+) -> bytes | FileBytes | None:
     uri, length = buffer.get("uri"), whole(buffer, "byteLength", least=1)
     if uri is None:
         data = binary
@@ -293,7 +308,7 @@ def _buffer(folder: Path, number: int, buffer: Json, binary: bytes | FileBytes |
         except ValueError:
             raise GltfError(f"buffer {number} is text that is not in base64") from None
     else:
-        data = FileBytes.of(file_of(folder, number, uri))
+        data = file(number, uri)
     if data is None:
         return None
     if len(data) < length:

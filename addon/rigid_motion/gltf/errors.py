@@ -1,7 +1,8 @@
-"""How far off nodes are in the world, where other tracks move them: proven between keys, too.
+"""How far off what is seen is in the world, where other tracks move the nodes: proven between keys, too.
 
-What counts is a ball around each node: no point of it is off by more. Its radius is that in the world, where the node
-is largest; a node that shrinks takes its ball along. Of a long clip no more is looked at at once than a stretch of it.
+What counts is a ball around each node that holds all that the node carries, and a shell around it at least: no point of
+it is off by more. The ball is in the node's own space, so it grows and shrinks with the node. What morph targets add to
+that is bounded by their largest displacement. Of a long clip no more is looked at at once than a stretch of it.
 Joints that stand on the ground are feet: how far they slide there counts, and when too far.
 """
 
@@ -17,7 +18,8 @@ from ..motion.affine import AffineMaps, ball_displacement, displacement_bound
 from ..motion.contacts import LOW, SLOW, contacts, spans
 from ..motion.skeleton_stretches import stretches
 from .nodes import Nodes
-from .tracks import SCALE, Tracks
+from .seen import Seen
+from .tracks import SCALE, WEIGHTS, Tracks
 
 PARTS = 8
 """Of every gap between keys: that is how closely it is looked at."""
@@ -31,16 +33,19 @@ AT_ONCE = 2**15
 EXACTLY = 64
 """Poses whose displacement is worked out at once, those with the largest bounds first."""
 
-AS_LARGE = 1.0 - 1e-9
-"""What is larger than this share of something else is no smaller but for rounding."""
-
-EVEN = 1e-4
-"""Of a scale: its axes differ by no more where it is even. Programs write some with rounding."""
-
 NOWHERE = np.empty(0, dtype=np.int64)
 
 UPWARDS = 1
 """The axis of glTF that is."""
+
+
+@dataclass(frozen=True, order=True)
+class Worst:
+    """The largest displacement, of what a node carries and when."""
+
+    error: float = 0.0
+    node: int = -1
+    time: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,11 +72,12 @@ class World:
     """Nodes that move, and what they are measured by. Lengths are in the unit of the document."""
 
     nodes: Nodes
+    seen: Seen
     moving: np.ndarray
     """The numbers of those that move, parents before their children, shape (n,)."""
 
-    radii: np.ndarray
-    """Of the balls, shape (n,)."""
+    shells: np.ndarray
+    """The least radii of their balls, in the world where a node is largest, shape (n,)."""
 
     truth: Tracks
     times: np.ndarray
@@ -94,7 +100,7 @@ class World:
         count = len(self.times)
         return stretches(count, STRETCH) if count > LONG * STRETCH else [slice(0, count)]
 
-    def seen(self, *tracks: Tracks, parts: int = 1, among: Collection[int] | None = None) -> Iterator[Block]:
+    def blocks(self, *tracks: Tracks, parts: int = 1, among: Collection[int] | None = None) -> Iterator[Block]:
         """Yield what moments look like as each of these tracks move the nodes, and so many parts of gaps between.
 
         Where that is asked for, among some of the stretches alone, by their numbers.
@@ -125,9 +131,8 @@ class World:
 
     def parted(self, first: int, end: int, parts: int) -> np.ndarray:
         """Return some of the moments, and so many parts of the gaps behind them."""
-        times = self.times[first : end + 1]
-        gaps = (times[:-1, None] + np.diff(times)[:, None] * np.arange(parts) / parts).ravel()
-        return gaps if len(times) > end - first else np.append(gaps, times[-1])
+        times = _parted(self.times[first : end + 1], parts)
+        return times if end >= len(self.times) else times[:-1]
 
     def worlds(self, tracks: Tracks, times: np.ndarray) -> AffineMaps:
         """Where the nodes are at times (m,) as tracks move them, shape (n, m)."""
@@ -137,7 +142,7 @@ class World:
         """How long the axes of each node's parent are in the world at times (m,), shape (n, m, 3), or (n, 1, 3)."""
         if any(path == SCALE and len(track.times) > 1 for (_, path), track in self.truth.items()):
             return self._above(np.linalg.norm(self.worlds(self.truth, times).axes, axis=-2))
-        return self._above(self._extremes[1][:, None])
+        return self._above(self._extremes[0][:, None])
 
     def _above(self, lengths: np.ndarray) -> np.ndarray:
         """Those of nodes' parents, where these are of the nodes, shape (n, ..., 3)."""
@@ -147,81 +152,118 @@ class World:
             result[row] = np.linalg.norm(self.nodes.resting.axes[parent], axis=-2) if parent >= 0 else 1.0
         return result
 
-    @property
-    def _is_uneven(self) -> bool:
-        """Whether any scale is uneven by more than rounding, or may be: what turns below has another shape then."""
-        scales = [track.points for (_, path), track in self.truth.items() if path == SCALE]
-        return bool(self.nodes.matrices) or any(
-            (np.ptp(some, axis=1) > EVEN * np.abs(some).max(axis=1)).any() for some in (self.nodes.rest[SCALE], *scales)
-        )
-
     @cached_property
-    def _extremes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of each node: its axes where they are first largest (n, 3, 3), their lengths at most (n, 3), and how far it
-        gets from its parent (n,).
-
-        Axes that are as large again, but for rounding, are not taken: under a parent whose scale is uneven, nodes that
-        turn keep their size and change the shape of what was a ball.
-        """
+    def _extremes(self) -> tuple[np.ndarray, np.ndarray]:
+        """How long the axes of each node get in the world (n, 3), and how far it gets from its parent (n,)."""
         count = len(self.moving)
-        axes, sizes = np.zeros((count, 3, 3)), np.full(count, -1.0)
         lengths, away = np.zeros((count, 3)), np.zeros(count)
-        hangs, every = self.parents >= 0, np.arange(count)
-        # Nodes that change their shape are largest for a moment, perhaps between two.
-        for block in self.seen(self.truth, parts=PARTS if self._is_uneven else 1):
+        hangs = self.parents >= 0
+        for block in self.blocks(self.truth):
             (maps,) = block.maps
-            squares = np.einsum("nmij,nmij->nm", maps.axes, maps.axes)
-            largest = np.argmax(squares >= AS_LARGE * squares.max(axis=1, keepdims=True), axis=1)
-            larger = AS_LARGE * squares[every, largest] > sizes
-            sizes[larger], axes[larger] = squares[every, largest][larger], maps.axes[every, largest][larger]
             lengths = np.maximum(lengths, np.linalg.norm(maps.axes, axis=-2).max(axis=1))
             from_parents = maps.origins[hangs] - maps.origins[self.parents[hangs]]
             away[hangs] = np.maximum(away[hangs], np.linalg.norm(from_parents, axis=-1).max(axis=1))
-        return axes, lengths, away
+        return lengths, away
+
+    @cached_property
+    def largest(self) -> np.ndarray:
+        """How long the longest axis of each node gets in the world, shape (n,)."""
+        return self._extremes[0].max(axis=1)
+
+    @cached_property
+    def balls(self) -> np.ndarray:
+        """The radii of the balls in the spaces of the nodes, shape (n,)."""
+        shells = np.divide(self.shells, self.largest, out=np.zeros(len(self.moving)), where=self.largest > 0.0)
+        return np.maximum(self.seen.reaches[self.moving], shells)
+
+    @cached_property
+    def radii(self) -> np.ndarray:
+        """The radii of the balls in the world, where the nodes are largest, shape (n,)."""
+        return self.balls * self.largest
 
     @cached_property
     def longest_above(self) -> np.ndarray:
         """How long any axis of each node's parent gets in the world, shape (n,)."""
-        return self._above(self._extremes[1]).max(axis=-1)
+        return self._above(self._extremes[0]).max(axis=-1)
 
     @cached_property
     def reaches(self) -> np.ndarray:
         """How far what hangs on each node is from it at most, with the balls around it, shape (n,); an upper bound."""
-        result, away = self.radii.copy(), self._extremes[2]
+        result, away = self.radii.copy(), self._extremes[1]
         for row in range(len(result) - 1, -1, -1):
             if (parent := self.parents[row]) >= 0:
                 result[parent] = max(result[parent], away[row] + result[row])
         return result
 
-    def largest_error(self, shown: Tracks, *, parts: int = PARTS) -> float:
-        """Return the largest displacement of any point of any ball at the moments, and at parts of the gaps between."""
-        return self.worst(shown, np.inf, parts=parts)[0]
+    def morph_scale(self, node: int) -> float:
+        """By how much the morph targets of a node's mesh are larger in the world than in it, at most."""
+        morph = self.seen.morphs[node]
+        largest = np.linalg.norm(self.nodes.resting.axes[morph.carriers], axis=-2).max(axis=-1)
+        moves = np.isin(morph.carriers, self.moving)
+        largest[moves] = self.largest[[self.rows[carrier] for carrier in morph.carriers[moves].tolist()]]
+        return float((largest * morph.factors).max())
+
+    def morphed(self, shown: Tracks) -> tuple[Worst, np.ndarray]:
+        """Return where morph targets displace vertices most, and how far at most on each of the nodes, shape (n,)."""
+        worst, besides = Worst(), np.zeros(len(self.moving))
+        for (node, path), track in self.truth.items():
+            if path != WEIGHTS or node not in self.seen.morphs:
+                continue
+            given = shown.get((node, path))
+            keys = track.times if given is None else np.union1d(track.times, given.times)
+            times = _parted(keys, PARTS)
+            there = self.nodes.rest_of(node, path) if given is None else given.at(times)
+            morph = self.seen.morphs[node]
+            errors = np.abs(there - track.at(times)) @ morph.deltas * self.morph_scale(node)
+            worst = max(worst, Worst(float(errors.max()), node, float(times[np.argmax(errors)])))
+            rows = [self.rows[carrier] for carrier in morph.carriers.tolist() if carrier in self.rows]
+            besides[rows] = np.maximum(besides[rows], errors.max())
+        return worst, besides
 
     def worst(
-        self, shown: Tracks, tolerance: float, *, parts: int = PARTS, among: Collection[int] | None = None
-    ) -> tuple[float, np.ndarray, np.ndarray]:
-        """Errors at the moments and parts of the gaps: the largest, and where it is over a tolerance and a peak.
+        self,
+        shown: Tracks,
+        morphed: tuple[Worst, np.ndarray],
+        tolerance: float = np.inf,
+        *,
+        parts: int = PARTS,
+        among: Collection[int] | None = None,
+    ) -> tuple[Worst, np.ndarray, np.ndarray]:
+        """Return the largest displacement of what is seen, at the moments and at parts of the gaps between them.
+
+        Parameters
+        ----------
+        shown : Tracks
+        morphed : tuple
+            What they make of morph targets: see `morphed`.
+        tolerance : float, optional
+        parts : int, optional
+        among : collection of int, optional
+            The stretches that are looked at, by their numbers.
 
         Returns
         -------
-        largest : float
+        largest : Worst
         rows, numbers : array, shape (k,)
-            Of nodes, and of the times.
+            Of nodes, and of the times, where the displacement is over the tolerance and a peak.
         """
-        largest, rows, numbers = 0.0, [NOWHERE], [NOWHERE]
-        for block in self.seen(shown, self.truth, parts=parts, among=among):
-            there, truth = (AffineMaps(some.axes @ self._to_balls, some.origins) for some in block.maps)
-            bounds = displacement_bound(there, truth, self.radii[:, None])
+        largest, besides = morphed
+        rows, numbers = [NOWHERE], [NOWHERE]
+        for block in self.blocks(shown, self.truth, parts=parts, among=among):
+            there, truth = block.maps
+            bounds = displacement_bound(there, truth, self.balls[:, None]) + besides[:, None]
             errors = np.zeros(bounds.shape)
-            waiting = np.flatnonzero(bounds > min(largest, tolerance))
+            waiting = np.flatnonzero(bounds > min(largest.error, tolerance))
             waiting = waiting[np.argsort(-bounds.flat[waiting])]
             for begin in range(0, len(waiting), EXACTLY):
                 some = waiting[begin : begin + EXACTLY]
-                if bounds.flat[some[0]] <= min(largest, tolerance):
+                if bounds.flat[some[0]] <= min(largest.error, tolerance):
                     break
-                where = np.unravel_index(some, errors.shape)
-                errors[where] = ball_displacement(there[where], truth[where], self.radii[where[0]])
-                largest = max(largest, float(np.max(errors[where])))
+                where = row, number = np.unravel_index(some, errors.shape)
+                errors[where] = ball_displacement(there[where], truth[where], self.balls[row]) + besides[row]
+                most = int(np.argmax(errors[where]))
+                found = Worst(float(errors[where][most]), int(self.moving[row[most]]), float(block.times[number[most]]))
+                largest = max(largest, found)
             padded = np.pad(errors, ((0, 0), (1, 1)))
             peaks = (errors > tolerance) & (errors >= padded[:, :-2]) & (errors >= padded[:, 2:])
             row, number = np.nonzero(peaks)
@@ -229,10 +271,11 @@ class World:
             numbers.append(number + block.first)
         return largest, np.concatenate(rows), np.concatenate(numbers)
 
-    @cached_property
-    def _to_balls(self) -> np.ndarray:
-        """From axes of nodes to those of their balls, which are even where the node is largest, (n, 1, 3, 3)."""
-        return np.linalg.pinv(self._extremes[0])[:, None]
+
+def _parted(times: np.ndarray, parts: int) -> np.ndarray:
+    """Return moments, and so many parts of the gaps behind them."""
+    gaps = times[:-1, None] + np.diff(times)[:, None] * np.arange(parts) / parts
+    return np.append(gaps.ravel(), times[-1])
 
 
 class Feet:
@@ -256,12 +299,12 @@ class Feet:
         if not len(self.rows) or len(times) < 2:
             return np.zeros(shape, dtype=bool)
         heights, lowest = np.empty(len(times)), np.inf
-        for block in world.seen(world.truth):
+        for block in world.blocks(world.truth):
             upwards = block.maps[0].origins[self.rows, :, UPWARDS]
             heights[block.samples], lowest = np.ptp(upwards, axis=0), min(lowest, float(upwards.min()))
         height, low, slow = float(np.median(heights)), np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
         before = None
-        for block in world.seen(world.truth):
+        for block in world.blocks(world.truth):
             positions = block.maps[0].origins[self.rows]
             low[:, block.samples] = positions[..., UPWARDS] - lowest <= LOW * height
             before = positions[:, :1] if before is None else before
@@ -308,7 +351,7 @@ class Feet:
             return []
         rows, firsts, lasts = self.spans.T
         result, starts = [np.empty(length) for length in lasts - firsts + 1], np.empty((len(rows), 3))
-        for block in self.world.seen(tracks):
+        for block in self.world.blocks(tracks):
             origins, samples = block.maps[0].origins, block.samples
             for number in np.flatnonzero((firsts < samples.stop) & (lasts >= samples.start)).tolist():
                 begin, end = max(firsts[number], samples.start), min(lasts[number] + 1, samples.stop)

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import itertools
 import secrets
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from .clips import ClipReduction, Options, ReducedClip
+from .clips import ALL_CHANNELS, ClipReduction, Options, ReducedClip
 from .documents import Document, GltfError, damage_refused, read_document
-from .nodes import Nodes
-from .rewriting import rewritten
-from .sizes import OF_A_BODY, OF_KEY_POSES, joints_of, radii_of, size_of
-from .tracks import WEIGHTS, Clip, read_clips
+from .errors import World
+from .nodes import Nodes, by_target, steadied
+from .rewriting import StoredTrack, rewritten, shown
+from .seen import Seen
+from .sizes import OF_A_BODY, OF_KEY_POSES, joints_of, shells_of, size_of
+from .tracks import PATHS, WEIGHTS, WIDTHS, Clip, Target, read_clips
 
 MOST = 0.1
 """A tolerance above this share of the size is a mistake, mostly of the unit."""
@@ -23,18 +25,34 @@ MOST = 0.1
 SOME = 1e-3
 """The tolerance where nothing has a size."""
 
+NOTE = "rigid_motion"
+"""What the tolerance is noted under, in the extras of the asset."""
+
+MOVERS = ("VRMC_node_constraint",)
+"""Extensions of nodes by which these follow others."""
+
+
+NewTracks = Mapping[int, Sequence[StoredTrack]]
+"""By the numbers of clips; of others they stay."""
+
 
 @dataclass(frozen=True, eq=False)
 class Report:
     """What became of a file. Lengths are in its unit, which glTF means to be the metre."""
 
     size: float
-    """Of its joints, or of its meshes."""
+    """Of its joints, or of what its nodes carry."""
 
     tolerance: float
     clips: tuple[ReducedClip, ...]
     document: Document
     """With fewer keys; the same where no clip needs fewer."""
+
+    left_alone: str = ""
+    """Why nothing of it was reduced."""
+
+    reduced_before: float | None = None
+    """The tolerance of an earlier reduction, whose errors are in it."""
 
 
 def reduced(document: Document, options: Options) -> Report:
@@ -47,29 +65,112 @@ def reduced(document: Document, options: Options) -> Report:
     """
     with damage_refused():
         clips, nodes = read_clips(document), Nodes(document)
-        if not any(clip.tracks for clip in clips):
-            raise GltfError("no animation moves a node", "export it with its animations")
-        joints = set(itertools.chain.from_iterable(joints_of(document)))
-        moved = _moved(nodes, clips)
-        size = size_of(nodes, moved)
-        radii = radii_of(nodes, moved, size) if options.radius is None else np.full(len(moved), options.radius)
+        if reason := _left_alone(nodes, clips):
+            return Report(0.0, options.tolerance or 0.0, (), document, reason)
+        seen = Seen.of(nodes, clips)
+        size = size_of(nodes, seen, _moved(nodes, clips, PATHS), clips)
     tolerance = options.tolerance
     if tolerance is None:
         tolerance = (OF_KEY_POSES if options.shared else OF_A_BODY) * size or SOME
     elif tolerance > MOST * size > 0.0:
-        raise GltfError(
-            f"a tolerance of {tolerance:.3g} m is more than a tenth of the size, which is {size:.3g} m in this file",
-            f"give one below {MOST * size:.2g} m",
-        )
+        reason = f"a tolerance of {tolerance:.3g} m is more than a tenth of its size of {size:.3g} m"
+        return Report(size, tolerance, (), document, f"{reason}: give one below {MOST * size:.2g} m")
     options = replace(options, tolerance=tolerance)
+    joints = set(itertools.chain.from_iterable(joints_of(document)))
     result = []
     for clip in clips:
         if clip.tracks:
-            own = np.isin(moved, _moved(nodes, (clip,)))
-            result.append(ClipReduction(nodes, clip, moved[own], radii[own], joints, size, options).reduced())
+            own = _moved(nodes, (clip,))
+            shells = shells_of(nodes, own, size, tolerance)
+            if options.radius is not None:
+                shells[:] = options.radius
+            world = World(nodes, seen, own, shells, steadied(clip.all_tracks), _key_times(clip))
+            needed = _needed(nodes, seen, clip, clips, options)
+            result.append(ClipReduction(world, clip, needed, joints, size, options).reduced())
     tracks = {clip.number: clip.tracks for clip in result if clip.tracks is not None}
     with damage_refused():
-        return Report(size, tolerance, tuple(result), rewritten(document, tracks) if tracks else document)
+        if not tracks:
+            return Report(size, tolerance, tuple(result), document, "all of its keys are needed")
+        changed = rewritten(document, tracks)
+        _require_proven(changed, nodes, seen, clips, tracks)
+        return Report(size, tolerance, tuple(result), changed)
+
+
+def _left_alone(nodes: Nodes, clips: Sequence[Clip]) -> str:
+    """Return why nothing of a document can be reduced, or an empty text."""
+    if not any(clip.tracks for clip in clips):
+        return "no animation moves a node"
+    for clip in clips:
+        if clip.unread:
+            return f"{clip.name} animates {clip.unread}, and what that moves is not known here"
+    for number, node in enumerate(nodes.document.json["nodes"]):
+        for mover in MOVERS:
+            if mover in node.get("extensions", {}):
+                return f"node {node.get('name', number)} follows others by {mover}, which is not worked out here"
+    return ""
+
+
+def _noted(document: Document) -> float | None:
+    """Return the tolerance that an earlier reduction has noted in a document."""
+    extras = document.json.get("asset", {}).get("extras")
+    note = extras.get(NOTE) if isinstance(extras, dict) else None
+    tolerance = note.get("tolerance") if isinstance(note, dict) else None
+    return tolerance if isinstance(tolerance, float) and tolerance > 0.0 else None
+
+
+def _with_note(document: Document, tolerance: float) -> Document:
+    """Return a document that says within which tolerance it was reduced, where there is room for extras."""
+    asset = document.json.get("asset", {})
+    extras = asset.get("extras", {})
+    if not isinstance(extras, dict):
+        return document
+    noted = {**asset, "extras": {**extras, NOTE: {"tolerance": tolerance}}}
+    return replace(document, json={**document.json, "asset": noted})
+
+
+def _key_times(clip: Clip) -> np.ndarray:
+    """The ends of a clip, and all times at which what moves nodes has keys."""
+    ends = [track.times[end] for track in clip.tracks for end in (0, -1)]
+    moved = [track.times for track in clip.all_tracks if track.path != WEIGHTS and not track.is_constant]
+    return np.unique(np.concatenate([np.unique(ends)[[0, -1]], *moved]))
+
+
+def _needed(nodes: Nodes, seen: Seen, clip: Clip, clips: Sequence[Clip], options: Options) -> set[Target]:
+    """Return the channels of a clip that keep a key also where nodes are as they rest.
+
+    What shows the clips after one another leaves a node where the clip before had it; and a file that shows nothing is
+    a library of clips for bodies that may rest in other ways.
+    """
+    others = clips if options.channels == ALL_CHANNELS or not seen.reaches.any() else [other for other in clips if other is not clip]
+    is_library = others is clips
+    return {
+        (track.node, track.path)
+        for other in others
+        for track in other.all_tracks
+        if is_library or not (track.is_constant and np.array_equal(track.points[0], nodes.rest_of(track.node, track.path)))
+    }
+
+
+def _require_proven(document: Document, nodes: Nodes, seen: Seen, clips: Sequence[Clip], tracks: NewTracks) -> None:
+    """Read a document as it is to be written: it has to show what was proven, and carry what was carried.
+
+    Raises
+    ------
+    GltfError
+        Where it does not.
+    """
+    document = document.reread()
+    written, own = read_clips(document), Nodes(document)
+    same = all(np.array_equal(nodes.rest[path], own.rest[path]) for path in nodes.rest)
+    if not same or not np.array_equal(nodes.parents, own.parents) or not seen.is_same(Seen.of(own, clips)):
+        raise GltfError("what would be written carries something else", "leave this file as it is, and report it")
+    for clip, result in zip(clips, written, strict=True):
+        of_channel = {track.channel: track for track in clip.tracks}
+        stored = tracks.get(clip.number)
+        new = clip.tracks if stored is None else tuple(shown(of_channel[track.channel], track) for track in stored)
+        proven, played = by_target(new + clip.pointers), by_target(result.all_tracks)
+        if proven.keys() != played.keys() or not all(played[key].shows(track) for key, track in proven.items()):
+            raise GltfError("what would be written shows something else", "leave this file as it is, and report it")
 
 
 def reduce_file(path: Path, output: Path, options: Options) -> Report:
@@ -88,7 +189,7 @@ def reduce_file(path: Path, output: Path, options: Options) -> Report:
     return report
 
 
-def _moved(nodes: Nodes, clips: Iterable[Clip]) -> np.ndarray:
-    """Return the nodes that tracks move, and all that hang on them, parents before their children."""
-    targets = {track.node for clip in clips for track in clip.tracks if track.path != WEIGHTS}
+def _moved(nodes: Nodes, clips: Iterable[Clip], paths: Collection[str] = tuple(WIDTHS)) -> np.ndarray:
+    """Return the nodes of which clips move one of the paths, and all that hang on them, parents before their children."""
+    targets = {track.node for clip in clips for track in clip.all_tracks if track.path in paths}
     return nodes.below(np.array(sorted(targets), dtype=np.int64))

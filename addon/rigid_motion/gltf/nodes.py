@@ -6,6 +6,7 @@ Source: the glTF 2.0 specification, Khronos 2021, section 3.5.
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 from functools import cached_property
 
@@ -54,7 +55,15 @@ class Nodes:
             return self.rest[path][node]
         described = self.document.json["nodes"][node]
         mesh = entry(self.document.json, "meshes", described["mesh"]) if "mesh" in described else {}
-        return np.array(described.get("weights", mesh.get("weights", ())), dtype=np.float64)
+        targets = max((len(objects(part, "targets")) for part in objects(mesh, "primitives")), default=0)
+        return np.array(described.get("weights") or mesh.get("weights") or [0.0] * targets, dtype=np.float64)
+
+    def with_rest(self, path: str, values: np.ndarray) -> Nodes:
+        """Return the same nodes with other translations, rotations or scales at rest (nodes, width)."""
+        result = copy.copy(self)
+        result.__dict__.pop("resting", None)
+        result.rest = {**self.rest, path: values}
+        return result
 
     def below(self, moved: np.ndarray) -> np.ndarray:
         """Return the nodes that move where these (m,) do, parents before their children, shape (n,)."""

@@ -20,7 +20,7 @@ import numpy as np
 
 from .accessors import GrowingView, denormalised, raw_numbers, stored_size
 from .documents import Document, FileBytes, Json, data_uri, is_data, objects
-from .tracks import LINEAR, ROTATION, TO_WXYZ, TO_XYZW, WEIGHTS, WIDTHS, Clip, Track, moves_node
+from .tracks import CUBICSPLINE, LINEAR, ROTATION, TO_WXYZ, TO_XYZW, WEIGHTS, WIDTHS, Clip, Track, moves_node
 
 KNOWN = re.compile(
     "(?:KHR|EXT)_(?:materials|texture|lights|mesh|animation|node|xmp)_.*|.*_meshopt_compression"
@@ -291,7 +291,7 @@ class Amount:
 
 
 def stored(track: Track, *, integers: bool) -> StoredTrack:
-    """Return a track without tangents as it is stored; rotations as 16-bit integers where these are asked for."""
+    """Return a track as it is stored; rotations as 16-bit integers where these are asked for."""
     values = track.values[..., TO_XYZW] if track.path == ROTATION else track.values
     values = values.reshape(-1, 1 if track.path == WEIGHTS else values.shape[-1])
     if integers and track.path == ROTATION and track.interpolation == LINEAR:
@@ -304,7 +304,7 @@ def stored(track: Track, *, integers: bool) -> StoredTrack:
 def shown(track: Track, stored: StoredTrack) -> Track:
     """Return what is shown by a track as it is stored."""
     values = denormalised(stored.values) if stored.values.dtype.kind == "i" else stored.values.astype(np.float64)
-    values = values.reshape(len(stored.times), -1)
+    values = values.reshape((len(stored.times), 3, -1) if stored.interpolation == CUBICSPLINE else (len(stored.times), -1))
     if track.path == ROTATION:
         values = values[..., TO_WXYZ]
     return replace(track, interpolation=stored.interpolation, times=stored.times.astype(np.float64), values=values)

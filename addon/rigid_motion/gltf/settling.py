@@ -5,13 +5,14 @@ Channels share key times where that saves bytes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
 from .errors import World
-from .tracks import CUBICSPLINE, LINEAR, ROTATION, SCALE, STEP, WEIGHTS, Clip, Track
+from .tracks import CUBICSPLINE, LINEAR, ROTATION, SCALE, STEP, TRANSLATION, WEIGHTS, Target, Track
 
 TIME = 4
 """Bytes of a key's time."""
@@ -22,8 +23,8 @@ AT_ONCE = 2**13
 NOISE = 0.01
 """A channel that changes by less than this share of the tolerance is constant."""
 
-OF_SCALES = 0.1
-"""The share of the tolerance that a channel of scales may take."""
+OF_CHANNELS = 0.1
+"""The share of the tolerance that a channel of scales or weights may take."""
 
 WITHIN_WEIGHTS = 0.005
 """How far off weights of morph targets may be: half a percent of the whole target."""
@@ -36,24 +37,33 @@ BOW = 0.02
 
 HALVINGS = 8
 
+DEAR = 20
+"""Samples for each key of a spline: one that needs more takes fewer bytes as a spline than as lines."""
 
-def on_lines(times: np.ndarray, values: np.ndarray, within: float) -> np.ndarray:
+Measure = Callable[[np.ndarray], np.ndarray]
+"""From differences of values (m, width) to how much of what is allowed they are, shape (m,)."""
+
+
+def on_lines(times: np.ndarray, values: np.ndarray, measure: Measure, within: float) -> np.ndarray:
     """Return the keys that straight lines need to stay within a distance of values (n, width), rising, shape (k,).
 
-    From each key the line goes as far as it can. The distance is the largest of any column.
+    From each key the line goes as far as it can.
     """
     keys, last = [0], len(times) - 1
     while keys[-1] < last:
         first, reach = keys[-1], 1
-        while first + reach < last and _is_line(times, values, first, min(first + 2 * reach, last), within):
+
+        def is_line(end: int, first: int = first) -> bool:
+            share = ((times[first : end + 1] - times[first]) / (times[end] - times[first]))[:, None]
+            line = (1.0 - share) * values[first] + share * values[end]
+            return bool(measure(line - values[first : end + 1]).max() <= within)
+
+        while first + reach < last and is_line(min(first + 2 * reach, last)):
             reach *= 2
         low, high = first + reach, min(first + 2 * reach, last)
         while low < high:
             middle = (low + high + 1) // 2
-            if _is_line(times, values, first, middle, within):
-                low = middle
-            else:
-                high = middle - 1
+            low, high = (middle, high) if is_line(middle) else (low, middle - 1)
         keys.append(min(low, last))
     return np.array(keys)
 
@@ -114,112 +124,110 @@ def shared_times(keys: Sequence[np.ndarray], widths: Sequence[int], samples: int
     return result
 
 
-def _is_line(times: np.ndarray, values: np.ndarray, first: int, last: int, within: float) -> bool:
-    share = ((times[first : last + 1] - times[first]) / (times[last] - times[first]))[:, None]
-    line = (1.0 - share) * values[first] + share * values[last]
-    return bool(np.abs(line - values[first : last + 1]).max() <= within)
+class Channel:
+    """A track, and how much of what is allowed differences of its values are, at moments between which it runs evenly.
 
-
-def moments(world: World, clip: Clip, tolerance: float) -> np.ndarray:
-    """Return the moments between which all runs evenly, as close as turns and splines need it, shape (m,), rising."""
-    moved = [track for track in clip.tracks if track.path != WEIGHTS and not track.is_constant]
-    different = {id(track.times): track.times for track in moved}
-    times = np.unique(np.concatenate([world.times, *different.values()]))
-    smooth = [track for track in moved if track.interpolation != STEP]
-    curved = any(track.interpolation == CUBICSPLINE for track in smooth)
-    reaches = replace(world, times=times).reaches if curved else None
-    for _ in range(HALVINGS):
-        halved = np.zeros(len(times) - 1, dtype=bool)
-        for track in smooth:
-            values = track.at(times)
-            if track.path == ROTATION:
-                cosines = np.einsum("ij,ij->i", values[1:], values[:-1])
-                # A spline that passes near 0 comes out on the other side: nearly a whole turn in no time.
-                halved |= (cosines if track.interpolation == CUBICSPLINE else np.abs(cosines)) < np.cos(WIDE / 2)
-            if track.interpolation == CUBICSPLINE and reaches is not None:
-                reach = 1.0 if track.path not in (ROTATION, SCALE) else 2.0 * reaches[world.rows[track.node]]
-                halved |= _bows(track, times, values) * reach > BOW * tolerance
-        middles = ((times[:-1] + times[1:]) / 2)[halved].astype(np.float32).astype(np.float64)
-        more = np.union1d(times, middles)
-        if len(more) == len(times):
-            break
-        times = more
-    return times
-
-
-def settled(world: World, clip: Clip, tolerance: float) -> dict[tuple[int, str], Track | None]:
-    """Return the tracks that need no search, and what takes their places: None where the node rests."""
-    result: dict[tuple[int, str], Track | None] = {}
-    for track in clip.tracks:
-        target = track.node, track.path
-        settling = _Settling(world, track, tolerance)
-        if settling.rests:
-            result[target] = None
-        elif settling.is_constant:
-            result[target] = replace(track, interpolation=LINEAR, times=world.times[:1], values=settling.values[:1])
-        elif track.interpolation == STEP:
-            # The first, and those that bring another value.
-            keys = np.flatnonzero(np.append(True, np.any(track.points[1:] != track.points[:-1], axis=1)))
-            result[target] = replace(track, times=track.times[keys], values=track.points[keys])
-        elif track.path in (SCALE, WEIGHTS):
-            keys = on_lines(settling.times, settling.values, settling.within)
-            times, values = settling.times[keys], settling.values[keys]
-            result[target] = replace(track, interpolation=LINEAR, times=times, values=values)
-    return result
-
-
-class _Settling:
-    """A track, and how far it moves what hangs on its node, at the moments between which it runs evenly."""
+    Parameters
+    ----------
+    world : World
+        Whose moments are those of keys at least.
+    track : Track
+    tolerance : float
+    """
 
     def __init__(self, world: World, track: Track, tolerance: float) -> None:
         self.world, self.track, self.tolerance = world, track, tolerance
-        curved = track.interpolation == CUBICSPLINE
-        self.times = np.union1d(world.times, track.times) if curved else track.times
-        self.values = track.at(self.times)
         self.row = world.rows.get(track.node, -1)
+        self.is_curved = track.interpolation == CUBICSPLINE
+        self.times, self.stays = track.times, False
+        """Whether it stays a spline."""
+        for _ in range(HALVINGS if track.interpolation != STEP else 0):
+            halved = self._halved(track.at(self.times))
+            middles = ((self.times[:-1] + self.times[1:]) / 2)[halved].astype(np.float32).astype(np.float64)
+            more = np.union1d(self.times, middles)
+            if len(more) == len(self.times):
+                break
+            self.times, self.stays = more, self.is_curved and len(more) > DEAR * len(track.times)
+            if self.stays:
+                self.times = track.times
+                break
+        self.values = track.at(self.times)
+
+    def _halved(self, values: np.ndarray) -> np.ndarray:
+        """Which gaps between the moments are too wide."""
+        result = np.zeros(len(self.times) - 1, dtype=bool)
+        if self.track.path == ROTATION:
+            cosines = np.einsum("ij,ij->i", values[1:], values[:-1])
+            # A spline that passes near 0 comes out on the other side: nearly a whole turn in no time.
+            result = (cosines if self.is_curved else np.abs(cosines)) < np.cos(WIDE / 2)
+        for share in (0.25, 0.5, 0.75) if self.is_curved else ():
+            line = (1.0 - share) * values[:-1] + share * values[1:]
+            if self.track.path == ROTATION:
+                line /= np.linalg.norm(line, axis=1, keepdims=True)
+            there = self.track.at((1.0 - share) * self.times[:-1] + share * self.times[1:])
+            result |= self.measured(there - line) > BOW
+        return result
 
     @property
     def rests(self) -> bool:
         """Whether the node is all the time as it would be without the track."""
         rest = self.world.nodes.rest_of(self.track.node, self.track.path)
-        if self.track.path == WEIGHTS and not len(rest):
-            rest = np.zeros(self.values.shape[1])
         return len(rest) == self.values.shape[1] and self._is_at(rest)
 
     @property
     def is_constant(self) -> bool:
         return self._is_at(self.values[0])
 
-    @property
-    def within(self) -> float:
-        """How far off the numbers of scales or weights may be."""
-        if self.track.path == WEIGHTS:
-            return WITHIN_WEIGHTS
-        return OF_SCALES * self.tolerance / self.world.reaches[self.row] * float(np.abs(self.values).max())
-
     def _is_at(self, value: np.ndarray) -> bool:
-        if self.track.path == WEIGHTS:
-            return bool(np.all(self.values == value))
-        return float(self._displacements(value).max()) <= NOISE * self.tolerance
-
-    def _displacements(self, value: np.ndarray) -> np.ndarray:
-        """How far what hangs on the node is moved at most from where one value has it, shape (m,)."""
-        values, reach = self.values, self.world.reaches[self.row]
+        off = self.measured(self.values - value)
         if self.track.path == ROTATION:
             # Of both signs, for noise is smaller than what is left of 1 less a cosine.
-            return 2.0 * reach * np.minimum(*(np.linalg.norm(values + sign * value, axis=1) for sign in (1.0, -1.0)))
-        if self.track.path == SCALE:
-            return reach * np.abs(values / np.where(value == 0.0, 1.0, value) - 1.0).max(axis=1)
-        return np.linalg.norm(values - value, axis=1) * self.world.longest_above[self.row]
+            off = np.minimum(off, self.measured(self.values + value))
+        return not self.stays and float(off.max()) <= NOISE
+
+    def measured(self, differences: np.ndarray) -> np.ndarray:
+        """How far what the node carries, and what hangs on it, is moved by differences (m, width), of the tolerance."""
+        off, world = np.abs(differences), self.world
+        if self.track.path == WEIGHTS:
+            morph = world.seen.morphs.get(self.track.node)
+            moved = off @ morph.deltas * world.morph_scale(self.track.node) if morph else 0.0
+            return np.maximum(moved / self.tolerance, OF_CHANNELS / WITHIN_WEIGHTS * off.max(axis=1))
+        if self.track.path == TRANSLATION:
+            return np.linalg.norm(off, axis=1) * world.longest_above[self.row] / self.tolerance
+        reach = world.reaches[self.row] / self.tolerance
+        if self.track.path == ROTATION:
+            return 2.0 * reach * np.linalg.norm(off, axis=1)
+        return reach * (off / self._largest).max(axis=1)
+
+    @cached_property
+    def _largest(self) -> np.ndarray:
+        """How large each of the scales gets, shape (3,)."""
+        result = np.abs(self.track.points).max(axis=0)
+        return np.where(result > 0.0, result, 1.0)
 
 
-def _bows(track: Track, times: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """How far a spline leaves the straight way between its values at moments (m,), in each gap, shape (m - 1,)."""
-    result = np.zeros(len(times) - 1)
-    for share in (0.25, 0.5, 0.75):
-        line = (1.0 - share) * values[:-1] + share * values[1:]
-        if track.path == ROTATION:
-            line /= np.linalg.norm(line, axis=1, keepdims=True)
-        there = track.at((1.0 - share) * times[:-1] + share * times[1:])
-        result = np.maximum(result, np.linalg.norm(there - line, axis=1))
+def settled(channels: Iterable[Channel], needed: Container[Target]) -> dict[Target, Track | None]:
+    """Return the tracks that need no search, and what takes their places: None where the node rests.
+
+    Those that are needed keep a key there as well.
+    """
+    result: dict[Target, Track | None] = {}
+    for channel in channels:
+        track = channel.track
+        target = track.node, track.path
+        if channel.rests and target not in needed:
+            result[target] = None
+        elif channel.is_constant:
+            result[target] = replace(track, interpolation=LINEAR, times=channel.times[:1], values=channel.values[:1])
+        elif channel.stays:
+            result[target] = track.whole
+        elif track.interpolation == STEP:
+            # The first, and those that bring another value.
+            keys = np.flatnonzero(np.append(True, np.any(track.points[1:] != track.points[:-1], axis=1)))
+            result[target] = replace(track, times=track.times[keys], values=track.points[keys])
+        elif track.path in (SCALE, WEIGHTS):
+            keys = on_lines(channel.times, channel.values, channel.measured, OF_CHANNELS)
+            times, values = channel.times[keys], channel.values[keys]
+            lines = replace(track, interpolation=LINEAR, times=times, values=values)
+            result[target] = track.whole if channel.is_curved and len(lines) >= len(track) else lines
     return result

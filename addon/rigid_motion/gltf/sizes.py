@@ -1,17 +1,19 @@
-"""How large things are in a glTF document: what tolerances and radii are judged by, in its unit, which is the metre.
+"""How large things are in a glTF document: what tolerances are judged by, in its unit, which is the metre.
 
-Size is that of joints, which are heads of bones, or of meshes: where bones end is made up by importers.
+Size is that of joints, which are heads of bones, or of what nodes carry: where bones end is made up by importers.
 """
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterable
 
 import numpy as np
 
-from .accessors import numbers
-from .documents import Document, Json, entry, objects
+from .documents import Document, entry, objects
 from .nodes import Nodes
+from .seen import Seen, corners_of
+from .tracks import SCALE, Clip
 
 OF_A_BODY = 0.003
 """The tolerance that the keys of a body are reduced to where none is given, of its size: 5 mm for a grown-up."""
@@ -20,7 +22,10 @@ OF_KEY_POSES = 0.02
 """The same for key poses, which are to be few: 35 mm."""
 
 SHELL = 0.03 / 1.7
-"""The radius of a joint's ball, of the size of its body: three centimetres of a grown-up."""
+"""The least radius of a node's ball, of the size: three centimetres of a grown-up."""
+
+TURN = np.radians(0.5)
+"""How far off rotations may be where nothing has a size."""
 
 
 def joints_of(document: Document) -> list[list[int]]:
@@ -31,60 +36,36 @@ def joints_of(document: Document) -> list[list[int]]:
     return skins
 
 
-def size_of(nodes: Nodes, moved: np.ndarray) -> float:
-    """Return the largest extent along any axis of what moves, at rest: joints, meshes, or nodes that are neither."""
-    document, origins = nodes.document, nodes.resting.origins
-    sizes = [float(np.ptp(origins[joints], axis=0).max()) for joints in joints_of(document) if joints]
+def size_of(nodes: Nodes, seen: Seen, moved: np.ndarray, clips: Iterable[Clip]) -> float:
+    """Return the largest extent along any axis of what moves: joints, or what is carried, or nodes that carry nothing.
+
+    They rest, but with their scales as large as any clip has them.
+    """
+    scales = nodes.rest[SCALE].copy()
+    for track in (track for clip in clips for track in clip.all_tracks if track.path == SCALE):
+        points = np.concatenate((scales[None, track.node], track.points))
+        scales[track.node] = np.take_along_axis(points, np.abs(points).argmax(axis=0)[None], axis=0)[0]
+    resting, joints = nodes.with_rest(SCALE, scales).resting, joints_of(nodes.document)
+    sizes = [float(np.ptp(resting.origins[some], axis=0).max()) for some in joints if some]
     if max(sizes, default=0.0) > 0.0:
         return max(sizes)
-    boxes = [
-        nodes.resting[node].at(corners)
-        for node in moved.tolist()
-        if (corners := corners_of(document, node)) is not None
-    ]
-    points = np.concatenate(boxes) if boxes else origins[moved]
+    carrying = [node for node in {*moved.tolist(), *itertools.chain(*joints)} if seen.reaches[node] > 0.0]
+    corners = [resting[node].at(corners_of(*seen.boxes[:, node])) for node in carrying]
+    points = np.concatenate(corners) if corners else resting.origins[moved]
     return float(np.ptp(points, axis=0).max()) if len(points) else 0.0
 
 
-def radii_of(nodes: Nodes, moved: np.ndarray, size: float) -> np.ndarray:
-    """Return the radius of the ball around each of these nodes (n,) in which no point is to be off by more, shape (n,).
+def shells_of(nodes: Nodes, moved: np.ndarray, size: float, tolerance: float) -> np.ndarray:
+    """Return the least radius of the ball around each of these nodes (n,) in the world, shape (n,).
 
-    Of a mesh it is that of the mesh, of what looks or shines the size of the whole, and of all else a share of it.
+    Of what looks or shines it is the size of the whole, and of all else a share of it; where nothing has a size, such
+    that rotations are kept within an angle.
     """
-    document, result = nodes.document, np.full(len(moved), SHELL * size)
-    for row, node in enumerate(moved.tolist()):
-        own = document.json["nodes"][node]
-        corners = corners_of(document, node)
-        if corners is not None:
-            away = nodes.resting[node].at(corners) - nodes.resting.origins[node]
-            result[row] = np.linalg.norm(away, axis=1).max()
-        elif "camera" in own or "KHR_lights_punctual" in own.get("extensions", {}):
-            result[row] = size
-    return result
+    if not size:
+        return np.full(len(moved), tolerance / TURN)
+    return np.array([size if _shines(nodes.document.json["nodes"][node]) else SHELL * size for node in moved])
 
 
-def corners_of(document: Document, node: int) -> np.ndarray | None:
-    """Return corners of a node's mesh in its own space, shape (8, 3); None without one, or where a skin moves it."""
-    own = document.json["nodes"][node]
-    if "mesh" not in own or "skin" in own:
-        return None
-    bounds = [
-        box
-        for primitive in objects(entry(document.json, "meshes", own["mesh"]), "primitives")
-        if (box := _bounds(document, primitive)) is not None
-    ]
-    if not bounds:
-        return None
-    low, high = np.min([low for low, _ in bounds], axis=0), np.max([high for _, high in bounds], axis=0)
-    return np.array(list(itertools.product(*zip(low, high, strict=True))))
-
-
-def _bounds(document: Document, primitive: Json) -> tuple[np.ndarray, np.ndarray] | None:
-    position = primitive.get("attributes", {}).get("POSITION")
-    if position is None:
-        return None
-    accessor = entry(document.json, "accessors", position)
-    if "min" in accessor and "max" in accessor and not accessor.get("normalized"):
-        return np.array(accessor["min"], dtype=np.float64), np.array(accessor["max"], dtype=np.float64)
-    positions = numbers(document, position)
-    return positions.min(axis=0), positions.max(axis=0)
+def _shines(node: dict) -> bool:
+    extensions = node.get("extensions")
+    return "camera" in node or (isinstance(extensions, dict) and "KHR_lights_punctual" in extensions)

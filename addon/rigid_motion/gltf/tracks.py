@@ -7,6 +7,7 @@ Source: the glTF 2.0 specification, Khronos 2021, section 3.11 and appendix C.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -59,6 +60,10 @@ class Track:
     Of a cubic spline (n, 3, width): tangent before the key, its value, tangent after it.
     """
 
+    def __len__(self) -> int:
+        """How many numbers its keys are."""
+        return len(self.times) * (1 + self.points.shape[1] * (3 if self.interpolation == CUBICSPLINE else 1))
+
     @property
     def points(self) -> np.ndarray:
         """The values of the keys without their tangents, shape (n, width)."""
@@ -66,11 +71,21 @@ class Track:
         return values[:, 1] if self.interpolation == CUBICSPLINE else values
 
     @property
+    def whole(self) -> Track:
+        """The same with all its values read."""
+        return replace(self, values=self.values[:])
+
+    @property
     def is_constant(self) -> bool:
         """Whether it is the same at all times."""
         tangents = self.interpolation == CUBICSPLINE and len(self.times) > 1 and self.values[:][:, [0, 2]].any()
         points = self.points
         return not tangents and bool(np.all(points == points[0]))
+
+    def shows(self, other: Track) -> bool:
+        """Whether it has the same keys as another."""
+        same = self.interpolation == other.interpolation and np.array_equal(self.times, other.times)
+        return same and np.array_equal(self.values[:], other.values[:])
 
     def near(self, first: float, last: float) -> Track:
         """Return the keys that say what is shown from one time to another, which are read where they are not yet."""
@@ -128,8 +143,15 @@ def turned_at(key_times: np.ndarray, keys: np.ndarray, times: np.ndarray) -> np.
     return begin[:, None] * first[segments] + end[:, None] * second[segments]
 
 
-Tracks = Mapping[tuple[int, str], Track]
-"""By node and path."""
+POINTER = re.compile(r"/nodes/(\d{1,9})/(translation|rotation|scale|weights)")
+
+MAY_MOVE = re.compile(r"/(nodes|meshes|skins)/(?!.*/extensions/)")
+"""Pointers of which what is seen may depend."""
+
+Target = tuple[int, str]
+"""A node, and its path."""
+
+Tracks = Mapping[Target, Track]
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +161,17 @@ class Clip:
     number: int
     name: str
     tracks: tuple[Track, ...]
-    """What moves nodes: channels without a node, or with paths of extensions, are not among them."""
+    """What moves nodes: channels without a node are not among them."""
+
+    pointers: tuple[Track, ...] = ()
+    """The same by KHR_animation_pointer."""
+
+    unread: str = ""
+    """A pointer that may move what is seen, in a way that is not known here."""
+
+    @property
+    def all_tracks(self) -> tuple[Track, ...]:
+        return self.tracks + self.pointers
 
 
 def read_clips(document: Document) -> tuple[Clip, ...]:
@@ -162,28 +194,43 @@ def _clip(document: Document, number: int) -> Clip:
     animation = document.json["animations"][number]
     name = animation.get("name")
     name = name if isinstance(name, str) and name else f"animation {number}"
-    tracks, targets = [], set()
+    tracks: list[Track] = []
+    pointers: list[Track] = []
+    targets, unread = set(), ""
     times: dict[int, np.ndarray] = {}
     for index, channel in enumerate(objects(animation, "channels")):
         target = channel.get("target")
         if not isinstance(target, dict):
             raise GltfError(f"{shown(name)}: channel {index} has no target")
-        if not moves_node(target):
+        pointer = _pointer(target)
+        known = POINTER.fullmatch(pointer)
+        if not moves_node(target) and not known:
+            unread = unread or (pointer if MAY_MOVE.match(pointer) else "")
             continue
+        node, path = (int(known[1]), known[2]) if known else (target["node"], target["path"])
         try:
-            track = _track(document, animation, index, channel, times)
+            track = _track(document, animation, index, channel, node, path, times)
         except GltfError as error:
             raise GltfError(f"{shown(name)}: channel {index}: {error.problem}", error.way_out) from None
         if (track.node, track.path) in targets:
             raise GltfError(f"{shown(name)}: channel {index} is the second {track.path} of node {track.node}")
         targets.add((track.node, track.path))
-        tracks.append(track)
-    return Clip(number, name, tuple(tracks))
+        (pointers if known else tracks).append(track)
+    return Clip(number, name, tuple(tracks), tuple(pointers), unread)
 
 
-def _track(document: Document, animation: Json, index: int, channel: Json, known: dict[int, np.ndarray]) -> Track:
+def _pointer(target: Json) -> str:
+    """Return what a channel of KHR_animation_pointer is of; empty for another."""
+    extensions = target.get("extensions")
+    own = extensions.get("KHR_animation_pointer") if isinstance(extensions, dict) else None
+    pointer = own.get("pointer") if isinstance(own, dict) else None
+    return pointer if isinstance(pointer, str) else ""
+
+
+def _track(
+    document: Document, animation: Json, index: int, channel: Json, node: int, path: str, known: dict[int, np.ndarray]
+) -> Track:
     """Return a channel as a track, with the times that are known of the accessor, or that are so from now on."""
-    node, path = channel["target"]["node"], channel["target"]["path"]
     moved = entry(document.json, "nodes", node)
     if "matrix" in moved and path != WEIGHTS:
         raise GltfError(f"node {node} has a matrix, and glTF moves nodes without one alone")

@@ -1,0 +1,203 @@
+"""What is seen of a glTF document: how far what nodes carry reaches, how far morph targets move it.
+
+A node carries its mesh and the instances of it; a joint carries every vertex of skins that has a weight of it. Of a mesh
+that is compressed the bounds of its accessors count, and any joint may carry all of it. Lengths are in the unit of the
+document, which glTF means to be the metre, and in the node's own space, before its scale, unless said otherwise.
+Source: the glTF 2.0 specification, Khronos 2021, sections 3.7 and 3.8; EXT_mesh_gpu_instancing.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..motion.affine import AffineMaps
+from ..motion.quaternions import matrices, normalise
+from .accessors import EVERY, KINDS, denormalised, numbers, raw_numbers
+from .documents import Document, GltfError, Json, entry, objects
+from .nodes import Nodes
+from .tracks import CUBICSPLINE, TO_WXYZ, WEIGHTS, Clip, Track
+
+INSTANCES = "EXT_mesh_gpu_instancing"
+
+OVERSHOOT = 4.0 / 27.0
+"""How far a cubic leaves its end values, at most, for a tangent of 1 at one end."""
+
+
+@dataclass(frozen=True, eq=False)
+class Morph:
+    """How far the morph targets of a node's mesh move its vertices."""
+
+    deltas: np.ndarray
+    """The farthest that any vertex is moved by a weight of 1, in the space of the mesh, shape (targets,)."""
+
+    carriers: np.ndarray
+    """The nodes that carry the vertices, shape (c,)."""
+
+    factors: np.ndarray
+    """By how much the mesh is larger in the spaces of the carriers, shape (c,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What the nodes of a document carry."""
+
+    reaches: np.ndarray
+    """The distance of the farthest vertex that each node carries from its origin, shape (nodes,); 0 without any."""
+
+    boxes: np.ndarray
+    """The lowest and highest coordinates of these without morph targets, shape (2, nodes, 3); infinite without any."""
+
+    morphs: dict[int, Morph]
+    """By node."""
+
+    @classmethod
+    def of(cls, nodes: Nodes, clips: Iterable[Clip]) -> Seen:
+        """Return what nodes carry, with morph targets as far as any of these clips takes them."""
+        document, count = nodes.document, len(nodes.parents)
+        boxes = np.full((2, count, 3), np.inf)
+        boxes[1] = -np.inf
+        result = cls(np.zeros(count), boxes, {})
+        tracks = [track for clip in clips for track in clip.all_tracks if track.path == WEIGHTS]
+        for number, node in enumerate(objects(document.json, "nodes")):
+            if "mesh" in node:
+                weights = _largest_weights(nodes, number, [track for track in tracks if track.node == number])
+                result.add(document, number, weights)
+        return result
+
+    def add(self, document: Document, number: int, weights: np.ndarray) -> None:
+        """Add the mesh of a node, with weights of its morph targets of up to so much (targets,)."""
+        node = document.json["nodes"][number]
+        deltas, carriers, factors = np.zeros(len(weights)), [], []
+        for primitive in objects(entry(document.json, "meshes", node["mesh"]), "primitives"):
+            if "POSITION" not in primitive.get("attributes", {}):
+                continue
+            points = _points(document, primitive["attributes"]["POSITION"])
+            spread = np.zeros(len(points))
+            for target, moved in enumerate(objects(primitive, "targets")[: len(weights)]):
+                if "POSITION" in moved:
+                    lengths = np.linalg.norm(_points(document, moved["POSITION"]), axis=1)
+                    deltas[target] = max(deltas[target], lengths.max())
+                    spread += weights[target] * (lengths if len(lengths) == len(spread) else lengths.max())
+            if _has_instances(node):
+                points, spread = corners_of(points.min(axis=0), points.max(axis=0)), np.full(8, spread.max())
+            for nodes, some, maps in _carried(document, number, primitive):
+                larger = np.linalg.norm(maps.axes, ord=2, axis=(-2, -1))
+                self._reach(nodes, maps.at(points[some]), larger * spread[some])
+                carriers.append(np.broadcast_to(nodes, larger.shape).ravel())
+                factors.append(larger.ravel())
+        if deltas.any() and carriers:
+            own, rows = np.unique(np.concatenate(carriers), return_inverse=True)
+            largest = np.zeros(len(own))
+            np.maximum.at(largest, rows, np.concatenate(factors))
+            self.morphs[number] = Morph(deltas, own, largest)
+
+    def _reach(self, nodes: np.ndarray, points: np.ndarray, spread: np.ndarray) -> None:
+        """Nodes carry points (..., 3) that morph targets move by up to so much (...)."""
+        nodes = np.broadcast_to(nodes, spread.shape)
+        np.maximum.at(self.reaches, nodes, np.linalg.norm(points, axis=-1) + spread)
+        np.minimum.at(self.boxes[0], nodes, points)
+        np.maximum.at(self.boxes[1], nodes, points)
+
+    def is_same(self, other: Seen) -> bool:
+        """Whether the nodes of another document carry the same, number by number."""
+        mine, theirs = (
+            [some.reaches, some.boxes, *(array for morph in some.morphs.values() for array in vars(morph).values())]
+            for some in (self, other)
+        )
+        return len(mine) == len(theirs) and all(map(np.array_equal, mine, theirs))
+
+
+def corners_of(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Return the corners of a box, shape (8, 3)."""
+    return np.array(list(itertools.product(*zip(low, high, strict=True))))
+
+
+def _largest_weights(nodes: Nodes, number: int, tracks: list[Track]) -> np.ndarray:
+    """How large the weights of a node's morph targets get, shape (targets,)."""
+    result = np.abs(nodes.rest_of(number, WEIGHTS))
+    for track in tracks:
+        values = np.abs(track.points)
+        if values.shape[1] != len(result):
+            raise GltfError(f"{values.shape[1]} weights do not fit the {len(result)} morph targets of node {number}")
+        result = np.maximum(result, values.max(axis=0))
+        if track.interpolation == CUBICSPLINE:
+            gaps, tangents = np.diff(track.times)[:, None], np.abs(track.values[:])
+            beyond = OVERSHOOT * gaps * (tangents[:-1, 2] + tangents[1:, 0])
+            result = np.maximum(result, (np.maximum(values[:-1], values[1:]) + beyond).max(axis=0))
+    return result
+
+
+def _carried(document: Document, number: int, primitive: Json) -> Iterator[tuple[np.ndarray, Any, AffineMaps]]:
+    """Yield nodes that carry vertices, which vertices these are, and the maps from their space to those of the nodes.
+
+    There is a node and a map for each vertex, or one node for all of them, with maps (instances, 1).
+    """
+    node = document.json["nodes"][number]
+    if "skin" not in node:
+        yield np.array([number]), EVERY, _instances(document, node)
+        return
+    skin = entry(document.json, "skins", node["skin"])
+    joints = np.array(skin["joints"], dtype=np.int64)
+    inverse = np.tile(np.eye(4), (len(joints), 1, 1))
+    if "inverseBindMatrices" in skin:
+        columns = numbers(document, skin["inverseBindMatrices"])[: len(joints)]
+        inverse = np.swapaxes(columns.reshape(-1, 4, 4), 1, 2)
+    maps, attributes = AffineMaps(inverse[:, :3, :3], inverse[:, :3, 3]), primitive["attributes"]
+    sets = [(attributes[name], attributes.get(name.replace("JOINTS", "WEIGHTS"))) for name in attributes if name.startswith("JOINTS_")]
+    for carriers, shares in sets:
+        try:
+            if _is_compressed(document, carriers) or _is_compressed(document, shares):
+                raise GltfError("the mesh is compressed")
+            columns, weights = raw_numbers(document, carriers).astype(np.int64), raw_numbers(document, shares).copy()
+        except GltfError:
+            # Any joint may carry all of it.
+            for joint, own in zip(joints.tolist(), maps, strict=True):
+                yield np.array([joint]), EVERY, own[None]
+            return
+        weights[~weights.any(axis=1), 0] = 1  # What nothing carries goes with its first joint.
+        for column, share in zip(columns.T, weights.T, strict=True):
+            some = np.flatnonzero(share)
+            yield joints[column[some]], some, maps[column[some]]
+
+
+def _has_instances(node: Json) -> bool:
+    return isinstance(node.get("extensions"), dict) and INSTANCES in node["extensions"]
+
+
+def _instances(document: Document, node: Json) -> AffineMaps:
+    """Where instances of a node's mesh are in its space, shape (instances, 1); itself, where there are none."""
+    attributes = node["extensions"][INSTANCES]["attributes"] if _has_instances(node) else {}
+    given = {name: numbers(document, accessor) for name, accessor in attributes.items() if not name.startswith("_")}
+    count = max(map(len, given.values()), default=1)
+    axes = np.tile(np.eye(3), (count, 1, 1))
+    if "ROTATION" in given:
+        axes = np.moveaxis(matrices(normalise(given["ROTATION"][:, TO_WXYZ])), -1, 0)
+    axes = axes * given.get("SCALE", np.ones((count, 3)))[:, None]
+    return AffineMaps(axes, given.get("TRANSLATION", np.zeros((count, 3))))[:, None]
+
+
+def _is_compressed(document: Document, accessor: object) -> bool:
+    """Whether the numbers of an accessor of a mesh are in an extension of the primitive, as Draco has them."""
+    described = entry(document.json, "accessors", accessor)
+    return "bufferView" not in described and "sparse" not in described
+
+
+def _points(document: Document, accessor: object) -> np.ndarray:
+    """Return the positions or displacements of an accessor, or the corners of their bounds if they are compressed, (v, 3)."""
+    try:
+        if not _is_compressed(document, accessor):
+            return numbers(document, accessor)
+    except GltfError:
+        pass
+    described = entry(document.json, "accessors", accessor)
+    if "min" not in described or "max" not in described:
+        return numbers(document, accessor)
+    ends = np.array([described["min"], described["max"]], dtype=np.float64)
+    if described.get("normalized") is True:
+        ends = denormalised(ends.astype(KINDS[described["componentType"]]))
+    return corners_of(*ends)
