@@ -23,7 +23,7 @@ from rigid_motion.gltf import Options, reduce_file
 from rigid_motion.gltf.accessors import stored_size
 from rigid_motion.gltf.documents import read_document
 from rigid_motion_batch.analysis.metrics import geometric_mean
-from tests.gltf.oracle import File
+from tests.gltf.player import File
 
 HEIGHT, RADIUS = 1.7, 0.03  # metres
 TOLERANCES = (1e-4, 1e-3, 5e-3)  # metres

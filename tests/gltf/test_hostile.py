@@ -13,7 +13,7 @@ import pytest
 from rigid_motion.gltf import GltfError, Options, documents, read_document, reduce_file, reduced
 from rigid_motion_batch.cli import reduce
 from tests.gltf.making import glb, walk
-from tests.gltf.oracle import File
+from tests.gltf.player import File
 
 RESULT = "walk-reduced"
 

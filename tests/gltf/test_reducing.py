@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from rigid_motion.gltf import Options, Report, read_document, reduce_file, reduced
 from tests.gltf.making import Making, turns, walk
-from tests.gltf.oracle import File, off
+from tests.gltf.player import File, off
 
 RADIUS = 0.03
 
@@ -29,7 +29,7 @@ def both(
 
 def holds(before: File, after: File, report: Report, clip: int = 0) -> float:
     """The largest error of a clip, which is no larger than promised and as large as is said."""
-    error = off(before, after, clip, RADIUS)
+    error = off(before, after, clip, RADIUS).error
     assert error <= report.tolerance + ROUNDING * report.size
     assert error <= report.clips[clip].error + ROUNDING * report.size
     return error
@@ -249,6 +249,6 @@ def test_whatever_hangs_on_whatever_keeps_to_the_tolerance(tmp_path_factory, see
     document = read_document(path)
     size = reduced(document, Options(radius=RADIUS * unit)).size
     report = reduce_file(path, folder / "out.glb", Options(0.01 * size or unit, RADIUS * unit))
-    error = off(File(path), File(folder / "out.glb"), 0, RADIUS * unit)
+    error = off(File(path), File(folder / "out.glb"), 0, RADIUS * unit).error
     assert error <= report.tolerance * (1.0 + 1e-4) + ROUNDING * unit * 10.0
     assert report.clips[0].after.size <= report.clips[0].before.size

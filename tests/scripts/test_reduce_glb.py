@@ -9,7 +9,7 @@ import pytest
 from rigid_motion_batch.keying import exporting, recordings
 from rigid_motion_batch.recordings.clip_reading import read_source
 from tests.animation.farm import played_on_a_farm
-from tests.gltf.oracle import File, off
+from tests.gltf.player import File, off
 from tests.scripts.reducing import FRAMES, WALK, hand_made, joints_in_metres, rig_file, run, write_csv
 
 MM = 1e-3
@@ -52,7 +52,7 @@ def require_near_export(made: Path, exported: Path, tolerance: float, radius: fl
     sampled, file = File(exported), File(made)
     assert len(sampled.json["animations"]) == len(file.json["animations"])
     for clip in range(len(sampled.json["animations"])):
-        assert off(sampled, file, clip, radius) <= tolerance + 1e-6
+        assert off(sampled, file, clip, radius).error <= tolerance + 1e-6
 
 
 def test_a_bvh_becomes_a_glb_in_metres_within_the_tolerance(tmp_path, capsys, exported):

@@ -10,7 +10,7 @@ import numpy as np
 from rigid_motion_batch.cli import reduce
 from rigid_motion_batch.keying import gltf_files
 from tests.gltf.making import Making, walk
-from tests.gltf.oracle import File, off
+from tests.gltf.player import File, off
 from tests.scripts.reducing import listed
 
 WITHOUT_BLENDER = """
@@ -40,7 +40,7 @@ def test_no_blender_is_needed(tmp_path):
     before, after, size_before, size_after = map(int, told.groups()[:4])
     assert after < before
     assert size_after < size_before
-    assert off(File(source), File(made), 0, 0.03) <= 1e-3 * float(told[5]) + 1e-5
+    assert off(File(source), File(made), 0, 0.03).error <= 1e-3 * float(told[5]) + 1e-5
     assert float(told[5]) <= 2.0
     assert re.search(r"walk\.glb: 1\.5 m large", done.stderr)
     assert "1 clip reduced; 1 file: 1 written." in done.stderr
@@ -66,7 +66,7 @@ def test_a_gltf_finds_its_files_from_another_folder(tmp_path):
     source = made.write(tmp_path / "walk.gltf")
     assert run(source, "--output", tmp_path / "out", "--tolerance", "2mm") == 0
     assert listed(tmp_path / "out") == ["skin a.png", "walk-reduced.bin", "walk-reduced.gltf"]
-    assert off(File(source), File(tmp_path / "out" / "walk-reduced.gltf"), 0, 0.0) <= 2e-3
+    assert off(File(source), File(tmp_path / "out" / "walk-reduced.gltf"), 0, 0.0).error <= 2e-3
 
 
 def test_names_of_clips_do_nothing_to_the_terminal(tmp_path, capsys):

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.gltf.making import Making
-from tests.gltf.oracle import File
+from tests.gltf.player import File
 
 
 @dataclass(frozen=True, eq=False)
