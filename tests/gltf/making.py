@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-KINDS = {"f4": 5126, "i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123}
+KINDS = {"f4": 5126, "i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125}
 
 TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 
@@ -69,6 +69,18 @@ class Making:
         animation["samplers"].append({"input": times, "output": values, "interpolation": interpolation})
         target = {"node": node, "path": path}
         animation["channels"].append({"sampler": len(animation["samplers"]) - 1, "target": target})
+
+    def pointer(self, pointer: str, times: int, values: int | np.ndarray, *more: Any) -> None:
+        """A channel of whatever a JSON pointer names, as `channel`."""
+        self.channel(0, "pointer", times, values, *more)
+        extensions = {"KHR_animation_pointer": {"pointer": pointer}}
+        clip = more[1] if len(more) > 1 else 0
+        self.json["animations"][clip]["channels"][-1]["target"] = {"path": "pointer", "extensions": extensions}
+        self.uses("KHR_animation_pointer")
+
+    def uses(self, extension: str) -> None:
+        """Say that an extension is used."""
+        self.json["extensionsUsed"] = sorted({extension, *self.json.get("extensionsUsed", [])})
 
     def write(self, path: Path, chunks: Sequence[tuple[bytes, bytes]] = ()) -> Path:
         """Write it as .glb, with other chunks behind, or as .gltf with its buffers beside it."""
