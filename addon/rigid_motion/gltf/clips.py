@@ -20,7 +20,7 @@ from .nodes import by_target
 from .rewriting import Amount, EveryKey, StoredTrack, amount, amount_before, key_size, shown, stored
 from .search import Search
 from .settling import Channel, settled, shared_times
-from .tracks import ROTATION, TRANSLATION, WEIGHTS, Clip, Target, Track, Tracks
+from .tracks import CUBICSPLINE, ROTATION, TRANSLATION, WEIGHTS, Clip, Target, Track, Tracks
 
 OF_INTEGERS = 0.85
 """The share of the tolerance that rotations may take that are stored as 16-bit integers."""
@@ -264,7 +264,8 @@ class ClipReduction:
             self._amount(tracks)
             rows, eighths = self._failures(self._shown(tracks), sound)
             if not len(rows):
-                return tracks, max(worst for _, worst in sound.values())
+                worst = max(self.world.morphed(self._shown(tracks))[0], *(worst for _, worst in sound.values()))
+                return (tracks, worst) if worst.error <= self.tolerance else None
             samples = self._with_more(samples, rows, eighths)
         return None
 
@@ -327,12 +328,18 @@ class ClipReduction:
         seen = [time for track in tracks for time in track.times[[0, -1]].tolist()]
         if np.isin(ends.astype(np.float32), seen).all():
             return tracks
-        if not tracks:
-            first = self.clip.tracks[0]
-            tracks = [stored(first.keyed(ends[:1]), integers=False)]
-        number = min(range(len(tracks)), key=lambda number: len(tracks[number].times))
-        track = shown(self._of_channel[tracks[number].channel], tracks[number])
-        tracks[number] = self._stored_track(track.keyed(np.union1d(track.times, ends)))
+        number = min(
+            (number for number, track in enumerate(tracks) if track.interpolation != CUBICSPLINE),
+            key=lambda number: len(tracks[number].times),
+            default=len(tracks),
+        )
+        if number < len(tracks):
+            track = shown(self._of_channel[tracks[number].channel], tracks[number])
+        else:
+            known = {track.channel for track in tracks}
+            track = next(track for track in self.clip.tracks if track.channel not in known).keyed(ends[:1])
+        longer = track.keyed(np.union1d(track.times, ends))
+        tracks[number : number + 1] = [self._stored_track(replace(longer, interpolation=track.interpolation))]
         return tracks
 
     @property
