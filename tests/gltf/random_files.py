@@ -165,7 +165,7 @@ class _File:
                 np.reshape(node["matrix"], (4, 4)).T
                 if "matrix" in node
                 else composed(
-                    np.array([node["translation"]]),
+                    np.array([node.get("translation", [0.0] * 3)]),
                     np.array([node.get("rotation", [0.0, 0.0, 0.0, 1.0])]),
                     np.array([node.get("scale", [1.0, 1.0, 1.0])]),
                 )[0]
