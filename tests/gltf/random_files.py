@@ -135,7 +135,9 @@ class _File:
                 node |= self._rest()
         if choice.rest == "matrix":
             some = self.nodes[int(random.integers(0, count))]
-            some["matrix"] = self._matrix(some.pop("translation")).T.ravel().tolist()
+            scale = self.random.uniform(0.5, 2.0, (1, 3))
+            matrix = composed(np.array([some.pop("translation")]), self._turn((1,)), scale)
+            some["matrix"] = matrix[0].T.ravel().tolist()
 
     def _rest(self) -> dict[str, Any]:
         """What a node rests with that does not rest plainly."""
@@ -143,12 +145,6 @@ class _File:
         if self.choice.rest in scales:
             return {"scale": scales[self.choice.rest]}
         return {"rotation": self._turn().tolist()} if self.choice.rest == "turned" else {}
-
-    def _matrix(self, translation: list[float]) -> np.ndarray:
-        matrix = np.eye(4)
-        matrix[:3, :3] += 0.3 * self.random.normal(size=(3, 3))
-        matrix[:3, 3] = translation
-        return matrix
 
     def _turn(self, count: tuple[int, ...] = ()) -> np.ndarray:
         values = self.random.normal(size=(*count, 4))
@@ -195,11 +191,11 @@ class _File:
             primitive["attributes"]["POSITION"] = self.made.accessor(whole, normalized=True)
         else:
             primitive["attributes"]["POSITION"] = self.made.accessor(places.astype("<f4"))
+        if "mesh" in self.nodes[node]:
+            node = self._child(node, {})
+        self.nodes[node]["mesh"] = len(self.meshes) - 1
         if "morph" in kind:
             self._morph(node, mesh, self.unit * (80.0 if kind == "big morph" else 0.1))
-        if "mesh" in self.nodes[node]:
-            node = self._child(node, {"mesh": len(self.meshes) - 1})
-        self.nodes[node]["mesh"] = len(self.meshes) - 1
         if kind == "instances":
             count = 3
             given = {
@@ -219,12 +215,12 @@ class _File:
         return self._child(joint, {"translation": (0.3 * self.unit * self.random.normal(size=3)).tolist()})
 
     def _child(self, node: int, content: dict[str, Any]) -> int:
-        self.nodes.append(content)
+        self.nodes.append({"name": f"Node {len(self.nodes)}", **content})
         self.nodes[node].setdefault("children", []).append(len(self.nodes) - 1)
         return len(self.nodes) - 1
 
     def _added(self, node: dict[str, Any]) -> int:
-        self.nodes.append(node)
+        self.nodes.append({"name": f"Node {len(self.nodes)}", **node})
         self.made.json["scenes"][0]["nodes"].append(len(self.nodes) - 1)
         return len(self.nodes) - 1
 
