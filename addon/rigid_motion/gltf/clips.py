@@ -16,7 +16,7 @@ from ..motion import SeparateKeys, Skeleton
 from ..motion.skeleton_stretches import Run
 from .errors import NOWHERE, PARTS, Feet, World
 from .nodes import Nodes, by_target, steadied
-from .rewriting import Amount, EveryKey, StoredTrack, amount, amount_before, key_size, shown, stored
+from .rewriting import Amount, EveryKey, StoredTrack, amount, key_size, shown, stored
 from .search import Search
 from .settling import moments, settled, shared_times
 from .tracks import ROTATION, TRANSLATION, Clip, Track, Tracks
@@ -90,6 +90,11 @@ class ReducedClip:
     """The largest displacement of any vertex of a skin, where that was asked for and there is one."""
 
 
+def kept(number: int, name: str, before: Amount, reason: str) -> ReducedClip:
+    """Return what there is to say of a clip that stays as it was."""
+    return ReducedClip(number, name, None, reason, before, before)
+
+
 class ClipReduction:
     """The search for the keys of one clip.
 
@@ -107,6 +112,8 @@ class ClipReduction:
         Of the body.
     options : Options
         With a tolerance.
+    before : Amount
+        What of the clip goes where other keys take its place.
     """
 
     def __init__(
@@ -118,11 +125,12 @@ class ClipReduction:
         joints: Iterable[int],
         size: float,
         options: Options,
+        before: Amount,
     ) -> None:
         self.clip, self.options, self.size = clip, options, size
         assert options.tolerance is not None
         self.tolerance = options.tolerance
-        self.before = amount_before(nodes.document, clip)
+        self.before = before
         span = np.unique([track.times[end] for track in clip.tracks for end in (0, -1)])[[0, -1]]
         world = World(nodes, moving, radii, steadied(clip.tracks), np.unique(span))
         self.world = replace(world, times=moments(world, clip, self.tolerance))
@@ -148,7 +156,7 @@ class ClipReduction:
         return ReducedClip(self.clip.number, name, tuple(tracks), "", self.before, after, error, slides, off)
 
     def _kept(self, reason: str) -> ReducedClip:
-        return ReducedClip(self.clip.number, self.clip.name, None, reason, self.before, self.before)
+        return kept(self.clip.number, self.clip.name, self.before, reason)
 
     def _so_many(self, count: int) -> tuple[list[StoredTrack], float]:
         """Tracks with so many key poses, those under which feet slide least, and the largest error."""

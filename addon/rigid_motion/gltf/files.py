@@ -10,10 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from .clips import ClipReduction, Options, ReducedClip
+from .clips import LARGER, ClipReduction, Options, ReducedClip, kept
 from .documents import Document, GltfError, damage_refused, read_document
 from .nodes import Nodes
-from .rewriting import rewritten
+from .references import References
+from .rewriting import amount_before, made_smaller
 from .sizes import OF_A_BODY, OF_KEY_POSES, joints_of, radii_of, size_of
 from .tracks import WEIGHTS, Clip, read_clips
 
@@ -46,7 +47,7 @@ def reduced(document: Document, options: Options) -> Report:
         For what is damaged, and where the tolerance makes no sense.
     """
     with damage_refused():
-        clips, nodes = read_clips(document), Nodes(document)
+        clips, nodes, references = read_clips(document), Nodes(document), References(document.json)
         if not any(clip.tracks for clip in clips):
             raise GltfError("no animation moves a node", "export it with its animations")
         joints = set(itertools.chain.from_iterable(joints_of(document)))
@@ -65,11 +66,17 @@ def reduced(document: Document, options: Options) -> Report:
     result = []
     for clip in clips:
         if clip.tracks:
-            own = np.isin(moved, _moved(nodes, (clip,)))
-            result.append(ClipReduction(nodes, clip, moved[own], radii[own], joints, size, options).reduced())
+            own, before = np.isin(moved, _moved(nodes, (clip,))), amount_before(document, references, clip)
+            reduction = ClipReduction(nodes, clip, moved[own], radii[own], joints, size, options, before)
+            result.append(reduction.reduced())
     tracks = {clip.number: clip.tracks for clip in result if clip.tracks is not None}
     with damage_refused():
-        return Report(size, tolerance, tuple(result), rewritten(document, tracks) if tracks else document)
+        smaller, chosen = made_smaller(document, references, tracks)
+    larger = tracks.keys() - chosen
+    clips_after = (
+        kept(clip.number, clip.name, clip.before, LARGER) if clip.number in larger else clip for clip in result
+    )
+    return Report(size, tolerance, tuple(clips_after), smaller)
 
 
 def reduce_file(path: Path, output: Path, options: Options) -> Report:

@@ -7,6 +7,7 @@ Source: the glTF 2.0 specification, Khronos 2021, section 3.11 and appendix C.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -14,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from ..motion.quaternions import normalise
-from .accessors import EVERY, Rows, numbers
-from .documents import Document, GltfError, Json, entry, objects, shown
+from .accessors import EVERY, MOST_ZEROS, Rows, numbers
+from .documents import Document, GltfError, Json, bytes_of, entry, objects, shown
 
 TRANSLATION, ROTATION, SCALE, WEIGHTS = PATHS = ("translation", "rotation", "scale", "weights")
 
@@ -31,6 +32,9 @@ NARROWEST = 1e-9
 
 AT_ONCE = 2**14
 """Keys of a track that are looked at in one go."""
+
+MOST_SHARED = 4
+"""Numbers of all tracks together, for each byte of a file: a key of 16-bit integers that eight tracks share."""
 
 FARTHEST = 1e30
 """Numbers beyond it are damage: their squares would be no floats in single precision."""
@@ -141,6 +145,9 @@ class Clip:
     tracks: tuple[Track, ...]
     """What moves nodes: channels without a node, or with paths of extensions, are not among them."""
 
+    cuts: int = 0
+    """How often two keys of a track are at one time: the first of them is taken as the least bit earlier."""
+
 
 def read_clips(document: Document) -> tuple[Clip, ...]:
     """All animations of a document.
@@ -150,7 +157,14 @@ def read_clips(document: Document) -> tuple[Clip, ...]:
     GltfError
         That names the animation and the channel that cannot be read.
     """
-    return tuple(_clip(document, number) for number in range(len(objects(document.json, "animations"))))
+    most = MOST_ZEROS + MOST_SHARED * bytes_of(document)
+    times: KnownTimes = {}
+    clips, numbers_read = [], 0
+    for number in range(len(objects(document.json, "animations"))):
+        clip = _clip(document, number, times, most - numbers_read)
+        numbers_read += sum(map(_numbers_of, clip.tracks))
+        clips.append(clip)
+    return tuple(clips)
 
 
 def moves_node(target: Json) -> bool:
@@ -158,12 +172,19 @@ def moves_node(target: Json) -> bool:
     return "node" in target and target.get("path") in PATHS
 
 
-def _clip(document: Document, number: int) -> Clip:
+KnownTimes = dict[int, tuple[np.ndarray, int]]
+"""By accessor: see `_times`."""
+
+
+def _numbers_of(track: Track) -> int:
+    return len(track.times) * math.prod(track.values.shape)
+
+
+def _clip(document: Document, number: int, times: KnownTimes, most: int) -> Clip:
     animation = document.json["animations"][number]
     name = animation.get("name")
     name = name if isinstance(name, str) and name else f"animation {number}"
     tracks, targets = [], set()
-    times: dict[int, np.ndarray] = {}
     for index, channel in enumerate(objects(animation, "channels")):
         target = channel.get("target")
         if not isinstance(target, dict):
@@ -178,10 +199,15 @@ def _clip(document: Document, number: int) -> Clip:
             raise GltfError(f"{shown(name)}: channel {index} is the second {track.path} of node {track.node}")
         targets.add((track.node, track.path))
         tracks.append(track)
-    return Clip(number, name, tuple(tracks))
+        most -= _numbers_of(track)
+        if most < 0:
+            raise GltfError(f"{shown(name)}: channel {index}: so many channels share numbers that it is too much")
+    samplers = [animation["samplers"][animation["channels"][track.channel]["sampler"]] for track in tracks]
+    cuts = sum(times[given][1] for given in {sampler["input"] for sampler in samplers})
+    return Clip(number, name, tuple(tracks), cuts)
 
 
-def _track(document: Document, animation: Json, index: int, channel: Json, known: dict[int, np.ndarray]) -> Track:
+def _track(document: Document, animation: Json, index: int, channel: Json, known: KnownTimes) -> Track:
     """Return a channel as a track, with the times that are known of the accessor, or that are so from now on."""
     node, path = channel["target"]["node"], channel["target"]["path"]
     moved = entry(document.json, "nodes", node)
@@ -194,7 +220,7 @@ def _track(document: Document, animation: Json, index: int, channel: Json, known
     given: Any = sampler.get("input")
     if given not in known:
         known[given] = _times(document, given)
-    times, values = known[given], numbers(document, sampler.get("output"))
+    (times, _), values = known[given], numbers(document, sampler.get("output"))
     width, uneven = divmod(values.size, len(times) * (3 if interpolation == CUBICSPLINE else 1))
     if uneven or not width or width != WIDTHS.get(path, width) or (path == WEIGHTS) != (values.shape[1] == 1):
         raise GltfError(f"{len(values)} values do not fit {len(times)} keys of {path}")
@@ -210,11 +236,23 @@ def _track(document: Document, animation: Json, index: int, channel: Json, known
     return track
 
 
-def _times(document: Document, number: object) -> np.ndarray:
-    """Those of keys, shape (n,)."""
+def _times(document: Document, number: object) -> tuple[np.ndarray, int]:
+    """Those of keys, shape (n,), and how often two are at one time, which is a cut.
+
+    The first of the two is taken as earlier, by a step of single precision.
+    """
     times = numbers(document, number)
-    if times.shape[1] != 1 or np.any(np.diff(times[:, 0]) <= 0.0):
-        raise GltfError("its times do not rise")
+    if times.shape[1] != 1:
+        raise GltfError("its times are no single numbers")
+    times = times[:, 0]
     if np.abs(times).max() > FARTHEST:
         raise GltfError("it has numbers that are too large")
-    return times[:, 0]
+    (cuts,) = np.nonzero(np.diff(times) == 0.0)
+    times[cuts] = np.nextafter(times[cuts].astype(np.float32), -np.float32(np.inf))
+    (falls,) = np.nonzero(np.diff(times) <= 0.0)
+    if len(falls):
+        raise GltfError(
+            f"its times do not rise ({times[falls[0]]:.6g} s, then {times[falls[0] + 1]:.6g} s)",
+            "take keys out until one comes after the other, and two are at one time at most",
+        )
+    return times, len(cuts)
