@@ -38,6 +38,7 @@ class Report:
     """With fewer keys; the same where no clip needs fewer."""
 
 
+@damage_refused()
 def reduced(document: Document, options: Options) -> Report:
     """Return a document with fewer keys in all of its clips.
 
@@ -46,14 +47,13 @@ def reduced(document: Document, options: Options) -> Report:
     GltfError
         For what is damaged, and where the tolerance makes no sense.
     """
-    with damage_refused():
-        clips, nodes, references = read_clips(document), Nodes(document), References(document.json)
-        if not any(clip.tracks for clip in clips):
-            raise GltfError("no animation moves a node", "export it with its animations")
-        joints = set(itertools.chain.from_iterable(joints_of(document)))
-        moved = _moved(nodes, clips)
-        size = size_of(nodes, moved)
-        radii = radii_of(nodes, moved, size) if options.radius is None else np.full(len(moved), options.radius)
+    clips, nodes, references = read_clips(document), Nodes(document), References(document.json)
+    if not any(clip.tracks for clip in clips):
+        raise GltfError("no animation moves a node", "export it with its animations")
+    joints = set(itertools.chain.from_iterable(joints_of(document)))
+    moved = _moved(nodes, clips)
+    size = size_of(nodes, moved)
+    radii = radii_of(nodes, moved, size) if options.radius is None else np.full(len(moved), options.radius)
     tolerance = options.tolerance
     if tolerance is None:
         tolerance = (OF_KEY_POSES if options.shared else OF_A_BODY) * size or SOME
@@ -70,8 +70,7 @@ def reduced(document: Document, options: Options) -> Report:
             reduction = ClipReduction(nodes, clip, moved[own], radii[own], joints, size, options, before)
             result.append(reduction.reduced())
     tracks = {clip.number: clip.tracks for clip in result if clip.tracks is not None}
-    with damage_refused():
-        smaller, chosen = made_smaller(document, references, tracks)
+    smaller, chosen = made_smaller(document, references, tracks)
     larger = tracks.keys() - chosen
     clips_after = (
         kept(clip.number, clip.name, clip.before, LARGER) if clip.number in larger else clip for clip in result
