@@ -201,7 +201,8 @@ def _clip(document: Document, number: int, times: KnownTimes, most: int) -> Clip
         tracks.append(track)
         most -= _numbers_of(track)
         if most < 0:
-            raise GltfError(f"{shown(name)}: channel {index}: so many channels share numbers that it is too much")
+            problem = f"{shown(name)}: channel {index}: too many channels share the numbers of so small a file"
+            raise GltfError(problem, "export fewer clips")
     samplers = [animation["samplers"][animation["channels"][track.channel]["sampler"]] for track in tracks]
     cuts = sum(times[given][1] for given in {sampler["input"] for sampler in samplers})
     return Clip(number, name, tuple(tracks), cuts)
@@ -247,12 +248,13 @@ def _times(document: Document, number: object) -> tuple[np.ndarray, int]:
     times = times[:, 0]
     if np.abs(times).max() > FARTHEST:
         raise GltfError("it has numbers that are too large")
-    (cuts,) = np.nonzero(np.diff(times) == 0.0)
-    times[cuts] = np.nextafter(times[cuts].astype(np.float32), -np.float32(np.inf))
-    (falls,) = np.nonzero(np.diff(times) <= 0.0)
+    (cuts,), rising = np.nonzero(np.diff(times) == 0.0), times.copy()
+    rising[cuts] = np.nextafter(times[cuts].astype(np.float32), -np.float32(np.inf))
+    (falls,) = np.nonzero(np.diff(rising) <= 0.0)
     if len(falls):
+        first, second = times[falls[0] :][:2]
         raise GltfError(
-            f"its times do not rise ({times[falls[0]]:.6g} s, then {times[falls[0] + 1]:.6g} s)",
+            f"its times do not rise ({first:.6g} s, then {second:.6g} s)",
             "take keys out until one comes after the other, and two are at one time at most",
         )
-    return times, len(cuts)
+    return rising, len(cuts)
