@@ -52,7 +52,7 @@ def animation_bytes(path: Path) -> int:
     document = read_document(path, in_memory=True)
     samplers = [sampler for animation in document.json["animations"] for sampler in animation["samplers"]]
     return sum(
-        stored_size(document, it) for it in {sampler[side] for sampler in samplers for side in ("input", "output")}
+        stored_size(document.json, it) for it in {sampler[side] for sampler in samplers for side in ("input", "output")}
     )
 
 

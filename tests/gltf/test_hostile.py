@@ -10,12 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigid_motion.gltf import GltfError, Options, documents, read_document, reduce_file, reduced
+from rigid_motion.gltf import GltfError, Options, documents, read_document, reduce_file, reduced, tracks
+from rigid_motion.gltf.tracks import read_clips
 from rigid_motion_batch.cli import reduce
 from tests.gltf.making import glb, walk
-from tests.gltf.player import File
+from tests.gltf.player import File, shown
 
 RESULT = "walk-reduced"
+
+
+ZEROS = {"componentType": 5126, "count": 2**27, "type": "VEC3"}
 
 
 def refusal(path: Path, capsys: pytest.CaptureFixture[str]) -> str:
@@ -65,7 +69,9 @@ def put(*keys: str | int, to: object) -> Callable[[dict[str, Any]], None]:
         (put("nodes", 5, to=None), "nodes is no list of objects; export it again"),
         (put("animations", 0, "channels", 1, "sampler", to=True), "samplers has no entry True"),
         (put("animations", 0, "samplers", 0, "interpolation", to="CUBIC"), "'CUBIC' is none of LINEAR"),
-        (put("animations", 0, "samplers", 0, "input", to=2), "its times do not rise; export it again"),
+        (put("animations", 0, "samplers", 0, "input", to=2), "its times are no single numbers; export it again"),
+        (put("accessors", 1, "bufferView", to=2), "its times do not rise (0"),
+        (put("accessors", 2, to=ZEROS), f"accessor 2 has {2**27} elements, more than are read; export it again"),
         (put("animations", 0, "samplers", 0, "output", to=1), "61 values do not fit 61 keys of translation"),
         (put("animations", 0, "channels", 0, "target", to="all"), "channel 0 has no target; export it again"),
         (put("animations", to=[]), "no animation moves a node; export it with its animations"),
@@ -90,13 +96,37 @@ def test_each_is_refused_in_one_line(tmp_path, capsys, change, line):
 def test_json_that_is_none_or_too_much_is_refused(tmp_path, capsys, monkeypatch):
     path = tmp_path / "walk.glb"
     for text, line in (
-        ("[" * 200_000, "this is no glTF (its JSON cannot be read"),
+        ("{", "this is no glTF (its JSON cannot be read"),
+        ("[" * 200_000, "its JSON has 200000 lists and objects in one another, more than the 128 that are read"),
+        ('{"extras":' * 900 + "1" + "}" * 900, "its JSON has 900 lists and objects in one another"),
+        (json.dumps(["[" * 900, '"]\\"{' * 900]), "this is no glTF (its JSON is no object)"),
         ("[]", "this is no glTF (its JSON is no object); export it again"),
         ('{"nodes": [{"scale": [1e999, 1, 1]}]}', "this is no glTF (its JSON cannot be read: 1e999 is no number)"),
     ):
         assert line in refusal(changed(path, lambda _: None, text), capsys)
     monkeypatch.setattr(documents, "MOST_VALUES", 100)
     assert "values of JSON are more than the 100 that are read" in refusal(changed(path, lambda _: None), capsys)
+
+
+def test_channels_that_share_numbers_without_end_are_refused(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(tracks, "MOST_ZEROS", 0)
+    path, animation = tmp_path / "walk.glb", File(walk().write(tmp_path / "walk.glb")).json["animations"][0]
+    line = ": too many channels share the numbers of so small a file; export fewer clips"
+    assert line in refusal(changed(path, put("animations", to=[animation] * 20)), capsys)
+
+
+def test_two_keys_at_one_time_are_a_cut(tmp_path):
+    made, path = walk(2), tmp_path / "cut.glb"
+    times = np.array([0.0, 1.0, 1.0, 2.0], dtype="<f4")
+    made.channel(1, "translation", made.times(times), np.eye(4, 3)[[0, 0, 1, 1]])
+    clip = read_clips(read_document(made.write(path)))[0]
+    assert clip.cuts == 1
+    track = clip.tracks[-1]
+    assert track.at(np.array([0.999, 1.0])).tolist() == np.eye(3)[:2].tolist()
+    assert np.array_equal(track.times.astype("<f4"), [0.0, np.nextafter(times[1], np.float32(0.0)), 1.0, 2.0])
+    reduce_file(path, tmp_path / "made.glb", Options(1e-3))
+    after = File(tmp_path / "made.glb").tracks(0)[1, "translation"]
+    assert shown(*after, np.array([0.999, 1.0]), turns=False) == pytest.approx(np.eye(3)[:2], abs=1e-3)
 
 
 def test_chunks_that_lie_are_refused(tmp_path, capsys):

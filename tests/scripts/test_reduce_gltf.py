@@ -69,6 +69,32 @@ def test_a_gltf_finds_its_files_from_another_folder(tmp_path):
     assert off(File(source), File(tmp_path / "out" / "walk-reduced.gltf"), 0, 0.0).error <= 2e-3
 
 
+def test_links_out_of_the_folder_are_not_followed(tmp_path, capsys):
+    made, folder = walk(), tmp_path / "in"
+    folder.mkdir()
+    names = ["skin.png", "deep/hat.png", "../secret.png", "deep/shoe.png"]
+    made.json["images"] = [{"uri": name} for name in names]
+    (tmp_path / "secret.png").write_bytes(b"secret")
+    (folder / "deep").mkdir()
+    (folder / "deep" / "hat.png").write_bytes(b"hat")
+    (folder / "skin.png").symlink_to(tmp_path / "secret.png")
+    (folder / "deep" / "shoe.png").symlink_to("hat.png")
+    source, out = made.write(folder / "walk.gltf"), tmp_path / "out"
+    assert run(source, "--output", out, "--tolerance", "2mm") == 0
+    assert (listed(out), listed(out / "deep")) == (
+        ["deep", "walk-reduced.bin", "walk-reduced.gltf"],
+        ["hat.png", "shoe.png"],
+    )
+    said = capsys.readouterr().err
+    for name in ("../secret.png", "skin.png"):
+        assert f"walk.gltf: {name} is outside of the folder of the file; left out" in said
+    buffer = folder / "walk 0.bin"
+    buffer.rename(tmp_path / "walk.bin")
+    buffer.symlink_to(tmp_path / "walk.bin")
+    assert run(source) == 2
+    assert "buffer 0 is outside of its folder ('walk%200.bin'); export it as .glb" in capsys.readouterr().err
+
+
 def test_names_of_clips_do_nothing_to_the_terminal(tmp_path, capsys):
     made = walk()
     made.json["animations"][0]["name"] = "a\nb\x1b[2J"

@@ -6,19 +6,21 @@ the specification has it (glTF 2.0, sections 3.6 and 3.11): -1 to 1, or 0 to 1.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from .documents import Document, GltfError, Json, entry, shown, whole
+from .documents import Document, GltfError, Json, bytes_of, entry, shown, whole
 
 KINDS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 """Types of components, as NumPy names them."""
 
 COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
-MOST_NUMBERS = 2**27
-"""Of an accessor: one without a view is made of zeros, and may name any count."""
+MOST_ZEROS = 2**22
+"""How many numbers an accessor may have more than the file has bytes: one without a view is made of zeros."""
 
 COMPRESSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 """What bytes of a view are not what its accessors say."""
@@ -63,7 +65,7 @@ def raw_numbers(document: Document, number: object, rows: slice = EVERY) -> np.n
     """
     accessor = entry(document.json, "accessors", number)
     kind, columns, count = _kind(accessor), _columns(accessor), whole(accessor, "count", least=1)
-    if count * columns > MOST_NUMBERS:
+    if count * columns > MOST_ZEROS + bytes_of(document):
         raise GltfError(f"accessor {number} has {count} elements, more than are read")
     if "bufferView" in accessor:
         result = _in_view(document, accessor, kind, columns, count, f"accessor {number}", rows)
@@ -92,16 +94,34 @@ def denormalised(raw: np.ndarray) -> np.ndarray:
     return np.maximum(raw / np.iinfo(raw.dtype).max, -1.0)
 
 
-def stored_size(document: Document, number: int) -> int:
+def parts_of(json: Json, number: int) -> Iterator[tuple[Json, int, int]]:
+    """Yield what of an accessor names a view, and which bytes of it: the first, and that behind the last."""
+    for part, width, count in _parts(json, number):
+        first = whole(part, "byteOffset", 0)
+        stride = whole(entry(json, "bufferViews", part["bufferView"]), "byteStride", width)
+        yield part, first, first + (count - 1) * stride + width
+
+
+def stored_size(json: Json, number: int) -> int:
     """How many bytes the numbers of an accessor take, without what lies between them."""
-    accessor = entry(document.json, "accessors", number)
-    size = whole(accessor, "count") * _columns(accessor) * _kind(accessor).itemsize
-    if "sparse" not in accessor:
-        return size
-    sparse = accessor["sparse"]
-    index = np.dtype(KINDS[sparse["indices"]["componentType"]]).itemsize
-    size = size if "bufferView" in accessor else 0
-    return size + whole(sparse, "count") * (index + _columns(accessor) * _kind(accessor).itemsize)
+    return sum(width * count for _, width, count in _parts(json, number))
+
+
+def _parts(json: Json, number: int) -> Iterator[tuple[Json, int, int]]:
+    """Yield what of an accessor names a view, the bytes of each element there, and how many there are."""
+    accessor = entry(json, "accessors", number)
+    size, columns = _kind(accessor).itemsize, _columns(accessor)
+    if accessor["type"].startswith("MAT"):  # Each column of a matrix begins aligned.
+        rows = math.isqrt(columns)
+        width = rows * -(-rows * size // ALIGNED) * ALIGNED
+    else:
+        width = size * columns
+    if "bufferView" in accessor:
+        yield accessor, width, whole(accessor, "count")
+    if "sparse" in accessor:
+        sparse = accessor["sparse"]
+        yield sparse["indices"], _kind(sparse["indices"]).itemsize, whole(sparse, "count")
+        yield sparse["values"], width, whole(sparse, "count")
 
 
 def _kind(accessor: Json) -> np.dtype:
@@ -185,10 +205,11 @@ class GrowingView:
             accessor = self.placed(content) | {"componentType": COMPONENT_TYPES[kind]}
             accessor |= {"normalized": True} if numbers.dtype.kind == "i" else {}
             accessor |= {"count": len(numbers), "type": TYPES[numbers.shape[1]]}
-            if bounds:
-                accessor |= {"min": numbers.min(axis=0).tolist(), "max": numbers.max(axis=0).tolist()}
             self._known[known] = len(self.accessors)
             self.accessors.append(accessor)
+        if bounds:
+            ends = {"min": numbers.min(axis=0), "max": numbers.max(axis=0)}
+            self.accessors[self._known[known]] |= {name: [float(str(x)) for x in end] for name, end in ends.items()}
         return self._known[known]
 
     def placed(self, content: bytes) -> Json:

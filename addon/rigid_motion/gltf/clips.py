@@ -17,7 +17,7 @@ from ..motion.skeleton_stretches import Run
 from .documents import shown as quoted
 from .errors import NOWHERE, PARTS, Feet, World, Worst
 from .nodes import by_target
-from .rewriting import Amount, EveryKey, StoredTrack, amount, amount_before, key_size, shown, stored
+from .rewriting import Amount, EveryKey, StoredTrack, amount, key_size, shown, stored
 from .search import Search
 from .settling import Channel, settled, shared_times
 from .tracks import CUBICSPLINE, ROTATION, TRANSLATION, WEIGHTS, Clip, Target, Track, Tracks
@@ -96,6 +96,11 @@ class _LargerError(Exception):
     """Other tracks take no fewer bytes than those of the clip."""
 
 
+def kept(number: int, name: str, before: Amount, reason: str) -> ReducedClip:
+    """Return what there is to say of a clip that stays as it was."""
+    return ReducedClip(number, name, None, reason, before, before)
+
+
 class ClipReduction:
     """The search for the keys of one clip.
 
@@ -112,6 +117,8 @@ class ClipReduction:
         Of the body.
     options : Options
         With a tolerance.
+    before : Amount
+        What of the clip goes where other keys take its place.
     """
 
     def __init__(
@@ -122,13 +129,16 @@ class ClipReduction:
         joints: Iterable[int],
         size: float,
         options: Options,
+        before: Amount,
     ) -> None:
         self.clip, self.options, self.size = clip, options, size
         assert options.tolerance is not None
         self.tolerance = options.tolerance
-        self.before = amount_before(world.nodes.document, clip)
+        self.before = before
         channels = [Channel(world, track, self.tolerance) for track in clip.all_tracks]
-        moved = [channel.times for channel in channels if channel.track.path != WEIGHTS and not channel.track.is_constant]
+        moved = [
+            channel.times for channel in channels if channel.track.path != WEIGHTS and not channel.track.is_constant
+        ]
         times = np.unique(np.concatenate([world.times, *moved]))
         self.world = world if np.array_equal(times, world.times) else replace(world, times=times)
         self.given = by_target(clip.pointers)
@@ -175,7 +185,7 @@ class ClipReduction:
         return result
 
     def _kept(self, reason: str) -> ReducedClip:
-        return ReducedClip(self.clip.number, self.clip.name, None, reason, self.before, self.before)
+        return kept(self.clip.number, self.clip.name, self.before, reason)
 
     def _so_many(self, count: int) -> tuple[list[StoredTrack], Worst]:
         """Tracks with so many key poses, those under which feet slide least, and the largest error."""

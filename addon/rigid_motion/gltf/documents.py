@@ -13,22 +13,31 @@ import math
 import ntpath
 import re
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from pathlib import Path, PurePosixPath, PureWindowsPath
+from pathlib import Path, PureWindowsPath
 from typing import Any
 from urllib.parse import quote, unquote
+
+import numpy as np
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = b"glTF", b"JSON", b"BIN\0"
 
 MOST_VALUES = 2**22
 """In the JSON that is read: a hundred times as many as a body of thousands of joints has."""
 
+MOST_TEXT = 2**30
+"""Bytes of that JSON, which may hold whole buffers."""
+
+DEEPEST_JSON = 128
+"""How many lists and objects of the JSON may be in one another: a document alone has ten."""
+
 MOST_BYTES = 2**32 - 1
 """Of a GLB, which counts them in 32 bits."""
 
-SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
+LARGEST = 2**53
+"""Whole numbers are below it."""
 
 AGAIN = "export it again"
 
@@ -45,10 +54,12 @@ class GltfError(ValueError):
 
 @contextmanager
 def damage_refused() -> Iterator[None]:
-    """Raise a `GltfError` where what the block reads of a document has a type that leads to another error."""
+    """Raise a `GltfError` where what the block reads of a document leads to another error."""
     try:
         yield
-    except (AttributeError, IndexError, KeyError, OverflowError, TypeError) as error:
+    except GltfError:
+        raise
+    except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
         raise GltfError(f"this glTF is damaged ({' '.join(str(error).split())[:80]})") from error
 
 
@@ -81,6 +92,10 @@ class FileBytes:
         return content
 
 
+Chunk = tuple[bytes, bytes | FileBytes]
+"""Of a GLB: its kind and what is in it."""
+
+
 @dataclass(frozen=True, eq=False)
 class Document:
     """A glTF document and the bytes that belong to it.
@@ -95,12 +110,24 @@ class Document:
         Kinds and contents of all chunks of a GLB, in their order. None for a .gltf file.
     changed : frozenset of int
         The buffers that are not what their files hold.
+    original : int, optional
+        The bytes of all the files that it was read from, where it is what they hold.
     """
 
     json: Json
     buffers: tuple[bytes | FileBytes | None, ...]
-    chunks: tuple[tuple[bytes, bytes | FileBytes], ...] | None = None
+    chunks: tuple[Chunk, ...] | None = None
     changed: frozenset[int] = frozenset()
+    original: int | None = None
+
+    @property
+    def size(self) -> int:
+        """Bytes of the document and its buffers as they were read, or else as they are written."""
+        if self.original is not None:
+            return self.original
+        text = as_text(self.json)
+        parts = () if self.chunks is None else self._parts(text)
+        return size_beside(self.json, self.buffers) + (12 + sum(map(_chunk_size, parts)) if parts else len(text))
 
     def files(self, name: str) -> dict[str, bytes]:
         """Return what is to be written where the document is written as `name`: names of files, and what is in them.
@@ -114,36 +141,43 @@ class Document:
                 beside[file], buffer = bytes(data), {**buffer, "uri": quote(file)}
             buffers.append(buffer)
         document = {**self.json, "buffers": buffers} if beside else self.json
-        text = _as_text(document)
+        text = as_text(document)
         if self.chunks is None:
             return beside | {name: text}
+        parts = self._parts(text)
+        length = 12 + sum(map(_chunk_size, parts))
+        if length > MOST_BYTES:
+            raise GltfError(f"{length} bytes are more than a GLB can hold", "export it as .gltf, with files beside it")
+        return beside | {name: b"".join((struct.pack("<4sII", MAGIC, 2, length), *map(_chunk, parts)))}
+
+    def _parts(self, text: bytes) -> list[Chunk]:
+        """Return the chunks of a GLB with this JSON."""
         # What the first buffer holds, where it is the one inside of the GLB.
         first = objects(self.json, "buffers")[:1]
         binary = self.buffers[0] if first and "uri" not in first[0] else None
-        parts = [_chunk(JSON_CHUNK, text, b" ")]
-        for kind, content in self.chunks:
+        parts: list[Chunk] = [(JSON_CHUNK, text)]
+        for kind, content in self.chunks or ():
             if kind == BINARY_CHUNK and binary is not None:
-                parts, binary = [*parts, _chunk(kind, binary, b"\0")], None
-            elif kind != JSON_CHUNK:
-                parts.append(_chunk(kind, content, b"\0"))
-        if binary is not None:
-            parts.insert(1, _chunk(BINARY_CHUNK, binary, b"\0"))
-        length = 12 + sum(map(len, parts))
-        if length > MOST_BYTES:
-            raise GltfError(f"{length} bytes are more than a GLB can hold", "export it as .gltf, with files beside it")
-        return beside | {name: b"".join((struct.pack("<4sII", MAGIC, 2, length), *parts))}
+                content, binary = binary, None
+            if kind != JSON_CHUNK:
+                parts.append((kind, content))
+        return parts if binary is None else [parts[0], (BINARY_CHUNK, binary), *parts[1:]]
 
     def reread(self) -> Document:
         """Return what is read of the document where it has been written."""
         name = "file.gltf" if self.chunks is None else "file.glb"
         return _document(self.files(name)[name], lambda number, _: self.buffers[number])
 
-    def companions(self, folder: Path) -> dict[str, bytes]:
-        """Files that the document names and that have not changed, from its folder: names, and what is in them."""
+    def companions(self, folder: Path) -> dict[str, Path | None]:
+        """Files beside it that the document names and that have not changed: names, and where they are.
+
+        None where that is not its folder or below.
+        """
         buffers = [buffer for number, buffer in enumerate(objects(self.json, "buffers")) if number not in self.changed]
         uris = [part.get("uri") for part in (*buffers, *objects(self.json, "images"))]
-        names = {unquote(uri) for uri in uris if isinstance(uri, str) and not is_data(uri) and is_inside(unquote(uri))}
-        return {name: (folder / name).read_bytes() for name in names if (folder / name).is_file()}
+        names = {unquote(uri) for uri in uris if isinstance(uri, str) and not is_data(uri) and "://" not in uri}
+        paths = {name: place_inside(folder, name) for name in sorted(names)}
+        return {name: path for name, path in paths.items() if path is None or path.is_file()}
 
 
 def read_document(path: Path, *, in_memory: bool = False) -> Document:
@@ -171,12 +205,12 @@ def _document(content: bytes | FileBytes, file: Callable[[int, object], bytes | 
         _buffer(file, number, buffer, binary if number == 0 else None)
         for number, buffer in enumerate(objects(document, "buffers"))
     ]
-    return Document(document, tuple(buffers), chunks)
+    return Document(document, tuple(buffers), chunks, original=len(content) + size_beside(document, buffers))
 
 
-def chunks_of(content: bytes | FileBytes) -> tuple[tuple[bytes, bytes | FileBytes], ...]:
+def chunks_of(content: bytes | FileBytes) -> tuple[Chunk, ...]:
     """Return the kinds and contents of all chunks of a GLB file, the JSON among them."""
-    result: list[tuple[bytes, bytes | FileBytes]] = []
+    result: list[Chunk] = []
     offset, whole = 12, len(content)
     if whole >= offset:
         version, length = struct.unpack("<II", bytes(content[4:12]))
@@ -200,10 +234,16 @@ def chunks_of(content: bytes | FileBytes) -> tuple[tuple[bytes, bytes | FileByte
 def parsed(text: bytes) -> Json:
     """Return the JSON of a document, which is an object."""
     values = sum(map(text.count, (b",", b"[", b"{")))
-    if values > MOST_VALUES:
+    for count, most, kind in ((values, MOST_VALUES, "values"), (len(text), MOST_TEXT, "bytes")):
+        if count > most:
+            raise GltfError(
+                f"{count} {kind} of JSON are more than the {most} that are read",
+                "export the body without the rest of its scene",
+            )
+    if (depth := _depth(text)) > DEEPEST_JSON:
         raise GltfError(
-            f"{values} values of JSON are more than the {MOST_VALUES} that are read",
-            "export the body without the rest of its scene",
+            f"its JSON has {depth} lists and objects in one another, more than the {DEEPEST_JSON} that are read",
+            "export it without its custom properties",
         )
     try:
         document = json.loads(text.decode("utf-8-sig"), parse_float=_finite, parse_constant=_finite)
@@ -212,6 +252,11 @@ def parsed(text: bytes) -> Json:
     if not isinstance(document, dict):
         raise GltfError("this is no glTF (its JSON is no object)")
     return document
+
+
+def bytes_of(document: Document) -> int:
+    """Return how many bytes the buffers of a document have."""
+    return sum(len(data) for data in document.buffers if data is not None)
 
 
 def objects(parent: Json, name: str) -> list[Json]:
@@ -234,12 +279,20 @@ def entry(parent: Json, name: str, number: Any) -> Json:
     return result[number] if isinstance(result[number], dict) else objects(parent, name)[number]
 
 
+def _depth(text: bytes) -> int:
+    """How many lists and objects of a JSON text are in one another, at most."""
+    outside = re.sub(rb'"[^"]*"', b"", text.replace(rb"\\", b"").replace(rb"\"", b""))
+    signs = np.frombuffer(outside, dtype=np.uint8) & ~np.uint8(ord("[") ^ ord("{"))
+    steps = (signs == ord("[")).astype(np.int8) - (signs == ord("]")).astype(np.int8)
+    return int(np.cumsum(steps[steps != 0]).max(initial=0))
+
+
 def whole(parent: Json, name: str, default: int | None = None, least: int = 0) -> int:
     """Return a member that is a whole number, and not below the least."""
     number = parent.get(name, default)
     if isinstance(number, float) and number.is_integer():
         number = int(number)
-    if not isinstance(number, int) or isinstance(number, bool) or number < least:
+    if not isinstance(number, int) or isinstance(number, bool) or not least <= number < LARGEST:
         raise GltfError(f"{name} is {shown(number)}, and has to be a whole number from {least} on")
     return number
 
@@ -261,11 +314,21 @@ def bytes_of_uri(uri: str) -> bytes:
     return base64.b64decode(data)
 
 
-def is_inside(uri: str) -> bool:
-    """Whether a path stays in its folder, on whatever system."""
-    if SCHEME.match(uri) or PurePosixPath(uri).is_absolute() or PureWindowsPath(uri).anchor:
-        return False
-    return ntpath.normpath(uri).split("\\")[0] != ".."
+def size_beside(json: Json, buffers: Sequence[bytes | FileBytes | None]) -> int:
+    """Return the bytes of buffers that are in files beside a document."""
+    described = zip(objects(json, "buffers"), buffers, strict=True)
+    return sum(len(data) for buffer, data in described if data and "uri" in buffer and not is_data(buffer["uri"]))
+
+
+def place_inside(folder: Path, name: str) -> Path | None:
+    """Return where a path leads, links followed; None where that is not in the folder or below, on whatever system."""
+    if ":" in name or PureWindowsPath(name).anchor or ntpath.normpath(name).split("\\")[0] == "..":
+        return None
+    try:
+        path = (folder / name).resolve()
+        return path if path.is_relative_to(folder.resolve()) else None
+    except (OSError, RuntimeError, ValueError):  # Links in a circle, names that no system has.
+        return None
 
 
 def file_of(folder: Path, number: int, uri: object) -> Path:
@@ -276,14 +339,14 @@ def file_of(folder: Path, number: int, uri: object) -> Path:
     GltfError
         Where it is not in the folder or below, or is no file.
     """
-    if not isinstance(uri, str) or not is_inside(uri) or not is_inside(unquote(uri)):
+    path = place_inside(folder, unquote(uri)) if isinstance(uri, str) else None
+    if path is None:
         raise GltfError(
             f"buffer {number} is outside of its folder ({shown(uri)})", "export it as .glb, which is one file"
         )
-    path = folder / unquote(uri)
     if not path.is_file():
         raise GltfError(
-            f"buffer {number}, {shown(unquote(uri))}, is not there",
+            f"buffer {number}, {shown(unquote(str(uri)))}, is not there",
             "bring that file along, or export it as .glb, which is one file",
         )
     return path
@@ -291,6 +354,13 @@ def file_of(folder: Path, number: int, uri: object) -> Path:
 
 def data_uri(data: bytes) -> str:
     return f"data:application/octet-stream;base64,{base64.b64encode(data).decode()}"
+
+
+def as_text(document: Json) -> bytes:
+    try:
+        return json.dumps(document, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode()
+    except UnicodeEncodeError:  # Halves of signs, which JSON can have as numbers alone.
+        return json.dumps(document, allow_nan=False, separators=(",", ":")).encode()
 
 
 def _buffer(
@@ -316,16 +386,14 @@ def _buffer(
     return data[:length]
 
 
-def _as_text(document: Json) -> bytes:
-    try:
-        return json.dumps(document, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode()
-    except UnicodeEncodeError:  # Halves of signs, which JSON can have as numbers alone.
-        return json.dumps(document, allow_nan=False, separators=(",", ":")).encode()
-
-
-def _chunk(kind: bytes, content: bytes | FileBytes, padding: bytes) -> bytes:
-    content = bytes(content) + padding * (-len(content) % 4)
+def _chunk(part: Chunk) -> bytes:
+    kind, content = part[0], bytes(part[1])
+    content += (b" " if kind == JSON_CHUNK else b"\0") * (-len(content) % 4)
     return struct.pack("<I4s", len(content), kind) + content
+
+
+def _chunk_size(part: Chunk) -> int:
+    return 8 + -(-len(part[1]) // 4) * 4
 
 
 def _finite(text: str) -> float:

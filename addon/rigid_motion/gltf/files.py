@@ -10,11 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from .clips import ALL_CHANNELS, ClipReduction, Options, ReducedClip
+from .clips import ALL_CHANNELS, LARGER, ClipReduction, Options, ReducedClip, kept
 from .documents import Document, GltfError, damage_refused, read_document
 from .errors import World
 from .nodes import Nodes, by_target, steadied
-from .rewriting import StoredTrack, rewritten, shown
+from .references import References
+from .rewriting import StoredTrack, amount_before, made_smaller, shown
 from .seen import Seen
 from .sizes import OF_A_BODY, OF_KEY_POSES, joints_of, shells_of, size_of
 from .tracks import PATHS, WEIGHTS, WIDTHS, Clip, Target, read_clips
@@ -48,6 +49,10 @@ class Report:
     document: Document
     """With fewer keys; the same where no clip needs fewer."""
 
+    before: int
+    after: int
+    """Bytes of all its files."""
+
     left_alone: str = ""
     """Why nothing of it was reduced."""
 
@@ -63,10 +68,16 @@ def reduced(document: Document, options: Options) -> Report:
     GltfError
         For what is damaged, and where the tolerance makes no sense.
     """
+    before = document.size
     with damage_refused():
-        clips, nodes = read_clips(document), Nodes(document)
-        if reason := _left_alone(nodes, clips):
-            return Report(0.0, options.tolerance or 0.0, (), document, reason)
+        clips, nodes, references = read_clips(document), Nodes(document), References(document.json)
+        earlier, joints = _noted(document), set(itertools.chain.from_iterable(joints_of(document)))
+
+        def left_alone(reason: str, size: float = 0.0, clips: Sequence[ReducedClip] = ()) -> Report:
+            return Report(size, options.tolerance or 0.0, tuple(clips), document, before, before, reason, earlier)
+
+        if reason := _unread(nodes, clips):
+            return left_alone(reason)
         seen = Seen.of(nodes, clips)
         size = size_of(nodes, seen, _moved(nodes, clips, PATHS), clips)
     tolerance = options.tolerance
@@ -74,9 +85,8 @@ def reduced(document: Document, options: Options) -> Report:
         tolerance = (OF_KEY_POSES if options.shared else OF_A_BODY) * size or SOME
     elif tolerance > MOST * size > 0.0:
         reason = f"a tolerance of {tolerance:.3g} m is more than a tenth of its size of {size:.3g} m"
-        return Report(size, tolerance, (), document, f"{reason}: give one below {MOST * size:.2g} m")
+        return left_alone(f"{reason}: give one below {MOST * size:.2g} m", size)
     options = replace(options, tolerance=tolerance)
-    joints = set(itertools.chain.from_iterable(joints_of(document)))
     result = []
     for clip in clips:
         if clip.tracks:
@@ -85,18 +95,21 @@ def reduced(document: Document, options: Options) -> Report:
             if options.radius is not None:
                 shells[:] = options.radius
             world = World(nodes, seen, own, shells, steadied(clip.all_tracks), _key_times(clip))
-            needed = _needed(nodes, seen, clip, clips, options)
-            result.append(ClipReduction(world, clip, needed, joints, size, options).reduced())
+            needed, amount = _needed(nodes, seen, clip, clips, options), amount_before(document, references, clip)
+            result.append(ClipReduction(world, clip, needed, joints, size, options, amount).reduced())
     tracks = {clip.number: clip.tracks for clip in result if clip.tracks is not None}
     with damage_refused():
-        if not tracks:
-            return Report(size, tolerance, tuple(result), document, "all of its keys are needed")
-        changed = rewritten(document, tracks)
-        _require_proven(changed, nodes, seen, clips, tracks)
-        return Report(size, tolerance, tuple(result), changed)
+        changed, chosen = made_smaller(_with_note(document, tolerance + (earlier or 0.0)), references, tracks)
+        for row, clip in enumerate(result):
+            if clip.number in tracks.keys() - chosen:
+                result[row] = kept(clip.number, clip.name, clip.before, LARGER)
+        if not chosen:
+            return left_alone("no clip would become smaller", size, result)
+        _require_proven(changed, nodes, seen, clips, {number: tracks[number] for number in chosen})
+    return Report(size, tolerance, tuple(result), changed, before, changed.size, "", earlier)
 
 
-def _left_alone(nodes: Nodes, clips: Sequence[Clip]) -> str:
+def _unread(nodes: Nodes, clips: Sequence[Clip]) -> str:
     """Return why nothing of a document can be reduced, or an empty text."""
     if not any(clip.tracks for clip in clips):
         return "no animation moves a node"
@@ -129,7 +142,7 @@ def _with_note(document: Document, tolerance: float) -> Document:
 
 
 def _key_times(clip: Clip) -> np.ndarray:
-    """The ends of a clip, and all times at which what moves nodes has keys."""
+    """Return the ends of a clip, and all times at which what moves nodes has keys."""
     ends = [track.times[end] for track in clip.tracks for end in (0, -1)]
     moved = [track.times for track in clip.all_tracks if track.path != WEIGHTS and not track.is_constant]
     return np.unique(np.concatenate([np.unique(ends)[[0, -1]], *moved]))
@@ -141,13 +154,18 @@ def _needed(nodes: Nodes, seen: Seen, clip: Clip, clips: Sequence[Clip], options
     What shows the clips after one another leaves a node where the clip before had it; and a file that shows nothing is
     a library of clips for bodies that may rest in other ways.
     """
-    others = clips if options.channels == ALL_CHANNELS or not seen.reaches.any() else [other for other in clips if other is not clip]
+    others = (
+        clips
+        if options.channels == ALL_CHANNELS or not seen.reaches.any()
+        else [other for other in clips if other is not clip]
+    )
     is_library = others is clips
     return {
         (track.node, track.path)
         for other in others
         for track in other.all_tracks
-        if is_library or not (track.is_constant and np.array_equal(track.points[0], nodes.rest_of(track.node, track.path)))
+        if is_library
+        or not (track.is_constant and np.array_equal(track.points[0], nodes.rest_of(track.node, track.path)))
     }
 
 
@@ -190,6 +208,6 @@ def reduce_file(path: Path, output: Path, options: Options) -> Report:
 
 
 def _moved(nodes: Nodes, clips: Iterable[Clip], paths: Collection[str] = tuple(WIDTHS)) -> np.ndarray:
-    """Return the nodes of which clips move one of the paths, and all that hang on them, parents before their children."""
+    """Return the nodes of which clips move one of the paths, and all that hang on them, parents first."""
     targets = {track.node for clip in clips for track in clip.all_tracks if track.path in paths}
     return nodes.below(np.array(sorted(targets), dtype=np.int64))

@@ -1,8 +1,8 @@
 """Documents with other animations: nothing else changes but the numbers of accessors, views and where bytes are.
 
-What animations alone used goes out of the buffers, what they use now comes in behind the rest, in one view. Views and
-images that stay have the same bytes. In files with extensions that are not known here, which may name accessors and
-views in ways of their own, all that stays keeps its number.
+What animations alone used goes out of the buffers, also out of views that meshes are in, and what they use now comes in
+behind the rest, in one view. Views and images that stay have the same bytes. Of files with extensions that are not
+known here, see `references`.
 
 How tracks are stored, what they show then, and how many bytes that takes, is told as well.
 """
@@ -10,31 +10,29 @@ How tracks are stored, what they show then, and how many bytes that takes, is to
 from __future__ import annotations
 
 import copy
-import re
-from collections import Counter
+from bisect import bisect_left
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
 
-from .accessors import GrowingView, denormalised, raw_numbers, stored_size
-from .documents import Document, FileBytes, Json, data_uri, is_data, objects
+from .accessors import GrowingView, denormalised, parts_of, stored_size
+from .documents import Document, FileBytes, Json, as_text, data_uri, is_data, objects, whole
+from .references import ELSEWHERE, References, Slot, other_slots, sampler_slots, unknown, view_slots
 from .tracks import CUBICSPLINE, LINEAR, ROTATION, TO_WXYZ, TO_XYZW, WEIGHTS, WIDTHS, Clip, Track, moves_node
-
-KNOWN = re.compile(
-    "(?:KHR|EXT)_(?:materials|texture|lights|mesh|animation|node|xmp)_.*|.*_meshopt_compression"
-    "|KHR_draco_mesh_compression|KHR_xmp|KHR_techniques_webgl|MSFT_(?:lod|texture_dds|packing_.*)|VRM.*"
-)
-"""Extensions whose numbers of accessors and views are found below, or that have none."""
-
-INSTANCES = "EXT_mesh_gpu_instancing"
 
 ALIGNED = 8
 """Bytes go out of buffers in multiples of it, so that what stays is aligned as it was."""
 
 Range = tuple[int, int]
 """The first byte, and that behind the last."""
+
+Ranges = dict[int, list[Range]]
+"""By the number of a buffer."""
 
 INTEGER = np.iinfo(np.int16).max
 """What stands for 1 where 16-bit integers are normalised."""
@@ -66,162 +64,216 @@ def rewritten(document: Document, tracks: Mapping[int, Sequence[StoredTrack]]) -
 
     Their channels that are not among the tracks go, but for those that move no node or that extensions define.
     """
-    return _Rewriting(document, tracks).done()
+    return _Rewriting(document, References(document.json), tracks).done()
+
+
+def made_smaller(
+    document: Document, references: References, tracks: Mapping[int, Sequence[StoredTrack]]
+) -> tuple[Document, frozenset[int]]:
+    """Return the document with those of the tracks that make it smaller, and the numbers of their animations.
+
+    What several animations share goes with the last of them that uses it. So an animation is worth the most together
+    with all others, and one that is worth nothing then is worth nothing at all.
+    """
+    animations = objects(document.json, "animations")
+    chosen = {number: new for number, new in tracks.items() if not any(unknown(animations[number]))}
+    while chosen:
+        rewriting = _Rewriting(document, references, chosen)
+        smaller = {number: new for number, new in chosen.items() if rewriting.saved(number) > 0}
+        if len(smaller) == len(chosen):
+            result = rewriting.done()
+            return (result, frozenset(chosen)) if result.size < document.size else (document, frozenset())
+        chosen = smaller
+    return document, frozenset()
 
 
 class _Rewriting:
-    def __init__(self, document: Document, tracks: Mapping[int, Sequence[StoredTrack]]) -> None:
-        self.before, self.tracks = document, tracks
+    def __init__(self, document: Document, references: References, tracks: Mapping[int, Sequence[StoredTrack]]) -> None:
+        self.before, self.tracks, self.references = document, tracks, references
         self.json: Json = copy.deepcopy(document.json)
         self.view = GrowingView(self.json)
         self.accessors, self.views = self.json["accessors"], self.json["bufferViews"]
-        self.first_new = len(self.accessors)
-        self.keeps_numbers = not all(
-            isinstance(name, str) and KNOWN.fullmatch(name) for name in self.json.get("extensionsUsed", ())
-        )
+        self.first_new = len(document.json.get("accessors", ()))
+        self.view_users: dict[int, list[int]] = defaultdict(list)
+        """By the number of a view: the accessors in it, and ELSEWHERE for all else that names it."""
+        of_accessors = [(slot, number) for number, part in enumerate(self.accessors) for slot in view_slots(part)]
+        owners = {id(container): number for (container, _), number in of_accessors}
+        for container, key in view_slots(self.json):
+            self.view_users[container[key]].append(owners.get(id(container), ELSEWHERE))
+        for number, animation_tracks in tracks.items():
+            self._put(objects(self.json, "animations")[number], animation_tracks)
+        self.used_after = Counter(container[key] for container, key in sampler_slots(self.json))
+        self.unused = {
+            number
+            for number, users in references.users.items()
+            if users <= set(tracks) and number not in self.used_after
+        }
+
+    def saved(self, number: int) -> int:
+        """Return how many bytes fewer the file has for an animation, given that all others are as they are."""
+        before, after = (objects(json, "animations")[number] for json in (self.before.json, self.json))
+        used = Counter(sampler[key] for sampler in after["samplers"] for key in ("input", "output"))
+        comes = [
+            accessor
+            for accessor, count in used.items()
+            if accessor >= self.first_new and count == self.used_after[accessor]
+        ]
+        return len(as_text(before)) - len(as_text(after)) + self._goes[number] - sum(map(self._cost, comes))
+
+    @cached_property
+    def _goes(self) -> Counter[int]:
+        """By the number of an animation: the bytes that would stay if it stayed as it was."""
+        result: Counter[int] = Counter()
+        for accessor in self.unused:
+            result.update(dict.fromkeys(self.references.users[accessor], self._cost(accessor)))
+        return result
+
+    def _cost(self, number: int) -> int:
+        """Return about how many bytes a file has for an accessor, with the views that are its alone."""
+        accessor = self.accessors[number]
+        views = {container[key] for container, key in view_slots(accessor)}
+        own = [self.views[view] for view in views if set(self.view_users.get(view, ())) == {number}]
+        return stored_size(self.json, number) + sum(len(as_text(part)) + 1 for part in (accessor, *own))
 
     def done(self) -> Document:
-        before = {container[key] for container, key in _sampler_slots(self.json)}
-        others = {container[key] for container, key in _other_slots(self.json)}
-        for number, tracks in self.tracks.items():
-            self._put(objects(self.json, "animations")[number], tracks)
-        after = {container[key] for container, key in _sampler_slots(self.json)}
-        unused = before - after - others
-        removed = self._views_without(unused, before - others)
-        for number in after - others:
-            if number < self.first_new and removed & set(_views_of(self.accessors[number])):
-                self._move(number)
-        self.view.json["byteLength"] = max(len(self.view.data), 1)
-        slots = [*_sampler_slots(self.json), *_other_slots(self.json)]
-        self._renumber("accessors", unused, slots, {"componentType": 5126, "count": 1, "type": "SCALAR"})
-        buffers = self._buffers(removed)
-        self._renumber("bufferViews", removed, list(_view_slots(self.json)), {**self.view.json, "byteLength": 1})
-        return buffers
+        removed = self._views_that_go()
+        slots = [*sampler_slots(self.json), *other_slots(self.json)]
+        document = self._with_bytes(removed)
+        self._take_out("accessors", self.unused, slots, {"componentType": 5126, "count": 1, "type": "SCALAR"})
+        nothing = {"buffer": self.view.json["buffer"], "byteLength": 1}
+        self._take_out("bufferViews", removed, list(view_slots(self.json)), nothing)
+        return document
 
     def _put(self, animation: Json, tracks: Sequence[StoredTrack]) -> None:
         """Give an animation these tracks and no others."""
         new = {track.channel: track for track in tracks}
-        channels, samplers = [], []
+        channels: list[Json] = []
+        samplers: list[Json] = []
+        numbers: dict[bytes, int] = {}
         for number, channel in enumerate(animation["channels"]):
             sampler = dict(animation["samplers"][channel["sampler"]])
             if number in new:
-                times, values = (
-                    self.view.add(numbers, bounds=numbers.shape[1] == 1) for numbers in new[number].accessors
-                )
-                sampler |= {"input": times, "output": values}
+                times, values = new[number].accessors
+                sampler |= {"input": self.view.add(times, bounds=True), "output": self.view.add(values)}
                 if sampler.get("interpolation", LINEAR) != new[number].interpolation:
                     sampler["interpolation"] = new[number].interpolation
             elif moves_node(channel["target"]):
                 continue
-            samplers.append(sampler)
-            channels.append({**channel, "sampler": len(samplers) - 1})
+            same = numbers.setdefault(as_text(sampler), len(samplers))
+            if same == len(samplers):
+                samplers.append(sampler)
+            channels.append({**channel, "sampler": same})
         animation["channels"], animation["samplers"] = channels, samplers
 
-    def _move(self, number: int) -> None:
-        """Bring what an accessor has into the new view: that which it is in goes."""
-        accessor, content = self.accessors[number], raw_numbers(self.before, number)
-        accessor.pop("byteOffset", None)
-        accessor.pop("sparse", None)
-        accessor |= self.view.placed(content.tobytes())
+    def _views_that_go(self) -> set[int]:
+        """Return the views in which there is nothing but numbers that are not used any more."""
+        views = self.view_users.keys() - self.references.unclear
+        return {view for view in views if self.unused.issuperset(self.view_users[view])}
 
-    def _views_without(self, unused: set[int], of_animations: set[int]) -> set[int]:
-        """Return the views that animations alone use, and some of which they use no more."""
-        uses = Counter(container[key] for container, key in _view_slots(self.json))
-        owned = Counter(view for number in of_animations for view in _views_of(self.accessors[number]))
-        free = {view for view, count in owned.items() if count == uses[view]}
-        return free & {view for number in unused for view in _views_of(self.accessors[number])}
-
-    def _renumber(self, name: str, unused: set[int], slots: list[tuple[Any, Any]], nothing: Json) -> None:
-        """Take entries out of a list, the last ones into their places, and say so wherever they are named."""
+    def _take_out(self, name: str, unused: set[int], slots: list[Slot], nothing: Json) -> None:
+        """Take entries out of a list, and say so wherever others are named, or have nothing in their places."""
         listed = self.json[name]
-        if self.keeps_numbers:
+        if self.references.unclear:
             for number in unused:
                 listed[number] = dict(nothing)
-            return
-        kept = [number for number in range(len(listed)) if number not in unused]
-        numbers = {before: after for after, before in enumerate(kept)}
-        listed[:] = [listed[number] for number in kept]
-        for container, key in slots:
-            if container[key] in numbers:
-                container[key] = numbers[container[key]]
+        else:
+            kept = [number for number in range(len(listed)) if number not in unused]
+            numbers = {before: after for after, before in enumerate(kept)}
+            listed[:] = [listed[number] for number in kept]
+            for container, key in slots:
+                if container[key] in numbers:
+                    container[key] = numbers[container[key]]
+        if not listed:
+            del self.json[name]
 
-    def _buffers(self, removed: set[int]) -> Document:
-        """Return the document with its bytes: without those of views that were removed, and with the new ones."""
-        json = self.json
+    def _with_bytes(self, removed: set[int]) -> Document:
+        """Return the document with its bytes: without those that are not used any more, and with the new ones."""
         contents: list[Any] = list(self.before.buffers)
-        ranges: dict[int, list[Range]] = {}
-        for number in sorted(removed):
-            view = self.views[number]
-            ranges.setdefault(view["buffer"], []).append(_range(view))
-        target = max(ranges, key=lambda buffer: sum(end - first for first, end in ranges[buffer]), default=-1)
-        if target < 0:
-            target = len(contents)
+        goes, stays = self._ranges(removed)
+        target = max(
+            (number for number, content in enumerate(contents) if content is not None),
+            key=lambda number: sum(end - first for first, end in goes.get(number, ())),
+            default=len(contents),
+        )
+        if target == len(contents):
             # A first buffer may be that inside of a GLB.
-            has_room = self.before.chunks is not None and not self.before.buffers
-            json.setdefault("buffers", []).append({"byteLength": 0} | ({} if has_room else {"uri": data_uri(b"")}))
+            has_room = self.before.chunks is not None and not contents
+            self.json.setdefault("buffers", []).append({"byteLength": 0} | ({} if has_room else {"uri": data_uri(b"")}))
             contents.append(b"")
-        users = [user for number, view in enumerate(self.views[:-1]) if number not in removed for user in _spans(view)]
-        for buffer in {*ranges, target}:
-            own = [user for user in users if user.get("buffer") == buffer]
-            cuts = _cuts(ranges.get(buffer, []), [_range(user) for user in own])
-            for user in own:
-                offset = user.get("byteOffset", 0)
-                if (moved := offset - sum(end - first for first, end in cuts if end <= offset)) != offset:
-                    user["byteOffset"] = moved
+        changed = {target, *(number for number in goes if contents[number] is not None)}
+        for buffer in changed:
+            cuts = [] if self.references.buffers_are_named else _cuts(goes.get(buffer, []), stays.get(buffer, []))
+            self._close_up(buffer, cuts)
             contents[buffer] = _without(contents[buffer], cuts)
         view = self.view.json
-        view["buffer"] = target
+        view |= {"buffer": target, "byteLength": len(self.view.data)}
         padded = contents[target] + bytes(-len(contents[target]) % ALIGNED)
         if padded:
-            view |= {"byteOffset": len(padded)}
-        contents[target] = padded + bytes(self.view.data or b"\0")
-        for buffer in {*ranges, target}:
-            described = json["buffers"][buffer]
+            view["byteOffset"] = len(padded)
+        if self.view.data:
+            contents[target] = padded + bytes(self.view.data)
+        else:
+            self.views.remove(view)
+        for buffer in changed:
+            contents[buffer] = contents[buffer] or bytes(ALIGNED)
+            described = self.json["buffers"][buffer]
             described["byteLength"] = len(contents[buffer])
             if is_data(described.get("uri")):
                 described["uri"] = data_uri(contents[buffer])
-        return replace(self.before, json=json, buffers=tuple(contents), changed=self.before.changed | {*ranges, target})
+        buffers = tuple(contents)
+        return replace(
+            self.before, json=self.json, buffers=buffers, changed=self.before.changed | changed, original=None
+        )
+
+    def _ranges(self, removed: set[int]) -> tuple[Ranges, Ranges]:
+        """Return what may go of each buffer and what stays, which may be the same."""
+        goes: Ranges = defaultdict(list)
+        stays: Ranges = defaultdict(list)
+        for number, view in enumerate(self.views[:-1]):
+            first, end = _range(view)
+            users = set(self.view_users.get(number, ()))
+            shared = users & self.unused and number not in self.references.unclear and ELSEWHERE not in users
+            if number in removed:
+                goes[view["buffer"]].append((first, end))
+            elif not shared:
+                for span in _spans(view):
+                    stays[span.get("buffer", ELSEWHERE)].append(_range(span))
+            else:
+                for accessor in users:
+                    ranges = goes if accessor in self.unused else stays
+                    ranges[view["buffer"]] += [
+                        (first + begin, first + behind)
+                        for part, begin, behind in parts_of(self.json, accessor)
+                        if part["bufferView"] == number
+                    ]
+        return goes, stays
+
+    def _close_up(self, buffer: int, cuts: list[Range]) -> None:
+        """Say where all is once these bytes have gone out of a buffer."""
+        firsts, ends = [first for first, _ in cuts], [end for _, end in cuts]
+        gone = list(accumulate((end - first for first, end in cuts), initial=0))
+
+        def moved(offset: int) -> int:
+            before = bisect_left(firsts, offset)
+            return offset - gone[before] + (max(ends[before - 1] - offset, 0) if before else 0)
+
+        for accessor in self.accessors[: self.first_new] if cuts else ():
+            for part, _ in view_slots(accessor):
+                view = self.views[part["bufferView"]]
+                if view.get("buffer") == buffer:
+                    first, _ = _range(view)
+                    _set_offset(part, moved(first + whole(part, "byteOffset", 0)) - moved(first))
+        for view in self.views[:-1] if cuts else ():
+            for span in _spans(view):
+                if span.get("buffer") == buffer:
+                    first, end = _range(span)
+                    _set_offset(span, moved(first))
+                    span["byteLength"] = moved(end) - moved(first)
 
 
-def _sampler_slots(json: Json) -> Iterator[tuple[Json, str]]:
-    """Every place of animations that names an accessor: what it is in, and by which key."""
-    for animation in objects(json, "animations"):
-        for sampler in objects(animation, "samplers"):
-            yield from ((sampler, key) for key in ("input", "output"))
-
-
-def _other_slots(json: Json) -> Iterator[tuple[Json, str]]:
-    """Every other place that does."""
-    for mesh in objects(json, "meshes"):
-        for primitive in objects(mesh, "primitives"):
-            if "indices" in primitive:
-                yield primitive, "indices"
-            for attributes in (primitive.get("attributes") or {}, *objects(primitive, "targets")):
-                yield from ((attributes, name) for name in attributes)
-    for skin in objects(json, "skins"):
-        if "inverseBindMatrices" in skin:
-            yield skin, "inverseBindMatrices"
-    for node in objects(json, "nodes"):
-        attributes = node.get("extensions", {}).get(INSTANCES, {}).get("attributes", {})
-        yield from ((attributes, name) for name in attributes)
-
-
-def _view_slots(json: Json) -> Iterator[tuple[Json, str]]:
-    """Every place that names a view, in extensions as well: all name it alike."""
-    waiting: list[Any] = [part for name, part in json.items() if name != "extras"]
-    while waiting:
-        part = waiting.pop()
-        if isinstance(part, dict):
-            if isinstance(part.get("bufferView"), int):
-                yield part, "bufferView"
-            waiting += [below for name, below in part.items() if name != "extras"]
-        elif isinstance(part, list):
-            waiting += part
-
-
-def _views_of(accessor: Json) -> list[int]:
-    """Return the views that an accessor is in: its own, and those of what is sparse."""
-    return [container["bufferView"] for container, _ in _view_slots({"accessor": accessor})]
+def _set_offset(part: Json, offset: int) -> None:
+    if offset or "byteOffset" in part:
+        part["byteOffset"] = offset
 
 
 def _spans(view: Json) -> Iterator[Json]:
@@ -233,8 +285,8 @@ def _spans(view: Json) -> Iterator[Json]:
 
 
 def _range(view: Json) -> Range:
-    first = view.get("byteOffset", 0)
-    return first, first + view["byteLength"]
+    first = whole(view, "byteOffset", 0)
+    return first, first + whole(view, "byteLength")
 
 
 def _cuts(removed: list[Range], kept: list[Range]) -> list[Range]:
@@ -304,7 +356,9 @@ def stored(track: Track, *, integers: bool) -> StoredTrack:
 def shown(track: Track, stored: StoredTrack) -> Track:
     """Return what is shown by a track as it is stored."""
     values = denormalised(stored.values) if stored.values.dtype.kind == "i" else stored.values.astype(np.float64)
-    values = values.reshape((len(stored.times), 3, -1) if stored.interpolation == CUBICSPLINE else (len(stored.times), -1))
+    values = values.reshape(
+        (len(stored.times), 3, -1) if stored.interpolation == CUBICSPLINE else (len(stored.times), -1)
+    )
     if track.path == ROTATION:
         values = values[..., TO_WXYZ]
     return replace(track, interpolation=stored.interpolation, times=stored.times.astype(np.float64), values=values)
@@ -322,10 +376,10 @@ def amount(tracks: Iterable[StoredTrack]) -> Amount:
     return Amount(sum(len(track.times) for track in tracks), sum(len(content) for _, content in parts))
 
 
-def amount_before(document: Document, clip: Clip) -> Amount:
-    """Keys and bytes of the tracks of a clip as it is in the file."""
+def amount_before(document: Document, references: References, clip: Clip) -> Amount:
+    """Keys and bytes of the tracks of a clip as it is in the file, without bytes that other things use as well."""
     animation = document.json["animations"][clip.number]
     samplers = [animation["samplers"][animation["channels"][track.channel]["sampler"]] for track in clip.tracks]
     accessors = {sampler[key] for sampler in samplers for key in ("input", "output")}
-    size = sum(stored_size(document, number) for number in accessors)
-    return Amount(sum(len(track.times) for track in clip.tracks), size)
+    own = [number for number in accessors if ELSEWHERE not in references.users[number]]
+    return Amount(sum(len(track.times) for track in clip.tracks), sum(stored_size(document.json, n) for n in own))

@@ -1,8 +1,8 @@
 """What is seen of a glTF document: how far what nodes carry reaches, how far morph targets move it.
 
-A node carries its mesh and the instances of it; a joint carries every vertex of skins that has a weight of it. Of a mesh
-that is compressed the bounds of its accessors count, and any joint may carry all of it. Lengths are in the unit of the
-document, which glTF means to be the metre, and in the node's own space, before its scale, unless said otherwise.
+A node carries its mesh and the instances of it; a joint carries every vertex of skins that has a weight of it. Of a
+mesh that is compressed the bounds of its accessors count, and any joint may carry all of it. Lengths are in the unit of
+the document, which glTF means to be the metre, and in the node's own space, before its scale, unless said otherwise.
 Source: the glTF 2.0 specification, Khronos 2021, sections 3.7 and 3.8; EXT_mesh_gpu_instancing.
 """
 
@@ -148,7 +148,11 @@ def _carried(document: Document, number: int, primitive: Json) -> Iterator[tuple
         columns = numbers(document, skin["inverseBindMatrices"])[: len(joints)]
         inverse = np.swapaxes(columns.reshape(-1, 4, 4), 1, 2)
     maps, attributes = AffineMaps(inverse[:, :3, :3], inverse[:, :3, 3]), primitive["attributes"]
-    sets = [(attributes[name], attributes.get(name.replace("JOINTS", "WEIGHTS"))) for name in attributes if name.startswith("JOINTS_")]
+    sets = [
+        (attributes[name], attributes.get(name.replace("JOINTS", "WEIGHTS")))
+        for name in attributes
+        if name.startswith("JOINTS_")
+    ]
     for carriers, shares in sets:
         try:
             if _is_compressed(document, carriers) or _is_compressed(document, shares):
@@ -188,7 +192,7 @@ def _is_compressed(document: Document, accessor: object) -> bool:
 
 
 def _points(document: Document, accessor: object) -> np.ndarray:
-    """Return the positions or displacements of an accessor, or the corners of their bounds if they are compressed, (v, 3)."""
+    """Return the vectors of an accessor, shape (v, 3), or the corners of their bounds if they are compressed."""
     try:
         if not _is_compressed(document, accessor):
             return numbers(document, accessor)

@@ -7,6 +7,7 @@ Source: the glTF 2.0 specification, Khronos 2021, section 3.11 and appendix C.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -15,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from ..motion.quaternions import normalise
-from .accessors import EVERY, Rows, numbers
-from .documents import Document, GltfError, Json, entry, objects, shown
+from .accessors import EVERY, MOST_ZEROS, Rows, numbers
+from .documents import Document, GltfError, Json, bytes_of, entry, objects, shown
 
 TRANSLATION, ROTATION, SCALE, WEIGHTS = PATHS = ("translation", "rotation", "scale", "weights")
 
@@ -32,6 +33,9 @@ NARROWEST = 1e-9
 
 AT_ONCE = 2**14
 """Keys of a track that are looked at in one go."""
+
+MOST_SHARED = 4
+"""Numbers of all tracks together, for each byte of a file: a key of 16-bit integers that eight tracks share."""
 
 FARTHEST = 1e30
 """Numbers beyond it are damage: their squares would be no floats in single precision."""
@@ -182,7 +186,13 @@ def read_clips(document: Document) -> tuple[Clip, ...]:
     GltfError
         That names the animation and the channel that cannot be read.
     """
-    return tuple(_clip(document, number) for number in range(len(objects(document.json, "animations"))))
+    most = MOST_ZEROS + MOST_SHARED * bytes_of(document)
+    times: dict[int, np.ndarray] = {}
+    clips = []
+    for number in range(len(objects(document.json, "animations"))):
+        clips.append(_clip(document, number, times, most))
+        most -= sum(map(_numbers_of, clips[-1].all_tracks))
+    return tuple(clips)
 
 
 def moves_node(target: Json) -> bool:
@@ -190,14 +200,17 @@ def moves_node(target: Json) -> bool:
     return "node" in target and target.get("path") in PATHS
 
 
-def _clip(document: Document, number: int) -> Clip:
+def _numbers_of(track: Track) -> int:
+    return len(track.times) * math.prod(track.values.shape)
+
+
+def _clip(document: Document, number: int, times: dict[int, np.ndarray], most: int) -> Clip:
     animation = document.json["animations"][number]
     name = animation.get("name")
     name = name if isinstance(name, str) and name else f"animation {number}"
     tracks: list[Track] = []
     pointers: list[Track] = []
     targets, unread = set(), ""
-    times: dict[int, np.ndarray] = {}
     for index, channel in enumerate(objects(animation, "channels")):
         target = channel.get("target")
         if not isinstance(target, dict):
@@ -216,6 +229,10 @@ def _clip(document: Document, number: int) -> Clip:
             raise GltfError(f"{shown(name)}: channel {index} is the second {track.path} of node {track.node}")
         targets.add((track.node, track.path))
         (pointers if known else tracks).append(track)
+        most -= _numbers_of(track)
+        if most < 0:
+            problem = f"{shown(name)}: channel {index}: too many channels share the numbers of so small a file"
+            raise GltfError(problem, "export fewer clips")
     return Clip(number, name, tuple(tracks), tuple(pointers), unread)
 
 
@@ -258,10 +275,23 @@ def _track(
 
 
 def _times(document: Document, number: object) -> np.ndarray:
-    """Those of keys, shape (n,)."""
+    """Those of keys, shape (n,).
+
+    Two at one time are a cut: the first of them is taken as earlier, by a step of single precision.
+    """
     times = numbers(document, number)
-    if times.shape[1] != 1 or np.any(np.diff(times[:, 0]) <= 0.0):
-        raise GltfError("its times do not rise")
+    if times.shape[1] != 1:
+        raise GltfError("its times are no single numbers")
+    times = times[:, 0]
     if np.abs(times).max() > FARTHEST:
         raise GltfError("it has numbers that are too large")
-    return times[:, 0]
+    (cuts,), rising = np.nonzero(np.diff(times) == 0.0), times.copy()
+    rising[cuts] = np.nextafter(times[cuts].astype(np.float32), -np.float32(np.inf))
+    (falls,) = np.nonzero(np.diff(rising) <= 0.0)
+    if len(falls):
+        first, second = times[falls[0] :][:2]
+        raise GltfError(
+            f"its times do not rise ({first:.6g} s, then {second:.6g} s)",
+            "take keys out until one comes after the other, and two are at one time at most",
+        )
+    return rising

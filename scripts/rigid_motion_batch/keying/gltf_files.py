@@ -71,9 +71,12 @@ def reduce_gltf(
 def _write(doing: Doing, output: Path, document: Document, report: Report) -> None:
     files, folder = report.document.files(output.name), doing.job.file.parent
     if document.chunks is None:
-        doing.outcome.read = [folder / name for name in document.companions(folder)]
+        doing.outcome.read = [folder / name for name, path in document.companions(folder).items() if path]
         if place_of(output.parent) != place_of(folder):
-            files = report.document.companions(folder) | files
+            companions = report.document.companions(folder)
+            files = {name: path.read_bytes() for name, path in companions.items() if path} | files
+            for name in (name for name, path in companions.items() if not path):
+                doing.say(f"{printable(name)} is outside of the folder of the file; left out")
     if doing.work.dry_run:
         return
     for name, content in files.items():

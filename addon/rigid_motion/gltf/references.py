@@ -1,0 +1,125 @@
+"""What names accessors and views of buffers in a glTF document: the places that are known, and what may be others.
+
+Extensions that are not known here may name them in ways of their own. Any whole number in what they say may be that of
+an accessor or a view, so nothing is renumbered beside them, and what has such a number stays with all of its bytes.
+Where they name a buffer, no byte of any goes. `extras` name nothing: they are of applications, not of the format.
+Source: the registry of glTF extensions, Khronos 2025.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterator
+from typing import Any
+
+from .documents import Json, objects
+from .tracks import moves_node
+
+INSTANCES = "EXT_mesh_gpu_instancing"
+
+KNOWN = re.compile(
+    "KHR_(?:materials_.*|texture_(?:transform|basisu)|lights_punctual|mesh_quantization|animation_pointer|xmp|xmp_json_ld"
+    "|node_(?:visibility|selectability|hoverability)|draco_mesh_compression|meshopt_compression|techniques_webgl)"
+    f"|EXT_(?:texture_(?:webp|avif)|lights_image_based|meshopt_compression)|{INSTANCES}"
+    "|MSFT_(?:lod|texture_dds|packing_.*)|FB_ngon_encoding|VRM"
+    "|VRMC_(?:vrm|vrm_animation|node_constraint|springBone|springBone_extended_collider|materials_.*)"
+)
+"""Extensions that name no accessors but by `INSTANCES`, and views as `bufferView` alone."""
+
+ELSEWHERE = -1
+"""What is no animation, or a channel that moves no node."""
+
+NUMBERS = re.compile(r"(?<!\d)\d{1,9}(?!\d)")
+
+Slot = tuple[Json, str]
+"""A place that names something: what it is in, and by which key."""
+
+
+def sampler_slots(json: Json) -> Iterator[Slot]:
+    """Yield every place of animations that names an accessor."""
+    for animation in objects(json, "animations"):
+        for sampler in objects(animation, "samplers"):
+            yield from ((sampler, key) for key in ("input", "output"))
+
+
+def other_slots(json: Json) -> Iterator[Slot]:
+    """Yield every other place that does."""
+    for mesh in objects(json, "meshes"):
+        for primitive in objects(mesh, "primitives"):
+            if "indices" in primitive:
+                yield primitive, "indices"
+            for attributes in (primitive.get("attributes") or {}, *objects(primitive, "targets")):
+                yield from ((attributes, name) for name in attributes)
+    for skin in objects(json, "skins"):
+        if "inverseBindMatrices" in skin:
+            yield skin, "inverseBindMatrices"
+    for node in objects(json, "nodes"):
+        attributes = node.get("extensions", {}).get(INSTANCES, {}).get("attributes", {})
+        yield from ((attributes, name) for name in attributes)
+
+
+def view_slots(json: Json) -> Iterator[Slot]:
+    """Yield every place that names a view, in extensions as well: all that are known name it alike."""
+    waiting: list[Any] = [json]
+    while waiting:
+        part = waiting.pop()
+        if isinstance(part, dict):
+            if isinstance(part.get("bufferView"), int):
+                yield part, "bufferView"
+            waiting += [below for name, below in part.items() if name != "extras"]
+        elif isinstance(part, list):
+            waiting += part
+
+
+def unknown(part: Any) -> Iterator[Any]:
+    """Yield what extensions say that are not known here."""
+    waiting = [part]
+    while waiting:
+        part = waiting.pop()
+        if isinstance(part, dict):
+            extensions = part.get("extensions")
+            extensions = extensions if isinstance(extensions, dict) else {}
+            waiting += [below for name, below in part.items() if name not in ("extensions", "extras")]
+            waiting += [content for name, content in extensions.items() if KNOWN.fullmatch(name)]
+            yield from (content for name, content in extensions.items() if not KNOWN.fullmatch(name))
+        elif isinstance(part, list):
+            waiting += part
+
+
+class References:
+    """Who names the accessors of a document, and what nobody may touch in it."""
+
+    def __init__(self, json: Json) -> None:
+        self.unclear: set[int] = set()
+        """Numbers that an extension names which is not known: of accessors, of views, or of something else."""
+        self.buffers_are_named = False
+        """Whether such an extension says where bytes are."""
+        self._look_at(list(unknown(json)))
+        self.users: dict[int, set[int]] = defaultdict(set)
+        """By the number of an accessor: the animations where tracks may take its place, and ELSEWHERE."""
+        for container, key in other_slots(json):
+            self.users[container[key]].add(ELSEWHERE)
+        for number in self.unclear:
+            self.users[number].add(ELSEWHERE)
+        for number, animation in enumerate(objects(json, "animations")):
+            samplers, channels = objects(animation, "samplers"), objects(animation, "channels")
+            stay = {channel.get("sampler") for channel in channels if not moves_node(channel["target"])}
+            for sampler_number, sampler in enumerate(samplers):
+                for key in ("input", "output"):
+                    self.users[sampler[key]].add(number)
+                    if sampler_number in stay:
+                        self.users[sampler[key]].add(ELSEWHERE)
+
+    def _look_at(self, waiting: list[Any]) -> None:
+        while waiting:
+            part = waiting.pop()
+            if isinstance(part, dict):
+                self.buffers_are_named |= "buffer" in part
+                waiting += [*part.keys(), *part.values()]
+            elif isinstance(part, list):
+                waiting += part
+            elif isinstance(part, str):
+                self.unclear.update(map(int, NUMBERS.findall(part)))
+            elif isinstance(part, (int, float)) and not isinstance(part, bool) and part == int(part):
+                self.unclear.add(int(part))

@@ -1,0 +1,187 @@
+"""Files get smaller by their animations alone: what else is in them, and what may name it, stays, and none grows."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rigid_motion.gltf import Options, Report, read_document, reduce_file
+from tests.gltf.making import Making, turns, walk
+from tests.gltf.oracle import File
+
+POINTER = "KHR_animation_pointer"
+
+
+def both(made: Making, folder: Path, suffix: str = ".glb") -> tuple[File, File, Report]:
+    """The file before and after it is reduced to a few keys, which is as small as it says and not larger."""
+    path, output = made.write(folder / f"walk{suffix}"), folder / f"made{suffix}"
+    report = reduce_file(path, output, Options(5e-3))
+    before, after = size(path), size(output)
+    assert (read_document(path).size, read_document(output).size) == (before, after)
+    assert after <= before
+    return File(path), File(output), report
+
+
+def size(path: Path) -> int:
+    """Bytes of a file and of the buffers beside it."""
+    uris = {buffer.get("uri", "data:").replace("%20", " ") for buffer in File(path).json["buffers"]}
+    return path.stat().st_size + sum((path.parent / uri).stat().st_size for uri in uris if uri[:5] != "data:")
+
+
+def with_mesh(made: Making) -> dict[str, Any]:
+    """The only primitive of a mesh that comes in, of accessors behind those of the animations."""
+    attributes = {"POSITION": made.accessor(np.random.default_rng(1).normal(size=(30, 3)).astype("<f4"))}
+    primitive = {"attributes": attributes, "indices": made.accessor(np.arange(30, dtype="<u2"))}
+    made.json["meshes"] = [{"primitives": [primitive]}]
+    made.json["nodes"][0]["mesh"] = 0
+    return primitive
+
+
+def packed(made: Making, random: np.random.Generator, views: int) -> Making:
+    """The same accessors in so few views, in whatever order."""
+    data, accessors = made.buffers[0], made.json["accessors"]
+    given = [made.json["bufferViews"][accessor["bufferView"]] for accessor in accessors]
+    contents = [bytes(data[view["byteOffset"] :][: view["byteLength"]]) for view in given]
+    made.buffers, made.json["bufferViews"] = [bytearray()], []
+    of_accessors = random.integers(0, views, len(accessors))
+    for group in np.unique(of_accessors):
+        content = bytearray()
+        for number in random.permutation(np.flatnonzero(of_accessors == group)).tolist():
+            accessors[number] |= {"bufferView": len(made.json["bufferViews"]), "byteOffset": len(content)}
+            content += contents[number] + bytes(-len(contents[number]) % 4)
+        made.view(bytes(content))
+    return made
+
+
+def point(made: Making, sampler: int, pointer: str = "/nodes/0/translation") -> None:
+    """Have a sampler of the first animation move something by a pointer, too."""
+    made.json["extensionsUsed"] = [POINTER]
+    target = {"path": "pointer", "extensions": {POINTER: {"pointer": pointer}}}
+    made.json["animations"][0]["channels"].append({"sampler": sampler, "target": target})
+
+
+def channels(file: File, clip: int) -> dict[str, tuple[bytes, bytes]]:
+    """Times and values by targets."""
+    animation = file.json["animations"][clip]
+    samplers = {json.dumps(it["target"]): animation["samplers"][it["sampler"]] for it in animation["channels"]}
+    return {
+        target: (file.numbers(it["input"]).tobytes(), file.numbers(it["output"]).tobytes())
+        for target, it in samplers.items()
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("EXT_mesh_manifold", lambda number: {"manifoldPrimitive": {"mode": 4, "indices": number}}),
+        ("EXT_mesh_primitive_edge_visibility", lambda number: {"visibility": number, "lineStrings": [{"x": 0.5}]}),
+        ("KHR_mesh_of_tomorrow", lambda number: {"where": [f"/accessors/{number}"]}),
+    ],
+)
+def test_numbers_that_an_unknown_extension_may_name_stay_and_so_does_what_has_them(tmp_path, name, content):
+    made = walk()
+    primitive = with_mesh(made)
+    number, own = made.accessor(np.arange(30, dtype="<u1")), made.json["animations"][0]["samplers"][1]["output"]
+    primitive["extensions"] = {name: content(number)}
+    made.json["extensions"] = {name: {"and": own}}
+    before, after, report = both(made, tmp_path)
+    assert report.clips[0].tracks is not None
+    assert (after.json["meshes"], after.json["extensions"]) == (before.json["meshes"], before.json["extensions"])
+    for named in (number, own, *primitive["attributes"].values()):
+        assert after.numbers(named).tobytes() == before.numbers(named).tobytes()
+
+
+def test_numbers_move_beside_extensions_that_name_no_accessors(tmp_path):
+    made = walk()
+    with_mesh(made)
+    variants = {"KHR_texture_transform": {"texCoord": 1}}
+    made.json["materials"] = [{"extensions": {"KHR_materials_ior": {"ior": 1, "extensions": variants}}}]
+    made.json["extensionsUsed"] = ["KHR_materials_ior", "ACME_nothing_here"]
+    made.json["extras"] = {"extensions": {"ACME": 3}}
+    before, after, _ = both(made, tmp_path)
+    assert after.json["meshes"] != before.json["meshes"]
+    assert len(after.json["bufferViews"]) < len(before.json["bufferViews"]), "and none has nothing in its place"
+
+
+def test_no_byte_goes_where_an_unknown_extension_says_where_bytes_are(tmp_path):
+    made = walk()
+    made.json["extensions"] = {"ACME_sound": {"buffer": 0, "from": 5, "to": 50}}
+    before, after, _ = both(made, tmp_path)
+    assert after.buffers[0][: len(before.buffers[0])] == before.buffers[0]
+
+
+def test_a_clip_of_which_an_unknown_extension_says_something_stays(tmp_path):
+    made = walk()
+    made.json["animations"][0]["samplers"][2]["extensions"] = {"ACME_ease": {"curve": "in"}}
+    before, after, report = both(made, tmp_path)
+    assert report.clips[0].tracks is None
+    assert after.json == before.json
+
+
+def test_views_lose_what_animations_had_in_them_and_keep_the_rest(tmp_path):
+    made = walk()
+    primitive = with_mesh(made)
+    before, after, report = both(packed(made, np.random.default_rng(4), 1), tmp_path)
+    assert (
+        len(after.buffers[0]) < len(before.buffers[0]) - 0.9 * report.clips[0].before.size + report.clips[0].after.size
+    )
+    (changed,) = after.json["meshes"][0]["primitives"]
+    for old, new in (
+        (primitive["indices"], changed["indices"]),
+        *zip(primitive["attributes"].values(), changed["attributes"].values(), strict=True),
+    ):
+        assert np.array_equal(before.numbers(old), after.numbers(new))
+
+
+def test_a_clip_whose_numbers_are_used_by_others_anyway_stays(tmp_path):
+    made = walk()
+    for sampler in range(len(made.json["animations"][0]["samplers"])):
+        point(made, sampler)
+    before, after, report = both(made, tmp_path)
+    assert (report.clips[0].tracks, report.clips[0].reason) == (None, "fewer keys would take more bytes")
+    assert after.json == before.json
+
+
+def test_clips_that_share_all_are_worth_it_together(tmp_path):
+    made = walk()
+    made.json["animations"] += [json.loads(json.dumps(made.json["animations"][0])) for _ in range(2)]
+    before, after, _ = both(made, tmp_path)
+    assert len(after.buffers[0]) < 0.5 * len(before.buffers[0])
+    assert after.tracks(0).keys() == after.tracks(2).keys()
+    assert len(after.json["accessors"]) <= 1 + 2 * len(after.json["animations"][0]["samplers"])
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 10**9))
+def test_no_file_grows_and_only_node_channels_change(tmp_path_factory, seed):
+    random, folder = np.random.default_rng(seed), tmp_path_factory.mktemp("random")
+    made = walk(int(random.integers(2, 5)), random.uniform(0.1, 1.0))
+    primitive = with_mesh(made)
+    first = made.json["animations"][0]
+    for _ in range(int(random.integers(0, 4))):
+        clip = json.loads(json.dumps(first))
+        for sampler in random.permutation(clip["samplers"])[: random.integers(0, 3)]:
+            keys = made.json["accessors"][sampler["input"]]["count"]
+            if made.json["accessors"][sampler["output"]]["type"] == "VEC4":
+                sampler["output"] = made.accessor(turns(np.arange(keys) / 30, int(random.integers(99))))
+        clip["channels"] = [channel for channel in clip["channels"] if random.random() < 0.8] or clip["channels"]
+        made.json["animations"].append(clip)
+    for _ in range(int(random.integers(0, 3))):
+        point(made, int(random.integers(len(first["samplers"]))))
+    named = random.integers(0, len(made.json["accessors"]), random.integers(0, 3)).tolist()
+    made.json["extensions"] = {"ACME_some": {"numbers": named}}
+    if random.random() < 0.8:
+        made = packed(made, random, int(random.integers(1, 6)))
+    before, after, report = both(made, folder, str(random.choice([".glb", ".gltf"])))
+    (changed,) = after.json["meshes"][0]["primitives"]
+    pairs = [(primitive["attributes"]["POSITION"], changed["attributes"]["POSITION"])]
+    for old, new in (*pairs, (primitive["indices"], changed["indices"]), *zip(named, named, strict=True)):
+        assert np.array_equal(before.numbers(old), after.numbers(new))
+    for clip in report.clips:
+        old, new = (channels(file, clip.number) for file in (before, after))
+        assert clip.tracks or new == old
+        assert {target: old[target] for target in old if POINTER in target}.items() <= new.items()
