@@ -99,6 +99,10 @@ def choices() -> st.SearchStrategy[Choice]:
     )
 
 
+def bounds(numbers: np.ndarray) -> dict[str, Any]:
+    return {"min": numbers.min(axis=0).tolist(), "max": numbers.max(axis=0).tolist()}
+
+
 class _File:
     def __init__(self, choice: Choice) -> None:
         self.choice, self.made = choice, Making()
@@ -186,11 +190,17 @@ class _File:
         node = self._moved_node(new=kind == "whole numbers")
         if kind == "whole numbers":
             self.made.uses("KHR_mesh_quantization")
+            self.made.json["extensionsRequired"] = ["KHR_mesh_quantization"]
             self.nodes[node]["scale"] = [self.unit] * 3
-            whole = np.rint(BOX / 0.1 * 127).astype("i1") if self.random.random() < 0.5 else (BOX * 3e5).astype("<i2")
-            primitive["attributes"]["POSITION"] = self.made.accessor(whole, normalized=True)
+            kind = "i1" if self.random.random() < 0.5 else "<i2"
+            padded = np.zeros((8, 4), kind)
+            padded[:, :3] = np.rint(BOX / 0.1 * np.iinfo(kind).max)
+            view = self.made.view(padded.tobytes(), byteStride=4 * padded.itemsize)
+            bounded = self.made.described(padded[:, :3]) | bounds(padded[:, :3])
+            self.made.json["accessors"].append({"bufferView": view, "normalized": True} | bounded)
+            primitive["attributes"]["POSITION"] = len(self.made.json["accessors"]) - 1
         else:
-            primitive["attributes"]["POSITION"] = self.made.accessor(places.astype("<f4"))
+            primitive["attributes"]["POSITION"] = self._places(places.astype("<f4"))
         if "mesh" in self.nodes[node]:
             node = self._child(node, {})
         self.nodes[node]["mesh"] = len(self.meshes) - 1
@@ -224,14 +234,19 @@ class _File:
         self.made.json["scenes"][0]["nodes"].append(len(self.nodes) - 1)
         return len(self.nodes) - 1
 
+    def _places(self, places: np.ndarray) -> int:
+        return self.made.accessor(places, **bounds(places))
+
     def _indices(self) -> int:
         return self.made.accessor(np.arange(6, dtype="<u2"))
 
     def _skinned(self, primitive: dict[str, Any], far: float) -> None:
         random, count, joints = self.random, 8, self.joints
         worlds = self._worlds()[:joints]
-        joint_numbers = random.integers(0, joints, size=(count, 4)).astype("u1" if random.random() < 0.5 else "<u2")
-        shares = random.uniform(size=(count, 4)) ** 3
+        carriers = min(joints, 4)
+        joint_numbers = np.zeros((count, 4), "u1" if random.random() < 0.5 else "<u2")
+        joint_numbers[:, :carriers] = [random.permutation(joints)[:carriers] for _ in range(count)]
+        shares = random.uniform(size=(count, 4)) ** 3 * (np.arange(4) < carriers)
         shares /= shares.sum(axis=1, keepdims=True)
         places = worlds[joint_numbers[:, 0], :3, 3] + 0.3 * far * self.unit * random.normal(size=(count, 3))
         inverse = np.array(
@@ -245,7 +260,7 @@ class _File:
         whole = {} if kind == "<f4" else {"normalized": True}
         shares = shares.astype(kind) if kind == "<f4" else np.rint(shares * np.iinfo(kind).max).astype(kind)
         primitive["attributes"] |= {
-            "POSITION": self.made.accessor(places.astype("<f4")),
+            "POSITION": self._places(places.astype("<f4")),
             "JOINTS_0": self.made.accessor(joint_numbers),
             "WEIGHTS_0": self.made.accessor(shares, **whole),
         }
@@ -256,7 +271,7 @@ class _File:
     def _morph(self, node: int, mesh: dict[str, Any], size: float) -> None:
         random, count = self.random, int(self.random.integers(1, 3))
         deltas = [(size * random.normal(size=(8, 3))).astype("<f4") for _ in range(count)]
-        mesh["primitives"][0]["targets"] = [{"POSITION": self.made.accessor(delta)} for delta in deltas]
+        mesh["primitives"][0]["targets"] = [{"POSITION": self._places(delta)} for delta in deltas]
         mesh["weights"] = random.uniform(size=count).round(2).tolist()
         if random.random() < 0.3:
             self.nodes[node]["weights"] = random.uniform(size=count).round(2).tolist()
