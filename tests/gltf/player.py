@@ -260,8 +260,16 @@ def vertices(file: Path | File, clip: int | str, times: np.ndarray, radius: floa
 
 def moments(*files: File, clip: int | str) -> np.ndarray:
     """Eighths of the gaps between all keys of all of these files in a clip, and the keys."""
-    keys = np.unique(np.concatenate([file.moments(clip) for file in files]))
-    return np.append((keys[:-1, None] + np.diff(keys)[:, None] * np.arange(8) / 8).ravel(), keys[-1])
+    return eighths(np.unique(np.concatenate([file.moments(clip) for file in files])))
+
+
+def eighths(keys: np.ndarray) -> np.ndarray:
+    """Eighths of the gaps between rising times, and these; but not between neighbours in single precision: a cut."""
+    gaps = np.diff(keys)[:, None]
+    between = (
+        keys[:-1, None] + np.where(gaps > 1.5 * np.spacing(np.float32(keys[:-1, None])), gaps, 0.0) * np.arange(8) / 8
+    )
+    return np.unique(np.append(between, keys[-1]))
 
 
 def off(before: File, after: File, clip: int | str, radius: float = 0.0) -> Off:
