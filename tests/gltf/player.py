@@ -191,15 +191,12 @@ class File:
         return result
 
     def around(self, clip: int | str, radius: float) -> np.ndarray:
-        """Points so far around each node where it is largest, in its space, shape (nodes, n, 3)."""
+        """Points so far around each node where its longest axis is longest, in its space, shape (nodes, n, 3)."""
         worlds, random = self.worlds(clip, moments(self, clip=clip)), np.random.default_rng(5)
         ball = random.normal(size=(BALL, 3))
         ball = radius * ball / np.linalg.norm(ball, axis=1, keepdims=True)
-        result = np.zeros((len(worlds), BALL, 3))
-        for node, axes in enumerate(worlds[:, :, :3, :3]):
-            sizes = np.linalg.norm(axes, axis=(1, 2))
-            result[node] = ball @ np.linalg.pinv(axes[np.argmax(sizes >= (1.0 - 1e-9) * sizes.max())]).T
-        return result
+        longest = np.linalg.norm(worlds[..., :3, :3], axis=-2).max(axis=(1, 2))
+        return ball / np.where(longest > 0.0, longest, np.inf)[:, None, None]
 
     def has_meshes(self) -> bool:
         return any("mesh" in self.json["nodes"][node] for node in self.seen_nodes())

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from rigid_motion.gltf import Options, Report, read_document, reduce_file
 from tests.gltf.making import Making, turns, walk
-from tests.gltf.oracle import File
+from tests.gltf.player import File
 
 POINTER = "KHR_animation_pointer"
 
@@ -57,7 +57,7 @@ def packed(made: Making, random: np.random.Generator, views: int) -> Making:
     return made
 
 
-def point(made: Making, sampler: int, pointer: str = "/nodes/0/translation") -> None:
+def point(made: Making, sampler: int, pointer: str = "/materials/0/emissiveFactor") -> None:
     """Have a sampler of the first animation move something by a pointer, too."""
     made.json["extensionsUsed"] = [POINTER]
     target = {"path": "pointer", "extensions": {POINTER: {"pointer": pointer}}}

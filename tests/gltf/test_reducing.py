@@ -58,6 +58,7 @@ def test_everything_else_of_the_file_stays(tmp_path):
     before, after = File(path), File(tmp_path / "made.glb")
     assert [kind for kind, _ in after.chunks] == [b"JSON", b"BIN\0", b"ODD\0"]
     assert after.chunks[2] == before.chunks[2]
+    assert after.json["asset"]["extras"].pop("rigid_motion") == {"tolerance": 1e-3}
     changing = {"animations", "accessors", "bufferViews", "buffers", "meshes", "skins", "images"}
     assert {name: part for name, part in before.json.items() if name not in changing} == {
         name: part for name, part in after.json.items() if name not in changing
@@ -72,18 +73,35 @@ def test_everything_else_of_the_file_stays(tmp_path):
     assert all(before.json[name] == after.json[name] for name in ("images", "meshes", "skins"))
 
 
-def test_constant_channels_have_one_key_and_those_at_rest_none(tmp_path):
+@pytest.mark.parametrize("channels", ["needed", "all"])
+@pytest.mark.parametrize("has_mesh", [True, False])
+@pytest.mark.parametrize("elsewhere", [0.2, 0.3])
+def test_constant_channels_have_one_key_and_those_that_nobody_needs_none(tmp_path, channels, has_mesh, elsewhere):
     made = walk()
     times = made.times([0.0, 1.0])
     made.json["nodes"].append({"name": "Hat", "translation": [0.0, 0.2, 0.0]})
     made.json["nodes"][5]["children"] = [6]
-    made.channel(6, "translation", times, np.array([[0.0, 0.2, 0.0]] * 2))
+    if has_mesh:
+        positions = made.accessor(0.1 * np.eye(3, dtype="<f4"))
+        made.json["meshes"] = [{"primitives": [{"attributes": {"POSITION": positions}}]}]
+        made.json["nodes"][6]["mesh"] = 0
+    made.channel(6, "translation", times, np.array([[0.0, 0.2, 0.0]] * 2, dtype="<f4"))
     made.channel(6, "rotation", times, turns(np.zeros(2), 3), "STEP")
-    _, after, _ = both(made, tmp_path, 1e-3)
+    made.channel(6, "translation", times, np.array([[0.0, elsewhere, 0.0]] * 2, dtype="<f4"), clip=1)
+    _, after, _ = both(made, tmp_path, 1e-3, channels=channels)
     tracks = after.tracks(0)
-    assert (6, "translation") not in tracks
-    assert all((joint, "scale") not in tracks for joint in range(6))
+    is_free = has_mesh and channels == "needed"
+    assert ((6, "translation") in tracks) == (not is_free or elsewhere != 0.2)
+    assert all(((joint, "scale") in tracks) == (not is_free) for joint in range(6))
+    assert all(len(track[1]) == 1 for (_, path), track in tracks.items() if path == "scale")
     assert len(tracks[6, "rotation"][1]) == 1
+
+
+def test_who_reduces_again_is_told(tmp_path):
+    path = walk().write(tmp_path / "walk.glb")
+    for tolerance, earlier in ((1e-3, None), (2e-3, 1e-3), (1e-3, 3e-3)):
+        report = reduce_file(path, path, Options(tolerance))
+        assert report.reduced_before == (earlier and pytest.approx(earlier))
 
 
 def test_steps_stay_as_they_are(tmp_path):
@@ -120,22 +138,6 @@ def test_a_clip_that_stands_still_lasts_as_long_as_before(tmp_path):
     _, after, report = both(made, tmp_path, 1e-3)
     assert report.clips[0].after.size < report.clips[0].before.size
     assert after.moments(0).tolist() == [0.5, 2.5]
-
-
-def test_vertices_of_skins_are_measured(tmp_path):
-    made, random = walk(), np.random.default_rng(2)
-    places = random.normal(size=(50, 3)).astype("<f4")
-    joints, shares = random.integers(0, 6, size=(50, 4)).astype("u1"), random.uniform(size=(50, 4)).astype("<f4")
-    shares /= shares.sum(axis=1, keepdims=True)
-    attributes = {"POSITION": places, "JOINTS_0": joints, "WEIGHTS_0": shares}
-    numbers = {name: made.accessor(values) for name, values in attributes.items()}
-    made.json["meshes"] = [{"primitives": [{"attributes": numbers}]}]
-    made.json["nodes"].append({"mesh": 0, "skin": 0})
-    before, after, report = both(made, tmp_path, 5e-3)
-    times = np.union1d(before.moments(0), after.moments(0))
-    moved = after.worlds(0, times)[:6] - before.worlds(0, times)[:6]
-    moved = np.einsum("vk,vkmab,vb->mva", shares, moved[joints], np.column_stack((places, np.ones(50))))
-    assert report.clips[0].vertices == pytest.approx(np.linalg.norm(moved[..., :3], axis=-1).max(), rel=1e-4)
 
 
 def test_sparse_strided_normalised_and_scattered_accessors_are_read(tmp_path):

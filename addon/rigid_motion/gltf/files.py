@@ -29,6 +29,9 @@ SOME = 1e-3
 NOTE = "rigid_motion"
 """What the tolerance is noted under, in the extras of the asset."""
 
+SINGLE = 1e-6
+"""What numbers of single precision that are equal may differ by."""
+
 MOVERS = ("VRMC_node_constraint",)
 """Extensions of nodes by which these follow others."""
 
@@ -154,18 +157,15 @@ def _needed(nodes: Nodes, seen: Seen, clip: Clip, clips: Sequence[Clip], options
     What shows the clips after one another leaves a node where the clip before had it; and a file that shows nothing is
     a library of clips for bodies that may rest in other ways.
     """
-    others = (
-        clips
-        if options.channels == ALL_CHANNELS or not seen.reaches.any()
-        else [other for other in clips if other is not clip]
-    )
-    is_library = others is clips
+    if options.channels == ALL_CHANNELS or not seen.reaches.any():
+        return {(track.node, track.path) for track in clip.tracks}
     return {
         (track.node, track.path)
-        for other in others
-        for track in other.all_tracks
-        if is_library
-        or not (track.is_constant and np.array_equal(track.points[0], nodes.rest_of(track.node, track.path)))
+        for track in (track for other in clips if other is not clip for track in other.all_tracks)
+        if not (
+            track.is_constant
+            and np.allclose(track.at(track.times[:1])[0], nodes.rest_of(track.node, track.path), atol=SINGLE)
+        )
     }
 
 
@@ -197,7 +197,8 @@ def reduce_file(path: Path, output: Path, options: Options) -> Report:
     What is at the place of the output is replaced once all is written. Files that a .gltf names are not copied.
     """
     report = reduced(read_document(path), options)
-    for name, content in report.document.files(output.name).items():
+    files = {output.name: path.read_bytes()} if report.left_alone else report.document.files(output.name)
+    for name, content in files.items():
         beside = output.with_name(f".{secrets.token_hex(4)}{output.suffix}")
         try:
             beside.write_bytes(content)
