@@ -86,6 +86,8 @@ def put(*keys: str | int, to: object) -> Callable[[dict[str, Any]], None]:
             put("buffers", 0, "uri", to="not there.bin"),
             "buffer 0, 'not there.bin', is not there; bring that file along",
         ),
+        (put("buffers", 0, "uri", to="long" * 999), "is not there; bring that file along"),
+        (put("buffers", 0, "uri", to="a b:c"), "buffer 0 is outside of its folder ('a b:c')"),
         (put("bufferViews", 1, "extensions", to={"EXT_meshopt_compression": {}}), "is compressed by meshopt"),
     ],
 )

@@ -69,6 +69,17 @@ def test_a_gltf_finds_its_files_from_another_folder(tmp_path):
     assert off(File(source), File(tmp_path / "out" / "walk-reduced.gltf"), 0, 0.0).error <= 2e-3
 
 
+def test_what_is_written_takes_no_name_of_what_stays(tmp_path):
+    made = walk()
+    made.json["images"] = [{"uri": "Walk-reduced.bin"}]
+    (tmp_path / "Walk-reduced.bin").write_bytes(b"skin")
+    source, out = made.write(tmp_path / "walk.gltf"), tmp_path / "out"
+    assert run(source, "--output", out, "--tolerance", "2mm") == 0
+    assert listed(out) == ["Walk-reduced.bin", "_walk-reduced.bin", "walk-reduced.gltf"]
+    assert (out / "Walk-reduced.bin").read_bytes() == b"skin"
+    assert off(File(source), File(out / "walk-reduced.gltf"), 0, 0.0) <= 2e-3
+
+
 def test_links_out_of_the_folder_are_not_followed(tmp_path, capsys):
     made, folder = walk(), tmp_path / "in"
     folder.mkdir()

@@ -16,6 +16,7 @@ import struct
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from os.path import isfile
 from pathlib import Path, PureWindowsPath
 from typing import Any
 from urllib.parse import quote, unquote
@@ -134,10 +135,12 @@ class Document:
 
         Buffers that have changed get a file of their own, beside it and called as it is.
         """
-        beside, buffers = {}, []
+        beside, buffers, taken = {}, [], {file.casefold() for file in self._files()}
         for number, (buffer, data) in enumerate(zip(objects(self.json, "buffers"), self.buffers, strict=True)):
             if number in self.changed and data is not None and "uri" in buffer and not is_data(buffer["uri"]):
                 file = f"{Path(name).stem}{number or ''}.bin"
+                while file.casefold() in taken:
+                    file = f"_{file}"
                 beside[file], buffer = bytes(data), {**buffer, "uri": quote(file)}
             buffers.append(buffer)
         document = {**self.json, "buffers": buffers} if beside else self.json
@@ -173,11 +176,14 @@ class Document:
 
         None where that is not its folder or below.
         """
+        paths = {name: place_inside(folder, name) for name in self._files()}
+        return {name: path for name, path in paths.items() if path is None or isfile(path)}
+
+    def _files(self) -> list[str]:
+        """Return the names of files beside it that have not changed."""
         buffers = [buffer for number, buffer in enumerate(objects(self.json, "buffers")) if number not in self.changed]
         uris = [part.get("uri") for part in (*buffers, *objects(self.json, "images"))]
-        names = {unquote(uri) for uri in uris if isinstance(uri, str) and not is_data(uri) and "://" not in uri}
-        paths = {name: place_inside(folder, name) for name in sorted(names)}
-        return {name: path for name, path in paths.items() if path is None or path.is_file()}
+        return sorted({unquote(uri) for uri in uris if isinstance(uri, str) and not is_data(uri) and "://" not in uri})
 
 
 def read_document(path: Path, *, in_memory: bool = False) -> Document:
@@ -344,7 +350,7 @@ def file_of(folder: Path, number: int, uri: object) -> Path:
         raise GltfError(
             f"buffer {number} is outside of its folder ({shown(uri)})", "export it as .glb, which is one file"
         )
-    if not path.is_file():
+    if not isfile(path):
         raise GltfError(
             f"buffer {number}, {shown(unquote(str(uri)))}, is not there",
             "bring that file along, or export it as .glb, which is one file",

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from rigid_motion.gltf.accessors import GrowingView, numbers
-from rigid_motion.gltf.documents import Document, FileBytes, GltfError, Json, objects, read_document
+from rigid_motion.gltf.documents import Document, FileBytes, GltfError, Json, damage_refused, objects, read_document
 from rigid_motion.gltf.nodes import Nodes
 from rigid_motion.gltf.tracks import CUBICSPLINE, LINEAR, ROTATION, STEP, TRANSLATION, WIDTHS, Track
 from rigid_motion.motion.quaternions import normalise
@@ -64,7 +64,8 @@ def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE
         beside = {buffer.path for buffer in document.buffers if isinstance(buffer, FileBytes)} - {path}
         refuse_too_large(path, *beside)
         _refuse_too_many(path, document.json)
-        Nodes(document)  # Refuses those that hang on themselves, or too many on one another.
+        with damage_refused():
+            Nodes(document)  # Refuses those that hang on themselves, or too many on one another.
         parts = {name: _stripped(part) for name, part in document.json.items() if name in PARTS}
         copy, made = straightened(replace(document, json=parts))
         name = f"copy{'.gltf' if copy.chunks is None else '.glb'}"
