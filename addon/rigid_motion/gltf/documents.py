@@ -37,6 +37,8 @@ DEEPEST_JSON = 128
 MOST_BYTES = 2**32 - 1
 """Of a GLB, which counts them in 32 bits."""
 
+MOST_CHUNKS = 1000
+
 LARGEST = 2**53
 """Whole numbers are below it."""
 
@@ -226,6 +228,8 @@ def chunks_of(content: bytes | FileBytes) -> tuple[Chunk, ...]:
             raise GltfError(f"{whole} of {length} bytes are here", "copy the file again, or export it anew")
         whole = length
     while offset + 8 <= whole:
+        if len(result) == MOST_CHUNKS:
+            raise GltfError(f"this GLB has more than {MOST_CHUNKS} parts")
         length, kind = struct.unpack("<I4s", bytes(content[offset : offset + 8]))
         offset += 8
         if offset + length > whole:
