@@ -20,7 +20,6 @@ from .rewriting import Amount, EveryKey, StoredTrack, amount, amount_before, key
 from .search import Search
 from .settling import moments, settled, shared_times
 from .tracks import ROTATION, TRANSLATION, Clip, Track, Tracks
-from .vertices import largest_displacement
 
 OF_INTEGERS = 0.85
 """The share of the tolerance that rotations may take that are stored as 16-bit integers."""
@@ -59,8 +58,8 @@ class Options:
     count: int | None = None
     """So many key poses of each clip instead of a tolerance."""
 
-    vertices: bool = False
-    """Whether the largest displacement of any vertex of a skin is measured."""
+    channels: str = "needed"
+    """"all" where every channel keeps a key at least; "needed" where those go that only ever are at rest."""
 
     run: Run = map
     """What has stretches of long clips searched, called as `map` is, with functions of modules."""
@@ -86,8 +85,8 @@ class ReducedClip:
     slides: tuple[float, float] = (0.0, 0.0)
     """How far joints slide that stand on the ground, before and after."""
 
-    vertices: float | None = None
-    """The largest displacement of any vertex of a skin, where that was asked for and there is one."""
+    where: str = ""
+    """The node and the time of the largest error: 'node "Hand" at 1.25 s'."""
 
 
 class ClipReduction:
@@ -143,9 +142,10 @@ class ClipReduction:
         if after.size >= self.before.size:
             return self._kept(LARGER)
         shown_tracks = self._shown(tracks)
-        off = largest_displacement(self.world, shown_tracks) if self.options.vertices else None
+        node = self.clip.tracks[0].node
+        where = f'node "{self.world.nodes.document.json["nodes"][node].get("name", node)}" at 0 s'
         slides, name = self.feet.slides(shown_tracks), self.clip.name
-        return ReducedClip(self.clip.number, name, tuple(tracks), "", self.before, after, error, slides, off)
+        return ReducedClip(self.clip.number, name, tuple(tracks), "", self.before, after, error, slides, where)
 
     def _kept(self, reason: str) -> ReducedClip:
         return ReducedClip(self.clip.number, self.clip.name, None, reason, self.before, self.before)

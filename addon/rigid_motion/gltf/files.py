@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from .clips import ClipReduction, Options, ReducedClip
-from .documents import Document, GltfError, damage_refused, read_document
+from .documents import Document, damage_refused, read_document
 from .nodes import Nodes
 from .rewriting import rewritten
 from .sizes import OF_A_BODY, OF_KEY_POSES, joints_of, radii_of, size_of
@@ -36,6 +36,16 @@ class Report:
     document: Document
     """With fewer keys; the same where no clip needs fewer."""
 
+    before: int = 0
+    after: int = 0
+    """Bytes of all of its files."""
+
+    left_alone: str = ""
+    """Why nothing of its motion was reduced, where nothing was."""
+
+    reduced_before: float | None = None
+    """The tolerance that an earlier reduction has noted in the file."""
+
 
 def reduced(document: Document, options: Options) -> Report:
     """Return a document with fewer keys in all of its clips.
@@ -48,7 +58,7 @@ def reduced(document: Document, options: Options) -> Report:
     with damage_refused():
         clips, nodes = read_clips(document), Nodes(document)
         if not any(clip.tracks for clip in clips):
-            raise GltfError("no animation moves a node", "export it with its animations")
+            return _left_alone(document, 0.0, "no animation moves a node")
         joints = set(itertools.chain.from_iterable(joints_of(document)))
         moved = _moved(nodes, clips)
         size = size_of(nodes, moved)
@@ -57,9 +67,10 @@ def reduced(document: Document, options: Options) -> Report:
     if tolerance is None:
         tolerance = (OF_KEY_POSES if options.shared else OF_A_BODY) * size or SOME
     elif tolerance > MOST * size > 0.0:
-        raise GltfError(
+        return _left_alone(
+            document,
+            size,
             f"a tolerance of {tolerance:.3g} m is more than a tenth of the size, which is {size:.3g} m in this file",
-            f"give one below {MOST * size:.2g} m",
         )
     options = replace(options, tolerance=tolerance)
     result = []
@@ -69,7 +80,19 @@ def reduced(document: Document, options: Options) -> Report:
             result.append(ClipReduction(nodes, clip, moved[own], radii[own], joints, size, options).reduced())
     tracks = {clip.number: clip.tracks for clip in result if clip.tracks is not None}
     with damage_refused():
-        return Report(size, tolerance, tuple(result), rewritten(document, tracks) if tracks else document)
+        if not tracks:
+            return replace(_left_alone(document, size, ""), clips=tuple(result), tolerance=tolerance)
+        made = rewritten(document, tracks)
+    noted = document.json["asset"].get("extras", {}).get("reducedWithin")
+    return Report(size, tolerance, tuple(result), made, _bytes_of(document), _bytes_of(made), "", noted)
+
+
+def _left_alone(document: Document, size: float, reason: str) -> Report:
+    return Report(size, 0.0, (), document, _bytes_of(document), _bytes_of(document), reason)
+
+
+def _bytes_of(document: Document) -> int:
+    return sum(map(len, document.files("a.glb").values()))
 
 
 def reduce_file(path: Path, output: Path, options: Options) -> Report:
