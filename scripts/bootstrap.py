@@ -7,7 +7,7 @@
     python scripts/bootstrap.py test                        run the tests
     python scripts/bootstrap.py test --blender 4.5.15       run the tests on another Blender
     python scripts/bootstrap.py bake shot.blend             turn in-betweens of .blend files into real keys, or back
-    python scripts/bootstrap.py reduce shot.blend           keep few keys, in .blend files and of recordings
+    python scripts/bootstrap.py reduce walk.glb             keep few keys, in glTF and .blend files and of recordings
     python scripts/bootstrap.py stream --help               send a recording over a network, in real time
     python scripts/bootstrap.py tasks list renders/hand     list the tasks of a comparison, and which are done
     python scripts/bootstrap.py dask scheduler              use many machines, with Dask's own commands
@@ -22,14 +22,16 @@
     python scripts/bootstrap.py completion bash             print what has a shell complete `rigid-motion`
 
 The packages go into .venv/ of this checkout; the first run downloads about 500 MB, of which Blender is 400. Where there
-is no Blender for a Python, the commands run that need none: compare --no-video, inspect, stream, tasks. All arguments
-after the command are passed on to it: `python scripts/bootstrap.py compare --help` shows the options of compare.
+is no Blender for a Python, the commands run that need none: compare --no-video, inspect, stream, tasks. No --help
+needs it, nor does reduce for glTF files. All arguments after the command are passed on to it: `python
+scripts/bootstrap.py compare --help` shows the options of compare.
 """
 
 from __future__ import annotations
 
 import difflib
 import hashlib
+import itertools
 import json
 import os
 import shutil
@@ -69,8 +71,14 @@ WITHOUT_BLENDER = ("inspect", "stream", "tasks", "dask", "openjd", "completion",
 """Need no Blender."""
 
 FILMING = ("compare", "bundle")
-NOT_FILMING = {"--no-video", "--blender", "--help", "-h"}
+NOT_FILMING = {"--no-video", "--blender"}
 """Commands that need none with one of these options."""
+
+DRAWING = "paper"
+"""Needs Blender for its --help too."""
+
+GLTF = (".glb", ".gltf", ".vrm", ".vrma")
+"""Endings of the inputs that reduce needs none for."""
 
 
 def main(arguments: list[str]) -> int:
@@ -99,7 +107,10 @@ def main(arguments: list[str]) -> int:
         del rest[place : place + 2]
         if blender not in here:
             return _fail(f"--blender takes one of {', '.join(here)} with Python {PYTHON}")
-    needed = command not in WITHOUT_BLENDER and not (command in FILMING and NOT_FILMING & {*rest})
+    alone = (command != DRAWING and bool({"--help", "-h"} & {*rest})) or (command == "reduce" and _is_gltf_alone(rest))
+    if alone and not (blender and _folder(blender).exists()):
+        blender = None
+    needed = not (alone or command in WITHOUT_BLENDER or (command in FILMING and NOT_FILMING & {*rest}))
     if needed and blender is None:
         without = "; or add --no-video, for the numbers and the report" if command in FILMING else ""
         fitting = " or ".join(known)
@@ -145,13 +156,35 @@ def _is_program(arguments: list[str]) -> bool:
     return bool(named) and not named[0].replace(".", "").isdecimal()
 
 
+def _is_gltf_alone(arguments: list[str]) -> bool:
+    """Return whether all inputs of reduce are glTF files that stay such.
+
+    What follows an option is its value, unless it is there as a file: better a Blender too many than one too few.
+    """
+    inputs = [
+        argument
+        for before, argument in itertools.pairwise(["", *arguments])
+        if not argument.startswith("-")
+        and (not before.startswith("-") or (before != "--output" and _is_there(argument)))
+    ]
+    return bool(inputs) and all(name.lower().endswith(GLTF) for name in inputs) and "--blend" not in arguments
+
+
+def _is_there(source: str) -> bool:
+    """Return whether a file is there, or one of which a body is named behind a colon."""
+    return os.path.exists(source) or os.path.exists(source.rpartition(":")[0])
+
+
+def _folder(blender: str | None) -> Path:
+    return ROOT / ".venv" / (f"blender-{blender}-python-{PYTHON}" if blender else f"python-{PYTHON}")
+
+
 def install(blender: str | None, requirements: list[str], folder: Path | None = None) -> Path | None:
     """Return the Python of an environment with these requirements, made or completed where need be; None on failure.
 
     It is in `.venv/` unless a folder is given.
     """
-    name = f"blender-{blender}-python-{PYTHON}" if blender else f"python-{PYTHON}"
-    folder = folder.absolute() if folder else ROOT / ".venv" / name
+    folder = folder.absolute() if folder else _folder(blender)
     python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     stamp = folder / "installed.json"
     requested = hashlib.sha256("\n".join([sys.version, *requirements]).encode()).hexdigest()

@@ -208,8 +208,8 @@ def report(**facts: Any) -> None:
         A file that is being written, or a folder that was made for one; it is removed if the process is killed.
     written : str
         A file that is complete, and to be printed at the end.
-    source : str
-        The input that it was made of.
+    prints_paths : bool
+        Whether standard output is for the paths of what is complete.
     summary : str
         What would be said if the process were stopped now.
     ended : bool
@@ -220,11 +220,6 @@ def report(**facts: Any) -> None:
             os.write(_journal, f"{json.dumps(facts)}\n".encode())
 
 
-def written_of(source: str) -> list[str]:
-    """Return the files that this process and its workers have reported as complete that were made of an input."""
-    return [path for path, made_of in _Journal(_session).written if made_of == source]
-
-
 class _Journal:
     """What the child reported."""
 
@@ -232,7 +227,8 @@ class _Journal:
         self.at = ""
         self.summary = STOPPED
         self.ended = False
-        self.written: list[tuple[str, str | None]] = []
+        self.prints_paths = True
+        self.written: list[str] = []
         self._making: list[Path] = []
         try:
             lines = (Path(folder or os.devnull) / JOURNAL).read_text(encoding="utf-8").splitlines()
@@ -244,7 +240,8 @@ class _Journal:
                 self.at = facts.get("at", self.at)
                 self.summary = facts.get("summary", self.summary)
                 self.ended = facts.get("ended", self.ended)
-                self.written += [(facts["written"], facts.get("source"))] if "written" in facts else []
+                self.prints_paths = facts.get("prints_paths", self.prints_paths)
+                self.written += [facts["written"]] if "written" in facts else []
                 self._making += [Path(facts["making"])] if "making" in facts else []
 
     def remove_half_written(self) -> None:
@@ -265,8 +262,8 @@ class _Journal:
         errors = _writable(sys.stderr)
         if errors and sys.stderr.isatty():
             print(SHOW_CURSOR, file=sys.stderr, flush=True)  # It is behind the progress bar, which has hidden it.
-        if _writable(sys.stdout):
-            for path, _ in self.written:
+        if self.prints_paths and _writable(sys.stdout):
+            for path in self.written:
                 print(path_line(path), flush=True)
         if errors:
             for line in filter(None, (crash, self.summary.removeprefix("Stopped. ") if crash else self.summary)):

@@ -111,4 +111,4 @@ def test_what_cannot_be_baked_of_a_rig_is_named_by_bone_and_the_others_go_on(tmp
     assert "Location X is driven" in refused["Hand"]
     assert "set its rotation mode to Quaternion first" in refused["Index"]
     assert f"{path}: Rig: 2 bones baked, " in "\n".join(lines)
-    assert lines[-1] == "2 bones baked, 2 not; 1 file: 1 written."
+    assert lines[-1] == "2 bones baked, 2 not."

@@ -104,14 +104,14 @@ def test_a_read_only_folder_is_named_by_its_own_name_and_before_the_work(tmp_pat
 
 
 @pytest.mark.parametrize("options", [(), ("--in-place",)])
-def test_a_name_that_is_too_long_for_the_result_is_told_before_the_work(tmp_path, capsys, options):
+def test_a_name_that_is_too_long_for_the_result_is_told(tmp_path, capsys, options):
     made = one_object_file(tmp_path / "shot.blend")
     path = made.rename(tmp_path / f"{'ü' * 124}x.blend")  # With -baked or a 1 behind it is too long.
     assert len(os.fsencode(path.name)) == 255
     capsys.readouterr()
     assert run(path, *options) == 1
-    (line,) = (line for line in capsys.readouterr().err.splitlines() if line.startswith(f"{path}: "))
-    assert line.endswith("of which file systems allow 255: give the input a shorter name")
+    *_, line, _ = capsys.readouterr().err.splitlines()
+    assert line.endswith("could not be written (File name too long): write elsewhere with --output")
     assert listed(tmp_path) == [path.name]
 
 
@@ -167,7 +167,7 @@ def test_a_file_where_a_folder_should_be_is_named(tmp_path, capsys):
     assert run(path, "--output", tmp_path / "file" / "folder") == 1
     said = capsys.readouterr().err.splitlines()
     assert any(line.startswith(f"{path}: {tmp_path / 'file'} is a file, and ") for line in said)
-    assert said[-1] == "0 objects baked; 1 file: 0 written, 1 failed."
+    assert said[-1] == "Nothing baked; 1 file failed."
     assert listed(tmp_path) == ["file", "shot.blend"]
 
 

@@ -1,5 +1,6 @@
 """The set-up in one command: what it installs, and what it says where it cannot."""
 
+import os
 import re
 import subprocess
 import sys
@@ -7,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from rigid_motion_batch.cli.commands import COMMANDS
+from rigid_motion_batch.recordings.gltf import ENDINGS
 from rigid_motion_batch.system_libraries import DEBIAN, way_out
 from scripts import bootstrap
 
@@ -50,6 +53,73 @@ def test_every_package_is_pinned():
 def test_the_blender_that_is_asked_for_is_the_only_one():
     requirements = bootstrap._requirements(bootstrap._project(), "4.5.15", ())
     assert [r for r in requirements if r.startswith("bpy")] == ["bpy==4.5.15"]
+
+
+@pytest.fixture
+def installed(monkeypatch, tmp_path) -> list[str | None]:
+    """The Blenders that are set up, in a checkout where there is none yet; nothing is installed or run."""
+    blenders: list[str | None] = []
+
+    def install(blender: str | None, *_: object) -> Path:
+        blenders.append(blender)
+        return tmp_path / "python"
+
+    monkeypatch.setattr(bootstrap, "_folder", lambda _: tmp_path / "none")
+    monkeypatch.setattr(bootstrap, "install", install)
+    monkeypatch.setattr(bootstrap, "_blender_starts", lambda _: True)
+    monkeypatch.setattr(bootstrap, "_become", lambda *_: 0)
+    return blenders
+
+
+@pytest.mark.parametrize("command", sorted({*bootstrap.COMMANDS} - {bootstrap.DRAWING}))
+def test_no_blender_is_set_up_for_the_help_of_a_command(installed, command):
+    assert bootstrap.main([command, "--help"]) == bootstrap.main([command, "-h"]) == 0
+    assert installed == [None, None]
+
+
+HELPS = """
+import sys
+sys.modules["bpy"] = None
+from rigid_motion_batch.cli.commands import COMMANDS, main
+for command in COMMANDS:
+    try:
+        main([command, "--help"])
+    except SystemExit as ended:
+        assert not ended.code, command
+"""
+
+
+def test_commands_say_what_they_do_where_there_is_no_blender():
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run([sys.executable, "-c", HELPS], capture_output=True, text=True, timeout=60, env=environment)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.count("usage: ") >= len(COMMANDS)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "is_needed"),
+    [
+        ("walk.glb", False),
+        ("walk.glb --tolerance 2mm --output small b.GLTF avatar.vrm --shared wave.vrma", False),
+        ("--json walk.glb walk.glb", False),
+        ("walk.glb shot.blend", True),
+        ("walk.glb --shared hand.csv", True),
+        ("walk.glb --shared hand.csv:left", True),
+        ("walk.glb gone.csv", True),
+        ("walk.glb --blend", True),
+        ("folder", True),
+        ("", True),
+    ],
+)
+def test_gltf_files_are_reduced_without_a_blender(installed, monkeypatch, tmp_path, arguments, is_needed):
+    monkeypatch.chdir(tmp_path)
+    for name in ("small", "folder"):
+        (tmp_path / name).mkdir()
+    for name in ("walk.glb", "wave.vrma", "hand.csv"):
+        (tmp_path / name).touch()
+    assert bootstrap.main(["reduce", *arguments.split()]) == 0
+    assert [blender is not None for blender in installed] == [is_needed]
+    assert bootstrap.GLTF == ENDINGS
 
 
 @pytest.mark.parametrize("kind", ["", "ImportError: "])

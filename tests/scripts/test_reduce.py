@@ -1,5 +1,6 @@
 """reduce.py on .blend files, as people run it: what it plays, what it leaves alone, what it says."""
 
+import json
 from pathlib import Path
 
 import bpy
@@ -122,6 +123,22 @@ def test_without_a_tolerance_a_rig_of_any_size_begins_with_one_that_fits_it(tmp_
     assert run(path) == 0
     open_again(reduced_name(path))
     assert sum(count_keys(bone) for bone in bpy.data.objects["Rig"].pose.bones) < 3 * len(FRAMES) / 2
+
+
+def test_what_became_of_rigs_and_recordings_is_printed_as_json(tmp_path, capsys):
+    shot, hand, body = rig_file(tmp_path / "shot.blend"), tmp_path / "hand.csv", hand_made(tmp_path)
+    write_csv(hand)
+    capsys.readouterr()
+    assert run(shot, hand, body, "--json", "--dry-run", "--tolerance", "5mm") == 0
+    said = capsys.readouterr()
+    told = json.loads(said.out)
+    made = ["shot-reduced.blend", "hand-keys.csv", "body-keys.blend"]
+    assert [entry["written"] for entry in told] == [[str(tmp_path / name)] for name in made]
+    clips = [clip for entry in told for clip in entry["clips"]]
+    assert [clip["name"] for clip in clips] == ["Rig: 3 bones", "hand", "body"]
+    assert all(clip["keys_after"] < clip["keys_before"] and 0.0 < clip["error"] <= 0.005 for clip in clips)
+    worst = max(clips, key=lambda clip: clip["error"])["error"]
+    assert f"to be reduced; at most {1e3 * worst:.3g} mm off (" in said.err.splitlines()[-1]
 
 
 # What is left alone, and how it ends

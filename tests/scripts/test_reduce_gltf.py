@@ -1,12 +1,19 @@
 """`reduce.py` gives glTF files back as they are, with fewer keys, and needs no Blender for that."""
 
+import json
 import os
 import re
 import subprocess
 import sys
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
+import pytest
 
+from rigid_motion.gltf import Document, Options, Report, reduced
+from rigid_motion.gltf.rewriting import Amount
 from rigid_motion_batch.cli import reduce
 from rigid_motion_batch.keying import gltf_files
 from tests.gltf.making import Making, walk
@@ -22,8 +29,29 @@ sys.exit(reduce.main(sys.argv[1:]))
 """
 
 
+GROWS = "it would not become smaller"
+
+
+@pytest.fixture
+def report(monkeypatch):
+    """Has files reduced as ever, and says something else of them; returns the options that were given."""
+
+    def alter(changed: Callable[[Report], dict[str, Any]]) -> list[Options]:
+        given: list[Options] = []
+
+        def altered(document: Document, options: Options) -> Report:
+            given.append(options)
+            made = reduced(document, options)
+            return replace(made, **changed(made))
+
+        monkeypatch.setattr(gltf_files, "reduced", altered)
+        return given
+
+    return alter
+
+
 def run(*arguments: object) -> int:
-    return reduce.main([str(argument) for argument in arguments])
+    return reduce.main([*map(str, arguments), "--jobs", "0"])
 
 
 def test_no_blender_is_needed(tmp_path):
@@ -34,7 +62,9 @@ def test_no_blender_is_needed(tmp_path):
     made = tmp_path / "walk-reduced.glb"
     assert (done.returncode, done.stdout) == (0, f"{made}\n")
     told = re.search(
-        r"Take0: reduced, (\d+) -> (\d+) keys, (\d+) -> (\d+) bytes, (\S+) mm off at most \(2 mm allowed\)", done.stderr
+        r"Take0: reduced, (\d+) -> (\d+) keys, (\d+) -> (\d+) bytes, (\S+) mm off at most \(2 mm allowed\), "
+        r'node "Joint\d" at \S+ s\n',
+        done.stderr,
     )
     assert told is not None
     before, after, size_before, size_after = map(int, told.groups()[:4])
@@ -43,18 +73,23 @@ def test_no_blender_is_needed(tmp_path):
     assert off(File(source), File(made), 0, 0.03).error <= 1e-3 * float(told[5]) + 1e-5
     assert float(told[5]) <= 2.0
     assert re.search(r"walk\.glb: 1\.5 m large", done.stderr)
-    assert "1 clip reduced; 1 file: 1 written." in done.stderr
+    size = f"{made.stat().st_size:,}".replace(",", " ")
+    worst = rf'{told[5]} mm off \(Take0, node "Joint\d" at \S+ s\)'
+    last = rf"1 clip reduced, \d\d \d\d\d to {size} bytes; at most {worst}\."
+    assert re.fullmatch(last, done.stderr.splitlines()[-1])
 
 
 def test_a_file_in_another_unit_is_told_from_its_size(tmp_path, capsys):
-    source = walk(unit=100.0).write(tmp_path / "walk.glb")
+    source = walk(joints=8, unit=100.0).write(tmp_path / "walk.glb")
     assert run(source, "--tolerance", "2mm") == 0
-    assert "150 m large in this file: if these are centimetres, give --tolerance 0.2" in capsys.readouterr().err
+    assert "210 m large in this file: if these are centimetres, give --tolerance 0.2" in capsys.readouterr().err
+    assert run(walk(joints=3, unit=100.0).write(tmp_path / "prop.glb"), "--tolerance", "2mm") == 0
+    assert "60 m large\n" in capsys.readouterr().err, "a prop may have any size"
 
 
-def test_a_tolerance_that_is_too_large_is_refused_and_nothing_is_written(tmp_path, capsys):
+def test_a_tolerance_that_is_too_large_leaves_the_file_alone(tmp_path, capsys):
     source = walk(unit=0.01).write(tmp_path / "walk.glb")
-    assert run(source, "--tolerance", "2mm") == 2
+    assert run(source, "--tolerance", "2mm") == 0
     assert "a tolerance of 0.002 m is more than a tenth of the size, which is 0.015 m" in capsys.readouterr().err
     assert listed(tmp_path) == ["walk.glb"]
 
@@ -145,3 +180,78 @@ def test_a_file_that_vanishes_while_it_is_read_is_said(tmp_path, monkeypatch, ca
     said = capsys.readouterr().err
     assert "walk.glb: this file changed while it was read; run the same command again" in said
     assert "Traceback" not in said
+
+
+@pytest.mark.parametrize("ending", [".glb", ".vrm", ".VRMA"])
+def test_avatars_and_their_animations_are_glb_files_and_keep_their_ending(tmp_path, capsys, ending):
+    source = walk().write(tmp_path / "walk.glb").rename(tmp_path / f"walk{ending}")
+    assert run(source) == run(tmp_path, "--output", tmp_path / "out") == 0
+    assert run(source, "--output", tmp_path / f"named{ending}") == 0
+    made = f"walk-reduced{ending.lower()}"
+    assert listed(tmp_path) == sorted([f"walk{ending}", made, f"named{ending}", "out"])
+    assert listed(tmp_path / "out") == [made]
+
+
+def test_what_became_of_each_input_is_printed_as_json(tmp_path, capsys):
+    source, bad, still = walk().write(tmp_path / "walk.glb"), tmp_path / "bad.glb", tmp_path / "still.gltf"
+    bad.write_bytes(b"glTF, but no more")
+    still.write_text('{"asset": {"version": "2.0"}}')
+    assert run(source, bad, still, "--json", "--tolerance", "2mm") == 1
+    made = tmp_path / "walk-reduced.glb"
+    said = capsys.readouterr()
+    printed = json.loads(said.out)
+    first, second, third = map(dict, printed)
+    (clip,) = first.pop("clips")
+    assert first.pop("bytes_before") > first["bytes_after"]
+    assert first == {
+        "source": str(source),
+        "state": "written",
+        "written": [str(made)],
+        "reason": "",
+        "size": pytest.approx(1.5),
+        "tolerance": 0.002,
+        "bytes_after": made.stat().st_size,
+    }
+    assert (clip["name"], clip["reason"]) == ("Take0", "")
+    assert clip["keys_after"] < clip["keys_before"]
+    assert 0.0 < clip["error"] <= 0.002
+    assert re.fullmatch(r'node "Joint\d" at \S+ s', clip["where"])
+    assert (second["state"], second["written"], second["clips"]) == ("failed", [], [])
+    assert second["reason"] in said.err
+    assert (third["state"], third["reason"]) == ("left alone", "no animation moves a node")
+    assert run(source, bad, still, "--json", "--tolerance", "2mm") == 1
+    assert json.loads(capsys.readouterr().out) == [printed[0] | {"state": "already written"}, *printed[1:]]
+
+
+def test_more_keys_in_fewer_bytes_are_not_called_reduced(tmp_path, report, capsys):
+    report(lambda made: {"clips": (replace(made.clips[0], before=Amount(96, 3000), after=Amount(137, 2000)),)})
+    assert run(walk().write(tmp_path / "walk.glb")) == 0
+    assert "Take0: stored in fewer bytes, 96 -> 137 keys, 3000 -> 2000 bytes, " in capsys.readouterr().err
+
+
+def test_a_file_that_would_grow_is_left_alone_as_a_whole(tmp_path, report, capsys):
+    report(lambda made: {"left_alone": GROWS, "after": made.before})
+    assert run(walk().write(tmp_path / "walk.glb"), "--json") == 0
+    said = capsys.readouterr()
+    (told,) = json.loads(said.out)
+    assert (told["state"], told["reason"], told["bytes_after"]) == ("left alone", GROWS, told["bytes_before"])
+    assert [clip["reason"] for clip in told["clips"]] == [GROWS]
+    assert "Take0" not in said.err
+    assert said.err.endswith(
+        f"walk.glb: {GROWS}; left alone, nothing is written\nNothing reduced; 1 file left alone.\n"
+    )
+    assert listed(tmp_path) == ["walk.glb"]
+
+
+def test_who_reduces_again_is_told_that_errors_add_up(tmp_path, report, capsys):
+    report(lambda _: {"reduced_before": 0.005})
+    assert run(walk().write(tmp_path / "walk.glb")) == 0
+    line = "walk.glb: reduced before within 5 mm: errors add up; reduce the original instead\n"
+    assert line in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("channels", ["needed", "all"])
+def test_which_channels_are_kept_is_what_is_asked_for(tmp_path, report, channels):
+    given = report(lambda _: {})
+    assert run(walk().write(tmp_path / "walk.glb"), "--channels", channels) == 0
+    assert [options.channels for options in given] == [channels]

@@ -7,11 +7,11 @@ unit of the recording. Radii are of the balls in which no point is off by more t
 
 from __future__ import annotations
 
-import math
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
+from decimal import Decimal
 from fractions import Fraction
 from typing import Any, ClassVar, cast
 
@@ -33,7 +33,23 @@ METRES = {unit: length * 1e-3 for unit, length in MILLIMETRES.items()}
 """Units of tolerances and radii, and their lengths."""
 
 NUMBER = r"\d{1,6}(?:\.\d{1,6})?"
-"""What amounts are made of: names of folders as well."""
+"""What rates are made of: names of folders as well."""
+
+LENGTH = re.compile(
+    rf"\s*((?=\.?\d)\d{{0,6}}\.?\d{{0,6}}(?:e[+-]?\d)?)\s*({'|'.join(METRES)})?\s*", re.ASCII | re.IGNORECASE
+)
+"""How lengths are written: 5mm, 5 MM, .5cm, 5e-3."""
+
+
+def read_length(text: str, problem: str) -> tuple[str, str]:
+    """Return the number and the unit of a length above 0, "0.5" and "cm" of ".5 CM"; the unit may be empty.
+
+    Raises ValueError with the problem where it is none.
+    """
+    parts = LENGTH.fullmatch(text)
+    if not parts or not Decimal(parts[1]):
+        raise ValueError(f"{text!r} {problem}")
+    return f"{Decimal(parts[1]):f}", (parts[2] or "").lower()
 
 
 @dataclass(frozen=True)
@@ -159,7 +175,7 @@ class Tolerance(Choice):
 
     @property
     def name(self) -> str:
-        return f"tolerance-{self.written}"
+        return f"tolerance-{''.join(self._parts())}"
 
     @property
     def amount(self) -> str:
@@ -229,13 +245,11 @@ class Tolerance(Choice):
 
     def _parts(self) -> tuple[str, str]:
         """Return the number and the unit, which may be empty."""
-        result = re.fullmatch(rf"({NUMBER})({'|'.join(METRES)})?", self.written, re.ASCII)
-        if not result or float(result[1]) <= 0.0:
-            raise ValueError(
-                f"{self.written!r} is no tolerance; give a length such as 5mm, 0.5cm or 0.005m, or a plain number in "
-                "the unit of the recording"
-            )
-        return result[1], result[2] or ""
+        return read_length(
+            self.written,
+            "is no tolerance; give a length such as 5mm, 0.5cm or 0.005m, or a plain number in the unit of the "
+            "recording",
+        )
 
 
 def _reduced(clip: Clip, mode: str, radius: Radius, shared: bool, **requested: Any) -> Keys:
@@ -293,14 +307,6 @@ def read_radii(text: str) -> Radii:
 
 
 def radius_in_metres(text: str) -> float:
-    """Return a radius as it is written: 3cm, 30mm, 0.03m, or 0.03. Raises ValueError where it is none above 0."""
-    parts = re.fullmatch(rf"(.*?)\s*({'|'.join(METRES)})?\s*", text, re.DOTALL)
-    assert parts is not None  # which any text fits
-    number, unit = parts.groups()
-    try:
-        radius = float(number) * METRES[unit or "m"]
-    except ValueError:
-        radius = math.nan
-    if not 0.0 < radius < math.inf:
-        raise ValueError(f"{text!r} is not a length above 0, such as 3cm or 0.03")
-    return radius
+    """Return a radius as it is written: 3cm, or 0.03, which is metres. Raises ValueError where it is none above 0."""
+    number, unit = read_length(text, "is not a length above 0, such as 3cm or 0.03")
+    return float(number) * METRES[unit or "m"]

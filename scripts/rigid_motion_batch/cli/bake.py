@@ -16,15 +16,14 @@ from rigid_motion_batch.system_libraries import require_blender
 SCRIPT = "bake.py"
 PROGRAM = program_of(SCRIPT)
 
-require_blender(SCRIPT)
-
-from rigid_motion_batch.keying.baking import BAKED, UNBAKED, baking, unbaking
-from rigid_motion_batch.keying.jobs import do_blend
 from rigid_motion_batch.keying.options import EXIT_CODES, add_file_options, add_target_options, refuse_odd_places
 from rigid_motion_batch.keying.planning import Job, named_file, planned
 from rigid_motion_batch.keying.records import is_made
 from rigid_motion_batch.keying.sessions import do_all
 from rigid_motion_batch.keying.work import Doing, Work
+
+BAKED, UNBAKED = "-baked", "-unbaked"
+"""Endings of the names of files that are written."""
 
 STEPS = 0.01, 1e6
 """Frames from key to key: keys closer than that are one key to Blender."""
@@ -108,6 +107,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
 def main(arguments: list[str]) -> int:
     """Do all files, and return the exit code."""
     options = parse(arguments)
+    require_blender(SCRIPT)
     return do_all(PROGRAM, options.todo, options.work, options.jobs)
 
 
@@ -122,6 +122,9 @@ class Bake(Work):
     interpolation: str
 
     def do(self, doing: Doing) -> None:
+        from rigid_motion_batch.keying.baking import baking
+        from rigid_motion_batch.keying.jobs import do_blend
+
         do_blend(doing, baking(self.step, self.first, self.last, self.interpolation))
 
 
@@ -131,6 +134,9 @@ class Unbake(Work):
     doing, done = "Un-baking", "un-baked"
 
     def do(self, doing: Doing) -> None:
+        from rigid_motion_batch.keying.baking import unbaking
+        from rigid_motion_batch.keying.jobs import do_blend
+
         do_blend(doing, unbaking())
 
 

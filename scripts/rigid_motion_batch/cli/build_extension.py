@@ -21,10 +21,6 @@ from rigid_motion_batch.system_libraries import require_blender
 SCRIPT = "build_extension.py"
 PROGRAM = program_of(SCRIPT)
 
-require_blender(SCRIPT)
-
-import bpy
-
 from rigid_motion_batch.files import written_beside
 from rigid_motion_batch.places import CHECKOUT, EXTENSION, LICENSE, MANIFEST
 
@@ -83,6 +79,8 @@ def _stage(folder: Path) -> None:
 
 def _blender_ext(*arguments: str) -> None:
     """Run Blender's own command for extensions, with the tags that Blender knows, as if Blender ran it."""
+    import bpy
+
     scripts = Path(cast(Any, bpy.utils).system_resource("SCRIPTS"))
     tool = scripts / "addons_core" / "bl_pkg" / "cli" / "blender_ext.py"
     tags = scripts / "modules" / "_bpy_internal" / "extensions" / "tags.py"
@@ -112,6 +110,7 @@ def main(arguments: list[str]) -> int:
         "--output", type=Path, default=(CHECKOUT or Path()) / "dist", metavar="DIR", help="folder to write to (dist)"
     )
     options = parser.parse_args(arguments)
+    require_blender(SCRIPT)
     try:
         package = build(options.output.expanduser())
     except BuildError as error:

@@ -33,7 +33,7 @@ RESEARCH = {
 COMMANDS = {
     "compare": ("compare", "compare interpolation modes on recordings: numbers, charts, videos"),
     "inspect": ("inspect", "look into recordings: bodies, units, axes, rate, and what looks wrong"),
-    "reduce": ("reduce", "keep the few keys that a motion needs, in .blend files and of recordings"),
+    "reduce": ("reduce", "keep the few keys that a motion needs, in glTF and .blend files and of recordings"),
     "bake": ("bake", "turn the in-betweens of .blend files into real keys, or back"),
     "stream": ("stream", "send a motion over a network in real time, or show what arrives"),
     "bundle": ("job_bundle", "write a comparison as a job for render farms"),

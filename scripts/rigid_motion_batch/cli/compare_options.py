@@ -284,7 +284,7 @@ def _amounts(kind: type[Choice]) -> Callable[[str], list[Choice]]:
     """Return how a list of amounts is read: each as a choice of that kind."""
 
     def parse_amounts(text: str) -> list[Choice]:
-        return distinct(map(kind, ["".join(part.split()) for part in text.split(",") if part.strip()] or [text]))
+        return distinct(map(kind, [part.strip() for part in text.split(",") if part.strip()] or [text]))
 
     return parse_amounts
 

@@ -25,12 +25,13 @@ from rigid_motion_batch.keying.gltf_files import do_gltf
 from rigid_motion_batch.keying.options import EXIT_CODES, add_file_options, add_target_options, refuse_odd_places
 from rigid_motion_batch.keying.planning import Job, file_and_body, named_file, planned
 from rigid_motion_batch.keying.records import is_made
-from rigid_motion_batch.keying.reductions import ENDINGS, GLB_SUFFIX, RATES, SUFFIX, TOLERANCE, Reductions, name_of
+from rigid_motion_batch.keying.reductions import GLB_SUFFIX, RATES, SUFFIX, TOLERANCE, Reductions, name_of
 from rigid_motion_batch.keying.sessions import do_all
 from rigid_motion_batch.keying.work import Doing, Work
+from rigid_motion_batch.recordings.gltf import ENDINGS as GLTF
 from rigid_motion_batch.recordings.options import add_reading_options, reading_options
 
-IN_FOLDERS = (".blend", ".bvh", ".csv", ".fbx", ".glb", ".gltf", ".tsv", ".tum")
+IN_FOLDERS = (".blend", ".bvh", ".csv", ".fbx", *GLTF, ".tsv", ".tum")
 """Endings of the files that are taken of a folder. What else it reads may be anything: .json, .txt."""
 
 MODE = "motor_spline"
@@ -45,6 +46,7 @@ examples:
   python scripts/reduce.py shot.blend --keys 12
   python scripts/reduce.py hand.csv --axes unity --tolerance 5mm --blend --fps 30
   python scripts/reduce.py walk.glb --output small/walk.glb --tolerance 2mm
+  python scripts/reduce.py avatar.vrm wave.vrma --json
   python scripts/reduce.py walk.fbx dance.bvh shot.blend --glb --tolerance 2mm
   python scripts/reduce.py mocap --output small --jobs 4 --dry-run
   blender --background --python scripts/reduce.py -- shot.blend
@@ -57,11 +59,12 @@ examples:
   everywhere that differ from axis to axis.
 
 glTF files:
-  walk.glb becomes walk-reduced.glb, and walk.gltf becomes walk-reduced.gltf with its .bin beside it, with fewer keys in
-  every clip and nothing else changed. Blender is not needed. No point within --radius of any node is off by more than
-  the tolerance in the world, neither at keys nor at eighths between them. Weights of morph targets are off by half a
-  percent at most. With --glb, .blend and FBX files and recordings become such files: Blender exports them, sampled on
-  every frame as they are shown, for glTF knows lines and even turns alone.
+  walk.glb becomes walk-reduced.glb, and so with .vrm and .vrma; walk.gltf becomes walk-reduced.gltf with its .bin
+  beside it. There are fewer keys in every clip, and nothing else is changed. Blender is not needed. No vertex, and no
+  point within --radius of any node, is off by more than the tolerance in the world, neither at keys nor at eighths
+  between them: what is written is played again. What moves no node, or would become larger, is left alone. With --glb,
+  .blend and FBX files and recordings become such files: Blender exports them, sampled on every frame as they are shown,
+  for glTF knows lines and even turns alone.
 
 recordings:
   The program reads what compare.py reads; FILE:BODY takes one body of several, FILE:* all. A rigid motion becomes
@@ -72,11 +75,12 @@ recordings:
 what is written:
   New files beside the inputs or in --output, which for a single input may be the name of the file. A file that was
   edited since, or that is not the program's own, is replaced only with --overwrite. With --in-place the program
-  replaces a .blend file itself, and keeps the one before as NAME.blend1. The paths of the results are printed on
-  standard output, one a line; everything else goes to standard error. Scripts and Python expressions in files do not
-  run. A folder stands for the .blend, glTF, FBX, BVH, CSV (.csv, .tsv) and .tum files in it and below, but for results
-  of this program. The same command again does what is new or has changed: the folder .rigid-motion beside the results
-  has the record of them.
+  replaces a .blend file itself, and keeps the one before as NAME.blend1. Nothing is written of what is left alone, not
+  even under the name that --output gives. The paths of the results are printed on standard output, one a line, or with
+  --json what became of each input; everything else goes to standard error, with a sentence on all of it as the last
+  line. Scripts and Python expressions in files do not run. A folder stands for the .blend, glTF, FBX, BVH, CSV (.csv,
+  .tsv) and .tum files in it and below, but for results of this program. The same command again does what is new or has
+  changed: the folder .rigid-motion beside the results has the record of them.
 """
 
 
@@ -114,8 +118,9 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         "--radius",
         type=radius_in_metres,
         metavar="LENGTH",
-        help="how far around the origin no point is off by more: 3cm, or 0.03 for metres (the size of an object, the "
-        f"length of a bone; for rigid recordings {RIGID})",
+        help="how far around the origin of each object, bone and node no point is off by more: 3cm, or 0.03 for "
+        "metres (as far as what it carries reaches; in glTF files at least 3 cm of a grown-up, in proportion; for "
+        f"rigid recordings {RIGID})",
     )
     keys.add_argument(
         "--shared", action="store_true", help="key poses: all bones of a rig get their keys on the same frames"
@@ -137,9 +142,18 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     gltf = parser.add_argument_group("glTF files")
     gltf.add_argument("--glb", action="store_true", help="write GLB files of .blend and FBX files and of recordings")
     gltf.add_argument(
-        "--vertices", action="store_true", help="also measure how far any vertex of a skin is off, which takes a while"
+        "--channels",
+        choices=("needed", "all"),
+        default="needed",
+        help="needed: a channel that stays at rest goes, unless another clip of the file moves it or the file has no "
+        "meshes; all: every channel keeps at least one key (%(default)s)",
     )
     add_file_options(parser)
+    parser.add_argument(
+        "--json",
+        action="store_true",
+        help="print JSON in place of paths: a list with what became of each input, or would, in metres and bytes",
+    )
     options = parser.parse_args(arguments)
     try:
         refuse_odd_places(options)
@@ -158,7 +172,7 @@ def main(arguments: list[str]) -> int:
     options = parse(arguments)
     if any(map(options.work.needs_blender, options.todo)):
         require_blender(SCRIPT)
-    return do_all(PROGRAM, options.todo, options.work, options.jobs)
+    return do_all(PROGRAM, options.todo, options.work, options.jobs, as_json=options.json)
 
 
 @dataclass(frozen=True)
@@ -194,13 +208,14 @@ def _planned(options: argparse.Namespace) -> list[Job]:
 
     An FBX file is none where it becomes a GLB file with all that is in it.
     """
-    whole = (".blend", *(() if options.blend else ENDINGS), *((".fbx",) if options.glb else ()))
-    ending = ".glb" if options.glb else ""
+    whole = (".blend", *(() if options.blend else GLTF), *((".fbx",) if options.glb else ()))
+
+    def kind_of(path: Path) -> str:
+        return ".glb" if options.glb and not _is_gltf(path) else path.suffix.lower()
+
     first = Path(options.inputs[0])
-    if not first.name.lower().endswith(whole):
-        endings = (".glb",) if options.glb else (".csv", ".tum", ".blend")
-    else:
-        endings = (ending or first.suffix.lower(),)
+    is_whole = options.glb or first.name.lower().endswith(whole)
+    endings = (kind_of(first),) if is_whole else (".csv", ".tum", ".blend")
     if (options.output or first).suffix.lower() == ".glb" and not (options.glb or _is_gltf(first)):
         raise ValueError(f"--output {options.output}: add --glb, and {first} becomes a GLB file")
     named = named_file(options.output, options.inputs, endings)
@@ -209,8 +224,7 @@ def _planned(options: argparse.Namespace) -> list[Job]:
         folder = named.parent if named else folder
         if source.lower().endswith(whole):
             file = Path(source)
-            kind = file.suffix.lower() if file.suffix.lower() == ".gltf" else ending or file.suffix.lower()
-            made = file if options.in_place else named or folder / f"{file.stem}{GLB_SUFFIX}{kind}"
+            made = file if options.in_place else named or folder / f"{file.stem}{GLB_SUFFIX}{kind_of(file)}"
             return Job(source, made.parent, made)
         name, suffix = name_of(*file_and_body(source)), GLB_SUFFIX if options.glb else SUFFIX
         made = named.with_suffix("") if named else folder / f"{name}{suffix}"
@@ -243,9 +257,8 @@ def _refuse_odd(options: argparse.Namespace) -> None:
 
 def _refuse_beside_glb(options: argparse.Namespace, jobs: list[Job]) -> None:
     """Raise ValueError for options that say nothing of GLB files."""
-    for name in ("mode", "blend", "in_place", "objects", "discard"):
-        if getattr(options, name):
-            option = f"--{name.replace('_', '-')}"
+    for option in ("--mode", "--blend", "--in-place", "--objects", "--discard"):
+        if getattr(options, option[2:].replace("-", "_")):
             raise ValueError(f"{option} is for .blend files, and --glb writes others: leave one of them out")
     for job in jobs:
         if job.file.suffix.lower() == ".gltf" and not job.is_found:
@@ -257,7 +270,7 @@ def _refuse_beside_glb(options: argparse.Namespace, jobs: list[Job]) -> None:
 
 
 def _is_gltf(path: Path) -> bool:
-    return path.suffix.lower() in ENDINGS
+    return path.suffix.lower() in GLTF
 
 
 def _is_result(path: Path) -> bool:

@@ -17,9 +17,6 @@ from rigid_motion.animation.transforms import Transform
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.keying.jobs import Action, Result
 
-BAKED, UNBAKED = "-baked", "-unbaked"
-"""Endings of the names of files that are written."""
-
 FEW = 4
 """As many bones are named; of more it is said how many they are."""
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from rigid_motion.gltf import Document, GltfError, Options, ReducedClip, Report, read_document, reduced
+from rigid_motion.gltf.documents import objects
 from rigid_motion.motion.skeleton_stretches import Run
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.command_line import printable
@@ -20,11 +21,8 @@ from rigid_motion_batch.supervising import end_with_parent
 
 from .planning import place_of
 from .records import Unreadable
-from .reductions import Reductions, doubt, off
-from .work import Doing
-
-MILLIMETRES = 1e3
-"""In a metre."""
+from .reductions import Reductions, as_length, as_text, doubt, off
+from .work import ClipNumbers, Doing, Numbers
 
 
 def do_gltf(doing: Doing, how: Reductions, export: Callable[[Path], None] | None = None) -> None:
@@ -44,26 +42,31 @@ def reduce_gltf(
     job, outcome = doing.job, doing.outcome
     try:
         document = read_document(job.file) if export is None else _exported(export)
-        if job.is_found and not document.json.get("animations"):
-            doing.say("no animations; left alone")
-            return
         tolerance = None if how.tolerance is None else how.tolerance.metres(per_unit)
         with side_by_side(doing.work.processes) as run:
-            report = reduced(document, Options(tolerance, how.radius, how.shared, how.count, how.vertices, run))
+            report = reduced(document, Options(tolerance, how.radius, how.shared, how.count, how.channels, run))
     except GltfError as error:
         raise Unreadable(str(error)) from None
     except OSError as error:  # Also while it is worked on.
         raise Unreadable(f"this cannot be read ({error.strerror}): see to its path, and who may read it") from None
-    length = how.tolerance or Tolerance(f"{MILLIMETRES * report.tolerance:.6f}mm")
-    for clip in report.clips:
+    length = how.tolerance or as_length(report.tolerance)
+    for clip in () if report.left_alone else report.clips:
         summary = _summary(clip, length, per_unit, doing.would, by_number=how.count is not None)
         doing.say(f"{printable(clip.name)}: {summary}")
     if report.size:
-        doing.say(f"{report.size:.3g} m large{doubt(report.size, how.tolerance, per_unit)}")
-    outcome.clips += sum(clip.tracks is not None for clip in report.clips)
-    if not outcome.clips and export is None:
-        doing.say("nothing could be reduced; left alone")
+        doing.say(f"{report.size:.3g} m large{doubt(report.size, _joints(document), how.tolerance, per_unit)}")
+    if report.reduced_before is not None:
+        within = as_text(report.reduced_before)
+        doing.say(f"reduced before within {within}: errors add up; reduce the original instead")
+    done = 0 if report.left_alone else sum(clip.tracks is not None for clip in report.clips)
+    outcome.clips += done
+    _note(outcome.numbers, report)
+    reason = "" if done else printable(report.left_alone) or "nothing could be reduced"
+    if reason and export is None:
+        doing.leave_alone(reason)
         return
+    if reason:
+        doing.say(f"{reason}; {doing.would}written as it was exported")
     _write(doing, output, document, report)
     doing.tell_written(output)
 
@@ -98,6 +101,21 @@ def _holds(path: Path, content: bytes) -> bool:
         return False
 
 
+def _note(numbers: Numbers, report: Report) -> None:
+    """Add what became of a file to what is known of its input."""
+    numbers.size, numbers.tolerance = report.size, report.tolerance
+    numbers.bytes_before = (numbers.bytes_before or 0) + report.before
+    numbers.bytes_after = (numbers.bytes_after or 0) + report.after
+    for clip in report.clips:
+        keys, reason = (clip.before.keys, clip.after.keys), clip.reason or report.left_alone
+        numbers.clips.append(ClipNumbers(clip.name, *keys, clip.error, clip.where, reason))
+
+
+def _joints(document: Document) -> int:
+    """Return how many joints the largest skin has."""
+    return max((len(skin["joints"]) for skin in objects(document.json, "skins")), default=0)
+
+
 def _exported(export: Callable[[Path], None]) -> Document:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "exported.glb"
@@ -110,10 +128,10 @@ def _summary(clip: ReducedClip, tolerance: Tolerance, per_unit: float, would: st
     if clip.tracks is None:
         return f"stays as it was, {clip.before.keys} keys in {clip.before.size} bytes: {clip.reason}"
     before, after = clip.before, clip.after
-    summary = f"{would}reduced, {before.keys} -> {after.keys} keys, {before.size} -> {after.size} bytes"
+    done = "reduced" if after.keys <= before.keys else "stored in fewer bytes"
+    summary = f"{would}{done}, {before.keys} -> {after.keys} keys, {before.size} -> {after.size} bytes"
     summary += off(tolerance, clip.error, per_unit, by_number=by_number)
-    if clip.vertices is not None:
-        summary += f"; vertices {tolerance.alike(clip.vertices, per_unit)} at most"
+    summary += f", {printable(clip.where)}" if clip.where else ""
     if clip.slides[0] > 0.0:
         slid, slides = (tolerance.alike(slide, per_unit) for slide in clip.slides)
         summary += f"; feet slide {slides}, and {slid} before"

@@ -19,8 +19,8 @@ from rigid_motion_batch.keying.blend_files import (
     open_file,
     write_file,
 )
-from rigid_motion_batch.keying.records import changed_at, refuse_long_name, refuse_read_only
-from rigid_motion_batch.keying.work import Doing, Outcome
+from rigid_motion_batch.keying.records import changed_at, refuse_read_only
+from rigid_motion_batch.keying.work import ClipNumbers, Doing, Outcome
 
 
 def do_blend(doing: Doing, action: Action) -> None:
@@ -29,14 +29,14 @@ def do_blend(doing: Doing, action: Action) -> None:
         _do_file(doing, action)
     if doing.outcome.failed:
         before = doing.outcome
-        doing.outcome = Outcome(before.source, failed=True, unreadable=before.unreadable, matched=before.matched)
+        doing.outcome = Outcome(
+            before.source, failed=True, unreadable=before.unreadable, matched=before.matched, reason=before.reason
+        )
 
 
 def _do_file(doing: Doing, action: Action) -> None:
     job, outcome = doing.job, doing.outcome
-    if job.in_place:
-        refuse_long_name(job.file.with_name(f"{job.file.name}1"))
-    else:
+    if not job.in_place:
         doing.record.refuse_to_replace(job.output)
     changed = changed_at(job.file)
     open_file(job.file)
@@ -49,8 +49,7 @@ def _do_file(doing: Doing, action: Action) -> None:
         doing.say(f"incomplete, for there may be objects to be {doing.work.done} in what is missing")
     _do_objects(doing, action, missing.reasons)
     if not outcome.done:
-        why = "nothing could be" if outcome.refused else "nothing to be"
-        doing.say(f"{why} {doing.work.done}; left alone")
+        doing.leave_alone(f"{'nothing could be' if outcome.refused else 'nothing to be'} {doing.work.done}")
         return
     if (before := cast(Any, bpy.data.version)[:2]) < HERE:
         doing.say(f"was saved by Blender {named(before)}; what is written is of Blender {named(HERE)}")
@@ -89,6 +88,7 @@ def _do_targets(doing: Doing, action: Action, targets: Sequence[Transform]) -> N
         doing.refuse(title_of(targets), reason, len(targets))
         return
     result = action.act(targets)
+    doing.outcome.numbers.clips += result.numbers
     for name, reason, count in result.refusals():
         doing.refuse(name, reason, count)
     if result.done:
@@ -115,6 +115,9 @@ class Result:
 
     summary: str = ""
     """Text about those that were done; begins with a comma or a semicolon."""
+
+    numbers: list[ClipNumbers] = field(default_factory=list)
+    """Of their keys, where these are counted."""
 
     def refusals(self) -> Iterator[tuple[str, str, int]]:
         """Yield which targets were refused, why, and how many they are:
@@ -169,11 +172,7 @@ def matching(target: Transform, asked: Iterable[str]) -> set[str]:
 
 def matching_missing(obj: bpy.types.Object, asked: Iterable[str]) -> set[str]:
     """Return the names and patterns that an object fits, or may have bones for that cannot be looked at."""
-    return {item for item in asked if any(_fits(obj.name, part) for part in (item, *_before_slashes(item)))}
-
-
-def _before_slashes(pattern: str) -> list[str]:
-    return [pattern[:place] for place, letter in enumerate(pattern) if letter == "/"]
+    return {item for item in asked if _fits(obj.name, item) or _fits(obj.name, item.rpartition("/")[0])}
 
 
 def _fits(name: str, pattern: str) -> bool:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rigid_motion_batch.recordings import TrajectoryError
+from rigid_motion_batch.recordings.gltf import ENDINGS as GLTF
 from rigid_motion_batch.recordings.reading import split_source
 
 from .records import is_made
@@ -18,7 +19,7 @@ from .records import is_made
 ALL = ":*"
 """Behind a recording: all of its bodies."""
 
-NAMES_OF_FILES = {".blend", ".csv", ".glb", ".gltf", ".tum"}
+NAMES_OF_FILES = {".blend", ".csv", ".tum", *GLTF}
 """Endings that the name of a folder does not have."""
 
 

@@ -24,7 +24,7 @@ from rigid_motion_batch.keying.planning import ALL
 from rigid_motion_batch.keying.records import FileProblem, Unreadable
 from rigid_motion_batch.keying.reductions import GLB_SUFFIX, SUFFIX, TOLERANCE, Reductions, name_of, off
 from rigid_motion_batch.keying.sessions import counted
-from rigid_motion_batch.keying.work import Doing
+from rigid_motion_batch.keying.work import ClipNumbers, Doing
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import folder_names, read_source
 from rigid_motion_batch.recordings.clips import Clip
@@ -40,9 +40,10 @@ def do_recording(doing: Doing, how: Reductions) -> None:
             clips, note = read_source(job.source, how.axes, how.reading)
         except TrajectoryError as error:
             if job.is_found and isinstance(error, NoMotion):
-                doing.say(f"{error.problem}; left alone")
+                doing.leave_alone(error.problem)
                 return
             outcome.failed = outcome.unreadable = True
+            outcome.reason = str(error).removeprefix(f"{job.source}: ")
             doing.note(str(error))
             return
         if note:
@@ -105,6 +106,7 @@ class _Clip:
             with self.doing.record.writing(table) as beside:
                 write_poses(beside, clip.times[keys], clip.poses[keys])
         self.doing.outcome.objects += 1
+        self._note(ClipNumbers(clip.name, len(clip.times), len(keys), largest))
         self.doing.tell_written(table)
         if scene:
             self._save(scene)
@@ -120,9 +122,9 @@ class _Clip:
         if result.done:
             doing.say(f"{counted(len(result.done), 'bone')} {doing.would}reduced{result.summary}")
         if not (result.done or result.left):
-            why = "nothing could be reduced" if result.refused else "nothing of this body moves"
-            doing.say(f"{why}; left alone")
+            doing.leave_alone("nothing could be reduced" if result.refused else "nothing of this body moves")
             return
+        self._note(*(replace(numbers, name=self.clip.name) for numbers in result.numbers))
         self._save(scene)
         doing.outcome.bones += len(result.done)
 
@@ -134,6 +136,11 @@ class _Clip:
 
     def _new_file(self) -> np.ndarray:
         return new_file(self.clip, self.tolerance.tolerance(self.clip), self.how.fps)
+
+    def _note(self, *clips: ClipNumbers) -> None:
+        numbers, tolerance = self.doing.outcome.numbers, self.how.tolerance
+        numbers.tolerance = tolerance.tolerance(self.clip) if tolerance else None
+        numbers.clips += clips
 
     def _save(self, scene: Path) -> None:
         if not self.doing.work.dry_run:

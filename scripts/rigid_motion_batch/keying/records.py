@@ -39,8 +39,7 @@ class Record:
         self._source = _from(folder, source)
 
     def refuse_to_replace(self, path: Path) -> None:
-        """Raise `FileProblem` where there is something already that is not to be replaced, or the name is too long."""
-        refuse_long_name(path)
+        """Raise `FileProblem` where there is something already that is not to be replaced."""
         if os.path.isdir(path):
             raise FileProblem(f"{path} is a folder: rename it, or give another --output")
         if os.path.lexists(path) and not self._may_replace(path):
@@ -129,10 +128,6 @@ def _from(folder: Path, path: str | os.PathLike[str]) -> str:
         return Path(os.path.abspath(path)).as_posix()
 
 
-LONGEST_NAME = 255
-"""Bytes of the name of a file."""
-
-
 class FileProblem(Exception):
     """Why a file cannot be done, and the way out."""
 
@@ -152,16 +147,6 @@ def changed_at(path: Path) -> int | None:
         return path.stat().st_mtime_ns
     except OSError:
         return None
-
-
-def refuse_long_name(path: Path) -> None:
-    """Raise `FileProblem` where a file system allows no name that is as long as this one."""
-    length = len(os.fsencode(path.name))
-    if length > LONGEST_NAME:
-        raise FileProblem(
-            f"the name {path.name} has {length} bytes, of which file systems allow {LONGEST_NAME}: "
-            "give the input a shorter name"
-        )
 
 
 def refuse_read_only(path: Path) -> None:

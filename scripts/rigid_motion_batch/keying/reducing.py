@@ -13,15 +13,13 @@ from rigid_motion.animation.queries.polls import with_more_keys_than
 from rigid_motion.animation.transforms import Transform
 from rigid_motion.animation.transforms.sizes import first_tolerance, metres_per_unit, rig_size
 from rigid_motion_batch.analysis.choices import Tolerance
-from rigid_motion_batch.keying.jobs import Action, Result
-from rigid_motion_batch.keying.reductions import Reductions, doubt, off
+from rigid_motion_batch.keying.jobs import Action, Result, title_of
+from rigid_motion_batch.keying.reductions import Reductions, as_length, doubt, off
 from rigid_motion_batch.keying.sessions import counted
+from rigid_motion_batch.keying.work import ClipNumbers
 
 FEWEST = 2
 """So many keys are as few as a motion has."""
-
-LEAST = 1e-6
-"""Millimetres: no tolerance is smaller."""
 
 
 def reducing(how: Reductions, asked: Sequence[str] | None = None) -> Action:
@@ -44,7 +42,7 @@ def reduced(targets: Sequence[Transform], how: Reductions) -> Result:
     """Leave targets of the open file the few keys that they need."""
     scene = cast(bpy.types.Scene, bpy.context.scene)
     unit = metres_per_unit(scene)
-    tolerance = how.tolerance or _written(first_tolerance(scene, targets, shared=how.shared) * unit)
+    tolerance = how.tolerance or as_length(first_tolerance(scene, targets, shared=how.shared) * unit)
     before = list(map(_bakes, targets))
     refusals: list[Refused] = []
     animation.reduce_keys_of(
@@ -72,6 +70,9 @@ def reduced(targets: Sequence[Transform], how: Reductions) -> Result:
         {target: reason for target, reason in reasons.items() if target not in left},
         {target: f"{reason}{doubt}" for target, reason in reasons.items() if target in left},
         summary,
+        [ClipNumbers(title_of(done), reduction.before, reduction.after, reduction.largest_error * unit)]
+        if reduction
+        else [],
     )
 
 
@@ -106,13 +107,10 @@ def _doubt(targets: Sequence[Transform], tolerance: Tolerance | None, unit: floa
     """Return what to think of where a tolerance is in metres, and a rig hardly is:
     importers leave it in units of its own.
     """
-    return doubt(rig_size(targets[0].animated) * unit if targets[0].is_part else 0.0, tolerance, unit)
-
-
-def _written(metres: float) -> Tolerance:
-    """Return a length as a user would write it."""
-    number, unit = (metres, "m") if metres >= 1.0 else (1e3 * metres, "mm")
-    return Tolerance(f"{max(number, LEAST):.6f}{unit}")
+    rig = targets[0].animated
+    if not targets[0].is_part or rig.pose is None:
+        return ""
+    return doubt(rig_size(rig) * unit, len(rig.pose.bones), tolerance, unit)
 
 
 def _bakes(target: Transform) -> int:

@@ -13,14 +13,17 @@ from rigid_motion_batch.recordings.rest_bodies import unit_of
 RATES = 1, 240
 """Frames a second that a .blend file may be given for the rate of its recording."""
 
+LEAST = 1e-6
+"""Millimetres: no tolerance is smaller."""
+
 TOLERANCE = Tolerance("5mm")
 """The tolerance where none is given, of tables and .blend files."""
 
 SUFFIX, GLB_SUFFIX = "-keys", "-reduced"
 """Endings of the names of files that are written, and of GLB files."""
 
-ENDINGS = (".glb", ".gltf")
-"""Those of glTF files."""
+MANY = 8
+"""So many joints or bones make a body, whose size says something of its unit; a prop has any size."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,8 +47,8 @@ class Reductions:
     count: int | None
     """So many keys of each object, or key poses of each rig, instead of a tolerance."""
 
-    vertices: bool
-    """True if the vertices of skins are measured, in glTF files."""
+    channels: str
+    """Of glTF files: "all" if every channel keeps a key at least, "needed" otherwise."""
 
     axes: str | None
     """Of recordings; None for those of each format."""
@@ -67,12 +70,23 @@ def name_of(file: Path, body: str | None) -> str:
     return "-".join([file.stem, *(folder_names([body]) if body else [])])
 
 
-def doubt(size: float, tolerance: Tolerance | None, per_unit: float) -> str:
+def as_length(metres: float) -> Tolerance:
+    """Return a length as a user would write it."""
+    number, unit = (metres, "m") if metres >= 1.0 else (1e3 * metres, "mm")
+    return Tolerance(f"{max(number, LEAST):.6f}{unit}")
+
+
+def as_text(metres: float) -> str:
+    """Return a length as it is spoken of."""
+    return as_length(metres).alike(metres, 1.0)
+
+
+def doubt(size: float, joints: int, tolerance: Tolerance | None, per_unit: float) -> str:
     """Return what to think of where a tolerance is in metres, and a body of this size in metres hardly is;
     mostly nothing.
     """
     name, length = unit_of(size)
-    if tolerance is None or not tolerance.is_length or length == 1.0:
+    if joints < MANY or tolerance is None or not tolerance.is_length or length == 1.0:
         return ""
     meant = tolerance.metres(per_unit) / (per_unit * length)
     return f"; it is {size:.3g} m large in this file: if these are {name}, give --tolerance {meant:.6g}"

@@ -7,13 +7,14 @@ by then is whole, and nothing else was touched. Where Blender does not listen, `
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import cast
 
@@ -23,9 +24,10 @@ from rigid_motion_batch.pipeline import steps
 from rigid_motion_batch.pipeline.executors import Executor, Made, ProcessExecutor, loss, processors
 from rigid_motion_batch.places import EXTENSION
 from rigid_motion_batch.progress import Progress, Stage
-from rigid_motion_batch.supervising import blender_program, report, written_of
+from rigid_motion_batch.supervising import blender_program, report
 
 from .planning import Job
+from .reductions import as_text
 from .work import Doing, Outcome, Work
 
 NAMED = 5
@@ -67,16 +69,13 @@ class Keyed(steps.Step, rooms=ROOMS):
 
             blender = _extension()
         doing = Doing(self.work, given, lambda text: append_lines(job.place / "notes", [{"note": text}]))
-        try:
-            with blender:
-                self.work.do(doing)
-        except KeyboardInterrupt:
-            raise KeyboardInterrupt(doing.outcome) from None
+        with blender:
+            self.work.do(doing)
         return {"outcome": doing.outcome}
 
 
-def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = None) -> int:
-    """Do all inputs, print the paths of what was written, and return the exit code.
+def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = None, *, as_json: bool = False) -> int:
+    """Do all inputs, print the paths of what was written or JSON, and return the exit code.
 
     Parameters
     ----------
@@ -88,6 +87,7 @@ def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = 
         Processes; 0 for this one. One for each processor, and this one for a single input, where None.
     """
     stopped, unmatched = False, set()
+    report(prints_paths=not as_json)
     try:
         executor = _executor(workers, len(jobs))
     except steps.RunError as error:
@@ -104,10 +104,9 @@ def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = 
         try:
             with progress.stage(work.doing, len(jobs)) as stage:
                 session.run(stage)
-        except KeyboardInterrupt as interrupt:
+        except KeyboardInterrupt:
             stopped = True
             executor.stop()
-            session.take_partly(*interrupt.args)
         else:
             unmatched = session.unmatched()
             for name in sorted(unmatched):
@@ -116,12 +115,11 @@ def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = 
                 )
     outcomes = session.in_order
     report(ended=True)
-    if not work.dry_run:
+    if as_json:
+        print(json.dumps([outcome.as_data() for outcome in outcomes], indent=1, ensure_ascii=False), flush=True)
+    elif not work.dry_run:
         for path in (path for outcome in outcomes for path in outcome.written):
             print(path_line(path), flush=True)
-    failed = [outcome.source for outcome in outcomes if outcome.failed]
-    if failed and len(jobs) > NAMED:  # What was said of them is far above.
-        print(f"Failed: {printable(listed(failed, NAMED))}", file=sys.stderr)
     print(_summary(outcomes, len(jobs), work, interrupted=stopped), file=sys.stderr, flush=True)
     if stopped:
         return 130
@@ -161,14 +159,6 @@ class _Session:
             self._end(future, *self._futures.pop(future))
         self._show(stage)
 
-    def take_partly(self, partly: Outcome | None = None) -> None:
-        """Count what is complete of inputs that were stopped in this process, or in workers."""
-        for place in self._at_work:
-            source = self._jobs[place].source
-            outcome = partly or Outcome(source, written=list(map(Path, written_of(source))))
-            if outcome.written:
-                self._outcomes[place] = outcome
-
     def unmatched(self) -> set[str]:
         """Return the names and patterns that were asked for, and that nothing has."""
         outcomes = self._outcomes.values()
@@ -185,14 +175,15 @@ class _Session:
         """Have an input done, unless it is done already or cannot be."""
         if job.problem:
             self._note(f"{job.source}: {job.problem}")
-            self._outcomes[place] = Outcome(job.source, failed=True, unreadable=True)
+            self._outcomes[place] = Outcome(job.source, failed=True, unreadable=True, reason=job.problem)
             return
         task = _task(self._work, job)
         key = task.key if task.inputs else ""
         if key and (result := self._work.record_of(job).done(key)):
             written, facts = result
             self._note(f"{job.source}: already {self._work.done}: {', '.join(map(str, written))}")
-            self._outcomes[place] = outcome = Outcome(job.source, is_old=True, matched=set(facts.get("matched", ())))
+            old, matched = facts.get("numbers", {}), set(facts.get("matched", ()))
+            self._outcomes[place] = outcome = Outcome(job.source, old=old, matched=matched)
             for path in written:
                 outcome.add_written(path)
             return
@@ -211,12 +202,14 @@ class _Session:
         try:
             outcome = future.result()["facts"]["outcome"]
         except steps.TaskError as error:
-            self._note(f"{job.source}: {str(error).removeprefix(f'{job.source}: ')}")
+            outcome.reason = str(error).removeprefix(f"{job.source}: ")
+            self._note(f"{job.source}: {outcome.reason}")
         except (CancelledError, Exception) as error:
-            self._note(f"{job.source}: {loss(error, request)}: leave it out, or see whether Blender opens it")
+            outcome.reason = f"{loss(error, request)}: leave it out, or see whether Blender opens it"
+            self._note(f"{job.source}: {outcome.reason}")
         else:
             if key and outcome.is_whole and not self._work.dry_run:
-                facts = {"matched": sorted(outcome.matched)}
+                facts = {"matched": sorted(outcome.matched), "numbers": asdict(outcome.numbers)}
                 self._work.record_of(job).keep(key, outcome.written, outcome.beside, outcome.read, facts)
         self._outcomes[place] = outcome
 
@@ -251,26 +244,49 @@ def _executor(workers: int | None, count: int) -> Executor:
 
 
 def _summary(outcomes: Sequence[Outcome], count: int, work: Work, *, interrupted: bool) -> str:
-    """Return what came of it all, in a line."""
-    would = "to be " if work.dry_run else ""
-    objects, bones, clips = (
-        sum(getattr(outcome, what) for outcome in outcomes) for what in ("objects", "bones", "clips")
-    )
+    """Return what came of it all, in a sentence."""
+    done = [outcome for outcome in outcomes if outcome.done]
+    kinds = {kind: sum(getattr(outcome, f"{kind}s") for outcome in done) for kind in ("object", "bone", "clip")}
+    what = " and ".join(counted(number, kind) for kind, number in kinds.items() if number)
+    files = f" of {counted(len(done), 'file')}" if done and count > 1 else ""
     refused = sum(outcome.refused for outcome in outcomes)
-    written, failed = sum(bool(outcome.written) for outcome in outcomes), sum(outcome.failed for outcome in outcomes)
-    old = sum(outcome.is_old for outcome in outcomes)
-    idle = sum(not (outcome.written or outcome.failed) for outcome in outcomes)
-    parts = [f"{written - old} {would}written"]
-    parts += [f"{old} already {work.done}"] if old else []
-    parts += [f"{idle} left alone"] if idle else []
-    parts += [f"{failed} failed"] if failed else []
-    parts += [f"{incomplete} incomplete"] if (incomplete := sum(outcome.incomplete for outcome in outcomes)) else []
-    parts += [f"{count - len(outcomes)} not reached"] if interrupted else []
-    done = [counted(objects, "object")] if objects or not (bones or clips) else []
-    done += [counted(bones, "bone")] if bones else []
-    done += [counted(clips, "clip")] if clips else []
-    summary = f"{' and '.join(done)} {would}{work.done}" + (f", {refused} not" if refused else "")
-    return f"{'Stopped. ' if interrupted else ''}{summary}; {counted(count, 'file')}: {', '.join(parts)}."
+    summary = f"{what or 'Nothing'}{files} {'to be ' * work.dry_run}{work.done}{f', {refused} not' * bool(refused)}"
+    failed = [outcome.source for outcome in outcomes if outcome.failed]
+    others = {
+        f"already {work.done}": sum(outcome.old is not None for outcome in outcomes),
+        "written as exported": sum(
+            bool(outcome.written) and not outcome.done and outcome.old is None for outcome in outcomes
+        ),
+        "left alone": sum(outcome.state == "left alone" for outcome in outcomes),
+        "failed" + f" ({printable(listed(failed, NAMED))})" * (count > NAMED): len(failed),
+        "incomplete": sum(outcome.incomplete for outcome in outcomes),
+        "not reached": interrupted * (count - len(outcomes)),
+    }
+    some = [(number, state) for state, number in others.items() if number]
+    rest = [f"{number if place else counted(number, 'file')} {state}" for place, (number, state) in enumerate(some)]
+    summary += _bytes_of(done) + _largest_error(done, count) + ("; " * bool(rest)) + ", ".join(rest)
+    return f"{'Stopped. ' * interrupted}{summary}."
+
+
+def _bytes_of(outcomes: Sequence[Outcome]) -> str:
+    """Return the bytes of all before and after, where those of all are known."""
+    sizes = [(outcome.numbers.bytes_before, outcome.numbers.bytes_after) for outcome in outcomes]
+    if not sizes or any(None in pair for pair in sizes):
+        return ""
+    before, after = (f"{sum(map(int, side)):,}".replace(",", " ") for side in zip(*sizes, strict=True))
+    return f", {before} to {after} bytes"
+
+
+def _largest_error(outcomes: Sequence[Outcome], count: int) -> str:
+    """Return how far off anything is, and where; nothing where that was not measured."""
+    clips = [(clip, outcome) for outcome in outcomes for clip in outcome.numbers.clips if not clip.reason]
+    if not clips:
+        return ""
+    clip, outcome = max(clips, key=lambda pair: pair[0].error)
+    file = Path(outcome.source)
+    place = ", ".join(filter(None, (file.name * (count > 1), clip.name * (clip.name != file.stem), clip.where)))
+    place = f" ({printable(place)})" if place else ""
+    return f"; at most {as_text(clip.error)} off{place}"
 
 
 def counted(count: int, what: str) -> str:

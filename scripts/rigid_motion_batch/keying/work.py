@@ -6,9 +6,9 @@ import argparse
 import os
 import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -58,6 +58,34 @@ class Work(ABC):
         """Do one input, and write what comes of it."""
 
 
+@dataclass(frozen=True)
+class ClipNumbers:
+    """What became of the keys of a clip, an object, a rig or a recorded body. Lengths are in metres."""
+
+    name: str
+    keys_before: int
+    keys_after: int
+    error: float = 0.0
+    where: str = ""
+    """The place and the time of the error."""
+
+    reason: str = ""
+    """Why it stays as it was."""
+
+
+@dataclass
+class Numbers:
+    """What is known of what was done to an input: plain data. Lengths are in metres."""
+
+    size: float | None = None
+    tolerance: float | None = None
+    bytes_before: int | None = None
+    bytes_after: int | None = None
+    """Of whole files."""
+
+    clips: list[ClipNumbers] = field(default_factory=list)
+
+
 @dataclass
 class Outcome:
     """What became of an input."""
@@ -77,8 +105,12 @@ class Outcome:
     incomplete: bool = False
     """True if there may be objects in it that cannot be looked at, for a library is missing."""
 
-    is_old: bool = False
-    """True if it was done by an earlier run."""
+    reason: str = ""
+    """Why it failed, or was left alone."""
+
+    numbers: Numbers = field(default_factory=Numbers)
+    old: Mapping[str, Any] | None = None
+    """The numbers as an earlier run has noted them, where that has done the input."""
 
     written: list[Path] = field(default_factory=list)
     """The files that were written, or would have been."""
@@ -95,11 +127,24 @@ class Outcome:
     def add_written(self, path: Path) -> None:
         """Note that a file is complete at its place."""
         self.written.append(path)
-        report(written=os.fspath(path), source=self.source)
+        report(written=os.fspath(path))
 
     @property
     def done(self) -> int:
         return self.objects + self.bones + self.clips
+
+    def as_data(self) -> dict[str, Any]:
+        """Return what is printed as JSON."""
+        known = asdict(self.numbers) if self.old is None else self.old
+        written = list(map(os.fspath, self.written))
+        return {"source": self.source, "state": self.state, "written": written, "reason": self.reason, **known}
+
+    @property
+    def state(self) -> str:
+        """Return what became of it, in a word."""
+        if self.failed:
+            return "failed"
+        return "left alone" if not self.written else "written" if self.old is None else "already written"
 
     @property
     def is_whole(self) -> bool:
@@ -128,12 +173,19 @@ class Doing:
         except FileProblem as problem:
             self.outcome.failed = True
             self.outcome.unreadable = isinstance(problem, Unreadable) and not self.outcome.written
+            self.outcome.reason = str(problem)
             self.say(problem)
         except Exception as error:
             self.outcome.failed = True
-            self.say(f"not written, for this program failed ({type(error).__name__}: {error}):")
+            self.outcome.reason = f"this program failed ({type(error).__name__}: {error})"
+            self.say(f"not written, for {self.outcome.reason}:")
             for line in "".join(traceback.format_exception(error)).splitlines():
                 self.note(line)
+
+    def leave_alone(self, reason: str) -> None:
+        """Say that nothing is written, and why."""
+        self.outcome.reason = reason
+        self.say(f"{reason}; left alone, nothing is written")
 
     def refuse(self, name: str, reason: str, count: int = 1) -> None:
         """Say that so many objects or bones are not done, and why."""

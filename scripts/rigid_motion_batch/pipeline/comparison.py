@@ -21,6 +21,7 @@ from rigid_motion_batch.analysis.modes import name_of_other, single_modes
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import clip_names
 from rigid_motion_batch.recordings.clips import ClipFacts
+from rigid_motion_batch.recordings.gltf import ENDINGS as GLTF
 from rigid_motion_batch.recordings.options import AS_THE_FILE_SAYS, ReadingOptions
 from rigid_motion_batch.recordings.reading import split_source
 from rigid_motion_batch.report.settings import Settings
@@ -58,7 +59,7 @@ TABLES = {
 }
 """Tables of all clips: what each is put together of, as `Part` names it, and the name of its rows there."""
 
-IN_BLENDER = (".blend", ".fbx", ".glb", ".gltf")
+IN_BLENDER = (".blend", ".fbx", *GLTF)
 """Recordings that Blender reads."""
 
 

@@ -32,6 +32,9 @@ from .importing import read_imported, refuse_too_large
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .recordings import Selection, Trajectory, TrajectoryError
 
+ENDINGS = (".glb", ".gltf", ".vrm", ".vrma")
+"""Of glTF files: avatars and animations for them, VRM and VRMA, are GLB files."""
+
 ADDON = "io_scene_gltf2"
 
 WITHOUT_A_RATE = 60.0

@@ -72,7 +72,7 @@ FORMATS = (
     Format("A-Frame recording", (".json",), aframe.read),
     Format("BVH", (".bvh",), bvh.read, axes="opengl", in_metres=False),
     Format("FBX", (".fbx",), fbx.read, honours=("scale",), measured=False),
-    Format("glTF", (".glb", ".gltf"), gltf.read, honours=("scale",), measured=False),
+    Format("glTF", gltf.ENDINGS, gltf.read, honours=("scale",), measured=False),
     Format("Blender file", (".blend",), blend.read, honours=("scale",), measured=False),
 )
 

@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rigid_motion.motion import KEYFRAME_MODES, interpolate
-from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform
+from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform, radius_in_metres
 from rigid_motion_batch.analysis.modes import BEST_OF
 from rigid_motion_batch.analysis.reconstructions import reconstruct
 from rigid_motion_batch.recordings.clips import Clip
@@ -50,10 +50,20 @@ def test_a_clip_too_short_for_two_keys_is_not_reconstructed(choice: Choice) -> N
     assert reconstruct(swinging_clip(), choice, KEYFRAME_MODES, 0.1) is None
 
 
-@pytest.mark.parametrize("written", ["0mm", "-5mm", "5in", "5 m m", "1e-3", "nan", "", "mm", "5MM", "../x", "5mm\n"])
+@pytest.mark.parametrize("written", ["0mm", "-5mm", "5in", "5 m m", "5,5mm", "nan", "", "mm", ".", ".e1", "../x"])
 def test_what_is_no_length_is_refused_with_the_way_out(written: str) -> None:
     with pytest.raises(ValueError, match=r"is no tolerance; give a length such as 5mm, 0.5cm or 0.005m"):
         Tolerance(written)
+
+
+@pytest.mark.parametrize(
+    ("written", "name"),
+    [(".1mm", "0.1mm"), ("1.mm", "1mm"), (" 5 mm", "5mm"), ("5MM", "5mm"), (".5 Cm\n", "0.5cm"), ("1e-3", "0.001")],
+)
+def test_a_length_may_be_written_as_people_do_for_tolerances_and_radii(written: str, name: str) -> None:
+    tolerance = Tolerance(written)
+    assert tolerance.name == f"tolerance-{name}", "as a folder is called"
+    assert tolerance.metres(1.0) == radius_in_metres(written) == Tolerance(name).metres(1.0)
 
 
 @pytest.mark.parametrize("kind", [Uniform, Budget])
