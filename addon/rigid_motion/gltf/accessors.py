@@ -99,7 +99,7 @@ def parts_of(json: Json, number: int) -> Iterator[tuple[Json, int, int]]:
     for part, width, count in _parts(json, number):
         first = whole(part, "byteOffset", 0)
         stride = whole(entry(json, "bufferViews", part["bufferView"]), "byteStride", width)
-        yield part, first, first + (count - 1) * stride + width
+        yield part, first, first + max((count - 1) * stride + width, 0)
 
 
 def stored_size(json: Json, number: int) -> int:

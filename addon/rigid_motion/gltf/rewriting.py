@@ -89,7 +89,7 @@ def made_smaller(
 
 class _Rewriting:
     def __init__(self, document: Document, references: References, tracks: Mapping[int, Sequence[StoredTrack]]) -> None:
-        self.before, self.tracks, self.references = document, tracks, references
+        self.before, self.references = document, references
         self.json: Json = copy.deepcopy(document.json)
         self.view = GrowingView(self.json)
         self.accessors, self.views = self.json["accessors"], self.json["bufferViews"]
@@ -201,10 +201,13 @@ class _Rewriting:
             self.json.setdefault("buffers", []).append({"byteLength": 0} | ({} if has_room else {"uri": data_uri(b"")}))
             contents.append(b"")
         changed = {target, *(number for number in goes if contents[number] is not None)}
+        cuts = {
+            buffer: [] if self.references.buffers_are_named else _cuts(goes.get(buffer, []), stays.get(buffer, []))
+            for buffer in changed
+        }
+        self._close_up(cuts)
         for buffer in changed:
-            cuts = [] if self.references.buffers_are_named else _cuts(goes.get(buffer, []), stays.get(buffer, []))
-            self._close_up(buffer, cuts)
-            contents[buffer] = _without(contents[buffer], cuts)
+            contents[buffer] = _without(contents[buffer], cuts[buffer])
         view = self.view.json
         view |= {"buffer": target, "byteLength": len(self.view.data)}
         padded = contents[target] + bytes(-len(contents[target]) % ALIGNED)
@@ -213,7 +216,7 @@ class _Rewriting:
         if self.view.data:
             contents[target] = padded + bytes(self.view.data)
         else:
-            self.views.remove(view)
+            self.views.pop()
         for buffer in changed:
             contents[buffer] = contents[buffer] or bytes(ALIGNED)
             described = self.json["buffers"][buffer]
@@ -231,13 +234,13 @@ class _Rewriting:
         stays: Ranges = defaultdict(list)
         for number, view in enumerate(self.views[:-1]):
             first, end = _range(view)
-            users = set(self.view_users.get(number, ()))
-            shared = users & self.unused and number not in self.references.unclear and ELSEWHERE not in users
+            users, spans = set(self.view_users.get(number, ())), list(_spans(view))
+            shared = users & self.unused and ELSEWHERE not in users and number not in self.references.unclear
             if number in removed:
                 goes[view["buffer"]].append((first, end))
-            elif not shared:
-                for span in _spans(view):
-                    stays[span.get("buffer", ELSEWHERE)].append(_range(span))
+            elif not shared or len(spans) > 1:
+                for span in spans:
+                    stays[span["buffer"]].append(_range(span))
             else:
                 for accessor in users:
                     ranges = goes if accessor in self.unused else stays
@@ -248,27 +251,34 @@ class _Rewriting:
                     ]
         return goes, stays
 
-    def _close_up(self, buffer: int, cuts: list[Range]) -> None:
-        """Say where all is once these bytes have gone out of a buffer."""
-        firsts, ends = [first for first, _ in cuts], [end for _, end in cuts]
-        gone = list(accumulate((end - first for first, end in cuts), initial=0))
-
-        def moved(offset: int) -> int:
-            before = bisect_left(firsts, offset)
-            return offset - gone[before] + (max(ends[before - 1] - offset, 0) if before else 0)
-
-        for accessor in self.accessors[: self.first_new] if cuts else ():
+    def _close_up(self, cuts: Ranges) -> None:
+        """Say where all is once these bytes have gone out of buffers."""
+        moved = {buffer: _Moved(ranges) for buffer, ranges in cuts.items() if ranges}
+        for accessor in self.accessors[: self.first_new]:
             for part, _ in view_slots(accessor):
                 view = self.views[part["bufferView"]]
-                if view.get("buffer") == buffer:
+                if view["buffer"] in moved:
                     first, _ = _range(view)
-                    _set_offset(part, moved(first + whole(part, "byteOffset", 0)) - moved(first))
-        for view in self.views[:-1] if cuts else ():
+                    to = moved[view["buffer"]]
+                    _set_offset(part, to[first + whole(part, "byteOffset", 0)] - to[first])
+        for view in self.views[:-1]:
             for span in _spans(view):
-                if span.get("buffer") == buffer:
-                    first, end = _range(span)
-                    _set_offset(span, moved(first))
-                    span["byteLength"] = moved(end) - moved(first)
+                if span["buffer"] in moved:
+                    (first, end), to = _range(span), moved[span["buffer"]]
+                    _set_offset(span, to[first])
+                    span["byteLength"] = to[end] - to[first]
+
+
+class _Moved:
+    """Where bytes of a buffer are once some are gone: by where they were."""
+
+    def __init__(self, cuts: list[Range]) -> None:
+        self.firsts, self.ends = ([cut[side] for cut in cuts] for side in (0, 1))
+        self.gone = list(accumulate((end - first for first, end in cuts), initial=0))
+
+    def __getitem__(self, offset: int) -> int:
+        before = bisect_left(self.firsts, offset)
+        return offset - self.gone[before] + (max(self.ends[before - 1] - offset, 0) if before else 0)
 
 
 def _set_offset(part: Json, offset: int) -> None:
