@@ -74,7 +74,6 @@ def put(*keys: str | int, to: object) -> Callable[[dict[str, Any]], None]:
         (put("accessors", 2, to=ZEROS), f"accessor 2 has {2**25} elements, more than are read; export it again"),
         (put("animations", 0, "samplers", 0, "output", to=1), "61 values do not fit 61 keys of translation"),
         (put("animations", 0, "channels", 0, "target", to="all"), "channel 0 has no target; export it again"),
-        (put("animations", to=[]), "no animation moves a node; export it with its animations"),
         (put("skins", 0, "inverseBindMatrices", to={}), "this glTF is damaged"),
         (put("buffers", 0, "uri", to="data:,%00"), "buffer 0 is text that is not in base64; export it again"),
         (put("buffers", 0, "uri", to="../../etc/passwd"), "buffer 0 is outside of its folder ('../../etc/passwd')"),

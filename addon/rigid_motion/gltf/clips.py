@@ -14,7 +14,6 @@ import numpy as np
 
 from ..motion import SeparateKeys, Skeleton
 from ..motion.skeleton_stretches import Run
-from .documents import shown as quoted
 from .errors import NOWHERE, PARTS, Feet, World, Worst
 from .nodes import by_target
 from .rewriting import Amount, EveryKey, StoredTrack, amount, key_size, shown, stored
@@ -174,7 +173,7 @@ class ClipReduction:
         if worst.node < 0:
             return ""
         name = self.world.nodes.document.json["nodes"][worst.node].get("name")
-        node = f"node {quoted(name)}" if isinstance(name, str) and name else f"node {worst.node}"
+        node = f'node "{name}"' if isinstance(name, str) and name else f"node {worst.node}"
         return f"{node} at {worst.time:.4g} s"
 
     def _amount(self, tracks: list[StoredTrack]) -> Amount:
@@ -335,7 +334,7 @@ class ClipReduction:
     def _spanning(self, tracks: list[StoredTrack]) -> list[StoredTrack]:
         """Return the same with keys at both ends of the clip in one of them at least: it lasts as long as before."""
         ends = self.world.times[[0, -1]]
-        seen = [time for track in tracks for time in track.times[[0, -1]].tolist()]
+        seen = [time for track in (*tracks, *self.given.values()) for time in track.times[[0, -1]].tolist()]
         if np.isin(ends.astype(np.float32), seen).all():
             return tracks
         number = min(

@@ -87,7 +87,7 @@ def reduced(document: Document, options: Options) -> Report:
     if tolerance is None:
         tolerance = (OF_KEY_POSES if options.shared else OF_A_BODY) * size or SOME
     elif tolerance > MOST * size > 0.0:
-        reason = f"a tolerance of {tolerance:.3g} m is more than a tenth of its size of {size:.3g} m"
+        reason = f"a tolerance of {tolerance:.3g} m is more than a tenth of the size, which is {size:.3g} m"
         return left_alone(f"{reason}: give one below {MOST * size:.2g} m", size)
     options = replace(options, tolerance=tolerance)
     result = []

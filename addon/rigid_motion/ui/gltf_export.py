@@ -32,9 +32,8 @@ class RIGID_MOTION_OT_export_gltf(bpy.types.Operator, ExportHelper):
     bl_idname = "rigid_motion.export_gltf"
     bl_label = "Export glTF, Reduced"
     bl_description = (
-        "Write a GLB file with only the keys that its animations need: no joint, nor any point within the radius of "
-        "it, is off by more than the tolerance in any viewer. All other options are those that glTF 2.0 was exported "
-        "with last"
+        "Write a GLB file with only the keys that its animations need: nothing that is seen is off by more than the "
+        "tolerance in any viewer. All other options are those that glTF 2.0 was exported with last"
     )
     bl_options: ClassVar[set[str]] = {"REGISTER"}
 
@@ -45,23 +44,12 @@ class RIGID_MOTION_OT_export_gltf(bpy.types.Operator, ExportHelper):
 
     tolerance: FloatProperty(
         name="Tolerance",
-        description="How far off any point within the radius of any joint or object may be in the world, at any time",
+        description="How far off any vertex, and any point close to a joint, may be in the world, at any time",
         default=0.001,
         min=1e-6,
         soft_max=0.1,
         step=0.1,
         precision=4,
-        subtype="DISTANCE",
-        unit="LENGTH",
-    )
-    radius: FloatProperty(
-        name="Radius",
-        description="How far from its joint a point may be for which the tolerance holds",
-        default=0.03,
-        min=0.0,
-        soft_max=1.0,
-        step=1.0,
-        precision=3,
         subtype="DISTANCE",
         unit="LENGTH",
     )
@@ -85,11 +73,17 @@ class RIGID_MOTION_OT_export_gltf(bpy.types.Operator, ExportHelper):
                     use_selection=self.use_selection,
                     **_last_options(context),
                 )
-                report = reduce_file(exported, output, Options(self.tolerance, self.radius))
+                report = reduce_file(exported, output, Options(self.tolerance))
         except (GltfError, OSError, RuntimeError) as error:
             self.report({"ERROR"}, str(error).strip())
             return {"CANCELLED"}
-        self.report({"INFO"}, _summary(report, output))
+        if report.left_alone:
+            reason = rpt_("{name}: exported with all its keys: {reason}").format(
+                name=output.name, reason=report.left_alone
+            )
+            self.report({"WARNING"}, reason)
+        else:
+            self.report({"INFO"}, _summary(report, output))
         return {"FINISHED"}
 
 

@@ -50,7 +50,7 @@ def reduce_gltf(
     except OSError as error:  # Also while it is worked on.
         raise Unreadable(f"this cannot be read ({error.strerror}): see to its path, and who may read it") from None
     length = how.tolerance or as_length(report.tolerance)
-    for clip in () if report.left_alone else report.clips:
+    for clip in report.clips:
         summary = _summary(clip, length, per_unit, doing.would, by_number=how.count is not None)
         doing.say(f"{printable(clip.name)}: {summary}")
     if report.size:
@@ -61,7 +61,7 @@ def reduce_gltf(
     done = 0 if report.left_alone else sum(clip.tracks is not None for clip in report.clips)
     outcome.clips += done
     _note(outcome.numbers, report)
-    reason = "" if done else printable(report.left_alone) or "nothing could be reduced"
+    reason = "" if done else printable(report.left_alone)
     if reason and export is None:
         doing.leave_alone(reason)
         return
