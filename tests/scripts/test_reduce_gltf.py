@@ -29,7 +29,6 @@ sys.exit(reduce.main(sys.argv[1:]))
 """
 
 
-GROWS = "it would not become smaller"
 
 
 @pytest.fixture
