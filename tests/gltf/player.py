@@ -9,9 +9,10 @@ How to use it::
 
 Clips are numbers or names. What is seen: the vertices of each primitive of each node of a scene (rigid, skinned,
 morphed before that, instanced by EXT_mesh_gpu_instancing; not those that Draco compresses), and the origin of each
-node. Where a radius is given, also points so far around each node in the world, where the node is largest: what
-shrinks takes its ball along. KHR_animation_pointer moves nodes and weights; its other targets do not count.
-What a file does not move rests. Skins ignore the transform of their node, and shares of joints sum to 1.
+node. Where a radius is given, also points on a ball around each node in its own space, so far off in the world along
+its longest axis when that is longest: what shrinks takes its ball along. KHR_animation_pointer moves nodes and weights;
+its other targets do not count. What a file does not move rests. Skins ignore the transform of their node, and shares
+of joints sum to 1.
 """
 
 import base64
